@@ -1,0 +1,14 @@
+"""The only place with time: the clock, the loop, and the run of a session."""
+
+from rigidimeter.acquisition.clock import Clock, RealTimeClock, SimulatedClock
+from rigidimeter.acquisition.loop import ControlLoop
+from rigidimeter.acquisition.session import SessionResult, run_session
+
+__all__ = [
+    "Clock",
+    "ControlLoop",
+    "RealTimeClock",
+    "SessionResult",
+    "SimulatedClock",
+    "run_session",
+]

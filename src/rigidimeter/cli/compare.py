@@ -1,0 +1,168 @@
+"""`rigidimeter compare`: two conditions side by side."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rigidimeter.cli.inputs import analyse_inputs, read_inputs, say, status
+from rigidimeter.cli.options import (
+    BandOption,
+    ColumnOption,
+    ConditionOption,
+    EpochLengthOption,
+    InputsArgument,
+    MethodOption,
+    RateOption,
+    ReactionOption,
+    SettingsOption,
+    TaskOption,
+)
+from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.study import Comparison
+
+__all__ = ["COMPARISONS_SCHEMA", "compare"]
+
+COMPARISONS_SCHEMA = "rigidimeter.comparisons/1"
+
+
+def compare(
+    inputs: InputsArgument,
+    reference: Annotated[
+        str | None,
+        typer.Option("--reference", metavar="NAME", help="Condition to compare with."),
+    ] = None,
+    other: Annotated[
+        str | None, typer.Option("--other", metavar="NAME", help="Condition that is compared.")
+    ] = None,
+    json_out: Annotated[
+        Path | None, typer.Option("--json", metavar="OUT", help="Write the numbers as JSON.")
+    ] = None,
+    csv_out: Annotated[
+        Path | None, typer.Option("--csv", metavar="OUT", help="Write the table as CSV.")
+    ] = None,
+    method: MethodOption = "bandlimited",
+    column: ColumnOption = None,
+    rate_hz: RateOption = None,
+    reaction: ReactionOption = False,
+    epoch_length_s: EpochLengthOption = None,
+    condition: ConditionOption = "",
+    task: TaskOption = None,
+    band_hz: BandOption = None,
+    settings: SettingsOption = None,
+) -> None:
+    """Compare two conditions in J, B, K, angular impulse and work.
+
+    Median and quartiles, the two-sided Wilcoxon rank-sum test (asymptotic, ties and continuity
+    corrected), effect size r = z/√N, and the Hodges-Lehmann shift with its 95 % interval. Inputs
+    are session folders, recordings, or one JSON file that `rigidimeter estimate` wrote.
+
+    \b
+    For example:
+      rigidimeter compare demo-study/sessions/day-1 demo-study/sessions/day-2
+      rigidimeter compare estimates.json --reference OFF --other DBS --csv table.csv
+    """
+    from rigidimeter.recording import read_estimates, write_json
+    from rigidimeter.report import write_comparisons_csv
+    from rigidimeter.study import compare as compare_analysis
+    from rigidimeter.study import conditions
+
+    exit_status = 0
+    if any(path.suffix.lower() == ".json" for path in inputs):
+        if len(inputs) > 1:
+            raise UserError("compare takes one JSON file of estimates, or recordings, not both")
+        analysis = read_estimates(inputs[0])
+    else:
+        read = read_inputs(
+            inputs,
+            settings=settings,
+            column=column,
+            rate_hz=rate_hz,
+            reaction=reaction,
+            epoch_length_s=epoch_length_s,
+            condition=condition,
+            task=task,
+            band_hz=band_hz,
+        )
+        say(read.notices)
+        analysis = analyse_inputs(read, method)
+        exit_status = status(read, analysis)
+    known = conditions(analysis)
+    for option, name in (("--reference", reference), ("--other", other)):
+        if name is not None and name not in known:
+            listed = ", ".join(known) or "none"
+            raise UserError(f"{option} {name}: there is no such condition; recorded are: {listed}")
+    if reference is not None and reference == other:
+        raise UserError(f"--reference and --other are both {reference}; name two conditions")
+    if len(known) > 2 and (reference is None or other is None):
+        raise UserError(
+            f"there are {len(known)} conditions ({', '.join(known)}); choose two with "
+            "--reference and --other"
+        )
+    if len(known) < 2:
+        listed = known[0] if known else "none is named"
+        raise UserError(
+            f"a comparison needs two conditions, but the recordings hold one ({listed}); name them "
+            "in a condition column, or per file with --condition and `rigidimeter estimate`"
+        )
+    comparisons = compare_analysis(analysis, reference, other)
+    typer.echo("\n".join(_lines(comparisons)))
+    if json_out is not None:
+        write_json(
+            json_out,
+            {
+                "schema": COMPARISONS_SCHEMA,
+                "method": analysis.method,
+                "comparisons": [_row(comparison) for comparison in comparisons],
+            },
+        )
+    if csv_out is not None:
+        write_comparisons_csv(csv_out, comparisons)
+    raise typer.Exit(exit_status)
+
+
+def _row(comparison: Comparison) -> dict[str, Any]:
+    names = [comparison.reference, comparison.other]
+    return {
+        "measure": comparison.measure,
+        "unit": comparison.unit,
+        "reference": comparison.reference,
+        "other": comparison.other,
+        "groups": {
+            name: {
+                key: value if value == value else None
+                for key, value in asdict(comparison.summaries[name]).items()
+            }
+            | {"excluded": comparison.excluded[name]}
+            for name in names
+        },
+        "test": "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected",
+        **(asdict(comparison.test) if comparison.test is not None else {}),
+        "remark": comparison.remark,
+    }
+
+
+def _lines(comparisons: tuple[Comparison, ...]) -> list[str]:
+    lines = ["Wilcoxon rank-sum test, two-sided, asymptotic, tie and continuity corrected", ""]
+    for c in comparisons:
+        lines.append(f"{c.title} ({c.unit})")
+        for name in (c.reference, c.other):
+            s = c.summaries[name]
+            lines.append(
+                f"  {name:>10}: n {s.n:3d}, excluded {c.excluded[name]:2d}, median {s.median:.4g} "
+                f"[{s.q1:.4g} to {s.q3:.4g}]"
+            )
+        if c.test is None:
+            lines.append(f"  no test: {c.remark}")
+        else:
+            t = c.test
+            lines.append(
+                f"  {c.reference} − {c.other}: shift {t.shift:.4g} "
+                f"[{t.shift_low:.4g} to {t.shift_high:.4g}], z {t.z:.3f}, p {t.p:.2g}, r {t.r:.3f}"
+            )
+    return lines

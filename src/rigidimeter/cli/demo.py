@@ -1,0 +1,172 @@
+"""`rigidimeter demo`: a virtual OFF/DBS study from the perturbation to the report."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rigidimeter.errors import UserError
+
+__all__ = ["demo"]
+
+DAYS = 2
+"""Sessions, run side by side; the order of the conditions alternates, as in Sec. 2.5."""
+
+STUDY: dict[str, Any] = {
+    "subject": {
+        "OFF": {
+            "damping_nm_s_rad": 0.1368,
+            "stiffness_nm_rad": 1.751,
+            "inertia_cv_percent": 2.0,
+            "damping_cv_percent": 12.0,
+            "stiffness_cv_percent": 15.0,
+            "voluntary_sd_nm": 0.01,
+        },
+        "DBS": {
+            "damping_nm_s_rad": 0.117,
+            "stiffness_nm_rad": 1.42,
+            "inertia_cv_percent": 2.0,
+            "damping_cv_percent": 12.0,
+            "stiffness_cv_percent": 15.0,
+            "voluntary_sd_nm": 0.01,
+        },
+    }
+}
+"""A virtual subject: OFF is the paper's median, DBS is chosen here (the paper prints none)."""
+
+
+def demo(
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="New folder for the study.")
+    ] = Path("demo-study"),
+    prbs_epochs: Annotated[
+        int, typer.Option("--prbs-epochs", min=1, max=500, help="PRBS epochs a condition and day.")
+    ] = 10,
+    sinusoid_epochs: Annotated[
+        int,
+        typer.Option("--sinusoid-epochs", min=1, max=500, help="Sinusoids a condition and day."),
+    ] = 8,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the study.")] = 2023,
+) -> None:
+    """Run a virtual OFF/DBS study, analyse it, and write its report.
+
+    Two days, each with PRBS and sinusoidal epochs in OFF and DBS on the virtual rig: 40 PRBS and 32
+    sinusoidal epochs unless told otherwise. A study that is there already under the same name is
+    moved aside, not overwritten.
+
+    \b
+    For example:
+      rigidimeter demo
+      rigidimeter demo --out small --prbs-epochs 3 --sinusoid-epochs 3
+    """
+    from rigidimeter.cli.inputs import analyse_inputs, read_inputs, say, status
+    from rigidimeter.cli.reporting import make_report
+    from rigidimeter.recording import write_estimates_json
+
+    start_s = time.monotonic()
+    _move_aside(out)
+    sessions = [out / "sessions" / f"day-{day + 1}" for day in range(DAYS)]
+    settings = [_day(day, prbs_epochs, sinusoid_epochs, seed) for day in range(DAYS)]
+    typer.echo(
+        f"A virtual subject, {DAYS} days, OFF and DBS: {2 * DAYS * prbs_epochs} PRBS and "
+        f"{2 * DAYS * sinusoid_epochs} sinusoidal epochs of 20 s with their rests"
+    )
+    _simulate(settings, sessions)
+    read = read_inputs(
+        sessions,
+        settings=None,
+        column=None,
+        rate_hz=None,
+        reaction=False,
+        epoch_length_s=None,
+        condition="",
+        task=None,
+        band_hz=None,
+    )
+    say(read.notices)
+    analysis = analyse_inputs(read, "bandlimited")
+    exit_status = status(read, analysis)
+    write_estimates_json(out / "estimates.json", analysis)
+    page = make_report("A virtual study of elbow rigidity", read, analysis, out / "report")
+    typer.echo(f"Done in {time.monotonic() - start_s:.0f} s. Open the report in a browser:")
+    typer.echo(str(page.resolve()))
+    raise typer.Exit(exit_status)
+
+
+def _day(day: int, prbs_epochs: int, sinusoid_epochs: int, seed: int) -> dict[str, Any]:
+    """Return the settings of one day; even days begin with OFF, odd ones with DBS."""
+    order = ("OFF", "DBS") if day % 2 == 0 else ("DBS", "OFF")
+    blocks = [
+        {"task": task, "condition": condition, "epochs": epochs}
+        for condition in order
+        for task, epochs in (("prbs", prbs_epochs), ("sinusoid", sinusoid_epochs))
+    ]
+    return {**STUDY, "seed": seed + day, "protocol": {"blocks": blocks}}
+
+
+def _simulate(settings: list[dict[str, Any]], folders: list[Path]) -> None:
+    """Run the sessions side by side, one process each, as many as there are cores."""
+    import os
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    from rigidimeter.cli.progress import Meter
+    from rigidimeter.cli.virtual import session_length_s
+    from rigidimeter.settings import parse_settings
+
+    parsed = [parse_settings(values) for values in settings]
+    context = get_context("spawn")
+    reached = context.Array("d", len(parsed), lock=False)
+    workers = min(len(parsed), os.cpu_count() or 1)
+    total_s = sum(session_length_s(one) for one in parsed)
+    with (
+        Meter("simulate", total_s) as meter,
+        ProcessPoolExecutor(workers, context, initializer=_share, initargs=(reached,)) as pool,
+    ):
+        jobs = [
+            pool.submit(_run_day, index, values, str(folder))
+            for index, (values, folder) in enumerate(zip(settings, folders, strict=True))
+        ]
+        while not all(job.done() for job in jobs):
+            time.sleep(0.1)
+            meter.reach(sum(reached))
+        for job in jobs:
+            job.result()
+
+
+_reached: Any = None
+
+
+def _share(reached: Any) -> None:
+    global _reached
+    _reached = reached
+
+
+def _run_day(index: int, values: dict[str, Any], folder: str) -> None:
+    """Run one session in its own process, reporting its time as it goes."""
+    from rigidimeter.cli.virtual import run_virtual_session
+    from rigidimeter.settings import parse_settings
+
+    def reach(time_s: float) -> None:
+        _reached[index] = time_s
+
+    result = run_virtual_session(parse_settings(values), Path(folder), progress=reach)
+    if result.outcome != "success":
+        raise UserError(f"{folder}: the session ended with {result.outcome}: {result.reason}")
+
+
+def _move_aside(out: Path) -> None:
+    """Give an earlier study another name, so that nothing is written over."""
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return
+    number = 1
+    while (aside := out.with_name(f"{out.name}-{number}")).exists():
+        number += 1
+    try:
+        out.rename(aside)
+    except OSError as error:
+        raise UserError(f"{out}: cannot be moved aside ({error.strerror or error})") from None
+    typer.echo(f"{out} was there already and is now {aside}")

@@ -1,0 +1,128 @@
+"""`rigidimeter estimate`: J, B, K and scores of recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rigidimeter.cli.inputs import analyse_inputs, read_inputs, say, status
+from rigidimeter.cli.options import (
+    BandOption,
+    ColumnOption,
+    ConditionOption,
+    EpochLengthOption,
+    InputsArgument,
+    MethodOption,
+    RateOption,
+    ReactionOption,
+    SettingsOption,
+    TaskOption,
+)
+
+if TYPE_CHECKING:
+    from rigidimeter.records import Analysis, Fit
+
+__all__ = ["estimate"]
+
+
+def estimate(
+    inputs: InputsArgument,
+    method: MethodOption = "bandlimited",
+    json_out: Annotated[
+        Path | None, typer.Option("--json", metavar="OUT", help="Write everything as JSON.")
+    ] = None,
+    csv_out: Annotated[
+        Path | None, typer.Option("--csv", metavar="OUT", help="Write the epoch table as CSV.")
+    ] = None,
+    column: ColumnOption = None,
+    rate_hz: RateOption = None,
+    reaction: ReactionOption = False,
+    epoch_length_s: EpochLengthOption = None,
+    condition: ConditionOption = "",
+    task: TaskOption = None,
+    band_hz: BandOption = None,
+    settings: SettingsOption = None,
+) -> None:
+    """Estimate inertia J, damping B and stiffness K of each epoch, and score the sinusoids.
+
+    A file holds time_s, torque_nm, at least one of velocity_rad_s and angle_rad, and optionally
+    velocity_command_rad_s, perturbation_nm, epoch, condition and task. Torque is positive when it
+    drives the joint toward positive angle. The exit status is 1 if any input was bad; the rest is
+    analysed all the same.
+
+    \b
+    For example:
+      rigidimeter estimate demo-study/sessions/day-1
+      rigidimeter estimate elbow.csv --epoch-length-s 20 --json estimates.json
+      rigidimeter estimate ankle.npz --column angle_rad=position_rad \\
+          --column torque_nm=torque_Nm --rate-hz 1000 --reaction --epoch-length-s 20
+    """
+    from rigidimeter.recording import write_estimates_csv, write_estimates_json
+
+    read = read_inputs(
+        inputs,
+        settings=settings,
+        column=column,
+        rate_hz=rate_hz,
+        reaction=reaction,
+        epoch_length_s=epoch_length_s,
+        condition=condition,
+        task=task,
+        band_hz=band_hz,
+    )
+    say(read.notices)
+    analysis = analyse_inputs(read, method)
+    typer.echo("\n".join(_lines(analysis)))
+    if json_out is not None:
+        write_estimates_json(json_out, analysis)
+    if csv_out is not None:
+        write_estimates_csv(csv_out, analysis)
+    raise typer.Exit(status(read, analysis))
+
+
+def _lines(analysis: Analysis) -> list[str]:
+    lines: list[str] = []
+    if analysis.fits:
+        lines += [
+            f"J, B, K of each epoch, method {analysis.method} (± one standard error)",
+            *_fit_table(analysis.fits),
+            "",
+            f"B, K with the inertia held at the median, {analysis.inertia_kg_m2:.5g} kg·m²",
+            *_fit_table(analysis.fixed_inertia),
+        ]
+    if analysis.scores:
+        lines += (
+            ["", "Scores of each sinusoidal epoch, per cycle"]
+            if lines
+            else ["Scores of each sinusoidal epoch, per cycle"]
+        )
+        lines.append(f"{'epoch':>10} {'condition':>10} {'impulse N·m·s':>14} {'work J':>10}")
+        for score in analysis.scores:
+            lines.append(
+                f"{score.epoch[-10:]:>10} {score.condition[:10]:>10} {score.impulse_nm_s:14.5g} "
+                f"{score.work_j:10.5g}{_remark(score.outcome.kind, score.outcome.reason)}"
+            )
+    return lines
+
+
+def _fit_table(fits: tuple[Fit, ...]) -> list[str]:
+    lines = [
+        f"{'epoch':>10} {'condition':>10} {'J kg·m²':>21} {'B N·m·s/rad':>19} "
+        f"{'K N·m/rad':>19} {'R²':>8} {'VAF %':>7}"
+    ]
+    lines += [
+        f"{fit.epoch[-10:]:>10} {fit.condition[:10]:>10} "
+        f"{fit.inertia_kg_m2:11.5g} ±{fit.inertia_kg_m2_se:8.2g} "
+        f"{fit.damping_nm_s_rad:9.4g} ±{fit.damping_nm_s_rad_se:8.2g} "
+        f"{fit.stiffness_nm_rad:9.4g} ±{fit.stiffness_nm_rad_se:8.2g} "
+        f"{fit.r_squared:8.4f} {fit.vaf_percent:7.2f}"
+        f"{_remark(fit.outcome.kind, fit.outcome.reason)}"
+        for fit in fits
+    ]
+    return lines
+
+
+def _remark(kind: str, reason: str) -> str:
+    return "" if kind == "included" else f"  {kind}: {reason}"

@@ -1,0 +1,181 @@
+"""Read what the user named, and go on with the rest when one input is bad."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import typer
+
+from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score, Task
+    from rigidimeter.settings import Settings
+
+__all__ = ["Inputs", "analyse_inputs", "read_inputs", "say", "status"]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Everything that was read: epochs, what to say about them, and the settings to use."""
+
+    epochs: tuple[Epoch, ...]
+    notices: tuple[Notice, ...]
+    settings: Settings
+    paths: tuple[Path, ...]
+
+
+def read_inputs(
+    paths: list[Path],
+    *,
+    settings: Path | None,
+    column: list[str] | None,
+    rate_hz: float | None,
+    reaction: bool,
+    epoch_length_s: float | None,
+    condition: str,
+    task: str | None,
+    band_hz: tuple[float, float] | None,
+) -> Inputs:
+    """Read every input; one that cannot be read becomes a notice of level `error`.
+
+    The settings are those of the file given, else those that the first session folder was recorded
+    with, else the defaults.
+
+    Raises
+    ------
+    UserError
+        If an option is wrong, or not one input can be read.
+    """
+    from rigidimeter.recording import (
+        ReadOptions,
+        is_session,
+        read_recording,
+        read_session,
+        session_settings,
+    )
+    from rigidimeter.records import Notice
+    from rigidimeter.settings import load_settings
+
+    options = ReadOptions(
+        columns=_columns(column or []),
+        rate_hz=_positive("--rate-hz", rate_hz),
+        reaction=reaction,
+        epoch_length_s=_positive("--epoch-length-s", epoch_length_s),
+        condition=condition,
+        task=_task(task),
+    )
+    epochs: list[Epoch] = []
+    notices: list[Notice] = []
+    chosen = load_settings(settings) if settings is not None else None
+    for path in dict.fromkeys(paths):
+        try:
+            if is_session(path):
+                recorded = session_settings(path)
+                if chosen is None:
+                    chosen = recorded
+                elif settings is None and _analysis_of(recorded) != _analysis_of(chosen):
+                    notices.append(
+                        Notice(
+                            "warning",
+                            f"{path}: was recorded with other estimation or score settings than "
+                            "the session before it; those of the first are used for all "
+                            "(--settings FILE chooses)",
+                        )
+                    )
+                found, remarks = read_session(path)
+            else:
+                found, remarks = read_recording(path, options)
+        except UserError as error:
+            notices.append(Notice("error", str(error)))
+            continue
+        epochs += found
+        notices += remarks
+    if not epochs:
+        raise UserError(" / ".join(n.text for n in notices) or "no epoch was found")
+    chosen = chosen if chosen is not None else load_settings(None)
+    if band_hz is not None:
+        chosen = _with_band(chosen, band_hz)
+    return Inputs(tuple(epochs), tuple(notices), chosen, tuple(dict.fromkeys(paths)))
+
+
+def analyse_inputs(inputs: Inputs, method: str) -> Analysis:
+    """Fit and score with progress.
+
+    Raises
+    ------
+    UserError
+        If there is no such method.
+    """
+    from rigidimeter.cli.progress import Meter
+    from rigidimeter.estimation import METHODS
+    from rigidimeter.study import analyse
+
+    if method not in METHODS:
+        raise UserError(f"--method {method}: there is no such method; known: {', '.join(METHODS)}")
+    with Meter("estimate", 2 * len(inputs.epochs)) as meter:
+        return analyse(inputs.epochs, inputs.settings, method, progress=lambda _: meter.advance())
+
+
+def say(notices: tuple[Notice, ...]) -> None:
+    """Print notices to the standard error, one sentence a line."""
+    for notice in notices:
+        typer.echo(f"{notice.level}: {notice.text}", err=True)
+
+
+def status(inputs: Inputs, analysis: Analysis) -> int:
+    """Say what failed; return 1 if an input was bad or an epoch failed, else 0."""
+    bad = any(notice.level == "error" for notice in inputs.notices)
+    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
+    for result in results:
+        if result.outcome.kind == "failed":
+            bad = True
+            typer.echo(
+                f"error: {result.source}, epoch {result.epoch}: {result.outcome.reason}", err=True
+            )
+    return int(bad)
+
+
+def _analysis_of(settings: Settings) -> tuple[object, object]:
+    return settings.estimation, settings.scores
+
+
+def _with_band(settings: Settings, band_hz: tuple[float, float]) -> Settings:
+    from rigidimeter.settings import dump_settings, parse_settings
+
+    low, high = band_hz
+    values = dump_settings(settings)
+    values["estimation"] |= {
+        "band_low_hz": low,
+        "band_high_hz": high,
+        "band_high_unknown_hz": high,
+    }
+    return parse_settings(values, source=f"--band-hz {low:g} {high:g}")
+
+
+def _columns(pairs: list[str]) -> dict[str, str]:
+    columns: dict[str, str] = {}
+    for pair in pairs:
+        name, equals, column = pair.partition("=")
+        if not (name and equals and column):
+            raise UserError(
+                f"--column {pair}: write NAME=COLUMN, for example --column torque_nm=Fz"
+            )
+        if name in columns:
+            raise UserError(f"--column {pair}: {name} was already given as {columns[name]}")
+        columns[name] = column
+    return columns
+
+
+def _positive(option: str, value: float | None) -> float | None:
+    if value is not None and not 0 < value < float("inf"):
+        raise UserError(f"{option} {value:g}: must be a number greater than 0")
+    return value
+
+
+def _task(task: str | None) -> Task | None:
+    if task not in (None, "prbs", "sinusoid"):
+        raise UserError(f"--task {task}: must be prbs or sinusoid")
+    return cast("Task | None", task)

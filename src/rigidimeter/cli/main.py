@@ -1,0 +1,80 @@
+"""The command `rigidimeter`: commands by name, and errors as sentences.
+
+Modules of the command line import heavy libraries inside their functions, so that `--version` and
+`--help` answer at once.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from rigidimeter import __version__
+from rigidimeter.cli.compare import compare
+from rigidimeter.cli.demo import demo
+from rigidimeter.cli.design import design
+from rigidimeter.cli.estimate import estimate
+from rigidimeter.cli.recover import recover
+from rigidimeter.cli.report import report
+from rigidimeter.cli.simulate import simulate
+from rigidimeter.errors import UserError
+
+__all__ = ["main"]
+
+app = typer.Typer(
+    name="rigidimeter",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"rigidimeter {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    """Measure joint rigidity: perturbation, virtual rig, recording, J-B-K estimates, report.
+
+    \b
+    A first look:   rigidimeter demo --out demo-study
+    Your own data:  rigidimeter estimate recording.csv --epoch-length-s 20
+
+    rigidimeter is research software and no medical device.
+    """
+
+
+for command in (design, simulate, estimate, compare, report, recover, demo):
+    app.command()(command)
+
+
+def _terminated(_signal: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def main() -> None:
+    """Run the command line; what a user did wrong ends with one sentence and status 1."""
+    signal.signal(signal.SIGTERM, _terminated)
+    try:
+        app()
+    except UserError as error:
+        typer.echo(f"rigidimeter: {error}", err=True)
+        sys.exit(1)
+    except BrokenPipeError:
+        # The reader of our output has gone, as in `rigidimeter ... | head`: not our error.
+        sys.stderr.close()
+        sys.exit(0)

@@ -1,0 +1,43 @@
+"""From what was read and computed to a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.cli.inputs import Inputs
+    from rigidimeter.records import Analysis
+
+__all__ = ["make_report"]
+
+
+def make_report(title: str, inputs: Inputs, analysis: Analysis, out: Path) -> Path:
+    """Compare the first two conditions and write the report; return the page's path.
+
+    Raises
+    ------
+    UserError
+        If the folder cannot be written.
+    """
+    from rigidimeter.cli.provenance import provenance
+    from rigidimeter.report import write_report
+    from rigidimeter.study import Study, compare
+
+    study = Study(
+        title=title,
+        settings=inputs.settings,
+        epochs=inputs.epochs,
+        analysis=analysis,
+        comparisons=compare(analysis),
+        notices=inputs.notices,
+        provenance=provenance(inputs.paths, inputs.settings),
+    )
+    try:
+        return write_report(study, out)
+    except OSError as error:
+        raise UserError(
+            f"{out}: the report cannot be written ({error.strerror or error})"
+        ) from None

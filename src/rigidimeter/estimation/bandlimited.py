@@ -1,0 +1,101 @@
+"""Least squares on signals that all went through the same zero-phase band.
+
+A linear time-invariant filter F commutes with Eq. 3:
+
+    J F(θ'') + B F(θ') + K F(θ) = F(M)
+
+so filtering *every* signal alike leaves J, B and K where they are, while filtering one of them does
+not. Drift below the band and sensor noise above it are removed from both sides. The first and last
+second are dropped after filtering: there the filter saw no neighbours.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy import signal
+
+from rigidimeter.estimation.signals import (
+    Array,
+    Signals,
+    grid_rate_hz,
+    kinematics,
+    motion_channels,
+    spline,
+    uniform_grid,
+)
+from rigidimeter.records import Epoch
+from rigidimeter.settings import EstimationSettings
+
+__all__ = ["band_hz", "bandlimited_signals", "zero_phase_band"]
+
+USABLE_FRACTION_OF_RATE = 0.4
+"""A channel carries information up to half its rate; interpolation is good to about 0.4 of it."""
+
+
+def band_hz(epoch: Epoch, settings: EstimationSettings) -> tuple[float, float]:
+    """Return the band for an epoch.
+
+    The upper edge is `band_high_hz` where the perturbation is known (from the session or from a
+    recorded perturbation channel) and `band_high_unknown_hz` where it is not, and never above 0.4
+    times the rate of the slowest channel used.
+    """
+    known = epoch.excitation_hz is not None or "perturbation_nm" in epoch.channels
+    wanted = settings.band_high_hz if known else settings.band_high_unknown_hz
+    used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
+    slowest = min(channel.rate_hz for channel in used)
+    return settings.band_low_hz, min(wanted, USABLE_FRACTION_OF_RATE * slowest)
+
+
+EDGE_SAMPLES = 10
+"""Samples of the slowest channel dropped at each end before filtering.
+
+The derivative of a spline is poor at its ends, and a filter with a long memory would carry that
+error into the epoch.
+"""
+
+
+def zero_phase_band(values: Array, rate_hz: float, band: tuple[float, float]) -> Array:
+    """Band-pass without phase: Butterworth forwards and backwards.
+
+    Second order at the lower edge and fourth at the upper, each applied twice. The two are
+    separate filters because one band-pass over a ratio of 70 would be poorly conditioned.
+    """
+    low, high = band
+    lowpass = signal.butter(4, high, "lowpass", fs=rate_hz, output="sos")
+    highpass = signal.butter(2, low, "highpass", fs=rate_hz, output="sos")
+    smooth = signal.sosfiltfilt(lowpass, values - np.mean(values))
+    return np.asarray(signal.sosfiltfilt(highpass, smooth), dtype=np.float64)
+
+
+def bandlimited_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
+    """Return torque, acceleration, velocity and angle through the same band, edges trimmed.
+
+    Parameters
+    ----------
+    epoch : Epoch
+        With `torque_nm` and `velocity_rad_s` or `angle_rad`.
+    settings : EstimationSettings
+        For the band and the trimming.
+    """
+    torque = epoch.channels["torque_nm"]
+    band = band_hz(epoch, settings)
+    used = [torque, *motion_channels(epoch)]
+    rate_hz = grid_rate_hz(used, band[1])
+    whole = uniform_grid(used, rate_hz)
+    angle, velocity, acceleration = kinematics(epoch, whole)
+    edge = math.ceil(EDGE_SAMPLES * rate_hz / min(channel.rate_hz for channel in used))
+    inner = slice(edge, whole.size - edge)
+    time_s = whole[inner]
+    trim = max(round(settings.trim_s * rate_hz) - edge, 0)
+    keep = slice(trim, time_s.size - trim)
+    return Signals(
+        time_s=time_s[keep],
+        torque_nm=zero_phase_band(spline(torque)(time_s), rate_hz, band)[keep],
+        acceleration_rad_s2=zero_phase_band(acceleration[inner], rate_hz, band)[keep],
+        velocity_rad_s=zero_phase_band(velocity[inner], rate_hz, band)[keep],
+        angle_rad=zero_phase_band(angle[inner], rate_hz, band)[keep],
+        rate_hz=rate_hz,
+        band_hz=band,
+    )

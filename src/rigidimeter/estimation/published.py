@@ -1,0 +1,75 @@
+"""The paper's estimator to the letter (Sec. 2.4.4, Eq. 6).
+
+- velocity: the one *commanded* to the drive,
+- acceleration: its forward difference, (θ'(t+Δt) − θ'(t)) / Δt,
+- position: its running sum, θ(t+Δt) = θ'(t+Δt) Δt + θ(t) with θ(0) = 0, then a Butterworth
+  high-pass at 0.20 Hz *on the position alone*,
+- torque: as measured.
+
+It is kept as printed so that the paper can be reproduced. High-passing one regressor and not the
+torque breaks Eq. 3, which biases the stiffness in the closed loop; `bandlimited` does not do that.
+The paper gives neither order nor direction of the filter: here second order and causal by default.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import signal
+
+from rigidimeter.estimation.signals import Array, Signals, kinematics, motion_channels, uniform_grid
+from rigidimeter.records import Channel, Epoch
+from rigidimeter.settings import EstimationSettings
+
+__all__ = ["published_signals"]
+
+
+def published_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
+    """Return the regressors and the torque of Eq. 6, at the rate of the torque channel.
+
+    Where no command was recorded, the measured velocity stands in for it.
+
+    Parameters
+    ----------
+    epoch : Epoch
+        With `torque_nm` and `velocity_command_rad_s` (or a measured motion channel).
+    settings : EstimationSettings
+        For the high-pass filter.
+    """
+    torque = epoch.channels["torque_nm"]
+    command = epoch.channels.get("velocity_command_rad_s")
+    others = [command] if command is not None else motion_channels(epoch)
+    rate_hz = torque.rate_hz
+    time_s = uniform_grid([torque, *others], rate_hz)
+    if command is not None:
+        velocity = _held(command, time_s)
+    else:
+        _, velocity, _ = kinematics(epoch, time_s)
+    dt = 1.0 / rate_hz
+    acceleration = np.diff(velocity) / dt
+    # The sum starts from θ(0) = 0, so the first velocity does not enter it.
+    angle = np.concatenate(([0.0], np.cumsum(velocity[1:]) * dt))
+    highpass = signal.butter(
+        settings.published_highpass_order,
+        settings.published_highpass_hz,
+        "highpass",
+        fs=rate_hz,
+        output="sos",
+    )
+    angle = signal.sosfilt(highpass, angle)
+    n = acceleration.size  # the last sample has no forward difference
+    return Signals(
+        time_s=time_s[:n],
+        torque_nm=np.interp(time_s[:n], torque.time_s, torque.values),
+        acceleration_rad_s2=acceleration,
+        velocity_rad_s=velocity[:n],
+        angle_rad=angle[:n],
+        rate_hz=rate_hz,
+        band_hz=(0.0, rate_hz / 2),
+    )
+
+
+def _held(command: Channel, time_s: Array) -> Array:
+    """Return the command in force at each time: the last one sent, as the drive holds it."""
+    # A tick of rounding must not turn a command into the one before.
+    index = np.searchsorted(command.time_s, time_s + 1e-9, side="right") - 1
+    return command.values[np.maximum(index, 0)]

@@ -1,0 +1,199 @@
+"""Estimates as files: JSON with everything, CSV with the epoch table."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.errors import UserError
+from rigidimeter.records import Analysis, Fit, Outcome, Score
+
+__all__ = [
+    "ESTIMATES_SCHEMA",
+    "estimates_document",
+    "read_estimates",
+    "write_estimates_csv",
+    "write_estimates_json",
+    "write_json",
+]
+
+ESTIMATES_SCHEMA = "rigidimeter.estimates/1"
+
+_FIT_NUMBERS = (
+    "inertia_kg_m2",
+    "inertia_kg_m2_se",
+    "damping_nm_s_rad",
+    "damping_nm_s_rad_se",
+    "stiffness_nm_rad",
+    "stiffness_nm_rad_se",
+    "r_squared",
+    "vaf_percent",
+    "condition_number",
+    "residual_sd_nm",
+)
+_SCORE_NUMBERS = ("impulse_nm_s", "work_j", "frequency_hz")
+
+
+def estimates_document(analysis: Analysis) -> dict[str, Any]:
+    """Return an analysis as plain values; numbers that do not exist are null."""
+    return {
+        "schema": ESTIMATES_SCHEMA,
+        "method": analysis.method,
+        "epochs": [_fit_row(fit) for fit in analysis.fits],
+        "fixed_inertia": {
+            "inertia_kg_m2": _finite(analysis.inertia_kg_m2),
+            "epochs": [_fit_row(fit) for fit in analysis.fixed_inertia],
+        },
+        "scores": [_score_row(score) for score in analysis.scores],
+    }
+
+
+def write_estimates_json(path: Path, analysis: Analysis) -> None:
+    """Write the document of an analysis."""
+    write_json(path, estimates_document(analysis))
+
+
+def write_estimates_csv(path: Path, analysis: Analysis) -> None:
+    """Write the epoch table: one row a fit, with B and K at fixed inertia beside, full precision.
+
+    An analysis of sinusoids alone gives the table of scores.
+    """
+    rows: list[dict[str, Any]] = []
+    for fit, fixed in zip(analysis.fits, analysis.fixed_inertia, strict=True):
+        row = _fit_row(fit)
+        low, high = row.pop("band_hz") or (None, None)
+        rows.append(
+            row
+            | {"band_low_hz": low, "band_high_hz": high}
+            | {
+                f"fixed_inertia_{name}": _finite(getattr(fixed, name))
+                for name in _FIT_NUMBERS
+                if name != "inertia_kg_m2_se"
+            }
+        )
+    if not rows:
+        rows = [_score_row(score) for score in analysis.scores]
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, fieldnames=list(rows[0]) if rows else ["epoch"])
+            writer.writeheader()
+            writer.writerows(rows)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+def write_json(path: Path, document: Mapping[str, Any]) -> None:
+    """Write a document as JSON.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be written.
+    """
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+def read_estimates(path: Path) -> Analysis:
+    """Read back what `write_estimates_json` wrote.
+
+    Raises
+    ------
+    UserError
+        If the file is not such a document.
+    """
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except ValueError as error:
+        raise UserError(f"{path}: is not valid JSON ({error})") from None
+    schema = document.get("schema") if isinstance(document, dict) else None
+    if schema != ESTIMATES_SCHEMA:
+        raise UserError(f"{path}: schema is {schema!r}; expected {ESTIMATES_SCHEMA!r}")
+    try:
+        method = str(document["method"])
+        fixed = document["fixed_inertia"]
+        return Analysis(
+            method,
+            tuple(_fit(row, method) for row in document["epochs"]),
+            tuple(_fit(row, method) for row in fixed["epochs"]),
+            _number(fixed["inertia_kg_m2"]),
+            tuple(_score(row) for row in document["scores"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(
+            f"{path}: is not a complete {ESTIMATES_SCHEMA} document ({error})"
+        ) from None
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _number(value: Any) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _outcome(result: Fit | Score) -> dict[str, Any]:
+    return {
+        "source": result.source,
+        "epoch": result.epoch,
+        "condition": result.condition,
+        "outcome": result.outcome.kind,
+        "reason": result.outcome.reason,
+    }
+
+
+def _numbers(result: Fit | Score, names: Sequence[str]) -> dict[str, Any]:
+    return {name: _finite(getattr(result, name)) for name in names}
+
+
+def _fit_row(fit: Fit) -> dict[str, Any]:
+    band = [fit.band_hz[0], fit.band_hz[1]] if all(map(math.isfinite, fit.band_hz)) else None
+    return {
+        **_outcome(fit),
+        **_numbers(fit, _FIT_NUMBERS),
+        "n_samples": fit.n_samples,
+        "band_hz": band,
+    }
+
+
+def _score_row(score: Score) -> dict[str, Any]:
+    return {**_outcome(score), **_numbers(score, _SCORE_NUMBERS), "n_cycles": score.n_cycles}
+
+
+def _fit(row: Mapping[str, Any], method: str) -> Fit:
+    low, high = row["band_hz"] or (math.nan, math.nan)
+    fit = Fit(
+        source=str(row["source"]),
+        epoch=str(row["epoch"]),
+        condition=str(row["condition"]),
+        method=method,
+        outcome=Outcome(row["outcome"], str(row["reason"])),
+        n_samples=int(row["n_samples"]),
+        band_hz=(float(low), float(high)),
+    )
+    numbers: dict[str, Any] = {name: _number(row[name]) for name in _FIT_NUMBERS}
+    return replace(fit, **numbers)
+
+
+def _score(row: Mapping[str, Any]) -> Score:
+    return Score(
+        source=str(row["source"]),
+        epoch=str(row["epoch"]),
+        condition=str(row["condition"]),
+        outcome=Outcome(row["outcome"], str(row["reason"])),
+        impulse_nm_s=_number(row["impulse_nm_s"]),
+        work_j=_number(row["work_j"]),
+        n_cycles=int(row["n_cycles"]),
+        frequency_hz=_number(row["frequency_hz"]),
+    )

@@ -1,0 +1,165 @@
+"""The session folder: `manifest.json`, `samples.arrows`, `events.jsonl`.
+
+The manifest is written before the first sample and never changes: settings, versions, seeds,
+protocol, and the unit of every channel. What happened is in the events: each epoch starts, and ends
+with success, abort or fail and a reason; so does the session. A folder without a
+`session_ended` event was interrupted; `recover` closes it.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pyarrow as pa
+import scipy
+
+from rigidimeter import __version__
+from rigidimeter.errors import UserError
+from rigidimeter.recording.log import SAMPLE_UNITS, Sample, SampleLog, append_event
+from rigidimeter.settings import Settings, dump_settings
+
+__all__ = ["EVENTS", "MANIFEST", "SAMPLES", "SCHEMA", "Ending", "SessionWriter", "read_manifest"]
+
+MANIFEST, SAMPLES, EVENTS = "manifest.json", "samples.arrows", "events.jsonl"
+SCHEMA = "rigidimeter.session/1"
+
+Ending = Literal["success", "abort", "fail"]
+
+
+class SessionWriter:
+    """Create a session folder and write to it while the session runs.
+
+    Parameters
+    ----------
+    folder : Path
+        Must not hold a session already.
+    settings : Settings
+    protocol : sequence of mappings
+        The planned epochs, stored as planned.
+    seeds : mapping of str to int
+    virtual : bool
+        Whether the rig is simulated.
+
+    Raises
+    ------
+    UserError
+        If the folder cannot be made or holds files already.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        settings: Settings,
+        protocol: Sequence[Mapping[str, Any]],
+        seeds: Mapping[str, int],
+        *,
+        virtual: bool,
+    ) -> None:
+        self.folder = folder
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if any(folder.iterdir()):
+                raise UserError(
+                    f"{folder}: is not empty; a recording is never written over another, so name "
+                    "a new folder"
+                )
+            manifest = {
+                "schema": SCHEMA,
+                "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+                "virtual": virtual,
+                "versions": {
+                    "rigidimeter": __version__,
+                    "python": platform.python_version(),
+                    "numpy": np.__version__,
+                    "scipy": scipy.__version__,
+                    "pyarrow": pa.__version__,
+                },
+                "seeds": dict(seeds),
+                "settings": dump_settings(settings),
+                "protocol": [dict(epoch) for epoch in protocol],
+                "channel_units": dict(SAMPLE_UNITS),
+            }
+            text = json.dumps(manifest, indent=1, ensure_ascii=False, allow_nan=False)
+            (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
+            self._log = SampleLog(folder / SAMPLES, settings.rig.tick_rate_hz)
+            self._events = (folder / EVENTS).open("xb")
+        except OSError as error:
+            reason = error.strerror or error
+            raise UserError(f"{folder}: a session cannot be written there ({reason})") from None
+
+    def sample(self, sample: Sample) -> None:
+        """Record one tick."""
+        self._log.append(sample)
+
+    def session_started(self) -> None:
+        """Say that the loop runs."""
+        append_event(self._events, {"event": "session_started", "time_s": 0.0})
+
+    def epoch_started(
+        self, number: int, label: str, task: str, condition: str, time_s: float, **facts: Any
+    ) -> None:
+        """Say that an epoch begins, with whatever facts belong to it."""
+        append_event(
+            self._events,
+            {
+                "event": "epoch_started",
+                "epoch": number,
+                "label": label,
+                "task": task,
+                "condition": condition,
+                "time_s": time_s,
+                **facts,
+            },
+        )
+
+    def epoch_ended(self, number: int, time_s: float, outcome: Ending, reason: str) -> None:
+        """Close an epoch; its samples are in the file before the event is."""
+        self._log.flush()
+        append_event(
+            self._events,
+            {
+                "event": "epoch_ended",
+                "epoch": number,
+                "time_s": time_s,
+                "outcome": outcome,
+                "reason": reason,
+            },
+        )
+
+    def close(self, time_s: float, outcome: Ending, reason: str) -> None:
+        """Close the session with its outcome."""
+        self._log.close()
+        append_event(
+            self._events,
+            {"event": "session_ended", "time_s": time_s, "outcome": outcome, "reason": reason},
+        )
+        self._events.close()
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Return the manifest of a session folder.
+
+    Raises
+    ------
+    UserError
+        If the folder is no session folder, or one that this version cannot read.
+    """
+    path = folder / MANIFEST
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise UserError(f"{folder}: is not a session folder, it has no {MANIFEST}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: cannot be read ({error})") from None
+    except json.JSONDecodeError as error:
+        raise UserError(f"{path}: is not valid JSON ({error})") from None
+    schema = manifest.get("schema") if isinstance(manifest, dict) else None
+    if schema != SCHEMA:
+        raise UserError(f"{path}: schema is {schema!r}; this version reads {SCHEMA!r}")
+    return dict(manifest)

@@ -1,0 +1,183 @@
+"""The raw log: samples appended as an Arrow IPC stream, events as JSON lines.
+
+A stream needs no footer, so what was written before the process was killed can be read: every
+whole batch. One batch holds at most `BATCH_S` seconds.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from rigidimeter.errors import UserError
+
+__all__ = ["BATCH_S", "SAMPLE_UNITS", "Sample", "SampleLog", "read_samples", "stream_extent"]
+
+BATCH_S = 0.1
+"""How much can be lost when the process is killed."""
+
+
+class Sample(NamedTuple):
+    """One tick of the loop. Units stand in the names; see `SAMPLE_UNITS`.
+
+    `epoch` is the number of the epoch, -1 during rests. `limited` is a `guard.Limited` value. The
+    command is what was sent after the guard; the request is what the controller asked for.
+    """
+
+    tick: int
+    time_s: float
+    lateness_s: float
+    epoch: int
+    perturbation_nm: float
+    torque_nm: float
+    torque_time_s: float
+    angle_rad: float
+    velocity_rad_s: float
+    motion_time_s: float
+    target_angle_rad: float
+    velocity_request_rad_s: float
+    velocity_command_rad_s: float
+    limited: int
+
+
+SAMPLE_UNITS: Mapping[str, str] = {
+    "tick": "1",
+    "time_s": "s since the session's start",
+    "lateness_s": "s behind the tick's deadline",
+    "epoch": "number, -1 in a rest",
+    "perturbation_nm": "N·m",
+    "torque_nm": "N·m applied to the joint",
+    "torque_time_s": "s, stamp of the torque sample",
+    "angle_rad": "rad",
+    "velocity_rad_s": "rad/s",
+    "motion_time_s": "s, stamp of the angle and velocity sample",
+    "target_angle_rad": "rad, NaN where no position is commanded",
+    "velocity_request_rad_s": "rad/s, asked for by the controller",
+    "velocity_command_rad_s": "rad/s, sent after the guard",
+    "limited": "0 not, 1 acceleration, 2 speed, 3 position, 4 latched",
+}
+"""The unit of every recorded column, as the manifest states them."""
+
+_INTEGERS = {"tick": pa.int64(), "epoch": pa.int32(), "limited": pa.int8()}
+_SCHEMA = pa.schema(
+    [pa.field(name, _INTEGERS.get(name, pa.float64()), nullable=False) for name in Sample._fields]
+)
+_DTYPES = [np.dtype(field.type.to_pandas_dtype()) for field in _SCHEMA]
+
+
+class SampleLog:
+    """Append samples to an Arrow stream, a batch at a time.
+
+    Parameters
+    ----------
+    path : Path
+        Must not exist: a recording is never overwritten.
+    tick_rate_hz : float
+        Sets how many samples make a batch of `BATCH_S`.
+    """
+
+    def __init__(self, path: Path, tick_rate_hz: float) -> None:
+        self._file: BinaryIO = path.open("xb", buffering=0)
+        # Threads cost more than they gain on a batch of a few kilobytes.
+        options = pa.ipc.IpcWriteOptions(compression="lz4", use_threads=False)
+        self._writer = pa.ipc.new_stream(self._file, _SCHEMA, options=options)
+        self._rows: list[Sample] = []
+        self._batch = max(1, int(BATCH_S * tick_rate_hz))
+
+    def append(self, sample: Sample) -> None:
+        """Add one tick; a full batch goes to the file at once."""
+        self._rows.append(sample)
+        if len(self._rows) >= self._batch:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what is waiting, however little."""
+        if not self._rows:
+            return
+        n = len(self._rows)
+        arrays = [
+            pa.array(np.fromiter(column, dtype, n))
+            for column, dtype in zip(zip(*self._rows, strict=True), _DTYPES, strict=True)
+        ]
+        self._writer.write_batch(pa.record_batch(arrays, schema=_SCHEMA))
+        self._rows.clear()
+
+    def close(self) -> None:
+        """Write the rest and the end of the stream."""
+        if self._file.closed:
+            return
+        self.flush()
+        self._writer.close()
+        self._file.close()
+
+
+def _batches(path: Path) -> Iterator[tuple[pa.RecordBatch, int]]:
+    """Yield each whole batch with the offset of its end; stop where the stream is torn."""
+    with pa.OSFile(str(path), "rb") as file:
+        try:
+            reader = pa.ipc.open_stream(file)
+        except (pa.ArrowInvalid, OSError):
+            return
+        while True:
+            try:
+                batch = reader.read_next_batch()
+            except (StopIteration, pa.ArrowInvalid, OSError):
+                return
+            yield batch, file.tell()
+
+
+def read_samples(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the columns of every whole batch; empty columns where there is none."""
+    batches = [batch for batch, _ in _batches(path)]
+    table = pa.Table.from_batches(batches, schema=_SCHEMA)
+    return {name: table.column(name).to_numpy() for name in _SCHEMA.names}
+
+
+def stream_extent(path: Path) -> tuple[int, bool]:
+    """Return the length in bytes up to the last whole batch, and whether the stream is closed.
+
+    The length is that of the schema alone when no batch is whole, and 0 when not even that is.
+    """
+    end = 0
+    with pa.OSFile(str(path), "rb") as file:
+        try:
+            pa.ipc.open_stream(file)
+            end = file.tell()
+        except (pa.ArrowInvalid, OSError):
+            return 0, False
+    for _, offset in _batches(path):
+        end = offset
+    with path.open("rb") as raw:
+        raw.seek(end)
+        closed = raw.read(8) == b"\xff\xff\xff\xff\x00\x00\x00\x00"
+    return end, closed
+
+
+def append_event(file: BinaryIO, event: Mapping[str, Any]) -> None:
+    """Write one event as one line, at once."""
+    file.write(json.dumps(event, ensure_ascii=False, allow_nan=False).encode() + b"\n")
+    file.flush()
+
+
+def read_events(path: Path) -> tuple[list[dict[str, Any]], bool]:
+    """Return the events and whether the last line is torn (then it is left out).
+
+    Raises
+    ------
+    UserError
+        If a whole line is not a JSON object.
+    """
+    events: list[dict[str, Any]] = []
+    lines = path.read_bytes().split(b"\n")
+    for number, line in enumerate(lines[:-1], start=1):
+        try:
+            events.append(dict(json.loads(line)))
+        except (ValueError, TypeError):
+            raise UserError(f"{path}: line {number} is not a JSON object") from None
+    return events, lines[-1] != b""

@@ -1,0 +1,122 @@
+"""What is compared, condition by condition, and the one sentence that sums it up."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from rigidimeter.records import Analysis, Fit, Score
+from rigidimeter.report.numbers import number, p_and_r
+from rigidimeter.statistics import summarise
+from rigidimeter.study import Comparison, Study
+
+__all__ = ["Measure", "condition_name", "conditions", "measures", "verdict"]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One measure: its included values, and how many epochs have none, by condition."""
+
+    name: str
+    title: str
+    unit: str
+    values: Mapping[str, tuple[float, ...]]
+    excluded: Mapping[str, int]
+
+    @property
+    def label(self) -> str:
+        """Title and unit, for axes and headings."""
+        return f"{self.title} ({self.unit})"
+
+
+_Result = Fit | Score
+_MEASURES: tuple[tuple[str, str, str, Callable[[Analysis], Sequence[_Result]]], ...] = (
+    ("inertia_kg_m2", "Inertia J", "kg·m²", lambda analysis: analysis.fits),
+    ("damping_nm_s_rad", "Viscous damping B", "N·m·s/rad", lambda analysis: analysis.fixed_inertia),
+    ("stiffness_nm_rad", "Stiffness K", "N·m/rad", lambda analysis: analysis.fixed_inertia),
+    ("impulse_nm_s", "Angular impulse", "N·m·s", lambda analysis: analysis.scores),
+    ("work_j", "Work", "J", lambda analysis: analysis.scores),
+)
+"""Inertia is from the first fit; damping and stiffness are from the second, at fixed inertia."""
+
+
+def condition_name(condition: str) -> str:
+    """Return the condition as people read it."""
+    return condition or "(no condition)"
+
+
+def conditions(study: Study) -> tuple[str, ...]:
+    """Return the conditions in one order for the whole report: as compared, then as recorded."""
+    compared = [name for c in study.comparisons for name in c.summaries]
+    analysis = study.analysis
+    results: tuple[_Result, ...] = (*analysis.fits, *analysis.fixed_inertia, *analysis.scores)
+    recorded = [item.condition for item in (*study.epochs, *results)]
+    return tuple(dict.fromkeys([*compared, *recorded]))
+
+
+def measures(study: Study) -> tuple[Measure, ...]:
+    """Return the five measures, those without any epoch left out."""
+    found = []
+    for name, title, unit, results_of in _MEASURES:
+        results = results_of(study.analysis)
+        if not results:
+            continue
+        present = {result.condition for result in results}
+        order = [condition for condition in conditions(study) if condition in present]
+        left_out = Counter(result.condition for result in results if not result.outcome.included)
+        values = {
+            condition: tuple(
+                float(getattr(result, name))
+                for result in results
+                if result.outcome.included and result.condition == condition
+            )
+            for condition in order
+        }
+        found.append(Measure(name, title, unit, values, {key: left_out[key] for key in order}))
+    return tuple(found)
+
+
+def verdict(study: Study) -> str:
+    """Return what the study shows, in a line."""
+    prefix = "Virtual subject. " if any(epoch.virtual for epoch in study.epochs) else ""
+    tested = [comparison for comparison in study.comparisons if comparison.test is not None]
+    if tested:
+        pairs = dict.fromkeys((c.reference, c.other) for c in tested)
+        lines = [
+            _pair_verdict(pair, [c for c in tested if (c.reference, c.other) == pair])
+            for pair in pairs
+        ]
+        return prefix + " ".join(lines)
+    medians = [
+        text for name in conditions(study) if (text := _condition_verdict(name, measures(study)))
+    ]
+    if medians:
+        return f"{prefix}No comparison of conditions. Medians, {'; '.join(medians)}."
+    return f"{prefix}No epoch could be included; the reasons are listed under “Exclusions”."
+
+
+def _pair_verdict(pair: tuple[str, str], comparisons: Sequence[Comparison]) -> str:
+    groups: dict[str, list[str]] = {"lower": [], "higher": [], "no difference shown in": []}
+    for comparison in comparisons:
+        test = comparison.test
+        if test is None:
+            continue
+        shown = test.p < 1 - test.confidence
+        direction = "lower" if test.z > 0 else "higher"
+        title = comparison.title[:1].lower() + comparison.title[1:]
+        groups[direction if shown else "no difference shown in"].append(
+            f"{title} ({p_and_r(test.p, test.r)})"
+        )
+    parts = [f"{heading} {', '.join(items)}" for heading, items in groups.items() if items]
+    reference, other = (condition_name(name) for name in pair)
+    return f"{other} against {reference}: {'; '.join(parts)}."
+
+
+def _condition_verdict(condition: str, found: Sequence[Measure]) -> str:
+    medians = [
+        f"{measure.title} {number(summarise(values).median)} {measure.unit} (n = {len(values)})"
+        for measure in found
+        if (values := measure.values.get(condition))
+    ]
+    return f"{condition_name(condition)}: {', '.join(medians)}" if medians else ""

@@ -1,0 +1,60 @@
+"""Numbers as people read them. Only the page rounds; what is stored keeps every digit."""
+
+from __future__ import annotations
+
+import math
+
+__all__ = ["number", "p_and_r", "p_value"]
+
+SMALLEST_P = 1e-300
+"""Below this a p-value has run out of floating point."""
+
+
+def number(value: float, digits: int = 4) -> str:
+    """Return a number with so many significant digits, a dash for NaN.
+
+    Examples
+    --------
+    >>> number(0.1368), number(12345.6), number(-2.0), number(1.2e-7)
+    ('0.1368', '12346', '−2.000', '1.200e-07')
+    """
+    if math.isnan(value):
+        return "–"
+    sign = "−" if value < 0 else ""
+    size = abs(value)
+    if math.isinf(size):
+        return f"{sign}∞"
+    if size == 0:
+        return "0"
+    scientific = f"{size:.{digits - 1}e}"
+    exponent = int(scientific.partition("e")[2])
+    if not -4 <= exponent < 6:
+        return sign + scientific
+    return f"{sign}{size:.{max(digits - 1 - exponent, 0)}f}"
+
+
+def p_value(p: float) -> str:
+    """Return a p-value, never as zero.
+
+    Examples
+    --------
+    >>> p_value(0.0004), p_value(1.234e-6), p_value(0.0496), p_value(0.0)
+    ('0.0004', '1.2e-06', '0.0496', '< 1e-300')
+    """
+    if math.isnan(p):
+        return "–"
+    if p < SMALLEST_P:
+        return f"< {SMALLEST_P:.0e}"
+    return f"{p:.3g}" if p >= 1e-4 else f"{p:.1e}"
+
+
+def p_and_r(p: float, r: float) -> str:
+    """Return p and effect size as sentences quote them, unbroken at the signs.
+
+    Examples
+    --------
+    >>> p_and_r(0.0004, -0.351).replace("\N{NO-BREAK SPACE}", " ")
+    'p = 0.0004, r = −0.35'
+    """
+    text = f"p = {p_value(p)}, r = {r:.2f}".replace("= <", "<").replace("= -", "= −")
+    return text.replace(" =", "\N{NO-BREAK SPACE}=").replace("= ", "=\N{NO-BREAK SPACE}")

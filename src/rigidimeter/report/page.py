@@ -1,0 +1,188 @@
+"""Assemble the report: one page that needs nothing beside it, with its tables and figures."""
+
+from __future__ import annotations
+
+import base64
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path, PurePath
+
+import jinja2
+from markupsafe import Markup
+
+from rigidimeter import __version__
+from rigidimeter.records import Fit, Score
+from rigidimeter.report.measures import condition_name, conditions, verdict
+from rigidimeter.report.numbers import number, p_value
+from rigidimeter.report.pictures import (
+    Picture,
+    distribution_pictures,
+    loop_pictures,
+    perturbation_pictures,
+    torque_pictures,
+)
+from rigidimeter.report.table import Cell, Column, Table, csv_text
+from rigidimeter.report.tables import all_tables
+from rigidimeter.study import Comparison, Study
+
+__all__ = ["render_page", "short_names", "write_report"]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """The comparisons between one pair of conditions, ready for the page."""
+
+    reference: str
+    other: str
+    confidence_percent: str
+    rows: tuple[Mapping[str, str], ...]
+    unbounded: bool
+
+
+def write_report(study: Study, out: Path) -> Path:
+    """Write ``report.html``, ``tables/*.csv`` and ``figures/*.svg`` into a folder.
+
+    The same study gives the same bytes.
+
+    Parameters
+    ----------
+    study : Study
+        What to show.
+    out : Path
+        The folder; made if it does not exist. Files of the same names are replaced.
+
+    Returns
+    -------
+    Path
+        Of the page.
+    """
+    tables = all_tables(study)
+    pictures = {
+        "distributions": distribution_pictures(study),
+        "perturbation": perturbation_pictures(study),
+        "torque": torque_pictures(study),
+        "loops": loop_pictures(study),
+    }
+    (out / "tables").mkdir(parents=True, exist_ok=True)
+    (out / "figures").mkdir(parents=True, exist_ok=True)
+    for table in tables.values():
+        _write(out / "tables" / f"{table.name}.csv", csv_text(table))
+    for group in pictures.values():
+        for picture in group:
+            _write(out / "figures" / f"{picture.name}.svg", picture.svg)
+    page = out / "report.html"
+    _write(page, render_page(study, tables, pictures))
+    return page
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
+def render_page(
+    study: Study, tables: Mapping[str, Table], pictures: Mapping[str, Sequence[Picture]]
+) -> str:
+    """Return the page as text, with its style and its figures inside."""
+    folder = resources.files("rigidimeter.report")
+    names = short_names([*(e.source for e in study.epochs), *_sources(study)])
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["data_uri"] = _data_uri
+    environment.globals["show"] = lambda cell, column: _shown(cell, column, names)
+    template = environment.from_string((folder / "page.html").read_text(encoding="utf-8"))
+    return template.render(
+        study=study,
+        # The style is this package's own file, so it may stand as it is.
+        css=Markup((folder / "page.css").read_text(encoding="utf-8")),
+        tables=tables,
+        pictures=pictures,
+        pairs=(pairs := _pairs(study.comparisons)),
+        uncompared=len(conditions(study)) > 2 * len(pairs),
+        verdict=verdict(study),
+        virtual=sum(epoch.virtual for epoch in study.epochs),
+        sources=Counter(epoch.source for epoch in study.epochs),
+        source_names=names,
+        inertia=number(study.analysis.inertia_kg_m2),
+        version=__version__,
+    )
+
+
+def short_names(sources: Iterable[str]) -> dict[str, str]:
+    """Return the last parts of each path: as few as tell the sources apart."""
+    unique = list(dict.fromkeys(sources))
+    parts = {source: PurePath(source).parts for source in unique}
+    for depth in range(1, max(map(len, parts.values()), default=1) + 1):
+        names = {source: "/".join(parts[source][-depth:]) or source for source in unique}
+        if len(set(names.values())) == len(unique):
+            return names
+    return {source: source for source in unique}
+
+
+def _sources(study: Study) -> list[str]:
+    analysis = study.analysis
+    results: tuple[Fit | Score, ...] = (*analysis.fits, *analysis.fixed_inertia, *analysis.scores)
+    return [result.source for result in results]
+
+
+def _data_uri(svg: str) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode("ascii")
+
+
+def _shown(cell: Cell, column: Column, names: Mapping[str, str]) -> str:
+    """Return a cell as the page prints it."""
+    if cell is None or cell == "":
+        return "(no condition)" if column.kind == "condition" else "–"
+    if column.kind == "source":
+        return names.get(str(cell), str(cell))
+    if isinstance(cell, float):
+        return f"{cell:g}" if column.kind == "setting" else number(cell)
+    return str(cell)
+
+
+def _pairs(comparisons: Iterable[Comparison]) -> list[Pair]:
+    groups: dict[tuple[str, str], list[Comparison]] = {}
+    for comparison in comparisons:
+        if comparison.other not in comparison.summaries:
+            continue  # one condition only: its summaries say it all
+        groups.setdefault((comparison.reference, comparison.other), []).append(comparison)
+    pairs = []
+    for (reference, other), members in groups.items():
+        tests = [c.test for c in members if c.test is not None]
+        confidences = dict.fromkeys(f"{100 * test.confidence:g} %" for test in tests)
+        pairs.append(
+            Pair(
+                condition_name(reference),
+                condition_name(other),
+                " and ".join(confidences) or "95 %",
+                tuple(_row(comparison) for comparison in members),
+                any(not test.shift_bounded for test in tests),
+            )
+        )
+    return pairs
+
+
+def _row(comparison: Comparison) -> dict[str, str]:
+    row = {"title": comparison.title, "unit": comparison.unit, "remark": comparison.remark}
+    sides = {"reference": comparison.reference, "other": comparison.other}
+    for side, condition in sides.items():
+        s = comparison.summaries[condition]
+        row[f"n_{side}"] = str(s.n)
+        row[f"excluded_{side}"] = str(comparison.excluded[condition])
+        row[f"median_{side}"] = number(s.median)
+        row[f"quartiles_{side}"] = _interval(s.q1, s.q3) if s.n else ""
+    test = comparison.test
+    if test is None:
+        return row
+    row["shift"] = number(test.shift)
+    row["interval"] = _interval(test.shift_low, test.shift_high)
+    row["interval"] += "" if test.shift_bounded else " †"
+    row["z"], row["r"] = number(test.z, 3), f"{test.r:.2f}".replace("-", "−")
+    row["p"] = p_value(test.p)
+    return row
+
+
+def _interval(low: float, high: float) -> str:
+    return f"[{number(low, 3)} to {number(high, 3)}]"

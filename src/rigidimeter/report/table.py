@@ -1,0 +1,47 @@
+"""A table: full precision inside, to CSV as it is, to the page rounded."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = ["Cell", "Column", "Kind", "Table", "csv_text"]
+
+Cell = str | int | float | None
+Kind = Literal[
+    "text", "label", "reason", "source", "condition", "outcome", "count", "number", "setting"
+]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its stored name with the unit, its heading for people, what it holds.
+
+    A column that is not `on_page` is in the CSV only.
+    """
+
+    name: str
+    heading: str
+    kind: Kind = "number"
+    on_page: bool = True
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of unrounded cells; `None` is a cell that has no value."""
+
+    name: str
+    caption: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+def csv_text(table: Table) -> str:
+    """Return the table as CSV: stored names as header, floats so that they read back equal."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow([column.name for column in table.columns])
+    writer.writerows(table.rows)
+    return file.getvalue()

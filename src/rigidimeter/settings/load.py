@@ -1,0 +1,58 @@
+"""Read settings from TOML and write them back; refusals are sentences."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from rigidimeter.errors import UserError
+from rigidimeter.settings.messages import sentence
+from rigidimeter.settings.models import Settings
+
+__all__ = ["dump_settings", "load_settings", "parse_settings"]
+
+
+def parse_settings(values: Mapping[str, Any], *, source: str = "settings") -> Settings:
+    """Validate a nested mapping.
+
+    Raises
+    ------
+    UserError
+        Naming each offending key, its value, its unit and the allowed range; for an unknown key
+        the nearest known one.
+    """
+    try:
+        return Settings.model_validate(dict(values))
+    except ValidationError as error:
+        lines = [sentence(Settings, values, detail) for detail in error.errors()]
+        raise UserError(f"{source}: " + "; ".join(lines)) from None
+
+
+def load_settings(path: Path | None) -> Settings:
+    """Read a TOML file; `None` gives the defaults.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, is not TOML, or holds a bad value.
+    """
+    if path is None:
+        return Settings()
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except UnicodeDecodeError:
+        raise UserError(f"{path}: is not a text file in UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise UserError(f"{path}: is not valid TOML: {error}") from None
+    return parse_settings(values, source=str(path))
+
+
+def dump_settings(settings: Settings) -> dict[str, Any]:
+    """Return the settings as plain nested values, as the manifest stores them."""
+    return settings.model_dump(mode="json")

@@ -1,0 +1,124 @@
+"""Turn a validation error into a sentence with key, value, unit and allowed range."""
+
+from __future__ import annotations
+
+import difflib
+import types
+import typing
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+__all__ = ["sentence"]
+
+
+def sentence(root: type[BaseModel], values: Mapping[str, Any], detail: ErrorDetails) -> str:
+    """Return one sentence for one error that pydantic reports about `values`."""
+    where = [part for part in detail["loc"] if part != "[key]"]
+    key = _dotted(where)
+    owner, field = _walk(root, where)
+    if detail["type"] == "extra_forbidden":
+        return _unknown_key(root, values, where, owner)
+    if detail["type"] == "value_error":
+        text = str(detail["msg"]).removeprefix("Value error, ")
+        return f"{key}: {text}" if key else text
+    value = detail["input"]
+    shown = repr(value) if isinstance(value, str) else _plain(value)
+    if field is None:
+        return f"{key} = {shown}: {detail['msg']}"
+    return f"{key} = {shown} is not allowed: it must be {_expected(field)}"
+
+
+def _dotted(where: Sequence[str | int]) -> str:
+    text = ""
+    for part in where:
+        text += f"[{part}]" if isinstance(part, int) else (f".{part}" if text else part)
+    return text
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        return "a table"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    found: list[type[BaseModel]] = []
+    for inner in typing.get_args(annotation):
+        found += _models_in(inner)
+    return found
+
+
+def _walk(
+    root: type[BaseModel], where: Sequence[str | int]
+) -> tuple[type[BaseModel] | None, FieldInfo | None]:
+    """Follow a location to the model that owns its last key, and the field if there is one."""
+    model: type[BaseModel] | None = root
+    owner: type[BaseModel] | None = root
+    field: FieldInfo | None = None
+    for part in where:
+        if model is not None and isinstance(part, str) and part in model.model_fields:
+            owner, field = model, model.model_fields[part]
+            inner = _models_in(field.annotation)
+            model = inner[0] if inner and not _is_container(field.annotation) else None
+        elif field is not None and _models_in(field.annotation) and model is None:
+            model = _models_in(field.annotation)[0]  # an entry of a list or dict of tables
+            owner = model
+        else:
+            owner, field = model or owner, None if model is not None else field
+    return owner, field
+
+
+def _is_container(annotation: Any) -> bool:
+    return typing.get_origin(annotation) in (list, dict, tuple, types.UnionType)
+
+
+def _unknown_key(
+    root: type[BaseModel],
+    values: Mapping[str, Any],
+    where: Sequence[str | int],
+    owner: type[BaseModel] | None,
+) -> str:
+    key, name = _dotted(where), str(where[-1])
+    known = list(owner.model_fields) if owner is not None else []
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
+    if not near:
+        return f"{key} is not a setting"
+    here = _dotted([*where[:-1], near[0]])
+    return f"{key} is not a setting; the nearest is {here} (known here: {', '.join(known)})"
+
+
+def _expected(field: FieldInfo) -> str:
+    extra = field.json_schema_extra
+    unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    suffix = "" if unit in ("", "1") else f" {unit}"
+    bounds = {
+        name: getattr(item, name)
+        for item in field.metadata
+        for name in ("gt", "ge", "le", "lt", "min_length", "max_length")
+        if getattr(item, name, None) is not None
+    }
+    if typing.get_origin(field.annotation) is typing.Literal:
+        return "one of " + ", ".join(repr(choice) for choice in typing.get_args(field.annotation))
+    if field.annotation is str:
+        return f"a text of {bounds['min_length']} to {bounds['max_length']} letters"
+    if field.annotation not in (int, float):
+        if _is_container(field.annotation):
+            inner = typing.get_args(field.annotation)
+            what = "numbers" if inner and inner[-1] is float else "tables"
+            return f"a non-empty list of {what}{f' in {unit}' if suffix else ''}"
+        return "a table"
+    kind = "a whole number" if field.annotation is int else "a number"
+    low = (
+        f"greater than {bounds['gt']:g}{suffix}"
+        if "gt" in bounds
+        else f"at least {bounds['ge']:g}{suffix}"
+    )
+    return f"{kind} {low} and at most {bounds['le']:g}{suffix}"

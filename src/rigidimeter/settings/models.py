@@ -1,0 +1,305 @@
+"""What can be set, with its unit, its default and its allowed range.
+
+Every number is declared by `quantity`, which keeps the unit beside the bounds so that a refusal can
+name both. The defaults are the paper's where it gives a value.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from rigidimeter.units import per_rad_from_per_deg
+
+__all__ = [
+    "BlockSettings",
+    "ControllerSettings",
+    "EstimationSettings",
+    "GuardSettings",
+    "MotionSensorSettings",
+    "PrbsSettings",
+    "ProtocolSettings",
+    "RigSettings",
+    "ScoreSettings",
+    "Settings",
+    "SinusoidSettings",
+    "SubjectSettings",
+    "TorqueSensorSettings",
+    "quantity",
+]
+
+
+def quantity(default: float, unit: str, low: float, high: float, *, above: bool = False) -> Any:
+    """Declare a number with its unit and range.
+
+    Parameters
+    ----------
+    default : float
+        The value when the key is absent.
+    unit : str
+        The unit, for messages; ``"1"`` for a pure number.
+    low, high : float
+        The allowed range, both ends included unless `above`.
+    above : bool
+        The value must be greater than `low`.
+    """
+    lower: dict[str, Any] = {"gt": low} if above else {"ge": low}
+    return Field(default, **lower, le=high, json_schema_extra={"unit": unit})
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_default=True
+    )
+
+
+class ControllerSettings(_Section):
+    """The admittance M_PRBS − M_meas = J_c θ'' + B_c θ' (Eq. 5), per radian.
+
+    The paper prints both values per degree in Sec. 2.4.2 (0.0008 and 0.028) and per radian in
+    App. A. Only the reading per degree gives the position SD of about 4 deg that it reports.
+    """
+
+    inertia_kg_m2: float = quantity(per_rad_from_per_deg(0.0008), "kg·m²", 0.0, 10.0, above=True)
+    damping_nm_s_rad: float = quantity(per_rad_from_per_deg(0.028), "N·m·s/rad", 0.0, 100.0)
+    torque_cutoff_hz: float = quantity(20.0, "Hz", 0.5, 1000.0)
+    tracking_gain_per_s: float = quantity(1.0, "1/s", 0.0, 50.0)
+
+
+class GuardSettings(_Section):
+    """Limits that hold whatever the controller asks for.
+
+    `reaction_time_s` is what passes between a command and the motion that answers it, encoder
+    included; braking for the position limit begins that much earlier.
+    """
+
+    position_limit_deg: float = quantity(40.0, "deg", 1.0, 180.0)
+    speed_limit_deg_s: float = quantity(200.0, "deg/s", 1.0, 1000.0)
+    acceleration_limit_deg_s2: float = quantity(6000.0, "deg/s²", 10.0, 100000.0)
+    reaction_time_s: float = quantity(0.02, "s", 0.0, 0.2)
+
+
+class PrbsSettings(_Section):
+    """The torque perturbation: a maximal-length pseudo-random binary sequence."""
+
+    register_bits: int = quantity(7, "1", 3, 20)
+    clock_hz: float = quantity(20.0, "Hz", 0.1, 1000.0)
+    amplitude_nm: float = quantity(1.0, "N·m", 0.0, 50.0, above=True)
+    duration_s: float = quantity(20.0, "s", 1.0, 3600.0)
+    wanted_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
+    wanted_high_hz: float = quantity(10.0, "Hz", 0.01, 500.0)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.wanted_low_hz >= self.wanted_high_hz:
+            raise ValueError("wanted_low_hz must be below wanted_high_hz")
+        return self
+
+
+class SinusoidSettings(_Section):
+    """The position perturbation for the impulse and work scores."""
+
+    frequency_hz: float = quantity(1.0, "Hz", 0.05, 10.0)
+    amplitude_deg: float = quantity(20.0, "deg", 0.1, 90.0)
+    motion_s: float = quantity(10.0, "s", 1.0, 600.0)
+    duration_s: float = quantity(20.0, "s", 1.0, 3600.0)
+    taper_s: float = quantity(1.0, "s", 0.0, 10.0)
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.motion_s > self.duration_s:
+            raise ValueError("motion_s must not exceed duration_s")
+        if 2 * self.taper_s > self.motion_s:
+            raise ValueError("taper_s must be at most half of motion_s")
+        return self
+
+
+class TorqueSensorSettings(_Section):
+    """The virtual torque sensor. `stamp_latency_s` is the part of the latency its stamps know."""
+
+    rate_hz: float = quantity(1000.0, "Hz", 1.0, 20000.0)
+    noise_sd_nm: float = quantity(0.005, "N·m", 0.0, 10.0)
+    resolution_nm: float = quantity(0.0005, "N·m", 0.0, 1.0)
+    latency_s: float = quantity(0.001, "s", 0.0, 0.1)
+    stamp_latency_s: float = quantity(0.001, "s", 0.0, 0.1)
+    jitter_s: float = quantity(0.0, "s", 0.0, 0.1)
+
+
+class MotionSensorSettings(_Section):
+    """The virtual encoder: angle and velocity sampled together."""
+
+    rate_hz: float = quantity(1000.0, "Hz", 1.0, 20000.0)
+    angle_resolution_deg: float = quantity(2.25e-4, "deg", 0.0, 1.0)
+    velocity_resolution_deg_s: float = quantity(0.01, "deg/s", 0.0, 10.0)
+    latency_s: float = quantity(0.001, "s", 0.0, 0.1)
+    stamp_latency_s: float = quantity(0.001, "s", 0.0, 0.1)
+    jitter_s: float = quantity(0.0, "s", 0.0, 0.1)
+
+
+class RigSettings(_Section):
+    """The virtual rig: loop rate, drive and sensors."""
+
+    tick_rate_hz: float = quantity(1000.0, "Hz", 50.0, 5000.0)
+    drive_bandwidth_hz: float = quantity(50.0, "Hz", 1.0, 2000.0)
+    drive_damping_ratio: float = quantity(0.7071, "1", 0.1, 0.99)
+    torque: TorqueSensorSettings = TorqueSensorSettings()
+    motion: MotionSensorSettings = MotionSensorSettings()
+
+
+class SubjectSettings(_Section):
+    """A virtual subject in one condition.
+
+    Each epoch draws J, B and K log-normally about the medians given here, with the coefficients of
+    variation given here.
+    """
+
+    inertia_kg_m2: float = quantity(0.0045, "kg·m²", 0.0, 10.0, above=True)
+    damping_nm_s_rad: float = quantity(0.1368, "N·m·s/rad", 0.0, 100.0)
+    stiffness_nm_rad: float = quantity(1.751, "N·m/rad", 0.0, 10000.0)
+    inertia_cv_percent: float = quantity(0.0, "%", 0.0, 100.0)
+    damping_cv_percent: float = quantity(0.0, "%", 0.0, 100.0)
+    stiffness_cv_percent: float = quantity(0.0, "%", 0.0, 100.0)
+    voluntary_sd_nm: float = quantity(0.0, "N·m", 0.0, 10.0)
+    voluntary_low_hz: float = quantity(0.3, "Hz", 0.01, 20.0)
+    voluntary_high_hz: float = quantity(4.0, "Hz", 0.05, 50.0)
+    tremor_amplitude_nm: float = quantity(0.0, "N·m", 0.0, 10.0)
+    tremor_frequency_hz: float = quantity(5.0, "Hz", 1.0, 20.0)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.voluntary_low_hz >= self.voluntary_high_hz:
+            raise ValueError("voluntary_low_hz must be below voluntary_high_hz")
+        return self
+
+
+class BlockSettings(_Section):
+    """A run of epochs of one task in one condition."""
+
+    task: Literal["prbs", "sinusoid"] = "prbs"
+    condition: str = Field("OFF", min_length=1, max_length=40)
+    epochs: int = quantity(4, "1", 1, 1000)
+
+
+class ProtocolSettings(_Section):
+    """Blocks of epochs in order, with random rests in between."""
+
+    blocks: list[BlockSettings] = Field(
+        default_factory=lambda: [BlockSettings(task="prbs"), BlockSettings(task="sinusoid")],
+        min_length=1,
+    )
+    rests_s: list[float] = Field([10.0, 20.0], min_length=1, json_schema_extra={"unit": "s"})
+    return_s: float = quantity(3.0, "s", 0.5, 60.0)
+
+    @model_validator(mode="after")
+    def _rests_hold_the_return(self) -> Self:
+        for rest_s in self.rests_s:
+            if not self.return_s <= rest_s <= 3600:
+                raise ValueError(
+                    f"rests_s holds {rest_s:g} s; each rest must last at least return_s "
+                    f"({self.return_s:g} s) and at most 3600 s"
+                )
+        return self
+
+
+class EstimationSettings(_Section):
+    """How J, B and K are estimated from an epoch.
+
+    `band_high_hz` applies where the perturbation is known; `band_high_unknown_hz` where it is not,
+    since an imposed motion may excite the joint far above the paper's 10 Hz.
+    """
+
+    band_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
+    band_high_hz: float = quantity(10.0, "Hz", 0.1, 1000.0)
+    band_high_unknown_hz: float = quantity(50.0, "Hz", 0.1, 1000.0)
+    trim_s: float = quantity(1.0, "s", 0.0, 60.0)
+    shortest_epoch_s: float = quantity(5.0, "s", 1.0, 600.0)
+    published_highpass_hz: float = quantity(0.2, "Hz", 0.001, 10.0)
+    published_highpass_order: int = quantity(2, "1", 1, 6)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.band_low_hz >= min(self.band_high_hz, self.band_high_unknown_hz):
+            raise ValueError("band_low_hz must be below band_high_hz and band_high_unknown_hz")
+        return self
+
+
+class ScoreSettings(_Section):
+    """How the impulse and work scores are computed (Sec. 2.3)."""
+
+    band_low_hz: float = quantity(0.2, "Hz", 0.001, 10.0)
+    band_high_hz: float = quantity(5.0, "Hz", 0.1, 100.0)
+    cycles: int = quantity(8, "1", 1, 1000)
+    discard_s: float = quantity(1.0, "s", 0.0, 60.0)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.band_low_hz >= self.band_high_hz:
+            raise ValueError("band_low_hz must be below band_high_hz")
+        return self
+
+
+class Settings(_Section):
+    """Everything that can be set, one table of the TOML file for each field."""
+
+    seed: int = Field(1, ge=0, le=2**32 - 1, json_schema_extra={"unit": "1"})
+    controller: ControllerSettings = ControllerSettings()
+    guard: GuardSettings = GuardSettings()
+    prbs: PrbsSettings = PrbsSettings()
+    sinusoid: SinusoidSettings = SinusoidSettings()
+    rig: RigSettings = RigSettings()
+    subject: dict[str, SubjectSettings] = Field(
+        default_factory=lambda: {
+            "OFF": SubjectSettings(),
+            "DBS": SubjectSettings(damping_nm_s_rad=0.115, stiffness_nm_rad=1.42),
+        }
+    )
+    protocol: ProtocolSettings = ProtocolSettings()
+    estimation: EstimationSettings = EstimationSettings()
+    scores: ScoreSettings = ScoreSettings()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for block in self.protocol.blocks:
+            if block.condition not in self.subject:
+                known = ", ".join(sorted(self.subject))
+                raise ValueError(
+                    f"protocol.blocks names condition {block.condition!r}, but there is no "
+                    f"[subject.{block.condition}]; known conditions: {known}"
+                )
+        if self.sinusoid.amplitude_deg >= self.guard.position_limit_deg:
+            raise ValueError(
+                f"sinusoid.amplitude_deg = {self.sinusoid.amplitude_deg:g} deg must stay below "
+                f"guard.position_limit_deg = {self.guard.position_limit_deg:g} deg"
+            )
+        rig = self.rig
+        delay_s = (
+            rig.drive_damping_ratio / (math.pi * rig.drive_bandwidth_hz)
+            + rig.motion.latency_s
+            + 1 / rig.tick_rate_hz
+        )
+        if self.guard.reaction_time_s < delay_s:
+            raise ValueError(
+                f"guard.reaction_time_s = {self.guard.reaction_time_s:g} s is shorter than this "
+                f"rig takes to react ({delay_s:.3g} s: drive lag, encoder latency and one tick), "
+                "so the arm could pass the position limit; raise it to at least that"
+            )
+        if self.controller.torque_cutoff_hz >= self.rig.tick_rate_hz / 2:
+            raise ValueError(
+                f"controller.torque_cutoff_hz = {self.controller.torque_cutoff_hz:g} Hz must stay "
+                f"below half of rig.tick_rate_hz = {self.rig.tick_rate_hz:g} Hz"
+            )
+        if self.prbs.clock_hz > self.rig.tick_rate_hz:
+            raise ValueError(
+                f"prbs.clock_hz = {self.prbs.clock_hz:g} Hz must not exceed rig.tick_rate_hz = "
+                f"{self.rig.tick_rate_hz:g} Hz"
+            )
+        rates = {"torque": self.rig.torque.rate_hz, "motion": self.rig.motion.rate_hz}
+        for name, rate in rates.items():
+            if rate > self.rig.tick_rate_hz:
+                raise ValueError(
+                    f"rig.{name}.rate_hz = {rate:g} Hz must not exceed rig.tick_rate_hz = "
+                    f"{self.rig.tick_rate_hz:g} Hz"
+                )
+        return self

@@ -1,0 +1,201 @@
+"""From epochs to fits, to the median inertia, to the second fit, to comparisons.
+
+Acquisition and study meet only in recorded files, so a laboratory can analyse with no driver
+installed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimeter.estimation import fit_epoch, score_epoch, single_frequency_share
+from rigidimeter.estimation.screening import before_fit
+from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score, Task
+from rigidimeter.settings import Settings
+from rigidimeter.statistics import RankSum, Summary, ranksum, summarise
+
+__all__ = ["Comparison", "Study", "analyse", "compare", "conditions", "task_of"]
+
+SINGLE_FREQUENCY_SHARE = 0.85
+"""Above this share of the angle's variance in one line, the epoch is an imposed sinusoid.
+
+A sinusoid whose motion fills half the epoch reaches 0.95, a PRBS in the closed loop 0.5.
+"""
+
+FEWEST_FOR_TEST = 3
+"""Below this many values in a condition there is no rank-sum test."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One measure in two conditions.
+
+    Attributes
+    ----------
+    measure : str
+        Stored name with unit, for example ``damping_nm_s_rad``.
+    title : str
+        Name for people, for example ``Viscous damping B``.
+    unit : str
+        For axes and tables, for example ``N·m·s/rad``.
+    reference, other : str
+        The two conditions; differences are reference − other.
+    values : mapping of str to tuple of float
+        The included values by condition, in the order of recording.
+    summaries : mapping of str to Summary
+        By condition.
+    excluded : mapping of str to int
+        How many epochs of each condition have no included value.
+    test : RankSum or None
+        None when a condition has too few values, for the reason in `remark`.
+    remark : str
+        Why there is no test, else empty.
+    """
+
+    measure: str
+    title: str
+    unit: str
+    reference: str
+    other: str
+    values: Mapping[str, tuple[float, ...]]
+    summaries: Mapping[str, Summary]
+    excluded: Mapping[str, int]
+    test: RankSum | None
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything that a report shows."""
+
+    title: str
+    settings: Settings
+    epochs: tuple[Epoch, ...]
+    analysis: Analysis
+    comparisons: tuple[Comparison, ...]
+    notices: tuple[Notice, ...]
+    provenance: Mapping[str, str]
+
+
+def task_of(epoch: Epoch, settings: Settings) -> Task:
+    """Return the epoch's task: as recorded, else a sinusoid if the angle holds a single line."""
+    if epoch.task is not None:
+        return epoch.task
+    if before_fit(epoch, settings.estimation):
+        return "prbs"  # it will fail with its reason among the fits
+    return "sinusoid" if single_frequency_share(epoch) > SINGLE_FREQUENCY_SHARE else "prbs"
+
+
+def analyse(
+    epochs: Iterable[Epoch],
+    settings: Settings,
+    method: str = "bandlimited",
+    *,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Analysis:
+    """Fit every perturbation epoch and score every sinusoidal one.
+
+    Two stages, as in Sec. 2.4.4: J, B and K for each epoch; then J held at the median of all
+    included epochs of all conditions, and B and K again (Eq. 7).
+
+    Parameters
+    ----------
+    epochs : iterable of Epoch
+    settings : Settings
+    method : str
+        A key of `estimation.METHODS`.
+    progress : callable
+        Called with the name of each epoch once it is done, in either stage.
+    """
+    fitted: list[Epoch] = []
+    fits: list[Fit] = []
+    scores: list[Score] = []
+    for epoch in epochs:
+        if task_of(epoch, settings) == "sinusoid":
+            scores.append(score_epoch(epoch, settings.scores, settings.estimation))
+        else:
+            fitted.append(epoch)
+            fits.append(fit_epoch(epoch, method, settings.estimation))
+        progress(epoch.name)
+    included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
+    inertia_kg_m2 = float(np.median(included)) if included else float("nan")
+    fixed = []
+    for epoch, fit in zip(fitted, fits, strict=True):
+        if included:
+            fixed.append(fit_epoch(epoch, method, settings.estimation, inertia_kg_m2))
+        else:  # no epoch gives a median to hold
+            fixed.append(Fit(fit.source, fit.epoch, fit.condition, fit.method, fit.outcome))
+        progress(epoch.name)
+    return Analysis(method, tuple(fits), tuple(fixed), inertia_kg_m2, tuple(scores))
+
+
+def conditions(analysis: Analysis) -> tuple[str, ...]:
+    """Return the named conditions in order of appearance, ``OFF`` first where it occurs."""
+    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
+    seen = dict.fromkeys(result.condition for result in results if result.condition)
+    return tuple(sorted(seen, key=lambda condition: condition != "OFF"))
+
+
+def compare(
+    analysis: Analysis, reference: str | None = None, other: str | None = None
+) -> tuple[Comparison, ...]:
+    """Compare two conditions in J, B, K, impulse and work; B and K with the inertia held.
+
+    Without names, the first two conditions that `conditions` gives. An analysis with one condition
+    gives its summaries and no test.
+    """
+    names = conditions(analysis) or ("",)
+    first = reference if reference is not None else names[0]
+    rest = [name for name in names if name != first]
+    second = other if other is not None else (rest[0] if rest else "")
+    one, two, work = analysis.fits, analysis.fixed_inertia, analysis.scores
+    measures: list[tuple[str, str, str, Sequence[Fit | Score]]] = [
+        ("inertia_kg_m2", "Inertia J", "kg·m²", one),
+        ("damping_nm_s_rad", "Viscous damping B", "N·m·s/rad", two),
+        ("stiffness_nm_rad", "Stiffness K", "N·m/rad", two),
+        ("impulse_nm_s", "Angular impulse", "N·m·s", work),
+        ("work_j", "Work", "J", work),
+    ]
+    return tuple(
+        _comparison(measure, title, unit, results, first, second)
+        for measure, title, unit, results in measures
+        if results
+    )
+
+
+def _comparison(
+    measure: str,
+    title: str,
+    unit: str,
+    results: Sequence[Fit | Score],
+    reference: str,
+    other: str,
+) -> Comparison:
+    groups = [reference, other] if other else [reference]
+    values = {
+        name: tuple(
+            float(getattr(result, measure))
+            for result in results
+            if result.condition == name and result.outcome.included
+        )
+        for name in groups
+    }
+    excluded = {
+        name: sum(r.condition == name and not r.outcome.included for r in results)
+        for name in groups
+    }
+    test, remark = None, ""
+    if not other:
+        remark = "only one condition was recorded"
+    elif min(len(values[name]) for name in groups) < FEWEST_FOR_TEST:
+        counts = " and ".join(f"{len(values[name])} in {name}" for name in groups)
+        remark = f"a test needs {FEWEST_FOR_TEST} epochs in each condition; there are {counts}"
+    else:
+        test = ranksum(values[reference], values[other])
+    summaries = {name: summarise(values[name]) for name in groups}
+    return Comparison(
+        measure, title, unit, reference, other, values, summaries, excluded, test, remark
+    )

@@ -1,0 +1,100 @@
+"""SIGKILL in the middle of a session: all but the last tenth of a second comes back."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from rigidimeter.recording.log import read_samples
+
+RIGIDIMETER = [sys.executable, "-m", "rigidimeter"]
+
+
+def start(folder, *options):
+    return subprocess.Popen(
+        [*RIGIDIMETER, "simulate", "--out", str(folder), "--task", "prbs", *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def wait_for_epoch(folder, number, timeout_s=60.0):
+    deadline = time.monotonic() + timeout_s
+    while time.monotonic() < deadline:
+        events = folder / "events.jsonl"
+        if events.exists() and events.read_text().count("epoch_started") >= number:
+            return
+        time.sleep(0.02)
+    pytest.fail(f"epoch {number} did not start within {timeout_s} s")
+
+
+def run(*arguments):
+    return subprocess.run(
+        [*RIGIDIMETER, *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+
+
+def test_a_killed_session_comes_back_and_is_analysed(tmp_path):
+    folder = tmp_path / "session"
+    process = start(folder, "--epochs", "50")
+    wait_for_epoch(folder, 3)
+    process.kill()
+    process.communicate()
+    last_written = read_samples(folder / "samples.arrows")["tick"][-1]
+
+    recovered = run("recover", folder, "--reason", "the plug was pulled")
+    assert recovered.returncode == 0, recovered.stderr
+    ticks = read_samples(folder / "samples.arrows")["tick"]
+    np.testing.assert_array_equal(ticks, np.arange(last_written + 1))
+    closing = [
+        json.loads(line)
+        for line in (folder / "events.jsonl").read_text().splitlines()
+        if "_ended" in line
+    ]
+    assert closing[-1]["event"] == "session_ended"
+    assert closing[-1]["reason"] == "the plug was pulled"
+
+    out = tmp_path / "out.json"
+    analysed = run("estimate", folder, "--json", out)
+    assert analysed.returncode == 0, analysed.stderr
+    epochs = json.loads(out.read_text())["epochs"]
+    assert [e["outcome"] for e in epochs[:2]] == ["included", "included"]
+    assert epochs[0]["stiffness_nm_rad"] == pytest.approx(1.751, rel=0.01)
+    assert "the plug was pulled" in epochs[-1]["reason"]
+
+
+def test_in_real_time_at_most_a_tenth_of_a_second_is_lost(tmp_path):
+    folder = tmp_path / "session"
+    process = start(folder, "--epochs", "1", "--real-time")
+    wait_for_epoch(folder, 1)
+    started = time.monotonic()
+    time.sleep(1.5)
+    process.kill()
+    ran_s = time.monotonic() - started
+    process.communicate()
+    samples = read_samples(folder / "samples.arrows")
+    # The epoch's event is polled every 20 ms, so the loop had run at least as long as we waited.
+    assert samples["time_s"][-1] >= ran_s - 0.1 - 0.02
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_session_closes_in_order(tmp_path, number):
+    folder = tmp_path / "session"
+    process = start(folder, "--epochs", "50")
+    wait_for_epoch(folder, 2)
+    os.kill(process.pid, number)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode != 0
+    assert "Traceback" not in errors
+    events = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
+    assert events[-1]["event"] == "session_ended"
+    assert events[-1]["outcome"] == "abort"
+    assert events[-1]["reason"] == "interrupted by the operator"
+    # The velocity was ramped to zero before the end.
+    assert read_samples(folder / "samples.arrows")["velocity_command_rad_s"][-1] == 0.0

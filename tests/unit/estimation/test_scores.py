@@ -1,0 +1,106 @@
+"""A sinusoid has both scores in closed form: work π B ω A², and an impulse from the amplitude."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rigidimeter.estimation import find_motion, score_epoch, scoring_cycles, single_frequency_share
+from rigidimeter.estimation.scores import loop_area_j
+from rigidimeter.joint import JointDynamics
+from rigidimeter.records import Channel, Epoch, Motion, Outcome
+from rigidimeter.settings import EstimationSettings, ScoreSettings
+
+A, F = math.radians(20.0), 1.0
+W = 2 * math.pi * F
+SCORES, SCREEN = ScoreSettings(), EstimationSettings()
+
+
+def motion(t):
+    return A * np.sin(W * t), A * W * np.cos(W * t), -A * W**2 * np.sin(W * t)
+
+
+def sinusoid_epoch(joint, rate_hz=1000.0, duration_s=20.0, delay_s=0.0, known=True):
+    t = np.arange(round(duration_s * rate_hz) + 1) / rate_hz
+    channels = {
+        "torque_nm": Channel("torque_nm", t, joint.torque_nm(*motion(t - delay_s))),
+        "angle_rad": Channel("angle_rad", t, motion(t)[0]),
+    }
+    said = Motion(F, 0.0, duration_s) if known else None
+    return Epoch("file", "1", channels, task="sinusoid", motion=said)
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 1.751, 25.0])
+def test_the_loop_area_is_pi_b_omega_a_squared_whatever_the_stiffness(stiffness):
+    t = np.linspace(0.0, 8.0, 8 * 4096 + 1)
+    torque = JointDynamics(0.0045, 0.1368, stiffness).torque_nm(*motion(t))
+    area = loop_area_j(torque, motion(t)[0]) / 8
+    assert area == pytest.approx(math.pi * 0.1368 * W * A**2, rel=1e-6)
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 1000.0])
+def test_the_work_score_of_a_recording_is_the_closed_form(rate_hz):
+    expected = math.pi * 0.1368 * W * A**2
+    soft = score_epoch(
+        sinusoid_epoch(JointDynamics(0.0045, 0.1368, 1.751), rate_hz), SCORES, SCREEN
+    )
+    hard = score_epoch(
+        sinusoid_epoch(JointDynamics(0.0045, 0.1368, 3.064), rate_hz), SCORES, SCREEN
+    )
+    assert soft.n_cycles == 8
+    assert soft.work_j == pytest.approx(expected, rel=1e-6)
+    assert hard.work_j == pytest.approx(soft.work_j, rel=1e-9)
+
+
+def test_the_impulse_score_of_a_recording_is_the_closed_form():
+    # Σ|M|Δt over a cycle of amplitude C is 4 C / ω.
+    joint = JointDynamics(0.0045, 0.1368, 1.751)
+    amplitude = A * math.hypot(1.751 - 0.0045 * W**2, 0.1368 * W)
+    score = score_epoch(sinusoid_epoch(joint), SCORES, SCREEN)
+    assert score.impulse_nm_s == pytest.approx(4 * amplitude / W, rel=1e-5)
+
+
+def test_a_delay_between_torque_and_angle_makes_work_depend_on_stiffness():
+    # −K A² π sin(ωτ): a torque that is 10 ms late makes a stiff joint seem to give work back.
+    late = [
+        score_epoch(sinusoid_epoch(JointDynamics(1e-9, 1e-6, k), delay_s=0.01), SCORES, SCREEN)
+        for k in (1.0, 2.0)
+    ]
+    for k, score in zip((1.0, 2.0), late, strict=True):
+        assert score.work_j == pytest.approx(-math.pi * k * A**2 * math.sin(0.01 * W), rel=5e-3)
+
+
+def test_the_motion_is_found_where_it_is_not_said():
+    t = np.arange(20_001) / 1000.0
+    moving = (t >= 3.0) & (t <= 13.0)
+    angle = np.where(moving, A * np.sin(2 * np.pi * 1.1 * (t - 3.0)), 0.0)
+    channels = {
+        "torque_nm": Channel("torque_nm", t, angle + 0.1),
+        "angle_rad": Channel("angle_rad", t, angle),
+    }
+    epoch = Epoch("file", "1", channels)
+    found = find_motion(epoch)
+    assert found.frequency_hz == pytest.approx(1.1, abs=0.005)
+    assert found.start_s == pytest.approx(3.0, abs=0.3)
+    assert found.start_s + found.duration_s == pytest.approx(13.0, abs=0.3)
+    assert single_frequency_share(epoch) > 0.9
+
+
+def test_a_short_motion_gives_the_cycles_it_has_or_says_that_it_has_none():
+    joint = JointDynamics(0.0045, 0.1368, 1.751)
+    assert scoring_cycles(sinusoid_epoch(joint, duration_s=6.0), SCORES).n_cycles == 4
+    epoch = sinusoid_epoch(joint)
+    short = Epoch("f", "1", epoch.channels, task="sinusoid", motion=Motion(F, 0.0, 2.5))
+    score = score_epoch(short, SCORES, SCREEN)
+    assert score.outcome.kind == "failed"
+    assert "no whole cycle" in score.outcome.reason
+    assert math.isnan(score.work_j)
+
+
+def test_an_epoch_that_was_not_closed_with_success_is_scored_but_does_not_count():
+    epoch = sinusoid_epoch(JointDynamics(0.0045, 0.1368, 1.751))
+    touched = Epoch("f", "1", epoch.channels, motion=epoch.motion,
+                    closed=Outcome("excluded", "limit"))  # fmt: skip
+    score = score_epoch(touched, SCORES, SCREEN)
+    assert score.outcome == Outcome("excluded", "limit")
+    assert math.isfinite(score.work_j)

@@ -1,0 +1,120 @@
+"""The dialects of text files."""
+
+import numpy as np
+import pytest
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.readers import read_recording, read_table
+from rigidimeter.recording.table import ReadOptions
+
+PLAIN = "time_s,torque_nm,angle_rad\n0.0,1.5,-0.25\n0.5,-2e-3,0.75\n1.0,3,0\n"
+WANTED = {"time_s": [0, 0.5, 1], "torque_nm": [1.5, -0.002, 3], "angle_rad": [-0.25, 0.75, 0]}
+
+
+def excel(text: str) -> str:
+    return text.replace(",", ";").replace(".", ",")
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        PLAIN.encode(),
+        PLAIN.strip().encode(),
+        PLAIN.encode("utf-8-sig"),
+        PLAIN.encode("utf-16"),
+        excel(PLAIN).encode(),
+        excel(PLAIN).encode("utf-16"),
+        PLAIN.replace(",", ";").encode(),
+        PLAIN.replace(",", "\t").encode(),
+        excel(PLAIN).replace(";", "\t").encode(),
+        PLAIN.replace("\n", "\r\n").encode(),
+        PLAIN.replace("\n", "\r").encode(),
+        PLAIN.replace(",", " , ").encode(),
+        PLAIN.replace("time_s,torque_nm", '"time_s", " torque_nm "').encode(),
+        ("# made by hand\n\n" + PLAIN.replace("0.5,-2", "  # here, it, moved\n\n0.5,-2")).encode(),
+    ],
+    ids=[
+        "plain", "no last newline", "byte order mark", "utf-16", "decimal comma",
+        "decimal comma utf-16", "semicolon and point", "tab", "tab and comma", "crlf", "cr",
+        "spaces", "quotes", "comments",
+    ],
+)  # fmt: skip
+def test_dialects(tmp_path, data):
+    path = tmp_path / "r.csv"
+    path.write_bytes(data)
+    table = read_table(path)
+    (epoch,), notices = read_recording(path, ReadOptions())
+    assert list(table.columns) == list(WANTED)
+    assert notices == []
+    np.testing.assert_array_equal(epoch.channels["torque_nm"].time_s, WANTED["time_s"])
+    for name, channel in epoch.channels.items():
+        np.testing.assert_array_equal(channel.values, WANTED[name])
+
+
+@pytest.mark.parametrize("mark", ["", "NaN", "nan", "NA", "N/A", " NA", "#N/A", "null"])
+def test_marks_of_missing_samples(tmp_path, mark):
+    path = tmp_path / "r.csv"
+    rows = [f"{k / 100},{k % 3 + 0.5},0.1" for k in range(20)]
+    rows[7] = f"0.07,{mark},0.1"
+    path.write_text("time_s,torque_nm,angle_rad\n" + "\n".join(rows))
+    (epoch,), (notice,) = read_recording(path, ReadOptions())
+    assert notice.level == "error"
+    assert "torque_nm has 1 sample missing or not finite, at 0.07 s" in notice.text
+    assert 0.07 not in epoch.channels["torque_nm"].time_s
+    assert len(epoch.channels["angle_rad"]) == 20
+
+
+def test_a_missing_mark_in_the_first_column_is_not_a_comment(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("torque_nm,time_s,angle_rad\n1,0,1\n#N/A,1,1\n2,2,1\n3,3,1\n")
+    (epoch,), notices = read_recording(path, ReadOptions())
+    assert len(epoch.channels["angle_rad"]) == 4
+    assert [notice.level for notice in notices if "has 1 sample" in notice.text] == ["error"]
+
+
+def test_line_numbers_count_comments_and_blank_lines(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("# one\n\n" + PLAIN + "# seven\n1.5,abc,0\n")
+    with pytest.raises(UserError, match=r"r\.csv, line 8: torque_nm holds 'abc', which is not a"):
+        read_recording(path, ReadOptions())
+
+
+def test_text_far_down_a_column_is_found(tmp_path):
+    path = tmp_path / "r.csv"
+    rows = "".join(f"{k / 1000},{k},0\n" for k in range(200_000))
+    path.write_text("time_s,torque_nm,angle_rad\n" + rows + "200,1,0.5 V\n")
+    with pytest.raises(UserError, match=r"line 200002: angle_rad holds '0\.5 V'"):
+        read_recording(path, ReadOptions())
+
+
+def test_a_date_in_a_column_of_numbers_is_text(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("time_s,torque_nm,angle_rad\n12:30:00,1,2\n12:30:01,1,2\n")
+    with pytest.raises(UserError, match=r"line 2: time_s holds '12:30:00'"):
+        read_recording(path, ReadOptions())
+
+
+def test_labels_with_a_decimal_comma_file(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text(
+        "time_s;torque_nm;angle_rad;condition\n0,0;1,5;1;DBS, left\n0,1;2,5;1;DBS, left\n"
+    )
+    (epoch,), _ = read_recording(path, ReadOptions())
+    assert epoch.condition == "DBS, left"
+    np.testing.assert_array_equal(epoch.channels["torque_nm"].values, [1.5, 2.5])
+
+
+def test_a_nameless_column_has_its_number(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text(",torque_nm,angle_rad\n0,1,2\n1,2,3\n")
+    options = ReadOptions(columns={"time_s": "column 1"})
+    assert len(read_recording(path, options)[0]) == 1
+
+
+def test_whole_numbers_as_labels(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text(
+        "time_s,torque_nm,angle_rad,epoch\n0,1,2,1\n1,1,2,1\n2,1,2,\n3,1,2,2\n4,1,2,2\n"
+    )
+    epochs, _ = read_recording(path, ReadOptions())
+    assert [epoch.label for epoch in epochs] == ["1", "2"]

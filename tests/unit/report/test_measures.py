@@ -1,0 +1,62 @@
+import dataclasses
+
+from rigidimeter.records import Outcome
+from rigidimeter.report.measures import conditions, measures, verdict
+from rigidimeter.report.pictures import representative_fits
+from rigidimeter.study import Study
+
+
+def test_included_values_are_those_that_were_compared(study: Study) -> None:
+    found = {measure.name: measure for measure in measures(study)}
+    assert list(found) == [comparison.measure for comparison in study.comparisons]
+    for comparison in study.comparisons:
+        assert found[comparison.measure].values == comparison.values
+        assert found[comparison.measure].excluded == comparison.excluded
+        assert found[comparison.measure].title == comparison.title
+        assert found[comparison.measure].unit == comparison.unit
+
+
+def test_verdict_says_which_way(make_study, make_analysis) -> None:
+    made = make_study([], analysis=make_analysis({"OFF": 40, "DBS": 40}))
+    assert verdict(made).startswith("DBS against OFF: ")
+    stiffness = {c.measure: c for c in made.comparisons}["stiffness_nm_rad"]
+    assert stiffness.test is not None
+    assert f"p\xa0=\xa0{stiffness.test.p:.3g}" in verdict(made)
+
+
+def test_verdict_of_a_lower_stiffness(study: Study) -> None:
+    assert "lower" in verdict(study)
+    assert verdict(study).index("lower") < verdict(study).index("stiffness K")
+
+
+def test_verdict_without_comparison_gives_medians(make_study, make_analysis) -> None:
+    text = verdict(make_study([], analysis=make_analysis({"": 3})))
+    assert text.startswith("No comparison of conditions. Medians, (no condition): Inertia J ")
+    assert text.count("(n = 3)") == 5
+
+
+def test_verdict_of_nothing(make_study, make_analysis) -> None:
+    failed = make_analysis({"OFF": 2}, Outcome("failed", "no torque"), scores=False)
+    for analysis in (failed, make_analysis({})):
+        assert "No epoch could be included" in verdict(make_study([], analysis=analysis))
+
+
+def test_conditions_keep_one_order(study: Study) -> None:
+    assert conditions(study) == ("OFF", "DBS")
+
+
+def test_the_representative_is_the_included_fit_with_the_median_vaf(
+    make_study, make_analysis
+) -> None:
+    analysis = make_analysis({"OFF": 5, "DBS": 4})
+    vaf = [90.0, 60.0, 80.0, 99.0, 70.0, 50.0, 10.0, 30.0, 20.0]
+    fits = [
+        dataclasses.replace(fit, vaf_percent=percent)
+        for fit, percent in zip(analysis.fits, vaf, strict=True)
+    ]
+    fits[3] = dataclasses.replace(fits[3], outcome=Outcome("excluded", "limit"))
+    fits[0] = dataclasses.replace(fits[0], outcome=Outcome("excluded", "limit"))
+    made = make_study([], analysis=dataclasses.replace(analysis, fixed_inertia=tuple(fits)))
+    chosen = [(fit.condition, fit.vaf_percent) for fit in representative_fits(made)]
+    # Three are left of OFF; of the four of DBS the lower middle one is taken.
+    assert chosen == [("OFF", 70.0), ("DBS", 20.0)]
