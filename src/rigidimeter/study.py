@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,16 @@ from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score, Task
 from rigidimeter.settings import Settings
 from rigidimeter.statistics import RankSum, Summary, ranksum, summarise
 
-__all__ = ["Comparison", "Study", "analyse", "compare", "conditions", "task_of"]
+__all__ = [
+    "MEASURES",
+    "Comparison",
+    "Measure",
+    "Study",
+    "analyse",
+    "compare",
+    "conditions",
+    "task_of",
+]
 
 SINGLE_FREQUENCY_SHARE = 0.85
 """Above this share of the angle's variance in one line, the epoch is an imposed sinusoid.
@@ -27,6 +37,25 @@ A sinusoid whose motion fills half the epoch reaches 0.95, a PRBS in the closed 
 
 FEWEST_FOR_TEST = 3
 """Below this many values in a condition there is no rank-sum test."""
+
+
+class Measure(NamedTuple):
+    """What is compared: stored name, name for people, unit, and where an analysis holds it."""
+
+    name: str
+    title: str
+    unit: str
+    results: Callable[[Analysis], Sequence[Fit | Score]]
+
+
+MEASURES = (
+    Measure("inertia_kg_m2", "Inertia J", "kg·m²", lambda found: found.fits),
+    Measure("damping_nm_s_rad", "Viscous damping B", "N·m·s/rad", lambda f: f.fixed_inertia),
+    Measure("stiffness_nm_rad", "Stiffness K", "N·m/rad", lambda f: f.fixed_inertia),
+    Measure("impulse_nm_s", "Angular impulse", "N·m·s", lambda found: found.scores),
+    Measure("work_j", "Work", "J", lambda found: found.scores),
+)
+"""Inertia is from the first stage; damping and stiffness are from the second, at fixed inertia."""
 
 
 @dataclass(frozen=True)
@@ -151,25 +180,15 @@ def compare(
     first = reference if reference is not None else names[0]
     rest = [name for name in names if name != first]
     second = other if other is not None else (rest[0] if rest else "")
-    one, two, work = analysis.fits, analysis.fixed_inertia, analysis.scores
-    measures: list[tuple[str, str, str, Sequence[Fit | Score]]] = [
-        ("inertia_kg_m2", "Inertia J", "kg·m²", one),
-        ("damping_nm_s_rad", "Viscous damping B", "N·m·s/rad", two),
-        ("stiffness_nm_rad", "Stiffness K", "N·m/rad", two),
-        ("impulse_nm_s", "Angular impulse", "N·m·s", work),
-        ("work_j", "Work", "J", work),
-    ]
     return tuple(
-        _comparison(measure, title, unit, results, first, second)
-        for measure, title, unit, results in measures
-        if results
+        _comparison(measure, results, first, second)
+        for measure in MEASURES
+        if (results := measure.results(analysis))
     )
 
 
 def _comparison(
-    measure: str,
-    title: str,
-    unit: str,
+    measure: Measure,
     results: Sequence[Fit | Score],
     reference: str,
     other: str,
@@ -177,7 +196,7 @@ def _comparison(
     groups = [reference, other] if other else [reference]
     values = {
         name: tuple(
-            float(getattr(result, measure))
+            float(getattr(result, measure.name))
             for result in results
             if result.condition == name and result.outcome.included
         )
@@ -197,5 +216,14 @@ def _comparison(
         test = ranksum(values[reference], values[other])
     summaries = {name: summarise(values[name]) for name in groups}
     return Comparison(
-        measure, title, unit, reference, other, values, summaries, excluded, test, remark
+        measure.name,
+        measure.title,
+        measure.unit,
+        reference,
+        other,
+        values,
+        summaries,
+        excluded,
+        test,
+        remark,
     )

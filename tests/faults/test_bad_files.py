@@ -144,6 +144,43 @@ def test_matlab_without_columns(tmp_path):
     assert "has no column of samples" in refusal(path)
 
 
+@pytest.fixture
+def whole_mat(tmp_path):
+    path = tmp_path / "r.mat"
+    columns = {"time_s": np.arange(50) / 100, "torque_nm": np.ones(50), "angle_rad": np.ones(50)}
+    cells = np.array(["a", "bc"], dtype=object)
+    more = {"s": {"x": np.array([1j, 2j]), "t": cells, "e": np.zeros((0, 0))}, "label": "OFF"}
+    scipy.io.savemat(path, columns | more)
+    return path
+
+
+# Where scipy's compiled reader takes a wrong code as it comes and ends the process.
+@pytest.mark.parametrize(("place", "value"), [(145, 42), (184, 21), (656, 152), (128, 77)])
+def test_matlab_files_that_would_end_the_process(whole_mat, place, value):
+    data = bytearray(whole_mat.read_bytes())
+    data[place] = value
+    whole_mat.write_bytes(data)
+    assert "is not a complete MATLAB file" in refusal(whole_mat)
+
+
+def test_whole_matlab_files_pass_the_check(whole_mat):
+    (epoch,), notices = read_recording(whole_mat, ReadOptions())
+    assert notices == []
+    assert len(epoch.channels["torque_nm"]) == 50
+
+
+@pytest.mark.parametrize("kept", [100, 130, 400, -1, -9])
+def test_matlab_files_cut_short(whole_mat, kept):
+    whole_mat.write_bytes(whole_mat.read_bytes()[:kept])
+    assert "is not a complete MATLAB file" in refusal(whole_mat)
+
+
+def test_names_with_line_feeds_stay_in_one_sentence(tmp_path):
+    path = tmp_path / "r.npz"
+    np.savez(path, **{"a\nb": np.arange(4.0)})
+    assert "a?b" in refusal(path)
+
+
 @pytest.mark.parametrize("suffix", ["csv", "npz", "mat"])
 def test_damage_anywhere_is_read_or_refused(tmp_path, suffix):
     """Flip bytes or cut the file short: a sentence or an epoch, nothing else."""
@@ -154,7 +191,7 @@ def test_damage_anywhere_is_read_or_refused(tmp_path, suffix):
     elif suffix == "npz":
         np.savez_compressed(path, **columns)
     else:
-        scipy.io.savemat(path, columns, do_compression=True)
+        scipy.io.savemat(path, columns)
     whole = path.read_bytes()
     rng = np.random.default_rng(11)
     sentences = []

@@ -67,8 +67,8 @@ def compare(
       rigidimeter compare demo-study/sessions/day-1 demo-study/sessions/day-2
       rigidimeter compare estimates.json --reference OFF --other DBS --csv table.csv
     """
-    from rigidimeter.recording import read_estimates, write_json
-    from rigidimeter.report import write_comparisons_csv
+    from rigidimeter.recording import read_estimates, write_json, write_text
+    from rigidimeter.report import csv_text, results_table
     from rigidimeter.study import compare as compare_analysis
     from rigidimeter.study import conditions
 
@@ -122,7 +122,7 @@ def compare(
             },
         )
     if csv_out is not None:
-        write_comparisons_csv(csv_out, comparisons)
+        write_text(csv_out, csv_text(results_table(comparisons)))
     raise typer.Exit(exit_status)
 
 

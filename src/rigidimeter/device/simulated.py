@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigidimeter.device.base import Reading
 from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import RigSettings, SubjectSettings
 from rigidimeter.simulation import (
     DriveState,
-    SampleClock,
     SubjectTorque,
     arm_torque_nm,
     draw_joint,
     drive,
     drive_step,
     quantised,
+    sample_times_s,
 )
 from rigidimeter.units import rad_from_deg
 
@@ -54,32 +57,35 @@ class SimulatedRig:
             settings.drive_bandwidth_hz, settings.drive_damping_ratio, self._interval_s
         )
         torque_rng, noise_rng, motion_rng, self._subject_rng, self._joint_rng = rng.spawn(5)
-        self._noise_rng = noise_rng
         t, m = settings.torque, settings.motion
-        self._torque_clock = SampleClock(t.rate_hz, t.latency_s, t.jitter_s, torque_rng)
-        self._motion_clock = SampleClock(m.rate_hz, m.latency_s, m.jitter_s, motion_rng)
-        self._angle_step_rad = rad_from_deg(m.angle_resolution_deg)
-        self._velocity_step_rad_s = rad_from_deg(m.velocity_resolution_deg_s)
+        self._torque_sensor = _Sensor(t.latency_s, t.stamp_latency_s, t.resolution_nm)
+        self._motion_sensor = _Sensor(
+            m.latency_s,
+            m.stamp_latency_s,
+            rad_from_deg(m.angle_resolution_deg),
+            rad_from_deg(m.velocity_resolution_deg_s),
+        )
+        self._noise = _flow(lambda n: t.noise_sd_nm * noise_rng.standard_normal(n))
+        self._torque_times = sample_times_s(t.rate_hz, t.latency_s, t.jitter_s, torque_rng)
+        self._motion_times = sample_times_s(m.rate_hz, m.latency_s, m.jitter_s, motion_rng)
+        self._torque_next_s = next(self._torque_times)
+        self._motion_next_s = next(self._motion_times)
         self._torque_queue: deque[tuple[float, float, float]] = deque()
         self._motion_queue: deque[tuple[float, float, float, float]] = deque()
-        self._reading = Reading(0.0, -t.latency_s, 0.0, 0.0, -m.latency_s)
+        # What a sensor shows before its first sample arrives: the arm at rest.
+        self._reading = Reading(0.0, -1.0, 0.0, 0.0, -1.0)
         self._tick = 0
         self._state = DriveState()
         self._command = 0.0
         self._enabled = False
-        self._noise: list[float] = noise_rng.standard_normal(BLOCK_TICKS).tolist()
-        self._noise_sd_nm, self._torque_step_nm = t.noise_sd_nm, t.resolution_nm
-        self._noise_used = 0
         self._voluntary_before = self._voluntary_now = 0.0
         self._set_subject(subject)
 
     def _set_subject(self, subject: SubjectSettings) -> None:
         self._subject = subject
-        self._torque_source = SubjectTorque(
-            subject, self._settings.tick_rate_hz, self._subject_rng.spawn(1)[0]
+        self._voluntary = _flow(
+            SubjectTorque(subject, self._settings.tick_rate_hz, self._subject_rng.spawn(1)[0]).block
         )
-        self._voluntary = self._torque_source.block(BLOCK_TICKS).tolist()
-        self._voluntary_used = 0
         self.joint = draw_joint(subject, self._joint_rng)
 
     @property
@@ -119,98 +125,83 @@ class SimulatedRig:
 
     def read(self) -> Reading:
         """Advance one tick and return the newest samples that have arrived."""
-        if self._tick > 0:
-            self._advance()
-        else:
-            self._sample(0.0, 0.0, self._state)
-        now = self._tick * self._interval_s
-        self._tick += 1
-        torque, motion = self._torque_queue, self._motion_queue
-        reading = self._reading
-        fresh = False
-        torque_nm, torque_s, angle, velocity, motion_s = reading
-        while torque and torque[0][0] <= now + SAME_TIME_S:
-            _, torque_s, torque_nm = torque.popleft()
-            fresh = True
-        while motion and motion[0][0] <= now + SAME_TIME_S:
-            _, motion_s, angle, velocity = motion.popleft()
-            fresh = True
-        if fresh:
-            reading = Reading(torque_nm, torque_s, angle, velocity, motion_s)
-            self._reading = reading
-        return reading
-
-    def _advance(self) -> None:
-        if self._voluntary_used == BLOCK_TICKS:
-            self._voluntary = self._torque_source.block(BLOCK_TICKS).tolist()
-            self._voluntary_used = 0
-        self._voluntary_before = self._voluntary_now
-        self._voluntary_now = self._voluntary[self._voluntary_used]
-        self._voluntary_used += 1
+        now_s = self._tick * self._interval_s
         before = self._state
-        self._state = drive_step(self._whole_tick, before, self._command)
-        self._sample((self._tick - 1) * self._interval_s, self._tick * self._interval_s, before)
+        if self._tick > 0:
+            self._voluntary_before = self._voluntary_now
+            self._voluntary_now = next(self._voluntary)
+            self._state = drive_step(self._whole_tick, before, self._command)
+        until_s = now_s + SAME_TIME_S
+        while self._torque_next_s <= until_s:
+            self._take_torque(self._torque_next_s, now_s, before)
+            self._torque_next_s = next(self._torque_times)
+        while self._motion_next_s <= until_s:
+            self._take_motion(self._motion_next_s, now_s, before)
+            self._motion_next_s = next(self._motion_times)
+        self._tick += 1
+        torque_nm, torque_s, angle, velocity, motion_s = self._reading
+        queue = self._torque_queue
+        while queue and queue[0][0] <= until_s:
+            _, torque_s, torque_nm = queue.popleft()
+        samples = self._motion_queue
+        while samples and samples[0][0] <= until_s:
+            _, motion_s, angle, velocity = samples.popleft()
+        self._reading = Reading(torque_nm, torque_s, angle, velocity, motion_s)
+        return self._reading
 
-    def _sample(self, start_s: float, stop_s: float, before: DriveState) -> None:
-        """Take the samples that fall between two ticks, the later one included."""
-        until_s = stop_s + SAME_TIME_S
-        clock = self._torque_clock
-        while clock.next_s <= until_s:
-            self._take_torque(clock.next_s, start_s, stop_s, before)
-            clock.advance()
-        clock = self._motion_clock
-        while clock.next_s <= until_s:
-            self._take_motion(clock.next_s, start_s, stop_s, before)
-            clock.advance()
-
-    def _take_torque(
-        self, taken_s: float, start_s: float, stop_s: float, before: DriveState
-    ) -> None:
-        angle, velocity, acceleration = self._state_at(taken_s, start_s, stop_s, before)
+    def _take_torque(self, taken_s: float, now_s: float, before: DriveState) -> None:
+        """Measure the torque at a time since the last tick."""
         voluntary = self._voluntary_now
-        if taken_s < stop_s - SAME_TIME_S:
-            fraction = max((taken_s - start_s) / self._interval_s, 0.0)
-            voluntary -= (1.0 - fraction) * (voluntary - self._voluntary_before)
-        if self._noise_used == BLOCK_TICKS:
-            self._noise = self._noise_rng.standard_normal(BLOCK_TICKS).tolist()
-            self._noise_used = 0
-        torque_nm = self._noise_sd_nm * self._noise[self._noise_used] + arm_torque_nm(
+        if taken_s >= now_s - SAME_TIME_S:
+            angle, velocity, acceleration = self._state
+        else:
+            angle, velocity, acceleration = self._between(taken_s, now_s, before)
+            left = min((now_s - taken_s) / self._interval_s, 1.0)
+            voluntary -= left * (voluntary - self._voluntary_before)
+        torque_nm = next(self._noise) + arm_torque_nm(
             self._J, self._B, self._K, angle, velocity, acceleration, voluntary
         )
-        self._noise_used += 1
-        arrives_s = taken_s + self._torque_clock.latency_s
-        self._torque_queue.append(
-            (
-                arrives_s,
-                arrives_s - self._settings.torque.stamp_latency_s,
-                quantised(torque_nm, self._torque_step_nm),
-            )
-        )
+        sensor = self._torque_sensor
+        arrives_s = taken_s + sensor.latency_s
+        stamp_s = arrives_s - sensor.stamp_latency_s
+        self._torque_queue.append((arrives_s, stamp_s, quantised(torque_nm, sensor.resolution)))
 
-    def _take_motion(
-        self, taken_s: float, start_s: float, stop_s: float, before: DriveState
-    ) -> None:
-        angle, velocity, _ = self._state_at(taken_s, start_s, stop_s, before)
-        arrives_s = taken_s + self._motion_clock.latency_s
+    def _take_motion(self, taken_s: float, now_s: float, before: DriveState) -> None:
+        """Measure angle and velocity at a time since the last tick."""
+        if taken_s >= now_s - SAME_TIME_S:
+            angle, velocity, _ = self._state
+        else:
+            angle, velocity, _ = self._between(taken_s, now_s, before)
+        sensor = self._motion_sensor
+        arrives_s = taken_s + sensor.latency_s
         self._motion_queue.append(
             (
                 arrives_s,
-                arrives_s - self._settings.motion.stamp_latency_s,
-                quantised(angle, self._angle_step_rad),
-                quantised(velocity, self._velocity_step_rad_s),
+                arrives_s - sensor.stamp_latency_s,
+                quantised(angle, sensor.resolution),
+                quantised(velocity, sensor.velocity_resolution),
             )
         )
 
-    def _state_at(
-        self, time_s: float, start_s: float, stop_s: float, before: DriveState
-    ) -> DriveState:
-        if time_s >= stop_s - SAME_TIME_S:
-            return self._state
-        if time_s <= start_s + SAME_TIME_S:
+    def _between(self, time_s: float, now_s: float, before: DriveState) -> DriveState:
+        """Return the exact state at a time between the last tick and this one."""
+        elapsed_s = time_s - (now_s - self._interval_s)
+        if elapsed_s <= SAME_TIME_S:
             return before
         part = drive(
-            self._settings.drive_bandwidth_hz,
-            self._settings.drive_damping_ratio,
-            time_s - start_s,
+            self._settings.drive_bandwidth_hz, self._settings.drive_damping_ratio, elapsed_s
         )
         return drive_step(part, before, self._command)
+
+
+class _Sensor(NamedTuple):
+    latency_s: float
+    stamp_latency_s: float
+    resolution: float
+    velocity_resolution: float = 0.0
+
+
+def _flow(block: Callable[[int], NDArray[np.float64]]) -> Iterator[float]:
+    """Yield numbers one by one that are drawn a block at a time."""
+    while True:
+        yield from block(BLOCK_TICKS).tolist()

@@ -8,6 +8,7 @@ from rigidimeter.recording.estimates import (
     write_estimates_csv,
     write_estimates_json,
     write_json,
+    write_text,
 )
 from rigidimeter.recording.folder import SessionWriter, read_manifest
 from rigidimeter.recording.readers import read_recording, read_table
@@ -32,4 +33,5 @@ __all__ = [
     "write_estimates_csv",
     "write_estimates_json",
     "write_json",
+    "write_text",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.columns import Table
+from rigidimeter.recording.columns import Table, printable
 
 __all__ = ["first_line", "table_of_arrays"]
 
@@ -27,10 +27,12 @@ def table_of_arrays(source: str, entries: Mapping[str, NDArray[Any]]) -> Table:
     columns: dict[str, NDArray[Any]] = {}
     scalars: dict[str, float | str] = {}
     others: dict[str, str] = {}
-    for name, array in entries.items():
+    for key, array in entries.items():
+        name = printable(key)
         text = array.dtype.kind in "OU"
         if array.dtype.kind not in "fiubOU":
-            others[name] = f"an array of {array.dtype}"
+            kind = "objects" if array.dtype.kind == "V" else str(array.dtype)
+            others[name] = f"an array of {kind}"
         elif array.size == 0:
             others[name] = "empty"
         elif array.size == 1:

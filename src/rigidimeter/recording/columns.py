@@ -30,6 +30,7 @@ __all__ = [
     "nearest",
     "numbers",
     "plain",
+    "printable",
 ]
 
 LABELS = ("epoch", "condition", "task")
@@ -148,10 +149,15 @@ def plain(value: object) -> str:
         if math.isnan(value):
             return ""
         return str(int(value)) if value.is_integer() else repr(float(value))
-    text = str(value).strip()
+    text = printable(" ".join(str(value).split()))
     if text.lower() in MISSING:
         return ""
     return re.sub(r"^(-?\d+)\.0+$", r"\1", text)
+
+
+def printable(name: str) -> str:
+    """Return a name without line feeds and the like, as it can stand in a sentence."""
+    return "".join(letter if letter.isprintable() else "?" for letter in name)
 
 
 def nearest(name: str, candidates: Iterable[str], *, least: float = 0.0) -> str:
@@ -178,8 +184,8 @@ def _no_such_column(table: Table, standard: str, name: str) -> str:
     option = f"--column {shlex.quote(f'{standard}={name}')}"
     if name in table.others:
         return (
-            f"{table.source}: {option}: {name} is {table.others[name]}, but a column has one "
-            "dimension and one value for each sample"
+            f"{table.source}: {option}: {name} is {table.others[name]}; a column has one "
+            "dimension and a real number or text for each sample"
         )
     if name in table.scalars:
         return f"{table.source}: {option}: {name} is a single value, not a column of samples"

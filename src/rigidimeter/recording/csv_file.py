@@ -17,7 +17,7 @@ import pyarrow.csv
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.columns import Table
+from rigidimeter.recording.columns import Table, printable
 
 __all__ = ["read_csv"]
 
@@ -106,7 +106,7 @@ def _header(source: str, text: str) -> tuple[str, list[str]]:
             "must name all columns, separated by commas, semicolons or tabs"
         )
     fields = _fields(text, delimiter)
-    names = [name.strip().strip("\"'").strip() for name in fields]
+    names = [printable(name.strip().strip("\"'").strip()) for name in fields]
     if all(_NUMBER.fullmatch(name) for name in names if name) and any(names):
         raise UserError(
             f"{source}: its first line holds numbers ({', '.join(names[:3])}, ...), but it must "

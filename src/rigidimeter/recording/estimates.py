@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -20,6 +21,7 @@ __all__ = [
     "write_estimates_csv",
     "write_estimates_json",
     "write_json",
+    "write_text",
 ]
 
 ESTIMATES_SCHEMA = "rigidimeter.estimates/1"
@@ -78,26 +80,34 @@ def write_estimates_csv(path: Path, analysis: Analysis) -> None:
         )
     if not rows:
         rows = [_score_row(score) for score in analysis.scores]
-    try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, fieldnames=list(rows[0]) if rows else ["epoch"])
-            writer.writeheader()
-            writer.writerows(rows)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
+    file = io.StringIO()
+    writer = csv.DictWriter(file, list(rows[0]) if rows else ["epoch"], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(path, file.getvalue())
 
 
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
-    """Write a document as JSON.
+    """Write a document as JSON; numbers must be finite.
 
     Raises
     ------
     UserError
         If the file cannot be written.
     """
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    write_text(path, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be written.
+    """
     try:
-        path.write_text(text, encoding="utf-8")
+        path.write_text(text, encoding="utf-8", newline="")
     except OSError as error:
         raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
 

@@ -117,25 +117,23 @@ class SampleLog:
         self._file.close()
 
 
-def _batches(path: Path) -> Iterator[tuple[pa.RecordBatch, int]]:
-    """Yield each whole batch with the offset of its end; stop where the stream is torn."""
-    with pa.OSFile(str(path), "rb") as file:
+def _batches(file: pa.NativeFile) -> Iterator[pa.RecordBatch]:
+    """Yield each whole batch; stop where the stream is torn."""
+    try:
+        reader = pa.ipc.open_stream(file, options=pa.ipc.IpcReadOptions(use_threads=False))
+    except (pa.ArrowInvalid, OSError):
+        return
+    while True:
         try:
-            reader = pa.ipc.open_stream(file)
-        except (pa.ArrowInvalid, OSError):
+            yield reader.read_next_batch()
+        except (StopIteration, pa.ArrowInvalid, OSError):
             return
-        while True:
-            try:
-                batch = reader.read_next_batch()
-            except (StopIteration, pa.ArrowInvalid, OSError):
-                return
-            yield batch, file.tell()
 
 
 def read_samples(path: Path) -> dict[str, NDArray[Any]]:
     """Return the columns of every whole batch; empty columns where there is none."""
-    batches = [batch for batch, _ in _batches(path)]
-    table = pa.Table.from_batches(batches, schema=_SCHEMA)
+    with pa.OSFile(str(path), "rb") as file:
+        table = pa.Table.from_batches(_batches(file), schema=_SCHEMA)
     return {name: table.column(name).to_numpy() for name in _SCHEMA.names}
 
 
@@ -151,8 +149,9 @@ def stream_extent(path: Path) -> tuple[int, bool]:
             end = file.tell()
         except (pa.ArrowInvalid, OSError):
             return 0, False
-    for _, offset in _batches(path):
-        end = offset
+        file.seek(0)
+        for _ in _batches(file):
+            end = file.tell()
     with path.open("rb") as raw:
         raw.seek(end)
         closed = raw.read(8) == b"\xff\xff\xff\xff\x00\x00\x00\x00"

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 __all__ = ["check_mat5"]
 
 _HEADER_BYTES = 128
-_INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED = 1, 5, 6, 14, 15
+_INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED, _UTF8 = 1, 5, 6, 14, 15, 16
 _NUMBERS = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13})
-_TYPES = _NUMBERS | {_MATRIX, 16, 17, 18}
+_TYPES = _NUMBERS | {_MATRIX, _UTF8, 17, 18}
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _LAST_PLAIN = 1, 2, 3, 4, 5, 15
 _COMPLEX = 0x0800
 _DEEPEST = 100
@@ -103,7 +103,9 @@ def _check_matrix(order: str, data: bytes, matrix: _Element, depth: int) -> None
         return  # classes and functions: never a column, and read without their parts
     _, dims, name, *rest = parts
     n_dims = (dims.stop - dims.start) // 4
-    if dims.kind != _INT32 or name.kind != _INT8 or not 2 <= n_dims <= 32:
+    # Other programs than MATLAB write dimensions without sign and names in UTF-8.
+    named = dims.kind in (_INT32, _UINT32) and name.kind in (_INT8, _UTF8)
+    if not named or not 2 <= n_dims <= 32:
         raise ValueError("a variable has no dimensions or no name")
     count = 1
     for length in struct.unpack_from(f"{order}{n_dims}i", data, dims.start):

@@ -5,7 +5,6 @@ Fields of structures get dotted names: `data.torque`.
 
 from __future__ import annotations
 
-import io
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -53,12 +52,11 @@ def read_mat(path: Path) -> Table:
 
 
 def _entries(source: str, path: Path) -> dict[str, NDArray[Any]]:
-    data = path.read_bytes()
-    check_mat5(data)
+    check_mat5(path.read_bytes())
     with warnings.catch_warnings():
         # A doubtful file is refused: its warning becomes the reason.
         warnings.simplefilter("error", scipy.io.matlab.MatReadWarning)
-        loaded = scipy.io.loadmat(io.BytesIO(data), simplify_cells=True)
+        loaded = scipy.io.loadmat(path, simplify_cells=True)
     return _flat({name: value for name, value in loaded.items() if not name.startswith("__")})
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rigidimeter.records import Analysis, Fit, Score
+from rigidimeter.records import Fit, Score
 from rigidimeter.report.numbers import number, p_and_r
 from rigidimeter.statistics import summarise
-from rigidimeter.study import Comparison, Study
+from rigidimeter.study import MEASURES, Comparison, Study
 
 __all__ = ["Measure", "condition_name", "conditions", "measures", "verdict"]
 
@@ -30,17 +30,6 @@ class Measure:
         return f"{self.title} ({self.unit})"
 
 
-_Result = Fit | Score
-_MEASURES: tuple[tuple[str, str, str, Callable[[Analysis], Sequence[_Result]]], ...] = (
-    ("inertia_kg_m2", "Inertia J", "kg·m²", lambda analysis: analysis.fits),
-    ("damping_nm_s_rad", "Viscous damping B", "N·m·s/rad", lambda analysis: analysis.fixed_inertia),
-    ("stiffness_nm_rad", "Stiffness K", "N·m/rad", lambda analysis: analysis.fixed_inertia),
-    ("impulse_nm_s", "Angular impulse", "N·m·s", lambda analysis: analysis.scores),
-    ("work_j", "Work", "J", lambda analysis: analysis.scores),
-)
-"""Inertia is from the first fit; damping and stiffness are from the second, at fixed inertia."""
-
-
 def condition_name(condition: str) -> str:
     """Return the condition as people read it."""
     return condition or "(no condition)"
@@ -50,7 +39,7 @@ def conditions(study: Study) -> tuple[str, ...]:
     """Return the conditions in one order for the whole report: as compared, then as recorded."""
     compared = [name for c in study.comparisons for name in c.summaries]
     analysis = study.analysis
-    results: tuple[_Result, ...] = (*analysis.fits, *analysis.fixed_inertia, *analysis.scores)
+    results: tuple[Fit | Score, ...] = (*analysis.fits, *analysis.fixed_inertia, *analysis.scores)
     recorded = [item.condition for item in (*study.epochs, *results)]
     return tuple(dict.fromkeys([*compared, *recorded]))
 
@@ -58,7 +47,7 @@ def conditions(study: Study) -> tuple[str, ...]:
 def measures(study: Study) -> tuple[Measure, ...]:
     """Return the five measures, those without any epoch left out."""
     found = []
-    for name, title, unit, results_of in _MEASURES:
+    for name, title, unit, results_of in MEASURES:
         results = results_of(study.analysis)
         if not results:
             continue

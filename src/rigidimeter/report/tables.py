@@ -11,7 +11,7 @@ from rigidimeter.report.table import Cell, Column, Table
 from rigidimeter.statistics import summarise
 from rigidimeter.study import Comparison, Study
 
-__all__ = ["all_tables"]
+__all__ = ["all_tables", "results_table"]
 
 
 def all_tables(study: Study) -> dict[str, Table]:
@@ -23,7 +23,7 @@ def all_tables(study: Study) -> dict[str, Table]:
         design_table(study),
         settings_table(study.settings),
         _epochs(study),
-        _results(study.comparisons),
+        results_table(study.comparisons),
         _summaries(study),
         _fits("fits", "Fits of inertia, damping and stiffness, epoch by epoch", analysis.fits),
         _fits("fixed_inertia", f"{fixed}, epoch by epoch", analysis.fixed_inertia),
@@ -70,7 +70,8 @@ def _epochs(study: Study) -> Table:
     return Table("epochs", "Epochs as they were recorded", columns, rows)
 
 
-def _results(comparisons: Iterable[Comparison]) -> Table:
+def results_table(comparisons: Iterable[Comparison]) -> Table:
+    """Return the comparisons, one row a measure."""
     sides = ("reference", "other")
     columns = [Column("measure", "Measure", "text"), Column("title", "Title", "text")]
     columns += [Column("unit", "Unit", "text")]

@@ -2,14 +2,13 @@
 
 from rigidimeter.simulation.arm import Arm, arm, arm_step, arm_torque_nm
 from rigidimeter.simulation.drive import Drive, DriveState, drive, drive_step
-from rigidimeter.simulation.sensor import SampleClock, quantised
+from rigidimeter.simulation.sensor import quantised, sample_times_s
 from rigidimeter.simulation.subject import SubjectTorque, draw_joint
 
 __all__ = [
     "Arm",
     "Drive",
     "DriveState",
-    "SampleClock",
     "SubjectTorque",
     "arm",
     "arm_step",
@@ -18,4 +17,5 @@ __all__ = [
     "drive",
     "drive_step",
     "quantised",
+    "sample_times_s",
 ]

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-__all__ = ["SampleClock", "quantised"]
+__all__ = ["quantised", "sample_times_s"]
+
+_BLOCK = 4096
 
 
 def quantised(value: float, resolution: float) -> float:
@@ -14,11 +18,14 @@ def quantised(value: float, resolution: float) -> float:
     return round(value / resolution) * resolution
 
 
-class SampleClock:
-    """When a sensor samples, and when the sample reaches the loop.
+def sample_times_s(
+    rate_hz: float, latency_s: float, jitter_s: float, rng: np.random.Generator
+) -> Iterator[float]:
+    """Yield when a sensor samples, for ever.
 
     Sample k is taken at k/rate − latency + jitter_k, with jitter_k uniform between 0 and the given
-    bound, and arrives `latency_s` later. The first sample arrives at time zero.
+    bound. It reaches the loop `latency_s` later, so the first one arrives at time zero or, with
+    jitter, just after.
 
     Parameters
     ----------
@@ -26,21 +33,10 @@ class SampleClock:
     rng : numpy.random.Generator
         For the jitter.
     """
-
-    def __init__(
-        self, rate_hz: float, latency_s: float, jitter_s: float, rng: np.random.Generator
-    ) -> None:
-        self.rate_hz = rate_hz
-        self.latency_s = latency_s
-        self.jitter_s = jitter_s
-        self._rng = rng
-        self._index = 0
-        self.next_s = -latency_s
-        """When the next sample is taken."""
-
-    def advance(self) -> None:
-        """Schedule the sample after the one just taken."""
-        self._index += 1
-        self.next_s = self._index / self.rate_hz - self.latency_s
-        if self.jitter_s > 0.0:
-            self.next_s += self._rng.uniform(0.0, self.jitter_s)
+    first = 0
+    while True:
+        times = np.arange(first, first + _BLOCK) / rate_hz - latency_s
+        if jitter_s > 0.0:
+            times += rng.uniform(0.0, jitter_s, _BLOCK)
+        yield from times.tolist()
+        first += _BLOCK

@@ -118,6 +118,14 @@ def test_rounding_of_stamps_moves_no_sample_across_a_cut(start_s, rate_hz):
     assert [len(epoch.channels["angle_rad"]) for epoch in epochs] == [rate_hz] * 3
 
 
+def test_jitter_moves_no_sample_across_a_cut():
+    rng = np.random.default_rng(4)
+    data = table(3000, rate_hz=1000.0)
+    data.columns["time_s"][:] += rng.uniform(-1e-4, 1e-4, 3000)
+    epochs, _ = epochs_from_table(data, ReadOptions(epoch_length_s=0.1))
+    assert [len(epoch.channels["angle_rad"]) for epoch in epochs] == [100] * 30
+
+
 def test_labels_win_over_a_length_aloud():
     options = ReadOptions(epoch_length_s=1.0)
     epochs, notices = epochs_from_table(table(epoch=texts(("x", 300))), options)

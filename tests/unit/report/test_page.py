@@ -215,8 +215,7 @@ def test_no_comparison_at_all(make_study, make_analysis, tmp_path: Path) -> None
 
 def test_short_samples_mark_their_interval(make_study, make_analysis, tmp_path: Path) -> None:
     made = make_study([], analysis=make_analysis({"OFF": 3, "DBS": 3}))
-    if all(comparison.test is None for comparison in made.comparisons):
-        pytest.skip("three epochs in each condition are not tested")
+    assert any(comparison.test is not None for comparison in made.comparisons)
     assert "†" in page_of(made, tmp_path).text
 
 

@@ -1,9 +1,11 @@
+import itertools
+
 import numpy as np
 import pytest
 from scipy import signal
 
 from rigidimeter.settings import SubjectSettings
-from rigidimeter.simulation import SampleClock, SubjectTorque, draw_joint, quantised
+from rigidimeter.simulation import SubjectTorque, draw_joint, quantised, sample_times_s
 
 
 def test_voluntary_torque_has_the_wanted_size_and_band():
@@ -54,14 +56,15 @@ def test_a_reading_is_rounded_to_its_resolution():
     assert quantised(0.12345, 0.0) == 0.12345
 
 
-def test_the_sample_clock_keeps_its_rate_and_its_jitter():
-    clock = SampleClock(50.0, 0.002, 0.005, np.random.default_rng(1))
-    assert clock.next_s == -0.002
-    stamps = []
-    for _ in range(1000):
-        stamps.append(clock.next_s)
-        clock.advance()
-    lateness = np.array(stamps) - (np.arange(1000) / 50.0 - 0.002)
-    assert lateness.min() >= 0.0
-    assert lateness.max() <= 0.005
-    assert lateness.max() > 0.0049
+def test_samples_keep_their_rate_and_their_jitter():
+    times = sample_times_s(50.0, 0.002, 0.005, np.random.default_rng(1))
+    taken = np.array(list(itertools.islice(times, 9000)))
+    late = taken - (np.arange(9000) / 50.0 - 0.002)
+    assert late.min() >= -1e-12
+    assert late.max() <= 0.005 + 1e-12
+    assert late.max() > 0.0049
+
+
+def test_without_jitter_the_first_sample_arrives_at_time_zero():
+    times = sample_times_s(100.0, 0.002, 0.0, np.random.default_rng(1))
+    assert list(itertools.islice(times, 3)) == pytest.approx([-0.002, 0.008, 0.018])
