@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
@@ -22,9 +23,11 @@ from rigidimeter.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from rigidimeter.records import Analysis, Fit
+    from rigidimeter.records import Analysis, Fit, Outcome, Score
 
 __all__ = ["estimate"]
+
+_R = TypeVar("_R", "Fit", "Score")
 
 
 def estimate(
@@ -85,44 +88,59 @@ def estimate(
 def _lines(analysis: Analysis) -> list[str]:
     lines: list[str] = []
     if analysis.fits:
+        low, high = next((f.band_hz for f in analysis.fits if f.n_samples), (0.0, 0.0))
         lines += [
-            f"J, B, K of each epoch, method {analysis.method} (± one standard error)",
-            *_fit_table(analysis.fits),
+            f"J, B, K of each epoch ± one standard error, method {analysis.method}, "
+            f"{low:g} to {high:g} Hz",
+            *_by_source(analysis.fits, _FIT_HEADING, _fit_line),
             "",
             f"B, K with the inertia held at the median, {analysis.inertia_kg_m2:.5g} kg·m²",
-            *_fit_table(analysis.fixed_inertia),
+            *_by_source(analysis.fixed_inertia, _FIT_HEADING, _fit_line),
         ]
     if analysis.scores:
-        lines += (
-            ["", "Scores of each sinusoidal epoch, per cycle"]
-            if lines
-            else ["Scores of each sinusoidal epoch, per cycle"]
-        )
-        lines.append(f"{'epoch':>10} {'condition':>10} {'impulse N·m·s':>14} {'work J':>10}")
-        for score in analysis.scores:
-            lines.append(
-                f"{score.epoch[-10:]:>10} {score.condition[:10]:>10} {score.impulse_nm_s:14.5g} "
-                f"{score.work_j:10.5g}{_remark(score.outcome.kind, score.outcome.reason)}"
-            )
+        lines += [
+            *([""] if lines else []),
+            "Scores of each sinusoidal epoch, per cycle",
+            *_by_source(analysis.scores, _SCORE_HEADING, _score_line),
+        ]
     return lines
 
 
-def _fit_table(fits: tuple[Fit, ...]) -> list[str]:
-    lines = [
-        f"{'epoch':>10} {'condition':>10} {'J kg·m²':>21} {'B N·m·s/rad':>19} "
-        f"{'K N·m/rad':>19} {'R²':>8} {'VAF %':>7}"
-    ]
-    lines += [
+_FIT_HEADING = (
+    f"{'epoch':>10} {'condition':>10} {'J kg·m²':>21} {'B N·m·s/rad':>19} {'K N·m/rad':>19} "
+    f"{'R²':>8} {'VAF %':>7}"
+)
+_SCORE_HEADING = f"{'epoch':>10} {'condition':>10} {'impulse N·m·s':>14} {'work J':>10}"
+
+
+def _by_source(results: Sequence[_R], heading: str, line: Callable[[_R], str]) -> list[str]:
+    """Return a table with a line for each result, under the name of its source."""
+    lines = [heading]
+    source = None
+    for result in results:
+        if result.source != source:
+            source = result.source
+            lines.append(f" {source}")
+        lines.append(line(result))
+    return lines
+
+
+def _fit_line(fit: Fit) -> str:
+    return (
         f"{fit.epoch[-10:]:>10} {fit.condition[:10]:>10} "
         f"{fit.inertia_kg_m2:11.5g} ±{fit.inertia_kg_m2_se:8.2g} "
         f"{fit.damping_nm_s_rad:9.4g} ±{fit.damping_nm_s_rad_se:8.2g} "
         f"{fit.stiffness_nm_rad:9.4g} ±{fit.stiffness_nm_rad_se:8.2g} "
-        f"{fit.r_squared:8.4f} {fit.vaf_percent:7.2f}"
-        f"{_remark(fit.outcome.kind, fit.outcome.reason)}"
-        for fit in fits
-    ]
-    return lines
+        f"{fit.r_squared:8.4f} {fit.vaf_percent:7.2f}{_remark(fit.outcome)}"
+    )
 
 
-def _remark(kind: str, reason: str) -> str:
-    return "" if kind == "included" else f"  {kind}: {reason}"
+def _score_line(score: Score) -> str:
+    return (
+        f"{score.epoch[-10:]:>10} {score.condition[:10]:>10} {score.impulse_nm_s:14.5g} "
+        f"{score.work_j:10.5g}{_remark(score.outcome)}"
+    )
+
+
+def _remark(outcome: Outcome) -> str:
+    return "" if outcome.included else f"  {outcome.kind}: {outcome.reason}"

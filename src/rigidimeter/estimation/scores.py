@@ -29,13 +29,16 @@ from rigidimeter.estimation.signals import (
     uniform_grid,
 )
 from rigidimeter.estimation.sinusoid import find_motion
-from rigidimeter.records import Epoch, Motion, Outcome, Score
+from rigidimeter.records import Epoch, Outcome, Score
 from rigidimeter.settings import EstimationSettings, ScoreSettings
 
 __all__ = ["Cycles", "angular_impulse_nm_s", "loop_area_j", "score_epoch", "scoring_cycles"]
 
 POINTS_PER_CYCLE = 4096
 """Enough that the chords miss less than 4e-7 of the loop."""
+
+SAME_AMPLITUDE = 0.9
+"""A cycle at the end of a recording with less of the full excursion is a start or a stop."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,7 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     bandpass = signal.butter(
         2, [settings.band_low_hz, settings.band_high_hz], "bandpass", fs=rate_hz, output="sos"
     )
+    moving = _moving_at_ends(angle, round(rate_hz / motion.frequency_hz))
     padding_s = 3 / settings.band_low_hz  # the slowest part of the filter settles in that time
     torque = spline(used[0])(grid)
     start = max(motion.start_s + settings.discard_s, float(grid[0]))
@@ -96,14 +100,24 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     fine = start + np.arange(points + 1) / (POINTS_PER_CYCLE * motion.frequency_hz)
 
     def band_passed(values: Array) -> Array:
-        padded, before = _continued(grid, values - np.mean(values), motion, padding_s)
+        centred = values - np.mean(values)
+        padded, before = _continued(grid, centred, motion.frequency_hz, moving, padding_s)
         filtered = signal.sosfiltfilt(bandpass, padded)[before : before + grid.size]
         return np.asarray(CubicSpline(grid, filtered)(fine), dtype=np.float64)
 
     return Cycles(fine, band_passed(torque), band_passed(angle), motion.frequency_hz, n_cycles)
 
 
-def _continued(grid: Array, values: Array, motion: Motion, padding_s: float) -> tuple[Array, int]:
+def _moving_at_ends(angle: Array, points_per_cycle: int) -> tuple[bool, bool]:
+    """Return whether the first and the last cycle of a recording have the full amplitude."""
+    full = SAME_AMPLITUDE * float(np.ptp(angle))
+    n = points_per_cycle
+    return float(np.ptp(angle[:n])) > full, float(np.ptp(angle[-n:])) > full
+
+
+def _continued(
+    grid: Array, values: Array, frequency_hz: float, moving: tuple[bool, bool], padding_s: float
+) -> tuple[Array, int]:
     """Return the values continued at both ends, and how many were put before them.
 
     A recording that begins in the middle of the motion is continued with the cycles next to its
@@ -113,13 +127,13 @@ def _continued(grid: Array, values: Array, motion: Motion, padding_s: float) -> 
     interval_s = float(grid[1] - grid[0])
     n = round(padding_s / interval_s)
     steps = np.arange(1, n + 1) * interval_s
-    cycle_s = 1.0 / motion.frequency_hz
+    cycle_s = 1.0 / frequency_hz
     back = (-steps) % cycle_s  # how far into the first cycle, for each time before it
     early = CubicSpline(grid, values)(grid[0] + back)
     late = CubicSpline(grid, values)(grid[-1] - back)
-    if motion.start_s > grid[0] + interval_s:
+    if not moving[0]:
         early = np.full(n, values[0])
-    if motion.start_s + motion.duration_s < grid[-1] - interval_s:
+    if not moving[1]:
         late = np.full(n, values[-1])
     return np.concatenate([early[::-1], values, late]), n
 

@@ -16,8 +16,8 @@ from rigidimeter.records import Epoch, Motion
 
 __all__ = ["find_motion", "single_frequency_share"]
 
-LOWEST_HZ, HIGHEST_HZ = 0.1, 10.0
-"""Where the frequency of an imposed sinusoid is looked for."""
+LOWEST_HZ, HIGHEST_HZ = 0.25, 10.0
+"""Where the frequency of an imposed sinusoid is looked for: slower motion is drift."""
 
 
 def find_motion(epoch: Epoch) -> Motion:

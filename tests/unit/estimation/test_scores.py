@@ -86,6 +86,14 @@ def test_the_motion_is_found_where_it_is_not_said():
     assert single_frequency_share(epoch) > 0.9
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_a_drifting_angle_is_no_sinusoid(seed):
+    t = np.arange(2000) / 100.0
+    angle = np.cumsum(np.random.default_rng(seed).standard_normal(2000)) * 0.001
+    epoch = Epoch("file", "1", {"angle_rad": Channel("angle_rad", t, angle)})
+    assert single_frequency_share(epoch) < 0.7
+
+
 def test_a_short_motion_gives_the_cycles_it_has_or_says_that_it_has_none():
     joint = JointDynamics(0.0045, 0.1368, 1.751)
     assert scoring_cycles(sinusoid_epoch(joint, duration_s=6.0), SCORES).n_cycles == 4

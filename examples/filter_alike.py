@@ -1,0 +1,84 @@
+"""Show what a high-pass on the position alone does to J, B and K.
+
+    rigidimeter simulate --out session --task prbs --epochs 10
+    python examples/filter_alike.py session
+
+The joint of a virtual session is known, so each row is an error in percent of the truth: the
+median over the epochs.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfilt, sosfiltfilt
+
+from rigidimeter.estimation import Signals, fit_inertia_damping_stiffness
+from rigidimeter.estimation.signals import kinematics, motion_channels, spline, uniform_grid
+from rigidimeter.recording import read_session, session_settings
+from rigidimeter.records import Epoch
+
+Array = NDArray[np.float64]
+Filter = Callable[[Array], Array]
+
+TRUTH = np.array([0.0045, 0.1368, 1.751])
+"""J, B, K of subject OFF as the settings have it by default."""
+
+HIGHPASS_HZ = 0.2
+
+
+def measured(epoch: Epoch) -> Signals:
+    """Return the measured signals on one grid, unfiltered."""
+    torque = epoch.channels["torque_nm"]
+    rate_hz = torque.rate_hz
+    time_s = uniform_grid([torque, *motion_channels(epoch)], rate_hz)
+    angle, velocity, acceleration = kinematics(epoch, time_s)
+    band = (0.0, rate_hz / 2)
+    return Signals(time_s, spline(torque)(time_s), acceleration, velocity, angle, rate_hz, band)
+
+
+def position_only(raw: Signals, high_pass: Filter) -> Signals:
+    """Filter the position and leave the rest."""
+    return replace(raw, angle_rad=high_pass(raw.angle_rad))
+
+
+def all_alike(raw: Signals, high_pass: Filter) -> Signals:
+    """Filter torque, acceleration, velocity and position alike."""
+    return replace(
+        raw,
+        torque_nm=high_pass(raw.torque_nm),
+        acceleration_rad_s2=high_pass(raw.acceleration_rad_s2),
+        velocity_rad_s=high_pass(raw.velocity_rad_s),
+        angle_rad=high_pass(raw.angle_rad),
+    )
+
+
+def main(folder: Path) -> None:
+    """Print one row for each way to filter."""
+    order = session_settings(folder).estimation.published_highpass_order
+    raw = [measured(epoch) for epoch in read_session(folder)[0] if epoch.task == "prbs"]
+    sos = butter(order, HIGHPASS_HZ, "highpass", fs=raw[0].rate_hz, output="sos")
+    causal: Filter = lambda values: sosfilt(sos, values)  # noqa: E731
+    zero_phase: Filter = lambda values: sosfiltfilt(sos, values)  # noqa: E731
+    ways: dict[str, Callable[[Signals], Signals]] = {
+        "no filter": lambda s: s,
+        "position only, causal": lambda s: position_only(s, causal),
+        "position only, zero phase": lambda s: position_only(s, zero_phase),
+        "all four, causal": lambda s: all_alike(s, causal),
+        "all four, zero phase": lambda s: all_alike(s, zero_phase),
+    }
+    print(f"{'high-pass at 0.2 Hz':26} {'J %':>7} {'B %':>7} {'K %':>7} {'R²':>7}")
+    for name, way in ways.items():
+        found = [fit_inertia_damping_stiffness(way(signals)) for signals in raw]
+        error = 100 * (np.median([fit.parameters for fit in found], axis=0) / TRUTH - 1)
+        r_squared = np.median([fit.r_squared for fit in found])
+        print(f"{name:26} {error[0]:7.2f} {error[1]:7.2f} {error[2]:7.2f} {r_squared:7.3f}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

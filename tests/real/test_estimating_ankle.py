@@ -1,0 +1,74 @@
+"""A measured human ankle, from the file to J, B and K, by the command line."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import scipy.io
+
+PUBLISHED = {"inertia_kg_m2": 0.0175, "damping_nm_s_rad": 1.25, "stiffness_nm_rad": 103.0}
+"""Least squares on the whole recording, at 100 samples/s (shared data, README)."""
+
+NAMES = ["--column", "angle_rad=position_rad", "--column", "torque_nm=torque_Nm"]
+OPTIONS = ["--rate-hz", "1000", "--reaction", "--epoch-length-s", "20"]
+
+
+def estimate(path, out, *options):
+    command = [sys.executable, "-m", "rigidimeter", "estimate", path, *options, "--json", out]
+    ran = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    return json.loads(out.read_text())
+
+
+@pytest.fixture(scope="module")
+def ankle(shared_data, tmp_path_factory):
+    path = shared_data / "ankle" / "z_df.npz"
+    out = tmp_path_factory.mktemp("ankle") / "npz.json"
+    return path, estimate(path, out, *NAMES, *OPTIONS)
+
+
+def test_each_epoch_is_within_a_tenth_of_the_known_fit(ankle):
+    epochs = ankle[1]["epochs"]
+    assert [epoch["outcome"] for epoch in epochs] == ["included"] * 3
+    for name, value in PUBLISHED.items():
+        np.testing.assert_allclose([epoch[name] for epoch in epochs], value, rtol=0.1)
+
+
+def test_the_fits_account_for_at_least_87_percent_of_the_variance(ankle):
+    assert np.mean([epoch["vaf_percent"] for epoch in ankle[1]["epochs"]]) >= 87.0
+
+
+def same_but_for_the_source(one, two):
+    for a, b in zip(one["epochs"], two["epochs"], strict=True):
+        for key in a.keys() - {"source"}:
+            assert a[key] == b[key], key
+
+
+def test_the_same_numbers_from_a_matlab_file(ankle, tmp_path):
+    path, reference = ankle
+    with np.load(path) as archive:
+        scipy.io.savemat(tmp_path / "ankle.mat", {k: archive[k] for k in archive.files})
+    found = estimate(tmp_path / "ankle.mat", tmp_path / "mat.json", *NAMES, *OPTIONS)
+    same_but_for_the_source(found, reference)
+
+
+def test_the_same_numbers_from_a_text_file(ankle, tmp_path):
+    path, reference = ankle
+    with np.load(path) as archive:
+        angle, torque = archive["position_rad"], archive["torque_Nm"]
+    rows = zip(
+        (np.arange(angle.size) / 1000).tolist(), angle.tolist(), torque.tolist(), strict=True
+    )
+    text = "time_s,angle_rad,torque_nm\n" + "".join(f"{t!r},{a!r},{m!r}\n" for t, a, m in rows)
+    (tmp_path / "ankle.csv").write_text(text)
+    found = estimate(tmp_path / "ankle.csv", tmp_path / "csv.json", "--reaction",
+                     "--epoch-length-s", 20)  # fmt: skip
+    same_but_for_the_source(found, reference)
+
+
+def test_the_wrong_sign_shows_itself(ankle, tmp_path):
+    path, _ = ankle
+    found = estimate(path, tmp_path / "out.json", *NAMES, "--rate-hz", 1000, "--epoch-length-s", 20)
+    assert all(epoch["stiffness_nm_rad"] < 0 for epoch in found["epochs"])

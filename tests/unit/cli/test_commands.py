@@ -1,0 +1,161 @@
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+
+def test_help_names_every_command_and_gives_examples(rigidimeter):
+    ran = rigidimeter("--help")
+    assert ran.status == 0
+    for command in ("design", "simulate", "estimate", "compare", "report", "recover", "demo"):
+        assert command in ran.out
+        assert "For example:\n" in rigidimeter(command, "--help").out
+
+
+def test_the_version_is_printed(rigidimeter):
+    assert rigidimeter("--version").out == "rigidimeter 0.1.0\n"
+
+
+def test_help_imports_nothing_heavy():
+    """Start-up time is a promise; what it depends on can be tested without a clock."""
+    code = (
+        "import sys, rigidimeter.cli.main; "
+        "print([m for m in ('numpy','scipy','pyarrow','matplotlib','pydantic','rich') "
+        "if m in sys.modules])"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == "[]"
+
+
+def test_a_session_goes_from_simulation_to_estimate_to_comparison(rigidimeter, tmp_path):
+    settings = tmp_path / "study.toml"
+    settings.write_text(
+        """
+        seed = 4
+        [protocol]
+        rests_s = [1.0]
+        return_s = 1.0
+        blocks = [{task = "prbs", condition = "OFF", epochs = 3},
+                  {task = "prbs", condition = "DBS", epochs = 3},
+                  {task = "sinusoid", condition = "OFF", epochs = 1}]
+        """
+    )
+    session, out, table = tmp_path / "session", tmp_path / "e.json", tmp_path / "e.csv"
+    ran = rigidimeter("simulate", "--settings", settings, "--out", session)
+    assert ran.status == 0
+    assert "7 of 7 epochs ended with success" in ran.out
+
+    ran = rigidimeter("estimate", session, "--json", out, "--csv", table)
+    assert ran.status == 0, ran.err
+    document = json.loads(out.read_text())
+    stiffness = [epoch["stiffness_nm_rad"] for epoch in document["epochs"]]
+    np.testing.assert_allclose(stiffness, [1.751] * 3 + [1.42] * 3, rtol=0.01)
+    assert [score["condition"] for score in document["scores"]] == ["OFF"]
+    assert len(table.read_text().splitlines()) == 7
+
+    one, two = tmp_path / "c1.json", tmp_path / "c2.json"
+    assert rigidimeter("compare", session, "--json", one).status == 0
+    ran = rigidimeter("compare", out, "--json", two, "--csv", tmp_path / "c.csv")
+    assert ran.status == 0
+    assert json.loads(one.read_text()) == json.loads(two.read_text())
+    measures = {c["measure"]: c for c in json.loads(two.read_text())["comparisons"]}
+    assert measures["stiffness_nm_rad"]["shift"] == pytest.approx(0.331, abs=0.01)
+    assert "asymptotic" in measures["stiffness_nm_rad"]["test"]
+    assert "work_j" in (tmp_path / "c.csv").read_text()
+
+
+def test_published_and_bandlimited_differ_as_the_ledger_says(rigidimeter, simulate, tmp_path):
+    folder = simulate()
+    found = {}
+    for method in ("published", "bandlimited"):
+        assert (
+            rigidimeter("estimate", folder, "--method", method, "--json", tmp_path / "x").status
+            == 0
+        )
+        (found[method],) = json.loads((tmp_path / "x").read_text())["epochs"]
+    # A causal high-pass on the position alone halves the stiffness, with hardly any noise.
+    assert found["published"]["stiffness_nm_rad"] == pytest.approx(0.49 * 1.751, rel=0.1)
+    assert found["bandlimited"]["stiffness_nm_rad"] == pytest.approx(1.751, rel=0.005)
+
+
+def test_options_shape_a_simulation(rigidimeter, tmp_path):
+    ran = rigidimeter(
+        "simulate", "--out", tmp_path / "s", "--task", "prbs", "--condition", "DBS",
+        "--epochs", 1, "--seed", 8, "--paper-rates",
+    )  # fmt: skip
+    assert ran.status == 0, ran.err
+    manifest = json.loads((tmp_path / "s" / "manifest.json").read_text())
+    assert manifest["seeds"] == {"session": 8}
+    assert manifest["settings"]["rig"]["torque"]["rate_hz"] == 100.0
+    assert manifest["settings"]["rig"]["motion"]["rate_hz"] == 50.0
+    assert [epoch["condition"] for epoch in manifest["protocol"]] == ["DBS"]
+
+
+def test_a_wider_band_is_passed_on(rigidimeter, simulate, tmp_path):
+    folder = simulate()
+    assert (
+        rigidimeter("estimate", folder, "--band-hz", 0.2, 12, "--json", tmp_path / "x").status == 0
+    )
+    assert json.loads((tmp_path / "x").read_text())["epochs"][0]["band_hz"] == [0.2, 12.0]
+
+
+def test_a_report_of_a_foreign_recording(rigidimeter, tmp_path):
+    rng = np.random.default_rng(0)
+    t = np.arange(4000) / 100.0
+    angle = np.cumsum(rng.standard_normal(4000)) * 0.001
+    torque = 2.0 * angle + 0.1 * rng.standard_normal(4000)
+    rows = "".join(f"{a},{b},{c}\n" for a, b, c in zip(t, angle, torque, strict=True))
+    (tmp_path / "joint.csv").write_text("time_s,angle_rad,torque_nm\n" + rows)
+    ran = rigidimeter(
+        "report", tmp_path / "joint.csv", "--epoch-length-s", 20, "--out", tmp_path / "report"
+    )
+    assert ran.status == 0, ran.err
+    assert ran.out.strip().endswith("report.html")
+    assert (tmp_path / "report" / "estimates.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["estimate", "none.csv"], "none.csv: there is no such file"),
+        (["estimate", "{session}", "--method", "magic"], "known: bandlimited, published"),
+        (["estimate", "{session}", "--rate-hz", "-5"], "--rate-hz -5: must be a number greater"),
+        (["estimate", "{session}", "--column", "torque_nm"], "write NAME=COLUMN"),
+        (["estimate", "{session}", "--column", "a=b", "--column", "a=c"], "already given"),
+        (["estimate", "{session}", "--task", "dance"], "must be prbs or sinusoid"),
+        (["estimate", "{session}", "--band-hz", "5", "2"], "band_low_hz must be below"),
+        (["estimate", "{session}", "--json", "no/such/folder.json"], "cannot be written"),
+        (["estimate", "{session}", "--settings", "none.toml"], "none.toml: cannot be read"),
+        (["compare", "{session}"], "needs two conditions"),
+        (["compare", "{session}", "--reference", "X"], "no such condition; recorded are: OFF"),
+        (["recover", "."], "is not a session folder"),
+        (["simulate", "--out", "{session}"], "is not empty"),
+        (["simulate", "--out", "x", "--epochs", "3"], "need --task"),
+        (["simulate", "--out", "x", "--task", "dance"], "must be one of 'prbs', 'sinusoid'"),
+        (["simulate", "--out", "x", "--task", "prbs", "--condition", "Z"], "condition 'Z'"),
+        (["simulate", "--out", "x", "--task", "prbs", "--epochs", "0"], "at least 1"),
+        (["report", "{session}", "--out", "{session}/manifest.json"], "cannot be written"),
+    ],
+)
+def test_what_a_user_did_wrong_is_one_sentence_and_a_status(
+    rigidimeter, simulate, arguments, words, tmp_path, monkeypatch
+):
+    folder = simulate() if any("{session}" in argument for argument in arguments) else None
+    monkeypatch.chdir(tmp_path)
+    ran = rigidimeter(*(argument.format(session=folder) for argument in arguments))
+    assert ran.status == 1
+    assert words in ran.err
+    assert ran.err.count("rigidimeter: ") == 1
+
+
+def test_a_good_epoch_beside_bad_inputs_is_analysed(rigidimeter, simulate, tmp_path):
+    good = simulate()
+    (tmp_path / "bad.csv").write_text("time_s,torque_nm,angle_rad\n0,1,2\n0.1,x,2\n")
+    out = tmp_path / "out.json"
+    ran = rigidimeter("estimate", tmp_path / "bad.csv", good, "--json", out)
+    assert ran.status == 1
+    assert "bad.csv" in ran.err
+    (epoch,) = json.loads(out.read_text())["epochs"]
+    assert epoch["outcome"] == "included"

@@ -1,0 +1,80 @@
+import csv
+import json
+import math
+
+import pytest
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording import read_estimates, write_estimates_csv, write_estimates_json
+from rigidimeter.records import Analysis, Fit, Outcome, Score
+
+GOOD = Fit("a.csv", "1", "OFF", "bandlimited", Outcome(), 0.0045, 1e-5, 0.13, 1e-3, 1.7, 0.02,
+           0.99, 99.1, 3.2, 0.004, 18000, (0.15, 10.0))  # fmt: skip
+FAILED = Fit("a.csv", "2", "", "bandlimited", Outcome("failed", "torque_nm is constant"))
+ANALYSIS = Analysis(
+    "bandlimited",
+    (GOOD, FAILED),
+    (GOOD, FAILED),
+    0.0045,
+    (Score("a.csv", "3", "DBS", Outcome(), 0.4, 1 / 3, 8, 1.0),),
+)
+
+
+def test_the_document_has_the_published_keys(tmp_path):
+    write_estimates_json(tmp_path / "e.json", ANALYSIS)
+    document = json.loads((tmp_path / "e.json").read_text())
+    assert document["schema"] == "rigidimeter.estimates/1"
+    assert document["method"] == "bandlimited"
+    assert document["epochs"][0].keys() >= {
+        "source", "epoch", "condition", "outcome", "reason", "inertia_kg_m2", "inertia_kg_m2_se",
+        "damping_nm_s_rad", "damping_nm_s_rad_se", "stiffness_nm_rad", "stiffness_nm_rad_se",
+        "r_squared", "vaf_percent", "condition_number", "n_samples",
+    }  # fmt: skip
+    assert document["epochs"][1]["inertia_kg_m2"] is None
+    assert document["epochs"][1]["reason"] == "torque_nm is constant"
+    assert document["fixed_inertia"]["inertia_kg_m2"] == 0.0045
+    assert document["fixed_inertia"]["epochs"][0]["stiffness_nm_rad"] == 1.7
+    assert document["scores"][0].keys() >= {"impulse_nm_s", "work_j"}
+
+
+def test_estimates_are_read_back_equal(tmp_path):
+    write_estimates_json(tmp_path / "e.json", ANALYSIS)
+    assert repr(read_estimates(tmp_path / "e.json")) == repr(ANALYSIS)
+
+
+def test_the_table_has_a_row_an_epoch_in_full_precision(tmp_path):
+    write_estimates_csv(tmp_path / "e.csv", ANALYSIS)
+    with (tmp_path / "e.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["outcome"] for row in rows] == ["included", "failed"]
+    assert float(rows[0]["inertia_kg_m2"]) == 0.0045
+    assert float(rows[0]["fixed_inertia_damping_nm_s_rad"]) == 0.13
+    assert rows[1]["damping_nm_s_rad"] == ""
+
+
+def test_scores_alone_give_the_table_of_scores(tmp_path):
+    only = Analysis("bandlimited", (), (), math.nan, ANALYSIS.scores)
+    write_estimates_csv(tmp_path / "s.csv", only)
+    with (tmp_path / "s.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    assert float(row["work_j"]) == 1 / 3
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{", "not valid JSON"),
+        ("[]", "schema is None"),
+        ('{"schema": "other/1"}', "schema is 'other/1'"),
+        ('{"schema": "rigidimeter.estimates/1", "method": "x"}', "not a complete"),
+    ],
+)
+def test_another_document_is_refused(tmp_path, text, words):
+    (tmp_path / "e.json").write_text(text)
+    with pytest.raises(UserError, match=words):
+        read_estimates(tmp_path / "e.json")
+
+
+def test_a_folder_that_does_not_exist_is_named(tmp_path):
+    with pytest.raises(UserError, match="cannot be written"):
+        write_estimates_json(tmp_path / "no" / "e.json", ANALYSIS)

@@ -1,0 +1,102 @@
+import math
+
+import numpy as np
+import pytest
+
+from rigidimeter.records import Analysis, Channel, Epoch, Fit, Outcome, Score
+from rigidimeter.settings import Settings
+from rigidimeter.study import analyse, compare, conditions, task_of
+
+
+def fit(condition, B=0.1, K=1.0, J=0.004, outcome=None):
+    return Fit("s", "1", condition, "bandlimited", outcome or Outcome(),
+               inertia_kg_m2=J, damping_nm_s_rad=B, stiffness_nm_rad=K)  # fmt: skip
+
+
+def analysis(fits, scores=()):
+    return Analysis("bandlimited", tuple(fits), tuple(fits), 0.004, tuple(scores))
+
+
+def epochs_with_inertia(inertias, closed=None):
+    """Exact broad-band motions of joints that differ in inertia alone."""
+    t = np.arange(6000) / 300.0
+    f = np.arange(0.2, 20.0, 0.35)
+    w = 2 * np.pi * f
+    made = []
+    for k, J in enumerate(inertias):
+        phase = np.random.default_rng(k).uniform(0, 2 * np.pi, f.size)
+        angle = np.outer(w, t) + phase[:, None]
+        A = 0.05 / (1 + f)
+        x, v, a = A @ np.sin(angle), (A * w) @ np.cos(angle), -(A * w**2) @ np.sin(angle)
+        channels = {
+            "torque_nm": Channel("torque_nm", t, J * a + 0.14 * v + 1.7 * x),
+            "angle_rad": Channel("angle_rad", t, x),
+        }
+        outcome = (closed or {}).get(k, Outcome())
+        made.append(Epoch("s", str(k), channels, task="prbs", closed=outcome))
+    return made
+
+
+def test_the_second_stage_holds_the_median_inertia_of_the_included():
+    epochs = epochs_with_inertia([0.004, 0.005, 0.009, 0.02], {3: Outcome("excluded", "limit")})
+    found = analyse(epochs, Settings())
+    assert found.inertia_kg_m2 == pytest.approx(0.005, rel=1e-3)
+    assert {f.inertia_kg_m2 for f in found.fixed_inertia} == {found.inertia_kg_m2}
+    assert found.fixed_inertia[1].damping_nm_s_rad == pytest.approx(0.14, rel=1e-3)
+    assert found.fixed_inertia[3].outcome.reason == "limit"
+
+
+def test_without_an_included_epoch_there_is_no_second_stage():
+    epochs = epochs_with_inertia([0.004], {0: Outcome("excluded", "limit")})
+    found = analyse(epochs, Settings())
+    assert math.isnan(found.inertia_kg_m2)
+    assert math.isnan(found.fixed_inertia[0].damping_nm_s_rad)
+    assert found.fits[0].damping_nm_s_rad == pytest.approx(0.14, rel=1e-3)
+
+
+def test_a_bad_epoch_does_not_stop_the_good_ones():
+    good, bad = epochs_with_inertia([0.004, 0.004])
+    t = np.arange(100) / 100.0
+    bad = Epoch("s", "bad", {"torque_nm": Channel("torque_nm", t, t),
+                             "angle_rad": Channel("angle_rad", t, t)})  # fmt: skip
+    found = analyse([bad, good], Settings())
+    assert [f.outcome.kind for f in found.fits] == ["failed", "included"]
+
+
+def test_the_task_is_told_from_the_motion_where_it_is_not_said():
+    t = np.arange(2000) / 100.0
+    sine = {"torque_nm": Channel("torque_nm", t, np.cos(2 * np.pi * t)),
+            "angle_rad": Channel("angle_rad", t, np.sin(2 * np.pi * t))}  # fmt: skip
+    assert task_of(Epoch("f", "1", sine), Settings()) == "sinusoid"
+    assert task_of(Epoch("f", "1", sine, task="prbs"), Settings()) == "prbs"
+    (broad,) = epochs_with_inertia([0.004])
+    assert task_of(Epoch("f", "1", broad.channels), Settings()) == "prbs"
+
+
+def test_off_is_the_reference_wherever_it_comes():
+    assert conditions(analysis([fit("DBS"), fit("OFF"), fit("")])) == ("OFF", "DBS")
+
+
+def test_excluded_epochs_are_counted_and_left_out():
+    fits = [fit("OFF", K=k) for k in (2.0, 2.1, 2.2)] + [fit("DBS", K=k) for k in (1.0, 1.1, 1.2)]
+    fits.append(fit("OFF", K=99.0, outcome=Outcome("excluded", "limit")))
+    stiffness = next(c for c in compare(analysis(fits)) if c.measure == "stiffness_nm_rad")
+    assert stiffness.values == {"OFF": (2.0, 2.1, 2.2), "DBS": (1.0, 1.1, 1.2)}
+    assert stiffness.excluded == {"OFF": 1, "DBS": 0}
+    assert stiffness.test is not None
+    assert stiffness.test.shift == pytest.approx(1.0)
+    assert stiffness.test.z > 0
+
+
+def test_too_few_epochs_give_summaries_and_a_reason():
+    (inertia, *_) = compare(analysis([fit("OFF"), fit("DBS")]))
+    assert inertia.test is None
+    assert "needs 3 epochs" in inertia.remark
+    assert inertia.summaries["OFF"].n == 1
+
+
+def test_one_condition_gives_its_summary():
+    scores = [Score("s", "1", "OFF", Outcome(), 0.4, 0.3, 8, 1.0)]
+    found = compare(analysis([], scores))
+    assert [c.measure for c in found] == ["impulse_nm_s", "work_j"]
+    assert found[0].remark == "only one condition was recorded"
