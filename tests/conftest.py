@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
+from rigidimeter.cli.main import main
 from rigidimeter.cli.virtual import run_virtual_session
 from rigidimeter.settings import parse_settings
 
@@ -30,5 +32,28 @@ def simulate(tmp_path: Path) -> Simulate:
         }
         run_virtual_session(parse_settings(values), tmp_path / name)
         return tmp_path / name
+
+    return run
+
+
+class Ran(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def rigidimeter(monkeypatch, capsys) -> Callable[..., Ran]:
+    """Run a command line in this process and return its status and what it printed."""
+
+    def run(*arguments: object) -> Ran:
+        monkeypatch.setattr(sys, "argv", ["rigidimeter", *map(str, arguments)])
+        capsys.readouterr()
+        try:
+            main()
+            status = 0
+        except SystemExit as stop:
+            status = stop.code if isinstance(stop.code, int) else 0
+        return Ran(status, *capsys.readouterr())
 
     return run

@@ -1,0 +1,148 @@
+"""The loop on a rig made for the test: what it does when readings or the rig go wrong."""
+
+import json
+import math
+import time
+
+import numpy as np
+import pytest
+
+from rigidimeter.acquisition import RealTimeClock, SimulatedClock, run_session
+from rigidimeter.design import plan
+from rigidimeter.device import Reading, SimulatedRig
+from rigidimeter.recording import SessionWriter
+from rigidimeter.recording.log import read_samples
+from rigidimeter.settings import parse_settings
+
+SETTINGS = parse_settings(
+    {
+        "protocol": {"blocks": [{"epochs": 2}], "rests_s": [1.0], "return_s": 1.0},
+        "prbs": {"duration_s": 1.0},
+    }
+)
+
+
+class SpoiledRig:
+    """The virtual rig, but what it reads from a given tick on is changed."""
+
+    def __init__(self, spoil, from_tick=500):
+        self.rig = SimulatedRig(SETTINGS.rig, SETTINGS.subject["OFF"], np.random.default_rng(1))
+        self.spoil, self.from_tick = spoil, from_tick
+        self.tick = 0
+        self.disabled = 0
+
+    def enable(self):
+        self.rig.enable()
+
+    def read(self):
+        reading = self.rig.read()
+        self.tick += 1
+        return self.spoil(reading) if self.tick > self.from_tick else reading
+
+    def write(self, velocity_rad_s):
+        return self.rig.write(velocity_rad_s)
+
+    def disable(self):
+        self.disabled += 1
+        self.rig.disable()
+
+
+def run(rig, folder, clock=None, **options):
+    protocol = plan(SETTINGS.protocol, SETTINGS.prbs, SETTINGS.sinusoid, 1)
+    writer = SessionWriter(folder, SETTINGS, [], {"session": 1}, virtual=True)
+    return run_session(protocol, SETTINGS, rig, clock or SimulatedClock(), writer, **options)
+
+
+def events(folder):
+    return [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda r: r._replace(torque_nm=math.nan), "torque sensor"),
+        (lambda r: r._replace(torque_nm=math.inf), "torque sensor"),
+        (lambda r: r._replace(angle_rad=math.nan), "angle or velocity"),
+        (lambda r: r._replace(velocity_rad_s=-math.inf), "angle or velocity"),
+        (lambda r: r._replace(angle_rad=2.0), "beyond the position limit"),
+    ],
+)
+def test_a_bad_reading_stops_the_rig_and_closes_the_record(tmp_path, spoil, words):
+    rig = SpoiledRig(spoil)
+    result = run(rig, tmp_path / "s")
+    assert (result.outcome, result.epochs_run) == ("fail", 1)
+    assert words in result.reason
+    assert rig.disabled == 1
+    kinds = [(e["event"], e.get("outcome")) for e in events(tmp_path / "s")]
+    assert kinds[-2:] == [("epoch_ended", "fail"), ("session_ended", "fail")]
+    samples = read_samples(tmp_path / "s" / "samples.arrows")
+    sent = samples["velocity_command_rad_s"]
+    assert np.isfinite(sent).all()
+    # The ramp to rest keeps to the deceleration limit.
+    limit = np.deg2rad(SETTINGS.guard.acceleration_limit_deg_s2) / SETTINGS.rig.tick_rate_hz
+    assert np.abs(np.diff(sent)[499:]).max() <= limit * (1 + 1e-9)
+    assert sent[-1] == 0.0
+    assert (samples["limited"][500:] == 4).all()
+
+
+def test_a_bad_torque_does_not_enter_the_filter(tmp_path):
+    """One NaN in a recursive filter would stay for ever; the record shows that it did not."""
+    rig = SpoiledRig(lambda r: r._replace(torque_nm=math.nan))
+    run(rig, tmp_path / "s")
+    asked = read_samples(tmp_path / "s" / "samples.arrows")["velocity_request_rad_s"]
+    assert np.isfinite(asked[501:]).all()
+
+
+def test_a_rig_that_raises_is_disabled_and_the_record_closed(tmp_path):
+    def fail(_):
+        raise OSError("the wire came off")
+
+    rig = SpoiledRig(fail)
+    with pytest.raises(OSError, match="wire came off"):
+        run(rig, tmp_path / "s")
+    assert rig.disabled == 1
+    ended = [e for e in events(tmp_path / "s") if e["event"].endswith("_ended")]
+    assert [e["outcome"] for e in ended] == ["fail", "fail"]
+    assert "the wire came off" in ended[0]["reason"]
+    assert len(read_samples(tmp_path / "s" / "samples.arrows")["tick"]) == 500
+
+
+def test_the_arm_returns_to_where_it_began(tmp_path):
+    rig = SpoiledRig(lambda r: r)
+    run(rig, tmp_path / "s")
+    samples = read_samples(tmp_path / "s" / "samples.arrows")
+    assert np.abs(samples["angle_rad"][:1000]).max() > 0.05
+    assert abs(samples["angle_rad"][1990]) < 0.005
+
+
+def test_what_comes_before_an_epoch_is_stored_with_it(tmp_path):
+    run(SpoiledRig(lambda r: r), tmp_path / "s", before_epoch=lambda p: {"note": p.label * 2})
+    started = [e for e in events(tmp_path / "s") if e["event"] == "epoch_started"]
+    assert [e["note"] for e in started] == ["11", "22"]
+
+
+def test_progress_reaches_the_end(tmp_path):
+    reached = []
+    run(SpoiledRig(lambda r: r), tmp_path / "s", progress=reached.append)
+    assert reached == [1.0, 2.0, 3.0, 4.0]
+
+
+def test_the_real_clock_waits_for_absolute_deadlines():
+    clock = RealTimeClock()
+    start = time.monotonic()
+    times = [clock.wait_until(0.01 * k) for k in range(1, 11)]
+    assert time.monotonic() - start >= 0.1 - 1e-3
+    assert all(t >= 0.01 * k for k, t in enumerate(times, start=1))
+    assert clock.wait_until(0.0) >= 0.1  # a deadline in the past returns at once
+
+
+def test_a_rig_without_power_does_not_move():
+    rig = SimulatedRig(SETTINGS.rig, SETTINGS.subject["OFF"], np.random.default_rng(1))
+    assert rig.write(1.0) == 0.0
+    rig.enable()
+    assert rig.write(1.0) == 1.0
+    rig.disable()
+    for _ in range(200):
+        reading = rig.read()
+    assert isinstance(reading, Reading)
+    assert reading.angle_rad == 0.0
