@@ -8,19 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rigidimeter.cli.inputs import analyse_inputs, read_inputs, say, status
-from rigidimeter.cli.options import (
-    BandOption,
-    ColumnOption,
-    ConditionOption,
-    EpochLengthOption,
-    InputsArgument,
-    MethodOption,
-    RateOption,
-    ReactionOption,
-    SettingsOption,
-    TaskOption,
-)
+from rigidimeter.cli.inputs import Recordings, analyse_inputs, say, status
+from rigidimeter.cli.options import reads_recordings
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -31,8 +20,9 @@ __all__ = ["COMPARISONS_SCHEMA", "compare"]
 COMPARISONS_SCHEMA = "rigidimeter.comparisons/1"
 
 
+@reads_recordings
 def compare(
-    inputs: InputsArgument,
+    recordings: Recordings,
     reference: Annotated[
         str | None,
         typer.Option("--reference", metavar="NAME", help="Condition to compare with."),
@@ -46,15 +36,6 @@ def compare(
     csv_out: Annotated[
         Path | None, typer.Option("--csv", metavar="OUT", help="Write the table as CSV.")
     ] = None,
-    method: MethodOption = "bandlimited",
-    column: ColumnOption = None,
-    rate_hz: RateOption = None,
-    reaction: ReactionOption = False,
-    epoch_length_s: EpochLengthOption = None,
-    condition: ConditionOption = "",
-    task: TaskOption = None,
-    band_hz: BandOption = None,
-    settings: SettingsOption = None,
 ) -> None:
     """Compare two conditions in J, B, K, angular impulse and work.
 
@@ -73,24 +54,14 @@ def compare(
     from rigidimeter.study import conditions
 
     exit_status = 0
-    if any(path.suffix.lower() == ".json" for path in inputs):
-        if len(inputs) > 1:
+    if any(path.suffix.lower() == ".json" for path in recordings.paths):
+        if len(recordings.paths) > 1:
             raise UserError("compare takes one JSON file of estimates, or recordings, not both")
-        analysis = read_estimates(inputs[0])
+        analysis = read_estimates(recordings.paths[0])
     else:
-        read = read_inputs(
-            inputs,
-            settings=settings,
-            column=column,
-            rate_hz=rate_hz,
-            reaction=reaction,
-            epoch_length_s=epoch_length_s,
-            condition=condition,
-            task=task,
-            band_hz=band_hz,
-        )
+        read = recordings.read()
         say(read.notices)
-        analysis = analyse_inputs(read, method)
+        analysis = analyse_inputs(read)
         exit_status = status(read, analysis)
     known = conditions(analysis)
     for option, name in (("--reference", reference), ("--other", other)):

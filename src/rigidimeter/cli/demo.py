@@ -62,7 +62,7 @@ def demo(
       rigidimeter demo
       rigidimeter demo --out small --prbs-epochs 3 --sinusoid-epochs 3
     """
-    from rigidimeter.cli.inputs import analyse_inputs, read_inputs, say, status
+    from rigidimeter.cli.inputs import Recordings, analyse_inputs, say, status
     from rigidimeter.cli.reporting import make_report
     from rigidimeter.recording import write_estimates_json
 
@@ -75,19 +75,9 @@ def demo(
         f"{2 * DAYS * sinusoid_epochs} sinusoidal epochs of 20 s with their rests"
     )
     _simulate(settings, sessions)
-    read = read_inputs(
-        sessions,
-        settings=None,
-        column=None,
-        rate_hz=None,
-        reaction=False,
-        epoch_length_s=None,
-        condition="",
-        task=None,
-        band_hz=None,
-    )
+    read = Recordings(sessions).read()
     say(read.notices)
-    analysis = analyse_inputs(read, "bandlimited")
+    analysis = analyse_inputs(read)
     exit_status = status(read, analysis)
     write_estimates_json(out / "estimates.json", analysis)
     page = make_report("A virtual study of elbow rigidity", read, analysis, out / "report")

@@ -8,19 +8,8 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from rigidimeter.cli.inputs import analyse_inputs, read_inputs, say, status
-from rigidimeter.cli.options import (
-    BandOption,
-    ColumnOption,
-    ConditionOption,
-    EpochLengthOption,
-    InputsArgument,
-    MethodOption,
-    RateOption,
-    ReactionOption,
-    SettingsOption,
-    TaskOption,
-)
+from rigidimeter.cli.inputs import Recordings, analyse_inputs, say, status
+from rigidimeter.cli.options import reads_recordings
 
 if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Outcome, Score
@@ -30,23 +19,15 @@ __all__ = ["estimate"]
 _R = TypeVar("_R", "Fit", "Score")
 
 
+@reads_recordings
 def estimate(
-    inputs: InputsArgument,
-    method: MethodOption = "bandlimited",
+    recordings: Recordings,
     json_out: Annotated[
         Path | None, typer.Option("--json", metavar="OUT", help="Write everything as JSON.")
     ] = None,
     csv_out: Annotated[
         Path | None, typer.Option("--csv", metavar="OUT", help="Write the epoch table as CSV.")
     ] = None,
-    column: ColumnOption = None,
-    rate_hz: RateOption = None,
-    reaction: ReactionOption = False,
-    epoch_length_s: EpochLengthOption = None,
-    condition: ConditionOption = "",
-    task: TaskOption = None,
-    band_hz: BandOption = None,
-    settings: SettingsOption = None,
 ) -> None:
     """Estimate inertia J, damping B and stiffness K of each epoch, and score the sinusoids.
 
@@ -64,19 +45,9 @@ def estimate(
     """
     from rigidimeter.recording import write_estimates_csv, write_estimates_json
 
-    read = read_inputs(
-        inputs,
-        settings=settings,
-        column=column,
-        rate_hz=rate_hz,
-        reaction=reaction,
-        epoch_length_s=epoch_length_s,
-        condition=condition,
-        task=task,
-        band_hz=band_hz,
-    )
+    read = recordings.read()
     say(read.notices)
-    analysis = analyse_inputs(read, method)
+    analysis = analyse_inputs(read)
     typer.echo("\n".join(_lines(analysis)))
     if json_out is not None:
         write_estimates_json(json_out, analysis)

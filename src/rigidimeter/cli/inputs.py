@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score, Task
     from rigidimeter.settings import Settings
 
-__all__ = ["Inputs", "analyse_inputs", "read_inputs", "say", "status"]
+__all__ = ["Inputs", "Recordings", "analyse_inputs", "say", "status"]
 
 
 @dataclass(frozen=True)
@@ -25,30 +25,40 @@ class Inputs:
     notices: tuple[Notice, ...]
     settings: Settings
     paths: tuple[Path, ...]
+    method: str
 
 
-def read_inputs(
-    paths: list[Path],
-    *,
-    settings: Path | None,
-    column: list[str] | None,
-    rate_hz: float | None,
-    reaction: bool,
-    epoch_length_s: float | None,
-    condition: str,
-    task: str | None,
-    band_hz: tuple[float, float] | None,
-) -> Inputs:
-    """Read every input; one that cannot be read becomes a notice of level `error`.
+@dataclass(frozen=True)
+class Recordings:
+    """What the user named, and how to read it; the fields are the options of the commands.
 
     The settings are those of the file given, else those that the first session folder was recorded
     with, else the defaults.
-
-    Raises
-    ------
-    UserError
-        If an option is wrong, or not one input can be read.
     """
+
+    paths: list[Path]
+    method: str = "bandlimited"
+    column: list[str] | None = None
+    rate_hz: float | None = None
+    reaction: bool = False
+    epoch_length_s: float | None = None
+    condition: str = ""
+    task: str | None = None
+    band_hz: tuple[float, float] | None = None
+    settings: Path | None = None
+
+    def read(self) -> Inputs:
+        """Read every input; one that cannot be read becomes a notice of level `error`.
+
+        Raises
+        ------
+        UserError
+            If an option is wrong, or not one input can be read.
+        """
+        return _read(self)
+
+
+def _read(wanted: Recordings) -> Inputs:
     from rigidimeter.recording import (
         ReadOptions,
         is_session,
@@ -60,23 +70,23 @@ def read_inputs(
     from rigidimeter.settings import load_settings
 
     options = ReadOptions(
-        columns=_columns(column or []),
-        rate_hz=_positive("--rate-hz", rate_hz),
-        reaction=reaction,
-        epoch_length_s=_positive("--epoch-length-s", epoch_length_s),
-        condition=condition,
-        task=_task(task),
+        columns=_columns(wanted.column or []),
+        rate_hz=_positive("--rate-hz", wanted.rate_hz),
+        reaction=wanted.reaction,
+        epoch_length_s=_positive("--epoch-length-s", wanted.epoch_length_s),
+        condition=wanted.condition,
+        task=_task(wanted.task),
     )
     epochs: list[Epoch] = []
     notices: list[Notice] = []
-    chosen = load_settings(settings) if settings is not None else None
-    for path in dict.fromkeys(paths):
+    chosen = load_settings(wanted.settings) if wanted.settings is not None else None
+    for path in dict.fromkeys(wanted.paths):
         try:
             if is_session(path):
                 recorded = session_settings(path)
                 if chosen is None:
                     chosen = recorded
-                elif settings is None and _analysis_of(recorded) != _analysis_of(chosen):
+                elif wanted.settings is None and _analysis_of(recorded) != _analysis_of(chosen):
                     notices.append(
                         Notice(
                             "warning",
@@ -96,12 +106,13 @@ def read_inputs(
     if not epochs:
         raise UserError(" / ".join(n.text for n in notices) or "no epoch was found")
     chosen = chosen if chosen is not None else load_settings(None)
-    if band_hz is not None:
-        chosen = _with_band(chosen, band_hz)
-    return Inputs(tuple(epochs), tuple(notices), chosen, tuple(dict.fromkeys(paths)))
+    if wanted.band_hz is not None:
+        chosen = _with_band(chosen, wanted.band_hz)
+    paths = tuple(dict.fromkeys(wanted.paths))
+    return Inputs(tuple(epochs), tuple(notices), chosen, paths, wanted.method)
 
 
-def analyse_inputs(inputs: Inputs, method: str) -> Analysis:
+def analyse_inputs(inputs: Inputs) -> Analysis:
     """Fit and score with progress.
 
     Raises
@@ -113,6 +124,7 @@ def analyse_inputs(inputs: Inputs, method: str) -> Analysis:
     from rigidimeter.estimation import METHODS
     from rigidimeter.study import analyse
 
+    method = inputs.method
     if method not in METHODS:
         raise UserError(f"--method {method}: there is no such method; known: {', '.join(METHODS)}")
     with Meter("estimate", 2 * len(inputs.epochs)) as meter:

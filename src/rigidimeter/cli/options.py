@@ -1,24 +1,21 @@
-"""Options that several commands share: how to read a recording and how to fit it."""
+"""Options that several commands share: how to read a recording and how to fit it.
+
+`reads_recordings` gives them to a command, which takes a `Recordings` as its first parameter.
+"""
 
 from __future__ import annotations
 
+import functools
+import inspect
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_type_hints
 
 import typer
 
-__all__ = [
-    "BandOption",
-    "ColumnOption",
-    "ConditionOption",
-    "EpochLengthOption",
-    "InputsArgument",
-    "MethodOption",
-    "RateOption",
-    "ReactionOption",
-    "SettingsOption",
-    "TaskOption",
-]
+from rigidimeter.cli.inputs import Recordings
+
+__all__ = ["SettingsOption", "reads_recordings"]
 
 InputsArgument = Annotated[
     list[Path],
@@ -92,3 +89,57 @@ BandOption = Annotated[
         "else to 50, and at most 0.4 times the slowest channel's rate.",
     ),
 ]
+
+
+def _reading(
+    inputs: InputsArgument,
+    method: MethodOption = "bandlimited",
+    column: ColumnOption = None,
+    rate_hz: RateOption = None,
+    reaction: ReactionOption = False,
+    epoch_length_s: EpochLengthOption = None,
+    condition: ConditionOption = "",
+    task: TaskOption = None,
+    band_hz: BandOption = None,
+    settings: SettingsOption = None,
+) -> Recordings:
+    """Hold the shared parameters and what becomes of them."""
+    return Recordings(
+        inputs,
+        method,
+        column,
+        rate_hz,
+        reaction,
+        epoch_length_s,
+        condition,
+        task,
+        band_hz,
+        settings,
+    )
+
+
+def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:
+    """Replace a command's first parameter, a `Recordings`, by the options that make one."""
+    shared = inspect.signature(_reading).parameters
+    own = list(inspect.signature(command).parameters.values())[1:]
+
+    @functools.wraps(command)
+    def with_options(**given: object) -> None:
+        reading = {name: given.pop(name) for name in shared}
+        command(_reading(**reading), **given)  # type: ignore[arg-type]
+
+    parameters = [*shared.values(), *own]
+    hints = {
+        **get_type_hints(command, include_extras=True),
+        **get_type_hints(_reading, include_extras=True),
+        "return": None,
+    }
+    with_options.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [
+            parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=hints[parameter.name])
+            for parameter in parameters
+        ]
+    )
+    with_options.__annotations__ = {p.name: hints[p.name] for p in parameters}
+    del with_options.__wrapped__
+    return with_options

@@ -85,7 +85,9 @@ def _solve(regressors: Array, target: Array) -> tuple[Array, Array, float, Array
         raise ValueError("a regressor is zero throughout")
     left, singular, right = np.linalg.svd(regressors / lengths, full_matrices=False)
     if singular[-1] < singular[0] * regressors.shape[0] * np.finfo(np.float64).eps:
-        raise ValueError("the regressors are linearly dependent")
+        raise ValueError(
+            "the motion cannot tell J, B and K apart: its regressors are linearly dependent"
+        )
     values = (right.T @ ((left.T @ target) / singular)) / lengths
     variances = np.sum((right.T / singular) ** 2, axis=1) / lengths**2
     residual = target - regressors @ values

@@ -112,7 +112,7 @@ def test_a_single_frequency_is_excluded_with_the_reason():
     )
     channels = {
         "torque_nm": Channel("torque_nm", t, x + 0.01 * noise),
-        "angle_rad": Channel("angle_rad", t, x),
+        "angle_rad": Channel("angle_rad", t, x + 1e-5 * noise),
     }
     fit = fit_epoch(Epoch("file", "1", channels), "bandlimited", SETTINGS)
     assert fit.outcome.kind == "excluded"
