@@ -72,8 +72,7 @@ class SimulatedRig:
         self._motion_next_s = next(self._motion_times)
         self._torque_queue: deque[tuple[float, float, float]] = deque()
         self._motion_queue: deque[tuple[float, float, float, float]] = deque()
-        # What a sensor shows before its first sample arrives: the arm at rest.
-        self._reading = Reading(0.0, -1.0, 0.0, 0.0, -1.0)
+        self._reading = Reading(0.0, -t.latency_s, 0.0, 0.0, -m.latency_s)
         self._tick = 0
         self._state = DriveState()
         self._command = 0.0

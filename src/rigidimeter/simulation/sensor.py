@@ -24,8 +24,8 @@ def sample_times_s(
     """Yield when a sensor samples, for ever.
 
     Sample k is taken at k/rate − latency + jitter_k, with jitter_k uniform between 0 and the given
-    bound. It reaches the loop `latency_s` later, so the first one arrives at time zero or, with
-    jitter, just after.
+    bound, and reaches the loop `latency_s` later. The first has no jitter and arrives at time zero:
+    a loop starts when its sensors have spoken.
 
     Parameters
     ----------
@@ -37,6 +37,8 @@ def sample_times_s(
     while True:
         times = np.arange(first, first + _BLOCK) / rate_hz - latency_s
         if jitter_s > 0.0:
-            times += rng.uniform(0.0, jitter_s, _BLOCK)
+            jitter = rng.uniform(0.0, jitter_s, _BLOCK)
+            jitter[: first == 0] = 0.0
+            times += jitter
         yield from times.tolist()
         first += _BLOCK
