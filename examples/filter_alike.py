@@ -64,7 +64,10 @@ def main(folder: Path) -> None:
     raw = [measured(epoch) for epoch in read_session(folder)[0] if epoch.task == "prbs"]
     sos = butter(order, HIGHPASS_HZ, "highpass", fs=raw[0].rate_hz, output="sos")
     causal: Filter = lambda values: sosfilt(sos, values)  # noqa: E731
-    zero_phase: Filter = lambda values: sosfiltfilt(sos, values)  # noqa: E731
+    memory = round(raw[0].rate_hz / HIGHPASS_HZ)  # continued at both ends by its mirror image
+    zero_phase: Filter = lambda values: sosfiltfilt(  # noqa: E731
+        sos, values, padtype="even", padlen=memory
+    )
     ways: dict[str, Callable[[Signals], Signals]] = {
         "no filter": lambda s: s,
         "position only, causal": lambda s: position_only(s, causal),
