@@ -9,9 +9,11 @@ The guard knows nothing of the controller. Whatever velocity is asked for, it se
   the distance left.
 
 The distance left is not counted from the last reading, which is old and does not show what the
-drive has been told but has not done yet. It is counted from where the joint would come to rest if
-the command became zero at once: the reading, plus what was in flight when it was taken (a first
-order memory of what was sent, as long as the reaction time), plus what has been sent since.
+drive has been told but has not done yet. It is counted from the farthest point at which the joint
+could come to rest if the command became zero at once: the reading, plus the largest part of what
+was sent since the reading was taken, less the reaction time, that may still be on its way. A drive
+that follows its command after any delay up to the reaction time, or after a mixture of such delays,
+is covered; one that overshoots its command passes by what it overshoots.
 
 The position limit wins over the acceleration limit; it only ever makes the speed toward the limit
 smaller. A number that is not finite, or an angle beyond the limit, latches: the velocity is ramped
@@ -27,7 +29,13 @@ from enum import IntEnum
 from math import isfinite
 from typing import NamedTuple
 
-__all__ = ["Cause", "GuardLimits", "GuardState", "Limited", "guard_step"]
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Cause", "GuardLimits", "GuardState", "Limited", "guard_state", "guard_step"]
+
+MEMORY_S = 0.5
+"""How far back the guard remembers what was sent; a reading older than that is no reading."""
 
 
 class Cause(IntEnum):
@@ -38,6 +46,7 @@ class Cause(IntEnum):
     MOTION_NOT_FINITE = 2
     COMMAND_NOT_FINITE = 3
     POSITION_LIMIT_EXCEEDED = 4
+    MOTION_STALE = 5
 
     @property
     def sentence(self) -> str:
@@ -51,6 +60,7 @@ _SENTENCES = {
     Cause.MOTION_NOT_FINITE: "the angle or velocity reading was not finite",
     Cause.COMMAND_NOT_FINITE: "the controller asked for a velocity that is not finite",
     Cause.POSITION_LIMIT_EXCEEDED: "the angle was beyond the position limit",
+    Cause.MOTION_STALE: "no angle reading arrived for half a second",
 }
 
 
@@ -70,8 +80,8 @@ _NO_CAUSE, _NOT_LIMITED = int(Cause.NONE), int(Limited.NOT)
 class GuardLimits(NamedTuple):
     """Limits, symmetric about the initial position.
 
-    `reaction_time_s` is what passes between a command and the reading that shows its motion: drive
-    lag, encoder latency and one tick. `tolerance_rad` is how far beyond the position limit a
+    `reaction_time_s` is how long the drive may take to have done what it was told, and how far the
+    stamp of a reading may be wrong. `tolerance_rad` is how far beyond the position limit a
     reading may be before it counts as a fault: sensor noise at the limit is none.
     """
 
@@ -86,15 +96,22 @@ class GuardLimits(NamedTuple):
 class GuardState(NamedTuple):
     """What the guard remembers.
 
-    The velocity last sent, where the joint would come to rest, what of the motion is in flight, the
-    stamp of the last reading, and the first cause.
+    `sent_rad` is a ring of the running sum of what was sent, one entry a tick, `tick` the place of
+    the newest. The ring is written in place: a state is used once. `angle_rad` is the last reading
+    that was a number, `age_s` how old it is.
     """
 
+    sent_rad: NDArray[np.float64]
+    tick: int = 0
     velocity_rad_s: float = 0.0
-    rest_angle_rad: float = 0.0
-    in_flight_rad: float = 0.0
-    reading_time_s: float = -math.inf
+    angle_rad: float = 0.0
+    age_s: float = 0.0
     cause: int = _NO_CAUSE
+
+
+def guard_state(limits: GuardLimits) -> GuardState:
+    """Return the state of a guard at rest that has seen nothing wrong."""
+    return GuardState(np.zeros(math.ceil(MEMORY_S / limits.interval_s) + 1))
 
 
 def guard_step(
@@ -104,7 +121,7 @@ def guard_step(
     torque_nm: float,
     angle_rad: float,
     velocity_rad_s: float,
-    reading_time_s: float,
+    age_s: float,
 ) -> tuple[GuardState, float, int]:
     """Limit one velocity command.
 
@@ -116,8 +133,8 @@ def guard_step(
         What the controller asks for.
     torque_nm, angle_rad, velocity_rad_s : float
         The newest readings, checked for being finite.
-    reading_time_s : float
-        Stamp of the motion reading; a new stamp means a new reading.
+    age_s : float
+        How long ago the motion reading was taken.
 
     Returns
     -------
@@ -128,11 +145,14 @@ def guard_step(
         A `Limited` value.
     """
     dt = limits.interval_s
-    sent_before, rest_angle, in_flight, last_time_s, cause = state
-    rest_angle += sent_before * dt
-    tau = limits.reaction_time_s
-    in_flight = in_flight * (tau / (tau + dt)) + sent_before * dt
-    motion_finite = isfinite(angle_rad) and isfinite(velocity_rad_s)
+    ring, tick, sent_before, angle, age, cause = state
+    size = ring.shape[0]
+    ring[(tick + 1) % size] = ring[tick % size] + sent_before * dt
+    tick += 1
+    age += dt
+    motion_finite = isfinite(angle_rad) and isfinite(velocity_rad_s) and isfinite(age_s)
+    if motion_finite:
+        angle, age = angle_rad, age_s
     if cause == _NO_CAUSE:
         if not isfinite(torque_nm):
             cause = int(Cause.TORQUE_NOT_FINITE)
@@ -140,10 +160,10 @@ def guard_step(
             cause = int(Cause.MOTION_NOT_FINITE)
         elif not isfinite(requested_rad_s):
             cause = int(Cause.COMMAND_NOT_FINITE)
-        elif abs(angle_rad) > limits.position_rad + limits.tolerance_rad:
+        elif abs(angle) > limits.position_rad + limits.tolerance_rad:
             cause = int(Cause.POSITION_LIMIT_EXCEEDED)
-    if motion_finite and reading_time_s != last_time_s:
-        rest_angle = angle_rad + in_flight
+        elif age > MEMORY_S:
+            cause = int(Cause.MOTION_STALE)
     sent, limited = requested_rad_s, _NOT_LIMITED
     if cause != _NO_CAUSE:
         sent, limited = 0.0, int(Limited.LATCHED)
@@ -157,11 +177,27 @@ def guard_step(
         sent, limited = math.copysign(limits.speed_rad_s, sent), max(limited, int(Limited.SPEED))
 
     # Toward the nearer limit, no faster than can still be stopped in the distance left.
-    left = limits.position_rad - rest_angle if sent > 0 else limits.position_rad + rest_angle
+    toward = 1.0 if sent > 0 else -1.0
+    left = limits.position_rad - toward * angle
+    back = min(math.ceil((max(age, 0.0) + limits.reaction_time_s) / dt), size - 1, tick)
+    # Far from the limit the search is spared: all that can be in flight would not reach it.
+    speed = limits.speed_rad_s
+    if left < speed * (back + 1) * dt + speed * speed / (2.0 * limits.acceleration_rad_s2):
+        left -= _farthest_in_flight(ring, tick, back, toward)
     fastest = _stoppable_speed(limits.acceleration_rad_s2, dt, left)
     if abs(sent) > fastest:
         sent, limited = math.copysign(fastest, sent), max(limited, int(Limited.POSITION))
-    return GuardState(sent, rest_angle, in_flight, reading_time_s, cause), sent, limited
+    return GuardState(ring, tick, sent, angle, age, cause), sent, limited
+
+
+def _farthest_in_flight(ring: NDArray[np.float64], tick: int, back: int, toward: float) -> float:
+    """Return the most, toward a limit, that was sent in any stretch up to now, at most `back`."""
+    size = ring.shape[0]
+    newest = ring[tick % size]
+    farthest = 0.0
+    for k in range(1, back + 1):
+        farthest = max(farthest, toward * (newest - ring[(tick - k) % size]))
+    return float(farthest)
 
 
 def _stoppable_speed(acceleration: float, interval_s: float, distance_rad: float) -> float:

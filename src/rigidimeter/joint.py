@@ -67,7 +67,7 @@ class JointDynamics:
     def bandwidth_hz(self) -> float:
         """Return the frequency at which |θ/M| is 3 dB below its value at rest.
 
-        The compliance is K / √2 of its static value where
+        The compliance is 1 / √2 of its static value, 1/K, where
         ``J² ω⁴ + (B² − 2 J K) ω² − K² = 0``, a quadratic in ω² with one positive root.
 
         Raises

@@ -7,7 +7,7 @@ installed.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ __all__ = [
     "analyse",
     "compare",
     "conditions",
+    "doubts",
     "task_of",
 ]
 
@@ -154,11 +155,33 @@ def analyse(
     fixed = []
     for epoch, fit in zip(fitted, fits, strict=True):
         if included:
-            fixed.append(fit_epoch(epoch, method, settings.estimation, inertia_kg_m2))
+            second = fit_epoch(epoch, method, settings.estimation, inertia_kg_m2)
+            # What did not count in the first stage does not in the second.
+            fixed.append(second if fit.outcome.included else replace(second, outcome=fit.outcome))
         else:  # no epoch gives a median to hold
             fixed.append(Fit(fit.source, fit.epoch, fit.condition, fit.method, fit.outcome))
         progress(epoch.name)
     return Analysis(method, tuple(fits), tuple(fixed), inertia_kg_m2, tuple(scores))
+
+
+def doubts(analysis: Analysis) -> tuple[Notice, ...]:
+    """Return what looks wrong with an analysis as a whole, and what to do about it."""
+    included = [fit for fit in analysis.fits if fit.outcome.included]
+    reversed_sign = [
+        fit
+        for fit in included
+        if max(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad) < 0
+    ]
+    if not reversed_sign:
+        return ()
+    return (
+        Notice(
+            "warning",
+            f"J, B and K are all negative in {len(reversed_sign)} of {len(included)} epochs: the "
+            "torque has the wrong sign; a sensor that reports the joint's reaction needs "
+            "--reaction",
+        ),
+    )
 
 
 def conditions(analysis: Analysis) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from rigidimeter.control import (
     tracking_step,
 )
 from rigidimeter.device.base import Reading, Rig
-from rigidimeter.guard import Cause, GuardLimits, GuardState, Limited, guard_step
+from rigidimeter.guard import Cause, GuardLimits, Limited, guard_state, guard_step
 from rigidimeter.recording.log import Sample
 from rigidimeter.settings import Settings
 from rigidimeter.units import rad_from_deg
@@ -41,11 +41,13 @@ class Passage(NamedTuple):
     """How a stretch of ticks went.
 
     `limit_time_s` is when the position limit first held the command back, NaN if it never did;
-    `cause` is why the guard latched, `Cause.NONE` if it did not.
+    `cause` is why the guard latched, `Cause.NONE` if it did not; `limited_ticks` is how many
+    commands the guard changed, for whatever limit.
     """
 
     limit_time_s: float
     cause: Cause
+    limited_ticks: int
 
 
 def guard_limits(settings: Settings) -> GuardLimits:
@@ -87,9 +89,10 @@ class ControlLoop:
         self._lowpass: Biquad = butterworth_lowpass(controller.torque_cutoff_hz, self._rate_hz)
         self._filter = BiquadState()
         self._limits = guard_limits(settings)
-        self._guard = GuardState()
+        self._guard = guard_state(self._limits)
         self._tick = 0
         self._limit_time_s = math.nan
+        self._limited_ticks = 0
         self._angle_rad = 0.0
 
     @property
@@ -155,11 +158,12 @@ class ControlLoop:
         command: Callable[[Reading, float, int], tuple[float, float, float]],
     ) -> Passage:
         self._limit_time_s = math.nan
+        self._limited_ticks = 0
         for k in range(n):
             self._run_tick(epoch, k, command)
             if self._guard.cause:
                 break
-        return Passage(self._limit_time_s, Cause(self._guard.cause))
+        return Passage(self._limit_time_s, Cause(self._guard.cause), self._limited_ticks)
 
     def _run_tick(
         self,
@@ -177,11 +181,13 @@ class ControlLoop:
             smooth_nm = torque_nm
         request, perturbation_nm, target = command(reading, smooth_nm, k)
         self._guard, allowed, limited = guard_step(
-            self._limits, self._guard, request, torque_nm, angle, velocity, motion_s
+            self._limits, self._guard, request, torque_nm, angle, velocity, due_s - motion_s
         )
         sent = self._rig.write(allowed)
-        if limited == POSITION_LIMITED and not self._limit_time_s <= due_s:
-            self._limit_time_s = due_s
+        if limited:
+            self._limited_ticks += 1
+            if limited == POSITION_LIMITED and not self._limit_time_s <= due_s:
+                self._limit_time_s = due_s
         if math.isfinite(angle):
             self._angle_rad = angle
         self._record(

@@ -89,7 +89,9 @@ def run_session(
             else:
                 passage = loop.follow(planned.number, angle, velocity)
             ending, why = _ending(passage, settings)
-            writer.epoch_ended(planned.number, loop.time_s, ending, why)
+            writer.epoch_ended(
+                planned.number, loop.time_s, ending, why, limited_ticks=passage.limited_ticks
+            )
             current = None
             run += 1
             good += ending == "success"

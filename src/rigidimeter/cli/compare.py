@@ -46,6 +46,7 @@ def compare(
     \b
     For example:
       rigidimeter compare demo-study/sessions/day-1 demo-study/sessions/day-2
+      rigidimeter compare before.csv after.csv --condition OFF --condition DBS
       rigidimeter compare estimates.json --reference OFF --other DBS --csv table.csv
     """
     from rigidimeter.recording import read_estimates, write_json, write_text
@@ -79,7 +80,7 @@ def compare(
         listed = known[0] if known else "none is named"
         raise UserError(
             f"a comparison needs two conditions, but the recordings hold one ({listed}); name them "
-            "in a condition column, or per file with --condition and `rigidimeter estimate`"
+            "in a condition column, or give --condition once for each file in their order"
         )
     comparisons = compare_analysis(analysis, reference, other)
     typer.echo("\n".join(_lines(comparisons)))

@@ -35,7 +35,7 @@ STUDY: dict[str, Any] = {
         },
     }
 }
-"""A virtual subject: OFF is the paper's median, DBS is chosen here (the paper prints none)."""
+"""A virtual subject: OFF has the values of Sec. 3.4; DBS is chosen here, the paper prints none."""
 
 
 def demo(

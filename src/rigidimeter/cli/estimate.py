@@ -59,15 +59,18 @@ def estimate(
 def _lines(analysis: Analysis) -> list[str]:
     lines: list[str] = []
     if analysis.fits:
-        low, high = next((f.band_hz for f in analysis.fits if f.n_samples), (0.0, 0.0))
         lines += [
-            f"J, B, K of each epoch ± one standard error, method {analysis.method}, "
-            f"{low:g} to {high:g} Hz",
+            f"J, B, K of each epoch ± one standard error, {analysis.method}{_band(analysis)}",
             *_by_source(analysis.fits, _FIT_HEADING, _fit_line),
             "",
-            f"B, K with the inertia held at the median, {analysis.inertia_kg_m2:.5g} kg·m²",
-            *_by_source(analysis.fixed_inertia, _FIT_HEADING, _fit_line),
         ]
+        if any(fit.outcome.included for fit in analysis.fits):
+            lines += [
+                f"B, K with the inertia held at the median, {analysis.inertia_kg_m2:.5g} kg·m²",
+                *_by_source(analysis.fixed_inertia, _FIT_HEADING, _fit_line),
+            ]
+        else:
+            lines.append("No epoch could be included, so there is no median inertia to hold.")
     if analysis.scores:
         lines += [
             *([""] if lines else []),
@@ -75,6 +78,11 @@ def _lines(analysis: Analysis) -> list[str]:
             *_by_source(analysis.scores, _SCORE_HEADING, _score_line),
         ]
     return lines
+
+
+def _band(analysis: Analysis) -> str:
+    bands = {fit.band_hz for fit in analysis.fits if fit.n_samples}
+    return "".join(f", {low:.4g} to {high:.4g} Hz" for low, high in sorted(bands)[:1])
 
 
 _FIT_HEADING = (

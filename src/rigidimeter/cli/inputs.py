@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -42,7 +42,7 @@ class Recordings:
     rate_hz: float | None = None
     reaction: bool = False
     epoch_length_s: float | None = None
-    condition: str = ""
+    condition: list[str] | None = None
     task: str | None = None
     band_hz: tuple[float, float] | None = None
     settings: Path | None = None
@@ -69,35 +69,44 @@ def _read(wanted: Recordings) -> Inputs:
     from rigidimeter.records import Notice
     from rigidimeter.settings import load_settings
 
+    conditions = _conditions(wanted.condition or [""], len(wanted.paths))
     options = ReadOptions(
         columns=_columns(wanted.column or []),
         rate_hz=_positive("--rate-hz", wanted.rate_hz),
         reaction=wanted.reaction,
         epoch_length_s=_positive("--epoch-length-s", wanted.epoch_length_s),
-        condition=wanted.condition,
         task=_task(wanted.task),
     )
     epochs: list[Epoch] = []
     notices: list[Notice] = []
+    first: Settings | None = None
     chosen = load_settings(wanted.settings) if wanted.settings is not None else None
-    for path in dict.fromkeys(wanted.paths):
+    for path, condition in dict(zip(wanted.paths, conditions, strict=True)).items():
         try:
             if is_session(path):
                 recorded = session_settings(path)
                 if chosen is None:
                     chosen = recorded
-                elif wanted.settings is None and _analysis_of(recorded) != _analysis_of(chosen):
+                if first is None:
+                    first = recorded
+                differing = [
+                    name
+                    for name in ("controller", "guard", "prbs", "sinusoid", "rig")
+                    + (() if wanted.settings else ("estimation", "scores"))
+                    if getattr(recorded, name) != getattr(first, name)
+                ]
+                if differing:
                     notices.append(
                         Notice(
                             "warning",
-                            f"{path}: was recorded with other estimation or score settings than "
-                            "the session before it; those of the first are used for all "
-                            "(--settings FILE chooses)",
+                            f"{path}: was recorded with other settings than the first session in "
+                            f"{', '.join(differing)}; the analysis and the report use those of the "
+                            "first for all",
                         )
                     )
                 found, remarks = read_session(path)
             else:
-                found, remarks = read_recording(path, options)
+                found, remarks = read_recording(path, replace(options, condition=condition))
         except UserError as error:
             notices.append(Notice("error", str(error)))
             continue
@@ -138,7 +147,10 @@ def say(notices: tuple[Notice, ...]) -> None:
 
 
 def status(inputs: Inputs, analysis: Analysis) -> int:
-    """Say what failed; return 1 if an input was bad or an epoch failed, else 0."""
+    """Say what failed or looks wrong; return 1 if an input was bad or an epoch failed, else 0."""
+    from rigidimeter.study import doubts
+
+    say(doubts(analysis))
     bad = any(notice.level == "error" for notice in inputs.notices)
     results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
     for result in results:
@@ -148,10 +160,6 @@ def status(inputs: Inputs, analysis: Analysis) -> int:
                 f"error: {result.source}, epoch {result.epoch}: {result.outcome.reason}", err=True
             )
     return int(bad)
-
-
-def _analysis_of(settings: Settings) -> tuple[object, object]:
-    return settings.estimation, settings.scores
 
 
 def _with_band(settings: Settings, band_hz: tuple[float, float]) -> Settings:
@@ -179,6 +187,17 @@ def _columns(pairs: list[str]) -> dict[str, str]:
             raise UserError(f"--column {pair}: {name} was already given as {columns[name]}")
         columns[name] = column
     return columns
+
+
+def _conditions(names: list[str], n_inputs: int) -> list[str]:
+    if len(names) == 1:
+        return names * n_inputs
+    if len(names) != n_inputs:
+        raise UserError(
+            f"--condition was given {len(names)} times for {n_inputs} inputs; give it once for all "
+            "of them, or once for each in their order"
+        )
+    return names
 
 
 def _positive(option: str, value: float | None) -> float | None:

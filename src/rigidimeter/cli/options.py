@@ -20,7 +20,7 @@ __all__ = ["SettingsOption", "reads_recordings"]
 InputsArgument = Annotated[
     list[Path],
     typer.Argument(
-        metavar="INPUT...",
+        metavar="INPUT",
         help="Session folders, or recordings as .csv, .npz or .mat.",
         show_default=False,
     ),
@@ -36,7 +36,9 @@ MethodOption = Annotated[
 ]
 SettingsOption = Annotated[
     Path | None,
-    typer.Option("--settings", metavar="FILE", help="Settings in TOML; see `rigidimeter design`."),
+    typer.Option(
+        "--settings", metavar="FILE", help="Settings in TOML, such as examples/settings/study.toml."
+    ),
 ]
 ColumnOption = Annotated[
     list[str] | None,
@@ -67,9 +69,12 @@ EpochLengthOption = Annotated[
     ),
 ]
 ConditionOption = Annotated[
-    str,
+    list[str] | None,
     typer.Option(
-        "--condition", metavar="NAME", help="Condition of files without a condition column."
+        "--condition",
+        metavar="NAME",
+        help="Condition of files without a condition column: once for all of them, or once for "
+        "each input in their order.",
     ),
 ]
 TaskOption = Annotated[
@@ -98,7 +103,7 @@ def _reading(
     rate_hz: RateOption = None,
     reaction: ReactionOption = False,
     epoch_length_s: EpochLengthOption = None,
-    condition: ConditionOption = "",
+    condition: ConditionOption = None,
     task: TaskOption = None,
     band_hz: BandOption = None,
     settings: SettingsOption = None,

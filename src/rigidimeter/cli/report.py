@@ -9,6 +9,7 @@ import typer
 
 from rigidimeter.cli.inputs import Recordings, analyse_inputs, say, status
 from rigidimeter.cli.options import reads_recordings
+from rigidimeter.errors import UserError
 
 __all__ = ["report"]
 
@@ -29,8 +30,10 @@ def report(
       rigidimeter report ankle.csv --reaction --epoch-length-s 20 --out report
     """
     from rigidimeter.cli.reporting import make_report
-    from rigidimeter.recording import write_estimates_json
+    from rigidimeter.recording import is_session, write_estimates_json
 
+    if is_session(out):
+        raise UserError(f"--out {out}: is a session folder; name another folder for the report")
     read = recordings.read()
     say(read.notices)
     analysis = analyse_inputs(read)

@@ -65,12 +65,18 @@ def simulate(
     from rigidimeter.cli.virtual import run_virtual_session, session_length_s
     from rigidimeter.settings import load_settings
 
+    if task not in (None, "prbs", "sinusoid"):
+        raise UserError(f"--task {task}: must be prbs or sinusoid")
     chosen = _changed(load_settings(settings), seed, task, condition, epochs, paper_rates)
     with Meter("simulate", session_length_s(chosen)) as meter:
         result = run_virtual_session(chosen, out, real_time=real_time, progress=meter.reach)
     typer.echo(
         f"{result.epochs_good} of {result.epochs_run} epochs ended with success; session in {out}"
     )
+    if result.epochs_run and not result.epochs_good:
+        raise UserError(
+            f"{out}: no epoch ended with success; events.jsonl holds the reason of each"
+        )
     if result.outcome != "success":
         raise UserError(f"{out}: the session ended with {result.outcome}: {result.reason}")
 
@@ -90,7 +96,8 @@ def _changed(
     if seed is not None:
         values["seed"] = seed
     if task is not None:
-        block = {"task": task, "condition": condition or "OFF", "epochs": epochs or 4}
+        first = next(iter(settings.subject), "OFF")
+        block: dict[str, Any] = {"task": task, "condition": condition or first}
         if epochs is not None:
             block["epochs"] = epochs
         values["protocol"]["blocks"] = [block]
@@ -99,4 +106,4 @@ def _changed(
     if paper_rates:
         for sensor, changes in PAPER_RATES.items():
             values["rig"][sensor] |= changes
-    return parse_settings(values, source="options")
+    return parse_settings(values, source="the options")

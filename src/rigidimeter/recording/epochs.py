@@ -16,6 +16,9 @@ from rigidimeter.settings import Settings, parse_settings
 
 __all__ = ["is_session", "read_session", "session_settings"]
 
+MUCH_LIMITED = 0.01
+"""Above this share of limited ticks the reader is told."""
+
 
 def is_session(path: Path) -> bool:
     """Whether the path is a folder with a manifest."""
@@ -68,6 +71,16 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
             )
             continue
         rows = slice(first[number], last[number] + 1)
+        share = float(np.mean(samples["limited"][rows] > 0))
+        if share > MUCH_LIMITED:
+            notices.append(
+                Notice(
+                    "warning",
+                    f"{folder}, epoch {event['label']}: the guard changed {100 * share:.0f} % of "
+                    "the commands, so the arm did not follow the perturbation as designed; see the "
+                    "column limited of its samples, and the limits in [guard]",
+                )
+            )
         epochs.append(_epoch(folder, settings, manifest, samples, rows, event, ended.get(number)))
     return epochs, notices
 

@@ -118,7 +118,9 @@ class SessionWriter:
             },
         )
 
-    def epoch_ended(self, number: int, time_s: float, outcome: Ending, reason: str) -> None:
+    def epoch_ended(
+        self, number: int, time_s: float, outcome: Ending, reason: str, **facts: Any
+    ) -> None:
         """Close an epoch; its samples are in the file before the event is."""
         self._log.flush()
         append_event(
@@ -129,6 +131,7 @@ class SessionWriter:
                 "time_s": time_s,
                 "outcome": outcome,
                 "reason": reason,
+                **facts,
             },
         )
 

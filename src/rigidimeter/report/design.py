@@ -96,7 +96,7 @@ def design_table(study: Study) -> Table:
         Column("value", "Value", "setting"),
         Column("unit", "Unit", "text"),
     )
-    caption = "The settings of this study (not read from the recordings)"
+    caption = "The settings of this study"
     return Table("design", caption, columns, tuple(rows))
 
 

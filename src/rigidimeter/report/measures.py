@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 
 from rigidimeter.records import Fit, Score
 from rigidimeter.report.numbers import number, p_and_r
 from rigidimeter.statistics import summarise
 from rigidimeter.study import MEASURES, Comparison, Study
 
-__all__ = ["Measure", "condition_name", "conditions", "measures", "verdict"]
+__all__ = ["Measure", "condition_name", "conditions", "measures", "short_names", "verdict"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,17 @@ class Measure:
 def condition_name(condition: str) -> str:
     """Return the condition as people read it."""
     return condition or "(no condition)"
+
+
+def short_names(sources: Iterable[str]) -> dict[str, str]:
+    """Return the last parts of each path: as few as tell the sources apart."""
+    unique = list(dict.fromkeys(sources))
+    parts = {source: PurePath(source).parts for source in unique}
+    for depth in range(1, max(map(len, parts.values()), default=1) + 1):
+        names = {source: "/".join(parts[source][-depth:]) or source for source in unique}
+        if len(set(names.values())) == len(unique):
+            return names
+    return {source: source for source in unique}
 
 
 def conditions(study: Study) -> tuple[str, ...]:

@@ -7,14 +7,14 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
-from pathlib import Path, PurePath
+from pathlib import Path
 
 import jinja2
 from markupsafe import Markup
 
 from rigidimeter import __version__
 from rigidimeter.records import Fit, Score
-from rigidimeter.report.measures import condition_name, conditions, verdict
+from rigidimeter.report.measures import condition_name, conditions, short_names, verdict
 from rigidimeter.report.numbers import number, p_value
 from rigidimeter.report.pictures import (
     Picture,
@@ -108,17 +108,6 @@ def render_page(
         inertia=number(study.analysis.inertia_kg_m2),
         version=__version__,
     )
-
-
-def short_names(sources: Iterable[str]) -> dict[str, str]:
-    """Return the last parts of each path: as few as tell the sources apart."""
-    unique = list(dict.fromkeys(sources))
-    parts = {source: PurePath(source).parts for source in unique}
-    for depth in range(1, max(map(len, parts.values()), default=1) + 1):
-        names = {source: "/".join(parts[source][-depth:]) or source for source in unique}
-        if len(set(names.values())) == len(unique):
-            return names
-    return {source: source for source in unique}
 
 
 def _sources(study: Study) -> list[str]:

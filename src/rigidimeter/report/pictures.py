@@ -21,7 +21,7 @@ from rigidimeter.report.figures import (
     torque_limit_nm,
     torque_parts,
 )
-from rigidimeter.report.measures import Measure, condition_name, conditions, measures
+from rigidimeter.report.measures import Measure, condition_name, conditions, measures, short_names
 from rigidimeter.report.numbers import number, p_and_r
 from rigidimeter.statistics import summarise
 from rigidimeter.study import Study
@@ -98,7 +98,8 @@ def perturbation_pictures(study: Study) -> list[Picture]:
         return []
     prbs = study.settings.prbs
     low, high = epoch.excitation_hz or (prbs.wanted_low_hz, prbs.wanted_high_hz)
-    whose = f"of epoch {epoch.label} ({condition_name(epoch.condition)})"
+    where = short_names(one.source for one in study.epochs)[epoch.source]
+    whose = f"of epoch {epoch.label} of {where} ({condition_name(epoch.condition)})"
     size = float(max(abs(channel.values)))
     return [
         Picture(
@@ -157,7 +158,7 @@ def torque_pictures(study: Study) -> list[Picture]:
                 svg_text(figure),
                 f"{name}: measured and modelled torque of epoch {fit.epoch}, and the parts of "
                 f"inertia, damping and stiffness. VAF {number(fit.vaf_percent)} %.",
-                f"{name}: epoch {fit.epoch}, the included epoch with the median VAF "
+                f"{name}: {_place(study, fit)}, an included epoch with a middle VAF "
                 f"({number(fit.vaf_percent)} %); its first {TORQUE_WINDOW_S:g} s as fitted, in the "
                 f"band {number(fit.band_hz[0], 3)} to {number(fit.band_hz[1], 3)} Hz.",
             )
@@ -187,7 +188,7 @@ def loop_pictures(study: Study) -> list[Picture]:
                 svg_text(loop(cycles, colours[score.condition], limits, f"{work} per cycle")),
                 f"{name}: torque against angle of epoch {score.epoch}, {cycles.n_cycles} cycles "
                 f"at {number(cycles.frequency_hz, 3)} Hz, work {work} per cycle.",
-                f"{name}: epoch {score.epoch}, the included epoch with the median work; "
+                f"{name}: {_place(study, score)}, an included epoch with a middle work; "
                 f"{cycles.n_cycles} cycles.",
             )
         )
@@ -228,6 +229,12 @@ def _epoch_of(study: Study, result: Fit | Score) -> Epoch | None:
         if (epoch.source, epoch.label) == (result.source, result.epoch):
             return epoch
     return None
+
+
+def _place(study: Study, result: Fit | Score) -> str:
+    """Return epoch and source: labels repeat from one session to the next."""
+    names = short_names(epoch.source for epoch in study.epochs)
+    return f"epoch {result.epoch} of {names.get(result.source, result.source)}"
 
 
 def _origin_s(epoch: Epoch) -> float:

@@ -71,8 +71,8 @@ class ControllerSettings(_Section):
 class GuardSettings(_Section):
     """Limits that hold whatever the controller asks for.
 
-    `reaction_time_s` is what passes between a command and the motion that answers it, encoder
-    included; braking for the position limit begins that much earlier.
+    `reaction_time_s` is how long the drive may take to have done what it was told, plus how far the
+    stamp of an angle reading may be wrong; braking for the position limit begins that much earlier.
     """
 
     position_limit_deg: float = quantity(40.0, "deg", 1.0, 180.0)
@@ -143,7 +143,7 @@ class RigSettings(_Section):
 
     tick_rate_hz: float = quantity(1000.0, "Hz", 50.0, 5000.0)
     drive_bandwidth_hz: float = quantity(50.0, "Hz", 1.0, 2000.0)
-    drive_damping_ratio: float = quantity(0.7071, "1", 0.1, 0.99)
+    drive_damping_ratio: float = quantity(0.7071, "1", 0.6, 0.99)
     torque: TorqueSensorSettings = TorqueSensorSettings()
     motion: MotionSensorSettings = MotionSensorSettings()
 
@@ -274,16 +274,15 @@ class Settings(_Section):
                 f"guard.position_limit_deg = {self.guard.position_limit_deg:g} deg"
             )
         rig = self.rig
-        delay_s = (
-            rig.drive_damping_ratio / (math.pi * rig.drive_bandwidth_hz)
-            + rig.motion.latency_s
-            + 1 / rig.tick_rate_hz
-        )
+        # A second-order drive has done nearly all it was told after twice its mean lag.
+        lag_s = rig.drive_damping_ratio / (math.pi * rig.drive_bandwidth_hz)
+        unknown_s = abs(rig.motion.latency_s - rig.motion.stamp_latency_s)
+        delay_s = 2 * lag_s + unknown_s + 1 / rig.tick_rate_hz
         if self.guard.reaction_time_s < delay_s:
             raise ValueError(
                 f"guard.reaction_time_s = {self.guard.reaction_time_s:g} s is shorter than this "
-                f"rig takes to react ({delay_s:.3g} s: drive lag, encoder latency and one tick), "
-                "so the arm could pass the position limit; raise it to at least that"
+                f"rig may take to react ({delay_s:.3g} s: twice the drive's lag, what the stamps "
+                "of the encoder do not know of its latency, and one tick); raise it to that"
             )
         if self.controller.torque_cutoff_hz >= self.rig.tick_rate_hz / 2:
             raise ValueError(
@@ -295,8 +294,13 @@ class Settings(_Section):
                 f"prbs.clock_hz = {self.prbs.clock_hz:g} Hz must not exceed rig.tick_rate_hz = "
                 f"{self.rig.tick_rate_hz:g} Hz"
             )
-        rates = {"torque": self.rig.torque.rate_hz, "motion": self.rig.motion.rate_hz}
-        for name, rate in rates.items():
+        for name, sensor in (("torque", self.rig.torque), ("motion", self.rig.motion)):
+            rate = sensor.rate_hz
+            if sensor.jitter_s * rate >= 1:
+                raise ValueError(
+                    f"rig.{name}.jitter_s = {sensor.jitter_s:g} s must be shorter than the "
+                    f"{1 / rate:g} s between samples at rig.{name}.rate_hz = {rate:g} Hz"
+                )
             if rate > self.rig.tick_rate_hz:
                 raise ValueError(
                     f"rig.{name}.rate_hz = {rate:g} Hz must not exceed rig.tick_rate_hz = "

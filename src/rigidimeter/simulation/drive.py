@@ -2,7 +2,8 @@
 
     v'' + 2 ζ ω_n v' + ω_n² v = ω_n² c
 
-with c the velocity command (held between ticks), v the velocity and ω_n/2π the bandwidth. Second
+with c the velocity command (held between ticks), v the velocity and ω_n/2π the bandwidth (its
+-3 dB frequency at the damping ratio of 0.7071). Second
 order, so that the acceleration, and with it the torque, is continuous. The drive is stiff: the arm
 does not change its motion.
 """

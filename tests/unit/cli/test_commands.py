@@ -133,7 +133,7 @@ def test_a_report_of_a_foreign_recording(rigidimeter, tmp_path):
         (["recover", "."], "is not a session folder"),
         (["simulate", "--out", "{session}"], "is not empty"),
         (["simulate", "--out", "x", "--epochs", "3"], "need --task"),
-        (["simulate", "--out", "x", "--task", "dance"], "must be one of 'prbs', 'sinusoid'"),
+        (["simulate", "--out", "x", "--task", "dance"], "--task dance: must be prbs or sinusoid"),
         (["simulate", "--out", "x", "--task", "prbs", "--condition", "Z"], "condition 'Z'"),
         (["simulate", "--out", "x", "--task", "prbs", "--epochs", "0"], "at least 1"),
         (["report", "{session}", "--out", "{session}/manifest.json"], "cannot be written"),
@@ -159,3 +159,65 @@ def test_a_good_epoch_beside_bad_inputs_is_analysed(rigidimeter, simulate, tmp_p
     assert "bad.csv" in ran.err
     (epoch,) = json.loads(out.read_text())["epochs"]
     assert epoch["outcome"] == "included"
+
+
+def test_two_files_of_one_condition_each_are_compared(rigidimeter, tmp_path):
+    t = np.arange(3000) / 100.0
+    f = np.arange(0.2, 8.0, 0.35)
+    w = 2 * np.pi * f
+    A = 0.03 / (1 + f)
+    for name, stiffness in (("before", 2.0), ("after", 1.0)):
+        x = A @ np.sin(np.outer(w, t) + (f * 7)[:, None])
+        v = (A * w) @ np.cos(np.outer(w, t) + (f * 7)[:, None])
+        rows = zip(t, x, v, stiffness * x + 0.1 * v, strict=True)
+        text = "".join(",".join(map(repr, map(float, row))) + "\n" for row in rows)
+        (tmp_path / f"{name}.csv").write_text("time_s,angle_rad,velocity_rad_s,torque_nm\n" + text)
+    files = (tmp_path / "before.csv", tmp_path / "after.csv")
+    ran = rigidimeter("compare", *files, "--condition", "OFF", "--condition", "DBS",
+                      "--epoch-length-s", 7, "--json", tmp_path / "c.json")  # fmt: skip
+    assert ran.status == 0, ran.err
+    rows = json.loads((tmp_path / "c.json").read_text())["comparisons"]
+    (stiffness,) = [row for row in rows if row["measure"] == "stiffness_nm_rad"]
+    assert stiffness["shift"] == pytest.approx(1.0, rel=0.01)
+    ran = rigidimeter(
+        "estimate", *files, "--condition", "A", "--condition", "B", "--condition", "C"
+    )
+    assert "given 3 times for 2 inputs" in ran.err
+    # The torque with its sign turned is doubted.
+    ran = rigidimeter("estimate", files[0], "--reaction", "--epoch-length-s", 7)
+    assert "all negative" in ran.err or "wrong sign" in ran.err
+
+
+def test_a_guard_that_changes_many_commands_is_said(rigidimeter, simulate):
+    folder = simulate(guard={"speed_limit_deg_s": 5.0})
+    ran = rigidimeter("estimate", folder)
+    assert "the guard changed" in ran.err
+    assert "% of the commands" in ran.err
+
+
+def test_milliseconds_given_as_seconds_have_no_band_left(rigidimeter, tmp_path):
+    t = np.arange(4000.0)
+    x = np.random.default_rng(0).standard_normal(4000)
+    rows = "".join(f"{a},{b},{b}\n" for a, b in zip(t, x, strict=True))
+    (tmp_path / "ms.csv").write_text("time_s,angle_rad,torque_nm\n" + rows)
+    ran = rigidimeter("estimate", tmp_path / "ms.csv")
+    assert ran.status == 1
+    assert "check the unit of the time stamps" in ran.err
+    assert "No epoch could be included" in ran.out
+
+
+def test_a_report_is_not_written_into_a_session(rigidimeter, simulate):
+    folder = simulate()
+    ran = rigidimeter("report", folder, "--out", folder)
+    assert ran.status == 1
+    assert "is a session folder" in ran.err
+
+
+def test_a_session_without_a_good_epoch_fails(rigidimeter, tmp_path):
+    (tmp_path / "tight.toml").write_text(
+        "[guard]\nposition_limit_deg = 6.0\n[sinusoid]\namplitude_deg = 5.0\n"
+        '[protocol]\nrests_s = [1.0]\nreturn_s = 1.0\nblocks = [{task = "prbs", epochs = 1}]\n'
+    )
+    ran = rigidimeter("simulate", "--settings", tmp_path / "tight.toml", "--out", tmp_path / "s")
+    assert ran.status == 1
+    assert "no epoch ended with success" in ran.err

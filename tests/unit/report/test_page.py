@@ -12,7 +12,7 @@ import pytest
 
 from rigidimeter.records import Epoch, Notice, Outcome
 from rigidimeter.report import write_report
-from rigidimeter.report.page import short_names
+from rigidimeter.report.measures import short_names
 from rigidimeter.report.tables import all_tables
 from rigidimeter.study import Study
 
@@ -124,7 +124,7 @@ def test_page_says_what_was_done(page: Page, study: Study) -> None:
     assert "tie and continuity correction" in text
     assert "0.0008" in text
     assert "0.0458366" in text
-    assert "The settings of this study (not read from the recordings)" in text
+    assert "The settings of this study" in text
     assert "virtual subject" not in text.lower()
 
 

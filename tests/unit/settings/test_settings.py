@@ -53,7 +53,7 @@ def test_the_controller_is_read_per_degree():
             "names condition 'X', but there is no [subject.X]",
         ),
         ({"sinusoid": {"amplitude_deg": 60.0}}, "must stay below guard.position_limit_deg"),
-        ({"guard": {"reaction_time_s": 0.001}}, "is shorter than this rig takes to react"),
+        ({"guard": {"reaction_time_s": 0.001}}, "is shorter than this rig may take to react"),
         ({"rig": {"torque": {"rate_hz": 2000.0}}}, "must not exceed rig.tick_rate_hz"),
     ],
 )  # fmt: skip
