@@ -190,7 +190,7 @@ def test_the_manifest_and_event_keys_are_those_of_a_session(tmp_path: Path) -> N
     writer = SessionWriter(tmp_path / "s", Settings(), [], {"session": 1}, virtual=True)
     writer.session_started()
     writer.epoch_started(1, "1", "prbs", "OFF", 0.0, planned_s=20.0, true_joint={})
-    writer.epoch_ended(1, 20.0, "success", "")
+    writer.epoch_ended(1, 20.0, "success", "", limited_ticks=0)
     writer.close(20.0, "success", "")
     assert list(table(FILES, "manifest.json")) == list(read_manifest(tmp_path / "s"))
     events, _ = read_events(tmp_path / "s" / "events.jsonl")
