@@ -27,8 +27,8 @@ from rigidimeter.recording import (
     read_manifest,
     read_recording,
 )
-from rigidimeter.recording.columns import LABELS
 from rigidimeter.recording.log import SAMPLE_UNITS, read_events
+from rigidimeter.recording.tables.columns import LABELS
 from rigidimeter.records import CHANNEL_UNITS, Analysis, Fit, Outcome, Score
 from rigidimeter.settings import Settings, load_settings, parse_settings
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rigidimeter.recording.readers import read_recording
-from rigidimeter.recording.table import ReadOptions
+from rigidimeter.recording.tables.readers import read_recording
+from rigidimeter.recording.tables.table import ReadOptions
 
 OPTIONS = ReadOptions(
     columns={"angle_rad": "position_rad", "torque_nm": "torque_Nm"},

@@ -11,9 +11,8 @@ from rigidimeter.recording.estimates import (
     write_text,
 )
 from rigidimeter.recording.folder import SessionWriter, read_manifest
-from rigidimeter.recording.readers import read_recording, read_table
 from rigidimeter.recording.recover import Recovery, recover
-from rigidimeter.recording.table import ReadOptions, Table
+from rigidimeter.recording.tables import ReadOptions, Table, read_recording, read_table
 
 __all__ = [
     "ESTIMATES_SCHEMA",

@@ -9,8 +9,8 @@ import pytest
 import scipy.io
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.readers import read_recording, read_table
-from rigidimeter.recording.table import ReadOptions
+from rigidimeter.recording.tables.readers import read_recording, read_table
+from rigidimeter.recording.tables.table import ReadOptions
 
 NAMES = ("time_s", "torque_nm", "angle_rad")
 

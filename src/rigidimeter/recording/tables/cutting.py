@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.columns import Table, plain
-from rigidimeter.recording.gaps import longest_s
-from rigidimeter.recording.stamps import seconds, typical_step_s
+from rigidimeter.recording.tables.columns import Table, plain
+from rigidimeter.recording.tables.gaps import longest_s
+from rigidimeter.recording.tables.stamps import seconds, typical_step_s
 from rigidimeter.records import Notice
 
 __all__ = ["Stretch", "by_label", "by_length", "constant_label", "lettered"]

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.columns import (
+from rigidimeter.recording.tables.columns import (
     LABELS,
     MOTION,
     Table,
@@ -24,8 +24,14 @@ from rigidimeter.recording.columns import (
     nearest,
     numbers,
 )
-from rigidimeter.recording.cutting import Stretch, by_label, by_length, constant_label, lettered
-from rigidimeter.recording.gaps import (
+from rigidimeter.recording.tables.cutting import (
+    Stretch,
+    by_label,
+    by_length,
+    constant_label,
+    lettered,
+)
+from rigidimeter.recording.tables.gaps import (
     Break,
     Loss,
     Rows,
@@ -34,8 +40,8 @@ from rigidimeter.recording.gaps import (
     kept_rows,
     make_signal,
 )
-from rigidimeter.recording.notices import about_breaks, about_losses, about_units
-from rigidimeter.recording.stamps import seconds, stamps
+from rigidimeter.recording.tables.notices import about_breaks, about_losses, about_units
+from rigidimeter.recording.tables.stamps import seconds, stamps
 from rigidimeter.records import CHANNEL_UNITS, Channel, Epoch, Notice, Task
 
 __all__ = ["ReadOptions", "Table", "epochs_from_table"]

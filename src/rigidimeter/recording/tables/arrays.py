@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.columns import Table, printable
+from rigidimeter.recording.tables.columns import Table, printable
 
 __all__ = ["first_line", "table_of_arrays"]
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rigidimeter.recording.gaps import Break, Loss, Signal
-from rigidimeter.recording.stamps import seconds
+from rigidimeter.recording.tables.gaps import Break, Loss, Signal
+from rigidimeter.recording.tables.stamps import seconds
 from rigidimeter.records import Notice
 
 __all__ = ["about_breaks", "about_losses", "about_units"]

@@ -15,9 +15,9 @@ import scipy.io
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.arrays import first_line, table_of_arrays
-from rigidimeter.recording.columns import Table
-from rigidimeter.recording.mat_check import check_mat5
+from rigidimeter.recording.tables.arrays import first_line, table_of_arrays
+from rigidimeter.recording.tables.columns import Table
+from rigidimeter.recording.tables.mat_check import check_mat5
 
 __all__ = ["read_mat"]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.recording.stamps import typical_step_s
+from rigidimeter.recording.tables.stamps import typical_step_s
 
 __all__ = [
     "Break",

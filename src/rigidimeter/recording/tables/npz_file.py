@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.arrays import first_line, table_of_arrays
-from rigidimeter.recording.columns import Table
+from rigidimeter.recording.tables.arrays import first_line, table_of_arrays
+from rigidimeter.recording.tables.columns import Table
 
 __all__ = ["read_npz"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.columns import Table, listed, nearest, numbers
+from rigidimeter.recording.tables.columns import Table, listed, nearest, numbers
 
 __all__ = ["RATE_NAMES", "seconds", "stamps", "typical_step_s"]
 

@@ -17,7 +17,7 @@ import pyarrow.csv
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.columns import Table, printable
+from rigidimeter.recording.tables.columns import Table, printable
 
 __all__ = ["read_csv"]
 

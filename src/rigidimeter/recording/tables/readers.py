@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.csv_file import read_csv
-from rigidimeter.recording.mat_file import read_mat
-from rigidimeter.recording.npz_file import read_npz
-from rigidimeter.recording.table import ReadOptions, Table, epochs_from_table
+from rigidimeter.recording.tables.csv_file import read_csv
+from rigidimeter.recording.tables.mat_file import read_mat
+from rigidimeter.recording.tables.npz_file import read_npz
+from rigidimeter.recording.tables.table import ReadOptions, Table, epochs_from_table
 from rigidimeter.records import Epoch, Notice
 
 __all__ = ["READERS", "read_recording", "read_table"]
