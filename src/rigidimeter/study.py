@@ -96,6 +96,11 @@ class Comparison:
     test: RankSum | None
     remark: str = ""
 
+    @property
+    def paired(self) -> bool:
+        """Whether there are two conditions; with one, `other` means nothing."""
+        return len(self.summaries) == 2
+
 
 @dataclass(frozen=True)
 class Study:

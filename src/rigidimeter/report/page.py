@@ -134,7 +134,7 @@ def _shown(cell: Cell, column: Column, names: Mapping[str, str]) -> str:
 def _pairs(comparisons: Iterable[Comparison]) -> list[Pair]:
     groups: dict[tuple[str, str], list[Comparison]] = {}
     for comparison in comparisons:
-        if comparison.other not in comparison.summaries:
+        if not comparison.paired:
             continue  # one condition only: its summaries say it all
         groups.setdefault((comparison.reference, comparison.other), []).append(comparison)
     pairs = []

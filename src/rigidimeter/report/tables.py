@@ -91,9 +91,10 @@ def results_table(comparisons: Iterable[Comparison]) -> Table:
     rows = []
     for c in comparisons:
         row: list[Cell] = [c.measure, c.title, c.unit, c.reference, c.other]
-        for condition in (c.reference, c.other):
-            s = c.summaries.get(condition)  # absent for `other` where one condition was recorded
-            row += [None] * 5 if s is None else [s.n, c.excluded[condition], s.median, s.q1, s.q3]
+        for condition in (c.reference, c.other) if c.paired else (c.reference,):
+            s = c.summaries[condition]
+            row += [s.n, c.excluded[condition], s.median, s.q1, s.q3]
+        row += [None] * (0 if c.paired else 5)
         t = c.test
         row += [None if t is None else getattr(t, name) for name in tested]
         rows.append((*row, c.remark))

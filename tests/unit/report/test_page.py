@@ -242,3 +242,12 @@ def test_short_names_tell_sources_apart() -> None:
     assert short_names(["x", "./x"]) == {"x": "x", "./x": "./x"}
     assert short_names([]) == {}
     assert short_names(["", "/"]) == {"": "", "/": "/"}
+
+
+def test_a_recording_without_a_condition_is_not_compared_with_itself(
+    make_study, make_analysis, tmp_path: Path
+) -> None:
+    made = make_study([], analysis=make_analysis({"": 4}))
+    assert not any(comparison.paired for comparison in made.comparisons)
+    page = page_of(made, tmp_path)
+    assert "(no condition) against" not in page.text
