@@ -50,7 +50,7 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
     samples = read_samples(folder / SAMPLES)
     events, _ = read_events(folder / EVENTS)
     notices: list[Notice] = []
-    if not any(event["event"] == "session_ended" for event in events):
+    if not any(event.get("event") == "session_ended" for event in events):
         notices.append(
             Notice(
                 "warning",
@@ -58,11 +58,11 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
                 f"`rigidimeter recover {folder}` closes it",
             )
         )
-    ended = {event["epoch"]: event for event in events if event["event"] == "epoch_ended"}
+    ended = {event["epoch"]: event for event in events if event.get("event") == "epoch_ended"}
     first, last = _extents(samples["epoch"])
     epochs = []
     for event in events:
-        if event["event"] != "epoch_started":
+        if event.get("event") != "epoch_started":
             continue
         number = event["epoch"]
         if number not in first:
@@ -119,6 +119,8 @@ def _epoch(
         Channel("velocity_command_rad_s", time_s, samples["velocity_command_rad_s"][rows]),
     ]
     task = started["task"]
+    if task not in ("prbs", "sinusoid"):
+        raise UserError(f"{folder}/{EVENTS}: task is {task!r}; it must be 'prbs' or 'sinusoid'")
     sine = settings.sinusoid
     if task == "prbs":
         channels.append(Channel("perturbation_nm", time_s, samples["perturbation_nm"][rows]))

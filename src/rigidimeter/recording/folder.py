@@ -29,6 +29,17 @@ __all__ = ["EVENTS", "MANIFEST", "SAMPLES", "SCHEMA", "Ending", "SessionWriter",
 MANIFEST, SAMPLES, EVENTS = "manifest.json", "samples.arrows", "events.jsonl"
 SCHEMA = "rigidimeter.session/1"
 
+MANIFEST_TYPES: Mapping[str, type] = {
+    "created_utc": str,
+    "virtual": bool,
+    "versions": dict,
+    "seeds": dict,
+    "settings": dict,
+    "protocol": list,
+    "channel_units": dict,
+}
+"""What a manifest must hold to be read."""
+
 Ending = Literal["success", "abort", "fail"]
 
 
@@ -165,4 +176,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     schema = manifest.get("schema") if isinstance(manifest, dict) else None
     if schema != SCHEMA:
         raise UserError(f"{path}: schema is {schema!r}; this version reads {SCHEMA!r}")
+    for key, kind in MANIFEST_TYPES.items():
+        if not isinstance(manifest.get(key), kind):
+            raise UserError(f"{path}: {key} is missing or damaged; the manifest was changed")
     return dict(manifest)

@@ -64,6 +64,14 @@ SAMPLE_UNITS: Mapping[str, str] = {
 }
 """The unit of every recorded column, as the manifest states them."""
 
+EVENT_TYPES: Mapping[str, Mapping[str, type | tuple[type, ...]]] = {
+    "session_started": {"time_s": (int, float)},
+    "epoch_started": {"epoch": int, "label": str, "task": str, "condition": str},
+    "epoch_ended": {"epoch": int, "outcome": str, "reason": str},
+    "session_ended": {"outcome": str, "reason": str},
+}
+"""What an event must hold to be read; others are kept and passed over."""
+
 _INTEGERS = {"tick": pa.int64(), "epoch": pa.int32(), "limited": pa.int8()}
 _SCHEMA = pa.schema(
     [pa.field(name, _INTEGERS.get(name, pa.float64()), nullable=False) for name in Sample._fields]
@@ -131,9 +139,20 @@ def _batches(file: pa.NativeFile) -> Iterator[pa.RecordBatch]:
 
 
 def read_samples(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the columns of every whole batch; empty columns where there is none."""
+    """Return the columns of every whole batch; empty columns where there is none.
+
+    Raises
+    ------
+    UserError
+        If the stream is not one that `SampleLog` wrote.
+    """
     with pa.OSFile(str(path), "rb") as file:
-        table = pa.Table.from_batches(_batches(file), schema=_SCHEMA)
+        try:
+            table = pa.Table.from_batches(_batches(file), schema=_SCHEMA)
+        except pa.ArrowInvalid:
+            raise UserError(
+                f"{path}: holds other columns than a recording of this version"
+            ) from None
     return {name: table.column(name).to_numpy() for name in _SCHEMA.names}
 
 
@@ -176,7 +195,12 @@ def read_events(path: Path) -> tuple[list[dict[str, Any]], bool]:
     lines = path.read_bytes().split(b"\n")
     for number, line in enumerate(lines[:-1], start=1):
         try:
-            events.append(dict(json.loads(line)))
+            event = dict(json.loads(line))
         except (ValueError, TypeError):
             raise UserError(f"{path}: line {number} is not a JSON object") from None
+        kind = event.get("event")
+        for key, kinds in EVENT_TYPES.get(str(kind), {}).items():
+            if not isinstance(event.get(key), kinds):
+                raise UserError(f"{path}: line {number}, {kind}: {key} is missing or damaged")
+        events.append(event)
     return events, lines[-1] != b""

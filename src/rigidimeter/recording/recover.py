@@ -52,12 +52,12 @@ def recover(folder: Path, reason: str = "the recording process ended without clo
     samples = read_samples(samples_path)
     n = len(samples["time_s"])
     last_time_s = float(samples["time_s"][-1]) if n else 0.0
-    started = {e["epoch"]: e["label"] for e in events if e["event"] == "epoch_started"}
-    ended = {e["epoch"] for e in events if e["event"] == "epoch_ended"}
+    started = {e["epoch"]: e["label"] for e in events if e.get("event") == "epoch_started"}
+    ended = {e["epoch"] for e in events if e.get("event") == "epoch_ended"}
     open_epochs = [(number, label) for number, label in started.items() if number not in ended]
     # A file without even a schema, cut to nothing by an earlier recovery, needs no end.
     stream_closed = stream_closed or samples_path.stat().st_size == 0
-    if any(e["event"] == "session_ended" for e in events) and stream_closed and not torn_event:
+    if any(e.get("event") == "session_ended" for e in events) and stream_closed and not torn_event:
         return Recovery(True, n, last_time_s, (), 0)
     torn = 0 if stream_closed else _end_stream(samples_path, length)
     if torn_event:
@@ -74,7 +74,7 @@ def recover(folder: Path, reason: str = "the recording process ended without clo
                     "reason": reason,
                 },
             )
-        if not any(e["event"] == "session_ended" for e in events):
+        if not any(e.get("event") == "session_ended" for e in events):
             append_event(
                 file,
                 {

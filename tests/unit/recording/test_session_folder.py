@@ -1,6 +1,7 @@
 import json
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from rigidimeter.errors import UserError
@@ -155,4 +156,52 @@ def test_a_session_without_its_samples_is_refused(simulate):
     folder = simulate()
     (folder / "samples.arrows").unlink()
     with pytest.raises(UserError, match=r"lost its samples\.arrows"):
+        read_session(folder)
+
+
+@pytest.mark.parametrize("key", ["settings", "virtual", "seeds", "created_utc"])
+def test_a_manifest_that_lost_a_key_is_named(simulate, key):
+    folder = simulate()
+    manifest = json.loads((folder / "manifest.json").read_text())
+    del manifest[key]
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(UserError, match=f"{key} is missing or damaged"):
+        read_session(folder)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"label": "1"', '"lable": "1"', "line 2, epoch_started: label is missing"),
+        ('"epoch": 1, "label"', '"epoch": "x", "label"', "line 2, epoch_started: epoch is missing"),
+        ('"outcome": "success"', '"outcome": 3', "line 3, epoch_ended: outcome is missing"),
+        ('"task": "prbs"', '"task": "dance"', "task is 'dance'"),
+    ],
+)
+def test_a_damaged_event_is_named(simulate, old, new, words):
+    folder = simulate()
+    text = (folder / "events.jsonl").read_text()
+    assert old in text
+    (folder / "events.jsonl").write_text(text.replace(old, new, 1))
+    with pytest.raises(UserError, match=words):
+        read_session(folder)
+
+
+def test_an_event_of_another_kind_is_passed_over(simulate):
+    folder = simulate()
+    text = (folder / "events.jsonl").read_text()
+    (folder / "events.jsonl").write_text('{"note": "the subject yawned"}\n' + text)
+    assert len(read_session(folder)[0]) == 1
+    assert recover(folder).already_closed
+
+
+def test_a_stream_of_other_columns_is_refused(simulate):
+    folder = simulate()
+    table = pa.table({"a": [1.0]})
+    with (
+        pa.OSFile(str(folder / "samples.arrows"), "wb") as file,
+        pa.ipc.new_stream(file, table.schema) as writer,
+    ):
+        writer.write_table(table)
+    with pytest.raises(UserError, match=r"samples\.arrows: holds other columns"):
         read_session(folder)
