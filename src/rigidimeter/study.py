@@ -172,21 +172,26 @@ def analyse(
 def doubts(analysis: Analysis) -> tuple[Notice, ...]:
     """Return what looks wrong with an analysis as a whole, and what to do about it."""
     included = [fit for fit in analysis.fits if fit.outcome.included]
-    reversed_sign = [
+    of_all = f"of {len(included)} included epochs"
+    turned = [
         fit
         for fit in included
         if max(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad) < 0
     ]
-    if not reversed_sign:
-        return ()
-    return (
-        Notice(
-            "warning",
-            f"J, B and K are all negative in {len(reversed_sign)} of {len(included)} epochs: the "
-            "torque has the wrong sign; a sensor that reports the joint's reaction needs "
-            "--reaction",
-        ),
-    )
+    if turned:
+        text = (
+            f"J, B and K are all negative in {len(turned)} {of_all}: the torque has the wrong sign; "
+            "a sensor that reports the joint's reaction needs --reaction"
+        )
+        return (Notice("warning", text),)
+    massless = [fit for fit in included if fit.inertia_kg_m2 <= 0]
+    if massless:
+        text = (
+            f"J is not greater than zero in {len(massless)} {of_all}, which no joint can be: the "
+            "channels are too slow, too noisy or late against each other for an inertia this small"
+        )
+        return (Notice("warning", text),)
+    return ()
 
 
 def conditions(analysis: Analysis) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ import pytest
 
 from rigidimeter.records import Analysis, Channel, Epoch, Fit, Outcome, Score
 from rigidimeter.settings import Settings
-from rigidimeter.study import analyse, compare, conditions, task_of
+from rigidimeter.study import analyse, compare, conditions, doubts, task_of
 
 
 def fit(condition, B=0.1, K=1.0, J=0.004, outcome=None):
@@ -100,3 +100,13 @@ def test_one_condition_gives_its_summary():
     found = compare(analysis([], scores))
     assert [c.measure for c in found] == ["impulse_nm_s", "work_j"]
     assert found[0].remark == "only one condition was recorded"
+
+
+def test_what_no_joint_can_be_is_doubted():
+    assert doubts(analysis([fit("OFF")])) == ()
+    (notice,) = doubts(analysis([fit("OFF", J=-0.001), fit("OFF")]))
+    assert "J is not greater than zero in 1 of 2" in notice.text
+    (notice,) = doubts(analysis([fit("OFF", J=-0.1, B=-0.1, K=-1.0)]))
+    assert "--reaction" in notice.text
+    bad = fit("OFF", J=-0.1, outcome=Outcome("excluded", "limit"))
+    assert doubts(analysis([bad])) == ()
