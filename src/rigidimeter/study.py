@@ -180,8 +180,8 @@ def doubts(analysis: Analysis) -> tuple[Notice, ...]:
     ]
     if turned:
         text = (
-            f"J, B and K are all negative in {len(turned)} {of_all}: the torque has the wrong sign; "
-            "a sensor that reports the joint's reaction needs --reaction"
+            f"J, B and K are all negative in {len(turned)} {of_all}: the torque has the wrong "
+            "sign; a sensor that reports the joint's reaction needs --reaction"
         )
         return (Notice("warning", text),)
     massless = [fit for fit in included if fit.inertia_kg_m2 <= 0]
