@@ -152,6 +152,8 @@ def _move_aside(out: Path) -> None:
     """Give an earlier study another name, so that nothing is written over."""
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return
+    if not (out / "sessions").is_dir():
+        raise UserError(f"--out {out}: is there already and is no earlier demo; name a new folder")
     number = 1
     while (aside := out.with_name(f"{out.name}-{number}")).exists():
         number += 1

@@ -115,10 +115,8 @@ def _expected(field: FieldInfo) -> str:
             what = "numbers" if inner and inner[-1] is float else "tables"
             return f"a non-empty list of {what}{f' in {unit}' if suffix else ''}"
         return "a table"
-    kind = "a whole number" if field.annotation is int else "a number"
-    low = (
-        f"greater than {bounds['gt']:g}{suffix}"
-        if "gt" in bounds
-        else f"at least {bounds['ge']:g}{suffix}"
-    )
-    return f"{kind} {low} and at most {bounds['le']:g}{suffix}"
+    whole = field.annotation is int
+    shown = {name: f"{bound:.0f}" if whole else f"{bound:g}" for name, bound in bounds.items()}
+    low = f"greater than {shown['gt']}" if "gt" in shown else f"at least {shown['ge']}"
+    kind = "a whole number" if whole else "a number"
+    return f"{kind} {low}{suffix} and at most {shown['le']}{suffix}"

@@ -221,3 +221,20 @@ def test_a_session_without_a_good_epoch_fails(rigidimeter, tmp_path):
     ran = rigidimeter("simulate", "--settings", tmp_path / "tight.toml", "--out", tmp_path / "s")
     assert ran.status == 1
     assert "no epoch ended with success" in ran.err
+
+
+def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(rigidimeter, tmp_path):
+    other = tmp_path / "thesis"
+    other.mkdir()
+    (other / "chapter.txt").write_text("years of work")
+    ran = rigidimeter("demo", "--out", other)
+    assert ran.status == 1
+    assert "is no earlier demo" in ran.err
+    assert rigidimeter("demo", "--out", other / "chapter.txt").status == 1
+    assert (other / "chapter.txt").read_text() == "years of work"
+    earlier = tmp_path / "demo"
+    (earlier / "sessions").mkdir(parents=True)
+    ran = rigidimeter("demo", "--out", earlier, "--prbs-epochs", 1, "--sinusoid-epochs", 1)
+    assert ran.status == 0, ran.err
+    assert ran.out.strip().endswith("report.html")
+    assert (tmp_path / "demo-1" / "sessions").is_dir()
