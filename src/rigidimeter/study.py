@@ -191,6 +191,13 @@ def doubts(analysis: Analysis) -> tuple[Notice, ...]:
             "channels are too slow, too noisy or late against each other for an inertia this small"
         )
         return (Notice("warning", text),)
+    negative = [fit for fit in included if min(fit.damping_nm_s_rad, fit.stiffness_nm_rad) < 0]
+    if negative:
+        text = (
+            f"B or K is negative in {len(negative)} {of_all}: the subject may have pushed, or the "
+            "channels are late against each other; look at R² before using them"
+        )
+        return (Notice("warning", text),)
     return ()
 
 

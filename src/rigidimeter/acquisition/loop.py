@@ -73,11 +73,22 @@ class ControlLoop:
     clock : Clock
     record : callable
         Takes one `Sample` a tick.
+    progress : callable
+        Takes the session time, about once a second of it.
     """
 
-    def __init__(self, settings: Settings, rig: Rig, clock: Clock, record: Recorder) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        rig: Rig,
+        clock: Clock,
+        record: Recorder,
+        progress: Callable[[float], None] = lambda _: None,
+    ) -> None:
+        self._progress = progress
         self._rate_hz = settings.rig.tick_rate_hz
         self._interval_s = 1.0 / self._rate_hz
+        self._second = round(self._rate_hz)
         self._rig = rig
         self._clock = clock
         self._record = record
@@ -163,6 +174,8 @@ class ControlLoop:
             self._run_tick(epoch, k, command)
             if self._guard.cause:
                 break
+            if self._tick % self._second == 0:
+                self._progress(self.time_s)
         return Passage(self._limit_time_s, Cause(self._guard.cause), self._limited_ticks)
 
     def _run_tick(

@@ -58,9 +58,9 @@ def run_session(
     before_epoch : callable
         Called while the arm rests, before each epoch; what it returns is stored with the epoch.
     progress : callable
-        Called with the session time after every epoch and rest.
+        Called with the session time, about once a second of it.
     """
-    loop = ControlLoop(settings, rig, clock, writer.sample)
+    loop = ControlLoop(settings, rig, clock, writer.sample, progress)
     perturbation = prbs_nm(settings.prbs, settings.rig.tick_rate_hz).tolist()
     angle, velocity = (
         values.tolist() for values in sinusoid(settings.sinusoid, settings.rig.tick_rate_hz)
@@ -95,10 +95,8 @@ def run_session(
             current = None
             run += 1
             good += ending == "success"
-            progress(loop.time_s)
             if passage.cause is Cause.NONE:
                 passage = loop.rest(planned.rest_s, settings.protocol.return_s)
-                progress(loop.time_s)
             if passage.cause is not Cause.NONE:
                 outcome, reason = "fail", f"the guard stopped the rig: {passage.cause.sentence}"
                 break

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rigidimeter.cli.inputs import Recordings, analyse_inputs, say, status
+from rigidimeter.cli.inputs import Recordings, analyse_inputs, keep_inputs, say, status
 from rigidimeter.cli.options import reads_recordings
 from rigidimeter.errors import UserError
 
@@ -54,6 +54,7 @@ def compare(
     from rigidimeter.study import compare as compare_analysis
     from rigidimeter.study import conditions
 
+    keep_inputs((json_out, csv_out), recordings.paths)
     exit_status = 0
     if any(path.suffix.lower() == ".json" for path in recordings.paths):
         if len(recordings.paths) > 1:
@@ -83,7 +84,6 @@ def compare(
             "in a condition column, or give --condition once for each file in their order"
         )
     comparisons = compare_analysis(analysis, reference, other)
-    typer.echo("\n".join(_lines(comparisons)))
     if json_out is not None:
         write_json(
             json_out,
@@ -95,6 +95,7 @@ def compare(
         )
     if csv_out is not None:
         write_text(csv_out, csv_text(results_table(comparisons)))
+    typer.echo("\n".join(_lines(comparisons)))
     raise typer.Exit(exit_status)
 
 

@@ -98,54 +98,48 @@ def _day(day: int, prbs_epochs: int, sinusoid_epochs: int, seed: int) -> dict[st
 
 
 def _simulate(settings: list[dict[str, Any]], folders: list[Path]) -> None:
-    """Run the sessions side by side, one process each, as many as there are cores."""
-    import os
-    from concurrent.futures import ProcessPoolExecutor
+    """Run the sessions side by side, a process each; end them when we are interrupted."""
     from multiprocessing import get_context
 
     from rigidimeter.cli.progress import Meter
     from rigidimeter.cli.virtual import session_length_s
     from rigidimeter.settings import parse_settings
 
-    parsed = [parse_settings(values) for values in settings]
+    total_s = sum(session_length_s(parse_settings(values)) for values in settings)
     context = get_context("spawn")
-    reached = context.Array("d", len(parsed), lock=False)
-    workers = min(len(parsed), os.cpu_count() or 1)
-    total_s = sum(session_length_s(one) for one in parsed)
-    with (
-        Meter("simulate", total_s) as meter,
-        ProcessPoolExecutor(workers, context, initializer=_share, initargs=(reached,)) as pool,
-    ):
-        jobs = [
-            pool.submit(_run_day, index, values, str(folder))
-            for index, (values, folder) in enumerate(zip(settings, folders, strict=True))
-        ]
-        while not all(job.done() for job in jobs):
-            time.sleep(0.1)
-            meter.reach(sum(reached))
-        for job in jobs:
-            job.result()
+    reached = context.Array("d", len(settings), lock=False)
+    days = [
+        context.Process(target=_run_day, args=(index, values, str(folder), reached), daemon=True)
+        for index, (values, folder) in enumerate(zip(settings, folders, strict=True))
+    ]
+    with Meter("simulate", total_s) as meter:
+        for day in days:
+            day.start()
+        try:
+            while any(day.is_alive() for day in days):
+                time.sleep(0.1)
+                meter.reach(sum(reached))
+        finally:
+            for day in days:
+                day.terminate()  # does nothing to one that has ended
+                day.join()
+    failed = [str(folder) for day, folder in zip(days, folders, strict=True) if day.exitcode]
+    if failed:
+        raise UserError(f"{', '.join(failed)}: the session did not end with success")
 
 
-_reached: Any = None
-
-
-def _share(reached: Any) -> None:
-    global _reached
-    _reached = reached
-
-
-def _run_day(index: int, values: dict[str, Any], folder: str) -> None:
+def _run_day(index: int, values: dict[str, Any], folder: str, reached: Any) -> None:
     """Run one session in its own process, reporting its time as it goes."""
+    import sys
+
     from rigidimeter.cli.virtual import run_virtual_session
     from rigidimeter.settings import parse_settings
 
     def reach(time_s: float) -> None:
-        _reached[index] = time_s
+        reached[index] = time_s
 
     result = run_virtual_session(parse_settings(values), Path(folder), progress=reach)
-    if result.outcome != "success":
-        raise UserError(f"{folder}: the session ended with {result.outcome}: {result.reason}")
+    sys.exit(result.outcome != "success")
 
 
 def _move_aside(out: Path) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.errors import UserError
 from rigidimeter.units import deg_from_rad, rad_from_deg
 
@@ -54,6 +55,7 @@ def design(
     from rigidimeter.design import overview
     from rigidimeter.settings import load_settings
 
+    keep_inputs((json_out,), [settings] if settings is not None else [])
     planned = overview(load_settings(settings))
     typer.echo("\n".join(_lines(planned)))
     document = _document(planned)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from rigidimeter.cli.inputs import Recordings, analyse_inputs, say, status
+from rigidimeter.cli.inputs import Recordings, analyse_inputs, keep_inputs, say, status
 from rigidimeter.cli.options import reads_recordings
 
 if TYPE_CHECKING:
@@ -45,14 +45,15 @@ def estimate(
     """
     from rigidimeter.recording import write_estimates_csv, write_estimates_json
 
+    keep_inputs((json_out, csv_out), recordings.paths)
     read = recordings.read()
     say(read.notices)
     analysis = analyse_inputs(read)
-    typer.echo("\n".join(_lines(analysis)))
     if json_out is not None:
         write_estimates_json(json_out, analysis)
     if csv_out is not None:
         write_estimates_csv(csv_out, analysis)
+    typer.echo("\n".join(_lines(analysis)))
     raise typer.Exit(status(read, analysis))
 
 

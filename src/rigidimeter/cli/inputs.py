@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score, Task
     from rigidimeter.settings import Settings
 
-__all__ = ["Inputs", "Recordings", "analyse_inputs", "say", "status"]
+__all__ = ["Inputs", "Recordings", "analyse_inputs", "keep_inputs", "say", "status"]
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,26 @@ def analyse_inputs(inputs: Inputs) -> Analysis:
         raise UserError(f"--method {method}: there is no such method; known: {', '.join(METHODS)}")
     with Meter("estimate", 2 * len(inputs.epochs)) as meter:
         return analyse(inputs.epochs, inputs.settings, method, progress=lambda _: meter.advance())
+
+
+def keep_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:
+    """Refuse to write over what is read.
+
+    Raises
+    ------
+    UserError
+        If an output is an input, lies in a session folder, or is named twice.
+    """
+    kept = {path.resolve() for path in inputs}
+    for output in outputs:
+        if output is None:
+            continue
+        place = output.resolve()
+        if place in kept:
+            raise UserError(f"{output}: is read or written already; name another file to write")
+        if (place.parent / "manifest.json").exists():
+            raise UserError(f"{output}: lies in a session folder, which is never written to again")
+        kept.add(place)
 
 
 def say(notices: tuple[Notice, ...]) -> None:

@@ -6,6 +6,7 @@ Modules of the command line import heavy libraries inside their functions, so th
 
 from __future__ import annotations
 
+import io
 import signal
 import sys
 from types import FrameType
@@ -69,6 +70,9 @@ def _terminated(_signal: int, _frame: FrameType | None) -> None:
 def main() -> None:
     """Run the command line; what a user did wrong ends with one sentence and status 1."""
     signal.signal(signal.SIGTERM, _terminated)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without "−" is no reason to fail
     try:
         app()
     except UserError as error:
@@ -78,3 +82,10 @@ def main() -> None:
         # The reader of our output has gone, as in `rigidimeter ... | head`: not our error.
         sys.stderr.close()
         sys.exit(0)
+    except OSError as error:
+        what = f"{error.filename}: " if error.filename else ""
+        typer.echo(f"rigidimeter: {what}{error.strerror or error}", err=True)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        typer.echo("rigidimeter: interrupted", err=True)
+        sys.exit(130)

@@ -16,6 +16,7 @@ import math
 import numpy as np
 from scipy import signal
 
+from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE
 from rigidimeter.estimation.signals import (
     Array,
     Signals,
@@ -29,9 +30,6 @@ from rigidimeter.records import Epoch
 from rigidimeter.settings import EstimationSettings
 
 __all__ = ["band_hz", "bandlimited_signals", "zero_phase_band"]
-
-USABLE_FRACTION_OF_RATE = 0.4
-"""A channel carries information up to half its rate; interpolation is good to about 0.4 of it."""
 
 
 def band_hz(epoch: Epoch, settings: EstimationSettings) -> tuple[float, float]:
@@ -47,9 +45,6 @@ def band_hz(epoch: Epoch, settings: EstimationSettings) -> tuple[float, float]:
     slowest = min(channel.rate_hz for channel in used)
     return settings.band_low_hz, min(wanted, USABLE_FRACTION_OF_RATE * slowest)
 
-
-LEAST_BAND_RATIO = 4.0
-"""A band narrower than two octaves cannot tell three parameters apart."""
 
 EDGE_SAMPLES = 10
 """Samples of the slowest channel dropped at each end before filtering.
@@ -87,20 +82,9 @@ def bandlimited_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
         With `torque_nm` and `velocity_rad_s` or `angle_rad`.
     settings : EstimationSettings
         For the band and the trimming.
-
-    Raises
-    ------
-    ValueError
-        If the recording is too slow for the band.
     """
     torque = epoch.channels["torque_nm"]
     band = band_hz(epoch, settings)
-    if band[1] < LEAST_BAND_RATIO * band[0]:
-        slowest = min([torque, *motion_channels(epoch)], key=lambda channel: channel.rate_hz)
-        raise ValueError(
-            f"{slowest.name} was sampled at {slowest.rate_hz:.3g} Hz, which leaves the band from "
-            f"{band[0]:.3g} to {band[1]:.3g} Hz; check the unit of the time stamps (seconds)"
-        )
     used = [torque, *motion_channels(epoch)]
     rate_hz = grid_rate_hz(used, band[1])
     whole = uniform_grid(used, rate_hz)

@@ -37,6 +37,9 @@ __all__ = ["Cycles", "angular_impulse_nm_s", "loop_area_j", "score_epoch", "scor
 POINTS_PER_CYCLE = 4096
 """Enough that the chords miss less than 4e-7 of the loop."""
 
+SAMPLES_PER_CYCLE = 10.0
+"""With fewer samples a cycle the spline no longer follows a sinusoid to a tenth of a percent."""
+
 LEAST_GAIN = 0.25
 """Half of half: the gain, taken twice, at the edges of the band."""
 
@@ -83,6 +86,12 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     """
     motion = find_motion(epoch)
     used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
+    slowest = min(used, key=lambda channel: channel.rate_hz)
+    if slowest.rate_hz < SAMPLES_PER_CYCLE * motion.frequency_hz:
+        raise ValueError(
+            f"{slowest.name} was sampled at {slowest.rate_hz:.3g} Hz; a {motion.frequency_hz:.3g} "
+            f"Hz motion needs {SAMPLES_PER_CYCLE * motion.frequency_hz:.3g} Hz"
+        )
     rate_hz = grid_rate_hz(used, settings.band_high_hz)
     grid = uniform_grid(used, rate_hz)
     angle, _, _ = kinematics(epoch, grid)

@@ -10,6 +10,12 @@ from rigidimeter.settings import EstimationSettings
 
 __all__ = ["after_fit", "before_fit", "unusable"]
 
+USABLE_FRACTION_OF_RATE = 0.4
+"""A channel carries information up to half its rate; interpolation is good to about 0.4 of it."""
+
+LEAST_BAND_RATIO = 4.0
+"""A band narrower than two octaves cannot tell three parameters apart."""
+
 LARGEST_CONDITION_NUMBER = 1000.0
 """Beyond this the motion excites less than three parameters; a PRBS epoch has about 3 to 10."""
 
@@ -31,6 +37,12 @@ def before_fit(epoch: Epoch, settings: EstimationSettings) -> str:
                 f"{channel.name} is {channel.values[bad]} at {channel.time_s[bad]:.4g} s; "
                 "samples must be finite numbers"
             )
+    slowest = min((torque, *motion), key=lambda channel: channel.rate_hz)
+    if USABLE_FRACTION_OF_RATE * slowest.rate_hz < LEAST_BAND_RATIO * settings.band_low_hz:
+        return (
+            f"{slowest.name} was sampled at {slowest.rate_hz:.3g} Hz, too slowly for a band from "
+            f"{settings.band_low_hz:g} Hz up; check the unit of the time stamps (seconds)"
+        )
     start = max(float(channel.time_s[0]) for channel in (torque, *motion))
     stop = min(float(channel.time_s[-1]) for channel in (torque, *motion))
     if stop - start < settings.shortest_epoch_s * (1 - 1e-3):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,15 +61,33 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
     ended = {event["epoch"]: event for event in events if event.get("event") == "epoch_ended"}
     first, last = _extents(samples["epoch"])
     epochs = []
+    seen: set[int] = set()
     for event in events:
         if event.get("event") != "epoch_started":
             continue
         number = event["epoch"]
-        if number not in first:
+        if number in seen:
             notices.append(
-                Notice("warning", f"{folder}, epoch {event['label']}: no sample was written")
+                Notice("error", f"{folder}/{EVENTS}: epoch {number} starts twice; the first counts")
             )
             continue
+        seen.add(number)
+        closed_well = ended.get(number, {}).get("outcome") == "success"
+        if number not in first:
+            level: Literal["warning", "error"] = "error" if closed_well else "warning"
+            notices.append(
+                Notice(level, f"{folder}, epoch {event['label']}: no sample was written")
+            )
+            continue
+        if closed_well:
+            missing_s = ended[number]["time_s"] - float(samples["time_s"][last[number]])
+            if missing_s > 1.5 / settings.rig.tick_rate_hz:
+                lost = (
+                    f"its last {missing_s:.3g} s are missing; {SAMPLES} breaks off at "
+                    f"{samples['time_s'][-1]:.3f} s"
+                )
+                notices.append(Notice("error", f"{folder}, epoch {event['label']}: {lost}"))
+                ended[number] = {"outcome": "fail", "reason": lost}
         rows = slice(first[number], last[number] + 1)
         share = float(np.mean(samples["limited"][rows] > 0))
         if share > MUCH_LIMITED:
@@ -82,6 +100,11 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
                 )
             )
         epochs.append(_epoch(folder, settings, manifest, samples, rows, event, ended.get(number)))
+    notices += [
+        Notice("error", f"{folder}/{EVENTS}: does not say what epoch {number} of the samples was")
+        for number in first
+        if number not in seen
+    ]
     return epochs, notices
 
 

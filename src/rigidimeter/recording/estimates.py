@@ -106,9 +106,19 @@ def write_text(path: Path, text: str) -> None:
     UserError
         If the file cannot be written.
     """
+    # Whole or not at all: an older file of that name survives a full disk.
+    content = text.encode("utf-8", errors="backslashreplace")
+    beside = path.with_name(f".{path.name}.part")
     try:
-        path.write_text(text, encoding="utf-8", newline="")
+        if path.is_dir():
+            raise IsADirectoryError(21, "Is a directory", str(path))
+        if path.exists() and not path.is_file():  # such as /dev/stdout
+            path.write_bytes(content)
+            return
+        beside.write_bytes(content)
+        beside.replace(path)
     except OSError as error:
+        beside.unlink(missing_ok=True)
         raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
@@ -124,7 +134,7 @@ def read_estimates(path: Path) -> Analysis:
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise UserError(f"{path}: is not valid JSON ({error})") from None
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != ESTIMATES_SCHEMA:
@@ -139,7 +149,7 @@ def read_estimates(path: Path) -> Analysis:
             _number(fixed["inertia_kg_m2"]),
             tuple(_score(row) for row in document["scores"]),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UserError(
             f"{path}: is not a complete {ESTIMATES_SCHEMA} document ({error})"
         ) from None
@@ -151,6 +161,15 @@ def _finite(value: float) -> float | None:
 
 def _number(value: Any) -> float:
     return math.nan if value is None else float(value)
+
+
+def _read_outcome(row: Mapping[str, Any], numbers: Sequence[str]) -> Outcome:
+    kind = row["outcome"]
+    if kind not in ("included", "excluded", "failed"):
+        raise ValueError(f"outcome {kind!r}")
+    if kind == "included" and not all(math.isfinite(_number(row[name])) for name in numbers):
+        raise ValueError(f"epoch {row['epoch']} is included without all its numbers")
+    return Outcome(kind, str(row["reason"]))
 
 
 def _outcome(result: Fit | Score) -> dict[str, Any]:
@@ -188,7 +207,7 @@ def _fit(row: Mapping[str, Any], method: str) -> Fit:
         epoch=str(row["epoch"]),
         condition=str(row["condition"]),
         method=method,
-        outcome=Outcome(row["outcome"], str(row["reason"])),
+        outcome=_read_outcome(row, _FIT_NUMBERS[0:6:2]),
         n_samples=int(row["n_samples"]),
         band_hz=(float(low), float(high)),
     )
@@ -201,7 +220,7 @@ def _score(row: Mapping[str, Any]) -> Score:
         source=str(row["source"]),
         epoch=str(row["epoch"]),
         condition=str(row["condition"]),
-        outcome=Outcome(row["outcome"], str(row["reason"])),
+        outcome=_read_outcome(row, _SCORE_NUMBERS[:2]),
         impulse_nm_s=_number(row["impulse_nm_s"]),
         work_j=_number(row["work_j"]),
         n_cycles=int(row["n_cycles"]),

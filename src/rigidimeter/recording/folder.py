@@ -8,12 +8,13 @@ with success, abort or fail and a reason; so does the session. A folder without 
 
 from __future__ import annotations
 
+import fcntl
 import json
 import platform
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, BinaryIO, Literal
 
 import numpy as np
 import pyarrow as pa
@@ -24,7 +25,16 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.log import SAMPLE_UNITS, Sample, SampleLog, append_event
 from rigidimeter.settings import Settings, dump_settings
 
-__all__ = ["EVENTS", "MANIFEST", "SAMPLES", "SCHEMA", "Ending", "SessionWriter", "read_manifest"]
+__all__ = [
+    "EVENTS",
+    "MANIFEST",
+    "SAMPLES",
+    "SCHEMA",
+    "Ending",
+    "SessionWriter",
+    "lock",
+    "read_manifest",
+]
 
 MANIFEST, SAMPLES, EVENTS = "manifest.json", "samples.arrows", "events.jsonl"
 SCHEMA = "rigidimeter.session/1"
@@ -100,6 +110,7 @@ class SessionWriter:
             (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
             self._log = SampleLog(folder / SAMPLES, settings.rig.tick_rate_hz)
             self._events = (folder / EVENTS).open("xb")
+            lock(self._events)
         except OSError as error:
             reason = error.strerror or error
             raise UserError(f"{folder}: a session cannot be written there ({reason})") from None
@@ -154,6 +165,18 @@ class SessionWriter:
             {"event": "session_ended", "time_s": time_s, "outcome": outcome, "reason": reason},
         )
         self._events.close()
+
+
+def lock(file: BinaryIO) -> bool:
+    """Mark an event file as being written until it is closed; return whether nobody else does.
+
+    The lock goes with the process, so a killed one leaves none.
+    """
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:

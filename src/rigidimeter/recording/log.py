@@ -67,7 +67,7 @@ SAMPLE_UNITS: Mapping[str, str] = {
 EVENT_TYPES: Mapping[str, Mapping[str, type | tuple[type, ...]]] = {
     "session_started": {"time_s": (int, float)},
     "epoch_started": {"epoch": int, "label": str, "task": str, "condition": str},
-    "epoch_ended": {"epoch": int, "outcome": str, "reason": str},
+    "epoch_ended": {"epoch": int, "time_s": (int, float), "outcome": str, "reason": str},
     "session_ended": {"outcome": str, "reason": str},
 }
 """What an event must hold to be read; others are kept and passed over."""

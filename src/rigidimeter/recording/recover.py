@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.folder import EVENTS, SAMPLES, read_manifest
+from rigidimeter.recording.folder import EVENTS, SAMPLES, lock, read_manifest
 from rigidimeter.recording.log import append_event, read_events, read_samples, stream_extent
 
 __all__ = ["Recovery", "recover"]
@@ -39,7 +39,7 @@ def recover(folder: Path, reason: str = "the recording process ended without clo
     Raises
     ------
     UserError
-        If the folder is no session folder, or holds no sample stream.
+        If the folder is no session folder, holds no sample stream, or is still being recorded.
     """
     read_manifest(folder)
     samples_path, events_path = folder / SAMPLES, folder / EVENTS
@@ -47,6 +47,13 @@ def recover(folder: Path, reason: str = "the recording process ended without clo
         raise UserError(f"{folder}: the session has no {SAMPLES}, so there is nothing to recover")
     if not events_path.is_file():
         events_path.touch()
+    with events_path.open("r+b") as events_file:
+        if not lock(events_file):
+            raise UserError(f"{folder}: is still being recorded; recover it once that has ended")
+        return _close(samples_path, events_path, reason)
+
+
+def _close(samples_path: Path, events_path: Path, reason: str) -> Recovery:
     events, torn_event = read_events(events_path)
     length, stream_closed = stream_extent(samples_path)
     samples = read_samples(samples_path)

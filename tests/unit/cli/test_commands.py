@@ -238,3 +238,45 @@ def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(rigidimeter, tmp_pat
     assert ran.status == 0, ran.err
     assert ran.out.strip().endswith("report.html")
     assert (tmp_path / "demo-1" / "sessions").is_dir()
+
+
+def test_what_is_read_is_never_written_over(rigidimeter, simulate, tmp_path):
+    folder = simulate()
+    samples = (folder / "samples.arrows").read_bytes()
+    for output in (folder / "samples.arrows", folder / "new.csv"):
+        ran = rigidimeter("estimate", folder, "--csv", output)
+        assert ran.status == 1
+        assert "session folder" in ran.err
+    assert (folder / "samples.arrows").read_bytes() == samples
+    (tmp_path / "rig.toml").write_text("seed = 3\n")
+    ran = rigidimeter(
+        "design", "--settings", tmp_path / "rig.toml", "--json", tmp_path / "rig.toml"
+    )
+    assert ran.status == 1
+    assert (tmp_path / "rig.toml").read_text() == "seed = 3\n"
+    ran = rigidimeter("estimate", folder, "--csv", tmp_path / "o", "--json", tmp_path / "o")
+    assert ran.status == 1
+    assert not (tmp_path / "o").exists()
+
+
+def test_files_are_written_even_when_nobody_reads_the_words(simulate, tmp_path):
+    folder, out = simulate(), tmp_path / "out.json"
+    command = f"{sys.executable} -m rigidimeter estimate {folder} --json {out} | true"
+    ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert "Traceback" not in ran.stderr
+    assert json.loads(out.read_text())["epochs"]
+
+
+def test_a_terminal_without_our_signs_or_space_is_no_traceback(tmp_path):
+    for redirect, encoding in (("/dev/full", "utf-8"), ("/dev/null", "cp1252")):
+        command = f"PYTHONIOENCODING={encoding} {sys.executable} -m rigidimeter design > {redirect}"
+        ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+        assert "Traceback" not in ran.stderr
+
+
+def test_microseconds_given_as_seconds_are_refused_in_words(rigidimeter, tmp_path):
+    rows = "".join(f"{a * 1e4},{a % 7},{a % 5}\n" for a in range(8000))
+    (tmp_path / "us.csv").write_text("time_s,angle_rad,torque_nm\n" + rows)
+    ran = rigidimeter("estimate", tmp_path / "us.csv")
+    assert ran.status == 1
+    assert "check the unit of the time stamps" in ran.err

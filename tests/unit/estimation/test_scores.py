@@ -112,3 +112,27 @@ def test_an_epoch_that_was_not_closed_with_success_is_scored_but_does_not_count(
     score = score_epoch(touched, SCORES, SCREEN)
     assert score.outcome == Outcome("excluded", "limit")
     assert math.isfinite(score.work_j)
+
+
+def test_a_recording_too_slow_for_its_motion_is_not_scored():
+    epoch = sinusoid_epoch(JointDynamics(0.0045, 0.1368, 1.751), rate_hz=4.0)
+    score = score_epoch(epoch, SCORES, SCREEN)
+    assert score.outcome.kind == "failed"
+    assert "was sampled at 4 Hz; a 1 Hz motion needs 10 Hz" in score.outcome.reason
+
+
+@pytest.mark.parametrize("frequency_hz", [0.5, 2.0, 3.0])
+def test_the_scores_hold_at_other_frequencies_than_the_papers(frequency_hz):
+    t = np.arange(20_001) / 1000.0
+    w = 2 * math.pi * frequency_hz
+    x, v = A * np.sin(w * t), A * w * np.cos(w * t)
+    channels = {
+        "torque_nm": Channel("torque_nm", t, 0.1368 * v + 1.751 * x),
+        "angle_rad": Channel("angle_rad", t, x),
+    }
+    motion = Motion(frequency_hz, 0.0, 20.0)
+    score = score_epoch(Epoch("f", "1", channels, motion=motion), SCORES, SCREEN)
+    assert score.work_j == pytest.approx(math.pi * 0.1368 * w * A**2, rel=1e-4)
+    fast = Motion(9.0, 0.0, 20.0)
+    outside = score_epoch(Epoch("f", "1", channels, motion=fast), SCORES, SCREEN)
+    assert "outside the band of the scores" in outside.outcome.reason

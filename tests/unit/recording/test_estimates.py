@@ -1,6 +1,7 @@
 import csv
 import json
 import math
+from pathlib import Path
 
 import pytest
 
@@ -67,6 +68,7 @@ def test_scores_alone_give_the_table_of_scores(tmp_path):
         ("[]", "schema is None"),
         ('{"schema": "other/1"}', "schema is 'other/1'"),
         ('{"schema": "rigidimeter.estimates/1", "method": "x"}', "not a complete"),
+        ("[" * 100_000, "not valid JSON"),
     ],
 )
 def test_another_document_is_refused(tmp_path, text, words):
@@ -78,3 +80,35 @@ def test_another_document_is_refused(tmp_path, text, words):
 def test_a_folder_that_does_not_exist_is_named(tmp_path):
     with pytest.raises(UserError, match="cannot be written"):
         write_estimates_json(tmp_path / "no" / "e.json", ANALYSIS)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"inertia_kg_m2": 0.0045,', '"inertia_kg_m2": null,', "without all its numbers"),
+        ('"outcome": "failed"', '"outcome": "foo"', "outcome 'foo'"),
+        ('"n_samples": 18000', '"n_samples": 1e999', "not a complete"),
+    ],
+)
+def test_estimates_changed_by_hand_are_refused(tmp_path, old, new, words):
+    path = tmp_path / "e.json"
+    write_estimates_json(path, ANALYSIS)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(UserError, match=words):
+        read_estimates(path)
+
+
+def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    path = tmp_path / "e.json"
+    path.write_text("the older one")
+
+    def full(self, content):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(UserError, match="No space left"):
+        write_estimates_json(path, ANALYSIS)
+    assert path.read_text() == "the older one"
+    assert list(tmp_path.iterdir()) == [path]

@@ -5,8 +5,15 @@ import pyarrow as pa
 import pytest
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording import read_manifest, read_session, recover, session_settings
+from rigidimeter.recording import (
+    SessionWriter,
+    read_manifest,
+    read_session,
+    recover,
+    session_settings,
+)
 from rigidimeter.recording.log import SAMPLE_UNITS, read_samples
+from rigidimeter.settings import Settings
 
 
 def events(folder):
@@ -205,3 +212,36 @@ def test_a_stream_of_other_columns_is_refused(simulate):
         writer.write_table(table)
     with pytest.raises(UserError, match=r"samples\.arrows: holds other columns"):
         read_session(folder)
+
+
+def test_a_session_that_is_being_recorded_is_left_alone(tmp_path):
+    writer = SessionWriter(tmp_path / "s", Settings(), [], {"session": 1}, virtual=True)
+    writer.session_started()
+    with pytest.raises(UserError, match="still being recorded"):
+        recover(tmp_path / "s")
+    writer.close(0.0, "success", "")
+    assert recover(tmp_path / "s").already_closed
+
+
+def test_a_closed_session_that_lost_samples_does_not_pass_for_whole(simulate):
+    folder = simulate(epochs=2)
+    path = folder / "samples.arrows"
+    path.write_bytes(path.read_bytes()[: int(0.3 * path.stat().st_size)])
+    (first,), notices = read_session(folder)
+    assert first.closed.kind == "excluded"
+    assert "are missing; samples.arrows breaks off at" in first.closed.reason
+    assert [notice.level for notice in notices] == ["error", "error"]
+
+
+def test_an_epoch_that_starts_twice_or_never_is_said(simulate):
+    folder = simulate(epochs=2)
+    lines = (folder / "events.jsonl").read_text().splitlines(keepends=True)
+    (folder / "events.jsonl").write_text("".join([*lines[:2], *lines[1:]]))
+    epochs, (notice,) = read_session(folder)
+    assert len(epochs) == 2
+    assert "epoch 1 starts twice" in notice.text
+    (folder / "events.jsonl").write_text("".join([lines[0], *lines[2:]]))
+    epochs, (notice,) = read_session(folder)
+    assert len(epochs) == 1
+    assert "does not say what epoch 1" in notice.text
+    assert notice.level == "error"
