@@ -49,7 +49,9 @@ def demo(
         int,
         typer.Option("--sinusoid-epochs", min=1, max=500, help="Sinusoids a condition and day."),
     ] = 8,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the study.")] = 2023,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, max=2**31, help="Seed of the study.")
+    ] = 2023,
 ) -> None:
     """Run a virtual OFF/DBS study, analyse it, and write its report.
 

@@ -22,6 +22,7 @@ def make_report(title: str, inputs: Inputs, analysis: Analysis, out: Path) -> Pa
     UserError
         If the folder cannot be written.
     """
+    from rigidimeter.cli.progress import Meter
     from rigidimeter.cli.provenance import provenance
     from rigidimeter.report import write_report
     from rigidimeter.study import Study, compare
@@ -36,7 +37,8 @@ def make_report(title: str, inputs: Inputs, analysis: Analysis, out: Path) -> Pa
         provenance=provenance(inputs.paths, inputs.settings),
     )
     try:
-        return write_report(study, out)
+        with Meter("report", 1.0) as meter:
+            return write_report(study, out, meter.reach)
     except OSError as error:
         raise UserError(
             f"{out}: the report cannot be written ({error.strerror or error})"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -41,7 +41,18 @@ class Pair:
     unbounded: bool
 
 
-def write_report(study: Study, out: Path) -> Path:
+DRAWN: Mapping[str, Callable[[Study], list[Picture]]] = {
+    "distributions": distribution_pictures,
+    "perturbation": perturbation_pictures,
+    "torque": torque_pictures,
+    "loops": loop_pictures,
+}
+"""The groups of figures, in the order in which they are drawn."""
+
+
+def write_report(
+    study: Study, out: Path, progress: Callable[[float], None] = lambda _: None
+) -> Path:
     """Write ``report.html``, ``tables/*.csv`` and ``figures/*.svg`` into a folder.
 
     The same study gives the same bytes.
@@ -52,6 +63,8 @@ def write_report(study: Study, out: Path) -> Path:
         What to show.
     out : Path
         The folder; made if it does not exist. Files of the same names are replaced.
+    progress : callable
+        Takes the share that is done, from 0 to 1.
 
     Returns
     -------
@@ -59,12 +72,11 @@ def write_report(study: Study, out: Path) -> Path:
         Of the page.
     """
     tables = all_tables(study)
-    pictures = {
-        "distributions": distribution_pictures(study),
-        "perturbation": perturbation_pictures(study),
-        "torque": torque_pictures(study),
-        "loops": loop_pictures(study),
-    }
+    pictures: dict[str, list[Picture]] = {}
+    for done, (group_name, draw) in enumerate(DRAWN.items()):
+        progress(done / len(DRAWN))
+        pictures[group_name] = draw(study)
+    progress(1.0)
     (out / "tables").mkdir(parents=True, exist_ok=True)
     (out / "figures").mkdir(parents=True, exist_ok=True)
     for table in tables.values():

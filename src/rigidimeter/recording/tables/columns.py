@@ -119,8 +119,23 @@ def find_columns(table: Table, wanted: Mapping[str, str]) -> dict[str, str]:
     return found
 
 
-def numbers(table: Table, standard: str, name: str) -> NDArray[np.float64]:
+STRAY_SHARE = 0.01
+"""Up to this share of entries may be text in a column of numbers and still be left out singly."""
+
+
+def numbers(
+    table: Table, standard: str, name: str, strays: list[str] | None = None
+) -> NDArray[np.float64]:
     """Return a column as float64, shape (n,), with NaN where a number is missing.
+
+    Parameters
+    ----------
+    table : Table
+    standard, name : str
+        What we and what the file call the column.
+    strays : list of str, optional
+        Where given, a few entries that are not numbers are missing too, and a sentence about each
+        is added here.
 
     Raises
     ------
@@ -131,15 +146,20 @@ def numbers(table: Table, standard: str, name: str) -> NDArray[np.float64]:
     if column.dtype != object:
         return column.astype(np.float64, copy=False)
     values = np.empty(column.size)
+    found: list[str] = []
     for row, entry in enumerate(column):
         text = str(entry).strip()
         try:
             values[row] = math.nan if text.lower() in MISSING else float(text)
         except ValueError:
             label = standard if standard == name else f"{standard} (column {name!r})"
-            raise UserError(
-                f"{table.where(row)}: {label} holds {text[:60]!r}, which is not a number"
-            ) from None
+            found.append(f"{table.where(row)}: {label} holds {text[:60]!r}, which is not a number")
+            values[row] = math.nan
+            # The first row is more often a row of units than a slip.
+            if strays is None or row == 0 or len(found) > STRAY_SHARE * column.size:
+                raise UserError(found[0]) from None
+    if strays is not None:
+        strays += found
     return values
 
 

@@ -99,7 +99,11 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
     epochs: list[Epoch] = []
     losses: dict[str, dict[str, list[Loss]]] = {name: {} for name in signals}
     for stretch in stretches:
-        condition, task = _meaning(table, labels, stretch, options)
+        try:
+            condition, task = _meaning(table, labels, stretch, options)
+        except UserError as error:  # that epoch is lost, the others are not
+            notices.append(Notice("error", f"{error}; the epoch was left out"))
+            continue
         present, more = _present(table.source, signals, stretch)
         notices += more
         breaks: list[Break] = []
@@ -131,8 +135,9 @@ def _signals(
     """Read the columns of numbers; one without a single number is left out."""
     signals: dict[str, Signal] = {}
     empty: list[str] = []
+    strays: list[str] = []
     for name in (name for name in CHANNEL_UNITS if name in names):
-        values = numbers(table, name, names[name])
+        values = numbers(table, name, names[name], strays)
         if reaction and name == "torque_nm":
             values = -values
         signal = make_signal(name, clock, values)
@@ -146,8 +151,11 @@ def _signals(
             "the torque and the angle or its velocity"
         )
     return signals, [
-        Notice("error", f"{table.source}: {name} has no number in any row; it was left out")
-        for name in empty
+        *(
+            Notice("error", f"{table.source}: {name} has no number in any row; it was left out")
+            for name in empty
+        ),
+        *(Notice("error", f"{text}; the entry was left out") for text in strays),
     ]
 
 

@@ -83,8 +83,34 @@ def test_text_far_down_a_column_is_found(tmp_path):
     path = tmp_path / "r.csv"
     rows = "".join(f"{k / 1000},{k},0\n" for k in range(200_000))
     path.write_text("time_s,torque_nm,angle_rad\n" + rows + "200,1,0.5 V\n")
-    with pytest.raises(UserError, match=r"line 200002: angle_rad holds '0\.5 V'"):
+    _, notices = read_recording(path, ReadOptions())
+    assert notices[0].level == "error"
+    assert "line 200002: angle_rad holds '0.5 V'" in notices[0].text
+
+
+def test_a_row_of_units_or_a_column_of_text_is_refused(tmp_path):
+    path = tmp_path / "r.csv"
+    rows = "".join(f"{k / 1000},{k % 7},{k % 5}\n" for k in range(2000))
+    path.write_text("time_s,torque_nm,angle_rad\n0,N·m,rad\n" + rows)
+    with pytest.raises(UserError, match=r"line 2: torque_nm holds 'N·m'"):
         read_recording(path, ReadOptions())
+    words = "".join(f"{k / 1000},{'x' if k % 50 == 9 else k},0\n" for k in range(2000))
+    path.write_text("time_s,torque_nm,angle_rad\n" + words)
+    with pytest.raises(UserError, match=r"line 11: torque_nm holds 'x'"):
+        read_recording(path, ReadOptions())
+
+
+def test_an_epoch_whose_condition_changes_is_lost_alone(tmp_path):
+    path = tmp_path / "r.csv"
+    rows = "".join(
+        f"{k / 100},{k % 7},{k % 5},{1 + k // 1000},{'DBS' if k == 500 else 'OFF'}\n"
+        for k in range(2000)
+    )
+    path.write_text("time_s,torque_nm,angle_rad,epoch,condition\n" + rows)
+    (epoch,), (notice,) = read_recording(path, ReadOptions())
+    assert epoch.label == "2"
+    assert notice.level == "error"
+    assert "condition changes from OFF to DBS within epoch 1" in notice.text
 
 
 def test_a_date_in_a_column_of_numbers_is_text(tmp_path):
