@@ -91,7 +91,7 @@ def test_text_far_down_a_column_is_found(tmp_path):
 def test_a_row_of_units_or_a_column_of_text_is_refused(tmp_path):
     path = tmp_path / "r.csv"
     rows = "".join(f"{k / 1000},{k % 7},{k % 5}\n" for k in range(2000))
-    path.write_text("time_s,torque_nm,angle_rad\n0,N·m,rad\n" + rows)
+    path.write_text("time_s,torque_nm,angle_rad\n-0.001,N·m,rad\n" + rows)
     with pytest.raises(UserError, match=r"line 2: torque_nm holds 'N·m'"):
         read_recording(path, ReadOptions())
     words = "".join(f"{k / 1000},{'x' if k % 50 == 9 else k},0\n" for k in range(2000))
