@@ -107,7 +107,9 @@ class SessionWriter:
                 "channel_units": dict(SAMPLE_UNITS),
             }
             text = json.dumps(manifest, indent=1, ensure_ascii=False, allow_nan=False)
-            (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
+            part = folder / f".{MANIFEST}.part"
+            part.write_text(text + "\n", encoding="utf-8")
+            part.replace(folder / MANIFEST)  # whole, or not there
             self._log = SampleLog(folder / SAMPLES, settings.rig.tick_rate_hz)
             self._events = (folder / EVENTS).open("xb")
             lock(self._events)
