@@ -11,7 +11,6 @@ from rigidimeter.control.filters import (
     BiquadState,
     biquad_step,
     butterworth_lowpass,
-    settled,
 )
 from rigidimeter.control.tracking import minimum_jerk, tracking_step
 
@@ -24,6 +23,5 @@ __all__ = [
     "biquad_step",
     "butterworth_lowpass",
     "minimum_jerk",
-    "settled",
     "tracking_step",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-__all__ = ["Biquad", "BiquadState", "biquad_step", "butterworth_lowpass", "settled"]
+__all__ = ["Biquad", "BiquadState", "biquad_step", "butterworth_lowpass"]
 
 
 class Biquad(NamedTuple):
@@ -54,9 +54,3 @@ def biquad_step(
     b0, b1, b2, a1, a2 = coefficients
     output = b0 * value + state[0]
     return BiquadState(b1 * value - a1 * output + state[1], b2 * value - a2 * output), output
-
-
-def settled(coefficients: Biquad, value: float) -> BiquadState:
-    """Return the state of a low-pass that has seen `value` for ever, for a start without a bump."""
-    _, b1, b2, a1, a2 = coefficients
-    return BiquadState(value * (b1 + b2 - a1 - a2), value * (b2 - a2))

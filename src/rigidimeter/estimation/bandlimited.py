@@ -31,6 +31,13 @@ from rigidimeter.settings import EstimationSettings
 
 __all__ = ["band_hz", "bandlimited_signals", "zero_phase_band"]
 
+EDGE_SAMPLES = 10
+"""Samples of the slowest channel dropped at each end before filtering.
+
+The derivative of a spline is poor at its ends, and a filter with a long memory would carry that
+error into the epoch.
+"""
+
 
 def band_hz(epoch: Epoch, settings: EstimationSettings) -> tuple[float, float]:
     """Return the band for an epoch.
@@ -44,14 +51,6 @@ def band_hz(epoch: Epoch, settings: EstimationSettings) -> tuple[float, float]:
     used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
     slowest = min(channel.rate_hz for channel in used)
     return settings.band_low_hz, min(wanted, USABLE_FRACTION_OF_RATE * slowest)
-
-
-EDGE_SAMPLES = 10
-"""Samples of the slowest channel dropped at each end before filtering.
-
-The derivative of a spline is poor at its ends, and a filter with a long memory would carry that
-error into the epoch.
-"""
 
 
 def zero_phase_band(values: Array, rate_hz: float, band: tuple[float, float]) -> Array:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from rigidimeter.control import BiquadState, biquad_step, butterworth_lowpass, settled
+from rigidimeter.control import BiquadState, biquad_step, butterworth_lowpass
 
 
 def test_the_section_is_scipys_butterworth():
@@ -20,12 +20,6 @@ def test_steps_give_what_lfilter_gives():
         out.append(y)
     expected = signal.lfilter(*signal.butter(2, 20.0, fs=1000.0), values)
     np.testing.assert_allclose(out, expected, rtol=1e-9, atol=1e-12)
-
-
-def test_a_settled_filter_starts_without_a_bump():
-    section = butterworth_lowpass(20.0, 1000.0)
-    _, y = biquad_step(section, settled(section, 0.7), 0.7)
-    assert y == pytest.approx(0.7, rel=1e-12)
 
 
 @pytest.mark.parametrize("cutoff_hz", [0.0, 500.0, 700.0, -1.0])
