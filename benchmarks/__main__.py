@@ -7,33 +7,18 @@ with it. Run by `make bench`; a table goes to `docs/reference/benchmarks.md`.
 from __future__ import annotations
 
 import platform
-import statistics
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.paired import REPEATS, paired
 from rigidimeter.cli.virtual import run_virtual_session
 from rigidimeter.estimation import METHODS, fit_epoch
 from rigidimeter.recording import ReadOptions, read_recording, read_session
 from rigidimeter.settings import Settings, parse_settings
 
-REPEATS = 5
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "benchmarks.md"
-
-
-def paired(ours: Callable[[], object], reference: Callable[[], object]) -> tuple[float, float]:
-    """Return the median time of ours and of the reference, taken in turn, after a warm-up."""
-    times: tuple[list[float], list[float]] = ([], [])
-    for repeat in range(REPEATS + 1):
-        for which, work in enumerate((ours, reference)):
-            start = time.perf_counter()
-            work()
-            if repeat:
-                times[which].append(time.perf_counter() - start)
-    return statistics.median(times[0]), statistics.median(times[1])
 
 
 def session(folder: Path, seed: int) -> Path:

@@ -32,7 +32,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Cause", "GuardLimits", "GuardState", "Limited", "guard_state", "guard_step"]
+from rigidimeter.settings import Settings
+from rigidimeter.units import rad_from_deg
+
+__all__ = [
+    "Cause",
+    "GuardLimits",
+    "GuardState",
+    "Limited",
+    "guard_limits",
+    "guard_state",
+    "guard_step",
+    "why_ended",
+]
 
 MEMORY_S = 0.5
 """How far back the guard remembers what was sent; a reading older than that is no reading."""
@@ -96,17 +108,45 @@ class GuardLimits(NamedTuple):
 class GuardState(NamedTuple):
     """What the guard remembers.
 
-    `sent_rad` is a ring of the running sum of what was sent, one entry a tick, `tick` the place of
-    the newest. The ring is written in place: a state is used once. `angle_rad` is the last reading
-    that was a number, `age_s` how old it is.
+    `sent_rad` is a ring of the running sum of what was sent, one entry a tick, `newest` the place
+    of the newest. What lies before the first tick is zero: nothing was sent. The ring is written in
+    place: a state is used once. `angle_rad` is the last reading that was a number, `age_s` how old
+    it is.
     """
 
     sent_rad: NDArray[np.float64]
-    tick: int = 0
+    newest: int = 0
     velocity_rad_s: float = 0.0
     angle_rad: float = 0.0
     age_s: float = 0.0
     cause: int = _NO_CAUSE
+
+
+def guard_limits(settings: Settings) -> GuardLimits:
+    """Return the guard's limits in radians for the loop's tick."""
+    guard = settings.guard
+    return GuardLimits(
+        position_rad=rad_from_deg(guard.position_limit_deg),
+        speed_rad_s=rad_from_deg(guard.speed_limit_deg_s),
+        acceleration_rad_s2=rad_from_deg(guard.acceleration_limit_deg_s2),
+        reaction_time_s=guard.reaction_time_s,
+        interval_s=1.0 / settings.rig.tick_rate_hz,
+    )
+
+
+def why_ended(settings: Settings, cause: Cause, limit_time_s: float) -> str:
+    """Return why an epoch does not count for what the guard did in it; empty where it counts.
+
+    `limit_time_s` is when the position limit first held the command back, NaN if it never did.
+    """
+    if cause is not Cause.NONE:
+        return f"the guard stopped the rig: {cause.sentence}"
+    if not math.isnan(limit_time_s):
+        return (
+            f"the arm came to the position limit of ±{settings.guard.position_limit_deg:g} deg "
+            f"at {limit_time_s:.3f} s"
+        )
+    return ""
 
 
 def guard_state(limits: GuardLimits) -> GuardState:
@@ -145,10 +185,10 @@ def guard_step(
         A `Limited` value.
     """
     dt = limits.interval_s
-    ring, tick, sent_before, angle, age, cause = state
+    ring, before, sent_before, angle, age, cause = state
     size = ring.shape[0]
-    ring[(tick + 1) % size] = ring[tick % size] + sent_before * dt
-    tick += 1
+    newest = before + 1 if before + 1 < size else 0
+    ring[newest] = ring[before] + sent_before * dt
     age += dt
     motion_finite = isfinite(angle_rad) and isfinite(velocity_rad_s) and isfinite(age_s)
     if motion_finite:
@@ -179,24 +219,26 @@ def guard_step(
     # Toward the nearer limit, no faster than can still be stopped in the distance left.
     toward = 1.0 if sent > 0 else -1.0
     left = limits.position_rad - toward * angle
-    back = min(math.ceil((max(age, 0.0) + limits.reaction_time_s) / dt), size - 1, tick)
-    # Far from the limit the search is spared: all that can be in flight would not reach it.
+    reach_s = max(age, 0.0) + limits.reaction_time_s
+    # Far from the limit the search is spared: at full speed, after all that can be in flight and
+    # two ticks more, the joint could still stop.
     speed = limits.speed_rad_s
-    if left < speed * (back + 1) * dt + speed * speed / (2.0 * limits.acceleration_rad_s2):
-        left -= _farthest_in_flight(ring, tick, back, toward)
-    fastest = _stoppable_speed(limits.acceleration_rad_s2, dt, left)
-    if abs(sent) > fastest:
-        sent, limited = math.copysign(fastest, sent), max(limited, int(Limited.POSITION))
-    return GuardState(ring, tick, sent, angle, age, cause), sent, limited
+    stopping = speed * speed / (2.0 * limits.acceleration_rad_s2)
+    if left < speed * (reach_s + 2.0 * dt) + stopping:
+        back = min(math.ceil(reach_s / dt), size - 1)
+        left -= _farthest_in_flight(ring, newest, back, toward)
+        fastest = _stoppable_speed(limits.acceleration_rad_s2, dt, left)
+        if abs(sent) > fastest:
+            sent, limited = math.copysign(fastest, sent), max(limited, int(Limited.POSITION))
+    return GuardState(ring, newest, sent, angle, age, cause), sent, limited
 
 
-def _farthest_in_flight(ring: NDArray[np.float64], tick: int, back: int, toward: float) -> float:
+def _farthest_in_flight(ring: NDArray[np.float64], newest: int, back: int, toward: float) -> float:
     """Return the most, toward a limit, that was sent in any stretch up to now, at most `back`."""
-    size = ring.shape[0]
-    newest = ring[tick % size]
+    now = ring[newest]
     farthest = 0.0
-    for k in range(1, back + 1):
-        farthest = max(farthest, toward * (newest - ring[(tick - k) % size]))
+    for k in range(1, back + 1):  # a place below zero counts from the ring's end
+        farthest = max(farthest, toward * (now - ring[newest - k]))
     return float(farthest)
 
 

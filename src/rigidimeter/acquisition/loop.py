@@ -22,12 +22,11 @@ from rigidimeter.control import (
     tracking_step,
 )
 from rigidimeter.device.base import Reading, Rig
-from rigidimeter.guard import Cause, GuardLimits, Limited, guard_state, guard_step
+from rigidimeter.guard import Cause, Limited, guard_limits, guard_state, guard_step
 from rigidimeter.recording.log import Sample
 from rigidimeter.settings import Settings
-from rigidimeter.units import rad_from_deg
 
-__all__ = ["REST", "ControlLoop", "Passage", "guard_limits"]
+__all__ = ["REST", "ControlLoop", "Passage"]
 
 REST = -1
 """The epoch number of samples between epochs."""
@@ -48,18 +47,6 @@ class Passage(NamedTuple):
     limit_time_s: float
     cause: Cause
     limited_ticks: int
-
-
-def guard_limits(settings: Settings) -> GuardLimits:
-    """Return the guard's limits in radians for the loop's tick."""
-    guard = settings.guard
-    return GuardLimits(
-        position_rad=rad_from_deg(guard.position_limit_deg),
-        speed_rad_s=rad_from_deg(guard.speed_limit_deg_s),
-        acceleration_rad_s2=rad_from_deg(guard.acceleration_limit_deg_s2),
-        reaction_time_s=guard.reaction_time_s,
-        interval_s=1.0 / settings.rig.tick_rate_hz,
-    )
 
 
 class ControlLoop:

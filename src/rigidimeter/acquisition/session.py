@@ -6,13 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from rigidimeter.acquisition.clock import Clock
 from rigidimeter.acquisition.loop import ControlLoop, Passage
 from rigidimeter.design import PlannedEpoch, Protocol, prbs_nm, sinusoid
 from rigidimeter.device.base import Rig
-from rigidimeter.guard import Cause
+from rigidimeter.guard import Cause, why_ended
 from rigidimeter.recording.folder import Ending, SessionWriter
 from rigidimeter.settings import Settings
 
@@ -111,15 +109,8 @@ def run_session(
 
 
 def _ending(passage: Passage, settings: Settings) -> tuple[Ending, str]:
-    if passage.cause is not Cause.NONE:
-        return "fail", f"the guard stopped the rig: {passage.cause.sentence}"
-    if not np.isnan(passage.limit_time_s):
-        return (
-            "fail",
-            f"the arm came to the position limit of ±{settings.guard.position_limit_deg:g} deg "
-            f"at {passage.limit_time_s:.3f} s",
-        )
-    return "success", ""
+    why = why_ended(settings, passage.cause, passage.limit_time_s)
+    return ("fail", why) if why else ("success", "")
 
 
 def _close(

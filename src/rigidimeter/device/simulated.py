@@ -13,24 +13,23 @@ from rigidimeter.device.base import Reading
 from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import RigSettings, SubjectSettings
 from rigidimeter.simulation import (
+    BLOCK_TICKS,
+    SAME_TIME_S,
     DriveState,
     SubjectTorque,
     arm_torque_nm,
+    between,
     draw_joint,
     drive,
     drive_step,
+    moment,
     quantised,
+    rig_streams,
     sample_times_s,
 )
 from rigidimeter.units import rad_from_deg
 
 __all__ = ["SimulatedRig"]
-
-BLOCK_TICKS = 5000
-"""Random numbers are drawn in blocks of this many ticks."""
-
-SAME_TIME_S = 1e-9
-"""Two times closer than this are the same: stamps are sums of rounded numbers."""
 
 
 class SimulatedRig:
@@ -56,7 +55,8 @@ class SimulatedRig:
         self._whole_tick = drive(
             settings.drive_bandwidth_hz, settings.drive_damping_ratio, self._interval_s
         )
-        torque_rng, noise_rng, motion_rng, self._subject_rng, self._joint_rng = rng.spawn(5)
+        streams = rig_streams(rng)
+        self._subject_rng, self._joint_rng = streams.subject, streams.joint
         t, m = settings.torque, settings.motion
         self._torque_sensor = _Sensor(t.latency_s, t.stamp_latency_s, t.resolution_nm)
         self._motion_sensor = _Sensor(
@@ -65,9 +65,13 @@ class SimulatedRig:
             rad_from_deg(m.angle_resolution_deg),
             rad_from_deg(m.velocity_resolution_deg_s),
         )
-        self._noise = _flow(lambda n: t.noise_sd_nm * noise_rng.standard_normal(n))
-        self._torque_times = sample_times_s(t.rate_hz, t.latency_s, t.jitter_s, torque_rng)
-        self._motion_times = sample_times_s(m.rate_hz, m.latency_s, m.jitter_s, motion_rng)
+        self._noise = _flow(lambda n: t.noise_sd_nm * streams.noise.standard_normal(n))
+        self._torque_times = sample_times_s(
+            t.rate_hz, t.latency_s, t.jitter_s, streams.torque_jitter
+        )
+        self._motion_times = sample_times_s(
+            m.rate_hz, m.latency_s, m.jitter_s, streams.motion_jitter
+        )
         self._torque_next_s = next(self._torque_times)
         self._motion_next_s = next(self._motion_times)
         self._torque_queue: deque[tuple[float, float, float]] = deque()
@@ -150,13 +154,9 @@ class SimulatedRig:
 
     def _take_torque(self, taken_s: float, now_s: float, before: DriveState) -> None:
         """Measure the torque at a time since the last tick."""
-        voluntary = self._voluntary_now
-        if taken_s >= now_s - SAME_TIME_S:
-            angle, velocity, acceleration = self._state
-        else:
-            angle, velocity, acceleration = self._between(taken_s, now_s, before)
-            left = min((now_s - taken_s) / self._interval_s, 1.0)
-            voluntary -= left * (voluntary - self._voluntary_before)
+        elapsed_s, left = moment(taken_s, now_s, self._interval_s)
+        angle, velocity, acceleration = self._state_after(elapsed_s, before)
+        voluntary = between(self._voluntary_now, self._voluntary_before, left)
         torque_nm = next(self._noise) + arm_torque_nm(
             self._J, self._B, self._K, angle, velocity, acceleration, voluntary
         )
@@ -167,10 +167,8 @@ class SimulatedRig:
 
     def _take_motion(self, taken_s: float, now_s: float, before: DriveState) -> None:
         """Measure angle and velocity at a time since the last tick."""
-        if taken_s >= now_s - SAME_TIME_S:
-            angle, velocity, _ = self._state
-        else:
-            angle, velocity, _ = self._between(taken_s, now_s, before)
+        elapsed_s, _ = moment(taken_s, now_s, self._interval_s)
+        angle, velocity, _ = self._state_after(elapsed_s, before)
         sensor = self._motion_sensor
         arrives_s = taken_s + sensor.latency_s
         self._motion_queue.append(
@@ -182,10 +180,11 @@ class SimulatedRig:
             )
         )
 
-    def _between(self, time_s: float, now_s: float, before: DriveState) -> DriveState:
-        """Return the exact state at a time between the last tick and this one."""
-        elapsed_s = time_s - (now_s - self._interval_s)
-        if elapsed_s <= SAME_TIME_S:
+    def _state_after(self, elapsed_s: float, before: DriveState) -> DriveState:
+        """Return the exact state at a time between the tick before and this one."""
+        if elapsed_s == self._interval_s:
+            return self._state
+        if elapsed_s == 0.0:
             return before
         part = drive(
             self._settings.drive_bandwidth_hz, self._settings.drive_damping_ratio, elapsed_s

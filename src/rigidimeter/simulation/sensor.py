@@ -5,23 +5,66 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["quantised", "sample_times_s"]
+__all__ = [
+    "SAME_TIME_S",
+    "between",
+    "moment",
+    "quantised",
+    "sample_time_blocks_s",
+    "sample_times_s",
+]
+
+SAME_TIME_S = 1e-9
+"""Two times closer than this are the same: stamps are sums of rounded numbers."""
 
 _BLOCK = 4096
+_ALL_WHOLE = 2.0**52
 
 
 def quantised(value: float, resolution: float) -> float:
-    """Return the value rounded to the nearest step of `resolution`; 0 means no rounding."""
+    """Return the value rounded to the nearest step of `resolution`; 0 means no rounding.
+
+    What is not finite stays what it is, for the guard to see.
+    """
     if resolution == 0.0:
         return value
-    return round(value / resolution) * resolution
+    steps = value / resolution
+    if not abs(steps) < _ALL_WHOLE:  # beyond, every number is whole already
+        return value
+    return round(steps) * resolution
 
 
-def sample_times_s(
+def moment(taken_s: float, now_s: float, interval_s: float) -> tuple[float, float]:
+    """Return where in the interval that ends now a sample was taken.
+
+    Returns
+    -------
+    elapsed_s : float
+        Since the tick before; `interval_s` itself for a sample of this tick, 0 for one of the tick
+        before.
+    left : float
+        The part of the interval between the sample and now, from 0 to 1.
+    """
+    if taken_s >= now_s - SAME_TIME_S:
+        return interval_s, 0.0
+    left = min((now_s - taken_s) / interval_s, 1.0)
+    elapsed_s = taken_s - (now_s - interval_s)
+    if elapsed_s <= SAME_TIME_S:
+        return 0.0, left
+    return elapsed_s, left
+
+
+def between(now: float, before: float, left: float) -> float:
+    """Return what went straight from `before` to `now`, with `left` of the way still to go."""
+    return now - left * (now - before)
+
+
+def sample_time_blocks_s(
     rate_hz: float, latency_s: float, jitter_s: float, rng: np.random.Generator
-) -> Iterator[float]:
-    """Yield when a sensor samples, for ever.
+) -> Iterator[NDArray[np.float64]]:
+    """Yield when a sensor samples, block after block, for ever.
 
     Sample k is taken at k/rate − latency + jitter_k, with jitter_k uniform between 0 and the given
     bound, and reaches the loop `latency_s` later. The first has no jitter and arrives at time zero:
@@ -40,5 +83,13 @@ def sample_times_s(
             jitter = rng.uniform(0.0, jitter_s, _BLOCK)
             jitter[: first == 0] = 0.0
             times += jitter
-        yield from times.tolist()
+        yield times
         first += _BLOCK
+
+
+def sample_times_s(
+    rate_hz: float, latency_s: float, jitter_s: float, rng: np.random.Generator
+) -> Iterator[float]:
+    """Yield the times of `sample_time_blocks_s` one by one."""
+    for times_s in sample_time_blocks_s(rate_hz, latency_s, jitter_s, rng):
+        yield from times_s.tolist()

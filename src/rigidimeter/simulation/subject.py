@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,16 @@ def draw_joint(subject: SubjectSettings, rng: np.random.Generator) -> JointDynam
     )
 
 
+@lru_cache(maxsize=32)
+def _band(low_hz: float, high_hz: float, rate_hz: float) -> tuple[NDArray[np.float64], float]:
+    """Return the band-pass as sections, and the energy of its impulse response."""
+    sos = signal.butter(2, [low_hz, high_hz], "bandpass", fs=rate_hz, output="sos")
+    impulse = np.zeros(int(10.0 * rate_hz / low_hz))
+    impulse[0] = 1.0
+    response = signal.sosfilt(sos, impulse)
+    return sos, float(response @ response)
+
+
 class SubjectTorque:
     """Voluntary torque M_sub in N·m, drawn in blocks at the tick rate.
 
@@ -52,18 +63,14 @@ class SubjectTorque:
         self._subject = subject
         self._rate_hz = rate_hz
         self._rng = rng
+        low_hz = subject.voluntary_low_hz
         high_hz = min(subject.voluntary_high_hz, 0.45 * rate_hz)
-        self._sos = signal.butter(
-            2, [subject.voluntary_low_hz, high_hz], "bandpass", fs=rate_hz, output="sos"
-        )
+        self._sos, energy = _band(low_hz, high_hz, rate_hz)
         self._memory = np.zeros((self._sos.shape[0], 2))
         self._phase_rad = rng.uniform(0.0, 2.0 * math.pi)
         # White noise of unit variance leaves the filter with the energy of its impulse response.
-        impulse = np.zeros(int(10.0 * rate_hz / subject.voluntary_low_hz))
-        impulse[0] = 1.0
-        response = signal.sosfilt(self._sos, impulse)
-        self._gain = subject.voluntary_sd_nm / math.sqrt(float(response @ response))
-        self.block(round(3.0 * rate_hz / subject.voluntary_low_hz))  # let the filter settle
+        self._gain = subject.voluntary_sd_nm / math.sqrt(energy)
+        self.block(round(3.0 * rate_hz / low_hz))  # let the filter settle
 
     def block(self, n: int) -> NDArray[np.float64]:
         """Return the next `n` ticks of torque."""

@@ -1,0 +1,218 @@
+"""The compiled batch against linear filters, a physics engine, the loop, and itself at other sizes.
+
+The reference of the filters is the same loop without what is not linear: no limits, no rounding, no
+noise. Its state is (θ, θ', θ'', two delays of the low-pass, the velocity command, the torque that
+the sensor took at the tick before), order 7; the matrices are read off the steps themselves.
+
+    python -m benchmarks.batch
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from benchmarks.paired import paired
+from rigidimeter.acquisition import ControlLoop, SimulatedClock
+from rigidimeter.batch import Bench, bench, draw_inputs, epoch_generator, simulate_chunks
+from rigidimeter.batch.run import empty_rows, run_row
+from rigidimeter.control import BiquadState, admittance_step, biquad_step
+from rigidimeter.design import prbs_nm
+from rigidimeter.device import SimulatedRig
+from rigidimeter.joint import JointDynamics
+from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.simulation import DriveState, arm_torque_nm, drive_step
+
+Matrices = tuple[NDArray[np.float64], ...]
+
+SETTINGS = Settings()
+JOINT = JointDynamics(0.0045, 0.1368, 1.751)
+REPEATS = 21
+ORDER = 7
+
+HINGE = """
+<mujoco>
+  <option timestep="{interval_s}" gravity="0 0 0" integrator="implicitfast"/>
+  <worldbody>
+    <body>
+      <inertial pos="0 0 0" mass="1" diaginertia="{J} {J} {J}"/>
+      <joint name="hinge" type="hinge" axis="0 0 1" damping="{B}" stiffness="{K}"/>
+    </body>
+  </worldbody>
+  <actuator><velocity joint="hinge" kv="10"/></actuator>
+</mujoco>
+"""
+
+
+def one_tick(
+    table: Bench, x: NDArray[np.float64], perturbation_nm: float
+) -> tuple[NDArray[np.float64], float]:
+    """Return the next state and the torque the loop reads at this tick."""
+    coefficients = table.coefficients
+    state, filtered = DriveState(*x[:3]), BiquadState(*x[3:5])
+    command, torque_nm = x[5], x[6]
+    filtered, smooth_nm = biquad_step(coefficients.lowpass, filtered, torque_nm)
+    command = admittance_step(coefficients.admittance, command, perturbation_nm, smooth_nm)
+    taken_nm = arm_torque_nm(
+        JOINT.inertia_kg_m2, JOINT.damping_nm_s_rad, JOINT.stiffness_nm_rad, *state, 0.0
+    )
+    moved = drive_step(coefficients.drive, state, command)
+    return np.array([*moved, *filtered, command, taken_nm]), torque_nm
+
+
+def linear_loop(table: Bench) -> Matrices:
+    """Return A, B, C, D of perturbation → torque, from the steps on unit vectors."""
+    columns = [one_tick(table, row, 0.0) for row in np.eye(ORDER)]
+    pushed, through = one_tick(table, np.zeros(ORDER), 1.0)
+    return (
+        np.column_stack([column for column, _ in columns]),
+        pushed[:, None],
+        np.array([[output for _, output in columns]]),
+        np.array([[through]]),
+    )
+
+
+def ideal_settings() -> Settings:
+    """No noise, no rounding: what the linear loop leaves out and can be set to nothing."""
+    return parse_settings(
+        {
+            "rig": {
+                "torque": {"noise_sd_nm": 0.0, "resolution_nm": 0.0},
+                "motion": {"angle_resolution_deg": 0.0, "velocity_resolution_deg_s": 0.0},
+            }
+        }
+    )
+
+
+class Steady:
+    """One 20 s epoch at 1 kHz, its random numbers drawn beforehand."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.wanted_nm = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
+        self.wanted_nm.setflags(write=False)
+        self.bench = bench(settings, self.wanted_nm.size)
+        rng = epoch_generator(settings.seed, 0)
+        self.inputs = draw_inputs(self.bench, settings.subject["OFF"], rng, JOINT)
+        self.rows = empty_rows(1, self.wanted_nm.size)
+
+    def __call__(self) -> NDArray[np.float64]:
+        run_row(self.rows, 0, self.bench, self.wanted_nm, self.inputs)
+        return self.rows["torque_nm"][0]
+
+
+def against_lfilter(steady: Steady) -> tuple[str, float, float]:
+    b, a = signal.ss2tf(*linear_loop(steady.bench))
+    ideal = Steady(ideal_settings())
+    difference = np.abs(ideal() - signal.lfilter(b[0], a, ideal.wanted_nm)).max()
+    assert difference < 1e-6, f"the linear loop differs by {difference:.2g} N·m"
+    name = f"batch epoch of 20 s at 1 kHz, steady / scipy.signal.lfilter of order {ORDER}"
+    return name, *paired(steady, lambda: signal.lfilter(b[0], a, steady.wanted_nm), REPEATS)
+
+
+def against_control(steady: Steady) -> list[tuple[str, float, float]]:
+    try:
+        import control
+    except ImportError:
+        print("control is not installed: no row for control.forced_response", file=sys.stderr)
+        return []
+    system = control.ss(*linear_loop(steady.bench), 1e-3)
+    name = "batch epoch of 20 s at 1 kHz, steady / control.forced_response"
+    return [
+        (name, *paired(steady, lambda: control.forced_response(system, inputs=steady.wanted_nm)))
+    ]
+
+
+def against_mujoco(steady: Steady) -> list[tuple[str, float, float]]:
+    try:
+        import mujoco
+        from mujoco import rollout
+    except ImportError:
+        print("mujoco is not installed: no row for mujoco.rollout", file=sys.stderr)
+        return []
+    model = mujoco.MjModel.from_xml_string(
+        HINGE.format(
+            interval_s=1e-3,
+            J=JOINT.inertia_kg_m2,
+            B=JOINT.damping_nm_s_rad,
+            K=JOINT.stiffness_nm_rad,
+        )
+    )
+    data = mujoco.MjData(model)
+    start = np.zeros(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+    commands = steady.rows["velocity_command_rad_s"][0][:, None].copy()
+    name = "batch epoch of 20 s at 1 kHz, steady / mujoco.rollout of a hinge with a velocity servo"
+    return [(name, *paired(steady, lambda: rollout.rollout(model, data, start, commands)))]
+
+
+def against_loop() -> tuple[str, float, float]:
+    """From seed to columns, random numbers and all, against the loop in the interpreter."""
+    wanted = prbs_nm(SETTINGS.prbs, SETTINGS.rig.tick_rate_hz).tolist()
+
+    def interpreted() -> None:
+        rig = SimulatedRig(SETTINGS.rig, SETTINGS.subject["OFF"], epoch_generator(1, 0))
+        rig.enable()
+        ControlLoop(SETTINGS, rig, SimulatedClock(), [].append).perturb(1, wanted)
+
+    name = "batch epoch of 20 s at 1 kHz with its random numbers / the loop in the interpreter"
+    return name, *paired(lambda: list(simulate_chunks(SETTINGS, 1)), interpreted)
+
+
+def measured_run(n_epochs: int) -> dict[str, float]:
+    """Time a run of default epochs in this process; give its time and its peak memory."""
+    for _ in simulate_chunks(SETTINGS, 1):
+        pass  # compile, or load what was compiled
+    start = time.perf_counter()
+    for batch in simulate_chunks(SETTINGS, n_epochs):
+        assert not batch.cause.any()
+    elapsed_s = time.perf_counter() - start
+    return {"s": elapsed_s, "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024}
+
+
+def apart(n_epochs: int) -> dict[str, float]:
+    """Measure a run in a process of its own, so that its peak memory is its own."""
+    command = [sys.executable, "-m", "benchmarks.batch", str(n_epochs)]
+    ran = subprocess.run(command, check=True, capture_output=True, text=True)
+    return dict(json.loads(ran.stdout))
+
+
+def growth(few: int = 100, many: int = 10_000) -> list[tuple[str, float, float]]:
+    """Cost per epoch and peak memory of many epochs, against those of few."""
+    small, large = apart(few), apart(many)
+    per_epoch = f"batch, time per epoch of {many} epochs / of {few}"
+    # The table is in ms; a megabyte stands there as a thousandth.
+    memory = f"batch, peak memory in MB of {many} epochs / of {few}"
+    return [
+        (per_epoch, large["s"] / many, small["s"] / few),
+        (memory, large["mb"] / 1e3, small["mb"] / 1e3),
+    ]
+
+
+def rows() -> list[tuple[str, float, float]]:
+    """Return (name, ours, reference), times in s."""
+    steady = Steady(SETTINGS)
+    return [
+        against_lfilter(steady),
+        *against_control(steady),
+        *against_mujoco(steady),
+        against_loop(),
+        *growth(),
+    ]
+
+
+def main() -> None:
+    if len(sys.argv) > 1:
+        print(json.dumps(measured_run(int(sys.argv[1]))))
+        return
+    for name, ours, reference in rows():
+        print(f"{name}: {1e3 * ours:.4g} / {1e3 * reference:.4g} = {ours / reference:.4g}")
+
+
+if __name__ == "__main__":
+    main()
