@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -17,7 +18,9 @@ __all__ = [
     "CHANNEL_UNITS",
     "Analysis",
     "Channel",
+    "Delay",
     "Epoch",
+    "Finding",
     "Fit",
     "Motion",
     "Notice",
@@ -37,6 +40,7 @@ CHANNEL_UNITS: Mapping[str, str] = {
     "velocity_rad_s": "rad/s",
     "velocity_command_rad_s": "rad/s",
     "perturbation_nm": "N·m",
+    "emg_v": "V",
 }
 """The channels an epoch may hold, and their units."""
 
@@ -86,7 +90,7 @@ class Channel:
         """The unit of the values."""
         return CHANNEL_UNITS[self.name]
 
-    @property
+    @cached_property
     def rate_hz(self) -> float:
         """The typical sampling rate: one over the median interval; NaN below two samples."""
         if len(self) < 2:
@@ -133,6 +137,33 @@ class Notice:
 
     level: Literal["warning", "error"]
     text: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one check found in an epoch.
+
+    Parameters
+    ----------
+    name : str
+        The check, as the settings name it.
+    level : {"note", "doubt", "exclude"}
+        `note` says what is; `doubt` asks for a look before the numbers are used; `exclude` says
+        that they mean nothing.
+    value, threshold : float
+        What was found and where it would change sides, in the unit that the text states.
+    text : str
+        Value, threshold and meaning in words.
+    remedy : str
+        What to do about it; empty where nothing is wrong.
+    """
+
+    name: str
+    level: Literal["note", "doubt", "exclude"]
+    value: float
+    threshold: float
+    text: str
+    remedy: str
 
 
 @dataclass(frozen=True)
@@ -183,10 +214,16 @@ class Fit:
     """J, B, K of one epoch with their standard errors and how far to trust them.
 
     Numbers are NaN when the outcome is `failed`. With the inertia held fixed its standard error is
-    0, and the statistics are those of the two-parameter fit.
+    0, and the statistics are those of the two-parameter fit. A fit to several epochs is called
+    ``pooled``.
 
     Attributes
     ----------
+    inertia_kg_m2_low, inertia_kg_m2_high : float
+        The 95 % interval; likewise for damping and stiffness.
+    inertia_kg_m2_bound : float
+        The standard error that no unbiased estimate from the same excitation can beat for the
+        noise that was found (Cramér–Rao); likewise for damping and stiffness.
     r_squared : float
         1 − Σ(residual²)/Σ((torque − mean)²) over the fitted samples.
     vaf_percent : float
@@ -209,16 +246,41 @@ class Fit:
     outcome: Outcome
     inertia_kg_m2: float = math.nan
     inertia_kg_m2_se: float = math.nan
+    inertia_kg_m2_low: float = math.nan
+    inertia_kg_m2_high: float = math.nan
+    inertia_kg_m2_bound: float = math.nan
     damping_nm_s_rad: float = math.nan
     damping_nm_s_rad_se: float = math.nan
+    damping_nm_s_rad_low: float = math.nan
+    damping_nm_s_rad_high: float = math.nan
+    damping_nm_s_rad_bound: float = math.nan
     stiffness_nm_rad: float = math.nan
     stiffness_nm_rad_se: float = math.nan
+    stiffness_nm_rad_low: float = math.nan
+    stiffness_nm_rad_high: float = math.nan
+    stiffness_nm_rad_bound: float = math.nan
     r_squared: float = math.nan
     vaf_percent: float = math.nan
     condition_number: float = math.nan
     residual_sd_nm: float = math.nan
     n_samples: int = 0
     band_hz: tuple[float, float] = (math.nan, math.nan)
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True)
+class Delay:
+    """How late the torque's stamps are against the motion's, in one source.
+
+    `corrected` says whether the torque was moved by it before anything was fitted or scored;
+    `remark` says why, or why there is no estimate.
+    """
+
+    source: str
+    delay_s: float = math.nan
+    delay_s_se: float = math.nan
+    corrected: bool = False
+    remark: str = ""
 
 
 @dataclass(frozen=True)
@@ -241,7 +303,9 @@ class Analysis:
 
     `fits` and `fixed_inertia` run in parallel: one entry for each epoch that was fitted, in the
     order of reading. `inertia_kg_m2` is the median that the second stage held fixed (NaN if no
-    epoch was included).
+    epoch was included). `pooled` are the fits to all epochs of each condition together, and with
+    several conditions to all epochs, whose condition is empty. `method_reason` says why a method
+    was chosen where it was left open.
     """
 
     method: str
@@ -249,3 +313,6 @@ class Analysis:
     fixed_inertia: tuple[Fit, ...]
     inertia_kg_m2: float
     scores: tuple[Score, ...]
+    pooled: tuple[Fit, ...] = ()
+    delays: tuple[Delay, ...] = ()
+    method_reason: str = ""

@@ -7,10 +7,14 @@ name both. The defaults are the paper's where it gives a value.
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from rigidimeter.settings.base import Section, quantity
+from rigidimeter.settings.diagnostics import DiagnosticsSettings
+from rigidimeter.settings.foresight import MarginsSettings, MultisineSettings, OptimiseSettings
+from rigidimeter.settings.online import OnlineSettings
 from rigidimeter.units import per_rad_from_per_deg
 
 __all__ = [
@@ -18,7 +22,10 @@ __all__ = [
     "ControllerSettings",
     "EstimationSettings",
     "GuardSettings",
+    "MarginsSettings",
     "MotionSensorSettings",
+    "MultisineSettings",
+    "OptimiseSettings",
     "PrbsSettings",
     "ProtocolSettings",
     "RigSettings",
@@ -31,31 +38,7 @@ __all__ = [
 ]
 
 
-def quantity(default: float, unit: str, low: float, high: float, *, above: bool = False) -> Any:
-    """Declare a number with its unit and range.
-
-    Parameters
-    ----------
-    default : float
-        The value when the key is absent.
-    unit : str
-        The unit, for messages; ``"1"`` for a pure number.
-    low, high : float
-        The allowed range, both ends included unless `above`.
-    above : bool
-        The value must be greater than `low`.
-    """
-    lower: dict[str, Any] = {"gt": low} if above else {"ge": low}
-    return Field(default, **lower, le=high, json_schema_extra={"unit": unit})
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_default=True
-    )
-
-
-class ControllerSettings(_Section):
+class ControllerSettings(Section):
     """The admittance M_PRBS − M_meas = J_c θ'' + B_c θ' (Eq. 5), per radian.
 
     The paper prints both values per degree in Sec. 2.4.2 (0.0008 and 0.028) and per radian in
@@ -68,7 +51,7 @@ class ControllerSettings(_Section):
     tracking_gain_per_s: float = quantity(1.0, "1/s", 0.0, 50.0)
 
 
-class GuardSettings(_Section):
+class GuardSettings(Section):
     """Limits that hold whatever the controller asks for.
 
     `reaction_time_s` is how long the drive may take to have done what it was told, plus how far the
@@ -81,7 +64,7 @@ class GuardSettings(_Section):
     reaction_time_s: float = quantity(0.02, "s", 0.0, 0.2)
 
 
-class PrbsSettings(_Section):
+class PrbsSettings(Section):
     """The torque perturbation: a maximal-length pseudo-random binary sequence."""
 
     register_bits: int = quantity(7, "1", 3, 20)
@@ -98,7 +81,7 @@ class PrbsSettings(_Section):
         return self
 
 
-class SinusoidSettings(_Section):
+class SinusoidSettings(Section):
     """The position perturbation for the impulse and work scores."""
 
     frequency_hz: float = quantity(1.0, "Hz", 0.05, 10.0)
@@ -116,7 +99,7 @@ class SinusoidSettings(_Section):
         return self
 
 
-class TorqueSensorSettings(_Section):
+class TorqueSensorSettings(Section):
     """The virtual torque sensor. `stamp_latency_s` is the part of the latency its stamps know."""
 
     rate_hz: float = quantity(1000.0, "Hz", 1.0, 20000.0)
@@ -127,7 +110,7 @@ class TorqueSensorSettings(_Section):
     jitter_s: float = quantity(0.0, "s", 0.0, 0.1)
 
 
-class MotionSensorSettings(_Section):
+class MotionSensorSettings(Section):
     """The virtual encoder: angle and velocity sampled together."""
 
     rate_hz: float = quantity(1000.0, "Hz", 1.0, 20000.0)
@@ -138,7 +121,7 @@ class MotionSensorSettings(_Section):
     jitter_s: float = quantity(0.0, "s", 0.0, 0.1)
 
 
-class RigSettings(_Section):
+class RigSettings(Section):
     """The virtual rig: loop rate, drive and sensors."""
 
     tick_rate_hz: float = quantity(1000.0, "Hz", 50.0, 5000.0)
@@ -148,7 +131,7 @@ class RigSettings(_Section):
     motion: MotionSensorSettings = MotionSensorSettings()
 
 
-class SubjectSettings(_Section):
+class SubjectSettings(Section):
     """A virtual subject in one condition.
 
     Each epoch draws J, B and K log-normally about the medians given here, with the coefficients of
@@ -174,7 +157,7 @@ class SubjectSettings(_Section):
         return self
 
 
-class BlockSettings(_Section):
+class BlockSettings(Section):
     """A run of epochs of one task in one condition."""
 
     task: Literal["prbs", "sinusoid"] = "prbs"
@@ -182,7 +165,7 @@ class BlockSettings(_Section):
     epochs: int = quantity(4, "1", 1, 1000)
 
 
-class ProtocolSettings(_Section):
+class ProtocolSettings(Section):
     """Blocks of epochs in order, with random rests in between."""
 
     blocks: list[BlockSettings] = Field(
@@ -203,29 +186,43 @@ class ProtocolSettings(_Section):
         return self
 
 
-class EstimationSettings(_Section):
+class EstimationSettings(Section):
     """How J, B and K are estimated from an epoch.
 
     `band_high_hz` applies where the perturbation is known; `band_high_unknown_hz` where it is not,
-    since an imposed motion may excite the joint far above the paper's 10 Hz.
+    since an imposed motion may excite the joint far above the paper's 10 Hz;
+    `band_high_closed_loop_hz` to the methods that weight each frequency by its noise and so gain
+    from all of them.
+
+    `intervals` says how standard errors and intervals are made: "hac" holds for any residual,
+    "bootstrap" draws blocks, "white" takes the residual for white within the band.
     """
 
     band_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
     band_high_hz: float = quantity(10.0, "Hz", 0.1, 1000.0)
     band_high_unknown_hz: float = quantity(50.0, "Hz", 0.1, 1000.0)
+    band_high_closed_loop_hz: float = quantity(50.0, "Hz", 0.1, 1000.0)
     trim_s: float = quantity(1.0, "s", 0.0, 60.0)
     shortest_epoch_s: float = quantity(5.0, "s", 1.0, 600.0)
     published_highpass_hz: float = quantity(0.2, "Hz", 0.001, 10.0)
     published_highpass_order: int = quantity(2, "1", 1, 6)
+    intervals: Literal["hac", "bootstrap", "white"] = "hac"
+    bootstrap_draws: int = quantity(999, "1", 100, 100_000)
+    correct_delay: bool = True
+    longest_delay_s: float = quantity(0.04, "s", 0.001, 0.2)
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        if self.band_low_hz >= min(self.band_high_hz, self.band_high_unknown_hz):
-            raise ValueError("band_low_hz must be below band_high_hz and band_high_unknown_hz")
+        highest = min(self.band_high_hz, self.band_high_unknown_hz, self.band_high_closed_loop_hz)
+        if self.band_low_hz >= highest:
+            raise ValueError(
+                "band_low_hz must be below band_high_hz, band_high_unknown_hz and "
+                "band_high_closed_loop_hz"
+            )
         return self
 
 
-class ScoreSettings(_Section):
+class ScoreSettings(Section):
     """How the impulse and work scores are computed (Sec. 2.3)."""
 
     band_low_hz: float = quantity(0.2, "Hz", 0.001, 10.0)
@@ -240,7 +237,7 @@ class ScoreSettings(_Section):
         return self
 
 
-class Settings(_Section):
+class Settings(Section):
     """Everything that can be set, one table of the TOML file for each field."""
 
     seed: int = Field(1, ge=0, le=2**32 - 1, json_schema_extra={"unit": "1"})
@@ -258,6 +255,11 @@ class Settings(_Section):
     protocol: ProtocolSettings = ProtocolSettings()
     estimation: EstimationSettings = EstimationSettings()
     scores: ScoreSettings = ScoreSettings()
+    margins: MarginsSettings = MarginsSettings()
+    optimise: OptimiseSettings = OptimiseSettings()
+    multisine: MultisineSettings = MultisineSettings()
+    diagnostics: DiagnosticsSettings = DiagnosticsSettings()
+    online: OnlineSettings = OnlineSettings()
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

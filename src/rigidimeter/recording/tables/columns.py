@@ -44,6 +44,7 @@ _ALIASES: Mapping[str, tuple[str, ...]] = {
     "torque_nm": ("torque", "moment"),
     "angle_rad": ("angle", "position", "theta"),
     "velocity_rad_s": ("velocity", "speed", "omega"),
+    "emg_v": ("emg",),
 }
 _SHOWN = 20
 

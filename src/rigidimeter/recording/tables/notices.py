@@ -16,17 +16,21 @@ __all__ = ["about_breaks", "about_losses", "about_units"]
 _SHOWN = 3
 _LARGEST_ANGLE_RAD = 2 * math.pi
 _LARGEST_VELOCITY_RAD_S = 50.0
+_LARGEST_EMG_V = 20.0
+"""Amplifiers give at most ±10 V or so; more is another unit."""
 _LARGEST_STEP_S = 0.5
 
 
 def about_units(source: str, signals: Mapping[str, Signal], step_s: float) -> list[Notice]:
-    """Warn of values that only make sense in degrees, or of a time in milliseconds."""
+    """Warn of values that only make sense in degrees, in microvolts, or in milliseconds."""
     notices = []
     for name, signal in signals.items():
         if name == "angle_rad":
             limit, right = _LARGEST_ANGLE_RAD, "degrees: divide by 57.2958 to have rad"
         elif name.endswith("_rad_s"):
             limit, right = _LARGEST_VELOCITY_RAD_S, "degrees: divide by 57.2958 to have rad/s"
+        elif name == "emg_v":
+            limit, right = _LARGEST_EMG_V, "microvolts: divide by 1e6 to have V"
         else:
             continue
         largest = float(np.max(np.abs(signal.values)))

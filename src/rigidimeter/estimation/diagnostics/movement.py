@@ -1,0 +1,156 @@
+"""Whether the subject moved by itself: by the torque the joint does not explain, and by EMG.
+
+Once J, B and K are known the subject's own torque can be had back (Eq. 5):
+
+    M_sub = J θ'' + B θ' + K θ − M_meas
+
+Least squares makes it as small as it can, so that part of a large M_sub hides in J, B and K: what
+is seen here is the least of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from rigidimeter.estimation.bandlimited import zero_phase_band
+from rigidimeter.estimation.diagnostics.findings import judged
+from rigidimeter.estimation.diagnostics.lines import inside, lines
+from rigidimeter.estimation.signals import Array, Signals
+from rigidimeter.records import Channel, Finding
+from rigidimeter.settings import DiagnosticsSettings
+
+__all__ = [
+    "active_movement",
+    "active_seconds",
+    "emg_activity",
+    "emg_envelope_v",
+    "reconstructed_torque_nm",
+    "voluntary_torque",
+]
+
+WINDOW_S = 1.0
+BASELINE_QUANTILE = 0.2
+"""The quietest fifth of the envelope is rest: its upper end is the baseline."""
+
+_SHOWN = 5
+
+
+def reconstructed_torque_nm(signals: Signals, parameters: tuple[float, float, float]) -> Array:
+    """Return M_sub of Eq. 5 in N·m, shape (n,), in the band of the signals."""
+    J, B, K = parameters
+    return (
+        J * signals.acceleration_rad_s2
+        + B * signals.velocity_rad_s
+        + K * signals.angle_rad
+        - signals.torque_nm
+    )
+
+
+def voluntary_torque(
+    voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings
+) -> Finding:
+    """Return how much of the torque's variance is the subject's own, in the voluntary band."""
+    frequency, share = lines(voluntary_nm, signals.rate_hz)
+    low, high = settings.voluntary_low_hz, settings.voluntary_high_hz
+    power = float(np.sum(share[inside(frequency, (low, high))]))
+    total = float(np.var(signals.torque_nm))
+    value = 100.0 * power / total if total > 0 else float("nan")
+    most = settings.voluntary_share_most_percent
+    return judged(
+        "voluntary_torque",
+        value,
+        most,
+        settings,
+        failed=not value <= most,
+        fact=(
+            f"the subject's own torque has an SD of {np.std(voluntary_nm):.3g} N·m; its power from "
+            f"{low:g} to {high:g} Hz, {power:.2g} N²m², is {value:.2g} % of the torque's variance "
+            f"(at most {most:g} %)"
+        ),
+        meaning="least squares takes part of it for the joint; in the loop J and B come out low",
+        remedy="use instruments (the known perturbation) and pool epochs, or leave the epoch out",
+    )
+
+
+def active_seconds(
+    voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings
+) -> tuple[Array, Array]:
+    """Return the SD of M_sub in the voluntary band, second by second.
+
+    Returns
+    -------
+    start_s : array, shape (m,)
+        When each whole second begins, on the epoch's clock.
+    sd_nm : array, shape (m,)
+    """
+    band = settings.voluntary_low_hz, min(settings.voluntary_high_hz, 0.45 * signals.rate_hz)
+    own = zero_phase_band(voluntary_nm, signals.rate_hz, band)
+    length = max(round(WINDOW_S * signals.rate_hz), 1)
+    count = own.size // length
+    windows = own[: count * length].reshape(count, length)
+    # About zero, not about the window's mean: a push of a second is no offset.
+    return signals.time_s[: count * length : length], np.sqrt(np.mean(windows**2, axis=1))
+
+
+def active_movement(
+    voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings
+) -> Finding:
+    """Return in what share of the seconds the subject pushed by itself.
+
+    A second is active if the SD of M_sub in it is above `active_torque_nm` and above
+    `active_share_percent` of the SD of the torque: what is much for an elbow is little for an
+    ankle.
+    """
+    start_s, sd_nm = active_seconds(voluntary_nm, signals, settings)
+    share = settings.active_share_percent / 100.0
+    above_nm = max(settings.active_torque_nm, share * float(np.std(signals.torque_nm)))
+    active = sd_nm > above_nm
+    value = 100.0 * float(np.mean(active)) if active.size else float("nan")
+    most = settings.active_most_percent
+    when = ", ".join(f"{second:.1f} s" for second in start_s[active][:_SHOWN])
+    more = " and later" if np.count_nonzero(active) > _SHOWN else ""
+    return judged(
+        "active_movement",
+        value,
+        most,
+        settings,
+        failed=not value <= most,
+        fact=(
+            f"the subject's own torque passes {above_nm:.2g} N·m in {value:.0f} % of the seconds "
+            f"(at most {most:g} %)" + (f", from {when}{more}" if when else "")
+        ),
+        meaning="the subject moved, and the estimate is of a joint that is not at rest",
+        remedy="ask the subject to relax and repeat, or leave these seconds out",
+    )
+
+
+def emg_envelope_v(emg: Channel, window_s: float) -> Array:
+    """Return the moving mean of the rectified EMG, its own mean taken off first, in V."""
+    length = max(round(window_s * emg.rate_hz), 1)
+    rectified = np.abs(emg.values - np.mean(emg.values))
+    return np.asarray(uniform_filter1d(rectified, length, mode="nearest"))
+
+
+def emg_activity(emg: Channel, settings: DiagnosticsSettings) -> Finding:
+    """Return in what share of the time the EMG stands above its own baseline.
+
+    A muscle that is active from beginning to end has no baseline to stand above.
+    """
+    envelope = emg_envelope_v(emg, settings.emg_window_s)
+    baseline = float(np.quantile(envelope, BASELINE_QUANTILE))
+    factor, most = settings.emg_baseline_factor, settings.emg_active_most_percent
+    value = 100.0 * float(np.mean(envelope > factor * baseline))
+    return judged(
+        "emg_activity",
+        value,
+        most,
+        settings,
+        failed=not value <= most,
+        fact=(
+            f"the EMG stands above {factor:g} times its baseline of {1e6 * baseline:.3g} µV in "
+            f"{value:.0f} % of the time (at most {most:g} %)"
+        ),
+        meaning="the muscle was active",
+        remedy="ask the subject to relax and repeat, or leave the active part out",
+    )

@@ -1,0 +1,125 @@
+"""What the fit left over, and whether it foresees torque that it has not seen.
+
+A residual that is white within the band carries nothing more to be explained, and textbook standard
+errors hold for it. One that still follows the perturbation says that the model lacks something: a
+delay between the channels, a reflex, a joint that is not linear.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy import signal
+from scipy.special import digamma
+
+from rigidimeter.estimation.bandlimited import zero_phase_band
+from rigidimeter.estimation.diagnostics.excitation import perturbation_nm
+from rigidimeter.estimation.diagnostics.findings import judged
+from rigidimeter.estimation.diagnostics.lines import inside, lines
+from rigidimeter.estimation.signals import Array, Signals
+from rigidimeter.records import Epoch, Finding
+from rigidimeter.settings import DiagnosticsSettings
+
+__all__ = ["held_out_vaf", "residual_perturbation", "residual_whiteness"]
+
+LINES_TOGETHER = 8
+LONGEST_LAG_S = 1.0
+
+
+def residual_whiteness(
+    residual_nm: Array, signals: Signals, settings: DiagnosticsSettings
+) -> Finding:
+    """Return the spectral flatness of the residual within the band: 1 for white.
+
+    The geometric over the arithmetic mean of the power, lines taken eight together; their mean
+    logarithm is that of white noise less ln 8 − ψ(8), which is made up for.
+    """
+    frequency, power = lines(residual_nm, signals.rate_hz)
+    power = power[inside(frequency, signals.band_hz)]
+    groups = max(power.size // LINES_TOGETHER, 1)
+    means = power[: groups * LINES_TOGETHER].reshape(groups, -1).mean(axis=1)
+    value, least = math.nan, settings.residual_flatness_least
+    if np.all(means > 0):
+        made_up = math.log(LINES_TOGETHER) - float(digamma(LINES_TOGETHER))
+        value = min(float(np.exp(np.mean(np.log(means)) + made_up) / np.mean(means)), 1.0)
+    return judged(
+        "residual_whiteness",
+        value,
+        least,
+        settings,
+        failed=not value >= least,
+        fact=f"the residual's spectral flatness in the band is {value:.2f} (at least {least:g})",
+        meaning=(
+            "the residual is coloured, by the subject's own torque or by what the model lacks, and "
+            "standard errors for white noise are too small"
+        ),
+        remedy="use the intervals for coloured residuals; see the residual's spectrum",
+    )
+
+
+def residual_perturbation(
+    epoch: Epoch, residual_nm: Array, signals: Signals, settings: DiagnosticsSettings
+) -> Finding:
+    """Return how much of the torque follows the perturbation and is yet not explained.
+
+    The largest correlation of residual and perturbation, at any lag up to 1 s either way, times the
+    residual's share of the torque: in % of the torque's standard deviation.
+    """
+    cause = perturbation_nm(epoch.channels["perturbation_nm"], signals.time_s)
+    if signals.band_hz[0] > 0:
+        cause = zero_phase_band(cause, signals.rate_hz, signals.band_hz)
+    cause, residual = cause - cause.mean(), residual_nm - residual_nm.mean()
+    size = float(np.linalg.norm(cause) * np.linalg.norm(residual))
+    together = signal.correlate(residual, cause, method="fft") / (size or math.inf)
+    middle, lag = residual.size - 1, round(LONGEST_LAG_S * signals.rate_hz)
+    near = together[max(middle - lag, 0) : middle + lag + 1]
+    at = int(np.argmax(np.abs(near)))
+    delay_s = (at - min(lag, middle)) / signals.rate_hz
+    r = float(abs(near[at]))
+    sd = float(np.std(signals.torque_nm))
+    value = 100.0 * r * float(np.std(residual)) / sd if sd > 0 else math.nan
+    most = settings.residual_perturbation_most_percent
+    return judged(
+        "residual_perturbation",
+        value,
+        most,
+        settings,
+        failed=not value <= most,
+        fact=(
+            f"what is left over follows the perturbation by {value:.2g} % of the torque's SD (at "
+            f"most {most:g} %; correlation {r:.2f} at a lag of {delay_s:.2g} s)"
+        ),
+        meaning="the model lacks something that the perturbation causes",
+        remedy=(
+            "look for a delay between torque and motion, for a reflex, for stiffness that changes "
+            "with the angle; the subject's own torque biases least squares in this way too"
+        ),
+    )
+
+
+def held_out_vaf(signals: Signals, settings: DiagnosticsSettings) -> Finding:
+    """Return how much of the second half's torque the parameters of the first half explain."""
+    half = signals.time_s.size // 2
+    regressors = np.column_stack(
+        [signals.acceleration_rad_s2, signals.velocity_rad_s, signals.angle_rad]
+    )
+    lengths = np.maximum(np.linalg.norm(regressors[:half], axis=0), 1e-300)
+    scaled, torque = regressors / lengths, signals.torque_nm
+    parameters = np.linalg.lstsq(scaled[:half], torque[:half], rcond=None)[0]
+    left = torque[half:] - scaled[half:] @ parameters
+    variance, least = float(np.var(torque[half:])), settings.held_out_vaf_least_percent
+    value = 100.0 * (1.0 - float(np.var(left)) / variance) if variance > 0 else math.nan
+    return judged(
+        "held_out_vaf",
+        value,
+        least,
+        settings,
+        failed=not value >= least,
+        fact=(
+            f"the first half's J, B and K explain {value:.1f} % of the second half's torque (at "
+            f"least {least:g} %)"
+        ),
+        meaning="the fit does not foresee torque that it has not seen",
+        remedy="look for movement of the subject's own, and for a change during the epoch",
+    )

@@ -1,0 +1,68 @@
+"""The checks on a measured ankle: nothing to exclude, and faults that are put in are found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigidimeter.estimation import epoch_signals, fit_inertia_damping_stiffness
+from rigidimeter.estimation.diagnostics import diagnose
+from rigidimeter.estimation.uncertainty import block_bootstrap, hac_covariance
+from rigidimeter.recording.tables.readers import read_recording
+from rigidimeter.recording.tables.table import ReadOptions
+from rigidimeter.records import Channel
+from rigidimeter.settings import Settings
+
+SETTINGS = Settings()
+
+
+@pytest.fixture(scope="module")
+def ankle(shared_data):
+    options = ReadOptions(
+        columns={"angle_rad": "position_rad", "torque_nm": "torque_Nm"},
+        reaction=True,
+        epoch_length_s=20.0,
+    )
+    epochs, _ = read_recording(shared_data / "ankle" / "z_df.npz", options)
+    return epochs[0]
+
+
+def diagnosed(epoch):
+    signals = epoch_signals(epoch, "bandlimited", SETTINGS.estimation)
+    parameters = fit_inertia_damping_stiffness(signals).parameters
+    return {f.name: f for f in diagnose(epoch, signals, parameters, SETTINGS.diagnostics)}
+
+
+def test_a_measured_epoch_is_sound(ankle):
+    found = diagnosed(ankle)
+    assert {name for name, finding in found.items() if finding.level != "note"} == set()
+    # An imposed motion leaves a residual that is far from white.
+    assert found["residual_whiteness"].remedy
+
+
+@pytest.mark.parametrize(
+    ("fault", "name"),
+    [
+        (lambda values: np.clip(values, np.quantile(values, 0.02), None), "saturation"),
+        (lambda values: np.where(np.arange(values.size) // 500 == 9, 0.0, values), "frozen"),
+    ],
+)
+def test_a_fault_of_the_sensor_is_found(ankle, fault, name):
+    torque = ankle.channels["torque_nm"]
+    broken = Channel("torque_nm", torque.time_s, fault(torque.values))
+    found = diagnosed(replace(ankle, channels={**ankle.channels, "torque_nm": broken}))
+    assert found[name].level == "exclude"
+    assert "torque_nm" in found[name].text
+
+
+def test_intervals_for_a_coloured_residual_are_wider_than_those_for_a_white_one(ankle):
+    signals = epoch_signals(ankle, "bandlimited", SETTINGS.estimation)
+    solution = fit_inertia_damping_stiffness(signals)
+    A = np.column_stack([signals.acceleration_rad_s2, signals.velocity_rad_s, signals.angle_rad])
+    residual = signals.torque_nm - A @ solution.parameters
+    coloured = hac_covariance(np.linalg.inv(A.T @ A), A * residual[:, None])
+    textbook = np.std(residual) * np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
+    assert coloured.standard_errors[2] > 2.0 * textbook[2]
+    drawn = block_bootstrap(A, A, signals.torque_nm, np.random.default_rng(0), draws=400)
+    ratio = np.sqrt(np.diag(drawn.covariance)) / coloured.standard_errors
+    assert np.all((ratio > 0.5) & (ratio < 2.0)), ratio

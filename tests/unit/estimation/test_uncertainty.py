@@ -1,0 +1,288 @@
+"""Intervals against closed forms, against another program, and by how often they hold."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from rigidimeter.estimation.uncertainty import (
+    _block_lengths,
+    block_bootstrap,
+    correlation_samples,
+    cramer_rao,
+    cramer_rao_coloured,
+    hac_covariance,
+    t_interval,
+)
+
+JOINT = np.array([0.0045, 0.1368, 1.751])
+RATE_HZ, N = 100.0, 2000
+
+
+def motion(rng, n=N, rate_hz=RATE_HZ):
+    """Acceleration, velocity and angle of the paper's loop under random binary torque, in band."""
+    chips = np.repeat(rng.choice([-1.0, 1.0], n // 5 + 1), round(rate_hz / 20))[:n]
+    J, B, K = np.array([0.0458, 1.604, 0.0]) + JOINT
+    loop = signal.cont2discrete(([1.0], [J, B, K]), 1 / rate_hz)
+    x = signal.lfilter(loop[0].ravel(), loop[1], chips)
+    loop = signal.cont2discrete(([1.0, 0.0], [J, B, K]), 1 / rate_hz)
+    v = signal.lfilter(loop[0].ravel(), loop[1], chips)
+    a = (chips - B * v - K * x) / J
+    band = signal.butter(2, [0.15, 10.0], "bandpass", fs=rate_hz, output="sos")
+    return signal.sosfiltfilt(band, np.column_stack([a, v, x]), axis=0)
+
+
+def first_order(rng, n=N):
+    return signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal(n + 500))[500:]
+
+
+def voluntary(rng, n=N, rate_hz=RATE_HZ):
+    band = signal.butter(2, [0.3, 4.0], "bandpass", fs=rate_hz, output="sos")
+    return signal.sosfilt(band, rng.standard_normal(n + 3000))[3000:]
+
+
+def white(rng, n=N):
+    return rng.standard_normal(n)
+
+
+def fitted(A, e):
+    """Return (AᵀA)⁻¹, the error of the estimate, and the scores."""
+    bread = np.linalg.inv(A.T @ A)
+    error = bread @ (A.T @ e)
+    return bread, error, A * (e - A @ error)[:, None]
+
+
+def test_one_parameter_without_lags_is_the_sum_of_squares():
+    # With A = 1 the estimate is the mean, D = 1/n, and cov = Σ e² / n².
+    e = np.array([1.0, -2.0, 0.5, 0.5, 3.0, -3.0])
+    found = hac_covariance(np.array([[1 / 6]]), e[:, None], 0, small_sample=False)
+    assert found.covariance[0, 0] == pytest.approx(np.sum(e**2) / 36, rel=1e-14)
+
+
+@pytest.mark.parametrize("lag", [0, 1, 7, 60])
+def test_a_fixed_lag_gives_what_statsmodels_gives(lag):
+    models = pytest.importorskip("statsmodels.api")
+    rng = np.random.default_rng(3)
+    A = motion(rng)
+    target = A @ JOINT + 0.1 * first_order(rng)
+    fit = models.OLS(target, A).fit(
+        cov_type="HAC", cov_kwds={"maxlags": lag, "use_correction": False}
+    )
+    bread, _, scores = fitted(A, target)
+    ours = hac_covariance(bread, scores, lag, small_sample=False)
+    np.testing.assert_allclose(ours.covariance, fit.cov_params(), rtol=1e-10)
+    np.testing.assert_allclose(ours.standard_errors, fit.bse, rtol=1e-10)
+
+
+def test_white_scores_have_no_correlation_and_a_moving_sum_has_its_length():
+    rng = np.random.default_rng(0)
+    values = rng.standard_normal((100_000, 1))
+    assert correlation_samples(values)[0] == pytest.approx(1.0, abs=0.1)
+    sums = np.cumsum(values, axis=0)
+    assert correlation_samples(sums[20:] - sums[:-20])[0] == pytest.approx(20.0, rel=0.15)
+
+
+def test_the_sampling_rate_does_not_change_the_answer():
+    rng = np.random.default_rng(4)
+    A, e = motion(rng), voluntary(rng)
+    coarse = hac_covariance(*(fitted(A, e)[k] for k in (0, 2)))
+    A10, e10 = (signal.resample(values, 10 * N, axis=0) for values in (A, e))
+    fine = hac_covariance(*(fitted(A10, e10)[k] for k in (0, 2)))
+    np.testing.assert_allclose(fine.standard_errors, coarse.standard_errors, rtol=0.05)
+    assert fine.degrees_of_freedom == pytest.approx(coarse.degrees_of_freedom, abs=2)
+
+
+def test_instruments_that_are_the_regressors_are_least_squares():
+    rng = np.random.default_rng(5)
+    A, e = motion(rng), white(rng)
+    bread, _, scores = fitted(A, e)
+    twice = hac_covariance(bread / 2, 2 * scores)  # Z = 2 A: the estimate is the same
+    np.testing.assert_allclose(twice.covariance, hac_covariance(bread, scores).covariance)
+
+
+def test_instruments_enter_from_both_sides():
+    rng = np.random.default_rng(14)
+    A, e = motion(rng), white(rng)
+    Z = np.roll(A, 2, axis=0)
+    bread = np.linalg.inv(Z.T @ A)  # not symmetric
+    found = hac_covariance(bread, Z * e[:, None], 0, small_sample=False)
+    expected = bread @ (Z.T * e**2) @ Z @ bread.T
+    np.testing.assert_allclose(found.covariance, expected, rtol=1e-10)
+
+
+def test_the_small_sample_factor_counts_independent_scores():
+    rng = np.random.default_rng(15)
+    bread, _, scores = fitted(motion(rng), voluntary(rng))
+    independent = N / np.max(correlation_samples(scores))
+    ratio = (
+        hac_covariance(bread, scores).covariance
+        / hac_covariance(bread, scores, small_sample=False).covariance
+    )
+    np.testing.assert_allclose(ratio, independent / (independent - 3))
+    degrees = hac_covariance(bread, scores).degrees_of_freedom
+    assert degrees == round(0.8 * independent ** (2 / 3))
+
+
+@pytest.mark.parametrize("stationary", [False, True])
+def test_the_blocks_of_a_draw_make_an_epoch(stationary):
+    lengths = _block_lengths(N, 37, 500, stationary, np.random.default_rng(16))
+    np.testing.assert_array_equal(lengths.sum(axis=1), N)
+    assert np.all(lengths >= 0)
+    drawn = lengths[lengths > 0]
+    assert np.mean(drawn) == pytest.approx(37.0, rel=0.05)
+
+
+def coverage(noise, seeds, covers):
+    held = []
+    for seed in seeds:
+        rng = np.random.default_rng([11, seed])
+        A = motion(rng)
+        low, high = covers(A, noise(rng), rng)
+        held.append((low <= 0) & (high >= 0))
+    return 100 * np.mean(held, axis=0)
+
+
+def by_hac(A, e, rng):
+    bread, error, scores = fitted(A, e)
+    found = hac_covariance(bread, scores)
+    return t_interval(error, found.standard_errors, found.degrees_of_freedom)
+
+
+def by_bootstrap(A, e, rng):
+    found = block_bootstrap(A, A, e, rng, draws=199)
+    return found.low, found.high
+
+
+@pytest.mark.parametrize("noise", [white, first_order, voluntary])
+def test_intervals_of_95_percent_hold(noise):
+    # Measured in 3000 trials: 93 to 96 %. In 100 trials a true 93 % shows as 85 % or more, but for
+    # one case in 600. The test of many trials is the sharp one.
+    held = coverage(noise, range(100), by_hac)
+    assert np.all(held >= 85.0), held
+
+
+def test_textbook_intervals_do_not_hold():
+    # So that the test above is seen to tell: σ² (AᵀA)⁻¹ takes each of 2000 samples for independent.
+    def by_textbook(A, e, rng):
+        bread, error, _ = fitted(A, e)
+        deviation = np.sqrt(np.diag(bread) * np.mean((e - A @ error) ** 2))
+        return t_interval(error, deviation, e.size - 3)
+
+    assert np.all(coverage(voluntary, range(100), by_textbook)[1:] < 75.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [white, first_order, voluntary])
+def test_intervals_of_95_percent_hold_in_many_trials(noise):
+    held = coverage(noise, range(3000), by_hac)
+    print(f"hac, {noise.__name__}: {held.round(1)}")
+    assert np.all((held > 92.5) & (held < 97.0)), held
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [white, first_order, voluntary])
+def test_intervals_of_the_bootstrap_nearly_hold(noise):
+    held = coverage(noise, range(600), by_bootstrap)
+    print(f"bootstrap, {noise.__name__}: {held.round(1)}")
+    assert np.all((held > 86.0) & (held < 98.5)), held
+
+
+@pytest.mark.parametrize("stationary", [False, True])
+def test_the_bootstrap_scatters_as_the_noise_does(stationary):
+    rng = np.random.default_rng(6)
+    A = motion(rng)
+    target = A @ JOINT + 0.05 * white(rng)
+    found = block_bootstrap(A, A, target, rng, draws=2000, stationary=stationary)
+    expected = np.sqrt(np.diag(cramer_rao(A, 0.05)))
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), expected, rtol=0.2)
+    assert np.all(found.low < JOINT + 3 * expected)
+    assert np.all(found.high > JOINT - 3 * expected)
+
+
+def test_the_bootstrap_of_an_exact_epoch_does_not_scatter():
+    rng = np.random.default_rng(7)
+    A = motion(rng)
+    found = block_bootstrap(A, A, A @ JOINT, rng, draws=50, block=40)
+    np.testing.assert_allclose(found.low, JOINT, rtol=1e-9)
+    np.testing.assert_allclose(found.high, JOINT, rtol=1e-9)
+
+
+def test_a_block_as_long_as_the_epoch_is_refused():
+    rng = np.random.default_rng(8)
+    A = motion(rng)
+    with pytest.raises(ValueError, match="does not fit twice"):
+        block_bootstrap(A, A, A @ JOINT, rng, block=1500)
+
+
+def test_a_residual_that_only_drifts_still_leaves_four_blocks():
+    t = np.linspace(-1.0, 1.0, N)
+    A = np.ones((N, 1))
+    found = block_bootstrap(A, A, t, np.random.default_rng(8), draws=20)
+    assert found.block == N // 4
+
+
+def test_the_cosines_are_those_of_the_formula():
+    scores = np.random.default_rng(13).standard_normal((300, 1))
+    found = hac_covariance(np.eye(1), scores, small_sample=False)
+    t, j = np.arange(300), np.arange(1, round(found.degrees_of_freedom) + 1)
+    sums = np.sqrt(2) * np.cos(np.pi * np.outer(j, t + 0.5) / 300) @ scores
+    assert found.covariance[0, 0] == pytest.approx(float(np.mean(sums**2)), rel=1e-12)
+
+
+def test_too_few_samples_and_wrong_shapes_are_refused():
+    with pytest.raises(ValueError, match="too few"):
+        hac_covariance(np.eye(3), np.ones((4, 3)))
+    with pytest.raises(ValueError, match="bread has shape"):
+        hac_covariance(np.eye(2), np.ones((40, 3)))
+    with pytest.raises(ValueError, match="max_lag"):
+        hac_covariance(np.eye(3), np.ones((40, 3)), 40)
+
+
+def test_the_bound_of_one_regressor_is_the_variance_over_its_energy():
+    x = np.sin(np.arange(500) / 7.0)
+    assert cramer_rao(x[:, None], 0.3)[0, 0] == pytest.approx(0.09 / np.sum(x**2), rel=1e-12)
+
+
+@pytest.mark.parametrize("n", [2000, 2001])
+def test_the_coloured_bound_of_white_noise_is_the_white_bound(n):
+    A = motion(np.random.default_rng(9), n)
+    density = np.full(n // 2 + 1, 2 * 0.3**2 / RATE_HZ)
+    density[0] /= 2
+    if n % 2 == 0:
+        density[-1] /= 2
+    np.testing.assert_allclose(
+        cramer_rao_coloured(A, density, RATE_HZ), cramer_rao(A, 0.3), rtol=1e-9
+    )
+
+
+def test_a_line_that_is_left_out_informs_nobody():
+    t = np.arange(N) / RATE_HZ
+    x = np.sin(2 * np.pi * 1.0 * t) + np.sin(2 * np.pi * 5.0 * t)
+    density = np.full(N // 2 + 1, 0.01)
+    density[np.fft.rfftfreq(N, 1 / RATE_HZ) > 2.0] = np.inf
+    bound = cramer_rao_coloured(x[:, None], density, RATE_HZ)
+    expected = 0.01 * RATE_HZ / 2 / np.sum(np.sin(2 * np.pi * t) ** 2)
+    assert bound[0, 0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_weighting_by_the_spectrum_beats_least_squares_and_reaches_the_bound():
+    # Generalised least squares on the lines, with the true density, has the bound as its scatter.
+    band = signal.butter(1, 3.0, fs=RATE_HZ, output="sos")
+    frequency = np.fft.rfftfreq(N, 1 / RATE_HZ)
+    gain = np.abs(signal.sosfreqz(band, frequency, fs=RATE_HZ)[1]) ** 2
+    density = np.maximum(gain, 1e-6) * 2 / RATE_HZ
+    density[frequency > 40.0] = np.inf
+    A = motion(np.random.default_rng(10))
+    weight = np.sqrt(1 / density)[:, None]
+    lines = np.fft.rfft(A, axis=0) * weight
+    design = np.concatenate([lines.real, lines.imag])
+    errors, plain = [], []
+    for seed in range(200):
+        rng = np.random.default_rng([12, seed])
+        e = signal.sosfilt(band, rng.standard_normal(N + 500))[500:]
+        noise = np.fft.rfft(e) * weight[:, 0]
+        target = np.concatenate([noise.real, noise.imag])
+        errors.append(np.linalg.lstsq(design, target, rcond=None)[0])
+        plain.append(fitted(A, e)[1])
+    bound = np.sqrt(np.diag(cramer_rao_coloured(A, density, RATE_HZ)))
+    np.testing.assert_allclose(np.std(errors, axis=0), bound, rtol=0.15)
+    assert np.std(plain, axis=0)[0] > 1.15 * bound[0]
