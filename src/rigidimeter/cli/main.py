@@ -19,6 +19,7 @@ from rigidimeter.cli.compare import compare
 from rigidimeter.cli.demo import demo
 from rigidimeter.cli.design import design
 from rigidimeter.cli.estimate import estimate
+from rigidimeter.cli.model import model
 from rigidimeter.cli.recover import recover
 from rigidimeter.cli.report import report
 from rigidimeter.cli.simulate import simulate
@@ -59,7 +60,7 @@ def _root(
     """
 
 
-for command in (design, simulate, estimate, compare, report, recover, demo):
+for command in (design, simulate, estimate, model, compare, report, recover, demo):
     app.command()(command)
 
 

@@ -1,0 +1,87 @@
+import json
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def joint(tmp_path):
+    """A joint with a cubic spring, a table of 40 s at 200 samples/s."""
+    rng = np.random.default_rng(4)
+    t = np.arange(8000) / 200.0
+    frequency_hz = np.linspace(0.2, 6.0, 40)[:, None]
+    phase = 2 * np.pi * frequency_hz * t + rng.uniform(0, 2 * np.pi, 40)[:, None]
+    scale, w = 0.02 / (1 + frequency_hz), 2 * np.pi * frequency_hz
+    x = (scale * np.sin(phase)).sum(0)
+    v = (scale * w * np.cos(phase)).sum(0)
+    a = (-scale * w**2 * np.sin(phase)).sum(0)
+    torque = 0.01 * a + 0.2 * v + 3 * x + 2000 * x**3 + 0.2 + 0.01 * rng.standard_normal(t.size)
+    rows = "".join(f"{p},{q},{r}\n" for p, q, r in zip(t, x, torque, strict=True))
+    (tmp_path / "joint.csv").write_text("time_s,angle_rad,torque_nm\n" + rows)
+    return tmp_path / "joint.csv"
+
+
+def test_terms_are_fitted_and_written(rigidimeter, joint, tmp_path):
+    ran = rigidimeter(
+        "model", joint, "--terms", "inertia,damping,stiffness,cubic,offset", "--band-hz", 0, 15,
+        "--json", tmp_path / "m.json",
+    )  # fmt: skip
+    assert ran.status == 0, ran.err
+    document = json.loads((tmp_path / "m.json").read_text())
+    assert document["schema"] == "rigidimeter.model/1"
+    (epoch,) = document["epochs"]
+    assert epoch["band_hz"] == [0.0, 15.0]
+    found = {p["term"]: p["value"] for p in epoch["models"][0]["parameters"]}
+    assert found["cubic"] == pytest.approx(2000, rel=0.05)
+    assert found["offset"] == pytest.approx(0.2, abs=0.01)
+    assert "cubic" in ran.out
+    assert "N·m/rad³" in ran.out
+
+
+def test_models_are_compared_and_one_is_recommended(rigidimeter, joint, tmp_path):
+    ran = rigidimeter(
+        "model", joint, "--terms", "inertia,damping,stiffness,cubic,coulomb", "--compare",
+        "--band-hz", 0.15, 15, "--json", tmp_path / "m.json",
+    )  # fmt: skip
+    assert ran.status == 0, ran.err
+    (epoch,) = json.loads((tmp_path / "m.json").read_text())["epochs"]
+    assert epoch["recommended"] == ["inertia", "damping", "stiffness", "cubic"]
+    assert len(epoch["models"]) == 4
+    assert "recommended: inertia+damping+stiffness+cubic: predicts" in ran.out
+
+
+def test_own_candidates_are_compared(rigidimeter, joint, tmp_path):
+    ran = rigidimeter(
+        "model", joint, "--terms", "inertia,damping,stiffness", "--terms", "damping,stiffness",
+        "--compare", "--json", tmp_path / "m.json",
+    )  # fmt: skip
+    assert ran.status == 0, ran.err
+    (epoch,) = json.loads((tmp_path / "m.json").read_text())["epochs"]
+    assert [model["terms"] for model in epoch["models"]] == [
+        ["inertia", "damping", "stiffness"],
+        ["damping", "stiffness"],
+    ]
+
+
+def test_a_session_is_modelled(rigidimeter, simulate):
+    ran = rigidimeter("model", simulate())
+    assert ran.status == 0, ran.err
+    assert "inertia+damping+stiffness, VAF" in ran.out
+    assert "±" in ran.out
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--terms", "inertia,magic"], "there is no term 'magic'; known: inertia"),
+        (["--terms", "reflex-slow"], "followed by + or - for the direction"),
+        (["--terms", "inertia,offset"], "offset is constant and does not pass a band"),
+        (["--terms", "damping,directional-damping"], "cannot tell damping, damping+ and damping-"),
+        (["--method", "published"], "--method published: terms are fitted only with bandlimited"),
+        (["--band-hz", "0", "-1"], "--band-hz 0 -1: the upper edge must be above 0 Hz"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(rigidimeter, joint, options, words):
+    ran = rigidimeter("model", joint, *options)
+    assert ran.status == 1
+    assert words in ran.err
