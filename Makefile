@@ -29,6 +29,7 @@ check: install
 	$(BIN)/lint-imports
 
 bench: install
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all,bench]'
 	$(BIN)/python -m pytest -m slow
 	$(BIN)/python -m benchmarks
 

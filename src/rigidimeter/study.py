@@ -12,11 +12,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimeter.estimation import fit_epoch, score_epoch, single_frequency_share
+from rigidimeter.estimation import (
+    aligned,
+    choose_method,
+    epoch_signals,
+    estimate_delays,
+    fit_epochs,
+    score_epoch,
+    single_frequency_share,
+)
+from rigidimeter.estimation.diagnostics import diagnose
 from rigidimeter.estimation.screening import before_fit
-from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score, Task
+from rigidimeter.records import Analysis, Delay, Epoch, Fit, Notice, Outcome, Score, Task
 from rigidimeter.settings import Settings
 from rigidimeter.statistics import RankSum, Summary, ranksum, summarise
+from rigidimeter.units import rad_from_deg
 
 __all__ = [
     "MEASURES",
@@ -127,46 +137,93 @@ def task_of(epoch: Epoch, settings: Settings) -> Task:
 def analyse(
     epochs: Iterable[Epoch],
     settings: Settings,
-    method: str = "bandlimited",
+    method: str = "auto",
     *,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Analysis:
     """Fit every perturbation epoch and score every sinusoidal one.
 
-    Two stages, as in Sec. 2.4.4: J, B and K for each epoch; then J held at the median of all
-    included epochs of all conditions, and B and K again (Eq. 7).
+    First the channels of each source are brought onto one clock. Then two stages, as in
+    Sec. 2.4.4: J, B and K for each epoch; then J held at the median of all included epochs of all
+    conditions, and B and K again (Eq. 7). Every fitted epoch is checked; a check that excludes
+    does so in both stages.
 
     Parameters
     ----------
     epochs : iterable of Epoch
     settings : Settings
     method : str
-        A key of `estimation.METHODS`.
+        A name of `estimation.METHODS`; ``auto`` chooses by what was recorded.
     progress : callable
         Called with the name of each epoch once it is done, in either stage.
     """
-    fitted: list[Epoch] = []
-    fits: list[Fit] = []
-    scores: list[Score] = []
-    for epoch in epochs:
-        if task_of(epoch, settings) == "sinusoid":
+    everything = list(epochs)
+    tasks = [task_of(epoch, settings) for epoch in everything]
+    fitted = [epoch for epoch, task in zip(everything, tasks, strict=True) if task == "prbs"]
+    reason = ""
+    if method == "auto":
+        method, reason = choose_method(fitted)
+    delays: tuple[Delay, ...] = ()
+    if method != "published":  # which is kept as it was printed
+        by_source: dict[str, list[Epoch]] = {epoch.source: [] for epoch in everything}
+        for epoch in fitted:
+            by_source[epoch.source].append(epoch)
+        delays = estimate_delays(by_source, settings)
+        everything = [aligned(epoch, delays) for epoch in everything]
+        fitted = [aligned(epoch, delays) for epoch in fitted]
+    scores = []
+    for epoch, task in zip(everything, tasks, strict=True):
+        if task == "sinusoid":
             scores.append(score_epoch(epoch, settings.scores, settings.estimation))
-        else:
-            fitted.append(epoch)
-            fits.append(fit_epoch(epoch, method, settings.estimation))
-        progress(epoch.name)
+            progress(epoch.name)
+    fits, pooled = fit_epochs(fitted, method, settings, progress=progress)
+    fits = [checked(epoch, fit, settings) for epoch, fit in zip(fitted, fits, strict=True)]
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
-    fixed = []
-    for epoch, fit in zip(fitted, fits, strict=True):
-        if included:
-            second = fit_epoch(epoch, method, settings.estimation, inertia_kg_m2)
-            # What did not count in the first stage does not in the second.
-            fixed.append(second if fit.outcome.included else replace(second, outcome=fit.outcome))
-        else:  # no epoch gives a median to hold
-            fixed.append(Fit(fit.source, fit.epoch, fit.condition, fit.method, fit.outcome))
-        progress(epoch.name)
-    return Analysis(method, tuple(fits), tuple(fixed), inertia_kg_m2, tuple(scores))
+    if included:
+        second, _ = fit_epochs(fitted, method, settings, inertia_kg_m2, progress)
+        # What did not count in the first stage does not in the second.
+        fixed = [
+            two if one.outcome.included else replace(two, outcome=one.outcome)
+            for one, two in zip(fits, second, strict=True)
+        ]
+    else:  # no epoch gives a median to hold
+        fixed = [Fit(fit.source, fit.epoch, fit.condition, fit.method, fit.outcome) for fit in fits]
+    return Analysis(
+        method,
+        tuple(fits),
+        tuple(fixed),
+        inertia_kg_m2,
+        tuple(scores),
+        tuple(pooled),
+        delays,
+        reason,
+    )
+
+
+def checked(epoch: Epoch, fit: Fit, settings: Settings) -> Fit:
+    """Return the fit with what the checks found, excluded if one of them says so."""
+    if fit.n_samples == 0:
+        return fit
+    try:
+        signals = epoch_signals(epoch, "bandlimited", settings.estimation)
+    except ValueError:
+        return fit  # the fit has said why
+    from_session = epoch.excitation_hz is not None
+    limit_rad = rad_from_deg(settings.guard.position_limit_deg) if from_session else None
+    findings = diagnose(
+        epoch,
+        signals,
+        (fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad),
+        settings.diagnostics,
+        position_limit_rad=limit_rad,
+    )
+    failed = [finding for finding in findings if finding.remedy]
+    grave = [finding for finding in failed if finding.level == "exclude"]
+    outcome = fit.outcome
+    if grave and outcome.included:
+        outcome = Outcome("excluded", f"{grave[0].text}; {grave[0].remedy}")
+    return replace(fit, outcome=outcome, findings=tuple(failed))
 
 
 def doubts(analysis: Analysis) -> tuple[Notice, ...]:

@@ -29,7 +29,7 @@ from rigidimeter.recording import (
 )
 from rigidimeter.recording.log import SAMPLE_UNITS, read_events
 from rigidimeter.recording.tables.columns import LABELS
-from rigidimeter.records import CHANNEL_UNITS, Analysis, Fit, Outcome, Score
+from rigidimeter.records import CHANNEL_UNITS, Analysis, Delay, Finding, Fit, Outcome, Score
 from rigidimeter.settings import Settings, load_settings, parse_settings
 
 ROOT = Path(__file__).parents[2]
@@ -204,13 +204,23 @@ def test_the_manifest_and_event_keys_are_those_of_a_session(tmp_path: Path) -> N
 def _analysis() -> Analysis:
     def fits(*conditions: str) -> tuple[Fit, ...]:
         return tuple(
-            Fit("s", str(k), name, "bandlimited", Outcome(), 1.0 + k, 0.1, 2.0 + k, 0.1, 3.0 + k)
+            Fit(
+                "s",
+                str(k),
+                name,
+                "bandlimited",
+                Outcome(),
+                inertia_kg_m2=1.0 + k,
+                damping_nm_s_rad=2.0 + k,
+                stiffness_nm_rad=3.0 + k,
+                findings=(Finding("frozen", "doubt", 1.0, 2.0, "a", "b"),),
+            )
             for k, name in enumerate(conditions)
         )
 
     found = fits(*["OFF"] * 3, *["DBS"] * 3)
     score = Score("s", "9", "OFF", Outcome(), 1.0, 2.0, 8, 1.0)
-    return Analysis("bandlimited", found, found, 1.0, (score,))
+    return Analysis("bandlimited", found, found, 1.0, (score,), found[:2], (Delay("s", 0.0, 0.1),))
 
 
 def test_the_keys_of_the_estimates_are_documented() -> None:
@@ -219,6 +229,9 @@ def test_the_keys_of_the_estimates_are_documented() -> None:
     assert set(table(FILES, "Each fit")) == set(document["epochs"][0])
     assert set(table(FILES, "Each fit")) == set(document["fixed_inertia"]["epochs"][0])
     assert set(table(FILES, "Each score")) == set(document["scores"][0])
+    assert set(table(FILES, "Each finding")) == set(document["epochs"][0]["findings"][0])
+    assert set(table(FILES, "Each delay")) == set(document["delays"][0])
+    assert set(document["pooled"]) == {*table(FILES, "Each fit"), "conditions"}
     assert set(document["fixed_inertia"]) == {"inertia_kg_m2", "epochs"}
     assert f"`{document['schema']}`" in FILES.read_text("utf-8")
 

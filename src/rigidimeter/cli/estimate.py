@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
@@ -59,6 +61,9 @@ def estimate(
 
 def _lines(analysis: Analysis) -> list[str]:
     lines: list[str] = []
+    if analysis.method_reason:
+        lines += [*_wrapped(f"Method {analysis.method}: {analysis.method_reason}."), ""]
+    lines += _delay_lines(analysis)
     if analysis.fits:
         lines += [
             f"J, B, K of each epoch ± one standard error, {analysis.method}{_band(analysis)}",
@@ -72,12 +77,80 @@ def _lines(analysis: Analysis) -> list[str]:
             ]
         else:
             lines.append("No epoch could be included, so there is no median inertia to hold.")
+        if analysis.pooled:
+            lines += ["", "J, B, K of all epochs together, 95 % intervals"]
+            lines += [line for fit in analysis.pooled for line in _pooled_lines(fit)]
+        lines += _finding_lines(analysis)
     if analysis.scores:
         lines += [
             *([""] if lines else []),
             "Scores of each sinusoidal epoch, per cycle",
             *_by_source(analysis.scores, _SCORE_HEADING, _score_line),
         ]
+    return lines
+
+
+def _wrapped(text: str, indent: str = "") -> list[str]:
+    return textwrap.wrap(text, 100, subsequent_indent=indent + "  ", initial_indent=indent)
+
+
+def _delay_lines(analysis: Analysis) -> list[str]:
+    """Say how late the torque is, for each source where that could be told."""
+    lines = []
+    for delay in analysis.delays:
+        if math.isfinite(delay.delay_s):
+            done = "corrected" if delay.corrected else delay.remark
+            text = (
+                f"Torque {1e3 * delay.delay_s:.3g} ± {1e3 * delay.delay_s_se:.2g} ms later than "
+                f"the motion in {delay.source}: {done}."
+            )
+            lines += _wrapped(text)
+    return [*lines, ""] if lines else []
+
+
+def _pooled_lines(fit: Fit) -> list[str]:
+    name = fit.condition or "all"
+    rows = (
+        ("J", fit.inertia_kg_m2, fit.inertia_kg_m2_low, fit.inertia_kg_m2_high, "kg·m²"),
+        (
+            "B",
+            fit.damping_nm_s_rad,
+            fit.damping_nm_s_rad_low,
+            fit.damping_nm_s_rad_high,
+            "N·m·s/rad",
+        ),
+        (
+            "K",
+            fit.stiffness_nm_rad,
+            fit.stiffness_nm_rad_low,
+            fit.stiffness_nm_rad_high,
+            "N·m/rad",
+        ),
+    )
+    return [
+        f"{name[:10] if symbol == 'J' else '':>10} {symbol} {value:11.5g}  "
+        f"[{low:.5g}, {high:.5g}] {unit}"
+        for symbol, value, low, high, unit in rows
+    ]
+
+
+def _finding_lines(analysis: Analysis) -> list[str]:
+    """Return each kind of finding once: in which epochs, the first in full, and what to do."""
+    seen: dict[tuple[str, str], list[Fit]] = {}
+    for fit in analysis.fits:
+        for finding in fit.findings:
+            seen.setdefault((finding.name, finding.level), []).append(fit)
+    if not seen:
+        return []
+    lines = ["", "What the checks found (all of it is in the JSON)"]
+    for (name, level), fits in seen.items():
+        first = next(found for found in fits[0].findings if found.name == name)
+        where = "1 epoch" if len(fits) == 1 else f"{len(fits)} epochs"
+        lines += _wrapped(
+            f"{level}: {where} of {len(analysis.fits)}, first epoch {fits[0].epoch}: {first.text}. "
+            f"Remedy: {first.remedy}.",
+            indent=" ",
+        )
     return lines
 
 

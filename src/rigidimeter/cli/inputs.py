@@ -38,7 +38,7 @@ class Recordings:
     """
 
     paths: list[Path]
-    method: str = "bandlimited"
+    method: str = "auto"
     column: list[str] | None = None
     rate_hz: float | None = None
     reaction: bool = False
@@ -46,6 +46,7 @@ class Recordings:
     condition: list[str] | None = None
     task: str | None = None
     band_hz: tuple[float, float] | None = None
+    controller: tuple[float, float] | None = None
     settings: Path | None = None
 
     def read(self) -> Inputs:
@@ -118,6 +119,8 @@ def _read(wanted: Recordings) -> Inputs:
     chosen = chosen if chosen is not None else load_settings(None)
     if wanted.band_hz is not None:
         chosen = _with_band(chosen, wanted.band_hz)
+    if wanted.controller is not None:
+        chosen = _with_controller(chosen, wanted.controller)
     paths = tuple(dict.fromkeys(wanted.paths))
     return Inputs(tuple(epochs), tuple(notices), chosen, paths, wanted.method)
 
@@ -192,8 +195,18 @@ def _with_band(settings: Settings, band_hz: tuple[float, float]) -> Settings:
         "band_low_hz": low,
         "band_high_hz": high,
         "band_high_unknown_hz": high,
+        "band_high_closed_loop_hz": high,
     }
     return parse_settings(values, source=f"--band-hz {low:g} {high:g}")
+
+
+def _with_controller(settings: Settings, controller: tuple[float, float]) -> Settings:
+    from rigidimeter.settings import dump_settings, parse_settings
+
+    inertia, damping = controller
+    values = dump_settings(settings)
+    values["controller"] |= {"inertia_kg_m2": inertia, "damping_nm_s_rad": damping}
+    return parse_settings(values, source=f"--controller {inertia:g} {damping:g}")
 
 
 def _columns(pairs: list[str]) -> dict[str, str]:

@@ -30,8 +30,9 @@ MethodOption = Annotated[
     typer.Option(
         "--method",
         metavar="NAME",
-        help="bandlimited (measured velocity, all signals in one zero-phase band) or published "
-        "(the paper to the letter).",
+        help="auto (iv where the perturbation was recorded, else bandlimited), iv (instrumental "
+        "variables), spectral (lines of the perturbation), ml (simulated loop), bandlimited "
+        "(least squares in one zero-phase band) or published (the paper to the letter).",
     ),
 ]
 SettingsOption = Annotated[
@@ -90,15 +91,25 @@ BandOption = Annotated[
     typer.Option(
         "--band-hz",
         metavar="LOW HIGH",
-        help="Band of the bandlimited fit. Default: 0.15 to 10 where the perturbation is known, "
-        "else to 50, and at most 0.4 times the slowest channel's rate.",
+        help="Band of the fit. Default: bandlimited 0.15 to 10 where the perturbation is known, "
+        "else to 50; iv, spectral and ml 0.15 to 50; at most 0.4 times the slowest channel's rate.",
+    ),
+]
+ControllerOption = Annotated[
+    tuple[float, float] | None,
+    typer.Option(
+        "--controller",
+        metavar="J_C B_C",
+        help="Inertia in kg·m² and damping in N·m·s/rad of the admittance, for files without a "
+        "manifest. Default: those of the settings, else the paper's. A wrong value makes iv less "
+        "precise, not wrong.",
     ),
 ]
 
 
 def _reading(
     inputs: InputsArgument,
-    method: MethodOption = "bandlimited",
+    method: MethodOption = "auto",
     column: ColumnOption = None,
     rate_hz: RateOption = None,
     reaction: ReactionOption = False,
@@ -106,6 +117,7 @@ def _reading(
     condition: ConditionOption = None,
     task: TaskOption = None,
     band_hz: BandOption = None,
+    controller: ControllerOption = None,
     settings: SettingsOption = None,
 ) -> Recordings:
     """Hold the shared parameters and what becomes of them."""
@@ -119,6 +131,7 @@ def _reading(
         condition,
         task,
         band_hz,
+        controller,
         settings,
     )
 

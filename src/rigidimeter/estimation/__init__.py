@@ -1,7 +1,14 @@
 """From an epoch to numbers: offline and pure."""
 
+from rigidimeter.estimation.alignment import aligned, estimate_delays
 from rigidimeter.estimation.bandlimited import band_hz
-from rigidimeter.estimation.epochs import METHODS, epoch_signals, fit_epoch
+from rigidimeter.estimation.epochs import (
+    METHODS,
+    choose_method,
+    epoch_signals,
+    fit_epoch,
+    fit_epochs,
+)
 from rigidimeter.estimation.leastsquares import Solution, fit_inertia_damping_stiffness
 from rigidimeter.estimation.scores import Cycles, score_epoch, scoring_cycles
 from rigidimeter.estimation.signals import Signals
@@ -12,10 +19,14 @@ __all__ = [
     "Cycles",
     "Signals",
     "Solution",
+    "aligned",
     "band_hz",
+    "choose_method",
     "epoch_signals",
+    "estimate_delays",
     "find_motion",
     "fit_epoch",
+    "fit_epochs",
     "fit_inertia_damping_stiffness",
     "score_epoch",
     "scoring_cycles",

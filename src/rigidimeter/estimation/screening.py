@@ -65,16 +65,17 @@ def before_fit(epoch: Epoch, settings: EstimationSettings) -> str:
     return ""
 
 
-def after_fit(epoch: Epoch, r_squared: float, condition_number: float) -> Outcome:
+def after_fit(epoch: Epoch, r_squared: float | None, condition_number: float) -> Outcome:
     """Return whether a fitted epoch counts, and why not.
 
     Excluded are epochs that were not closed with success (among them those that touched a position
     limit), those with R² below zero (Sec. 2.4.4), and those whose motion cannot tell the
-    parameters apart.
+    parameters apart. `r_squared` is None for methods that do not minimise the residual: there a
+    subject who pushes may turn it negative and the estimate still be right.
     """
     if not epoch.closed.included:
         return Outcome("excluded", epoch.closed.reason)
-    if r_squared < 0:
+    if r_squared is not None and r_squared < 0:
         return Outcome("excluded", f"R² is {r_squared:.3g}, below zero")
     if condition_number > LARGEST_CONDITION_NUMBER:
         return Outcome(

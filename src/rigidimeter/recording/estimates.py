@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.errors import UserError
-from rigidimeter.records import Analysis, Fit, Outcome, Score
+from rigidimeter.records import Analysis, Delay, Finding, Fit, Outcome, Score
 
 __all__ = [
     "ESTIMATES_SCHEMA",
@@ -26,13 +26,9 @@ __all__ = [
 
 ESTIMATES_SCHEMA = "rigidimeter.estimates/1"
 
+_PARAMETERS = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 _FIT_NUMBERS = (
-    "inertia_kg_m2",
-    "inertia_kg_m2_se",
-    "damping_nm_s_rad",
-    "damping_nm_s_rad_se",
-    "stiffness_nm_rad",
-    "stiffness_nm_rad_se",
+    *(name + ending for name in _PARAMETERS for ending in ("", "_se", "_low", "_high", "_bound")),
     "r_squared",
     "vaf_percent",
     "condition_number",
@@ -46,6 +42,9 @@ def estimates_document(analysis: Analysis) -> dict[str, Any]:
     return {
         "schema": ESTIMATES_SCHEMA,
         "method": analysis.method,
+        "method_reason": analysis.method_reason,
+        "delays": [_delay_row(delay) for delay in analysis.delays],
+        "pooled": _pooled(analysis.pooled),
         "epochs": [_fit_row(fit) for fit in analysis.fits],
         "fixed_inertia": {
             "inertia_kg_m2": _finite(analysis.inertia_kg_m2),
@@ -69,13 +68,14 @@ def write_estimates_csv(path: Path, analysis: Analysis) -> None:
     for fit, fixed in zip(analysis.fits, analysis.fixed_inertia, strict=True):
         row = _fit_row(fit)
         low, high = row.pop("band_hz") or (None, None)
+        row["findings"] = " / ".join(finding.text for finding in fit.findings)
         rows.append(
             row
             | {"band_low_hz": low, "band_high_hz": high}
             | {
                 f"fixed_inertia_{name}": _finite(getattr(fixed, name))
                 for name in _FIT_NUMBERS
-                if name != "inertia_kg_m2_se"
+                if name == "inertia_kg_m2" or not name.startswith("inertia_kg_m2")
             }
         )
     if not rows:
@@ -148,6 +148,9 @@ def read_estimates(path: Path) -> Analysis:
             tuple(_fit(row, method) for row in fixed["epochs"]),
             _number(fixed["inertia_kg_m2"]),
             tuple(_score(row) for row in document["scores"]),
+            _read_pooled(document.get("pooled"), method),
+            tuple(_read_delay(row) for row in document.get("delays", ())),
+            str(document.get("method_reason", "")),
         )
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UserError(
@@ -193,7 +196,26 @@ def _fit_row(fit: Fit) -> dict[str, Any]:
         **_numbers(fit, _FIT_NUMBERS),
         "n_samples": fit.n_samples,
         "band_hz": band,
+        "findings": [_finding_row(finding) for finding in fit.findings],
     }
+
+
+def _finding_row(finding: Finding) -> dict[str, Any]:
+    row = dict(vars(finding))
+    return row | {"value": _finite(finding.value), "threshold": _finite(finding.threshold)}
+
+
+def _delay_row(delay: Delay) -> dict[str, Any]:
+    row = dict(vars(delay))
+    return row | {name: _finite(row[name]) for name in ("delay_s", "delay_s_se")}
+
+
+def _pooled(fits: Sequence[Fit]) -> dict[str, Any] | None:
+    """Return the fit to all epochs, and under `conditions` that to each; None without any."""
+    if not fits:
+        return None
+    conditions = {fit.condition: _fit_row(fit) for fit in fits if fit.condition or len(fits) == 1}
+    return {**_fit_row(fits[-1]), "conditions": conditions}
 
 
 def _score_row(score: Score) -> dict[str, Any]:
@@ -207,12 +229,46 @@ def _fit(row: Mapping[str, Any], method: str) -> Fit:
         epoch=str(row["epoch"]),
         condition=str(row["condition"]),
         method=method,
-        outcome=_read_outcome(row, _FIT_NUMBERS[0:6:2]),
+        outcome=_read_outcome(row, _PARAMETERS),
         n_samples=int(row["n_samples"]),
         band_hz=(float(low), float(high)),
     )
-    numbers: dict[str, Any] = {name: _number(row[name]) for name in _FIT_NUMBERS}
-    return replace(fit, **numbers)
+    # A document of an older version lacks the ends of the intervals.
+    numbers: dict[str, Any] = {name: _number(row.get(name)) for name in _FIT_NUMBERS}
+    findings = tuple(_read_finding(found) for found in row.get("findings", ()))
+    return replace(fit, findings=findings, **numbers)
+
+
+def _read_finding(row: Mapping[str, Any]) -> Finding:
+    level = row["level"]
+    if level not in ("note", "doubt", "exclude"):
+        raise ValueError(f"finding level {level!r}")
+    return Finding(
+        str(row["name"]),
+        level,
+        _number(row["value"]),
+        _number(row["threshold"]),
+        str(row["text"]),
+        str(row["remedy"]),
+    )
+
+
+def _read_delay(row: Mapping[str, Any]) -> Delay:
+    return Delay(
+        str(row["source"]),
+        _number(row["delay_s"]),
+        _number(row["delay_s_se"]),
+        bool(row["corrected"]),
+        str(row["remark"]),
+    )
+
+
+def _read_pooled(row: Mapping[str, Any] | None, method: str) -> tuple[Fit, ...]:
+    if row is None:
+        return ()
+    fits = [_fit(part, method) for part in row["conditions"].values()]
+    whole = _fit(row, method)
+    return tuple(fits if whole in fits else [*fits, whole])
 
 
 def _score(row: Mapping[str, Any]) -> Score:

@@ -96,7 +96,18 @@ def test_options_shape_a_simulation(rigidimeter, tmp_path):
 def test_a_wider_band_is_passed_on(rigidimeter, simulate, tmp_path):
     folder = simulate()
     assert (
-        rigidimeter("estimate", folder, "--band-hz", 0.2, 12, "--json", tmp_path / "x").status == 0
+        rigidimeter(
+            "estimate",
+            folder,
+            "--method",
+            "bandlimited",
+            "--band-hz",
+            0.2,
+            12,
+            "--json",
+            tmp_path / "x",
+        ).status
+        == 0
     )
     assert json.loads((tmp_path / "x").read_text())["epochs"][0]["band_hz"] == [0.2, 12.0]
 
@@ -120,7 +131,7 @@ def test_a_report_of_a_foreign_recording(rigidimeter, tmp_path):
     ("arguments", "words"),
     [
         (["estimate", "none.csv"], "none.csv: there is no such file"),
-        (["estimate", "{session}", "--method", "magic"], "known: bandlimited, published"),
+        (["estimate", "{session}", "--method", "magic"], "known: auto, bandlimited, published, iv"),
         (["estimate", "{session}", "--rate-hz", "-5"], "--rate-hz -5: must be a number greater"),
         (["estimate", "{session}", "--column", "torque_nm"], "write NAME=COLUMN"),
         (["estimate", "{session}", "--column", "a=b", "--column", "a=c"], "already given"),

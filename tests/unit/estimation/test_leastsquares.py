@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.estimation import Signals, fit_inertia_damping_stiffness
+from rigidimeter.settings import EstimationSettings
 
 TRUTH = np.array([0.0045, 0.1368, 1.751])
 
@@ -36,8 +37,9 @@ def test_standard_errors_are_the_scatter_over_noise():
 
 
 def test_a_band_limited_residual_counts_as_few_as_it_has_values():
-    whole = fit_inertia_damping_stiffness(signals(0.02))
-    tenth = fit_inertia_damping_stiffness(signals(0.02, band=(0.0, 5.0)))
+    white = EstimationSettings(intervals="white")
+    whole = fit_inertia_damping_stiffness(signals(0.02), settings=white)
+    tenth = fit_inertia_damping_stiffness(signals(0.02, band=(0.0, 5.0)), settings=white)
     ratio = np.array(tenth.standard_errors) / np.array(whole.standard_errors)
     np.testing.assert_allclose(ratio, np.sqrt(10.0), rtol=0.01)
 

@@ -1,16 +1,28 @@
 import csv
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read_estimates, write_estimates_csv, write_estimates_json
-from rigidimeter.records import Analysis, Fit, Outcome, Score
+from rigidimeter.records import Analysis, Delay, Finding, Fit, Outcome, Score
 
-GOOD = Fit("a.csv", "1", "OFF", "bandlimited", Outcome(), 0.0045, 1e-5, 0.13, 1e-3, 1.7, 0.02,
-           0.99, 99.1, 3.2, 0.004, 18000, (0.15, 10.0))  # fmt: skip
+FOUND = Finding("coherence", "doubt", 0.3, 0.5, "the coherence is 0.3", "ask the subject to relax")
+GOOD = Fit(
+    "a.csv", "1", "OFF", "bandlimited", Outcome(),
+    inertia_kg_m2=0.0045, inertia_kg_m2_se=1e-5, inertia_kg_m2_low=0.00448,
+    inertia_kg_m2_high=0.00452, inertia_kg_m2_bound=9e-6,
+    damping_nm_s_rad=0.13, damping_nm_s_rad_se=1e-3, damping_nm_s_rad_low=0.128,
+    damping_nm_s_rad_high=0.132, damping_nm_s_rad_bound=9e-4,
+    stiffness_nm_rad=1.7, stiffness_nm_rad_se=0.02, stiffness_nm_rad_low=1.66,
+    stiffness_nm_rad_high=1.74, stiffness_nm_rad_bound=0.019,
+    r_squared=0.99, vaf_percent=99.1, condition_number=3.2, residual_sd_nm=0.004,
+    n_samples=18000, band_hz=(0.15, 10.0), findings=(FOUND,),
+)  # fmt: skip
+POOLED = replace(GOOD, epoch="pooled")
 FAILED = Fit("a.csv", "2", "", "bandlimited", Outcome("failed", "torque_nm is constant"))
 ANALYSIS = Analysis(
     "bandlimited",
@@ -18,6 +30,9 @@ ANALYSIS = Analysis(
     (GOOD, FAILED),
     0.0045,
     (Score("a.csv", "3", "DBS", Outcome(), 0.4, 1 / 3, 8, 1.0),),
+    (POOLED, replace(POOLED, condition="DBS"), replace(POOLED, condition="", inertia_kg_m2=0.0046)),
+    (Delay("a.csv", 0.007, 1e-5, corrected=True), Delay("b.csv", remark="not estimated")),
+    "the perturbation was not recorded",
 )
 
 
@@ -29,13 +44,42 @@ def test_the_document_has_the_published_keys(tmp_path):
     assert document["epochs"][0].keys() >= {
         "source", "epoch", "condition", "outcome", "reason", "inertia_kg_m2", "inertia_kg_m2_se",
         "damping_nm_s_rad", "damping_nm_s_rad_se", "stiffness_nm_rad", "stiffness_nm_rad_se",
-        "r_squared", "vaf_percent", "condition_number", "n_samples",
+        "inertia_kg_m2_low", "stiffness_nm_rad_high", "damping_nm_s_rad_bound",
+        "r_squared", "vaf_percent", "condition_number", "n_samples", "findings",
     }  # fmt: skip
     assert document["epochs"][1]["inertia_kg_m2"] is None
     assert document["epochs"][1]["reason"] == "torque_nm is constant"
     assert document["fixed_inertia"]["inertia_kg_m2"] == 0.0045
     assert document["fixed_inertia"]["epochs"][0]["stiffness_nm_rad"] == 1.7
     assert document["scores"][0].keys() >= {"impulse_nm_s", "work_j"}
+    # All epochs together under the keys of a fit, and each condition below.
+    assert document["pooled"]["inertia_kg_m2"] == 0.0046
+    assert document["pooled"]["conditions"]["DBS"]["inertia_kg_m2"] == 0.0045
+    assert list(document["pooled"]["conditions"]) == ["OFF", "DBS"]
+    assert document["delays"][0]["delay_s"] == 0.007
+    assert document["delays"][1]["delay_s"] is None
+    assert document["epochs"][0]["findings"][0]["remedy"] == "ask the subject to relax"
+
+
+def test_a_document_of_the_first_version_is_still_read(tmp_path):
+    write_estimates_json(tmp_path / "e.json", ANALYSIS)
+    document = json.loads((tmp_path / "e.json").read_text())
+    for name in ("pooled", "delays", "method_reason"):
+        del document[name]
+    for row in [*document["epochs"], *document["fixed_inertia"]["epochs"]]:
+        del row["findings"]
+        for key in [key for key in row if key.endswith(("_low", "_high", "_bound"))]:
+            del row[key]
+    (tmp_path / "e.json").write_text(json.dumps(document))
+    analysis = read_estimates(tmp_path / "e.json")
+    assert analysis.fits[0].stiffness_nm_rad == 1.7
+    assert analysis.pooled == ()
+
+
+def test_one_condition_is_pooled_once(tmp_path):
+    only = replace(ANALYSIS, pooled=(POOLED,))
+    write_estimates_json(tmp_path / "e.json", only)
+    assert repr(read_estimates(tmp_path / "e.json")) == repr(only)
 
 
 def test_estimates_are_read_back_equal(tmp_path):

@@ -1,0 +1,9 @@
+"""Estimates from a known perturbation in a closed loop, where the motion itself is not trusted."""
+
+from rigidimeter.estimation.closedloop.estimate import (
+    CLOSED_LOOP,
+    closed_loop_obstacle,
+    fit_closed_loop,
+)
+
+__all__ = ["CLOSED_LOOP", "closed_loop_obstacle", "fit_closed_loop"]

@@ -1,0 +1,129 @@
+"""How late the torque's stamps are against those of the motion.
+
+If the torque is stamped τ after the motion that it belongs to, every line turns by e^(−iωτ):
+
+    Y = e^(−iωτ) Φ p
+
+With J, B and K alone the turn looks like more damping and less inertia at low frequency, but its
+part τ J ω³ is like nothing else, so τ is estimated beside them. It is common to a source: one
+amplifier, one bus. The instruments are those of `instruments` turned alike, so a subject who pushes
+does not move it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigidimeter.estimation.closedloop.instruments import instrumental
+from rigidimeter.estimation.closedloop.refine import (
+    Linearise,
+    LineFit,
+    Observation,
+    Problem,
+    fit_pooled,
+)
+from rigidimeter.estimation.signals import Array
+
+SCAN_STEP_S = 0.005
+"""The search for the delay begins at the best of steps this far apart: a quarter of a period at
+50 Hz, so that the nearest valley is the right one."""
+
+SCAN_HIGH_HZ = 20.0
+"""And is made below this frequency."""
+
+__all__ = ["delayed", "direct", "estimate_delay"]
+
+
+def direct(observations: Sequence[Observation], values: Array) -> list[Problem]:
+    """Return the problems of least squares: the measured motion is its own instrument."""
+    del values  # they do not depend on the parameters
+    return [Problem(lines.motion, lines.motion, lines.torque_nm) for lines, *_ in observations]
+
+
+def delayed(linearise: Linearise) -> Linearise:
+    """Return the problems with the delay as the last parameter."""
+
+    def with_delay(observations: Sequence[Observation], values: Array) -> list[Problem]:
+        parameters, delay_s = values[:-1], values[-1]
+        problems = []
+        for observation, problem in zip(
+            observations, linearise(observations, parameters), strict=True
+        ):
+            omega = observation.lines.grid.omega_rad_s
+            turn = np.exp(-1j * omega * delay_s)[:, None]
+            slope = -1j * omega[:, None] * turn
+            late = slope * (problem.regressors @ parameters)[:, None]
+            instrument = slope * (problem.instruments @ parameters)[:, None]
+            problems.append(
+                Problem(
+                    np.hstack([turn * problem.instruments, instrument]),
+                    np.hstack([turn * problem.regressors, late]),
+                    problem.target + late[:, 0] * delay_s,
+                )
+            )
+        return problems
+
+    return with_delay
+
+
+def estimate_delay(
+    observations: Sequence[Observation],
+    start: Array,
+    longest_s: float,
+    linearise: Linearise = instrumental,
+) -> LineFit:
+    """Return J, B, K and the delay of the torque against the motion, in s, pooled.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+    start : array, shape (3,)
+        J, B and K to begin with.
+    longest_s : float
+        The search is between minus and plus this delay.
+    linearise : callable
+
+    Raises
+    ------
+    ValueError
+        If the parameters cannot be told apart.
+    """
+    problems = linearise(observations, start)
+    delays = np.linspace(-longest_s, longest_s, 2 * max(round(longest_s / SCAN_STEP_S), 1) + 1)
+    left = [_unexplained(observations, problems, delay_s) for delay_s in delays]
+    near_s = float(delays[int(np.argmin(left))])
+    near = _solved(observations, problems, near_s)
+    fit, _ = fit_pooled(observations, delayed(linearise), np.append(near, near_s))
+    return fit
+
+
+def _solved(
+    observations: Sequence[Observation], problems: Sequence[Problem], delay_s: float
+) -> Array:
+    """Return J, B and K at a given delay, every line with the same weight."""
+    gram, moment = np.zeros((3, 3)), np.zeros(3)
+    for observation, problem in zip(observations, problems, strict=True):
+        turned = problem.target * np.exp(1j * observation.lines.grid.omega_rad_s * delay_s)
+        gram += (problem.instruments.conj().T @ problem.regressors).real
+        moment += (problem.instruments.conj().T @ turned).real
+    scale = np.sqrt(np.abs(np.diag(gram)))
+    solution = np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0]
+    return np.asarray(solution / scale, dtype=np.float64)
+
+
+def _unexplained(
+    observations: Sequence[Observation], problems: Sequence[Problem], delay_s: float
+) -> float:
+    """Return the torque's power up to `SCAN_HIGH_HZ` that the instruments leave, at a delay."""
+    left = 0.0
+    for observation, problem in zip(observations, problems, strict=True):
+        omega = observation.lines.grid.omega_rad_s
+        low = omega < 2 * np.pi * SCAN_HIGH_HZ
+        target = (problem.target * np.exp(1j * omega * delay_s))[low]
+        rows = problem.instruments[low]
+        rows, target = np.vstack([rows.real, rows.imag]), np.hstack([target.real, target.imag])
+        _, residual, _, _ = np.linalg.lstsq(rows / np.linalg.norm(rows, axis=0), target)
+        left += float(residual.sum())
+    return left

@@ -1,0 +1,105 @@
+"""The noise of an epoch line by line, and what it makes of the parameters.
+
+The residual torque of a fit holds sensor noise and whatever the subject did. Its power over the
+lines weights the fit (a line is worth the inverse of its noise), and its own lines give the
+covariance: with estimates p = C Σ Re(U_k^H Y_k), U the weighted instruments,
+
+    cov p = C (½ Σ Re(U_k^H U_k) S_k) C^T
+
+whatever the spectrum S: the spectral form of an estimate consistent under heteroscedastic and
+autocorrelated errors (Newey and West 1987; Andrews 1991, the smoothed periodogram in place of a
+lag window). How many independent lines stand behind it gives the degrees of freedom of Student's t
+(Satterthwaite 1946): a stiffness that rests on three lines has a wide interval.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.estimation.signals import Array
+
+__all__ = ["Smoother", "line_covariance"]
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Smoother:
+    """Running mean over neighbouring lines, wider where the lines are high.
+
+    Voluntary torque has its edges at low frequency, where lines are few and matter most; above,
+    the spectrum is smooth on a logarithmic scale.
+
+    Attributes
+    ----------
+    start, stop : array of int, shape (m,)
+        The lines that are averaged for each line.
+    """
+
+    start: NDArray[np.intp]
+    stop: NDArray[np.intp]
+
+    @classmethod
+    def over(cls, lines: NDArray[np.intp], least: int, fraction: float) -> Smoother:
+        """Average at least `least` lines to each side, and the given fraction of the line's own."""
+        place = np.arange(lines.size)
+        half = np.maximum(least, np.rint(fraction * lines).astype(np.intp))
+        return cls(np.maximum(place - half, 0), np.minimum(place + half + 1, lines.size))
+
+    def __call__(self, power: Array) -> Array:
+        """Return the smoothed power."""
+        total = np.concatenate(([0.0], np.cumsum(power)))
+        mean = (total[self.stop] - total[self.start]) / (self.stop - self.start)
+        return np.asarray(mean, dtype=np.float64)
+
+    def adjoint(self, weight: Array) -> Array:
+        """Return how much each raw line counts in a weighted sum of smoothed ones."""
+        share = weight / (self.stop - self.start)
+        steps = np.zeros(share.size + 1)
+        np.add.at(steps, self.start, share)
+        np.add.at(steps, self.stop, -share)
+        return np.cumsum(steps[:-1])
+
+
+def line_covariance(
+    inverse: Array, weighted: Complex, residual: Complex, smoother: Smoother, shape: Array
+) -> tuple[Array, Array]:
+    """Return the covariance of the parameters and their degrees of freedom.
+
+    Parameters
+    ----------
+    inverse : array, shape (p, p)
+        C above: the inverse of Σ Re(U^H Φ).
+    weighted : complex array, shape (m, p)
+        U, the instruments times the weights.
+    residual : complex array, shape (m,)
+        Y − Φ p.
+    smoother : Smoother
+        For the power of the residual.
+    shape : array, shape (m,)
+        What the power looks like over the lines, up to a factor: the residual is divided by it
+        before smoothing and multiplied after, so that a steep spectrum is not smeared
+        (prewhitening, Andrews and Monahan 1992).
+
+    Returns
+    -------
+    covariance : array, shape (p, p)
+    degrees : array, shape (p,)
+        For Student's t, of each parameter.
+    """
+    power = np.abs(residual) ** 2
+    # The fit has taken one degree of freedom a parameter out of two a line.
+    p = inverse.shape[0]
+    power = power * (2 * power.size / max(2 * power.size - p, 1))
+    density = shape * smoother(power / shape)
+    middle = 0.5 * ((weighted.conj() * density[:, None]).T @ weighted).real
+    covariance = inverse @ middle @ inverse.T
+    effect = np.abs(weighted @ inverse.T) ** 2  # (m, p): each line's share of each variance
+    degrees = np.empty(p)
+    for j in range(p):
+        share = smoother.adjoint(effect[:, j] * shape) * density / shape
+        degrees[j] = 2 * np.sum(share) ** 2 / np.sum(share**2)
+    return covariance, degrees

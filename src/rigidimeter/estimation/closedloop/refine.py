@@ -1,0 +1,309 @@
+"""Weighted estimation from lines, iterated until weights and linearisation no longer change.
+
+Every method of the closed loop is the same linear problem at each step,
+
+    p = C Σ Re(U^H Y)      C = (Σ Re(U^H Φ))⁻¹      U = Z / S
+
+with its own instruments Z, regressors Φ and target Y at the current parameters, and S the power of
+the residual. One epoch weights itself; several epochs share their residual's power, which is then
+known from so many lines that it need not be smoothed over neighbours that differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.estimation.closedloop.lines import Lines
+from rigidimeter.estimation.closedloop.loop import LoopModel
+from rigidimeter.estimation.closedloop.noise import Smoother, line_covariance
+from rigidimeter.estimation.signals import Array
+from rigidimeter.records import Channel
+
+__all__ = ["LineFit", "Observation", "Problem", "Shape", "fit_pooled", "fit_single"]
+
+Complex = NDArray[np.complex128]
+
+ITERATIONS = 15
+CONVERGED = 0.02
+"""A step of less than this fraction of every standard error ends the iteration."""
+
+ENOUGH_LINES = 9
+"""How many lines, over epochs and neighbours, the power of the noise is averaged over at least."""
+
+NEIGHBOURS = 0.1
+"""And over neighbours within this fraction of a line's own number."""
+
+ENOUGH_EPOCHS = 10
+"""From this many epochs on, the scatter between them gives the covariance of the pooled estimate.
+"""
+
+SHARED_FROM = 4
+"""From this many epochs on, they share the shape of their noise."""
+
+
+class Observation(NamedTuple):
+    """One epoch, ready: its lines, the perturbation at its ticks, and the loop it ran in.
+
+    `excited` says at which lines a periodic perturbation has power; everywhere where it is not
+    periodic. Epochs with the same `response_key` have the same response to the perturbation.
+    """
+
+    lines: Lines
+    perturbation: Channel
+    loop: LoopModel
+    excited: NDArray[np.bool_]
+    response_key: Hashable
+
+
+class Problem(NamedTuple):
+    """The linear problem at given parameters.
+
+    `instruments` and `regressors` have shape (m, p), `target` (m,).
+    """
+
+    instruments: Complex
+    regressors: Complex
+    target: Complex
+
+
+Linearise = Callable[[Sequence[Observation], Array], list[Problem]]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Power of the noise over frequency, for a window of unit energy."""
+
+    omega_rad_s: Array
+    density: Array
+
+    def at(self, lines: Lines) -> Array:
+        """Return the power at the lines of an epoch."""
+        return np.interp(lines.grid.omega_rad_s, self.omega_rad_s, self.density)
+
+
+@dataclass(frozen=True)
+class LineFit:
+    """Parameters with their uncertainty.
+
+    Attributes
+    ----------
+    values : array, shape (p,)
+    covariance : array, shape (p, p)
+    degrees : array, shape (p,)
+        Degrees of freedom for Student's t.
+    bound : array, shape (p, p)
+        Covariance that no unbiased estimate from the perturbation can fall below, for the noise
+        that was found (Cramér–Rao).
+    condition_number : float
+        Of the whitened instruments, each scaled to unit length.
+    shape : Shape
+    problem : Problem or None
+        At the solution, for a fit to one epoch.
+    """
+
+    values: Array
+    covariance: Array
+    degrees: Array
+    bound: Array
+    condition_number: float
+    shape: Shape
+    problem: Problem | None = None
+
+    @property
+    def standard_errors(self) -> Array:
+        """Square roots of the diagonal of the covariance."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
+
+
+def fit_single(
+    observation: Observation,
+    linearise: Linearise,
+    start: Array,
+    shape: Shape | None = None,
+    problem: Problem | None = None,
+) -> LineFit:
+    """Fit one epoch.
+
+    Parameters
+    ----------
+    observation : Observation
+    linearise : callable
+        Makes the problems at given parameters.
+    start : array, shape (p,)
+    shape : Shape, optional
+        Power of the noise that epochs of the same kind share; else this epoch's own is found.
+    problem : Problem, optional
+        Use this problem and do not iterate: for instruments from a pooled estimate.
+
+    Raises
+    ------
+    ValueError
+        If the perturbation did not move the joint enough to tell the parameters apart.
+    """
+    lines = observation.lines
+    smoother = _smoother([lines])
+    values = np.array(start, dtype=np.float64)
+    weight_from = shape
+    fixed = problem is not None
+    for _ in range(1 if fixed and shape is not None else ITERATIONS):
+        if problem is None or not fixed:
+            (problem,) = linearise([observation], values)
+        if shape is None:
+            weight_from = _density([lines], [problem], values, smoother)
+        assert weight_from is not None
+        weighted = problem.instruments / weight_from.at(lines)[:, None]
+        inverse = _inverse((weighted.conj().T @ problem.regressors).real)
+        step = inverse @ (weighted.conj().T @ problem.target).real - values
+        values = values + step
+        scale = np.sqrt(np.diag(_bound([problem], [lines], weight_from)))
+        if np.all(np.abs(step) < CONVERGED * scale):
+            break
+    assert problem is not None
+    assert weight_from is not None
+    residual = problem.target - problem.regressors @ values
+    covariance, degrees = line_covariance(
+        inverse, weighted, residual, smoother, weight_from.at(lines)
+    )
+    # The epoch's own level on the common shape.
+    common = weight_from.at(lines)
+    own = common * smoother(np.abs(residual) ** 2 / common)
+    return LineFit(
+        values,
+        covariance,
+        degrees,
+        _bound([problem], [lines], Shape(lines.grid.omega_rad_s, own)),
+        _condition([problem], [lines], weight_from),
+        weight_from,
+        problem,
+    )
+
+
+def fit_pooled(
+    observations: Sequence[Observation], linearise: Linearise, start: Array
+) -> tuple[LineFit, list[Problem]]:
+    """Fit epochs that share the joint; also return their problems at the solution.
+
+    From ten epochs on the covariance comes from the scatter between them, whatever its cause: noise
+    or a joint that is not quite the same each time. With fewer it comes from the lines.
+
+    Raises
+    ------
+    ValueError
+        If the perturbation did not move the joint enough to tell the parameters apart.
+    """
+    everything = [observation.lines for observation in observations]
+    smoother = _smoother(everything)
+    values = np.array(start, dtype=np.float64)
+    for _ in range(ITERATIONS):
+        problems = linearise(observations, values)
+        shape = _density(everything, problems, values, smoother)
+        gram = np.zeros((values.size, values.size))
+        moment = np.zeros(values.size)
+        for problem, lines in zip(problems, everything, strict=True):
+            weighted = problem.instruments / shape.at(lines)[:, None]
+            gram += (weighted.conj().T @ problem.regressors).real
+            moment += (weighted.conj().T @ problem.target).real
+        inverse = _inverse(gram)
+        step = inverse @ moment - values
+        values = values + step
+        bound = _bound(problems, everything, shape)
+        if np.all(np.abs(step) < CONVERGED * np.sqrt(np.diag(bound))):
+            break
+    covariance, degrees = _pooled_covariance(problems, everything, shape, inverse, values)
+    fit = LineFit(
+        values,
+        covariance,
+        degrees,
+        bound,
+        _condition(problems, everything, shape),
+        shape,
+    )
+    return fit, problems
+
+
+def _pooled_covariance(
+    problems: Sequence[Problem],
+    everything: Sequence[Lines],
+    shape: Shape,
+    inverse: Array,
+    values: Array,
+) -> tuple[Array, Array]:
+    p, count = values.size, len(problems)
+    moments = np.empty((count, p))
+    of_lines = np.zeros((p, p))
+    squares = np.zeros(p)
+    for i, (problem, lines) in enumerate(zip(problems, everything, strict=True)):
+        weighted = problem.instruments / shape.at(lines)[:, None]
+        residual = problem.target - problem.regressors @ values
+        moments[i] = (weighted.conj().T @ residual).real
+        part, degrees = line_covariance(
+            inverse, weighted, residual, _smoother([lines]), shape.at(lines)
+        )
+        of_lines += part
+        squares += np.diag(part) ** 2 / degrees
+    between = inverse @ (moments.T @ moments) @ inverse.T * (count / max(count - 1, 1))
+    if count >= ENOUGH_EPOCHS:
+        return between, np.full(p, count - 1.0)
+    return of_lines, np.diag(of_lines) ** 2 / squares
+
+
+def _smoother(everything: Sequence[Lines]) -> Smoother:
+    needed = -(-ENOUGH_LINES // len(everything))
+    return Smoother.over(everything[0].grid.line, (needed - 1 + 1) // 2, NEIGHBOURS)
+
+
+def _density(
+    everything: Sequence[Lines],
+    problems: Sequence[Problem],
+    values: Array,
+    smoother: Smoother,
+) -> Shape:
+    """Return the mean power of the residuals on the lines of the first epoch, smoothed."""
+    omega = everything[0].grid.omega_rad_s
+    total = np.zeros(omega.size)
+    for lines, problem in zip(everything, problems, strict=True):
+        residual = problem.target - problem.regressors @ values
+        power = np.abs(residual) ** 2
+        total += np.interp(omega, lines.grid.omega_rad_s, power)
+    density = smoother(total / len(everything))
+    if not np.all(density > 0):
+        raise ValueError("the fit leaves nothing at some frequencies: are the channels simulated?")
+    return Shape(omega, density)
+
+
+def _bound(problems: Sequence[Problem], everything: Sequence[Lines], shape: Shape) -> Array:
+    """Return (2 Σ Re(Z^H Z) / S)⁻¹."""
+    p = problems[0].instruments.shape[1]
+    information = np.zeros((p, p))
+    for problem, lines in zip(problems, everything, strict=True):
+        weighted = problem.instruments / shape.at(lines)[:, None]
+        information += 2 * (weighted.conj().T @ problem.instruments).real
+    return _inverse(information)
+
+
+def _condition(problems: Sequence[Problem], everything: Sequence[Lines], shape: Shape) -> float:
+    rows = np.concatenate(
+        [
+            problem.instruments / np.sqrt(shape.at(lines))[:, None]
+            for problem, lines in zip(problems[:1], everything[:1], strict=True)
+        ]
+    )
+    stacked = np.concatenate([rows.real, rows.imag])
+    singular = np.linalg.svd(stacked / np.linalg.norm(stacked, axis=0), compute_uv=False)
+    return float(singular[0] / singular[-1])
+
+
+def _inverse(matrix: Array) -> Array:
+    """Invert a small matrix whose columns differ by orders of magnitude."""
+    scale = np.sqrt(np.abs(np.diag(matrix)))
+    if not np.all(np.isfinite(matrix)) or not np.all(scale > 0):
+        raise ValueError("the perturbation did not move the joint")
+    scaled = matrix / np.outer(scale, scale)
+    if np.linalg.cond(scaled) > 1e10:
+        raise ValueError("the motion that the perturbation causes cannot tell J, B and K apart")
+    return np.asarray(np.linalg.inv(scaled) / np.outer(scale, scale), dtype=np.float64)
