@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from benchmarks.paired import paired
+from benchmarks.paired import Row, in_ms, paired
 from rigidimeter.acquisition import ControlLoop, SimulatedClock
 from rigidimeter.batch import Bench, bench, draw_inputs, epoch_generator, simulate_chunks
 from rigidimeter.batch.run import empty_rows, run_row
@@ -107,16 +107,16 @@ class Steady:
         return self.rows["torque_nm"][0]
 
 
-def against_lfilter(steady: Steady) -> tuple[str, float, float]:
+def against_lfilter(steady: Steady) -> Row:
     b, a = signal.ss2tf(*linear_loop(steady.bench))
     ideal = Steady(ideal_settings())
     difference = np.abs(ideal() - signal.lfilter(b[0], a, ideal.wanted_nm)).max()
     assert difference < 1e-6, f"the linear loop differs by {difference:.2g} N·m"
     name = f"batch epoch of 20 s at 1 kHz, steady / scipy.signal.lfilter of order {ORDER}"
-    return name, *paired(steady, lambda: signal.lfilter(b[0], a, steady.wanted_nm), REPEATS)
+    return in_ms(name, paired(steady, lambda: signal.lfilter(b[0], a, steady.wanted_nm), REPEATS))
 
 
-def against_control(steady: Steady) -> list[tuple[str, float, float]]:
+def against_control(steady: Steady) -> list[Row]:
     try:
         import control
     except ImportError:
@@ -125,11 +125,13 @@ def against_control(steady: Steady) -> list[tuple[str, float, float]]:
     system = control.ss(*linear_loop(steady.bench), 1e-3)
     name = "batch epoch of 20 s at 1 kHz, steady / control.forced_response"
     return [
-        (name, *paired(steady, lambda: control.forced_response(system, inputs=steady.wanted_nm)))
+        in_ms(
+            name, paired(steady, lambda: control.forced_response(system, inputs=steady.wanted_nm))
+        )
     ]
 
 
-def against_mujoco(steady: Steady) -> list[tuple[str, float, float]]:
+def against_mujoco(steady: Steady) -> list[Row]:
     try:
         import mujoco
         from mujoco import rollout
@@ -148,10 +150,10 @@ def against_mujoco(steady: Steady) -> list[tuple[str, float, float]]:
     start = np.zeros(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
     commands = steady.rows["velocity_command_rad_s"][0][:, None].copy()
     name = "batch epoch of 20 s at 1 kHz, steady / mujoco.rollout of a hinge with a velocity servo"
-    return [(name, *paired(steady, lambda: rollout.rollout(model, data, start, commands)))]
+    return [in_ms(name, paired(steady, lambda: rollout.rollout(model, data, start, commands)))]
 
 
-def against_loop() -> tuple[str, float, float]:
+def against_loop() -> Row:
     """From seed to columns, random numbers and all, against the loop in the interpreter."""
     wanted = prbs_nm(SETTINGS.prbs, SETTINGS.rig.tick_rate_hz).tolist()
 
@@ -161,7 +163,7 @@ def against_loop() -> tuple[str, float, float]:
         ControlLoop(SETTINGS, rig, SimulatedClock(), [].append).perturb(1, wanted)
 
     name = "batch epoch of 20 s at 1 kHz with its random numbers / the loop in the interpreter"
-    return name, *paired(lambda: list(simulate_chunks(SETTINGS, 1)), interpreted)
+    return in_ms(name, paired(lambda: list(simulate_chunks(SETTINGS, 1)), interpreted))
 
 
 def measured_run(n_epochs: int) -> dict[str, float]:
@@ -182,20 +184,20 @@ def apart(n_epochs: int) -> dict[str, float]:
     return dict(json.loads(ran.stdout))
 
 
-def growth(few: int = 100, many: int = 10_000) -> list[tuple[str, float, float]]:
+def growth(few: int = 100, many: int = 10_000) -> list[Row]:
     """Cost per epoch and peak memory of many epochs, against those of few."""
     small, large = apart(few), apart(many)
-    per_epoch = f"batch, time per epoch of {many} epochs / of {few}"
-    # The table is in ms; a megabyte stands there as a thousandth.
-    memory = f"batch, peak memory in MB of {many} epochs / of {few}"
     return [
-        (per_epoch, large["s"] / many, small["s"] / few),
-        (memory, large["mb"] / 1e3, small["mb"] / 1e3),
+        in_ms(
+            f"batch, time per epoch of {many} epochs / of {few}",
+            (large["s"] / many, small["s"] / few),
+        ),
+        Row(f"batch, peak memory of {many} epochs / of {few}", large["mb"], small["mb"], "MB"),
     ]
 
 
-def rows() -> list[tuple[str, float, float]]:
-    """Return (name, ours, reference), times in s."""
+def rows() -> list[Row]:
+    """Return what was measured."""
     steady = Steady(SETTINGS)
     return [
         against_lfilter(steady),
@@ -210,8 +212,8 @@ def main() -> None:
     if len(sys.argv) > 1:
         print(json.dumps(measured_run(int(sys.argv[1]))))
         return
-    for name, ours, reference in rows():
-        print(f"{name}: {1e3 * ours:.4g} / {1e3 * reference:.4g} = {ours / reference:.4g}")
+    for row in rows():
+        print(row)
 
 
 if __name__ == "__main__":

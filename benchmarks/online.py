@@ -11,6 +11,7 @@ from collections.abc import Callable, MutableSequence, Sequence
 
 import numpy as np
 
+from benchmarks.paired import Row
 from rigidimeter.estimation.online import (
     STATE_SIZE,
     compiled_online_step,
@@ -50,8 +51,8 @@ def run(
     return (time.perf_counter() - start) / len(samples)
 
 
-def rows() -> list[tuple[str, float, float]]:
-    """Return what was measured, seconds a call of ours, and of a call that does nothing."""
+def rows() -> list[Row]:
+    """Return what was measured: a call of ours, and one that does nothing."""
     t = np.arange(SAMPLES) / RATE_HZ
     rng = np.random.default_rng(0)
     angle, velocity = 0.1 * np.sin(6.0 * t), 0.6 * np.cos(6.0 * t)
@@ -68,10 +69,11 @@ def rows() -> list[tuple[str, float, float]]:
             ours = run(step, kind(design), kind([0.0] * STATE_SIZE), samples)
             times.append((ours, run(nothing, kind(design), kind([0.0] * STATE_SIZE), samples)))
         ours, bare = (statistics.median(column) for column in zip(*times[1:], strict=True))
-        found.append((f"a sample of the live estimate, {name} / an empty call", ours, bare))
+        what = f"a sample of the live estimate, {name} / an empty call"
+        found.append(Row(what, 1e6 * ours, 1e6 * bare, "µs"))
     return found
 
 
 if __name__ == "__main__":
-    for what, ours, bare in rows():
-        print(f"{what}: {1e6 * ours:.2f} µs / {1e6 * bare:.2f} µs")
+    for row in rows():
+        print(row)
