@@ -100,9 +100,10 @@ def _delay_lines(analysis: Analysis) -> list[str]:
     for delay in analysis.delays:
         if math.isfinite(delay.delay_s):
             done = "corrected" if delay.corrected else delay.remark
+            side = "later" if delay.delay_s > 0 else "earlier"
             text = (
-                f"Torque {1e3 * delay.delay_s:.3g} ± {1e3 * delay.delay_s_se:.2g} ms later than "
-                f"the motion in {delay.source}: {done}."
+                f"Torque {1e3 * abs(delay.delay_s):.3g} ± {1e3 * delay.delay_s_se:.2g} ms {side} "
+                f"than the motion in {delay.source}: {done}."
             )
             lines += _wrapped(text)
     return [*lines, ""] if lines else []

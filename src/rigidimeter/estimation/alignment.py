@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigidimeter.estimation.bandlimited import band_hz
-from rigidimeter.estimation.closedloop.delay import direct, estimate_delay
+from rigidimeter.estimation.closedloop.delay import SCAN_STEP_S, direct, estimate_delay
 from rigidimeter.estimation.closedloop.drive import DriveModel
 from rigidimeter.estimation.closedloop.estimate import (
     closed_loop_obstacle,
@@ -104,8 +104,13 @@ def _estimate(source: str, epochs: Sequence[Epoch], settings: Settings) -> Delay
     except ValueError as error:
         return Delay(source, remark=f"not estimated: {error}")
     found = Delay(source, total_s, error_s)
-    if not np.isfinite(total_s) or abs(total_s) > settings.estimation.longest_delay_s:
-        return Delay(source, remark="the search for the channels' delay did not settle")
+    longest_s = settings.estimation.longest_delay_s
+    if not np.isfinite(total_s) or abs(total_s) > longest_s - SCAN_STEP_S / 2:
+        return Delay(
+            source,
+            remark=f"no delay within ±{1e3 * longest_s:g} ms explains the torque "
+            "(estimation.longest_delay_s)",
+        )
     if not known:
         return replace(
             found,

@@ -33,7 +33,7 @@ SCAN_STEP_S = 0.005
 SCAN_HIGH_HZ = 20.0
 """And is made below this frequency."""
 
-__all__ = ["delayed", "direct", "estimate_delay"]
+__all__ = ["SCAN_STEP_S", "delayed", "direct", "estimate_delay"]
 
 
 def direct(observations: Sequence[Observation], values: Array) -> list[Problem]:

@@ -161,6 +161,8 @@ def fit_closed_loop(
         there are several; their `epoch` is ``pooled``.
     """
     linearise = CLOSED_LOOP[method]
+    estimation = settings.estimation
+    draws = estimation.bootstrap_draws if estimation.intervals == "bootstrap" else 0
     if inertia_kg_m2 is not None:
         linearise = _holding(linearise, inertia_kg_m2)
     drive_of = drives(epochs, settings)
@@ -185,7 +187,7 @@ def fit_closed_loop(
         made: dict[int, Problem] = {}
         if good:
             try:
-                shared, problems = fit_pooled([o for _, o in good], linearise, start)
+                shared, problems = fit_pooled([o for _, o in good], linearise, start, draws)
             except ValueError:
                 shared = None  # each epoch will say why
             else:
@@ -202,6 +204,7 @@ def fit_closed_loop(
                     shared.values if shared is not None else start,
                     share.shape if share is not None else None,
                     reuse if share is not None else None,
+                    draws,
                 )
             except ValueError as error:
                 fits[place] = _without_numbers(epoch, method, str(error))
@@ -212,7 +215,7 @@ def fit_closed_loop(
         start = least_squares_start([observation for _, observation in counting])
         start = start if inertia_kg_m2 is None else start[1:]
         try:
-            everything, _ = fit_pooled([o for _, o in counting], linearise, start)
+            everything, _ = fit_pooled([o for _, o in counting], linearise, start, draws)
         except ValueError:
             pass  # as the conditions have
         else:
@@ -251,10 +254,14 @@ def least_squares_start(observations: Sequence[Observation]) -> Array:
 def _numbers(fit: LineFit, inertia_kg_m2: float | None) -> dict[str, Any]:
     """Return the fields of a `Fit` for J, B and K."""
     errors = fit.standard_errors
-    quantile = student.ppf(0.975, fit.degrees)
     bound = np.sqrt(np.diag(fit.bound))
-    columns = [fit.values, errors, fit.values - quantile * errors, fit.values + quantile * errors]
-    table = np.column_stack([*columns, bound])
+    if fit.drawn is not None:
+        errors = np.std(fit.drawn, axis=0, ddof=1)
+        low, high = np.quantile(fit.drawn, [0.025, 0.975], axis=0)
+    else:
+        half = student.ppf(0.975, fit.degrees) * errors
+        low, high = fit.values - half, fit.values + half
+    table = np.column_stack([fit.values, errors, low, high, bound])
     if inertia_kg_m2 is not None:
         held = [inertia_kg_m2, 0.0, inertia_kg_m2, inertia_kg_m2, 0.0]
         table = np.vstack([held, table])

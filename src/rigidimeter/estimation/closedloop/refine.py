@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.estimation.closedloop.lines import Lines
 from rigidimeter.estimation.closedloop.loop import LoopModel
-from rigidimeter.estimation.closedloop.noise import Smoother, line_covariance
+from rigidimeter.estimation.closedloop.noise import Smoother, drawn_lines, line_covariance
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel
 
@@ -28,9 +28,15 @@ __all__ = ["LineFit", "Observation", "Problem", "Shape", "fit_pooled", "fit_sing
 
 Complex = NDArray[np.complex128]
 
-ITERATIONS = 15
+ITERATIONS = 25
 CONVERGED = 0.02
 """A step of less than this fraction of every standard error ends the iteration."""
+
+SETTLED = 0.5
+"""After so many iterations a step of more than this fraction means that there is no solution."""
+
+BOOTSTRAP_SEED = 1
+"""The same epochs give the same interval every time."""
 
 ENOUGH_LINES = 9
 """How many lines, over epochs and neighbours, the power of the noise is averaged over at least."""
@@ -102,8 +108,8 @@ class LineFit:
     condition_number : float
         Of the whitened instruments, each scaled to unit length.
     shape : Shape
-    problem : Problem or None
-        At the solution, for a fit to one epoch.
+    drawn : array, shape (draws, p), or None
+        Parameters drawn by bootstrap, if that was asked for.
     """
 
     values: Array
@@ -112,7 +118,7 @@ class LineFit:
     bound: Array
     condition_number: float
     shape: Shape
-    problem: Problem | None = None
+    drawn: Array | None = None
 
     @property
     def standard_errors(self) -> Array:
@@ -126,6 +132,7 @@ def fit_single(
     start: Array,
     shape: Shape | None = None,
     problem: Problem | None = None,
+    draws: int = 0,
 ) -> LineFit:
     """Fit one epoch.
 
@@ -139,11 +146,14 @@ def fit_single(
         Power of the noise that epochs of the same kind share; else this epoch's own is found.
     problem : Problem, optional
         Use this problem and do not iterate: for instruments from a pooled estimate.
+    draws : int
+        Of the bootstrap; none if 0.
 
     Raises
     ------
     ValueError
-        If the perturbation did not move the joint enough to tell the parameters apart.
+        If the perturbation did not move the joint enough to tell the parameters apart, or the
+        iteration does not settle.
     """
     lines = observation.lines
     smoother = _smoother([lines])
@@ -165,6 +175,8 @@ def fit_single(
             break
     assert problem is not None
     assert weight_from is not None
+    if not (fixed and shape is not None):
+        _refuse_unsettled(step, scale)
     residual = problem.target - problem.regressors @ values
     covariance, degrees = line_covariance(
         inverse, weighted, residual, smoother, weight_from.at(lines)
@@ -179,12 +191,12 @@ def fit_single(
         _bound([problem], [lines], Shape(lines.grid.omega_rad_s, own)),
         _condition([problem], [lines], weight_from),
         weight_from,
-        problem,
+        values + drawn_lines(inverse, weighted, residual, _rng(), draws) if draws else None,
     )
 
 
 def fit_pooled(
-    observations: Sequence[Observation], linearise: Linearise, start: Array
+    observations: Sequence[Observation], linearise: Linearise, start: Array, draws: int = 0
 ) -> tuple[LineFit, list[Problem]]:
     """Fit epochs that share the joint; also return their problems at the solution.
 
@@ -214,7 +226,10 @@ def fit_pooled(
         bound = _bound(problems, everything, shape)
         if np.all(np.abs(step) < CONVERGED * np.sqrt(np.diag(bound))):
             break
-    covariance, degrees = _pooled_covariance(problems, everything, shape, inverse, values)
+    _refuse_unsettled(step, np.sqrt(np.diag(bound)))
+    covariance, degrees, errors = _pooled_covariance(
+        problems, everything, shape, inverse, values, draws
+    )
     fit = LineFit(
         values,
         covariance,
@@ -222,8 +237,21 @@ def fit_pooled(
         bound,
         _condition(problems, everything, shape),
         shape,
+        values + errors if draws else None,
     )
     return fit, problems
+
+
+def _refuse_unsettled(step: Array, scale: Array) -> None:
+    if not np.all(np.abs(step) < SETTLED * scale):
+        raise ValueError(
+            f"the estimate did not settle in {ITERATIONS} iterations; the motion that the "
+            "perturbation causes says too little of the joint"
+        )
+
+
+def _rng() -> np.random.Generator:
+    return np.random.default_rng(BOOTSTRAP_SEED)
 
 
 def _pooled_covariance(
@@ -232,11 +260,14 @@ def _pooled_covariance(
     shape: Shape,
     inverse: Array,
     values: Array,
-) -> tuple[Array, Array]:
+    draws: int,
+) -> tuple[Array, Array, Array]:
+    """Return covariance, degrees of freedom and, if draws are asked for, errors drawn."""
     p, count = values.size, len(problems)
     moments = np.empty((count, p))
     of_lines = np.zeros((p, p))
     squares = np.zeros(p)
+    errors, rng = np.zeros((draws, p)), _rng()
     for i, (problem, lines) in enumerate(zip(problems, everything, strict=True)):
         weighted = problem.instruments / shape.at(lines)[:, None]
         residual = problem.target - problem.regressors @ values
@@ -246,15 +277,20 @@ def _pooled_covariance(
         )
         of_lines += part
         squares += np.diag(part) ** 2 / degrees
+        if draws and count < ENOUGH_EPOCHS:
+            errors += drawn_lines(inverse, weighted, residual, rng, draws)
     between = inverse @ (moments.T @ moments) @ inverse.T * (count / max(count - 1, 1))
-    if count >= ENOUGH_EPOCHS:
-        return between, np.full(p, count - 1.0)
-    return of_lines, np.diag(of_lines) ** 2 / squares
+    if count < ENOUGH_EPOCHS:
+        return of_lines, np.diag(of_lines) ** 2 / squares, errors
+    if draws:  # each epoch is a block
+        times = rng.multinomial(count, np.full(count, 1.0 / count), size=draws)
+        errors = times @ moments @ inverse.T
+    return between, np.full(p, count - 1.0), errors
 
 
 def _smoother(everything: Sequence[Lines]) -> Smoother:
     needed = -(-ENOUGH_LINES // len(everything))
-    return Smoother.over(everything[0].grid.line, (needed - 1 + 1) // 2, NEIGHBOURS)
+    return Smoother.over(everything[0].grid.line, needed // 2, NEIGHBOURS)
 
 
 def _density(
