@@ -11,8 +11,11 @@ from rigidimeter.design import (
     corners,
     demand,
     ideal_response,
+    loop_margins,
+    loop_stability,
     power_spectrum,
     prbs_nm,
+    predicted_precision,
     sinusoid,
     time_constant_s,
 )
@@ -23,6 +26,7 @@ from rigidimeter.settings import (
     PrbsSettings,
     ScoreSettings,
     SinusoidSettings,
+    parse_settings,
 )
 
 MEDIAN_JOINT = JointDynamics(0.0045, 0.1368, 1.751)  # Sec. 3.4
@@ -95,6 +99,49 @@ def test_position_sd_tells_per_degree_from_per_radian(clock_hz: float) -> None:
         sd_deg.append(math.degrees(needs.angle_sd_rad))
     assert 4.0 < sd_deg[0] < 6.0
     assert 15.0 < sd_deg[1] < 22.0
+
+
+def test_the_loop_tells_per_degree_from_per_radian() -> None:
+    """20 Hz filter and 40 Hz drive: stable read per degree, unstable read per radian."""
+    rig = {"rig": {"drive_bandwidth_hz": 40.0}, "guard": {"reaction_time_s": 0.03}}
+    per_radian = {"controller": {"inertia_kg_m2": 0.0008, "damping_nm_s_rad": 0.028}}
+    per_degree = loop_stability(parse_settings(rig))
+    for margins in (*per_degree.conditions.values(), *per_degree.worst.values()):
+        assert margins.stable
+        assert margins.gain_margin_db > 10.0
+    assert not loop_margins(parse_settings({**rig, **per_radian}), MEDIAN_JOINT).stable
+
+
+def test_voluntary_torque_puts_least_squares_off_as_predicted() -> None:
+    """0.2 N·m in 0.3–4 Hz makes B come out 64 % and J 40 % too low, by how wide the band is.
+
+    Above the voluntary torque the motion is the perturbation's own, and more of it helps.
+    """
+    off = []
+    for high_hz in (10.0, 50.0):
+        settings = parse_settings(
+            {
+                "subject": {"OFF": {"voluntary_sd_nm": 0.2}},
+                "estimation": {"band_high_hz": high_hz},
+            }
+        )
+        torque = prbs_nm(settings.prbs, 1000.0)
+        found = predicted_precision(torque, settings, settings.subject["OFF"])
+        off.append(np.array(found.least_squares_bias) / found.values)
+    narrow, wide = off
+    assert narrow[0] < -0.40 < wide[0] < 0.0
+    assert narrow[1] < -0.64 < wide[1] < -0.60
+
+
+def test_white_noise_gives_the_cramer_rao_ratio_and_not_that_of_section_3_4() -> None:
+    """SD(J) : SD(B) : SD(K) is about 0.005 : 0.19 : 1; the printed SDs are nearly equal."""
+    settings = parse_settings({})
+    torque = prbs_nm(settings.prbs, 1000.0)
+    found = predicted_precision(torque, settings, settings.subject["OFF"]).bound.free
+    assert found[0] / found[2] == pytest.approx(0.005, rel=0.2)
+    assert found[1] / found[2] == pytest.approx(0.19, rel=0.1)
+    printed = (9.6e-7, 1.05e-6, 1.4e-6)
+    assert printed[0] / printed[2] > 100 * found[0] / found[2]
 
 
 def test_controller_per_radian_and_its_time_constant() -> None:

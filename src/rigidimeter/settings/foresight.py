@@ -14,8 +14,9 @@ __all__ = ["MarginsSettings", "MultisineSettings", "OptimiseSettings"]
 class MarginsSettings(Section):
     """How far the loop must stay from instability, and for which joints.
 
-    Each of J, B and K of every subject is varied by the two factors to find the worst case. Margins
-    below the two thresholds bring a warning; an unstable loop is refused.
+    Each of J, B and K of every subject is varied by the two factors to find the worst case. A loop
+    that is unstable or has smaller margins is refused for a condition's own joint, and brings a
+    warning for the worst case.
     """
 
     gain_margin_db: float = quantity(6.0, "dB", 0.0, 60.0)

@@ -12,9 +12,9 @@ import typer
 from typer.testing import CliRunner
 
 from rigidimeter.cli.design import SCHEMA, design
-from rigidimeter.design import overview, prbs_nm, sinusoid
+from rigidimeter.design import PARAMETERS, multisine_nm, overview, prbs_nm, sinusoid
 from rigidimeter.errors import UserError
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.settings import Settings, load_settings, parse_settings
 
 app = typer.Typer()
 app.command()(design)
@@ -103,6 +103,124 @@ def test_mistakes_are_sentences(tmp_path: Path) -> None:
     (tmp_path / "out" / "prbs.csv").mkdir()
     with pytest.raises(UserError, match=r"prbs\.csv: cannot be written"):
         run("--out", str(tmp_path / "out"))
+
+
+def test_prints_what_is_foreseen() -> None:
+    words = " ".join(run().split())
+    for expected in (
+        "subject OFF 28.3 dB 92.1 deg 1472 ms 0.95 stable",
+        "worst joint around it 16.2 dB",
+        "each of J, B, K from 0.25 to 4 times its value",
+        "iv, 0.1–50 Hz 2.72e-06 (0.0603 %) 8.7e-05 (0.0636 %) 0.000468 (0.0267 %)",
+        "passive arm, 0.15–10 Hz 3.57e-06 (0.0794 %) 9.21e-05 (0.0673 %) 0.000547 (0.0312 %)",
+        "iv, 4 epochs pooled",
+    ):
+        assert expected in words
+    assert "would put least squares off" not in words
+
+
+def test_the_subjects_own_torque_is_foreseen(tmp_path: Path) -> None:
+    settings = tmp_path / "rig.toml"
+    settings.write_text("[subject.OFF]\nvoluntary_sd_nm = 0.2\n")
+    words = " ".join(run("--settings", str(settings)).split())
+    assert "would put least squares off: J by -43 %, B by -69 %, K by +3 %" in words
+
+
+def test_numbers_of_what_is_foreseen(tmp_path: Path) -> None:
+    numbers = tmp_path / "numbers.json"
+    run("--json", str(numbers), "--detect", "damping=20%", "--detect", "stiffness=0.3")
+    document = json.loads(numbers.read_text())
+    off = document["stability"]["conditions"]["OFF"]
+    assert off["stable"] is True
+    assert off["gain_margin_db"] == pytest.approx(28.3, abs=0.1)
+    assert document["stability"]["worst"]["DBS"]["inertia_kg_m2"] == pytest.approx(0.018)
+    precision = document["precision"]["OFF"]
+    assert precision["iv_band_hz"] == pytest.approx([0.1016, 49.99], rel=1e-3)
+    assert precision["least_squares_band_hz"] == [0.15, 10.0]
+    for which in ("bound", "iv", "least_squares"):
+        assert list(precision[which]["free"]) == list(PARAMETERS)
+        assert list(precision[which]["fixed_inertia"]) == list(PARAMETERS[1:])
+    assert precision["planned_epochs"] == 4
+    for name in PARAMETERS:
+        assert precision["iv_pooled"][name] == precision["iv"]["free"][name] / 2
+    assert document["precision"]["DBS"]["iv_pooled"] is None
+    assert document["optimised"] is document["multisine"] is None
+    damping, stiffness = document["detection"]
+    assert damping["parameter"] == "damping"
+    assert damping["epochs_needed"] == 4
+    assert damping["planned_power"] is None
+    assert stiffness["difference"] == 0.3
+    assert document["remarks"] == []
+
+
+def test_searches_and_compares(tmp_path: Path) -> None:
+    settings, folder = tmp_path / "rig.toml", tmp_path / "planned"
+    settings.write_text("[optimise]\nclocks = 2\nbits_low = 7\nbits_high = 7\n")
+    text = run(
+        "--settings", str(settings), "--out", str(folder), "--optimise", "--criterion", "D",
+        "--multisine",
+    )  # fmt: skip
+    words = " ".join(text.split())
+    assert "Search for a PRBS (2 sequences, criterion D, iv, one epoch)" in words
+    assert "present 7 20 1 " in words
+    assert "Multisine (crest factor 1.49)" in words
+    assert {path.name for path in folder.iterdir()} == {
+        "prbs.csv", "sinusoid.csv", "protocol.csv", "bode.svg", "multisine.csv", "optimised.toml",
+        "design.json",
+    }  # fmt: skip
+    snippet = (folder / "optimised.toml").read_text()
+    assert all(f"    {line}" in text.splitlines() for line in snippet.splitlines())
+    best = load_settings(folder / "optimised.toml")
+    document = json.loads((folder / "design.json").read_text())
+    assert document["optimised"][0]["amplitude_nm"] == best.prbs.amplitude_nm
+    columns = np.loadtxt(folder / "multisine.csv", delimiter=",", skiprows=1, unpack=True)
+    np.testing.assert_array_equal(columns[1], multisine_nm(Settings()))
+    assert set(document["multisine"]["standard_errors"]["OFF"]) == {
+        "prbs", "same_peak_torque", "same_angle_sd", "same_peak_angle",
+    }  # fmt: skip
+    assert (folder / "bode.svg").read_text().startswith("<?xml")
+
+
+def test_an_unstable_loop_is_refused_after_it_is_shown(tmp_path: Path, rigidimeter) -> None:
+    settings, folder = tmp_path / "rig.toml", tmp_path / "planned"
+    settings.write_text("[controller]\ninertia_kg_m2 = 0.0008\ndamping_nm_s_rad = 0.028\n")
+    ran = rigidimeter(
+        "design", "--settings", settings, "--out", folder, "--optimise", "--multisine",
+        "--detect", "damping=20%",
+    )  # fmt: skip
+    assert ran.status == 1
+    assert ran.err.startswith("rigidimeter: the loop is unstable with subject OFF: a dist")
+    assert ran.err.count("\n") == 1
+    assert "UNSTABLE" in ran.out
+    assert "no standard errors, since the loop is unstable" in " ".join(ran.out.split())
+    document = json.loads((folder / "design.json").read_text())
+    assert document["stability"]["conditions"]["OFF"]["stable"] is False
+    assert document["optimised"] is None
+    assert document["detection"] == []
+    assert (folder / "bode.svg").exists()
+
+
+def test_nearly_unstable_is_a_warning(tmp_path: Path) -> None:
+    settings, numbers = tmp_path / "rig.toml", tmp_path / "numbers.json"
+    settings.write_text("[controller]\ninertia_kg_m2 = 0.003\ndamping_nm_s_rad = 0.105\n")
+    text = run("--settings", str(settings), "--json", str(numbers))
+    words = " ".join(text.split())
+    assert "Warning: the loop with subject OFF" in words
+    assert "less than margins.gain_margin_db = 6 dB." in words
+    assert text.count("Warning:") == len(json.loads(numbers.read_text())["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--detect", "rigidity=20%"), "names no difference"),
+        (("--criterion", "best"), "the criterion 'best' is unknown"),
+        (("--detect", "damping=20%", "--power", "1.5"), "--power 1.5"),
+    ],
+)
+def test_bad_values_of_options_are_sentences(arguments: tuple[str, ...], words: str) -> None:
+    with pytest.raises(UserError, match=words):
+        run(*arguments)
 
 
 def test_help_needs_no_numerics() -> None:
