@@ -178,6 +178,16 @@ def analyse(
             progress(epoch.name)
     fits, pooled = fit_epochs(fitted, method, settings, progress=progress)
     fits = [checked(epoch, fit, settings) for epoch, fit in zip(fitted, fits, strict=True)]
+    refused = [
+        not fit.outcome.included and epoch.closed.included and fit.n_samples > 0
+        for epoch, fit in zip(fitted, fits, strict=True)
+    ]
+    if any(refused):  # what a check excludes must not be in the pool either
+        kept = [
+            replace(epoch, closed=fit.outcome) if out else epoch
+            for epoch, fit, out in zip(fitted, fits, refused, strict=True)
+        ]
+        _, pooled = fit_epochs(kept, method, settings)
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
     if included:

@@ -11,14 +11,12 @@ from rigidimeter.design import (
     corners,
     demand,
     ideal_response,
-    loop_margins,
-    loop_stability,
     power_spectrum,
     prbs_nm,
-    predicted_precision,
     sinusoid,
     time_constant_s,
 )
+from rigidimeter.foresight import loop_margins, loop_stability, predicted_precision
 from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import (
     ControllerSettings,

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidimeter.design import closed_loop_motion, prbs_nm
+from rigidimeter.design import prbs_nm
 from rigidimeter.estimation.closedloop.drive import DriveModel
 from rigidimeter.estimation.closedloop.loop import loop_model
+from rigidimeter.foresight import closed_loop_motion
 from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import Settings, parse_settings
 

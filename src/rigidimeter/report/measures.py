@@ -2,28 +2,57 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
+from typing import NamedTuple
 
-from rigidimeter.records import Fit, Score
+from rigidimeter.records import Analysis, Fit, Score
 from rigidimeter.report.numbers import number, p_and_r
 from rigidimeter.statistics import summarise
 from rigidimeter.study import MEASURES, Comparison, Study
 
-__all__ = ["Measure", "condition_name", "conditions", "measures", "short_names", "verdict"]
+__all__ = [
+    "Estimate",
+    "Measure",
+    "condition_name",
+    "conditions",
+    "measures",
+    "short_names",
+    "split_pooled",
+    "verdict",
+]
+
+
+class Estimate(NamedTuple):
+    """A number and the ends of its 95 % interval, NaN where it has none."""
+
+    value: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
 class Measure:
-    """One measure: its included values, and how many epochs have none, by condition."""
+    """One measure, by condition.
+
+    `estimates` are those of the included epochs, `excluded` is how many epochs have none, and
+    `pooled` is the estimate from all epochs together, where there is one.
+    """
 
     name: str
     title: str
     unit: str
-    values: Mapping[str, tuple[float, ...]]
+    estimates: Mapping[str, tuple[Estimate, ...]]
     excluded: Mapping[str, int]
+    pooled: Mapping[str, Estimate]
+
+    @property
+    def values(self) -> dict[str, tuple[float, ...]]:
+        """The included values without their intervals."""
+        return {key: tuple(e.value for e in found) for key, found in self.estimates.items()}
 
     @property
     def label(self) -> str:
@@ -56,9 +85,33 @@ def conditions(study: Study) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*compared, *recorded]))
 
 
+def split_pooled(analysis: Analysis) -> tuple[dict[str, Fit], Fit | None]:
+    """Return the fit to all epochs of each condition, and the one to all epochs if there is one.
+
+    The latter has no condition, as recordings without a name for theirs have none: it comes last.
+    """
+    recorded = {fit.condition for fit in analysis.fits}
+    by_condition: dict[str, Fit] = {}
+    overall = None
+    for fit in analysis.pooled:
+        if fit.condition in by_condition or fit.condition not in recorded:
+            overall = fit
+        else:
+            by_condition[fit.condition] = fit
+    return by_condition, overall
+
+
+def _estimate(result: Fit | Score, name: str) -> Estimate:
+    value, low, high = (
+        float(getattr(result, name + ending, math.nan)) for ending in ("", "_low", "_high")
+    )
+    return Estimate(value, low, high)
+
+
 def measures(study: Study) -> tuple[Measure, ...]:
     """Return the five measures, those without any epoch left out."""
     found = []
+    by_condition, _ = split_pooled(study.analysis)
     for name, title, unit, results_of in MEASURES:
         results = results_of(study.analysis)
         if not results:
@@ -66,15 +119,21 @@ def measures(study: Study) -> tuple[Measure, ...]:
         present = {result.condition for result in results}
         order = [condition for condition in conditions(study) if condition in present]
         left_out = Counter(result.condition for result in results if not result.outcome.included)
-        values = {
+        estimates = {
             condition: tuple(
-                float(getattr(result, name))
+                _estimate(result, name)
                 for result in results
                 if result.outcome.included and result.condition == condition
             )
             for condition in order
         }
-        found.append(Measure(name, title, unit, values, {key: left_out[key] for key in order}))
+        excluded = {condition: left_out[condition] for condition in order}
+        pooled = {
+            condition: _estimate(fit, name)
+            for condition, fit in by_condition.items()
+            if isinstance(results[0], Fit)
+        }
+        found.append(Measure(name, title, unit, estimates, excluded, pooled))
     return tuple(found)
 
 

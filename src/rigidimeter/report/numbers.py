@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["number", "p_and_r", "p_value"]
+__all__ = ["interval", "number", "p_and_r", "p_value"]
 
 SMALLEST_P = 1e-300
 """Below this a p-value has run out of floating point."""
@@ -31,6 +31,17 @@ def number(value: float, digits: int = 4) -> str:
     if not -4 <= exponent < 6:
         return sign + scientific
     return f"{sign}{size:.{max(digits - 1 - exponent, 0)}f}"
+
+
+def interval(low: float, high: float, digits: int = 4) -> str:
+    """Return an interval as the page writes it.
+
+    Examples
+    --------
+    >>> interval(-0.5, 12.0, 3)
+    '[−0.500 to 12.0]'
+    """
+    return f"[{number(low, digits)} to {number(high, digits)}]"
 
 
 def p_value(p: float) -> str:

@@ -15,13 +15,16 @@ from markupsafe import Markup
 from rigidimeter import __version__
 from rigidimeter.records import Fit, Score
 from rigidimeter.report.measures import condition_name, conditions, short_names, verdict
-from rigidimeter.report.numbers import number, p_value
+from rigidimeter.report.methods import interval_basis, method_title, pooled_basis
+from rigidimeter.report.numbers import interval, number, p_value
 from rigidimeter.report.pictures import (
     Picture,
     distribution_pictures,
+    impedance_pictures,
     loop_pictures,
     perturbation_pictures,
     torque_pictures,
+    voluntary_pictures,
 )
 from rigidimeter.report.table import Cell, Column, Table, csv_text
 from rigidimeter.report.tables import all_tables
@@ -44,7 +47,9 @@ class Pair:
 DRAWN: Mapping[str, Callable[[Study], list[Picture]]] = {
     "distributions": distribution_pictures,
     "perturbation": perturbation_pictures,
+    "impedance": impedance_pictures,
     "torque": torque_pictures,
+    "voluntary": voluntary_pictures,
     "loops": loop_pictures,
 }
 """The groups of figures, in the order in which they are drawn."""
@@ -104,6 +109,8 @@ def render_page(
     )
     environment.filters["data_uri"] = _data_uri
     environment.globals["show"] = lambda cell, column: _shown(cell, column, names)
+    environment.globals["ends"] = _ends
+    environment.globals["shown_columns"] = lambda table: _shown_columns(table, len(names) > 1)
     template = environment.from_string((folder / "page.html").read_text(encoding="utf-8"))
     return template.render(
         study=study,
@@ -118,6 +125,9 @@ def render_page(
         sources=Counter(epoch.source for epoch in study.epochs),
         source_names=names,
         inertia=number(study.analysis.inertia_kg_m2),
+        method=method_title(study.analysis.method),
+        interval_basis=interval_basis(study.analysis.method, study.settings.estimation),
+        pooled_basis=pooled_basis(study.analysis.method),
         version=__version__,
     )
 
@@ -139,8 +149,34 @@ def _shown(cell: Cell, column: Column, names: Mapping[str, str]) -> str:
     if column.kind == "source":
         return names.get(str(cell), str(cell))
     if isinstance(cell, float):
-        return f"{cell:g}" if column.kind == "setting" else number(cell)
+        return f"{cell:g}" if column.kind == "setting" else number(cell * column.page_factor)
     return str(cell)
+
+
+def _shown_columns(table: Table, several_sources: bool) -> list[tuple[int, Column]]:
+    """Return the columns for the page with their places, without those that would say nothing.
+
+    A column of reasons without any is left out, and so is the only source beside each epoch.
+    """
+    by_epoch = any(column.name == "epoch" for column in table.columns)
+    return [
+        (place, column)
+        for place, column in enumerate(table.columns)
+        if column.on_page
+        and (column.kind != "reason" or any(row[place] for row in table.rows))
+        and (column.kind != "source" or several_sources or not by_epoch)
+    ]
+
+
+def _ends(table: Table, row: Sequence[Cell], column: Column) -> str:
+    """Return the interval of a number, if it has one: a value that was held has none."""
+    if column.ends is None:
+        return ""
+    places = {each.name: place for place, each in enumerate(table.columns)}
+    low, high = (row[places[name]] for name in column.ends)
+    if not isinstance(low, float) or not isinstance(high, float) or not low < high:
+        return ""
+    return interval(low, high)
 
 
 def _pairs(comparisons: Iterable[Comparison]) -> list[Pair]:
@@ -173,17 +209,13 @@ def _row(comparison: Comparison) -> dict[str, str]:
         row[f"n_{side}"] = str(s.n)
         row[f"excluded_{side}"] = str(comparison.excluded[condition])
         row[f"median_{side}"] = number(s.median)
-        row[f"quartiles_{side}"] = _interval(s.q1, s.q3) if s.n else ""
+        row[f"quartiles_{side}"] = interval(s.q1, s.q3, 3) if s.n else ""
     test = comparison.test
     if test is None:
         return row
     row["shift"] = number(test.shift)
-    row["interval"] = _interval(test.shift_low, test.shift_high)
+    row["interval"] = interval(test.shift_low, test.shift_high, 3)
     row["interval"] += "" if test.shift_bounded else " †"
     row["z"], row["r"] = number(test.z, 3), f"{test.r:.2f}".replace("-", "−")
     row["p"] = p_value(test.p)
     return row
-
-
-def _interval(low: float, high: float) -> str:
-    return f"[{number(low, 3)} to {number(high, 3)}]"

@@ -11,7 +11,16 @@ __all__ = ["Cell", "Column", "Kind", "Table", "csv_text"]
 
 Cell = str | int | float | None
 Kind = Literal[
-    "text", "label", "reason", "source", "condition", "outcome", "count", "number", "setting"
+    "text",
+    "label",
+    "check",
+    "reason",
+    "source",
+    "condition",
+    "outcome",
+    "count",
+    "number",
+    "setting",
 ]
 
 
@@ -19,13 +28,17 @@ Kind = Literal[
 class Column:
     """A column: its stored name with the unit, its heading for people, what it holds.
 
-    A column that is not `on_page` is in the CSV only.
+    A column that is not `on_page` is in the CSV only. On the page `ends` are the columns that hold
+    the ends of the number's interval, and the number is shown `page_factor` times as large, in the
+    unit that the heading states.
     """
 
     name: str
     heading: str
     kind: Kind = "number"
     on_page: bool = True
+    ends: tuple[str, str] | None = None
+    page_factor: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rigidimeter.records import Fit, Outcome
+from rigidimeter.records import Outcome
 from rigidimeter.report.design import design_table, epoch_counts, epoch_duration_s, settings_table
+from rigidimeter.report.estimates import HOW, WHO, delays_table, fits_table, pooled_table
+from rigidimeter.report.findings import finding_kinds, findings_table
 from rigidimeter.report.measures import measures
 from rigidimeter.report.table import Cell, Column, Table
 from rigidimeter.statistics import summarise
@@ -25,8 +27,12 @@ def all_tables(study: Study) -> dict[str, Table]:
         _epochs(study),
         results_table(study.comparisons),
         _summaries(study),
-        _fits("fits", "Fits of inertia, damping and stiffness, epoch by epoch", analysis.fits),
-        _fits("fixed_inertia", f"{fixed}, epoch by epoch", analysis.fixed_inertia),
+        delays_table(study),
+        pooled_table(study),
+        fits_table("fits", "Fits of inertia, damping and stiffness, epoch by epoch", analysis.fits),
+        fits_table("fixed_inertia", f"{fixed}, epoch by epoch", analysis.fixed_inertia),
+        finding_kinds(study),
+        findings_table(study),
         _scores(study),
         _exclusions(study),
         _notices(study),
@@ -35,17 +41,9 @@ def all_tables(study: Study) -> dict[str, Table]:
     return {table.name: table for table in tables}
 
 
-_WHO = (
-    Column("source", "Source", "source"),
-    Column("epoch", "Epoch", "label"),
-    Column("condition", "Condition", "condition"),
-)
-_HOW = (Column("outcome", "Outcome", "outcome"), Column("reason", "Reason", "reason"))
-
-
 def _epochs(study: Study) -> Table:
     columns = (
-        *_WHO,
+        *WHO,
         Column("task", "Task", "label"),
         Column("duration_s", "Duration (s)"),
         Column("virtual", "Virtual", "label"),
@@ -123,42 +121,10 @@ def _summaries(study: Study) -> Table:
     return Table("summaries", "Medians and quartiles by condition", columns, tuple(rows))
 
 
-def _fits(name: str, caption: str, fits: tuple[Fit, ...]) -> Table:
-    columns = (
-        *_WHO,
-        Column("method", "Method", "text", on_page=False),
-        *_HOW,
-        Column("inertia_kg_m2", "J (kg·m²)"),
-        Column("inertia_kg_m2_se", "SE of J (kg·m²)"),
-        Column("damping_nm_s_rad", "B (N·m·s/rad)"),
-        Column("damping_nm_s_rad_se", "SE of B (N·m·s/rad)"),
-        Column("stiffness_nm_rad", "K (N·m/rad)"),
-        Column("stiffness_nm_rad_se", "SE of K (N·m/rad)"),
-        Column("r_squared", "R²"),
-        Column("vaf_percent", "VAF (%)"),
-        Column("condition_number", "Condition number"),
-        Column("residual_sd_nm", "Residual SD (N·m)"),
-        Column("n_samples", "Samples", "count"),
-        Column("band_low_hz", "Band from (Hz)"),
-        Column("band_high_hz", "Band to (Hz)"),
-    )
-    numbers = [c.name for c in columns[6:-2]]
-    rows = tuple(
-        (
-            *(fit.source, fit.epoch, fit.condition, fit.method),
-            *(fit.outcome.kind, fit.outcome.reason),
-            *(getattr(fit, field) for field in numbers),
-            *fit.band_hz,
-        )
-        for fit in fits
-    )
-    return Table(name, caption, columns, rows)
-
-
 def _scores(study: Study) -> Table:
     columns = (
-        *_WHO,
-        *_HOW,
+        *WHO,
+        *HOW,
         Column("impulse_nm_s", "Angular impulse per cycle (N·m·s)"),
         Column("work_j", "Work per cycle (J)"),
         Column("n_cycles", "Cycles", "count"),
@@ -198,7 +164,7 @@ def _exclusions(study: Study) -> Table:
         if (epoch.source, epoch.label) not in analysed:
             reason = epoch.closed.reason or "nothing was estimated from it"
             rows.append((epoch.source, epoch.label, epoch.condition, "none", "failed", reason))
-    columns = (*_WHO, Column("stage", "Stage", "text"), *_HOW)
+    columns = (*WHO, Column("stage", "Stage", "text"), *HOW)
     return Table("exclusions", "Epochs that do not count, and why", columns, tuple(rows))
 
 

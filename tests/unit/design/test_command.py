@@ -12,8 +12,9 @@ import typer
 from typer.testing import CliRunner
 
 from rigidimeter.cli.design import SCHEMA, design
-from rigidimeter.design import PARAMETERS, multisine_nm, overview, prbs_nm, sinusoid
+from rigidimeter.design import multisine_nm, overview, prbs_nm, sinusoid
 from rigidimeter.errors import UserError
+from rigidimeter.foresight import PARAMETERS
 from rigidimeter.settings import Settings, load_settings, parse_settings
 
 app = typer.Typer()
@@ -76,6 +77,7 @@ def test_settings_change_the_plan_and_bring_warnings(tmp_path: Path) -> None:
     settings, numbers = tmp_path / "rig.toml", tmp_path / "numbers.json"
     settings.write_text(
         "[prbs]\nclock_hz = 8.0\n[controller]\ndamping_nm_s_rad = 0.0\n"
+        "[margins]\ngain_margin_db = 0.0\nphase_margin_deg = 0.0\n"
         "[guard]\nspeed_limit_deg_s = 100.0\n[sinusoid]\ntaper_s = 0.0\n"
     )
     text = " ".join(run("--settings", str(settings), "--json", str(numbers)).split())
@@ -200,14 +202,14 @@ def test_an_unstable_loop_is_refused_after_it_is_shown(tmp_path: Path, rigidimet
     assert (folder / "bode.svg").exists()
 
 
-def test_nearly_unstable_is_a_warning(tmp_path: Path) -> None:
+def test_nearly_unstable_is_said_and_refused(tmp_path: Path) -> None:
     settings, numbers = tmp_path / "rig.toml", tmp_path / "numbers.json"
     settings.write_text("[controller]\ninertia_kg_m2 = 0.003\ndamping_nm_s_rad = 0.105\n")
-    text = run("--settings", str(settings), "--json", str(numbers))
-    words = " ".join(text.split())
-    assert "Warning: the loop with subject OFF" in words
-    assert "less than margins.gain_margin_db = 6 dB." in words
-    assert text.count("Warning:") == len(json.loads(numbers.read_text())["warnings"])
+    with pytest.raises(UserError, match=r"less than margins\.gain_margin_db = 6 dB; raise"):
+        run("--settings", str(settings), "--json", str(numbers))
+    # All is shown and written before it is refused.
+    warnings = json.loads(numbers.read_text())["warnings"]
+    assert any("the loop with subject OFF" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from rigidimeter.design.prbs import prbs_levels
 from rigidimeter.joint import JointDynamics
 from rigidimeter.records import Analysis, Channel, Epoch, Fit, Motion, Notice, Outcome, Score
 from rigidimeter.settings import Settings
@@ -55,6 +56,41 @@ def prbs_epoch(
         "prbs",
         excitation_hz=(0.15, 10.0),
     )
+
+
+def periodic_epoch(
+    joint: JointDynamics,
+    label: str,
+    condition: str,
+    rng: np.random.Generator,
+    first_chip: int = 0,
+    noise_nm: float = 0.01,
+) -> Epoch:
+    """Return the loop's exact answer to three periods of a sequence that began earlier."""
+    levels, per_chip, periods = prbs_levels(6), 25, 3
+    held = np.repeat(np.roll(np.tile(levels, periods + 1), -first_chip), per_chip)
+    time_s = np.arange(held.size) / RATE_HZ
+    loop = signal.lti(
+        [1.0],
+        [
+            joint.inertia_kg_m2 + INERTIA_C,
+            joint.damping_nm_s_rad + DAMPING_C,
+            joint.stiffness_nm_rad,
+        ],
+    ).to_ss()
+    _, angle, states = signal.lsim(loop, held, time_s, interp=False)
+    velocity = states[:, 0] * loop.C[0, 1]
+    acceleration = (states @ loop.A[0] + loop.B[0, 0] * held) * loop.C[0, 1]
+    settled = slice(levels.size * per_chip, None)  # one period for the transient
+    torque = joint.torque_nm(angle, velocity, acceleration)[settled]
+    made = channels(
+        time_s[settled],
+        torque_nm=torque + noise_nm * rng.standard_normal(torque.size),
+        angle_rad=angle[settled],
+        velocity_rad_s=velocity[settled],
+        perturbation_nm=held[settled],
+    )
+    return Epoch("/data/periodic.csv", label, made, condition, "prbs", excitation_hz=(0.15, 5.0))
 
 
 def sinusoid_epoch(joint: JointDynamics, label: str, condition: str, source: str) -> Epoch:
@@ -128,14 +164,54 @@ def epochs() -> list[Epoch]:
 
 
 @pytest.fixture(scope="session")
+def periodic_study(make_study: MakeStudy) -> Study:
+    """Return two epochs of each condition, each begun elsewhere in the sequence."""
+    rng = np.random.default_rng(11)
+    return make_study(
+        [
+            periodic_epoch(joint, f"{condition}{i}", condition, rng, first_chip=17 * i)
+            for condition, joint in (("OFF", OFF), ("DBS", DBS))
+            for i in range(2)
+        ]
+    )
+
+
+@pytest.fixture(scope="session")
 def study(epochs: list[Epoch], make_study: MakeStudy) -> Study:
     return make_study(epochs, notices=(Notice("warning", "one column was empty"),))
 
 
 def fit(label: str, condition: str, value: float, outcome: Outcome | None = None) -> Fit:
+    """Return a fit whose intervals reach two standard errors either way."""
+    parameters = {
+        "inertia_kg_m2": (0.0045, 1e-4),
+        "damping_nm_s_rad": (value, 1e-3),
+        "stiffness_nm_rad": (10 * value, 1e-2),
+    }
+    numbers = {
+        name + ending: number
+        for name, (estimate, error) in parameters.items()
+        for ending, number in (
+            ("", estimate),
+            ("_se", error),
+            ("_low", estimate - 2 * error),
+            ("_high", estimate + 2 * error),
+            ("_bound", 0.9 * error),
+        )
+    }
     return Fit(
-        *("x.csv", label, condition, "bandlimited", outcome or Outcome()),
-        *(0.0045, 1e-4, value, 1e-3, 10 * value, 1e-2, 0.97, 97.0, 4.2, 0.02, 4501, (0.15, 10.0)),
+        source="x.csv",
+        epoch=label,
+        condition=condition,
+        method="bandlimited",
+        outcome=outcome or Outcome(),
+        r_squared=0.97,
+        vaf_percent=97.0,
+        condition_number=4.2,
+        residual_sd_nm=0.02,
+        n_samples=4501,
+        band_hz=(0.15, 10.0),
+        **numbers,
     )
 
 

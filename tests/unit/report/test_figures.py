@@ -52,6 +52,29 @@ def test_median_and_quartiles_are_marked() -> None:
     assert list(diamond.get_ydata()) == [3.0]
 
 
+def test_intervals_stand_at_their_points_and_the_pooled_estimate_beside_them() -> None:
+    ends = [(0.5, 1.5), (float("nan"), 3.0), (2.0, 6.0)]
+    figure = distribution(
+        "x (1)",
+        {"OFF": [1.0, 2.0, 4.0], "DBS": []},
+        {"OFF": "black", "DBS": "red"},
+        ends={"OFF": ends},
+        pooled={"OFF": (2.2, 1.7, 2.7), "DBS": (5.0, float("nan"), float("nan"))},
+    )
+    (axes,) = figure.axes
+    bars, pooled = (lines.get_segments() for lines in axes.collections)
+    points = next(line for line in axes.lines if line.get_marker() == "o")
+    assert [list(bar[:, 1]) for bar in bars] == [[0.5, 1.5], [2.0, 6.0]]
+    across = np.asarray(points.get_xdata())[[0, 2]]
+    np.testing.assert_allclose([bar[0, 0] for bar in bars], across)
+    assert list(pooled[0][:, 1]) == [1.7, 2.7]
+    squares = [line for line in axes.lines if line.get_marker() == "s"]
+    assert [float(line.get_ydata()[0]) for line in squares] == [2.2, 5.0]
+    low, high = axes.get_ylim()
+    assert low < 0.5
+    assert high > 6.0
+
+
 def test_changes_keep_the_course_of_a_held_signal() -> None:
     time_s, values = changes(PRBS)
     assert len(time_s) < len(PRBS) / 10

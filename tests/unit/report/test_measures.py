@@ -1,7 +1,10 @@
 import dataclasses
+import math
+
+import pytest
 
 from rigidimeter.records import Outcome
-from rigidimeter.report.measures import conditions, measures, verdict
+from rigidimeter.report.measures import conditions, measures, split_pooled, verdict
 from rigidimeter.report.pictures import representative_fits
 from rigidimeter.study import Study
 
@@ -14,6 +17,42 @@ def test_included_values_are_those_that_were_compared(study: Study) -> None:
         assert found[comparison.measure].excluded == comparison.excluded
         assert found[comparison.measure].title == comparison.title
         assert found[comparison.measure].unit == comparison.unit
+
+
+def test_estimates_bring_their_intervals(study: Study) -> None:
+    found = {measure.name: measure for measure in measures(study)}
+    included = [fit for fit in study.analysis.fixed_inertia if fit.outcome.included]
+    off = [fit for fit in included if fit.condition == "OFF"]
+    stiffness = found["stiffness_nm_rad"]
+    assert [e.low for e in stiffness.estimates["OFF"]] == [fit.stiffness_nm_rad_low for fit in off]
+    pooled, _ = split_pooled(study.analysis)
+    assert stiffness.pooled["DBS"].high == pooled["DBS"].stiffness_nm_rad_high
+    assert all(math.isnan(e.low) for e in found["work_j"].estimates["OFF"])
+    assert found["work_j"].pooled == {}
+
+
+@pytest.mark.parametrize(
+    ("recorded", "pooled", "named", "overall"),
+    [
+        (["OFF", "DBS"], ["OFF", "DBS", ""], ["OFF", "DBS"], True),
+        (["OFF"], ["OFF"], ["OFF"], False),
+        ([""], [""], [""], False),
+        (["", "OFF"], ["", "OFF", ""], ["", "OFF"], True),
+        (["OFF", "DBS"], ["OFF", "DBS"], ["OFF", "DBS"], False),
+        (["OFF"], [], [], False),
+    ],
+)
+def test_the_fit_to_all_conditions_is_told_from_that_without_a_name(
+    recorded, pooled, named, overall, make_analysis
+) -> None:
+    analysis = make_analysis(dict.fromkeys(recorded, 2))
+    fits = tuple(
+        dataclasses.replace(analysis.fits[0], condition=name, epoch="pooled", n_samples=place)
+        for place, name in enumerate(pooled)
+    )
+    by_condition, everything = split_pooled(dataclasses.replace(analysis, pooled=fits))
+    assert list(by_condition) == named
+    assert everything is (fits[-1] if overall else None)
 
 
 def test_verdict_says_which_way(make_study, make_analysis) -> None:

@@ -10,11 +10,12 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from rigidimeter.records import Epoch, Notice, Outcome
+from rigidimeter.records import Epoch, Finding, Notice, Outcome
 from rigidimeter.report import write_report
 from rigidimeter.report.measures import short_names
+from rigidimeter.report.numbers import interval, number
 from rigidimeter.report.tables import all_tables
-from rigidimeter.study import Study
+from rigidimeter.study import Study, analyse
 
 NASTY = "<script>alert('x')</script>&amp;\"$_$"
 VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -100,6 +101,7 @@ def test_every_figure_of_the_page_lies_beside_it(written: Path, page: Page) -> N
         "distribution_work_j",
         "perturbation",
         "perturbation_spectrum",
+        "voluntary_spectrum",
         "torque_1_off",
         "torque_2_dbs",
         "loop_1_off",
@@ -163,6 +165,67 @@ def test_special_characters_are_escaped(study: Study, make_study, tmp_path: Path
     assert any(NASTY in alt for alt in page.of("alt"))
     for path in (tmp_path / "figures").iterdir():
         ET.fromstring(path.read_bytes())
+
+
+def test_page_tells_what_the_estimates_know(page: Page, study: Study) -> None:
+    text = " ".join(page.text.split())
+    analysis = study.analysis
+    assert "Method: iv (instrumental variables" in text
+    assert f"Chosen because {analysis.method_reason}." in text
+    for delay in analysis.delays:
+        assert f"{number(1e3 * delay.delay_s)}" in text
+    for fit in (*analysis.fits, *analysis.fixed_inertia, *analysis.pooled):
+        assert interval(fit.stiffness_nm_rad_low, fit.stiffness_nm_rad_high) in text
+    assert "(all)" in text
+    assert "From 10 epochs on they come from the scatter between epochs; with fewer, the" in text
+    assert "Intervals are made from the power of the residual at each frequency" in text
+    assert "has a recorded perturbation that repeats at least twice" in text
+
+
+def test_a_method_asked_for_by_name_says_so(study: Study, make_study, tmp_path: Path) -> None:
+    epochs = [study.epochs[1]]
+    made = make_study(epochs, analysis=analyse(epochs, study.settings, "published"))
+    text = " ".join(page_of(made, tmp_path).text.split())
+    assert (
+        "Method: published (least squares as the paper prints it). It was asked for by name."
+        in text
+    )
+    assert "No delay between torque and motion was looked for." in text
+    assert "Intervals hold for a residual of any colour" in text
+    assert "The joint is taken for one that does not change" in text
+
+
+def test_the_joint_over_frequency_is_on_the_page(periodic_study: Study, tmp_path: Path) -> None:
+    text = " ".join(page_of(periodic_study, tmp_path).text.split())
+    assert "Torque over angle at the lines of the perturbation" in text
+    assert (tmp_path / "figures" / "impedance.svg").exists()
+
+
+def found(level: str, name: str = "voluntary_torque", text: str = "it pushed") -> Finding:
+    return Finding(name, level, 20.0, 15.0, text, "relax")
+
+
+def test_findings_are_told_once_a_kind(make_study, make_analysis, tmp_path: Path) -> None:
+    analysis = make_analysis({"OFF": 30, "DBS": 2}, scores=False)
+    fits = [
+        dataclasses.replace(fit, findings=(found("doubt", text=f"pushed in {fit.epoch}"),))
+        for fit in analysis.fits[:-1]
+    ]
+    last = dataclasses.replace(analysis.fits[-1], findings=(found("exclude", "frozen", "stood"),))
+    made = make_study([], analysis=dataclasses.replace(analysis, fits=(*fits, last)))
+    text = " ".join(page_of(made, tmp_path).text.split())
+    assert text.index("frozen exclude 1 32 1 stood") < text.index("voluntary_torque doubt 31 32")
+    assert "22, 23 and 7 more pushed in 0 relax" in text
+    assert "pushed in 1 " not in text
+    with (tmp_path / "tables" / "findings.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 32
+    assert rows[1]["text"] == "pushed in 1"
+
+
+def test_no_findings_say_so(make_study, make_analysis, tmp_path: Path) -> None:
+    clean = make_study([], analysis=make_analysis({"OFF": 3}))
+    assert "The checks found nothing." in page_of(clean, tmp_path).text
 
 
 def test_one_condition_is_summarised(study: Study, make_study, tmp_path: Path) -> None:

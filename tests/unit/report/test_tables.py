@@ -1,12 +1,13 @@
 """Tables: every digit kept, every epoch and reason there."""
 
 import csv
+import dataclasses
 import io
 import math
 
 import pytest
 
-from rigidimeter.records import Outcome
+from rigidimeter.records import Delay, Outcome
 from rigidimeter.report.table import Cell, Table, csv_text
 from rigidimeter.report.tables import all_tables
 from rigidimeter.study import Study, compare
@@ -73,6 +74,58 @@ def test_fits_hold_what_the_analysis_holds(study: Study) -> None:
             assert cells["n_samples"] == fit.n_samples
             assert (cells["band_low_hz"], cells["band_high_hz"]) == fit.band_hz
             assert cells["outcome"] == fit.outcome.kind
+
+
+def test_fits_hold_their_intervals_bounds_and_findings(study: Study) -> None:
+    table = all_tables(study)["fits"]
+    columns = [column.name for column in table.columns]
+    for row, fit in zip(table.rows, study.analysis.fits, strict=True):
+        cells = dict(zip(columns, row, strict=True))
+        for name in ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"):
+            for ending in ("_low", "_high", "_bound"):
+                assert cells[name + ending] == getattr(fit, name + ending)
+            assert cells[f"{name}_low"] < cells[name] < cells[f"{name}_high"]
+        assert cells["findings"] == ", ".join(finding.name for finding in fit.findings)
+        assert cells["n_findings"] == len(fit.findings)
+
+
+def test_the_band_is_on_the_page_where_it_differs(make_study, make_analysis) -> None:
+    analysis = make_analysis({"OFF": 3})
+    one = dataclasses.replace(analysis.fits[0], band_hz=(0.15, 20.0))
+    mixed = dataclasses.replace(analysis, fits=(one, *analysis.fits[1:]))
+    for made, shown in ((analysis, False), (mixed, True)):
+        table = all_tables(make_study([], analysis=made))["fits"]
+        band = next(column for column in table.columns if column.name == "band_low_hz")
+        assert band.on_page is shown
+        assert ("band 0.150 to 10.0 Hz" in table.caption) is not shown
+
+
+def test_pooled_estimates_are_by_condition_and_for_all(study: Study) -> None:
+    table = all_tables(study)["pooled"]
+    columns = [column.name for column in table.columns]
+    rows = [dict(zip(columns, row, strict=True)) for row in table.rows]
+    assert [row["condition"] for row in rows] == ["OFF", "DBS", "(all)"]
+    for row, fit in zip(rows, study.analysis.pooled, strict=True):
+        assert row["damping_nm_s_rad"] == fit.damping_nm_s_rad
+        assert row["damping_nm_s_rad_high"] == fit.damping_nm_s_rad_high
+
+
+def test_delays_say_what_was_done(make_study, make_analysis) -> None:
+    delays = (
+        Delay("a.csv", 0.012, 0.0001, corrected=True),
+        Delay("b.csv", -0.012, 0.0001, corrected=True),
+        Delay("c.csv", 1e-5, 1e-4, remark="not corrected: not told from zero"),
+    )
+    analysis = dataclasses.replace(make_analysis({"OFF": 3}), delays=delays)
+    rows = all_tables(make_study([], analysis=analysis))["delays"].rows
+    assert [row[:4] for row in rows] == [
+        ("a.csv", 0.012, 0.0001, "yes"),
+        ("b.csv", -0.012, 0.0001, "yes"),
+        ("c.csv", 1e-5, 1e-4, "no"),
+    ]
+    assert "moved earlier by it" in str(rows[0][4])
+    assert "moved later by it" in str(rows[1][4])
+    assert rows[2][4] == "not corrected: not told from zero"
 
 
 def test_results_hold_what_the_comparisons_hold(study: Study) -> None:

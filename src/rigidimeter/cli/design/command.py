@@ -11,7 +11,8 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs
 
 if TYPE_CHECKING:
-    from rigidimeter.design import Foresight, Overview
+    from rigidimeter.design import Overview
+    from rigidimeter.foresight import Foresight
 
 __all__ = ["design"]
 
@@ -83,17 +84,17 @@ def design(
         detection_lines,
         ranking_lines,
     )
-    from rigidimeter.design import (
+    from rigidimeter.design import overview
+    from rigidimeter.foresight import (
         Wanted,
         assess,
         check_criterion,
         compare_multisine,
         foresee,
-        overview,
         refuse_unstable,
     )
-    from rigidimeter.design import detect as epochs_needed
-    from rigidimeter.design import optimise as search
+    from rigidimeter.foresight import detect as epochs_needed
+    from rigidimeter.foresight import optimise as search
     from rigidimeter.settings import load_settings
 
     keep_inputs((json_out,), [settings] if settings is not None else [])

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any
 from rigidimeter.units import rad_from_deg
 
 if TYPE_CHECKING:
-    from rigidimeter.design import (
+    from rigidimeter.design import Corner, Overview
+    from rigidimeter.foresight import (
         Alternative,
         Candidate,
-        Corner,
         Detection,
         Errors,
         Foresight,
         Margins,
-        Overview,
         Precision,
     )
 
@@ -67,7 +66,7 @@ def _margins(margins: Margins) -> dict[str, Any]:
 
 
 def _named(values: tuple[float, ...]) -> dict[str, float]:
-    from rigidimeter.design import PARAMETERS
+    from rigidimeter.foresight import PARAMETERS
 
     return dict(zip(PARAMETERS[-len(values) :], values, strict=True))
 
@@ -77,7 +76,7 @@ def _errors(errors: Errors) -> dict[str, Any]:
 
 
 def _precision(planned: Overview, name: str, found: Precision) -> dict[str, Any]:
-    from rigidimeter.design import planned_epochs
+    from rigidimeter.foresight import planned_epochs
 
     epochs = planned_epochs(planned.settings)[name]
     return {

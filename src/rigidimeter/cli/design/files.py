@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.design import Alternative, Candidate, Foresight, Overview
+    from rigidimeter.design import Overview
+    from rigidimeter.foresight import Alternative, Candidate, Foresight
 
 __all__ = ["snippet", "write_folder", "write_json"]
 

@@ -11,7 +11,8 @@ from rigidimeter.cli.design.text import wrapped
 from rigidimeter.units import deg_from_rad
 
 if TYPE_CHECKING:
-    from rigidimeter.design import Alternative, Candidate, Detection, Foresight, Margins, Overview
+    from rigidimeter.design import Overview
+    from rigidimeter.foresight import Alternative, Candidate, Detection, Foresight, Margins
 
 __all__ = [
     "alternative_lines",
@@ -68,7 +69,7 @@ def _margins(name: str, found: Margins) -> str:
 
 def precision_lines(planned: Overview, seen: Foresight) -> Iterator[str]:
     """Yield the standard errors of one epoch, and of all planned ones."""
-    from rigidimeter.design import planned_epochs
+    from rigidimeter.foresight import planned_epochs
 
     counts = planned_epochs(planned.settings)
     yield "Predicted standard errors of one epoch"

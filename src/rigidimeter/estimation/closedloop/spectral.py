@@ -97,23 +97,38 @@ def periodic(observations: Sequence[Observation], values: Array) -> list[Problem
 def impedance(observations: Sequence[Observation]) -> Impedance:
     """Return the impedance of epochs that share the joint, without a model.
 
-    Torque and angle at the excited lines are averaged over the epochs, turned so that the
-    perturbation has the same phase in each; the coherence is that of the averages.
+    Torque and angle at the excited lines are added over the epochs, turned so that the
+    perturbation has phase zero in each; the coherence is that of the sums.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+        Made for the spectral method, with their excited lines at the same frequencies.
     """
-    chosen = [observation.excited for observation in observations]
-    count = int(np.count_nonzero(chosen[0]))
+    count = int(np.count_nonzero(observations[0].excited))
     torque, angle = np.zeros(count, dtype=np.complex128), np.zeros(count, dtype=np.complex128)
     noise = np.zeros(count)
-    for observation, mask in zip(observations, chosen, strict=True):
-        lines = observation.lines
-        torque = torque + lines.torque_nm[mask]
-        angle = angle + lines.motion[mask, 2]
+    for observation in observations:
+        lines, mask = observation.lines, observation.excited
+        turn = _toward_zero_phase(observation)[mask]
+        torque += turn * lines.torque_nm[mask]
+        angle += turn * lines.motion[mask, 2]
         between = np.abs(lines.torque_nm) ** 2
         between[mask] = np.nan
         beside = [between[max(i - 2, 0) : i + 3] for i in np.flatnonzero(mask)]
-        noise = noise + np.array([np.nanmean(part) for part in beside])
+        noise += np.array([np.nanmean(part) for part in beside])
     power = np.abs(torque) ** 2
-    omega = observations[0].lines.grid.omega_rad_s[chosen[0]]
-    return Impedance(
-        omega / (2 * np.pi), np.asarray(torque / angle), np.clip(1 - noise / power, 0.0, 1.0)
-    )
+    grid = observations[0].lines.grid
+    frequency_hz = grid.omega_rad_s[observations[0].excited] / (2 * np.pi)
+    return Impedance(frequency_hz, np.asarray(torque / angle), np.clip(1 - noise / power, 0.0, 1.0))
+
+
+def _toward_zero_phase(observation: Observation) -> Complex:
+    """Return what turns each line so that the perturbation has phase zero in it."""
+    grid, cause = observation.lines.grid, observation.perturbation
+    # A hundredth of a tick of rounding must not hold the level before.
+    stamps = cause.time_s - 0.01 / cause.rate_hz
+    level = cause.values[np.maximum(np.searchsorted(stamps, grid.time_s, side="right") - 1, 0)]
+    there = grid.transform(level)
+    size = np.abs(there)
+    return np.asarray(np.where(size > 0, there.conj() / np.where(size > 0, size, 1.0), 1.0))

@@ -68,8 +68,11 @@ def voluntary_torque(
             f"{low:g} to {high:g} Hz, {power:.2g} N²m², is {value:.2g} % of the torque's variance "
             f"(at most {most:g} %)"
         ),
-        meaning="least squares takes part of it for the joint; in the loop J and B come out low",
-        remedy="use instruments (the known perturbation) and pool epochs, or leave the epoch out",
+        meaning=(
+            "least squares takes part of it for the joint, J and B come out low in the loop; iv "
+            "does not, and is less precise"
+        ),
+        remedy="record the perturbation, use iv and pool epochs, or leave the epoch out",
     )
 
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MultipleLocator
 from numpy.typing import NDArray
 
-from rigidimeter.design import Margins, loop_model, open_loop
+from rigidimeter.foresight import Margins, loop_model, open_loop
 from rigidimeter.report.figures.style import GREY, condition_colours, drawable, note, styled
 from rigidimeter.settings import Settings
 

@@ -1,4 +1,4 @@
-"""One measure in each condition, every epoch a point."""
+"""One measure in each condition, every epoch a point with its interval."""
 
 from __future__ import annotations
 
@@ -17,6 +17,10 @@ __all__ = ["distribution"]
 _GOLDEN = 0.6180339887498949
 _STRIP = 0.26
 """Half the width of a strip, in units of the distance between conditions."""
+_ASIDE = 0.15
+"""How far to the right of median and quartiles the pooled estimate stands."""
+
+Array = NDArray[np.float64]
 
 
 def distribution(
@@ -24,6 +28,9 @@ def distribution(
     values: Mapping[str, Sequence[float]],
     colours: Mapping[str, str],
     remark: str = "",
+    *,
+    ends: Mapping[str, Sequence[tuple[float, float]]] | None = None,
+    pooled: Mapping[str, tuple[float, float, float]] | None = None,
 ) -> Figure:
     """Draw a strip of points for each condition, with its median and quartiles beside it.
 
@@ -37,13 +44,23 @@ def distribution(
         By condition.
     remark : str
         A few words above the axes, such as the test's p.
+    ends : mapping of str to sequence of (float, float), optional
+        The ends of each value's interval; an end that is not finite is not drawn.
+    pooled : mapping of str to (float, float, float), optional
+        An estimate from all of a condition and the ends of its interval, drawn as a square.
     """
+    ends, pooled = ends or {}, pooled or {}
     with styled():
-        figure = Figure(figsize=(max(2.9, 0.9 + 0.95 * len(values)), 3.0))
+        width = 0.95 + 0.2 * bool(pooled)
+        figure = Figure(figsize=(max(2.9, 0.9 + width * len(values)), 3.0))
         axes = figure.add_subplot()
         for position, (condition, sample) in enumerate(values.items()):
+            colour = colours[condition]
             if len(sample):
-                _strip(axes, position, np.asarray(sample, dtype=np.float64), colours[condition])
+                intervals = np.reshape(ends.get(condition, []), (-1, 2))
+                _strip(axes, position, np.asarray(sample, dtype=np.float64), intervals, colour)
+            if condition in pooled:
+                _pooled(axes, position + _STRIP + _ASIDE, pooled[condition], colour)
         axes.set_xlim(-0.55, len(values) - 0.45)
         axes.set_xticks(
             range(len(values)),
@@ -57,10 +74,16 @@ def distribution(
     return figure
 
 
-def _strip(axes: Axes, position: int, sample: NDArray[np.float64], colour: str) -> None:
+def _strip(axes: Axes, position: int, sample: Array, intervals: Array, colour: str) -> None:
     summary = summarise(sample)
+    across = position - 0.12 + _jitter(sample.size)
+    if intervals.size:
+        drawn = np.all(np.isfinite(intervals), axis=1)
+        axes.vlines(
+            across[drawn], *intervals[drawn].T, color=colour, alpha=0.4, linewidth=0.7, zorder=1.5
+        )
     axes.plot(
-        position - 0.12 + _jitter(sample.size),
+        across,
         sample,
         "o",
         color=colour,
@@ -73,7 +96,15 @@ def _strip(axes: Axes, position: int, sample: NDArray[np.float64], colour: str) 
     axes.plot(beside, summary.median, "D", color=colour, markersize=6, mec="white", mew=0.7)
 
 
-def _jitter(count: int) -> NDArray[np.float64]:
+def _pooled(axes: Axes, place: float, estimate: Sequence[float], colour: str) -> None:
+    value, low, high = estimate
+    if np.isfinite(value):
+        if np.isfinite(low) and np.isfinite(high):
+            axes.vlines(place, low, high, color=colour, linewidth=1.2)
+        axes.plot(place, value, "s", color="white", mec=colour, mew=1.2, markersize=4.5)
+
+
+def _jitter(count: int) -> Array:
     """Return offsets that fill the strip evenly; multiples of the golden ratio never cluster."""
     share = np.mod(0.5 + _GOLDEN * np.arange(count), 1.0)
     return np.asarray(_STRIP * (2 * share - 1), dtype=np.float64)

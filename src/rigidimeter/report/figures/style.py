@@ -19,7 +19,16 @@ from matplotlib import font_manager
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-__all__ = ["GREY", "condition_colours", "drawable", "note", "styled", "svg_text", "wrapped"]
+__all__ = [
+    "GREY",
+    "condition_colours",
+    "drawable",
+    "listed",
+    "note",
+    "styled",
+    "svg_text",
+    "wrapped",
+]
 
 GREY = "#555555"
 _BY_NAME = {"OFF": "#D55E00", "DBS": "#0072B2"}
@@ -83,6 +92,11 @@ def drawable(text: str) -> str:
     return "".join(
         c if c.isprintable() and font.get_char_index(ord(c)) else "\N{WHITE SQUARE}" for c in text
     )
+
+
+def listed(text: str) -> str:
+    """Return the text for a legend, which leaves out whatever begins with an underscore."""
+    return drawable(f" {text}" if text.startswith("_") else text)
 
 
 def wrapped(text: str, width: int, lines: int = 3) -> str:

@@ -3,13 +3,8 @@
 import numpy as np
 import pytest
 
-from rigidimeter.design import (
-    closed_loop_motion,
-    ideal_response,
-    prbs_nm,
-    subject_joint,
-    voluntary_motion_sd,
-)
+from rigidimeter.design import ideal_response, prbs_nm
+from rigidimeter.foresight import closed_loop_motion, subject_joint, voluntary_motion_sd
 from rigidimeter.settings import Settings, parse_settings
 
 RATE_HZ = 1000.0

@@ -5,18 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.design import (
+from rigidimeter.design import prbs_nm
+from rigidimeter.errors import UserError
+from rigidimeter.foresight import (
     Wanted,
     compare_multisine,
     detect,
     epoch_sd,
     foresee,
     planned_epochs,
-    prbs_nm,
     predicted_precision,
     ranksum_power,
 )
-from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings, parse_settings
 
 VARIED = {

@@ -24,12 +24,12 @@ import numpy as np
 
 from rigidimeter.design.band import check_band
 from rigidimeter.design.demand import demand
-from rigidimeter.design.loopmodel import Array
-from rigidimeter.design.motion import ClosedLoopMotion, closed_loop_motion, voluntary_motion_sd
 from rigidimeter.design.prbs import prbs_nm
-from rigidimeter.design.precision import Precision, predicted_precision
-from rigidimeter.design.stability import subject_joint
 from rigidimeter.errors import UserError
+from rigidimeter.foresight.loopmodel import Array
+from rigidimeter.foresight.motion import ClosedLoopMotion, closed_loop_motion, voluntary_motion_sd
+from rigidimeter.foresight.precision import Precision, predicted_precision
+from rigidimeter.foresight.stability import subject_joint
 from rigidimeter.settings import PrbsSettings, Settings
 from rigidimeter.units import rad_from_deg
 

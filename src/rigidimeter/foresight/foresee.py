@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimeter.design.loopmodel import Array
 from rigidimeter.design.multisine import crest_factor, multisine_nm
-from rigidimeter.design.power import Effect, SampleSize, epoch_sd, ranksum_power, sample_size
-from rigidimeter.design.precision import PARAMETERS, Precision, predicted_precision
-from rigidimeter.design.stability import Stability, loop_stability
 from rigidimeter.errors import UserError
+from rigidimeter.foresight.loopmodel import Array
+from rigidimeter.foresight.power import Effect, SampleSize, epoch_sd, ranksum_power, sample_size
+from rigidimeter.foresight.precision import PARAMETERS, Precision, predicted_precision
+from rigidimeter.foresight.stability import Stability, loop_stability
 from rigidimeter.settings import Settings
 
 __all__ = [

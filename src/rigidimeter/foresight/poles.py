@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimeter.design.loopmodel import (
+from rigidimeter.foresight.loopmodel import (
     Array,
     admittance_coefficients,
     drive_advance,

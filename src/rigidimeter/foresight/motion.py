@@ -16,7 +16,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfftfreq
 from scipy.signal import lfilter, oaconvolve
 
-from rigidimeter.design.loopmodel import (
+from rigidimeter.foresight.loopmodel import (
     Array,
     Complex,
     LoopModel,
@@ -24,8 +24,8 @@ from rigidimeter.design.loopmodel import (
     drive_advance,
     loop_model,
 )
-from rigidimeter.design.noise import subject_density
-from rigidimeter.design.poles import spectral_radius
+from rigidimeter.foresight.noise import subject_density
+from rigidimeter.foresight.poles import spectral_radius
 from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import ControllerSettings, RigSettings, Settings, SubjectSettings
 

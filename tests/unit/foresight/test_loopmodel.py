@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rigidimeter.control import admittance, butterworth_lowpass
-from rigidimeter.design import command_response, loop_model, open_loop
-from rigidimeter.design.loopmodel import (
+from rigidimeter.foresight import command_response, loop_model, open_loop
+from rigidimeter.foresight.loopmodel import (
     admittance_coefficients,
     drive_advance,
     lowpass_coefficients,

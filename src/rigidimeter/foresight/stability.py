@@ -23,14 +23,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimeter.design.loopmodel import (
+from rigidimeter.errors import UserError
+from rigidimeter.foresight.loopmodel import (
     Array,
     Complex,
     loop_model,
     open_loop,
 )
-from rigidimeter.design.poles import spectral_radius
-from rigidimeter.errors import UserError
+from rigidimeter.foresight.poles import spectral_radius
 from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import Settings
 

@@ -5,8 +5,9 @@ import pytest
 
 from rigidimeter.batch import simulate_epochs
 from rigidimeter.cli.simulate import PAPER_RATES
-from rigidimeter.design import closed_loop_motion, prbs_nm, subject_density, subject_joint
-from rigidimeter.design.record import expected_record, noise_covariance, noise_spectrum
+from rigidimeter.design import prbs_nm
+from rigidimeter.foresight import closed_loop_motion, subject_density, subject_joint
+from rigidimeter.foresight.record import expected_record, noise_covariance, noise_spectrum
 from rigidimeter.settings import RigSettings, Settings, SubjectSettings, parse_settings
 from rigidimeter.simulation import SubjectTorque
 

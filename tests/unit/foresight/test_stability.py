@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.design import (
+from rigidimeter.errors import UserError
+from rigidimeter.foresight import (
     loop_margins,
     loop_stability,
     refuse_unstable,
     spectral_radius,
     subject_joint,
 )
-from rigidimeter.errors import UserError
 from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import Settings, parse_settings
 

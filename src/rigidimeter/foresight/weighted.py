@@ -26,9 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, prev_fast_len, rfft
 
-from rigidimeter.design.loopmodel import Array
-from rigidimeter.design.record import Record, noise_covariance
 from rigidimeter.errors import UserError
+from rigidimeter.foresight.loopmodel import Array
+from rigidimeter.foresight.record import Record, noise_covariance
 from rigidimeter.settings import EstimationSettings, RigSettings, SubjectSettings
 
 __all__ = ["USABLE_FRACTION_OF_RATE", "Layout", "layout", "weighted_products"]

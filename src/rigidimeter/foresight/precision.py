@@ -37,12 +37,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.fft import next_fast_len, rfft, rfftfreq
 
-from rigidimeter.design.loopmodel import Array, Complex, loop_model
-from rigidimeter.design.motion import ClosedLoopMotion, closed_loop_motion, motion_per_torque
-from rigidimeter.design.noise import sensor_density, subject_density
-from rigidimeter.design.record import Record, expected_record, noise_spectrum
-from rigidimeter.design.weighted import USABLE_FRACTION_OF_RATE, layout, weighted_products
 from rigidimeter.errors import UserError
+from rigidimeter.foresight.loopmodel import Array, Complex, loop_model
+from rigidimeter.foresight.motion import ClosedLoopMotion, closed_loop_motion, motion_per_torque
+from rigidimeter.foresight.noise import sensor_density, subject_density
+from rigidimeter.foresight.record import Record, expected_record, noise_spectrum
+from rigidimeter.foresight.weighted import USABLE_FRACTION_OF_RATE, layout, weighted_products
 from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import RigSettings, Settings, SubjectSettings
 

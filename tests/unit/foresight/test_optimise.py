@@ -3,18 +3,17 @@
 import numpy as np
 import pytest
 
-from rigidimeter.design import (
+from rigidimeter.design import demand, prbs_nm
+from rigidimeter.errors import UserError
+from rigidimeter.foresight import (
     CRITERIA,
     assess,
     closed_loop_motion,
-    demand,
     optimise,
-    prbs_nm,
     predicted_precision,
     subject_joint,
 )
-from rigidimeter.design.optimise import strongest_amplitude_nm
-from rigidimeter.errors import UserError
+from rigidimeter.foresight.optimise import strongest_amplitude_nm
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.units import rad_from_deg
 

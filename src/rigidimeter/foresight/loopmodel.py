@@ -9,8 +9,8 @@ velocity command c (A), and the drive carries it out until the next tick:
 with p the perturbation, T the tick and M' the newest reading of M that has arrived. The motion
 between two ticks is solved exactly, so any latency is exact, whole ticks or not. A sensor slower
 than the loop is read again until it has news: the age of the reading goes through a pattern, and
-its mean response is taken; `rigidimeter.design.stability` takes the pattern itself. Jitter is taken
-at its bound. The guard is not in it: what it does is no longer linear.
+its mean response is taken; `rigidimeter.foresight.stability` takes the pattern itself. Jitter is
+taken at its bound. The guard is not in it: what it does is no longer linear.
 """
 
 from __future__ import annotations

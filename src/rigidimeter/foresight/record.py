@@ -20,9 +20,9 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfftfreq
 from scipy.interpolate import CubicSpline
 
-from rigidimeter.design.loopmodel import Array
-from rigidimeter.design.motion import ClosedLoopMotion
-from rigidimeter.design.noise import sensor_density, subject_density
+from rigidimeter.foresight.loopmodel import Array
+from rigidimeter.foresight.motion import ClosedLoopMotion
+from rigidimeter.foresight.noise import sensor_density, subject_density
 from rigidimeter.records import readonly
 from rigidimeter.settings import RigSettings, SubjectSettings
 

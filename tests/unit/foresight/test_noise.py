@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from rigidimeter.design import sensor_density, subject_density
-from rigidimeter.design.noise import TREMOR_PHASE_DIFFUSION_RAD2_S
+from rigidimeter.foresight import sensor_density, subject_density
+from rigidimeter.foresight.noise import TREMOR_PHASE_DIFFUSION_RAD2_S
 from rigidimeter.settings import SubjectSettings, TorqueSensorSettings
 from rigidimeter.simulation import SubjectTorque, subject
 

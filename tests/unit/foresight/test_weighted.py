@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 
-from rigidimeter.design import closed_loop_motion, prbs_nm, subject_joint
-from rigidimeter.design.record import Record, expected_record, noise_covariance
-from rigidimeter.design.weighted import layout, weighted_products
+from rigidimeter.design import prbs_nm
 from rigidimeter.errors import UserError
+from rigidimeter.foresight import closed_loop_motion, subject_joint
+from rigidimeter.foresight.record import Record, expected_record, noise_covariance
+from rigidimeter.foresight.weighted import layout, weighted_products
 from rigidimeter.settings import EstimationSettings, Settings, parse_settings
 
 COARSE = {"tick_rate_hz": 250.0, "torque": {"rate_hz": 125.0}, "motion": {"rate_hz": 250.0}}

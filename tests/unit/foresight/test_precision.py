@@ -5,15 +5,15 @@ import pytest
 from scipy.signal import butter, freqs
 
 from rigidimeter.cli.simulate import PAPER_RATES
-from rigidimeter.design import (
+from rigidimeter.design import prbs_nm
+from rigidimeter.errors import UserError
+from rigidimeter.foresight import (
     closed_loop_motion,
-    prbs_nm,
     predicted_precision,
     sensor_density,
     subject_joint,
 )
-from rigidimeter.design.record import expected_record
-from rigidimeter.errors import UserError
+from rigidimeter.foresight.record import expected_record
 from rigidimeter.settings import Settings, parse_settings
 
 RATE_HZ = 1000.0

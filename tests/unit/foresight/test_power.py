@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import mannwhitneyu, norm
 
-from rigidimeter.design import Effect, epoch_sd, ranksum_power, sample_size
 from rigidimeter.errors import UserError
+from rigidimeter.foresight import Effect, epoch_sd, ranksum_power, sample_size
 from rigidimeter.statistics.ranksum import ranksum
 
 
