@@ -46,6 +46,9 @@ SINGLE_FREQUENCY_SHARE = 0.85
 A sinusoid whose motion fills half the epoch reaches 0.95, a PRBS in the closed loop 0.5.
 """
 
+DIFFERENT_INERTIA = 0.15
+"""Sources whose median J differ by more than this hardly are one joint."""
+
 FEWEST_FOR_TEST = 3
 """Below this many values in a condition there is no rank-sum test."""
 
@@ -238,6 +241,39 @@ def checked(epoch: Epoch, fit: Fit, settings: Settings) -> Fit:
 
 def doubts(analysis: Analysis) -> tuple[Notice, ...]:
     """Return what looks wrong with an analysis as a whole, and what to do about it."""
+    return (*_misfit_doubts(analysis), *_source_doubts(analysis), *_sign_doubts(analysis))
+
+
+def _misfit_doubts(analysis: Analysis) -> tuple[Notice, ...]:
+    return tuple(
+        Notice("warning", f"{fit.condition or 'all epochs'}: {finding.text}; {finding.remedy}")
+        for fit in analysis.pooled
+        for finding in fit.findings
+    )
+
+
+def _source_doubts(analysis: Analysis) -> tuple[Notice, ...]:
+    """Say so when sources differ in J: one median for all would put the difference into K."""
+    by_source: dict[str, list[float]] = {}
+    for fit in analysis.fits:
+        if fit.outcome.included:
+            by_source.setdefault(fit.source, []).append(fit.inertia_kg_m2)
+    medians = {source: float(np.median(values)) for source, values in by_source.items()}
+    if len(medians) < 2 or min(medians.values()) <= 0:
+        return ()
+    low, high = min(medians, key=lambda s: medians[s]), max(medians, key=lambda s: medians[s])
+    if medians[high] / medians[low] - 1 < DIFFERENT_INERTIA:
+        return ()
+    text = (
+        f"the median J of {high} ({medians[high]:.4g} kg·m²) is "
+        f"{100 * (medians[high] / medians[low] - 1):.0f} % above that of {low} "
+        f"({medians[low]:.4g} kg·m²); B and K at one median J are then wrong for both. Analyse "
+        "different joints or subjects apart"
+    )
+    return (Notice("warning", text),)
+
+
+def _sign_doubts(analysis: Analysis) -> tuple[Notice, ...]:
     included = [fit for fit in analysis.fits if fit.outcome.included]
     of_all = f"of {len(included)} included epochs"
     turned = [

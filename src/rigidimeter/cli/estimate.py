@@ -106,6 +106,8 @@ def _delay_lines(analysis: Analysis) -> list[str]:
                 f"than the motion in {delay.source}: {done}."
             )
             lines += _wrapped(text)
+        elif delay.remark and any(fit.source == delay.source for fit in analysis.fits):
+            lines += _wrapped(f"{delay.source}: {delay.remark}.")
     return [*lines, ""] if lines else []
 
 

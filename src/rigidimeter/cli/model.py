@@ -17,6 +17,7 @@ from rigidimeter.errors import UserError
 if TYPE_CHECKING:
     from rigidimeter.estimation.terms import Comparison, ModelRow, TermsFit
     from rigidimeter.records import Epoch
+    from rigidimeter.settings import Settings
 
 __all__ = ["model"]
 
@@ -63,6 +64,7 @@ def model(
           --reaction --terms inertia,damping,stiffness,reflex --compare
       rigidimeter model elbow.csv --terms inertia,damping,stiffness,offset,coulomb --band-hz 0 20
     """
+    from rigidimeter.estimation import aligned, estimate_delays
     from rigidimeter.estimation.terms import candidates, parse_terms
     from rigidimeter.recording import write_json
     from rigidimeter.study import task_of
@@ -87,10 +89,13 @@ def model(
     bad = any(notice.level == "error" for notice in read.notices)
     rows: list[dict[str, Any]] = []
     lines: list[str] = []
-    for epoch in read.epochs:
-        if task_of(epoch, read.settings) == "sinusoid":
-            continue
-        row, text, failed = _epoch(epoch, read.settings.estimation, models, compare, band_hz)
+    perturbed = [e for e in read.epochs if task_of(e, read.settings) != "sinusoid"]
+    by_source: dict[str, list[Epoch]] = {}
+    for epoch in perturbed:
+        by_source.setdefault(epoch.source, []).append(epoch)
+    delays = estimate_delays(by_source, read.settings)
+    for epoch in perturbed:
+        row, text, failed = _epoch(aligned(epoch, delays), read.settings, models, compare, band_hz)
         rows.append(row)
         lines += [*text, ""]
         bad = bad or failed
@@ -104,7 +109,7 @@ def model(
 
 def _epoch(
     epoch: Epoch,
-    settings: Any,
+    every_setting: Settings,
     models: Sequence[tuple[str, ...]],
     compare: bool,
     wanted_band_hz: tuple[float, float] | None,
@@ -120,6 +125,7 @@ def _epoch(
         motion_from_epoch,
     )
 
+    settings = every_setting.estimation
     row: dict[str, Any] = {
         "source": epoch.source,
         "epoch": epoch.label,
@@ -141,6 +147,9 @@ def _epoch(
     lines = [f"{epoch.name}, {band[0]:.4g} to {band[1]:.4g} Hz"]
     if compare:
         compared = compare_models(motion, models, band, settings.trim_s)
+        pushes = _pushes(epoch, every_setting)
+        if pushes:
+            compared = replace(compared, recommended=None, reason=pushes)
         lines += _table(compared)
         row["recommended"] = compared.recommended and list(compared.recommended.terms)
         row["why"] = compared.reason
@@ -157,6 +166,33 @@ def _epoch(
         for problem in problems:
             typer.echo(f"error: {epoch.name}: {problem}", err=True)
     return row, lines, bool(problems) and (not compare or len(problems) == len(found))
+
+
+def _pushes(epoch: Epoch, settings: Settings) -> str:
+    """Return why held-out data cannot choose a model, or an empty text.
+
+    In the closed loop the subject's own torque is in the motion in both halves alike, so a term that
+    fits it predicts it too, and says nothing of the joint.
+    """
+    from rigidimeter.estimation import epoch_signals, fit_epochs
+    from rigidimeter.estimation.diagnostics import reconstructed_torque_nm, voluntary_torque
+
+    if "perturbation_nm" not in epoch.channels:
+        return ""
+    (fit,), _ = fit_epochs([epoch], "iv", settings)
+    if fit.n_samples == 0:
+        return ""
+    signals = epoch_signals(epoch, "bandlimited", settings.estimation)
+    parameters = (fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad)
+    own_nm = reconstructed_torque_nm(signals, parameters)
+    finding = voluntary_torque(own_nm, signals, settings.diagnostics)
+    if not finding.remedy:
+        return ""
+    return (
+        f"{finding.value:.2g} % of the torque's variance is the subject's own, which the loop puts "
+        "into the motion too; a term that fits it predicts it in both halves and says nothing of "
+        "the joint"
+    )
 
 
 def _fitted(fit_terms: Any, motion: Any, terms: Any, band: Any, trim_s: float) -> ModelRow:
@@ -188,6 +224,8 @@ def _table(compared: Comparison) -> list[str]:
             f"{fit.aic:9.1f} {fit.bic:9.1f} {fit.test.ljung_box_p:8.2g} {fit.test.input_p:8.2g}  "
             f"{name}"
         )
+    if compared.recommended is None:
+        return [*lines, f"  none is recommended: {compared.reason}"]
     return [*lines, f"  recommended: {compared.reason}"]
 
 

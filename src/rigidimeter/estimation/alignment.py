@@ -38,7 +38,13 @@ ROUNDS = 6
 """The channels are moved and the rest is estimated again: between coarse samples the first estimate
 sees the torque against motion that was not recorded."""
 
-SETTLED_S = 5e-5
+SETTLED_S = 1e-5
+MOST_STRETCH = 6.0
+"""A secant may go so many times as far as what is left."""
+
+SAME_S, SAME_SHARE = 3e-4, 0.1
+"""Delays from two bands that differ by less than this, or by three standard errors, are one."""
+
 SIGNIFICANT = 3.0
 """A delay within this many standard errors of zero is not told from none."""
 
@@ -87,31 +93,22 @@ def _estimate(source: str, epochs: Sequence[Epoch], settings: Settings) -> Delay
     known = [epoch for epoch in sound if not closed_loop_obstacle(epoch)]
     linearise: Linearise = instrumental if known else direct
     used = (known or sound)[:MOST_EPOCHS]
-    total_s, error_s = 0.0, float("nan")
+    estimation = settings.estimation
+    longest_s = estimation.longest_delay_s
     try:
         drive = drives(used, settings).get(source)
-        for _ in range(ROUNDS if known else 1):
-            observations = [
-                _observe(_moved(epoch, total_s), settings, drive, bool(known)) for epoch in used
-            ]
-            start = least_squares_start(observations)
-            longest_s = settings.estimation.longest_delay_s
-            fit = estimate_delay(observations, start, longest_s, linearise)
-            step_s, error_s = float(fit.values[-1]), float(fit.standard_errors[-1])
-            total_s += step_s
-            if abs(step_s) < SETTLED_S or abs(total_s) > longest_s:
-                break
+        total_s, error_s = _settled(used, settings, drive, linearise)
+        half = _settled(used, _half_the_band(settings), drive, linearise) if known else None
     except ValueError as error:
-        return Delay(source, remark=f"not estimated: {error}")
-    found = Delay(source, total_s, error_s)
-    longest_s = settings.estimation.longest_delay_s
+        return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
     if not np.isfinite(total_s) or abs(total_s) > longest_s - SCAN_STEP_S / 2:
         return Delay(
             source,
-            remark=f"no delay within ±{1e3 * longest_s:g} ms explains the torque "
+            remark=f"no delay of the torque within ±{1e3 * longest_s:g} ms explains it "
             "(estimation.longest_delay_s)",
         )
-    if not known:
+    found = Delay(source, total_s, error_s)
+    if half is None:
         return replace(
             found,
             remark="not corrected: without the recorded perturbation a reflex, or a subject who "
@@ -119,9 +116,55 @@ def _estimate(source: str, epochs: Sequence[Epoch], settings: Settings) -> Delay
         )
     if abs(total_s) < max(SIGNIFICANT * error_s, LEAST_S):
         return replace(found, remark="not corrected: not told from zero")
-    if not settings.estimation.correct_delay:
+    apart_s, allowed_s = abs(half[0] - total_s), SIGNIFICANT * np.hypot(error_s, half[1])
+    if apart_s > max(allowed_s, SAME_S + SAME_SHARE * abs(total_s)):
+        return replace(
+            found,
+            remark=f"not corrected: in the lower half of the band it is {1e3 * half[0]:.3g} ms; a "
+            "delay is the same at all frequencies, a soft cuff between drive and joint is not",
+        )
+    if not estimation.correct_delay:
         return replace(found, remark="not corrected: estimation.correct_delay is false")
     return replace(found, corrected=True)
+
+
+def _settled(
+    epochs: Sequence[Epoch],
+    settings: Settings,
+    drive: DriveModel | None,
+    linearise: Linearise,
+) -> tuple[float, float]:
+    """Return the delay at which none is left, and its standard error, in s.
+
+    The zero of what is left is sought by secants: between coarse samples moving the torque by what
+    is left takes only part of it away.
+    """
+    known = linearise is instrumental
+    before: tuple[float, float] | None = None
+    total_s, error_s = 0.0, float("nan")
+    for _ in range(ROUNDS if known else 1):
+        observations = [
+            _observe(_moved(epoch, total_s), settings, drive, known) for epoch in epochs
+        ]
+        start = least_squares_start(observations)
+        fit = estimate_delay(observations, start, settings.estimation.longest_delay_s, linearise)
+        left_s, error_s = float(fit.values[-1]), float(fit.standard_errors[-1])
+        step_s = left_s
+        if before is not None and abs(left_s) < abs(before[1]) and left_s != before[1]:
+            step_s = -left_s * (total_s - before[0]) / (left_s - before[1])
+            step_s = float(np.clip(step_s, -MOST_STRETCH * abs(left_s), MOST_STRETCH * abs(left_s)))
+        before = total_s, left_s
+        total_s += step_s
+        if abs(left_s) < SETTLED_S or abs(total_s) > settings.estimation.longest_delay_s:
+            break
+    return total_s, error_s
+
+
+def _half_the_band(settings: Settings) -> Settings:
+    estimation = settings.estimation
+    high_hz = max(0.5 * estimation.band_high_closed_loop_hz, 2.0 * estimation.band_low_hz)
+    narrower = estimation.model_copy(update={"band_high_closed_loop_hz": high_hz})
+    return settings.model_copy(update={"estimation": narrower})
 
 
 def _observe(

@@ -31,22 +31,24 @@ METHODS: tuple[str, ...] = ("auto", *_LEAST_SQUARES, *CLOSED_LOOP)
 def choose_method(epochs: Sequence[Epoch]) -> tuple[str, str]:
     """Return the method that suits what was recorded, and why.
 
-    With the perturbation in every epoch, instrumental variables: they do not mind a subject who
-    pushes. Without it nothing but least squares is left.
+    With the perturbation, instrumental variables: they do not mind a subject who pushes. An epoch
+    that lacks it then fails, unless most do. Without it nothing but least squares is left.
     """
-    obstacles = {closed_loop_obstacle(epoch) for epoch in epochs} - {""}
     if not epochs:
         return "bandlimited", "there is no epoch to fit"
-    if obstacles:
+    obstacles = [obstacle for epoch in epochs if (obstacle := closed_loop_obstacle(epoch))]
+    if 2 * len(obstacles) > len(epochs):
         return (
             "bandlimited",
-            f"{sorted(obstacles)[0]}, so the motion itself has to stand as the instrument: a "
-            "subject who pushes in a closed loop biases the estimate",
+            f"{obstacles[0]} (in {len(obstacles)} of {len(epochs)} epochs), so the motion itself "
+            "has to stand as the instrument: a subject who pushes in a closed loop biases the "
+            "estimate",
         )
+    where = f" in {len(epochs) - len(obstacles)} of {len(epochs)} epochs" if obstacles else ""
     return (
         "iv",
-        "the perturbation was recorded, so its own part of the motion can be the instrument: a "
-        "subject who pushes does not bias the estimate",
+        f"the perturbation was recorded{where}, so its own part of the motion can be the "
+        "instrument: a subject who pushes does not bias the estimate",
     )
 
 

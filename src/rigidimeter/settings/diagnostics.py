@@ -30,6 +30,7 @@ class DiagnosticLevels(Section):
     imposed_sinusoid: Level = "exclude"
     residual_whiteness: Level = "note"
     residual_perturbation: Level = "doubt"
+    lack_of_fit: Level = "doubt"
     held_out_vaf: Level = "exclude"
     voluntary_torque: Level = "doubt"
     active_movement: Level = "doubt"
@@ -51,6 +52,7 @@ class DiagnosticsSettings(Section):
     single_frequency_most_percent: float = quantity(85.0, "%", 1.0, 100.0)
     residual_flatness_least: float = quantity(0.7, "1", 0.0, 1.0)
     residual_perturbation_most_percent: float = quantity(10.0, "%", 0.0, 100.0)
+    lack_of_fit_most_percent: float = quantity(2.0, "%", 0.0, 100.0)
     held_out_vaf_least_percent: float = quantity(0.0, "%", -1000.0, 100.0)
     voluntary_low_hz: float = quantity(0.3, "Hz", 0.01, 20.0)
     voluntary_high_hz: float = quantity(4.0, "Hz", 0.05, 50.0)

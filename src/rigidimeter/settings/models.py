@@ -191,8 +191,8 @@ class EstimationSettings(Section):
 
     `band_high_hz` applies where the perturbation is known; `band_high_unknown_hz` where it is not,
     since an imposed motion may excite the joint far above the paper's 10 Hz;
-    `band_high_closed_loop_hz` to the methods that weight each frequency by its noise and so gain
-    from all of them.
+    `band_high_closed_loop_hz` to the methods that weight each frequency by its noise. Higher, they
+    gain precision where the subject pushes slowly, and take a soft cuff for the joint.
 
     `intervals` says how standard errors and intervals are made: "hac" holds for any residual,
     "bootstrap" draws blocks, "white" takes the residual for white within the band.
@@ -201,7 +201,7 @@ class EstimationSettings(Section):
     band_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
     band_high_hz: float = quantity(10.0, "Hz", 0.1, 1000.0)
     band_high_unknown_hz: float = quantity(50.0, "Hz", 0.1, 1000.0)
-    band_high_closed_loop_hz: float = quantity(50.0, "Hz", 0.1, 1000.0)
+    band_high_closed_loop_hz: float = quantity(25.0, "Hz", 0.1, 1000.0)
     trim_s: float = quantity(1.0, "s", 0.0, 60.0)
     shortest_epoch_s: float = quantity(5.0, "s", 1.0, 600.0)
     published_highpass_hz: float = quantity(0.2, "Hz", 0.001, 10.0)

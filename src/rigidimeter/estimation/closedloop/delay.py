@@ -30,6 +30,8 @@ SCAN_STEP_S = 0.005
 """The search for the delay begins at the best of steps this far apart: a quarter of a period at
 50 Hz, so that the nearest valley is the right one."""
 
+MOST_VALLEYS = 3
+
 SCAN_HIGH_HZ = 20.0
 """And is made below this frequency."""
 
@@ -93,10 +95,34 @@ def estimate_delay(
     problems = linearise(observations, start)
     delays = np.linspace(-longest_s, longest_s, 2 * max(round(longest_s / SCAN_STEP_S), 1) + 1)
     left = [_unexplained(observations, problems, delay_s) for delay_s in delays]
-    near_s = float(delays[int(np.argmin(left))])
-    near = _solved(observations, problems, near_s)
-    fit, _ = fit_pooled(observations, delayed(linearise), np.append(near, near_s))
-    return fit
+    # The valleys of the scan, the deepest first, and none: the subject may have dug the deepest.
+    inner = (
+        np.r_[True, np.array(left[1:]) < left[:-1]] & np.r_[np.array(left[:-1]) < left[1:], True]
+    )
+    valleys = sorted(np.flatnonzero(inner), key=lambda i: left[i])[:MOST_VALLEYS]
+    best: LineFit | None = None
+    for near_s in dict.fromkeys([*(float(delays[i]) for i in valleys), 0.0]):
+        near = _solved(observations, problems, near_s)
+        try:
+            fit, _ = fit_pooled(observations, delayed(linearise), np.append(near, near_s))
+        except ValueError:
+            continue  # nothing settles from there
+        if abs(fit.values[-1]) > longest_s or fit.values[0] <= 0:
+            continue  # no joint has a negative inertia
+        if best is None or unlikeliness(fit) < unlikeliness(best):
+            best = fit
+    if best is None:
+        raise ValueError("no delay explains the torque")
+    return best
+
+
+def unlikeliness(fit: LineFit) -> float:
+    """Return Σ log S over the lines: twice the Whittle log-likelihood's negative, but a constant.
+
+    Every line counts by the logarithm of what is left in it, so a subject who pushes slowly and
+    strongly does not outvote the lines above.
+    """
+    return float(np.sum(np.log(fit.shape.density)))
 
 
 def _solved(

@@ -8,7 +8,7 @@ epoch says of J, B and K is its own.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from rigidimeter.estimation.closedloop.instruments import LEAST, instrumental
 from rigidimeter.estimation.closedloop.likelihood import output_error
 from rigidimeter.estimation.closedloop.lines import epoch_grid, epoch_lines
 from rigidimeter.estimation.closedloop.loop import loop_model
+from rigidimeter.estimation.closedloop.misfit import misfits, worst_misfit
 from rigidimeter.estimation.closedloop.refine import (
     SHARED_FROM,
     Linearise,
@@ -38,7 +39,7 @@ from rigidimeter.estimation.screening import (
     unusable,
 )
 from rigidimeter.estimation.signals import Array, motion_channels
-from rigidimeter.records import Epoch, Fit
+from rigidimeter.records import Channel, Epoch, Finding, Fit
 from rigidimeter.settings import Settings
 
 __all__ = [
@@ -49,6 +50,9 @@ __all__ = [
     "least_squares_start",
     "observe",
 ]
+
+MOST_TRIED = 5
+"""So many epochs of a source may fail to show the drive before it is taken for unknown."""
 
 CLOSED_LOOP: Mapping[str, Linearise] = {
     "iv": instrumental,
@@ -67,10 +71,19 @@ def closed_loop_obstacle(epoch: Epoch) -> str:
         return "perturbation_nm holds no samples or numbers that are not finite"
     if float(np.ptp(perturbation.values)) == 0.0:
         return "perturbation_nm is constant"
-    spacing = np.diff(perturbation.time_s)
-    if float(np.ptp(spacing)) > 0.5 * float(np.median(spacing)):
-        return "perturbation_nm was not sampled evenly"
     return ""
+
+
+def _even(perturbation: Channel) -> Channel:
+    """Return the perturbation at every tick: the last level is held where ticks are missing."""
+    spacing = np.diff(perturbation.time_s)
+    interval_s = float(np.median(spacing))
+    if float(np.ptp(spacing)) < 0.5 * interval_s:
+        return perturbation
+    count = int((perturbation.time_s[-1] - perturbation.time_s[0]) / interval_s + 0.5) + 1
+    time_s = perturbation.time_s[0] + interval_s * np.arange(count)
+    last = np.searchsorted(perturbation.time_s, time_s + 0.5 * interval_s, side="right") - 1
+    return Channel(perturbation.name, time_s, perturbation.values[np.maximum(last, 0)])
 
 
 def drives(epochs: Sequence[Epoch], settings: Settings) -> dict[str, DriveModel | None]:
@@ -80,7 +93,9 @@ def drives(epochs: Sequence[Epoch], settings: Settings) -> dict[str, DriveModel 
     found: dict[str, DriveModel | None] = {}
     tried: dict[str, int] = {}
     for epoch in epochs:
-        if found.get(epoch.source) is None and tried.get(epoch.source, 0) < 3:
+        found.setdefault(epoch.source, None)
+        sound = not before_fit(epoch, settings.estimation) and epoch.closed.included
+        if sound and found[epoch.source] is None and tried.get(epoch.source, 0) < MOST_TRIED:
             tried[epoch.source] = tried.get(epoch.source, 0) + 1
             found[epoch.source] = fit_drive(epoch, start)
     return found
@@ -98,7 +113,7 @@ def observe(epoch: Epoch, settings: Settings, method: str, drive: DriveModel | N
     if obstacle:
         raise ValueError(obstacle)
     estimation, rig = settings.estimation, settings.rig
-    torque, perturbation = epoch.channels["torque_nm"], epoch.channels["perturbation_nm"]
+    torque, perturbation = epoch.channels["torque_nm"], _even(epoch.channels["perturbation_nm"])
     limiting = [torque] if drive is not None else [torque, *motion_channels(epoch)]
     slowest = min(channel.rate_hz for channel in limiting)
     high = min(estimation.band_high_closed_loop_hz, USABLE_FRACTION_OF_RATE * slowest)
@@ -127,7 +142,15 @@ def observe(epoch: Epoch, settings: Settings, method: str, drive: DriveModel | N
         perturbation,
         loop,
         excited,
-        (sequence, loop, late_ns, grid.time_s.size, round(1e6 * grid.rate_hz)),
+        (
+            sequence,
+            loop,
+            late_ns,
+            grid.time_s.size,
+            round(1e6 * grid.rate_hz),
+            int(grid.line[0]),
+            int(grid.line[-1]),
+        ),
     )
 
 
@@ -193,6 +216,7 @@ def fit_closed_loop(
             else:
                 made = {place: p for (place, _), p in zip(good, problems, strict=True)}
                 pooled.append(_pooled_fit(method, condition, shared, good, epochs, inertia_kg_m2))
+        singles: dict[int, LineFit] = {}
         for place, observation in members:
             epoch = epochs[place]
             share = shared if shared is not None and len(good) >= SHARED_FROM else None
@@ -210,7 +234,12 @@ def fit_closed_loop(
                 fits[place] = _without_numbers(epoch, method, str(error))
             else:
                 fits[place] = _epoch_fit(epoch, method, fit, observation, inertia_kg_m2)
+                singles[place] = fit
             progress(epoch.name)
+        if shared is not None:
+            finding = _misfit(good, made, singles, settings)
+            if finding is not None:
+                pooled[-1] = replace(pooled[-1], findings=(finding,))
     if len(groups) > 1 and counting:
         start = least_squares_start([observation for _, observation in counting])
         start = start if inertia_kg_m2 is None else start[1:]
@@ -221,6 +250,27 @@ def fit_closed_loop(
         else:
             pooled.append(_pooled_fit(method, "", everything, counting, epochs, inertia_kg_m2))
     return [fit for fit in fits if fit is not None], pooled
+
+
+def _misfit(
+    good: Sequence[tuple[int, Observation]],
+    made: Mapping[int, Problem],
+    singles: Mapping[int, LineFit],
+    settings: Settings,
+) -> Finding | None:
+    """Return what the epochs of the commonest sequence leave of their response to it."""
+    groups: dict[Hashable, list[int]] = {}
+    for place, observation in good:
+        if place in singles:
+            groups.setdefault(observation.response_key, []).append(place)
+    places = max(groups.values(), key=len, default=[])
+    of_place = dict(good)
+    parts = misfits(
+        [of_place[place] for place in places],
+        [made[place] for place in places],
+        [singles[place] for place in places],
+    )
+    return worst_misfit(parts, settings.diagnostics)
 
 
 def _holding(linearise: Linearise, inertia_kg_m2: float) -> Linearise:

@@ -32,8 +32,12 @@ ITERATIONS = 25
 CONVERGED = 0.02
 """A step of less than this fraction of every standard error ends the iteration."""
 
-SETTLED = 0.5
-"""After so many iterations a step of more than this fraction means that there is no solution."""
+UNDAMPED = 10
+"""Iterations that have not settled by then go on with half the step: the weights may swing."""
+
+SETTLED, SETTLED_SHARE = 0.5, 0.01
+"""After so many iterations a step of more than this fraction of a standard error, and of more than
+this fraction of the parameter itself, means that there is no solution."""
 
 BOOTSTRAP_SEED = 1
 """The same epochs give the same interval every time."""
@@ -45,8 +49,8 @@ NEIGHBOURS = 0.1
 """And over neighbours within this fraction of a line's own number."""
 
 ENOUGH_EPOCHS = 10
-"""From this many epochs on, the scatter between them gives the covariance of the pooled estimate.
-"""
+"""From this many epochs on, the scatter between them alone gives the covariance of the pooled
+estimate; of fewer it is the larger of scatter and lines."""
 
 SHARED_FROM = 4
 """From this many epochs on, they share the shape of their noise."""
@@ -160,7 +164,7 @@ def fit_single(
     values = np.array(start, dtype=np.float64)
     weight_from = shape
     fixed = problem is not None
-    for _ in range(1 if fixed and shape is not None else ITERATIONS):
+    for iteration in range(1 if fixed and shape is not None else ITERATIONS):
         if problem is None or not fixed:
             (problem,) = linearise([observation], values)
         if shape is None:
@@ -169,6 +173,7 @@ def fit_single(
         weighted = problem.instruments / weight_from.at(lines)[:, None]
         inverse = _inverse((weighted.conj().T @ problem.regressors).real)
         step = inverse @ (weighted.conj().T @ problem.target).real - values
+        step = step * (1.0 if iteration < UNDAMPED else 0.5)
         values = values + step
         scale = np.sqrt(np.diag(_bound([problem], [lines], weight_from)))
         if np.all(np.abs(step) < CONVERGED * scale):
@@ -176,7 +181,7 @@ def fit_single(
     assert problem is not None
     assert weight_from is not None
     if not (fixed and shape is not None):
-        _refuse_unsettled(step, scale)
+        _refuse_unsettled(step, scale, values)
     residual = problem.target - problem.regressors @ values
     covariance, degrees = line_covariance(
         inverse, weighted, residual, smoother, weight_from.at(lines)
@@ -201,7 +206,8 @@ def fit_pooled(
     """Fit epochs that share the joint; also return their problems at the solution.
 
     From ten epochs on the covariance comes from the scatter between them, whatever its cause: noise
-    or a joint that is not quite the same each time. With fewer it comes from the lines.
+    or a joint that is not quite the same each time. With fewer, the scatter itself is poorly known,
+    and each variance is the larger of that and what the lines say.
 
     Raises
     ------
@@ -211,7 +217,7 @@ def fit_pooled(
     everything = [observation.lines for observation in observations]
     smoother = _smoother(everything)
     values = np.array(start, dtype=np.float64)
-    for _ in range(ITERATIONS):
+    for iteration in range(ITERATIONS):
         problems = linearise(observations, values)
         shape = _density(everything, problems, values, smoother)
         gram = np.zeros((values.size, values.size))
@@ -221,12 +227,12 @@ def fit_pooled(
             gram += (weighted.conj().T @ problem.regressors).real
             moment += (weighted.conj().T @ problem.target).real
         inverse = _inverse(gram)
-        step = inverse @ moment - values
+        step = (inverse @ moment - values) * (1.0 if iteration < UNDAMPED else 0.5)
         values = values + step
         bound = _bound(problems, everything, shape)
         if np.all(np.abs(step) < CONVERGED * np.sqrt(np.diag(bound))):
             break
-    _refuse_unsettled(step, np.sqrt(np.diag(bound)))
+    _refuse_unsettled(step, np.sqrt(np.diag(bound)), values)
     covariance, degrees, errors = _pooled_covariance(
         problems, everything, shape, inverse, values, draws
     )
@@ -242,8 +248,8 @@ def fit_pooled(
     return fit, problems
 
 
-def _refuse_unsettled(step: Array, scale: Array) -> None:
-    if not np.all(np.abs(step) < SETTLED * scale):
+def _refuse_unsettled(step: Array, scale: Array, values: Array) -> None:
+    if not np.all(np.abs(step) < np.maximum(SETTLED * scale, SETTLED_SHARE * np.abs(values))):
         raise ValueError(
             f"the estimate did not settle in {ITERATIONS} iterations; the motion that the "
             "perturbation causes says too little of the joint"
@@ -280,12 +286,18 @@ def _pooled_covariance(
         if draws and count < ENOUGH_EPOCHS:
             errors += drawn_lines(inverse, weighted, residual, rng, draws)
     between = inverse @ (moments.T @ moments) @ inverse.T * (count / max(count - 1, 1))
-    if count < ENOUGH_EPOCHS:
-        return of_lines, np.diag(of_lines) ** 2 / squares, errors
-    if draws:  # each epoch is a block
+    if draws and count >= ENOUGH_EPOCHS:  # each epoch is a block
         times = rng.multinomial(count, np.full(count, 1.0 / count), size=draws)
         errors = times @ moments @ inverse.T
-    return between, np.full(p, count - 1.0), errors
+    if count >= ENOUGH_EPOCHS:
+        return between, np.full(p, count - 1.0), errors
+    degrees_of_lines = np.diag(of_lines) ** 2 / squares
+    wider = np.diag(between) > np.diag(of_lines)
+    if count == 1 or not np.any(wider):
+        return of_lines, degrees_of_lines, errors
+    scale = np.sqrt(np.maximum(np.diag(between) / np.diag(of_lines), 1.0))
+    covariance = of_lines * np.outer(scale, scale)
+    return covariance, np.where(wider, count - 1.0, degrees_of_lines), errors * scale
 
 
 def _smoother(everything: Sequence[Lines]) -> Smoother:

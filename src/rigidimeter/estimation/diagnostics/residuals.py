@@ -54,10 +54,7 @@ def residual_whiteness(
             "the residual is coloured, by the subject's own torque or by what the model lacks, and "
             "standard errors for white noise are too small"
         ),
-        remedy=(
-            "use the intervals for coloured residuals; `rigidimeter model` tells whether a reflex "
-            "or friction is missing"
-        ),
+        remedy="use the intervals for coloured residuals; see the residual's spectrum",
     )
 
 

@@ -141,6 +141,10 @@ def test_spectral_needs_two_periods(simulated):
 def test_auto_chooses_by_what_was_recorded(simulated):
     _, (epoch,) = simulated()
     assert choose_method([epoch])[0] == "iv"
-    method, why = choose_method([epoch, without(epoch, "perturbation_nm")])
+    bare = without(epoch, "perturbation_nm")
+    method, why = choose_method([epoch, epoch, bare])
+    assert method == "iv"
+    assert "in 2 of 3 epochs" in why
+    method, why = choose_method([epoch, bare, bare])
     assert method == "bandlimited"
-    assert "perturbation_nm was not recorded" in why
+    assert "perturbation_nm was not recorded (in 2 of 3 epochs)" in why
