@@ -97,6 +97,13 @@ class Channel:
             return math.nan
         return 1.0 / float(np.median(np.diff(self.time_s)))
 
+    @cached_property
+    def mean_rate_hz(self) -> float:
+        """Samples over time: for an even clock, free of the rounding of single stamps."""
+        if len(self) < 2:
+            return math.nan
+        return (len(self) - 1) / float(self.time_s[-1] - self.time_s[0])
+
 
 @dataclass(frozen=True)
 class Motion:

@@ -21,6 +21,7 @@ from rigidimeter.estimation import (
     score_epoch,
     single_frequency_share,
 )
+from rigidimeter.estimation.closedloop import CLOSED_LOOP, drives
 from rigidimeter.estimation.diagnostics import diagnose
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.records import Analysis, Delay, Epoch, Fit, Notice, Outcome, Score, Task
@@ -179,6 +180,8 @@ def analyse(
         if task == "sinusoid":
             scores.append(score_epoch(epoch, settings.scores, settings.estimation))
             progress(epoch.name)
+    if method in CLOSED_LOOP:
+        reason += _without_drive(fitted, settings, bool(reason))
     fits, pooled = fit_epochs(fitted, method, settings, progress=progress)
     fits = [checked(epoch, fit, settings) for epoch, fit in zip(fitted, fits, strict=True)]
     refused = [
@@ -211,6 +214,18 @@ def analyse(
         tuple(pooled),
         delays,
         reason,
+    )
+
+
+def _without_drive(epochs: Sequence[Epoch], settings: Settings, after: bool) -> str:
+    """Say of which sources the drive is unknown, and what that costs."""
+    unknown = [source for source, drive in drives(epochs, settings).items() if drive is None]
+    if not unknown:
+        return ""
+    return (
+        f"{'. ' if after else ''}In {', '.join(unknown)} command and velocity do not show the "
+        "drive, so the motion between samples is interpolated: J may come out about 1 % low and, "
+        "where the subject pushes, B some percent high"
     )
 
 

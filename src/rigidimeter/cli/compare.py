@@ -136,6 +136,13 @@ def _lines(comparisons: tuple[Comparison, ...]) -> list[str]:
             t = c.test
             lines.append(
                 f"  {c.reference} − {c.other}: shift {t.shift:.4g} "
-                f"[{t.shift_low:.4g} to {t.shift_high:.4g}], z {t.z:.3f}, p {t.p:.2g}, r {t.r:.3f}"
+                f"[{t.shift_low:.4g} to {t.shift_high:.4g}]{'' if t.shift_bounded else ' †'}, "
+                f"z {t.z:.3f}, p {t.p:.2g}, r {t.r:.3f}"
             )
+    if any(c.test is not None and not c.test.shift_bounded for c in comparisons):
+        lines += [
+            "",
+            "† Too few epochs for an interval at this confidence: the smallest and the largest",
+            "  difference stand in its place.",
+        ]
     return lines

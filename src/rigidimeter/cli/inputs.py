@@ -157,6 +157,10 @@ def keep_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:
         if output is None:
             continue
         place = output.resolve()
+        if output.is_dir():
+            raise UserError(f"{output}: cannot be written (it is a folder)")
+        if not place.parent.is_dir():
+            raise UserError(f"{output}: cannot be written (there is no folder {output.parent})")
         if place in kept:
             raise UserError(f"{output}: is read or written already; name another file to write")
         if (place.parent / "manifest.json").exists():

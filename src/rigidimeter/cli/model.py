@@ -171,8 +171,8 @@ def _epoch(
 def _pushes(epoch: Epoch, settings: Settings) -> str:
     """Return why held-out data cannot choose a model, or an empty text.
 
-    In the closed loop the subject's own torque is in the motion in both halves alike, so a term that
-    fits it predicts it too, and says nothing of the joint.
+    In the closed loop the subject's own torque is in the motion in both halves alike, so a term
+    that fits it predicts it too, and says nothing of the joint.
     """
     from rigidimeter.estimation import epoch_signals, fit_epochs
     from rigidimeter.estimation.diagnostics import reconstructed_torque_nm, voluntary_torque

@@ -16,6 +16,9 @@ USABLE_FRACTION_OF_RATE = 0.4
 LEAST_BAND_RATIO = 4.0
 """A band narrower than two octaves cannot tell three parameters apart."""
 
+LARGEST_VALUE = 1e9
+"""No joint has a torque, an angle or a velocity beyond this, in SI units."""
+
 LARGEST_CONDITION_NUMBER = 1000.0
 """Beyond this the motion excites less than three parameters; a PRBS in the closed loop has 1.3."""
 
@@ -56,6 +59,10 @@ def before_fit(epoch: Epoch, settings: EstimationSettings) -> str:
             f"{settings.trim_s:g} s at each end (estimation.trim_s)"
         )
     for channel in (torque, *motion):
+        largest = float(np.max(np.abs(channel.values)))
+        if largest > LARGEST_VALUE:
+            return f"{channel.name} reaches {largest:.3g} {channel.unit}; check its unit"
+    for channel in (torque, *motion):
         # A sensor that is connected shows its noise; one that repeats a number is not measuring.
         if float(np.ptp(channel.values)) <= 1e-12 * float(np.max(np.abs(channel.values))):
             return (
@@ -65,18 +72,21 @@ def before_fit(epoch: Epoch, settings: EstimationSettings) -> str:
     return ""
 
 
-def after_fit(epoch: Epoch, r_squared: float | None, condition_number: float) -> Outcome:
+def after_fit(
+    epoch: Epoch, r_squared: float, condition_number: float, *, least_r_squared: float = 0.0
+) -> Outcome:
     """Return whether a fitted epoch counts, and why not.
 
     Excluded are epochs that were not closed with success (among them those that touched a position
     limit), those with R² below zero (Sec. 2.4.4), and those whose motion cannot tell the
-    parameters apart. `r_squared` is None for methods that do not minimise the residual: there a
-    subject who pushes may turn it negative and the estimate still be right.
+    parameters apart. `least_r_squared` is lower for methods that do not minimise the residual:
+    there a subject who pushes may turn R² negative and the estimate still be right.
     """
     if not epoch.closed.included:
         return Outcome("excluded", epoch.closed.reason)
-    if r_squared is not None and r_squared < 0:
-        return Outcome("excluded", f"R² is {r_squared:.3g}, below zero")
+    if r_squared < least_r_squared:
+        least = "zero" if least_r_squared == 0 else f"{least_r_squared:g}"
+        return Outcome("excluded", f"R² is {r_squared:.3g}, below {least}")
     if condition_number > LARGEST_CONDITION_NUMBER:
         return Outcome(
             "excluded",

@@ -26,8 +26,15 @@ __all__ = ["DriveModel", "Driven", "fit_drive"]
 
 Complex = NDArray[np.complex128]
 
-LARGEST_MISFIT = 0.02
+LARGEST_MISFIT = 0.005
 """Above this share of the velocity's standard deviation the drive is not of second order."""
+
+LARGEST_RATIO = 0.08
+"""Ticks per period of the drive's bandwidth beyond which a command in a foreign file is rather one
+that was logged more slowly than it was sent: its stairs would then be too long."""
+
+EVEN = 0.01
+"""A stamp this share of an interval away from a tick is that tick."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +77,10 @@ class DriveModel:
 
     def driven(self, command: Channel, time_s: Array) -> Driven:
         """Return the motion under a recorded command at any times, exact between ticks too."""
-        ticks_s, sent = command.time_s, command.values
-        interval_s = float(np.median(np.diff(ticks_s)))
+        # From the first tick on: on a clock that counts from 1970 a delay is below the rounding.
+        origin_s = command.time_s[0]
+        ticks_s, sent = command.time_s - origin_s, command.values
+        interval_s = 1.0 / command.mean_rate_hz
         m11, m12, m21, m22, n1, n2 = (float(c) for c in _step(self, np.array(interval_s)))
         b1, b2 = 1 - m11, -m21
         denominator = [1.0, -(m11 + m22), m11 * m22 - m12 * m21]
@@ -79,12 +88,13 @@ class DriveModel:
         acceleration = lfilter([0.0, b2, m21 * b1 - m11 * b2], denominator, sent)
         steps = sent * interval_s + n1 * (velocity - sent) + n2 * acceleration
         angle = np.concatenate(([0.0], np.cumsum(steps[:-1])))
-        then_s = time_s - self.delay_s
-        # Counted in ticks: a stamp that is a rounding error early belongs to the tick it names.
-        place = (then_s - ticks_s[0]) / interval_s
-        k = np.clip(np.floor(place + 1e-6).astype(np.intp), 0, sent.size - 1)
-        elapsed_s = np.maximum(place - k, 0.0) * interval_s
-        if np.max(elapsed_s, initial=0.0) < 1e-6 * interval_s:
+        then_s = (time_s - origin_s) - self.delay_s
+        # A stamp that is a rounding error early belongs to the tick it names.
+        k = np.searchsorted(ticks_s, then_s + EVEN * interval_s, side="right") - 1
+        k = np.clip(k, 0, sent.size - 1)
+        elapsed_s = np.maximum(then_s - ticks_s[k], 0.0)
+        elapsed_s[elapsed_s < EVEN * interval_s] = 0.0
+        if not np.any(elapsed_s):
             return Driven(angle[k], velocity[k], acceleration[k])
         p11, p12, p21, p22, q1, q2 = _step(self, elapsed_s)
         c, v, a = sent[k], velocity[k], acceleration[k]
@@ -108,16 +118,20 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> DriveModel | None:
     Returns
     -------
     DriveModel or None
-        None if command or velocity was not recorded, or if what the fit leaves exceeds 2 % of the
-        velocity's standard deviation: then nothing is known of what happens between the ticks.
+        None if command or velocity was not recorded, if what the fit leaves exceeds 0.5 % of the
+        velocity's standard deviation, or if the command seems to have been logged more slowly than
+        it was sent: then nothing is known of what happens between the ticks.
     """
     command = epoch.channels.get("velocity_command_rad_s")
     velocity = epoch.channels.get("velocity_rad_s")
     if command is None or velocity is None or len(command) < 100:
         return None
-    spacing = np.diff(command.time_s)
-    if np.ptp(spacing) > 0.01 * np.median(spacing):
+    tick_s = 1.0 / command.mean_rate_hz
+    if np.ptp(np.diff(command.time_s)) > 0.5 * tick_s:
         return None  # ticks that were missed would be taken for a slower drive
+    fastest_hz = 0.45 / tick_s
+    if not 0.5 < start.bandwidth_hz < fastest_hz:
+        return None
     inside = (velocity.time_s >= command.time_s[0]) & (velocity.time_s <= command.time_s[-1])
     time_s, measured = velocity.time_s[inside], velocity.values[inside]
     scale = float(np.std(measured))
@@ -131,16 +145,22 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> DriveModel | None:
         left = model(x).driven(command, time_s).velocity_rad_s - measured
         return np.asarray(left / scale, dtype=np.float64)
 
-    tick_s = float(np.median(spacing))
+    # From between two ticks, where a stamp that is nearly a tick's is not yet taken for it.
+    delay_s = max(start.delay_s, 0.5 * tick_s)
     found = least_squares(
         misfit,
-        [math.log(start.bandwidth_hz), start.damping_ratio, start.delay_s],
-        bounds=([math.log(0.5), 0.05, 0.0], [math.log(0.45 / tick_s), 0.999, 0.1]),
+        [math.log(start.bandwidth_hz), start.damping_ratio, delay_s],
+        bounds=([math.log(0.5), 0.05, 0.0], [math.log(fastest_hz), 0.999, 0.1]),
         x_scale=[0.1, 0.1, tick_s],
     )
-    if float(np.sqrt(np.mean(found.fun**2))) > LARGEST_MISFIT:
+    fitted = model(found.x)
+    at_bound = fitted.damping_ratio > 0.99 or fitted.bandwidth_hz > 0.98 * fastest_hz
+    if at_bound or float(np.sqrt(np.mean(found.fun**2))) > LARGEST_MISFIT:
         return None
-    return model(found.x)
+    # A session records what was sent at every tick; of another file that is not known.
+    if epoch.excitation_hz is None and fitted.bandwidth_hz * tick_s > LARGEST_RATIO:
+        return None
+    return fitted
 
 
 def _step(drive: DriveModel, interval_s: Array) -> tuple[Array, ...]:

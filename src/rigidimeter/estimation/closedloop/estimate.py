@@ -51,6 +51,9 @@ __all__ = [
     "observe",
 ]
 
+WORST_R_SQUARED = -10.0
+"""A subject who pushes may turn R² negative; one far below says that a channel is wrong."""
+
 MOST_TRIED = 5
 """So many epochs of a source may fail to show the drive before it is taken for unknown."""
 
@@ -71,6 +74,9 @@ def closed_loop_obstacle(epoch: Epoch) -> str:
         return "perturbation_nm holds no samples or numbers that are not finite"
     if float(np.ptp(perturbation.values)) == 0.0:
         return "perturbation_nm is constant"
+    torque = epoch.channels.get("torque_nm")
+    if torque is not None and np.array_equal(torque.values, perturbation.values):
+        return "perturbation_nm holds the same numbers as torque_nm"
     return ""
 
 
@@ -131,7 +137,7 @@ def observe(epoch: Epoch, settings: Settings, method: str, drive: DriveModel | N
         samples if method == "spectral" else None,
     )
     assumed = drive or DriveModel(
-        min(rig.drive_bandwidth_hz, 0.45 * perturbation.rate_hz), rig.drive_damping_ratio
+        min(rig.drive_bandwidth_hz, 0.45 * perturbation.mean_rate_hz), rig.drive_damping_ratio
     )
     excited = grid.line % periods == 0 if periods else np.ones(grid.line.size, dtype=np.bool_)
     loop = loop_model(settings, torque.rate_hz, assumed)
@@ -343,7 +349,9 @@ def _epoch_fit(
         epoch=epoch.label,
         condition=epoch.condition,
         method=method,
-        outcome=after_fit(epoch, None, fit.condition_number),
+        outcome=after_fit(
+            epoch, 1.0 - share, fit.condition_number, least_r_squared=WORST_R_SQUARED
+        ),
         r_squared=1.0 - share,
         vaf_percent=100.0 * (1.0 - share),
         condition_number=fit.condition_number,

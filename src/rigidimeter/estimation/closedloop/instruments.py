@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from rigidimeter.estimation.closedloop.lines import SAME_TIME_S, Grid, response_lines
+from rigidimeter.estimation.closedloop.lines import SAME_TIME, Grid, response_lines
 from rigidimeter.estimation.closedloop.refine import Observation, Problem
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel
@@ -42,7 +42,7 @@ def instrumental(observations: Sequence[Observation], values: Array) -> list[Pro
     for observation in observations:
         lines, perturbation, loop, _, key = observation
         if key not in made:
-            rate_hz = perturbation.rate_hz
+            rate_hz = perturbation.mean_rate_hz
             response = loop.response(perturbation.values, rate_hz, stable(values))
             parts = [on_grid(part, perturbation, lines.grid) for part in response]
             made[key] = response_lines(lines.grid, parts)
@@ -58,8 +58,8 @@ def stable(values: Array) -> tuple[float, float, float]:
 
 def on_grid(values: Array, ticks: Channel, grid: Grid) -> Array:
     """Bring a signal from the ticks onto the grid; without interpolation where they coincide."""
-    place = (grid.time_s - ticks.time_s[0]) * ticks.rate_hz
+    place = (grid.time_s - ticks.time_s[0]) * ticks.mean_rate_hz
     nearest = np.clip(np.rint(place).astype(np.intp), 0, values.size - 1)
-    if np.max(np.abs(ticks.time_s[nearest] - grid.time_s)) < SAME_TIME_S:
+    if np.max(np.abs(ticks.time_s[nearest] - grid.time_s)) < SAME_TIME / ticks.mean_rate_hz:
         return np.asarray(values[nearest], dtype=np.float64)
     return np.asarray(CubicSpline(ticks.time_s, values)(grid.time_s), dtype=np.float64)

@@ -38,7 +38,7 @@ def output_error(observations: Sequence[Observation], values: Array) -> list[Pro
     for observation in observations:
         lines, perturbation, loop, _, key = observation
         if key not in made:
-            rate_hz = perturbation.rate_hz
+            rate_hz = perturbation.mean_rate_hz
             response = loop.response(perturbation.values, rate_hz, stable(values))
             slopes = loop.sensed(response, rate_hz, stable(values))
             torque = used @ np.stack(response)

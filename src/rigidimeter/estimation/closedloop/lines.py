@@ -35,8 +35,8 @@ __all__ = ["Grid", "Lines", "epoch_grid", "epoch_lines", "response_lines"]
 Complex = NDArray[np.complex128]
 
 FEWEST_LINES = 8
-SAME_TIME_S = 1e-7
-"""Stamps closer than this are the same time."""
+SAME_TIME = 0.01
+"""Stamps closer than this share of an interval are the same time: clocks are rounded."""
 
 
 @dataclass(frozen=True)
@@ -240,15 +240,16 @@ def _sampled(channel: Channel | None, time_s: Array) -> Array | None:
     """Return a channel at the times if it was sampled at just these, else None."""
     if channel is None:
         return None
-    first = int(np.searchsorted(channel.time_s, time_s[0] - SAME_TIME_S))
+    close_s = SAME_TIME / channel.mean_rate_hz
+    first = int(np.searchsorted(channel.time_s, time_s[0] - close_s))
     stamps = channel.time_s[first : first + time_s.size]
-    if stamps.size < time_s.size or np.max(np.abs(stamps - time_s)) > SAME_TIME_S:
+    if stamps.size < time_s.size or np.max(np.abs(stamps - time_s)) > close_s:
         return None
     return channel.values[first : first + time_s.size]
 
 
 def _interval_s(command: Channel) -> float:
-    return 1.0 / command.rate_hz
+    return 1.0 / command.mean_rate_hz
 
 
 def _times(torque: Channel, used: list[Channel]) -> tuple[Array, float]:
@@ -257,13 +258,13 @@ def _times(torque: Channel, used: list[Channel]) -> tuple[Array, float]:
     start = max(float(channel.time_s[0]) for channel in used)
     stop = min(float(channel.time_s[-1]) for channel in used)
     inside = slice(
-        int(np.searchsorted(torque.time_s, start - SAME_TIME_S)),
-        int(np.searchsorted(torque.time_s, stop + SAME_TIME_S)),
+        int(np.searchsorted(torque.time_s, start - SAME_TIME / rate_hz)),
+        int(np.searchsorted(torque.time_s, stop + SAME_TIME / rate_hz)),
     )
     own = torque.time_s[inside]
     if own.size > 1:
         even = own[0] + np.arange(own.size) * ((own[-1] - own[0]) / (own.size - 1))
-        if np.max(np.abs(own - even)) < SAME_TIME_S:
+        if np.max(np.abs(own - even)) < SAME_TIME / rate_hz:
             return own, (own.size - 1) / float(own[-1] - own[0])
     return uniform_grid(used, rate_hz), rate_hz
 

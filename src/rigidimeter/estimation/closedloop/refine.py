@@ -251,8 +251,8 @@ def fit_pooled(
 def _refuse_unsettled(step: Array, scale: Array, values: Array) -> None:
     if not np.all(np.abs(step) < np.maximum(SETTLED * scale, SETTLED_SHARE * np.abs(values))):
         raise ValueError(
-            f"the estimate did not settle in {ITERATIONS} iterations; the motion that the "
-            "perturbation causes says too little of the joint"
+            f"the estimate did not settle in {ITERATIONS} iterations: the perturbation causes too "
+            "little of the motion, or the controller's values are far off (--controller, per rad)"
         )
 
 

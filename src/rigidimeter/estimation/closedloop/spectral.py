@@ -63,7 +63,7 @@ def period_s(perturbation: Channel) -> float | None:
     # The best of the neighbours: a period need not be a whole number of ticks.
     first = low[0] + again[0]
     near = slice(first, min(first + 3, products.size))
-    return float(first + np.argmax(correlation[near])) / perturbation.rate_hz
+    return float(first + np.argmax(correlation[near])) / perturbation.mean_rate_hz
 
 
 def whole_periods(perturbation: Channel, grid_rate_hz: float, samples: int) -> tuple[int, int]:
@@ -127,7 +127,7 @@ def _toward_zero_phase(observation: Observation) -> Complex:
     """Return what turns each line so that the perturbation has phase zero in it."""
     grid, cause = observation.lines.grid, observation.perturbation
     # A hundredth of a tick of rounding must not hold the level before.
-    stamps = cause.time_s - 0.01 / cause.rate_hz
+    stamps = cause.time_s - 0.01 / cause.mean_rate_hz
     level = cause.values[np.maximum(np.searchsorted(stamps, grid.time_s, side="right") - 1, 0)]
     there = grid.transform(level)
     size = np.abs(there)

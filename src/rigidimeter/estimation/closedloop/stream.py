@@ -25,7 +25,7 @@ from rigidimeter.estimation.closedloop.estimate import (
     least_squares_start,
     observe,
 )
-from rigidimeter.estimation.closedloop.lines import SAME_TIME_S, Grid
+from rigidimeter.estimation.closedloop.lines import SAME_TIME, Grid
 from rigidimeter.estimation.closedloop.refine import Observation, fit_pooled
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Epoch
@@ -131,7 +131,9 @@ class EpochStream:
         if drive is None or "velocity_command_rad_s" not in self._epoch.channels:
             return np.ones(self._grid.line.size, dtype=np.complex128)
         command = self._epoch.channels["velocity_command_rad_s"]
-        return drive.sampled_derivative(observation.lines.grid.omega_rad_s, 1.0 / command.rate_hz)
+        return drive.sampled_derivative(
+            observation.lines.grid.omega_rad_s, 1.0 / command.mean_rate_hz
+        )
 
     def _values(self, epoch: Epoch) -> list[Array]:
         """Return the channels on the grid."""
@@ -139,10 +141,11 @@ class EpochStream:
         values = []
         for name in _CHANNELS:
             channel = epoch.channels[name]
-            first = int(np.searchsorted(channel.time_s, start_s - SAME_TIME_S))
+            close_s = SAME_TIME / self._grid.rate_hz
+            first = int(np.searchsorted(channel.time_s, start_s - close_s))
             stamps = channel.time_s[first : first + self._stamps_s.size]
             if stamps.size < self._stamps_s.size or not (
-                np.max(np.abs(stamps - start_s - self._stamps_s)) < SAME_TIME_S
+                np.max(np.abs(stamps - start_s - self._stamps_s)) < close_s
             ):
                 raise ValueError(
                     f"{epoch.name}: {name} has other stamps than the first epoch; a stream needs "

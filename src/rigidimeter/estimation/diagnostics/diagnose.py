@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimeter.estimation.diagnostics.channels import (
@@ -78,7 +79,8 @@ def diagnose(
     voluntary_nm = reconstructed_torque_nm(signals, parameters)
     if residual_nm is None:
         residual_nm = -voluntary_nm
-    perturbed = "perturbation_nm" in epoch.channels
+    cause = epoch.channels.get("perturbation_nm")
+    perturbed = cause is not None and len(cause) > 1 and float(np.ptp(cause.values)) > 0.0
     found = [saturation(epoch, settings), frozen(epoch, settings)]
     if limited is not None:
         found.append(guard_limited(limited, settings))
