@@ -201,7 +201,7 @@ class EstimationSettings(Section):
     band_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
     band_high_hz: float = quantity(10.0, "Hz", 0.1, 1000.0)
     band_high_unknown_hz: float = quantity(50.0, "Hz", 0.1, 1000.0)
-    band_high_closed_loop_hz: float = quantity(25.0, "Hz", 0.1, 1000.0)
+    band_high_closed_loop_hz: float = quantity(30.0, "Hz", 0.1, 1000.0)
     trim_s: float = quantity(1.0, "s", 0.0, 60.0)
     shortest_epoch_s: float = quantity(5.0, "s", 1.0, 600.0)
     published_highpass_hz: float = quantity(0.2, "Hz", 0.001, 10.0)

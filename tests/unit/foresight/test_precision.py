@@ -71,8 +71,10 @@ def test_least_squares_of_a_passive_arm_is_least_squares_in_the_band() -> None:
 
 
 def test_a_band_has_the_lines_of_the_estimation() -> None:
-    assert predict(Settings()).iv_band_hz == pytest.approx((0.1016, 49.99), rel=1e-3)
-    assert predict(parse_settings({"rig": PAPER_RATES})).iv_band_hz[1] == pytest.approx(40, abs=0.1)
+    assert predict(Settings()).iv_band_hz == pytest.approx((0.1016, 29.97), rel=1e-3)
+    wide = {"band_high_closed_loop_hz": 50.0}
+    paper = parse_settings({"rig": PAPER_RATES, "estimation": wide})
+    assert predict(paper).iv_band_hz[1] == pytest.approx(40, abs=0.1)
     assert predict(parse_settings({"rig": PAPER_RATES})).least_squares_band_hz == (0.15, 10.0)
     narrow = predict(Settings(), (0.15, 10.0))
     assert narrow.iv_band_hz[1] == pytest.approx(10.0, abs=0.05)
@@ -107,8 +109,11 @@ def test_the_bound_is_a_bound(rig: dict, voluntary_sd_nm: float) -> None:
 
 def test_lines_are_weighed_by_their_noise() -> None:
     """J is read above the voluntary torque and hardly minds it; K is read beside it."""
-    quiet = predict(Settings())
-    moved = predict(parse_settings({"subject": {"OFF": {"voluntary_sd_nm": 0.2}}}))
+    wide = {"band_high_closed_loop_hz": 50.0}
+    quiet = predict(parse_settings({"estimation": wide}))
+    moved = predict(
+        parse_settings({"estimation": wide, "subject": {"OFF": {"voluntary_sd_nm": 0.2}}})
+    )
     J, B, K = np.array(moved.iv.free) / quiet.iv.free
     assert J < 20 < 70 < B < K
     # A band below which nothing is pushed leaves K as it was.

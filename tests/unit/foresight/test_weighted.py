@@ -71,7 +71,7 @@ def test_the_window_rises_and_falls_over_the_trimming() -> None:
 
 def test_the_lines_begin_one_below_the_band_and_end_with_the_torque() -> None:
     record = Record(100.0, np.zeros((3, 2000)))  # lines every 0.05 Hz
-    lines = layout(record, EstimationSettings())
+    lines = layout(record, EstimationSettings(band_high_closed_loop_hz=50.0))
     assert lines.band_hz == (pytest.approx(0.1), pytest.approx(40.0))
     assert layout(record, EstimationSettings(), (2.0, 3.0)).band_hz == (1.95, 3.0)
     with pytest.raises(UserError, match=r"the band 2 to 2\.2 Hz holds 6 lines of an epoch of 20 s"):

@@ -33,7 +33,8 @@ CONVERGED = 0.02
 """A step of less than this fraction of every standard error ends the iteration."""
 
 UNDAMPED = 10
-"""Iterations that have not settled by then go on with half the step: the weights may swing."""
+"""Iterations that have not settled by then go on with half the step and the weights they have,
+which may swing where the model does not fit."""
 
 SETTLED, SETTLED_SHARE = 0.5, 0.01
 """After so many iterations a step of more than this fraction of a standard error, and of more than
@@ -167,7 +168,7 @@ def fit_single(
     for iteration in range(1 if fixed and shape is not None else ITERATIONS):
         if problem is None or not fixed:
             (problem,) = linearise([observation], values)
-        if shape is None:
+        if shape is None and iteration < UNDAMPED:
             weight_from = _density([lines], [problem], values, smoother)
         assert weight_from is not None
         weighted = problem.instruments / weight_from.at(lines)[:, None]
@@ -219,7 +220,8 @@ def fit_pooled(
     values = np.array(start, dtype=np.float64)
     for iteration in range(ITERATIONS):
         problems = linearise(observations, values)
-        shape = _density(everything, problems, values, smoother)
+        if iteration < UNDAMPED:
+            shape = _density(everything, problems, values, smoother)
         gram = np.zeros((values.size, values.size))
         moment = np.zeros(values.size)
         for problem, lines in zip(problems, everything, strict=True):

@@ -9,6 +9,7 @@ of another, and nothing is left behind in matplotlib's global state.
 from __future__ import annotations
 
 import io
+import re
 import textwrap
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -75,7 +76,13 @@ def svg_text(figure: Figure) -> str:
     file = io.StringIO()
     with styled():
         figure.savefig(file, format="svg", metadata={"Date": None, "Creator": "rigidimeter"})
-    return file.getvalue()
+    # A clipping path is named after its place in memory; it is named by its order instead.
+    text = file.getvalue()
+    names = dict.fromkeys(re.findall(r'<clipPath id="(\w+)"', text))
+    numbers = {name: f"clip-{number}" for number, name in enumerate(names)}
+    return re.sub(
+        r'(?<=[#"])p[0-9a-f]{10}(?=[")])', lambda found: numbers.get(found[0], found[0]), text
+    )
 
 
 def condition_colours(conditions: Iterable[str]) -> dict[str, str]:
