@@ -99,13 +99,16 @@ def draw_sampling(
     for row, length_s in enumerate(lengths_s.tolist()):
         parts[row] = drive(rig.drive_bandwidth_hz, rig.drive_damping_ratio, length_s)
     newest = np.searchsorted(np.maximum.accumulate(arrives_s), until_s, side="right") - 1
+    taken = np.searchsorted(in_order_s, until_s, side="right")
+    under_way = int((taken - newest).max())
     return Sampling(
-        _whole(np.searchsorted(in_order_s, until_s, side="right")),
+        _whole(taken),
         _whole(newest),
         readonly((arrives_s - sensor.stamp_latency_s)[newest]),
         _whole(part),
         readonly(left),
         readonly(parts),
+        1 << under_way.bit_length(),
     )
 
 

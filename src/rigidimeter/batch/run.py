@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ __all__ = ["Rows", "batch_of", "empty_rows", "perturbation_rows", "run_row", "si
 
 Rows = Mapping[str, NDArray[Any]]
 
-_STAMPS = ("torque_time_s", "motion_time_s")
+_STAMPS = {"torque_time_s": "torque", "motion_time_s": "motion"}  # and the sensor of each
 _ONE_EACH = {"ticks": np.int64, "cause": np.int64, "limited_ticks": np.int64}
 
 
@@ -46,7 +46,7 @@ def simulate_inputs(
         One an epoch; unknown if not given.
     """
     perturbation = perturbation_rows(perturbation_nm, len(inputs))
-    rows = empty_rows(len(inputs), bench.ticks)
+    rows = empty_rows(len(inputs), bench)
     for row, drawn in enumerate(inputs):
         run_row(rows, row, bench, perturbation[row], drawn)
     return batch_of(
@@ -77,11 +77,14 @@ def perturbation_rows(perturbation_nm: ArrayLike, n_epochs: int) -> NDArray[np.f
     return np.broadcast_to(readonly(given), (n_epochs, ticks))
 
 
-def empty_rows(n_epochs: int, ticks: int) -> Rows:
-    """Return columns to be written, one row an epoch."""
+def empty_rows(n_epochs: int, bench: Bench) -> Rows:
+    """Return columns to be written, one row an epoch.
+
+    The stamps of a sensor that keeps time are the same in every epoch: they have no rows.
+    """
     columns = {
-        name: np.empty((n_epochs, ticks), np.int8 if name == "limited" else np.float64)
-        for name in (*Columns._fields, *_STAMPS)
+        name: np.empty((n_epochs, bench.ticks), np.int8 if name == "limited" else np.float64)
+        for name in (*Columns._fields, *_jittering(bench))
     }
     counts = {name: np.empty(n_epochs, dtype) for name, dtype in _ONE_EACH.items()}
     return {**columns, **counts, "limit_time_s": np.empty(n_epochs)}
@@ -111,12 +114,13 @@ def run_row(
         DriveState(),
         Columns(*(rows[name][row] for name in Columns._fields)),
     )
-    for name, sampling in zip(_STAMPS, (inputs.torque, inputs.motion), strict=True):
-        rows[name][row] = sampling.seen_s
+    jittering = _jittering(bench)
+    for name in jittering:
+        rows[name][row] = getattr(inputs, _STAMPS[name]).seen_s
     for name, value in zip(("cause", "limit_time_s", "limited_ticks"), result, strict=True):
         rows[name][row] = value
     rows["ticks"][row] = ticks
-    for name in (*Columns._fields, *_STAMPS):
+    for name in (*Columns._fields, *jittering):
         rows[name][row, ticks:] = 0 if name == "limited" else np.nan
 
 
@@ -140,4 +144,22 @@ def batch_of(
         time_s=np.arange(bench.ticks) / bench.settings.rig.tick_rate_hz,
         perturbation_nm=perturbation_nm,
         **rows,
+        **dict(_kept_time(bench, rows["ticks"])),
     )
+
+
+def _jittering(bench: Bench) -> list[str]:
+    """Return the stamps that differ from epoch to epoch."""
+    return [name for name, sensor in _STAMPS.items() if getattr(bench, sensor) is None]
+
+
+def _kept_time(
+    bench: Bench, ticks: NDArray[np.int64]
+) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    """Yield the stamps that every epoch has in common, as rows; copied only if one ended early."""
+    ended = np.arange(bench.ticks) >= ticks[:, None] if ticks.min() < bench.ticks else None
+    for name, sensor in _STAMPS.items():
+        sampling = getattr(bench, sensor)
+        if sampling is not None:
+            rows = np.broadcast_to(sampling.seen_s, (ticks.size, bench.ticks))
+            yield name, rows if ended is None else np.where(ended, np.nan, rows)

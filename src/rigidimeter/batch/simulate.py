@@ -188,7 +188,7 @@ def _chunk(
     work: _Work, start: int, stop: int, pool: ThreadPoolExecutor, progress: Progress
 ) -> Batch:
     """Run the epochs of one chunk; each is a row that no other thread writes."""
-    rows = empty_rows(stop - start, work.bench.ticks)
+    rows = empty_rows(stop - start, work.bench)
 
     def run(i: int) -> JointDynamics:
         inputs = work.inputs(i)
