@@ -153,9 +153,7 @@ def _jittering(bench: Bench) -> list[str]:
     return [name for name, sensor in _STAMPS.items() if getattr(bench, sensor) is None]
 
 
-def _kept_time(
-    bench: Bench, ticks: NDArray[np.int64]
-) -> Iterator[tuple[str, NDArray[np.float64]]]:
+def _kept_time(bench: Bench, ticks: NDArray[np.int64]) -> Iterator[tuple[str, NDArray[np.float64]]]:
     """Yield the stamps that every epoch has in common, as rows; copied only if one ended early."""
     ended = np.arange(bench.ticks) >= ticks[:, None] if ticks.min() < bench.ticks else None
     for name, sensor in _STAMPS.items():
