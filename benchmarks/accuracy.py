@@ -4,7 +4,7 @@ A documented experiment on the virtual rig, per-degree controller, from fixed se
 
     python -m benchmarks.accuracy
 
-about ten minutes on two cores; the tables go to `docs/reference/accuracy.md`. With a number it
+about half an hour on a busy core; the tables go to `docs/reference/accuracy.md`. With a number it
 takes that fraction of the runs, for a quick look that writes nothing.
 """
 
@@ -30,7 +30,7 @@ from rigidimeter.estimation.closedloop.estimate import (
 from rigidimeter.estimation.closedloop.refine import fit_pooled
 from rigidimeter.joint import JointDynamics
 from rigidimeter.records import Channel, Epoch, Fit
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.settings import EstimationSettings, Settings, parse_settings
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "accuracy.md"
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
@@ -132,7 +132,9 @@ def efficiency(n: int) -> list[str]:
     out = [
         "## Scatter, bias and coverage of single epochs",
         "",
-        f"Sessions of {SESSION} epochs of 20 s. SD over the Cramér–Rao bound; bias in SDs of an "
+        f"Sessions of {SESSION} epochs of 20 s. SD over the Cramér–Rao bound within the "
+        f"band of iv, {EstimationSettings().band_high_closed_loop_hz:g} Hz (`rigidimeter design` "
+        "prints that over all frequencies); bias in SDs of an "
         "epoch; share of 95 % intervals that hold the truth, in %. Each for J, B, K.",
         "",
     ]

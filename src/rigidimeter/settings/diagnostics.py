@@ -37,6 +37,8 @@ class DiagnosticLevels(Section):
     emg_activity: Level = "doubt"
     saturation: Level = "exclude"
     frozen: Level = "exclude"
+    velocity_scale: Level = "exclude"
+    velocity_delay: Level = "doubt"
     guard_limited: Level = "doubt"
     position_limit: Level = "doubt"
     negative_parameters: Level = "doubt"
@@ -65,6 +67,8 @@ class DiagnosticsSettings(Section):
     emg_active_most_percent: float = quantity(20.0, "%", 0.0, 100.0)
     saturated_most_percent: float = quantity(0.5, "%", 0.0, 100.0)
     frozen_most_s: float = quantity(0.1, "s", 0.0, 60.0)
+    velocity_scale_most_percent: float = quantity(10.0, "%", 0.1, 1000.0)
+    velocity_delay_most_ms: float = quantity(5.0, "ms", 0.01, 1000.0)
     limited_most_percent: float = quantity(1.0, "%", 0.0, 100.0)
     position_most_percent: float = quantity(98.0, "%", 1.0, 100.0)
     inertia_least_kg_m2: float = quantity(1e-5, "kg·m²", 0.0, 10.0)

@@ -13,6 +13,11 @@ from rigidimeter.estimation.diagnostics.excitation import (
     conditioning,
     imposed_sinusoid,
 )
+from rigidimeter.estimation.diagnostics.kinematics import (
+    velocity_delay,
+    velocity_fit,
+    velocity_scale,
+)
 from rigidimeter.estimation.diagnostics.movement import (
     active_movement,
     active_seconds,
@@ -52,5 +57,8 @@ __all__ = [
     "residual_whiteness",
     "saturation",
     "summary",
+    "velocity_delay",
+    "velocity_fit",
+    "velocity_scale",
     "voluntary_torque",
 ]

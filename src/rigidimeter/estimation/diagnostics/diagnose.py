@@ -19,6 +19,11 @@ from rigidimeter.estimation.diagnostics.excitation import (
     conditioning,
     imposed_sinusoid,
 )
+from rigidimeter.estimation.diagnostics.kinematics import (
+    velocity_delay,
+    velocity_fit,
+    velocity_scale,
+)
 from rigidimeter.estimation.diagnostics.movement import (
     active_movement,
     emg_activity,
@@ -82,6 +87,10 @@ def diagnose(
     cause = epoch.channels.get("perturbation_nm")
     perturbed = cause is not None and len(cause) > 1 and float(np.ptp(cause.values)) > 0.0
     found = [saturation(epoch, settings), frozen(epoch, settings)]
+    if {"angle_rad", "velocity_rad_s"} <= set(epoch.channels):
+        fitted = velocity_fit(epoch)
+        if np.isfinite(fitted).all():  # what does not move is found by others
+            found += [velocity_scale(fitted, settings), velocity_delay(fitted, settings)]
     if limited is not None:
         found.append(guard_limited(limited, settings))
     if position_limit_rad is not None and "angle_rad" in epoch.channels:
