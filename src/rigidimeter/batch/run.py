@@ -135,6 +135,7 @@ def batch_of(
     first: int = 0,
 ) -> Batch:
     """Return written rows as a batch."""
+    columns: Rows = {**rows, **dict(_kept_time(bench, rows["ticks"]))}
     return Batch(
         settings=bench.settings,
         source=source,
@@ -143,8 +144,7 @@ def batch_of(
         conditions=tuple(conditions),
         time_s=np.arange(bench.ticks) / bench.settings.rig.tick_rate_hz,
         perturbation_nm=perturbation_nm,
-        **rows,
-        **dict(_kept_time(bench, rows["ticks"])),
+        **columns,
     )
 
 
