@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test check bench clean
+.PHONY: install demo test check bench bench-loop hazards mutation clean
 
 install: $(STAMP)
 
@@ -20,7 +20,8 @@ demo: install
 	$(BIN)/rigidimeter demo --out $(OUT)
 
 test: install
-	$(BIN)/python -m pytest -n auto -m 'not slow'
+	$(BIN)/python -m pytest -n auto -m 'not slow and not realtime'
+	$(BIN)/python -m pytest -n 2 -m 'not slow and realtime'
 
 check: install
 	$(BIN)/ruff format --check .
@@ -32,6 +33,17 @@ bench: install
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all,bench]'
 	$(BIN)/python -m pytest -m slow
 	$(BIN)/python -m benchmarks
+
+# Beside cyclictest, of Debian's rt-tests.
+bench-loop: install
+	$(BIN)/python -m benchmarks.loop --seconds 60 --runs 3
+	$(BIN)/python -m benchmarks.wires loop --seconds 60 --runs 3 --rates 1000
+
+hazards: install
+	$(BIN)/python -m tests.faults.measure
+
+mutation: install
+	$(BIN)/python -m tests.mutation
 
 clean:
 	rm -rf $(VENV) build src/*.egg-info .pytest_cache .mypy_cache .ruff_cache

@@ -57,3 +57,13 @@ def rigidimeter(monkeypatch, capsys) -> Callable[..., Ran]:
         return Ran(status, *capsys.readouterr())
 
     return run
+
+
+REALTIME = ("tests/wire/", "tests/faults/test_faults_", "tests/faults/test_realtime_")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what keeps real time: other work on the same processors would make it late."""
+    for item in items:
+        if any(part in item.path.as_posix() for part in REALTIME):
+            item.add_marker(pytest.mark.realtime)

@@ -7,7 +7,15 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigidimeter.guard import Cause, GuardLimits, guard_state, guard_step
+from rigidimeter.guard import (
+    REACTIONS,
+    Cause,
+    GuardLimits,
+    Limited,
+    Reaction,
+    guard_state,
+    guard_step,
+)
 from rigidimeter.simulation import DriveState, drive, drive_step
 
 DT = 0.001
@@ -22,6 +30,10 @@ LIMITS = GuardLimits(
 requests = st.lists(
     st.one_of(st.floats(-50, 50), st.just(1e6), st.just(-1e6)), min_size=1, max_size=40
 )
+
+
+# Following to 0.1 mrad for drives that are pure delays, whose angle is one that was commanded.
+EXACT = LIMITS._replace(following_rad=1e-4)
 
 
 def run(limits, wanted, move, *, hold, every=1, late=0):
@@ -64,7 +76,7 @@ def pure_delay(ticks):
 @given(requests, st.integers(1, 20), st.integers(0, 25), st.integers(0, 20), st.integers(20, 200))
 @settings(max_examples=80, deadline=None)
 def test_a_drive_that_lags_by_up_to_the_reaction_time_never_crosses(wanted, every, late, lag, hold):
-    angles, _, state = run(LIMITS, wanted, pure_delay(lag), hold=hold, every=every, late=late)
+    angles, _, state = run(EXACT, wanted, pure_delay(lag), hold=hold, every=every, late=late)
     assert np.abs(angles).max() <= LIMITS.position_rad + 1e-9
     assert state.cause == Cause.NONE
 
@@ -107,8 +119,123 @@ def test_it_does_not_hold_the_arm_at_the_limit():
     assert angles[-1] < 0.6 * LIMITS.position_rad
 
 
-@given(st.floats(allow_nan=True, allow_infinity=True), st.floats(-3, 3))
-def test_what_is_sent_is_always_finite(request, velocity):
-    state = guard_state(LIMITS)._replace(velocity_rad_s=velocity)
-    _, sent, _ = guard_step(LIMITS, state, request, 0.0, 0.0, 0.0, 0.0)
-    assert math.isfinite(sent)
+@given(
+    requests,
+    st.lists(st.integers(1, 6), min_size=1, max_size=60),
+    st.integers(0, 20),
+    st.integers(0, 25),
+    st.integers(1, 200),
+)
+@settings(max_examples=120, deadline=None)
+def test_steps_that_come_late_by_up_to_the_gap_never_let_it_cross(wanted, steps, lag, late, hold):
+    limits = EXACT._replace(gap_s=0.005)
+    state, move, commands, angles, tick, missed = (
+        guard_state(limits), pure_delay(lag), [], [0.0], 0, 1
+    )  # fmt: skip
+    pattern = itertools.cycle(steps)
+    while tick < 60 * hold:
+        taken = max(tick - late, 0)
+        request = wanted[tick // hold % len(wanted)]
+        state, sent, _ = guard_step(
+            limits, state, request, 0.0, angles[taken], 0.0, (tick - taken) * DT, 0.0, 0, missed
+        )
+        missed = next(pattern)
+        for _ in range(missed):
+            commands.append(sent)
+            angles.append(move(tick, commands))
+            tick += 1
+    assert np.abs(angles).max() <= limits.position_rad + 1e-9
+    assert state.cause == Cause.NONE
+
+
+anything = st.one_of(
+    st.floats(),
+    st.floats(-5, 5),
+    st.just(0.0),
+    st.sampled_from([math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324]),
+)
+STRICT = LIMITS._replace(
+    gap_s=0.005,
+    overspeed_rad_s=3.75,
+    stale_s=0.05,
+    torque_nm=2.0,
+    torque_stop_nm=4.0,
+    power_w=5.0,
+    energy_j=2.0,
+    following_rad=0.1,
+)
+ticks = st.lists(
+    st.tuples(
+        *(st.one_of(st.floats(-5, 5), anything), st.one_of(st.floats(-2.5, 2.5), anything)),
+        *(st.one_of(st.floats(-0.6, 0.6), anything), st.one_of(st.floats(-1, 1), anything)),
+        *(st.one_of(st.floats(0, 0.04), anything), st.one_of(st.floats(0, 0.04), anything)),
+        st.sampled_from([0] * 20 + [int(cause) for cause in Cause]),
+        st.one_of(st.just(1), st.integers(-3, 200), st.integers(0, 10**15)),
+    ),
+    min_size=1,
+    max_size=40,
+)
+
+
+@given(ticks, st.sampled_from([LIMITS, STRICT]))
+@settings(max_examples=300, deadline=None)
+def test_whatever_comes_in_whatever_order(inputs, limits):
+    state = guard_state(limits)
+    most = limits.acceleration_rad_s2 * DT
+    for values in inputs:
+        before = state
+        state, sent, limited = guard_step(limits, state, *values)
+        assert math.isfinite(sent)
+        assert abs(sent) <= limits.speed_rad_s
+        assert state.velocity_rad_s == sent
+        assert limited in set(Limited)
+        assert np.isfinite(state.sent_rad).all()
+        assert 0 <= state.newest < state.sent_rad.size
+        # Toward rest it may brake as hard as it must; away from it never.
+        change = sent - before.velocity_rad_s
+        if (
+            abs(sent) > abs(before.velocity_rad_s)
+            or sent * before.velocity_rad_s < 0
+            or limited < Limited.POSITION
+        ):
+            assert abs(change) <= most + 1e-12
+        # The first cause is kept, the reaction never weaker than each one's own.
+        if before.cause != Cause.NONE:
+            assert state.cause == before.cause
+            assert abs(sent) <= abs(before.velocity_rad_s)
+            assert limited == Limited.LATCHED
+        assert state.reaction >= max(before.reaction, REACTIONS[values[6]])
+        assert (state.cause == Cause.NONE) == (state.reaction == Reaction.NONE)
+        if state.reaction == Reaction.CUT:
+            assert sent == 0.0
+
+
+@given(ticks, st.integers(1, 20))
+@settings(max_examples=60, deadline=None)
+def test_what_is_latched_comes_to_rest_within_the_ramp(inputs, speed):
+    state = guard_state(STRICT)._replace(
+        velocity_rad_s=0.15 * speed, cause=int(Cause.SOFTWARE), reaction=int(Reaction.RAMP)
+    )
+    inputs = (inputs * 31)[:31]  # 3 rad/s at 0.1 rad/s a step, and one for what was rounded
+    for values in inputs:
+        state, sent, _ = guard_step(STRICT, state, *values)
+    assert sent == 0.0
+
+
+@given(st.lists(st.floats(-5, 5), min_size=60, max_size=60), st.integers(0, 20), st.integers(0, 20))
+@settings(max_examples=60, deadline=None)
+def test_an_encoder_that_jumps_is_found_at_once_and_one_that_does_not_never(wanted, lag, late):
+    state, move, commands, angles = guard_state(EXACT), pure_delay(lag), [], [0.0]
+    for k, request in enumerate(np.repeat(wanted, 5).tolist()):
+        taken = max(k - late, 0)
+        state, sent, _ = guard_step(
+            EXACT, state, request, 0.0, angles[taken], 0.0, (k - taken) * DT
+        )
+        commands.append(sent)
+        angles.append(move(k, commands))
+    assert state.cause == Cause.NONE
+    assert state.origin_rad == 0.0
+    width = 0.045 * LIMITS.speed_rad_s  # no stretch is wider: twice the reaction time and two ticks
+    jumped = math.copysign(width + 2e-4, -angles[-1] or 1.0) + angles[-1]
+    state, _, _ = guard_step(EXACT, state, 0.0, 0.0, jumped, 0.0, 0.0)
+    assert state.cause == Cause.NOT_FOLLOWING

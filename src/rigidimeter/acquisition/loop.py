@@ -1,7 +1,11 @@
-"""One tick: read, filter, control, guard, write, record.
+"""One tick: wait, read, filter, control, guard, write, record.
 
 The loop sees the rig only through `device.base` and takes its clock as an argument. What is
 recorded is what was sent after the guard.
+
+A tick that comes late is not made up for: the ticks whose time has passed are left out, the
+controller steps over the time that did pass (at most `LONGEST_STEP` ticks of it), and perturbation
+and position go on where the time is.
 """
 
 from __future__ import annotations
@@ -11,7 +15,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from rigidimeter.acquisition.clock import Clock
+from rigidimeter.acquisition.outside import Alone, Outside
+from rigidimeter.acquisition.states import Command, Order
 from rigidimeter.control import (
+    Admittance,
     Biquad,
     BiquadState,
     admittance,
@@ -22,7 +29,16 @@ from rigidimeter.control import (
     tracking_step,
 )
 from rigidimeter.device.base import Reading, Rig
-from rigidimeter.guard import Cause, Limited, guard_limits, guard_state, guard_step
+from rigidimeter.errors import UserError
+from rigidimeter.guard import (
+    REACTIONS,
+    Cause,
+    Limited,
+    Reaction,
+    guard_limits,
+    guard_state,
+    guard_step,
+)
 from rigidimeter.recording.log import Sample
 from rigidimeter.settings import Settings
 
@@ -31,9 +47,15 @@ __all__ = ["REST", "ControlLoop", "Passage"]
 REST = -1
 """The epoch number of samples between epochs."""
 
-POSITION_LIMITED = int(Limited.POSITION)
+LONGEST_STEP = 5
+"""The controller steps over at most so many ticks at once, however many were missed."""
+
+POSITION_LIMITED, CUT = int(Limited.POSITION), int(Reaction.CUT)
+STALLED = int(Cause.STALLED)
 
 Recorder = Callable[[Sample], None]
+Controller = Callable[[Reading, float, int], tuple[float, float, float]]
+"""Takes reading, filtered torque and place; gives velocity, perturbation and target."""
 
 
 class Passage(NamedTuple):
@@ -41,12 +63,15 @@ class Passage(NamedTuple):
 
     `limit_time_s` is when the position limit first held the command back, NaN if it never did;
     `cause` is why the guard latched, `Cause.NONE` if it did not; `limited_ticks` is how many
-    commands the guard changed, for whatever limit.
+    commands the guard changed, for whatever limit; `missed_ticks` how many were left out;
+    `interrupted` whether an operator ended it.
     """
 
     limit_time_s: float
     cause: Cause
     limited_ticks: int
+    missed_ticks: int = 0
+    interrupted: bool = False
 
 
 class ControlLoop:
@@ -62,6 +87,10 @@ class ControlLoop:
         Takes one `Sample` a tick.
     progress : callable
         Takes the session time, about once a second of it.
+    outside : Outside
+        Asked at every tick.
+    ordered : callable
+        Takes an order of the operator; returns whether the stretch that runs ends now.
     """
 
     def __init__(
@@ -71,6 +100,8 @@ class ControlLoop:
         clock: Clock,
         record: Recorder,
         progress: Callable[[float], None] = lambda _: None,
+        outside: Outside | None = None,
+        ordered: Callable[[Order], bool] = lambda _: False,
     ) -> None:
         self._progress = progress
         self._rate_hz = settings.rig.tick_rate_hz
@@ -79,32 +110,72 @@ class ControlLoop:
         self._rig = rig
         self._clock = clock
         self._record = record
+        self._outside = outside or Alone()
+        self._ordered = ordered
         controller = settings.controller
-        self._admittance = admittance(
-            controller.inertia_kg_m2, controller.damping_nm_s_rad, self._interval_s
-        )
+        self._steps = self._admittances(controller.inertia_kg_m2, controller.damping_nm_s_rad)
         self._tracking_gain = controller.tracking_gain_per_s
         self._lowpass: Biquad = butterworth_lowpass(controller.torque_cutoff_hz, self._rate_hz)
         self._filter = BiquadState()
         self._limits = guard_limits(settings)
         self._guard = guard_state(self._limits)
+        self._missed_limit = settings.loop.missed_in_a_row
+        self._stall_ticks = settings.loop.stall_s * self._rate_hz
         self._tick = 0
+        self._elapsed = 1
+        self._late_in_a_row = 0
+        self._missed_ticks = 0
         self._limit_time_s = math.nan
         self._limited_ticks = 0
         self._angle_rad = 0.0
+        self.scale = 1.0
+
+    def _admittances(self, inertia_kg_m2: float, damping_nm_s_rad: float) -> list[Admittance]:
+        """Return the steps over one tick, two, and so on."""
+        return [
+            admittance(inertia_kg_m2, damping_nm_s_rad, ticks * self._interval_s)
+            for ticks in range(1, LONGEST_STEP + 1)
+        ]
 
     @property
     def time_s(self) -> float:
         """When the next tick is due."""
         return self._tick / self._rate_hz
 
+    @property
+    def cause(self) -> Cause:
+        """Why the guard latched."""
+        return Cause(self._guard.cause)
+
+    @property
+    def reaction(self) -> Reaction:
+        """What the guard's cause asks for."""
+        return Reaction(self._guard.reaction)
+
+    def release(self) -> None:
+        """Forget the cause of a hold, from rest: the operator goes on.
+
+        Raises
+        ------
+        UserError
+            If the guard has stopped the rig rather than held it.
+        """
+        if self.reaction > Reaction.HOLD:
+            raise UserError(f"the rig was stopped: {self.cause.sentence}; a run cannot go on")
+        self._guard = guard_state(self._limits)
+
+    def change_controller(self, inertia_kg_m2: float, damping_nm_s_rad: float) -> None:
+        """Go on with another admittance; the velocity, its only memory, stays as it is."""
+        self._steps = self._admittances(inertia_kg_m2, damping_nm_s_rad)
+
     def perturb(self, epoch: int, perturbation_nm: Sequence[float]) -> Passage:
         """Let the subject move freely while the torque perturbation runs, one value a tick."""
 
         def command(_: Reading, torque_nm: float, k: int) -> tuple[float, float, float]:
-            value = perturbation_nm[k]
+            value = self.scale * perturbation_nm[k]
+            step = self._steps[min(self._elapsed, LONGEST_STEP) - 1]
             velocity = self._guard.velocity_rad_s
-            return admittance_step(self._admittance, velocity, value, torque_nm), value, math.nan
+            return admittance_step(step, velocity, value, torque_nm), value, math.nan
 
         return self._run(epoch, len(perturbation_nm), command)
 
@@ -135,54 +206,126 @@ class ControlLoop:
 
         return self._run(REST, round(duration_s * self._rate_hz), command)
 
+    def hold(self, duration_s: float, heard: Callable[[Reading], None] = lambda _: None) -> Passage:
+        """Stand still; `heard` takes every reading."""
+
+        def command(reading: Reading, _: float, __: int) -> tuple[float, float, float]:
+            heard(reading)
+            return 0.0, 0.0, math.nan
+
+        return self._run(REST, round(duration_s * self._rate_hz), command, latched=True)
+
+    def begin(self) -> None:
+        """Leave out the ticks that went by while the rig was enabled, which takes its time."""
+        while (late := self._ticks_late()) > 0:
+            self._rig.read(late)
+            self._tick += late
+
+    def _ticks_late(self) -> int:
+        """Wait for the tick that is due, and return how many whole ticks late that is."""
+        return math.floor(self._clock.wait_until(self.time_s) * self._rate_hz) - self._tick
+
     def stop(self) -> None:
-        """Ramp the velocity to zero within the acceleration limit."""
+        """Ramp the velocity to zero within the acceleration limit.
+
+        A tick that fails, say because its sample cannot be recorded, does not end the ramp. It goes
+        on without reading and recording, and the failure is raised after it.
+        """
 
         def command(_: Reading, __: float, ___: int) -> tuple[float, float, float]:
             return 0.0, 0.0, math.nan
 
-        for _ in range(round(self._rate_hz)):
-            if self._guard.velocity_rad_s == 0.0:
-                return
-            self._run_tick(REST, 0, command)
+        try:
+            for _ in range(round(self._rate_hz)):
+                if self._guard.velocity_rad_s == 0.0:
+                    return
+                self._run_tick(REST, 0, command)
+        except BaseException:
+            self._ramp_unrecorded()
+            raise
+
+    def _ramp_unrecorded(self) -> None:
+        """Only write: what else a tick does has failed."""
+        # The ramp takes its time, however late the failure made it.
+        self._tick += max(self._ticks_late(), 0)
+        change = self._limits.acceleration_rad_s2 * self._interval_s
+        while (velocity := self._guard.velocity_rad_s) != 0.0:
+            velocity = math.copysign(max(abs(velocity) - change, 0.0), velocity)
+            self._guard = self._guard._replace(velocity_rad_s=velocity)
+            self._clock.wait_until(self.time_s)
+            self._rig.write(velocity)
+            self._tick += 1
 
     def _age_ticks(self, reading: Reading) -> int:
         return round(self._tick - reading.motion_time_s * self._rate_hz)
 
-    def _run(
-        self,
-        epoch: int,
-        n: int,
-        command: Callable[[Reading, float, int], tuple[float, float, float]],
-    ) -> Passage:
+    def _run(self, epoch: int, n: int, command: Controller, latched: bool = False) -> Passage:
+        """Run `n` ticks' time; a guard that latches ends it, unless it was latched from the start.
+
+        `latched` allows that: the rig stands still, held.
+        """
         self._limit_time_s = math.nan
-        self._limited_ticks = 0
-        for k in range(n):
-            self._run_tick(epoch, k, command)
-            if self._guard.cause:
+        self._limited_ticks = self._missed_ticks = 0
+        known = self._guard.reaction if latched else 0
+        interrupted = False
+        k = 0
+        while k < n:
+            k = self._run_tick(epoch, k, command, n - 1) + 1
+            if self._guard.reaction > known:
+                break
+            order = self._outside.order()
+            if order.command is not Command.NONE and self._ordered(order):
+                interrupted = True
                 break
             if self._tick % self._second == 0:
                 self._progress(self.time_s)
-        return Passage(self._limit_time_s, Cause(self._guard.cause), self._limited_ticks)
+        return Passage(
+            self._limit_time_s,
+            Cause(self._guard.cause),
+            self._limited_ticks,
+            self._missed_ticks,
+            interrupted,
+        )
 
-    def _run_tick(
-        self,
-        epoch: int,
-        k: int,
-        command: Callable[[Reading, float, int], tuple[float, float, float]],
-    ) -> None:
+    def _run_tick(self, epoch: int, k: int, command: Controller, last: int = 0) -> int:
+        """Run one tick, and return the place it had: later than `k` if ticks were missed."""
         due_s = self._tick / self._rate_hz
         now_s = self._clock.wait_until(due_s)
-        reading = self._rig.read()
-        torque_nm, torque_s, angle, velocity, motion_s = reading
+        lateness_s = now_s - due_s
+        late = 0
+        if lateness_s >= self._interval_s:
+            late = self._miss(int(lateness_s * self._rate_hz))
+            k = min(k + self._elapsed - 1, last)
+            due_s = self._tick / self._rate_hz
+        else:
+            self._elapsed, self._late_in_a_row = 1, 0
+        reading = self._rig.read(self._elapsed)
+        torque_nm, torque_s, angle, velocity, motion_s = reading[:5]
         if math.isfinite(torque_nm):  # a bad number must not enter the filter's memory
             self._filter, smooth_nm = biquad_step(self._lowpass, self._filter, torque_nm)
         else:
             smooth_nm = torque_nm
         request, perturbation_nm, target = command(reading, smooth_nm, k)
+        if late == STALLED:
+            # A drive with a watchdog has stopped by now, and a ramp down from the velocity before
+            # would set the arm going again; one without brakes by its own ramp.
+            self._guard = self._guard._replace(velocity_rad_s=0.0)
+        was_cut = self._guard.reaction
         self._guard, allowed, limited = guard_step(
-            self._limits, self._guard, request, torque_nm, angle, velocity, due_s - motion_s
+            self._limits,
+            self._guard,
+            request,
+            torque_nm,
+            angle,
+            velocity,
+            due_s - motion_s,
+            due_s - torque_s,
+            # A loop that stood still comes first: the drive's own watchdog follows from it.
+            _graver(_graver(late, reading.cause), self._outside.cause(now_s)),
+            self._elapsed,
         )
+        if self._guard.reaction == CUT and was_cut != CUT:
+            self._rig.disable()
         sent = self._rig.write(allowed)
         if limited:
             self._limited_ticks += 1
@@ -194,7 +337,7 @@ class ControlLoop:
             Sample(
                 self._tick,
                 now_s,
-                now_s - due_s,
+                lateness_s,
                 epoch,
                 perturbation_nm,
                 torque_nm,
@@ -206,6 +349,29 @@ class ControlLoop:
                 request,
                 sent,
                 limited,
+                reading.torque_sequence,
+                reading.torque_status,
+                reading.motion_sequence,
+                reading.motion_status,
+                self._guard.cause,
             )
         )
         self._tick += 1
+        return k
+
+    def _miss(self, ticks: int) -> int:
+        """Leave out the ticks whose time has passed; return a cause if they were too many."""
+        self._tick += ticks
+        self._elapsed = ticks + 1
+        self._missed_ticks += ticks
+        self._late_in_a_row += 1
+        if ticks >= self._stall_ticks:
+            return int(Cause.STALLED)
+        if self._late_in_a_row >= self._missed_limit:
+            return int(Cause.DEADLINES_MISSED)
+        return int(Cause.NONE)
+
+
+def _graver(cause: int, other: int) -> int:
+    """Return the cause with the stronger reaction: an emergency stop is not masked by a fault."""
+    return other if REACTIONS[other] > REACTIONS[cause] else cause

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from rigidimeter.acquisition.changes import bounds
 from rigidimeter.acquisition.clock import Clock
 from rigidimeter.acquisition.loop import ControlLoop, Passage
+from rigidimeter.acquisition.outside import Alone, Outside, Sink
+from rigidimeter.acquisition.states import Command, Order, Run, State, after, epoch_over
+from rigidimeter.acquisition.zeroing import Zeroing
 from rigidimeter.design import PlannedEpoch, Protocol, prbs_nm, sinusoid
 from rigidimeter.device.base import Rig
-from rigidimeter.guard import Cause, why_ended
-from rigidimeter.recording.folder import Ending, SessionWriter
+from rigidimeter.errors import UserError
+from rigidimeter.guard import Cause, Reaction, why_ended
+from rigidimeter.recording.folder import Ending
 from rigidimeter.settings import Settings
 
 __all__ = ["SessionResult", "run_session"]
 
 BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
 Progress = Callable[[float], None]
+
+LOOK_S = 0.1
+"""A paused run looks so often whether it may go on."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +38,7 @@ class SessionResult:
     reason: str
     epochs_run: int
     epochs_good: int
+    cause: Cause = Cause.NONE
 
 
 def run_session(
@@ -35,10 +46,13 @@ def run_session(
     settings: Settings,
     rig: Rig,
     clock: Clock,
-    writer: SessionWriter,
+    writer: Sink,
     *,
     before_epoch: BeforeEpoch = lambda _: {},
     progress: Progress = lambda _: None,
+    outside: Outside | None = None,
+    zero_first: bool = False,
+    state_changed: Callable[[Run], None] = lambda _: None,
 ) -> SessionResult:
     """Run every epoch of a protocol with its rest.
 
@@ -50,84 +64,285 @@ def run_session(
     protocol : Protocol
     settings : Settings
     rig : Rig
+        Connected and configured.
     clock : Clock
-    writer : SessionWriter
+    writer : Sink
         Closed on return.
     before_epoch : callable
         Called while the arm rests, before each epoch; what it returns is stored with the epoch.
     progress : callable
         Called with the session time, about once a second of it.
+    outside : Outside
+        Where orders and causes from other processes come from; nobody if not given.
+    zero_first : bool
+        Whether to zero the torque sensor, and check its noise, before the first epoch.
+    state_changed : callable
+        Called whenever the run changes its state.
     """
-    loop = ControlLoop(settings, rig, clock, writer.sample, progress)
-    perturbation = prbs_nm(settings.prbs, settings.rig.tick_rate_hz).tolist()
-    angle, velocity = (
-        values.tolist() for values in sinusoid(settings.sinusoid, settings.rig.tick_rate_hz)
+    session = _Session(
+        protocol, settings, rig, clock, writer, before_epoch, progress, outside, state_changed
     )
-    run = good = 0
-    outcome: Ending = "success"
-    reason = ""
-    current: PlannedEpoch | None = None
-    writer.session_started()
-    try:
-        rig.enable()
-        for planned in protocol.epochs:
-            facts = before_epoch(planned)
-            writer.epoch_started(
-                planned.number,
-                planned.label,
-                planned.task,
-                planned.condition,
-                loop.time_s,
-                planned_s=planned.duration_s,
-                **facts,
-            )
-            current = planned
-            if planned.task == "prbs":
-                passage = loop.perturb(planned.number, perturbation)
-            else:
-                passage = loop.follow(planned.number, angle, velocity)
-            ending, why = _ending(passage, settings)
-            writer.epoch_ended(
-                planned.number, loop.time_s, ending, why, limited_ticks=passage.limited_ticks
-            )
-            current = None
-            run += 1
-            good += ending == "success"
-            if passage.cause is Cause.NONE:
-                passage = loop.rest(planned.rest_s, settings.protocol.return_s)
-            if passage.cause is not Cause.NONE:
-                outcome, reason = "fail", f"the guard stopped the rig: {passage.cause.sentence}"
-                break
-    except KeyboardInterrupt:
-        outcome, reason = "abort", "interrupted by the operator"
-    except Exception as error:
-        outcome, reason = "fail", f"{type(error).__name__}: {error}"
-        raise
-    finally:
-        _close(loop, rig, writer, current, outcome, reason)
-    return SessionResult(outcome, reason, run, good)
+    return session.run(zero_first)
 
 
-def _ending(passage: Passage, settings: Settings) -> tuple[Ending, str]:
-    why = why_ended(settings, passage.cause, passage.limit_time_s)
-    return ("fail", why) if why else ("success", "")
+class _Session:
+    """One run; see `run_session`."""
 
+    def __init__(
+        self,
+        protocol: Protocol,
+        settings: Settings,
+        rig: Rig,
+        clock: Clock,
+        writer: Sink,
+        before_epoch: BeforeEpoch,
+        progress: Progress,
+        outside: Outside | None,
+        state_changed: Callable[[Run], None],
+    ) -> None:
+        self._settings = settings
+        self._rig = rig
+        self._writer = writer
+        self._before_epoch = before_epoch
+        self._outside = outside or Alone()
+        self._state_changed = state_changed
+        self._loop = ControlLoop(
+            settings, rig, clock, writer.sample, progress, self._outside, self._obey
+        )
+        self._perturbation = prbs_nm(settings.prbs, settings.rig.tick_rate_hz).tolist()
+        self._angle, self._velocity = (
+            values.tolist() for values in sinusoid(settings.sinusoid, settings.rig.tick_rate_hz)
+        )
+        self._queue = deque(protocol.epochs)
+        self._next_number = max((epoch.number for epoch in protocol.epochs), default=0) + 1
+        self._controller = {
+            "inertia_kg_m2": settings.controller.inertia_kg_m2,
+            "damping_nm_s_rad": settings.controller.damping_nm_s_rad,
+        }
+        self._state = Run()
+        self._current: PlannedEpoch | None = None
+        self._epochs_run = self._epochs_good = 0
+        self._outcome: Ending = "success"
+        self._reason = ""
+        self._cause = Cause.NONE
 
-def _close(
-    loop: ControlLoop,
-    rig: Rig,
-    writer: SessionWriter,
-    current: PlannedEpoch | None,
-    outcome: Ending,
-    reason: str,
-) -> None:
-    """Stop, disable, close: every step is tried even when one before it fails."""
-    try:
-        loop.stop()
-    finally:
+    def run(self, zero_first: bool) -> SessionResult:
+        """Run all epochs, whatever comes."""
+        self._writer.session_started()
         try:
-            rig.disable()
+            self._become(after(self._state, Command.START))
+            self._rig.enable()
+            # A device may take long to come up. The clock is not set back for that: it is the
+            # drivers' clock too, and their heartbeats would cease meanwhile.
+            self._loop.begin()
+            if not zero_first or self._zero():
+                self._epochs()
+        except KeyboardInterrupt:
+            self._outcome, self._reason = "abort", "interrupted by the operator"
+        except Exception as error:
+            self._cause = self._cause or Cause.SOFTWARE
+            plain = isinstance(error, UserError)
+            self._reason = str(error) if plain else f"{type(error).__name__}: {error}"
+            self._outcome = "fail"
+            raise
         finally:
-            if current is not None:
-                writer.epoch_ended(current.number, loop.time_s, outcome, reason)
-            writer.close(loop.time_s, outcome, reason)
+            self._close()
+        return SessionResult(
+            self._outcome, self._reason, self._epochs_run, self._epochs_good, self._cause
+        )
+
+    def _epochs(self) -> None:
+        """Run what is in the queue, pausing where asked."""
+        rests = (self._settings.protocol.return_s, self._settings.protocol.return_s)
+        while self._queue:
+            if self._state.state is State.PAUSED and not self._wait(rests):
+                return
+            if self._state.state is not State.RUNNING:
+                break
+            planned = self._queue.popleft()
+            passage = self._epoch(planned)
+            self._become(epoch_over(self._state))
+            if self._failed() or not self._held():
+                return
+            if self._state.state is State.RUNNING:
+                passage = self._loop.rest(planned.rest_s, self._settings.protocol.return_s)
+                if passage.cause is not Cause.NONE and (self._failed() or not self._held()):
+                    return
+        if self._loop.reaction is Reaction.HOLD:
+            self._cause = self._loop.cause
+            self._reason = f"the guard held the rig in the last epoch: {self._cause.sentence}"
+        if self._state.state is State.STOPPING:
+            left = len(self._queue)
+            what = "aborted" if self._state.aborted else "stopped"
+            self._reason = f"{what} by the operator with {left} epochs left"
+            self._outcome = "abort" if self._state.aborted else "success"
+
+    def _epoch(self, planned: PlannedEpoch) -> Passage:
+        """Run one epoch and close it."""
+        loop, facts = self._loop, self._before_epoch(planned)
+        self._writer.epoch_started(
+            planned.number,
+            planned.label,
+            planned.task,
+            planned.condition,
+            loop.time_s,
+            planned_s=planned.duration_s,
+            **facts,
+        )
+        self._current = planned
+        if planned.task == "prbs":
+            passage = loop.perturb(planned.number, self._perturbation)
+        else:
+            passage = loop.follow(planned.number, self._angle, self._velocity)
+        why = why_ended(self._settings, passage.cause, passage.limit_time_s)
+        ending: Ending = "fail" if why else "success"
+        if passage.interrupted and not why:
+            ending, why = "abort", "ended by the operator"
+        self._writer.epoch_ended(
+            planned.number,
+            loop.time_s,
+            ending,
+            why,
+            limited_ticks=passage.limited_ticks,
+            missed_ticks=passage.missed_ticks,
+            counts=dict(self._rig.counts),
+        )
+        self._current = None
+        self._epochs_run += 1
+        self._epochs_good += ending == "success"
+        if ending == "abort":
+            self._again(planned, self._queue.appendleft)
+        elif ending == "fail" and self._settings.protocol.repeat_limited:
+            self._again(planned, self._queue.append)
+        return passage
+
+    def _again(self, planned: PlannedEpoch, put: Callable[[PlannedEpoch], None]) -> None:
+        """Plan an epoch once more under a number of its own; a repetition is not repeated."""
+        if planned.label.endswith("r"):
+            return
+        put(replace(planned, number=self._next_number, label=f"{planned.label}r"))
+        self._next_number += 1
+
+    def _zero(self) -> bool:
+        """Zero the torque sensor while the joint stands still; return whether all is well."""
+        limits = self._settings.zeroing
+        zeroing = Zeroing(limits)
+        passage = self._loop.hold(limits.duration_s, zeroing.hear)
+        if passage.cause is not Cause.NONE:
+            return not self._failed() and self._held()
+        bias_nm, noise_sd_nm, why = zeroing.result()
+        self._writer.event(
+            "sensor_zeroed",
+            time_s=self._loop.time_s,
+            bias_nm=bias_nm if math.isfinite(bias_nm) else None,
+            noise_sd_nm=noise_sd_nm if math.isfinite(noise_sd_nm) else None,
+            refused=why,
+        )
+        if why:
+            self._outcome, self._reason = "fail", why
+            return False
+        self._rig.zero(bias_nm)
+        return True
+
+    def _failed(self) -> bool:
+        """Whether the guard stopped the rig; the reason is kept."""
+        if self._loop.reaction <= Reaction.HOLD:
+            return False
+        self._cause = self._loop.cause
+        self._outcome = "fail"
+        self._reason = f"the guard stopped the rig: {self._cause.sentence}"
+        self._become(Run(State.FAULTED))
+        return True
+
+    def _held(self) -> bool:
+        """If the guard holds the rig, pause; without an operator that is the end."""
+        if self._loop.reaction is Reaction.NONE:
+            return True
+        if self._outside.attended:
+            self._become(Run(State.PAUSED))
+            return True
+        self._cause = self._loop.cause
+        self._outcome = "fail"
+        self._reason = (
+            f"the guard held the rig and nobody was there to go on: {self._cause.sentence}"
+        )
+        return False
+
+    def _wait(self, rest: tuple[float, float]) -> bool:
+        """Stand still until the operator goes on; return whether the session does."""
+        if self._loop.reaction is Reaction.NONE:
+            self._loop.rest(*rest)  # what interrupts it is looked at below
+        while self._state.state is State.PAUSED:
+            self._loop.hold(LOOK_S)
+            if self._failed():
+                return False
+        if self._state.state is State.RUNNING and self._loop.reaction is Reaction.HOLD:
+            self._loop.release()
+            passage = self._loop.rest(*rest)
+            return passage.cause is Cause.NONE or (not self._failed() and self._held())
+        return not self._failed()
+
+    def _obey(self, order: Order) -> bool:
+        """Take an order; return whether the stretch that runs ends now."""
+        facts: dict[str, Any] = {}
+        if order.command is Command.CHANGE:
+            facts = self._change(order)
+        before = self._state
+        self._become(after(before, order.command))
+        self._writer.event(
+            "order",
+            time_s=self._loop.time_s,
+            command=order.command.name.lower(),
+            state=self._state.state.name.lower(),
+            **facts,
+        )
+        if order.command is Command.HALT:
+            self._rig.disable()
+            self._cause, self._outcome = Cause.OPERATOR_HALT, "fail"
+            self._reason = Cause.OPERATOR_HALT.sentence
+        return self._state.at_once or (
+            before.state is State.PAUSED and self._state.state is not State.PAUSED
+        )
+
+    def _change(self, order: Order) -> dict[str, Any]:
+        """Change a parameter within its bounds; return what happened, for the record."""
+        low, high = bounds(order.name, self._settings.controller)
+        facts = {"name": order.name, "value": order.value if math.isfinite(order.value) else None}
+        if not low <= order.value <= high:
+            return {**facts, "refused": f"must be between {low:g} and {high:g}"}
+        if order.name == "perturbation_scale":
+            facts["before"], self._loop.scale = self._loop.scale, order.value
+        else:
+            facts["before"] = self._controller[order.name]
+            self._controller[order.name] = order.value
+            self._loop.change_controller(**self._controller)
+        return facts
+
+    def _become(self, run: Run) -> None:
+        if run != self._state:
+            self._state = run
+            self._state_changed(run)
+
+    def _close(self) -> None:
+        """Stop, disable, close: every step is tried even when one before it fails."""
+        try:
+            self._loop.stop()
+        finally:
+            if self._state.state is not State.FAULTED:
+                self._become(Run(State.STOPPING))
+            try:
+                self._stop_and_disable()
+            finally:
+                time_s = self._loop.time_s
+                if self._current is not None:
+                    number = self._current.number
+                    self._writer.epoch_ended(number, time_s, self._outcome, self._reason)
+                self._writer.close(time_s, self._outcome, self._reason)
+
+    def _stop_and_disable(self) -> None:
+        """Take the power away; a drive that no longer obeys brakes by its own ramp first."""
+        try:
+            if self._loop.cause in (Cause.DRIVE_LOST, Cause.DRIVE_STATE):
+                self._rig.stop()
+        finally:
+            self._rig.disable()

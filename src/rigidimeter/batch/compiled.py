@@ -24,10 +24,10 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from rigidimeter import guard
 from rigidimeter.batch import epoch
 from rigidimeter.control import admittance_step, biquad_step
 from rigidimeter.errors import UserError
+from rigidimeter.guard import Cause, step, watch
 from rigidimeter.simulation import arm_torque_nm, between, drive_step, moment, quantised
 
 __all__ = ["Compiled", "compiled"]
@@ -56,31 +56,33 @@ def compiled() -> Compiled:
             "simulating many epochs needs numba, which is not installed: pip install numba"
         ) from error
 
-    def step(function: Callable[..., Any], **helpers: Any) -> Any:
+    def inlined(function: Callable[..., Any], **helpers: Any) -> Any:
         return njit(_with_helpers(function, helpers), inline="always", error_model="numpy")
 
-    drive = step(drive_step)
+    drive = inlined(drive_step)
     outermost: list[tuple[Callable[..., Any], dict[str, Any]]] = [
         (
             epoch.run_epoch,
             {
-                "biquad_step": step(biquad_step),
-                "admittance_step": step(admittance_step),
-                "arm_torque_nm": step(arm_torque_nm),
-                "between": step(between),
-                "quantised": step(quantised),
-                "guard_step": step(
-                    guard.guard_step,
-                    Cause=_numbers(guard.Cause),
-                    Limited=_numbers(guard.Limited),
-                    _farthest_in_flight=step(guard._farthest_in_flight),
-                    _stoppable_speed=step(guard._stoppable_speed),
+                "biquad_step": inlined(biquad_step),
+                "admittance_step": inlined(admittance_step),
+                "arm_torque_nm": inlined(arm_torque_nm),
+                "between": inlined(between),
+                "quantised": inlined(quantised),
+                "guard_step": inlined(
+                    step.guard_step,
+                    Limited=_numbers(step.Limited),
+                    energy_after=inlined(watch.energy_after),
+                    found_wrong=inlined(watch.found_wrong, Cause=_numbers(Cause)),
+                    outside=inlined(watch.outside),
+                    _farthest_in_flight=inlined(step._farthest_in_flight),
+                    _stoppable_speed=inlined(step._stoppable_speed),
                 ),
                 "drive_step": drive,
-                "_state_at": step(epoch._state_at, drive_step=drive),
+                "_state_at": inlined(epoch._state_at, drive_step=drive),
             },
         ),
-        (epoch.moments, {"moment": step(moment)}),
+        (epoch.moments, {"moment": inlined(moment)}),
     ]
     digest = _digest()
     functions: list[Any] = []
@@ -114,7 +116,7 @@ def _numbers(members: type[IntEnum]) -> Any:
 def _digest() -> str:
     """Return a digest of every file that holds a step, and of this one."""
     steps = (
-        *(epoch.run_epoch, guard.guard_step, biquad_step, admittance_step),
+        *(epoch.run_epoch, step.guard_step, watch.found_wrong, biquad_step, admittance_step),
         *(drive_step, arm_torque_nm, quantised, _digest),
     )
     files = sorted({str(sys.modules[step.__module__].__file__) for step in steps})

@@ -126,7 +126,7 @@ def run_epoch(
     )
     J, B, K = joint
     # Arrays are named once, before the first tick: each look into a tuple would count references.
-    torque_taken, torque_newest, _, torque_part, torque_left, torque_parts, torque_ring = torque
+    torque_taken, torque_newest, torque_seen_s, torque_part, torque_left, torque_parts, torque_ring = torque
     motion_taken, motion_newest, motion_seen_s, motion_part, _, motion_parts, motion_ring = motion
     out_torque, out_angle, out_velocity, out_request, out_command, out_limited = columns
     torques = np.empty(torque_ring)
@@ -172,7 +172,14 @@ def run_epoch(
             admittance, guard.velocity_rad_s, perturbation_nm[tick], smooth_nm
         )
         guard, command, limited = guard_step(
-            limits, guard, request, torque_nm, angle, velocity, due_s - motion_seen_s[tick]
+            limits,
+            guard,
+            request,
+            torque_nm,
+            angle,
+            velocity,
+            due_s - motion_seen_s[tick],
+            due_s - torque_seen_s[tick],
         )
         if limited:
             limited_ticks += 1

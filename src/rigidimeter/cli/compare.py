@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rigidimeter.cli.compare_show import comparison_document, comparison_lines
+from rigidimeter.cli.compare_table import compare_table
 from rigidimeter.cli.inputs import Recordings, analyse_inputs, keep_inputs, say, status
 from rigidimeter.cli.options import reads_recordings
 from rigidimeter.errors import UserError
@@ -36,19 +38,52 @@ def compare(
     csv_out: Annotated[
         Path | None, typer.Option("--csv", metavar="OUT", help="Write the table as CSV.")
     ] = None,
+    value: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--value",
+            metavar="COLUMN",
+            help="Compare this column of one table instead; repeat for several.",
+        ),
+    ] = None,
+    by: Annotated[
+        str, typer.Option("--by", metavar="COLUMN", help="The table's column of groups.")
+    ] = "condition",
+    session: Annotated[
+        str | None,
+        typer.Option(
+            "--session",
+            metavar="COLUMN",
+            help="Column whose labels the bootstrap resamples; by default each row.",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, metavar="N", help="Of the bootstrap.")] = 1,
+    resamples: Annotated[
+        int, typer.Option("--resamples", min=100, metavar="N", help="Of the bootstrap.")
+    ] = 9999,
 ) -> None:
-    """Compare two conditions in J, B, K, angular impulse and work.
+    """Compare two conditions in J, B, K, angular impulse and work, or in columns of a table.
 
     Median and quartiles, the two-sided Wilcoxon rank-sum test (asymptotic, ties and continuity
     corrected), effect size r = z/√N, and the Hodges-Lehmann shift with its 95 % interval. Inputs
     are session folders, recordings, or one JSON file that `rigidimeter estimate` wrote.
+
+    With --value the input is one table as CSV. Then r and the rank-biserial correlation have
+    bootstrap intervals, several columns are adjusted by Holm, and every two are compared in how
+    well they part the groups.
 
     \b
     For example:
       rigidimeter compare demo-study/sessions/day-1 demo-study/sessions/day-2
       rigidimeter compare before.csv after.csv --condition OFF --condition DBS
       rigidimeter compare estimates.json --reference OFF --other DBS --csv table.csv
+      rigidimeter compare ratings.csv --value score --by condition --json comparison.json
     """
+    if value:
+        _compare_columns(
+            recordings, value, by, (reference, other), session, seed, resamples, json_out, csv_out
+        )
+        return
     from rigidimeter.recording import read_estimates, write_json, write_text
     from rigidimeter.report import csv_text, results_table
     from rigidimeter.study import compare as compare_analysis
@@ -97,6 +132,32 @@ def compare(
         write_text(csv_out, csv_text(results_table(comparisons)))
     typer.echo("\n".join(_lines(comparisons)))
     raise typer.Exit(exit_status)
+
+
+def _compare_columns(
+    recordings: Recordings,
+    values: list[str],
+    by: str,
+    pair: tuple[str | None, str | None],
+    session: str | None,
+    seed: int,
+    resamples: int,
+    json_out: Path | None,
+    csv_out: Path | None,
+) -> None:
+    from rigidimeter.recording import write_json
+    from rigidimeter.records import Notice
+
+    if len(recordings.paths) != 1:
+        raise UserError(f"--value takes one table, but {len(recordings.paths)} inputs were given")
+    if csv_out is not None:
+        raise UserError("--csv is not written with --value; use --json")
+    keep_inputs((json_out,), recordings.paths)
+    found = compare_table(recordings.paths[0], values, by, pair, session, seed, resamples)
+    say(tuple(Notice("warning", notice) for notice in found.notices))
+    if json_out is not None:
+        write_json(json_out, comparison_document(found))
+    typer.echo("\n".join(comparison_lines(found)))
 
 
 def _row(comparison: Comparison) -> dict[str, Any]:

@@ -15,13 +15,18 @@ from typing import Annotated
 import typer
 
 from rigidimeter import __version__
+from rigidimeter.cli.commission import commission
 from rigidimeter.cli.compare import compare
 from rigidimeter.cli.demo import demo
 from rigidimeter.cli.design import design
+from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
 from rigidimeter.cli.model import model
+from rigidimeter.cli.ratings import ratings
 from rigidimeter.cli.recover import recover
 from rigidimeter.cli.report import report
+from rigidimeter.cli.reproduce import reproduce
+from rigidimeter.cli.run import run
 from rigidimeter.cli.simulate import simulate
 from rigidimeter.errors import UserError
 
@@ -60,7 +65,21 @@ def _root(
     """
 
 
-for command in (design, simulate, estimate, model, compare, report, recover, demo):
+for command in (
+    design,
+    simulate,
+    run,
+    commission,
+    emulate,
+    estimate,
+    model,
+    compare,
+    ratings,
+    report,
+    reproduce,
+    recover,
+    demo,
+):
     app.command()(command)
 
 

@@ -16,8 +16,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import cont2discrete, lfilter
 
 from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import ControllerSettings, GuardSettings
@@ -173,7 +173,7 @@ def _filtered(
     torque_nm: NDArray[np.float64],
     rate_hz: float,
 ) -> NDArray[np.float64]:
-    b, a, _ = cont2discrete(
+    b, a, _ = scipy.signal.cont2discrete(
         (np.array(numerator), np.array(denominator)), 1.0 / rate_hz, method="zoh"
     )
-    return np.asarray(lfilter(np.squeeze(b), a, torque_nm), dtype=np.float64)
+    return np.asarray(scipy.signal.lfilter(np.squeeze(b), a, torque_nm), dtype=np.float64)

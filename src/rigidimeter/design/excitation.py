@@ -15,9 +15,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
-from scipy.signal import periodogram
 
 from rigidimeter.design.prbs import chip_count
 from rigidimeter.records import readonly
@@ -110,7 +109,7 @@ def envelope_edge_hz(clock_hz: float, drop_db: float = HALF_POWER_DB) -> float:
     if not 0 < drop_db <= 100:
         raise ValueError(f"drop_db must be above 0 and at most 100 dB, got {drop_db}")
     wanted = 10.0 ** (-drop_db / 20.0)
-    ratio = brentq(lambda x: float(np.sinc(x)) - wanted, 0.0, 1.0, xtol=1e-14)
+    ratio = scipy.optimize.brentq(lambda x: float(np.sinc(x)) - wanted, 0.0, 1.0, xtol=1e-14)
     return float(ratio) * clock_hz
 
 
@@ -127,7 +126,7 @@ def power_spectrum(torque_nm: ArrayLike, rate_hz: float) -> Spectrum:
     rate_hz : float
         Samples a second.
     """
-    frequency_hz, density_n2m2_hz = periodogram(
+    frequency_hz, density_n2m2_hz = scipy.signal.periodogram(
         np.asarray(torque_nm, dtype=np.float64), fs=rate_hz, detrend="constant"
     )
     return Spectrum(frequency_hz, density_n2m2_hz)

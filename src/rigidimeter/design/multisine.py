@@ -19,8 +19,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 from rigidimeter.design.ticks import tick_count, tick_times_s
 from rigidimeter.errors import UserError
@@ -64,19 +64,19 @@ def multisine_phases_rad(
         phases = -np.pi * order * (order + 1) / order.size
     else:
         phases = rng.uniform(0.0, 2.0 * np.pi, order.size)
-    points = next_fast_len(_POINTS_PER_CYCLE * last, real=True)
+    points = scipy.fft.next_fast_len(_POINTS_PER_CYCLE * last, real=True)
     lines = slice(first, last + 1)
 
     def signal(of: NDArray[np.float64]) -> NDArray[np.float64]:
         spectrum = np.zeros(points // 2 + 1, dtype=np.complex128)
         spectrum[lines] = np.exp(1j * of)
-        return np.asarray(irfft(spectrum, points), dtype=np.float64)
+        return np.asarray(scipy.fft.irfft(spectrum, points), dtype=np.float64)
 
     best, least = phases, crest_factor(signal(phases))
     for step in range(steps):
         wave = signal(phases)
         peak = float(np.max(np.abs(wave))) * (_CLIP_AT + (1.0 - _CLIP_AT) * step / steps)
-        phases = np.angle(rfft(np.clip(wave, -peak, peak))[lines])
+        phases = np.angle(scipy.fft.rfft(np.clip(wave, -peak, peak))[lines])
         crest = crest_factor(signal(phases))
         if crest < least:
             best, least = phases, crest

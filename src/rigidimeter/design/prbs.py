@@ -14,8 +14,8 @@ properties. The register itself is `scipy.signal.max_len_seq`.
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import max_len_seq
 
 from rigidimeter.design.ticks import as_written, tick_count
 from rigidimeter.errors import UserError
@@ -55,7 +55,7 @@ def prbs_levels(register_bits: int) -> NDArray[np.float64]:
     ValueError
         If scipy knows no primitive polynomial of that degree.
     """
-    bits, _ = max_len_seq(register_bits, state=np.ones(register_bits, dtype=np.int8))
+    bits, _ = scipy.signal.max_len_seq(register_bits, state=np.ones(register_bits, dtype=np.int8))
     return 2.0 * bits.astype(np.float64) - 1.0
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +81,7 @@ class SimulatedRig:
         self._state = DriveState()
         self._command = 0.0
         self._enabled = False
+        self._bias_nm = 0.0
         self._voluntary_before = self._voluntary_now = 0.0
         self._set_subject(subject)
 
@@ -111,6 +112,30 @@ class SimulatedRig:
             self.joint = draw_joint(subject, self._joint_rng)
         return self._joint
 
+    def connect(self) -> None:
+        """There is no wire."""
+
+    def configure(self) -> Mapping[str, Any]:
+        """Say that nothing here is real."""
+        return {"torque_sensor": {"model": "simulated"}, "drive": {"model": "simulated"}}
+
+    def zero(self, bias_nm: float) -> None:
+        """Take `bias_nm` off every torque from now on."""
+        self._bias_nm = bias_nm
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Nothing is lost on the way."""
+        return {}
+
+    def stop(self) -> None:
+        """Stop the drive."""
+        self._command = 0.0
+
+    def close(self) -> None:
+        """Stop the drive and refuse commands."""
+        self.disable()
+
     def enable(self) -> None:
         """Accept commands, from zero velocity."""
         self._command = 0.0
@@ -126,8 +151,17 @@ class SimulatedRig:
         self._command = 0.0
         self._enabled = False
 
-    def read(self) -> Reading:
-        """Advance one tick and return the newest samples that have arrived."""
+    def read(self, elapsed_ticks: int = 1) -> Reading:
+        """Advance so many ticks and return the newest samples that have arrived."""
+        for _ in range(elapsed_ticks - 1):
+            self._advance()
+        reading = self._advance()
+        if self._bias_nm:
+            return reading._replace(torque_nm=reading.torque_nm - self._bias_nm)
+        return reading
+
+    def _advance(self) -> Reading:
+        """Live one tick."""
         now_s = self._tick * self._interval_s
         before = self._state
         if self._tick > 0:
@@ -142,7 +176,7 @@ class SimulatedRig:
             self._take_motion(self._motion_next_s, now_s, before)
             self._motion_next_s = next(self._motion_times)
         self._tick += 1
-        torque_nm, torque_s, angle, velocity, motion_s = self._reading
+        torque_nm, torque_s, angle, velocity, motion_s, *_ = self._reading
         queue = self._torque_queue
         while queue and queue[0][0] <= until_s:
             _, torque_s, torque_nm = queue.popleft()

@@ -19,10 +19,17 @@ from typing import Any, BinaryIO, Literal
 import numpy as np
 import pyarrow as pa
 import scipy
+from numpy.typing import NDArray
 
 from rigidimeter import __version__
 from rigidimeter.errors import UserError
-from rigidimeter.recording.log import SAMPLE_UNITS, Sample, SampleLog, append_event
+from rigidimeter.recording.log import (
+    SAMPLE_UNITS,
+    Sample,
+    SampleLog,
+    append_event,
+    append_line,
+)
 from rigidimeter.settings import Settings, dump_settings
 
 __all__ = [
@@ -66,6 +73,8 @@ class SessionWriter:
     seeds : mapping of str to int
     virtual : bool
         Whether the rig is simulated.
+    continues : mapping
+        What session this one goes on with, if any.
 
     Raises
     ------
@@ -81,6 +90,7 @@ class SessionWriter:
         seeds: Mapping[str, int],
         *,
         virtual: bool,
+        continues: Mapping[str, Any] | None = None,
     ) -> None:
         self.folder = folder
         try:
@@ -106,12 +116,15 @@ class SessionWriter:
                 "protocol": [dict(epoch) for epoch in protocol],
                 "channel_units": dict(SAMPLE_UNITS),
             }
+            if continues:
+                manifest["continues"] = dict(continues)
             text = json.dumps(manifest, indent=1, ensure_ascii=False, allow_nan=False)
             part = folder / f".{MANIFEST}.part"
             part.write_text(text + "\n", encoding="utf-8")
             part.replace(folder / MANIFEST)  # whole, or not there
             self._log = SampleLog(folder / SAMPLES, settings.rig.tick_rate_hz)
-            self._events = (folder / EVENTS).open("xb")
+            # Unbuffered: a line that the disk refused must not turn up later.
+            self._events: BinaryIO = (folder / EVENTS).open("xb", buffering=0)
             lock(self._events)
         except OSError as error:
             reason = error.strerror or error
@@ -120,6 +133,27 @@ class SessionWriter:
     def sample(self, sample: Sample) -> None:
         """Record one tick."""
         self._log.append(sample)
+
+    def columns(self, columns: Mapping[str, NDArray[Any]]) -> None:
+        """Record many ticks at once, as columns; all or none are in the file then."""
+        self._log.append_columns(columns)
+
+    def line(self, line: bytes) -> None:
+        """Record an event that is a line of JSON already."""
+        append_line(self._events, line)
+
+    def event(self, kind: str, **facts: Any) -> None:
+        """Record something else that happened."""
+        append_event(self._events, {"event": kind, **facts})
+
+    def descriptors(self) -> tuple[int, int]:
+        """Return the file descriptors of samples and events, to be put on the disk."""
+        return self._log.fileno(), self._events.fileno()
+
+    def close_files(self) -> None:
+        """End the stream and close the files; for a session whose last event is written."""
+        self._log.close()
+        self._events.close()
 
     def session_started(self) -> None:
         """Say that the loop runs."""

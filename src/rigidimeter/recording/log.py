@@ -6,7 +6,9 @@ whole batch. One batch holds at most `BATCH_S` seconds.
 
 from __future__ import annotations
 
+import io
 import json
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -17,7 +19,20 @@ from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
 
-__all__ = ["BATCH_S", "SAMPLE_UNITS", "Sample", "SampleLog", "read_samples", "stream_extent"]
+__all__ = [
+    "BATCH_S",
+    "SAMPLE_UNITS",
+    "Sample",
+    "SampleLog",
+    "append_event",
+    "append_line",
+    "read_events",
+    "read_samples",
+    "sample_dtypes",
+    "stream_extent",
+]
+
+END_OF_STREAM = b"\xff\xff\xff\xff\x00\x00\x00\x00"
 
 BATCH_S = 0.1
 """How much can be lost when the process is killed."""
@@ -26,8 +41,9 @@ BATCH_S = 0.1
 class Sample(NamedTuple):
     """One tick of the loop. Units stand in the names; see `SAMPLE_UNITS`.
 
-    `epoch` is the number of the epoch, -1 during rests. `limited` is a `guard.Limited` value. The
-    command is what was sent after the guard; the request is what the controller asked for.
+    `epoch` is the number of the epoch, -1 during rests. `limited` is a `guard.Limited` value, and
+    `cause` a `guard.Cause` value. The command is what was sent after the guard; the request is what
+    the controller asked for. Sequences and status words are the devices' own.
     """
 
     tick: int
@@ -44,6 +60,11 @@ class Sample(NamedTuple):
     velocity_request_rad_s: float
     velocity_command_rad_s: float
     limited: int
+    torque_sequence: int = -1
+    torque_status: int = 0
+    motion_sequence: int = -1
+    motion_status: int = 0
+    cause: int = 0
 
 
 SAMPLE_UNITS: Mapping[str, str] = {
@@ -61,6 +82,11 @@ SAMPLE_UNITS: Mapping[str, str] = {
     "velocity_request_rad_s": "rad/s, asked for by the controller",
     "velocity_command_rad_s": "rad/s, sent after the guard",
     "limited": "0 not, 1 acceleration, 2 speed, 3 position, 4 latched",
+    "torque_sequence": "count of the torque sensor, -1 where it has none",
+    "torque_status": "status word of the torque sensor",
+    "motion_sequence": "count of the drive, -1 where it has none",
+    "motion_status": "status word of the drive",
+    "cause": "number of the cause for which the guard latched, 0 none",
 }
 """The unit of every recorded column, as the manifest states them."""
 
@@ -72,15 +98,34 @@ EVENT_TYPES: Mapping[str, Mapping[str, type | tuple[type, ...]]] = {
 }
 """What an event must hold to be read; others are kept and passed over."""
 
-_INTEGERS = {"tick": pa.int64(), "epoch": pa.int32(), "limited": pa.int8()}
+_INTEGERS = {
+    "tick": pa.int64(),
+    "epoch": pa.int32(),
+    "limited": pa.int8(),
+    "torque_sequence": pa.int64(),
+    "torque_status": pa.int64(),
+    "motion_sequence": pa.int64(),
+    "motion_status": pa.int64(),
+    "cause": pa.int8(),
+}
 _SCHEMA = pa.schema(
     [pa.field(name, _INTEGERS.get(name, pa.float64()), nullable=False) for name in Sample._fields]
 )
+_FIRST = len(Sample._fields) - len(Sample._field_defaults)
+"""Columns that every recording has; later versions added the others."""
 _DTYPES = [np.dtype(field.type.to_pandas_dtype()) for field in _SCHEMA]
+
+
+def sample_dtypes() -> dict[str, np.dtype[Any]]:
+    """Return the type of every recorded column, in order."""
+    return dict(zip(Sample._fields, _DTYPES, strict=True))
 
 
 class SampleLog:
     """Append samples to an Arrow stream, a batch at a time.
+
+    A batch is in the file whole or not at all: where the disk is full, what was written of it is
+    taken back, and it can be tried again.
 
     Parameters
     ----------
@@ -94,15 +139,38 @@ class SampleLog:
         self._file: BinaryIO = path.open("xb", buffering=0)
         # Threads cost more than they gain on a batch of a few kilobytes.
         options = pa.ipc.IpcWriteOptions(compression="lz4", use_threads=False)
-        self._writer = pa.ipc.new_stream(self._file, _SCHEMA, options=options)
+        # Arrow does not look at how much of its bytes a file took, so it writes to memory.
+        self._message = io.BytesIO()
+        self._writer = pa.ipc.new_stream(self._message, _SCHEMA, options=options)
         self._rows: list[Sample] = []
         self._batch = max(1, int(BATCH_S * tick_rate_hz))
+        # Arrow writes the schema with the first batch; here it must not be lost with one.
+        self._writer.write_batch(pa.RecordBatch.from_pylist([], schema=_SCHEMA))
+        self._message.seek(0)
+        self._message.truncate()
+        append_line(self._file, _SCHEMA.serialize().to_pybytes())
 
     def append(self, sample: Sample) -> None:
         """Add one tick; a full batch goes to the file at once."""
         self._rows.append(sample)
         if len(self._rows) >= self._batch:
             self.flush()
+
+    def append_columns(self, columns: Mapping[str, NDArray[Any]]) -> None:
+        """Write columns of equal length as one batch, after what was waiting.
+
+        Raises
+        ------
+        OSError
+            If they do not fit on the disk; then none of them is in the file.
+        """
+        self.flush()
+        arrays = [
+            pa.array(np.ascontiguousarray(columns[name], dtype))
+            for name, dtype in sample_dtypes().items()
+        ]
+        self._writer.write_batch(pa.record_batch(arrays, schema=_SCHEMA))
+        self._put()
 
     def flush(self) -> None:
         """Write what is waiting, however little."""
@@ -114,15 +182,27 @@ class SampleLog:
             for column, dtype in zip(zip(*self._rows, strict=True), _DTYPES, strict=True)
         ]
         self._writer.write_batch(pa.record_batch(arrays, schema=_SCHEMA))
+        self._put()
         self._rows.clear()
+
+    def fileno(self) -> int:
+        """Return the descriptor of the file, for whoever has it put on the disk."""
+        return self._file.fileno()
 
     def close(self) -> None:
         """Write the rest and the end of the stream."""
         if self._file.closed:
             return
         self.flush()
-        self._writer.close()
+        append_line(self._file, END_OF_STREAM)
         self._file.close()
+
+    def _put(self) -> None:
+        """Write what Arrow made of a batch, and forget it, also where that fails."""
+        message = self._message.getvalue()
+        self._message.seek(0)
+        self._message.truncate()
+        append_line(self._file, message)
 
 
 def _batches(file: pa.NativeFile) -> Iterator[pa.RecordBatch]:
@@ -146,14 +226,21 @@ def read_samples(path: Path) -> dict[str, NDArray[Any]]:
     UserError
         If the stream is not one that `SampleLog` wrote.
     """
+    table: pa.Table | None
     with pa.OSFile(str(path), "rb") as file:
         try:
-            table = pa.Table.from_batches(_batches(file), schema=_SCHEMA)
+            batches = list(_batches(file))
+            table = pa.Table.from_batches(batches, None if batches else _SCHEMA)
         except pa.ArrowInvalid:
-            raise UserError(
-                f"{path}: holds other columns than a recording of this version"
-            ) from None
-    return {name: table.column(name).to_numpy() for name in _SCHEMA.names}
+            table = None
+    if table is None or not set(Sample._fields[:_FIRST]) <= set(table.column_names):
+        raise UserError(f"{path}: holds other columns than a recording of this version")
+    columns = {
+        name: table.column(name).to_numpy() for name in Sample._fields if name in table.column_names
+    }
+    for name, default in Sample._field_defaults.items():  # recorded before there was this column
+        columns.setdefault(name, np.full(len(table), default, _DTYPES[Sample._fields.index(name)]))
+    return columns
 
 
 def stream_extent(path: Path) -> tuple[int, bool]:
@@ -173,14 +260,33 @@ def stream_extent(path: Path) -> tuple[int, bool]:
             end = file.tell()
     with path.open("rb") as raw:
         raw.seek(end)
-        closed = raw.read(8) == b"\xff\xff\xff\xff\x00\x00\x00\x00"
+        closed = raw.read(8) == END_OF_STREAM
     return end, closed
 
 
 def append_event(file: BinaryIO, event: Mapping[str, Any]) -> None:
     """Write one event as one line, at once."""
-    file.write(json.dumps(event, ensure_ascii=False, allow_nan=False).encode() + b"\n")
-    file.flush()
+    append_line(file, json.dumps(event, ensure_ascii=False, allow_nan=False).encode() + b"\n")
+
+
+def append_line(file: BinaryIO, line: bytes) -> None:
+    """Write bytes at the end of an unbuffered file, all of them or none.
+
+    Raises
+    ------
+    OSError
+        If the disk does not take them; what it took is cut off again.
+    """
+    start = os.fstat(file.fileno()).st_size
+    rest = memoryview(line)
+    try:
+        while rest:
+            rest = rest[file.write(rest) :]
+        file.flush()
+    except OSError:
+        file.seek(start)
+        file.truncate()
+        raise
 
 
 def read_events(path: Path) -> tuple[list[dict[str, Any]], bool]:

@@ -8,11 +8,15 @@ from pathlib import Path
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.folder import EVENTS, SAMPLES, lock, read_manifest
-from rigidimeter.recording.log import append_event, read_events, read_samples, stream_extent
+from rigidimeter.recording.log import (
+    END_OF_STREAM,
+    append_event,
+    read_events,
+    read_samples,
+    stream_extent,
+)
 
 __all__ = ["Recovery", "recover"]
-
-END_OF_STREAM = b"\xff\xff\xff\xff\x00\x00\x00\x00"
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ def _close(samples_path: Path, events_path: Path, reason: str) -> Recovery:
     torn = 0 if stream_closed else _end_stream(samples_path, length)
     if torn_event:
         _drop_torn_line(events_path)
-    with events_path.open("ab") as file:
+    with events_path.open("ab", buffering=0) as file:
         for number, _ in open_epochs:
             append_event(
                 file,

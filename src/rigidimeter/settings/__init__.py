@@ -8,6 +8,7 @@ from rigidimeter.settings.models import (
     ControllerSettings,
     EstimationSettings,
     GuardSettings,
+    LoopSettings,
     MotionSensorSettings,
     PrbsSettings,
     ProtocolSettings,
@@ -17,6 +18,7 @@ from rigidimeter.settings.models import (
     SinusoidSettings,
     SubjectSettings,
     TorqueSensorSettings,
+    ZeroingSettings,
 )
 from rigidimeter.settings.online import OnlineSettings
 
@@ -27,6 +29,7 @@ __all__ = [
     "DiagnosticsSettings",
     "EstimationSettings",
     "GuardSettings",
+    "LoopSettings",
     "MarginsSettings",
     "MotionSensorSettings",
     "MultisineSettings",
@@ -40,6 +43,7 @@ __all__ = [
     "SinusoidSettings",
     "SubjectSettings",
     "TorqueSensorSettings",
+    "ZeroingSettings",
     "dump_settings",
     "load_settings",
     "parse_settings",

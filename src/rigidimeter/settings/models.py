@@ -12,6 +12,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from rigidimeter.settings.base import Section, quantity
+from rigidimeter.settings.commissioning import CommissioningSettings
 from rigidimeter.settings.diagnostics import DiagnosticsSettings
 from rigidimeter.settings.foresight import MarginsSettings, MultisineSettings, OptimiseSettings
 from rigidimeter.settings.online import OnlineSettings
@@ -22,6 +23,7 @@ __all__ = [
     "ControllerSettings",
     "EstimationSettings",
     "GuardSettings",
+    "LoopSettings",
     "MarginsSettings",
     "MotionSensorSettings",
     "MultisineSettings",
@@ -34,6 +36,7 @@ __all__ = [
     "SinusoidSettings",
     "SubjectSettings",
     "TorqueSensorSettings",
+    "ZeroingSettings",
     "quantity",
 ]
 
@@ -56,12 +59,52 @@ class GuardSettings(Section):
 
     `reaction_time_s` is how long the drive may take to have done what it was told, plus how far the
     stamp of an angle reading may be wrong; braking for the position limit begins that much earlier.
+
+    Above `torque_limit_nm` or `power_limit_w` the rig holds still and the operator may go on. It
+    stops, latched, above `torque_stop_nm`, when more than `energy_limit_j` goes to and fro between
+    rig and joint within a second, when the angle is more than `following_limit_deg` from where the
+    commands should have brought it, and when a reading is older than `stale_s`.
     """
 
     position_limit_deg: float = quantity(40.0, "deg", 1.0, 180.0)
     speed_limit_deg_s: float = quantity(200.0, "deg/s", 1.0, 1000.0)
     acceleration_limit_deg_s2: float = quantity(6000.0, "deg/s²", 10.0, 100000.0)
     reaction_time_s: float = quantity(0.02, "s", 0.0, 0.2)
+    stale_s: float = quantity(0.1, "s", 0.002, 0.5)
+    following_limit_deg: float = quantity(2.0, "deg", 0.1, 45.0)
+    torque_limit_nm: float = quantity(10.0, "N·m", 0.01, 200.0)
+    torque_stop_nm: float = quantity(20.0, "N·m", 0.01, 400.0)
+    power_limit_w: float = quantity(20.0, "W", 0.01, 1000.0)
+    energy_limit_j: float = quantity(5.0, "J", 0.01, 1000.0)
+
+    @model_validator(mode="after")
+    def _stop_above_hold(self) -> Self:
+        if self.torque_stop_nm < self.torque_limit_nm:
+            raise ValueError(
+                f"torque_stop_nm = {self.torque_stop_nm:g} N·m must not be below torque_limit_nm "
+                f"= {self.torque_limit_nm:g} N·m: the rig pauses at the one and stops at the other"
+            )
+        return self
+
+
+class LoopSettings(Section):
+    """When a loop that falls behind stops the rig: so many late ticks in a row, or one so late."""
+
+    missed_in_a_row: int = quantity(20, "1", 1, 1000)
+    stall_s: float = quantity(0.1, "s", 0.005, 1.0)
+
+
+class ZeroingSettings(Section):
+    """Before the first epoch of a run the joint is held still and the torque sensor zeroed.
+
+    A mean above `bias_limit_nm` means that the sensor was zeroed under load or has another
+    calibration; a standard deviation above `noise_limit_nm` that the subject moves or a wire is
+    loose. Either way the run does not begin.
+    """
+
+    duration_s: float = quantity(2.0, "s", 0.1, 60.0)
+    bias_limit_nm: float = quantity(1.0, "N·m", 0.001, 100.0)
+    noise_limit_nm: float = quantity(0.1, "N·m", 0.0001, 100.0)
 
 
 class PrbsSettings(Section):
@@ -166,7 +209,10 @@ class BlockSettings(Section):
 
 
 class ProtocolSettings(Section):
-    """Blocks of epochs in order, with random rests in between."""
+    """Blocks of epochs in order, with random rests in between.
+
+    With `repeat_limited`, an epoch in which the arm came to a limit is run again at the end, once.
+    """
 
     blocks: list[BlockSettings] = Field(
         default_factory=lambda: [BlockSettings(task="prbs"), BlockSettings(task="sinusoid")],
@@ -174,6 +220,7 @@ class ProtocolSettings(Section):
     )
     rests_s: list[float] = Field([10.0, 20.0], min_length=1, json_schema_extra={"unit": "s"})
     return_s: float = quantity(3.0, "s", 0.5, 60.0)
+    repeat_limited: bool = False
 
     @model_validator(mode="after")
     def _rests_hold_the_return(self) -> Self:
@@ -243,6 +290,8 @@ class Settings(Section):
     seed: int = Field(1, ge=0, le=2**32 - 1, json_schema_extra={"unit": "1"})
     controller: ControllerSettings = ControllerSettings()
     guard: GuardSettings = GuardSettings()
+    loop: LoopSettings = LoopSettings()
+    zeroing: ZeroingSettings = ZeroingSettings()
     prbs: PrbsSettings = PrbsSettings()
     sinusoid: SinusoidSettings = SinusoidSettings()
     rig: RigSettings = RigSettings()
@@ -260,6 +309,7 @@ class Settings(Section):
     multisine: MultisineSettings = MultisineSettings()
     diagnostics: DiagnosticsSettings = DiagnosticsSettings()
     online: OnlineSettings = OnlineSettings()
+    commissioning: CommissioningSettings = CommissioningSettings()
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -286,6 +336,12 @@ class Settings(Section):
                 f"rig may take to react ({delay_s:.3g} s: twice the drive's lag, what the stamps "
                 "of the encoder do not know of its latency, and one tick); raise it to that"
             )
+        if self.prbs.amplitude_nm >= self.guard.torque_limit_nm:
+            raise ValueError(
+                f"prbs.amplitude_nm = {self.prbs.amplitude_nm:g} N·m must stay below "
+                f"guard.torque_limit_nm = {self.guard.torque_limit_nm:g} N·m, at which the rig "
+                "holds still"
+            )
         if self.controller.torque_cutoff_hz >= self.rig.tick_rate_hz / 2:
             raise ValueError(
                 f"controller.torque_cutoff_hz = {self.controller.torque_cutoff_hz:g} Hz must stay "
@@ -302,6 +358,12 @@ class Settings(Section):
                 raise ValueError(
                     f"rig.{name}.jitter_s = {sensor.jitter_s:g} s must be shorter than the "
                     f"{1 / rate:g} s between samples at rig.{name}.rate_hz = {rate:g} Hz"
+                )
+            oldest_s = 1 / rate + sensor.latency_s + sensor.jitter_s
+            if self.guard.stale_s <= oldest_s:
+                raise ValueError(
+                    f"guard.stale_s = {self.guard.stale_s:g} s is too short for rig.{name}, whose "
+                    f"readings may be {oldest_s:.3g} s old; raise it above that"
                 )
             if rate > self.rig.tick_rate_hz:
                 raise ValueError(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from rigidimeter.joint import JointDynamics
 
@@ -49,7 +49,7 @@ def arm(joint: JointDynamics, interval_s: float) -> Arm:
     """Discretise Eq. 3 exactly, by the matrix exponential of state and input together."""
     J, B, K = joint.inertia_kg_m2, joint.damping_nm_s_rad, joint.stiffness_nm_rad
     augmented = np.array([[0.0, 1.0, 0.0], [-K / J, -B / J, 1.0 / J], [0.0, 0.0, 0.0]])
-    e = expm(augmented * interval_s)
+    e = scipy.linalg.expm(augmented * interval_s)
     return Arm(*(float(e[i, j]) for i, j in ((0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2))))
 
 

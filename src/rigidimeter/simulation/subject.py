@@ -6,8 +6,8 @@ import math
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import SubjectSettings
@@ -38,10 +38,10 @@ def draw_joint(subject: SubjectSettings, rng: np.random.Generator) -> JointDynam
 @lru_cache(maxsize=32)
 def _band(low_hz: float, high_hz: float, rate_hz: float) -> tuple[NDArray[np.float64], float]:
     """Return the band-pass as sections, and the energy of its impulse response."""
-    sos = signal.butter(2, [low_hz, high_hz], "bandpass", fs=rate_hz, output="sos")
+    sos = scipy.signal.butter(2, [low_hz, high_hz], "bandpass", fs=rate_hz, output="sos")
     impulse = np.zeros(int(10.0 * rate_hz / low_hz))
     impulse[0] = 1.0
-    response = signal.sosfilt(sos, impulse)
+    response = scipy.signal.sosfilt(sos, impulse)
     return sos, float(response @ response)
 
 
@@ -76,7 +76,7 @@ class SubjectTorque:
         """Return the next `n` ticks of torque."""
         torque = np.zeros(n)
         if self._subject.voluntary_sd_nm > 0.0:
-            noise, self._memory = signal.sosfilt(
+            noise, self._memory = scipy.signal.sosfilt(
                 self._sos, self._rng.standard_normal(n), zi=self._memory
             )
             torque += self._gain * noise

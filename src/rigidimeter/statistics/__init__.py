@@ -1,6 +1,69 @@
-"""Tables in, tables out: summaries, tests and effect sizes."""
+"""Tables in, tables out: summaries, tests, mixed models and effect sizes."""
 
+from rigidimeter.statistics.contrasts import (
+    Contrast,
+    JointTest,
+    contrast,
+    difference,
+    joint_test,
+    pairwise,
+)
+from rigidimeter.statistics.effects import (
+    EffectDifference,
+    Effects,
+    TwoGroups,
+    compare_effects,
+    effect_sizes,
+    holm,
+    rank_biserial,
+    two_groups,
+)
+from rigidimeter.statistics.mixed import (
+    LikelihoodRatio,
+    Mixed,
+    fit_mixed,
+    likelihood_ratio,
+    nested,
+)
+from rigidimeter.statistics.published import (
+    PublishedDifference,
+    PublishedEffect,
+    compare_published,
+    effect_from_p,
+    largest_r,
+    rank_biserial_interval,
+)
 from rigidimeter.statistics.ranksum import RankSum, ranksum
 from rigidimeter.statistics.summary import Summary, summarise
 
-__all__ = ["RankSum", "Summary", "ranksum", "summarise"]
+__all__ = [
+    "Contrast",
+    "EffectDifference",
+    "Effects",
+    "JointTest",
+    "LikelihoodRatio",
+    "Mixed",
+    "PublishedDifference",
+    "PublishedEffect",
+    "RankSum",
+    "Summary",
+    "TwoGroups",
+    "compare_effects",
+    "compare_published",
+    "contrast",
+    "difference",
+    "effect_from_p",
+    "effect_sizes",
+    "fit_mixed",
+    "holm",
+    "joint_test",
+    "largest_r",
+    "likelihood_ratio",
+    "nested",
+    "pairwise",
+    "rank_biserial",
+    "rank_biserial_interval",
+    "ranksum",
+    "summarise",
+    "two_groups",
+]

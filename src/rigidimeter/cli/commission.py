@@ -1,0 +1,126 @@
+"""`rigidimeter commission`: try a rig before anyone is put into it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rigidimeter.cli.options import SettingsOption
+from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.commissioning import CommissioningRecord
+
+__all__ = ["commission"]
+
+
+def commission(
+    rig: Annotated[Path, typer.Option("--rig", metavar="RIG.toml", help="The rig file.")],
+    settings: SettingsOption = None,
+    signed_by: Annotated[
+        str, typer.Option("--signed-by", metavar="NAME", help="Who answers for it; recorded.")
+    ] = "",
+    yes: Annotated[
+        bool,
+        typer.Option(
+            "--yes", help="Consent to every question beforehand; the emergency stop is not tried."
+        ),
+    ] = False,
+    known_torque: Annotated[
+        float | None,
+        typer.Option(
+            "--known-torque-nm",
+            metavar="NM",
+            help="A torque that you put on the joint by hand or weight, toward positive angles.",
+        ),
+    ] = None,
+    known_angle: Annotated[
+        float | None,
+        typer.Option(
+            "--known-angle-deg",
+            metavar="DEG",
+            help="An angle by which you turn the joint by hand, without power.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", help="The record; beside the rig file unless told otherwise."
+        ),
+    ] = None,
+) -> None:
+    """Try a rig, without anyone in it, and write a record that later runs ask for.
+
+    First without power: what the devices say, rates, noise, lateness. Then, with your consent, by a
+    small slow motion: directions, units, delays, stability of the protocol's controller, watchdog
+    and emergency stop. Fasten a spring or a weight like a relaxed arm's to the joint.
+
+    \b
+    For example:
+      rigidimeter commission --rig RIG.toml --signed-by "A. Weber"
+      rigidimeter commission --rig RIG.toml --settings study.toml --known-torque-nm 2
+    """
+    from datetime import UTC, datetime
+
+    from rigidimeter import __version__
+    from rigidimeter.acquisition.realtime import DeadlineClock, prepare_loop_process
+    from rigidimeter.commissioning import Operator, Timebase, record_path, write_record
+    from rigidimeter.commissioning import commission as try_rig
+    from rigidimeter.device.rigfile import load_rig
+    from rigidimeter.settings import load_settings
+
+    rigfile, chosen = load_rig(rig), load_settings(settings)
+    if not yes and not sys.stdin.isatty():
+        raise UserError("nobody is there to consent; give --yes, or use a terminal")
+    operator = Operator(
+        ask=(lambda _: True) if yes else _ask,
+        say=lambda what: typer.echo(what, err=True),
+        presses=not yes,
+        known_torque_nm=known_torque,
+        known_angle_deg=known_angle,
+    )
+    typer.echo(str(prepare_loop_process()), err=True)
+    clock = DeadlineClock()
+    found = try_rig(
+        rigfile.build(clock.now_s, chosen.rig.tick_rate_hz),
+        rigfile,
+        chosen,
+        Timebase(clock.now_s, clock.wait_until),
+        operator,
+        limits=chosen.commissioning,
+        made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
+        software=__version__,
+        signed_by=signed_by,
+    )
+    path = out or record_path(rig)
+    write_record(path, found)
+    typer.echo(table(found))
+    typer.echo(f"Record: {path}")
+    if found.failed:
+        raise UserError(f"{rig}: not fit for a person: {found.failed[0].sentence}")
+    if found.missing:
+        raise UserError(
+            f"{rig}: not fit for a person: {found.missing[0]!r} was not possible; the "
+            "table says why"
+        )
+    if found.not_tried:
+        typer.echo(f"Not tried: {', '.join(found.not_tried)}.")
+
+
+def table(record: CommissioningRecord) -> str:
+    """Return the checks as lines, each with its remedy below where it has one."""
+    lines = []
+    for check in record.checks:
+        mark = {"passed": "ok  ", "failed": "FAIL"}.get(check.outcome, "  – ")
+        words = "" if check.value is None else check.words
+        lines.append(f"{mark}  {check.name:<40}  {words:<28}  {check.limit}")
+        if check.remedy:
+            lines.append(f"      {check.remedy}")
+    return "\n".join(lines)
+
+
+def _ask(question: str) -> bool:
+    return typer.confirm(question, default=False, err=True)

@@ -1,0 +1,83 @@
+"""`rigidimeter emulate`: a rig without hardware, on true wires, that misbehaves when told to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigidimeter.errors import UserError
+
+__all__ = ["emulate"]
+
+
+def emulate(
+    drive: Annotated[
+        str, typer.Option("--drive", metavar="cia402|ascii", help="Which kind of drive.")
+    ] = "cia402",
+    joint: Annotated[
+        tuple[float, float, float],
+        typer.Option("--joint", metavar="J B K", help="The arm, in kg·m², N·m·s/rad and N·m/rad."),
+    ] = (0.0045, 0.1368, 1.751),
+    rig_out: Annotated[
+        Path | None,
+        typer.Option(
+            "--rig-out", metavar="FILE", help="Where to write the rig file that reaches it."
+        ),
+    ] = None,
+    voluntary: Annotated[
+        float, typer.Option("--voluntary", metavar="NM", help="The subject pushes by this SD.")
+    ] = 0.0,
+    torque_rate: Annotated[
+        float, typer.Option("--torque-rate-hz", metavar="HZ", help="Torque samples per second.")
+    ] = 1000.0,
+    noise: Annotated[
+        float, typer.Option("--noise-nm", metavar="NM", help="Noise of the torque, SD.")
+    ] = 0.005,
+    bandwidth: Annotated[
+        float, typer.Option("--bandwidth-hz", metavar="HZ", help="Bandwidth of the drive.")
+    ] = 50.0,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of everything random.")] = 1,
+) -> None:
+    """Host an emulated rig: an arm with a torque sensor (UDP) and a drive (CANopen or ASCII).
+
+    Prints one line of JSON when it is ready, then takes one command a line and answers each with
+    one line of JSON; `help` lists them. The end of the input ends it.
+
+    \b
+    For example:
+      rigidimeter emulate --rig-out RIG.toml
+      rigidimeter emulate --drive ascii --joint 0.0045 0.14 1.75 --rig-out RIG.toml
+    """
+    from rigidimeter.emulation.bench import Bench, serve
+    from rigidimeter.joint import JointDynamics
+
+    if drive not in ("cia402", "ascii"):
+        raise UserError(f"--drive {drive}: must be cia402 or ascii")
+    try:
+        arm = JointDynamics(*joint)
+        bench = Bench(
+            "ascii" if drive == "ascii" else "cia402",
+            arm,
+            voluntary_sd_nm=voluntary,
+            torque_rate_hz=torque_rate,
+            noise_sd_nm=noise,
+            bandwidth_hz=bandwidth,
+            seed=seed,
+        )
+    except ValueError as error:
+        raise UserError(f"the bench cannot be made: {error}") from None
+    except ImportError as error:
+        raise UserError(
+            f"{error.name} is missing: pip install 'rigidimeter[canopen,serial]'"
+        ) from None
+    with bench:
+        try:
+            serve(bench, rig_out)
+        except KeyboardInterrupt:
+            typer.echo("rigidimeter: emulation ended", err=True)
+
+
+if __name__ == "__main__":
+    typer.run(emulate)

@@ -1,0 +1,55 @@
+"""`rigidimeter reproduce`: the paper's numbers beside ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigidimeter.errors import UserError
+
+__all__ = ["reproduce"]
+
+
+def reproduce(
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for page, ledger and figures.")
+    ],
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, max=2**31, help="Seed of everything random.")
+    ] = 2023,
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", metavar="ID", help="Make this row alone; repeat for several."),
+    ] = None,
+) -> None:
+    """Recompute the paper: every equation, figure and table beside what it prints.
+
+    Writes one self-contained page, paper.html, with a verdict for each row, ledger.json with the
+    same rows, and the figures. What needs the recordings of the animal, which were never published,
+    comes from a virtual study of the same design and says so.
+
+    \b
+    For example:
+      rigidimeter reproduce --out paper
+      rigidimeter reproduce --out paper --only fig-6b --only eq-8-largest
+    """
+    from rigidimeter.cli.progress import Meter
+    from rigidimeter.reproduce import Workshop, chosen, make_rows, tally, write_ledger
+
+    names = [name for text in only or [] for name in text.split(",") if name]
+    wanted = chosen(names)
+    if out.exists() and not out.is_dir():
+        raise UserError(f"--out {out}: is a file; name a folder")
+    with Meter("reproduce", float(len(wanted))) as meter:
+        rows = make_rows(Workshop(seed), wanted, progress=lambda _: meter.advance())
+    try:
+        page = write_ledger(rows, out, seed)
+    except OSError as error:
+        raise UserError(f"--out {out}: cannot be written ({error.strerror or error})") from None
+    width = max(len(row.id) for row in rows)
+    for row in rows:
+        typer.echo(f"{row.id:{width}}  {row.verdict}")
+    typer.echo("; ".join(f"{count} {verdict}" for verdict, count in tally(rows).items()))
+    typer.echo(str(page))

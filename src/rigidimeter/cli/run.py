@@ -1,0 +1,144 @@
+"""`rigidimeter run`: a session in real time, on the virtual rig or on hardware."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.design import Protocol
+    from rigidimeter.settings import Settings
+
+__all__ = ["run"]
+
+
+def run(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder for the session.")],
+    protocol: Annotated[
+        Path | None, typer.Argument(metavar="[PROTOCOL.toml]", help="Settings of the session.")
+    ] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option("--rig", metavar="RIG.toml", help="The devices; the virtual rig if absent."),
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option("--resume", metavar="DIR", help="Go on with what is left of this session."),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", help="Seed of everything random; recorded.")
+    ] = None,
+    unattended: Annotated[
+        bool, typer.Option("--unattended", help="No operator: what would pause the rig ends it.")
+    ] = False,
+    priority: Annotated[
+        int, typer.Option("--priority", min=0, max=99, help="Of SCHED_FIFO; 0 asks for none.")
+    ] = 80,
+    cpu: Annotated[
+        int | None, typer.Option("--cpu", help="Processor of the loop; the last one if absent.")
+    ] = None,
+) -> None:
+    """Run a protocol in real time: loop, recorder and live estimate in processes of their own.
+
+    Without --rig on the virtual rig. On hardware the rig must have been commissioned
+    (`rigidimeter commission`). Mechanical stops and a hardware enable come before this program.
+
+    \b
+    For example:
+      rigidimeter run --out session
+      rigidimeter run protocol.toml --rig rig.toml --out session
+      rigidimeter run --resume session --rig rig.toml --out session-2
+    """
+    from rigidimeter.acquisition.recorder import Recording
+    from rigidimeter.acquisition.supervise import Realtime, supervise
+    from rigidimeter.cli.realtime import run_loop
+    from rigidimeter.console import Terminal
+    from rigidimeter.device.rigfile import load_rig
+
+    settings, planned, continues = _planned(protocol, resume, seed)
+    _offer(out)
+    if rig is not None:
+        load_rig(rig)  # what is wrong with it is said before any process starts
+    recording = Recording(
+        out,
+        settings,
+        tuple(asdict(epoch) for epoch in planned.epochs),
+        {"session": settings.seed},
+        virtual=rig is None,
+        continues=continues,
+    )
+    attended = not unattended and sys.stdin.isatty()
+    ended = supervise(
+        partial(run_loop, settings, planned, rig),
+        recording,
+        realtime=Realtime(priority=priority, cpu=cpu, attended=attended),
+        console=Terminal(sys.stdin if not unattended else None, sys.stdout),
+    )
+    for remark in ended.remarks:
+        typer.echo(remark, err=True)
+    good, of = _counted(out)
+    typer.echo(f"{good} of {of} epochs ended with success; session in {out}")
+    if ended.outcome != "success":
+        again = f"; go on with `rigidimeter run --resume {out} --out NEW`" if good < of else ""
+        raise UserError(
+            f"{out}: the session ended with {ended.outcome or 'no outcome'}: {ended.reason}{again}"
+        )
+
+
+def _planned(
+    path: Path | None, resume: Path | None, seed: int | None
+) -> tuple[Settings, Protocol, dict[str, object]]:
+    """Return settings, the epochs to run, and what they continue."""
+    from rigidimeter.design import Protocol, plan
+    from rigidimeter.recording.resume import rest_of
+    from rigidimeter.settings import dump_settings, load_settings, parse_settings
+
+    if resume is None:
+        settings = load_settings(path)
+        if seed is not None:
+            values = dump_settings(settings) | {"seed": seed}
+            settings = parse_settings(values, source="the options")
+        planned = plan(settings.protocol, settings.prbs, settings.sinusoid, settings.seed)
+        return settings, planned, {}
+    if path is not None or seed is not None:
+        raise UserError(
+            "--resume goes on with the settings and the seed of the session; leave out "
+            + (f"{path}" if path is not None else "--seed")
+        )
+    rest = rest_of(resume)
+    if not rest.epochs:
+        raise UserError(f"{resume}: nothing is left to run, all {rest.done} epochs are done")
+    typer.echo(f"{rest.done} epochs are done; {len(rest.epochs)} are left")
+    return rest.settings, Protocol(rest.settings.seed, rest.epochs), dict(rest.continues)
+
+
+def _offer(out: Path) -> None:
+    """Say how to go on where the folder holds a session that was interrupted."""
+    from rigidimeter.recording import is_session
+    from rigidimeter.recording.resume import rest_of
+
+    if not is_session(out):
+        return
+    rest = rest_of(out)
+    if rest.epochs:
+        raise UserError(
+            f"{out}: holds a session of which {len(rest.epochs)} epochs are left; go on with "
+            f"`rigidimeter run --resume {out} --out NEW`, or name a new folder"
+        )
+
+
+def _counted(folder: Path) -> tuple[int, int]:
+    """Return how many epochs ended with success, and how many were planned."""
+    from rigidimeter.recording.folder import EVENTS, read_manifest
+    from rigidimeter.recording.log import read_events
+
+    events, _ = read_events(folder / EVENTS)
+    good = sum(e.get("event") == "epoch_ended" and e["outcome"] == "success" for e in events)
+    return good, len(read_manifest(folder)["protocol"])

@@ -1,0 +1,89 @@
+"""A check as a value: what was measured, what it must be, how it came out, what would help."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = ["Check", "Outcome", "above", "below", "impossible", "within", "yes"]
+
+Outcome = Literal["passed", "failed", "not possible here"]
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check.
+
+    Parameters
+    ----------
+    name : str
+        What was checked; the same words in every record.
+    value : float or str or None
+        What was found, in `unit`.
+    unit : str
+        Empty for a word, ``"1"`` for a pure number.
+    limit : str
+        What it must be, in words and numbers.
+    outcome : str
+        "passed", "failed" or "not possible here".
+    remedy : str
+        What to do about it; empty where it passed.
+    """
+
+    name: str
+    value: float | str | None
+    unit: str
+    limit: str
+    outcome: Outcome
+    remedy: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is as it must be."""
+        return self.outcome == "passed"
+
+    @property
+    def words(self) -> str:
+        """What was found, with its unit."""
+        return self.value if isinstance(self.value, str) else _number(self.value, self.unit)
+
+    @property
+    def sentence(self) -> str:
+        """What was found and what to do, for a refusal."""
+        return f"{self.name}: {self.words}, must be {self.limit}; {self.remedy}"
+
+
+def below(name: str, value: float, unit: str, limit: float, remedy: str) -> Check:
+    """Return the check that a number is at most a limit; one that is not finite is not."""
+    return _check(name, value, unit, f"at most {_number(limit, unit)}", value <= limit, remedy)
+
+
+def above(name: str, value: float, unit: str, limit: float, remedy: str) -> Check:
+    """Return the check that a number is at least a limit."""
+    return _check(name, value, unit, f"at least {_number(limit, unit)}", value >= limit, remedy)
+
+
+def within(name: str, value: float, unit: str, wanted: float, percent: float, remedy: str) -> Check:
+    """Return the check that a number is as wanted, but for so many percent."""
+    good = abs(value - wanted) <= 0.01 * percent * abs(wanted)
+    return _check(name, value, unit, f"{_number(wanted, unit)} ± {percent:g} %", good, remedy)
+
+
+def yes(name: str, good: bool, found: str, limit: str, remedy: str) -> Check:
+    """Return the check of something that is so or not."""
+    return Check(name, found, "", limit, "passed" if good else "failed", "" if good else remedy)
+
+
+def impossible(name: str, limit: str, why: str) -> Check:
+    """Return a check that could not be made; `why` is its remedy."""
+    return Check(name, None, "", limit, "not possible here", why)
+
+
+def _check(name: str, value: float, unit: str, limit: str, good: bool, remedy: str) -> Check:
+    kept = float(value) if math.isfinite(value) else None
+    return Check(name, kept, unit, limit, "passed" if good else "failed", "" if good else remedy)
+
+
+def _number(value: float | None, unit: str) -> str:
+    return "not measurable" if value is None else f"{value:.4g} {unit}".removesuffix(" 1").rstrip()

@@ -1,0 +1,209 @@
+"""Whether the rig stops without us: its watchdog, and the emergency stop.
+
+When nothing is written any more, a joint that moves slowly must not go on for longer than the
+watchdog allows. A drive that says so by itself must then stay where it is, whatever it is told,
+until an operator agrees; and so after the emergency stop, when it is released.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from rigidimeter.acquisition import ControlLoop
+from rigidimeter.commissioning.checks import Check, below, impossible, yes
+from rigidimeter.commissioning.moving import way
+from rigidimeter.commissioning.trial import (
+    Heard,
+    Timebase,
+    follow,
+    freshen,
+    hold,
+    listen,
+    stopped_for,
+    trial,
+)
+from rigidimeter.device.base import DeviceError, Rig
+from rigidimeter.guard import Cause
+from rigidimeter.settings import Settings
+from rigidimeter.settings.commissioning import CommissioningSettings
+from rigidimeter.units import rad_from_deg
+
+__all__ = ["emergency_stop_checks", "watchdog_checks"]
+
+Ask = Callable[[str], bool]
+
+SETTLE_S = 0.3
+TEMPTED_S = 0.4
+MOST_DEG = 0.2
+"""A stopped joint that moves more than this has started again."""
+
+TEMPTED_DEG_S = 2.0
+REPORTS = (Cause.DRIVE_FAULT, Cause.DRIVE_STATE, Cause.DRIVE_LOST, Cause.EMERGENCY_STOP)
+WATCHDOG, REPORT = "watchdog", "watchdog reported"
+RESTART = "stays stopped after the watchdog"
+AGAIN = "comes back after confirmation"
+STOP, RELEASE = "emergency stop", "stays stopped after the release"
+
+
+def watchdog_checks(
+    rig: Rig,
+    settings: Settings,
+    time: Timebase,
+    limits: CommissioningSettings,
+    watchdog_s: float | None,
+    ask: Ask,
+) -> list[Check]:
+    """Fall silent, at rest and in a slow motion; the drive must stop by itself and stay so."""
+    if watchdog_s is None:
+        why = "the drive has no watchdog that could be tried"
+        return [impossible(name, "", why) for name in (REPORT, RESTART, AGAIN, WATCHDOG)]
+    most_s = watchdog_s + limits.watchdog_margin_s
+    rate_hz = settings.rig.tick_rate_hz
+    reported_s = math.inf
+    tempted: Heard | None = None
+
+    def silence(loop: ControlLoop) -> None:
+        nonlocal reported_s, tempted
+        before = rig.read().motion_status
+        began_s = time.now()
+        # A driver may give the drive up by its own clock. Only what comes from the drive counts.
+        heard = listen(
+            rig,
+            time,
+            rate_hz,
+            most_s,
+            write_rad_s=None,
+            until=lambda r: r.cause in REPORTS and r.motion_status != before,
+        )
+        if rig.read().motion_status != before:
+            reported_s = float(heard.time_s[-1]) - began_s
+            tempted = _tempt(rig, time, rate_hz)
+
+    tried = trial(rig, settings, time, [hold(SETTLE_S), silence])
+    if tried.cause is not Cause.NONE:
+        why = "remove the reason and commission again"
+        return [yes(WATCHDOG, False, stopped_for(tried.cause), "tried", why)]
+    if tempted is None:
+        silent = "the drive does not say by itself that it stopped; there is nothing to confirm"
+        checks = [impossible(name, "", silent) for name in (REPORT, RESTART, AGAIN)]
+    else:
+        late = "the drive says too late that it stopped: shorten its watchdog"
+        checks = [below(REPORT, reported_s, "s", most_s, late), _stayed(RESTART, tempted)]
+        checks.append(_again(rig, settings, time, ask))
+        if not checks[-1].passed:
+            why = "the drive has no power again after the watchdog"
+            return [*checks, impossible(WATCHDOG, "", why)]
+    return [*checks, _overrun(rig, settings, time, limits, watchdog_s)]
+
+
+def emergency_stop_checks(
+    rig: Rig, settings: Settings, time: Timebase, limits: CommissioningSettings, ask: Ask | None
+) -> list[Check]:
+    """Let the operator press the emergency stop; `ask` is None where nobody is there."""
+    limit = "seen at once"
+    wait_s = limits.emergency_stop_wait_s
+    if ask is None:
+        why = "nobody was there to press it; commission with an operator"
+        return [impossible(STOP, limit, why), impossible(RELEASE, "", why)]
+    if not ask(
+        f"Emergency stop: after you agree the drive has power for {wait_s:g} s and stands still; "
+        "press the emergency stop within that time. Ready?"
+    ):
+        why = "the operator did not agree to it"
+        return [impossible(STOP, limit, why), impossible(RELEASE, "", why)]
+    tried = trial(rig, settings, time, [hold(wait_s)])
+    seen = tried.cause in REPORTS
+    words = tried.cause.sentence if tried.cause is not Cause.NONE else f"nothing in {wait_s:g} s"
+    remedy = "the emergency stop must take the drive's power away: look at its wiring"
+    checks = [yes(STOP, seen, words, limit, remedy)]
+    if not seen:
+        return [*checks, impossible(RELEASE, "", "the emergency stop was not seen")]
+    if not ask("Release the emergency stop again, and keep hands off the joint. Released?"):
+        return [*checks, impossible(RELEASE, "", "the operator did not release it")]
+    freshen(rig, time, settings.rig.tick_rate_hz)
+    return [*checks, _stayed(RELEASE, _tempt(rig, time, settings.rig.tick_rate_hz))]
+
+
+def _tempt(rig: Rig, time: Timebase, rate_hz: float) -> Heard:
+    """Command a slow motion to a rig that must not move; it ends as soon as it does."""
+    start_rad = rig.read().angle_rad
+    most_rad = rad_from_deg(MOST_DEG)
+    heard = listen(
+        rig,
+        time,
+        rate_hz,
+        TEMPTED_S,
+        write_rad_s=rad_from_deg(TEMPTED_DEG_S),
+        until=lambda reading: abs(reading.angle_rad - start_rad) > most_rad,
+    )
+    rig.write(0.0)
+    return heard
+
+
+def _stayed(name: str, heard: Heard) -> Check:
+    angle = heard.angle_rad[np.isfinite(heard.angle_rad)]
+    moved = math.degrees(float(np.ptp(angle))) if len(angle) else 0.0
+    remedy = "a stopped drive must wait for an operator: look at its automatic restart"
+    return below(name, moved, "deg", MOST_DEG, remedy)
+
+
+def _again(rig: Rig, settings: Settings, time: Timebase, ask: Ask) -> Check:
+    """Enable the rig again, once the operator agrees."""
+    limit = "enabled, at rest"
+    if not ask("The watchdog has stopped the drive. May it be reset and get power again?"):
+        return impossible(AGAIN, limit, "the operator did not agree to it")
+    try:
+        _reset(rig)
+        tried = trial(rig, settings, time, [hold(SETTLE_S)])
+    except DeviceError as error:
+        return yes(AGAIN, False, str(error), limit, "look at how the drive's fault is reset")
+    good = tried.cause is Cause.NONE
+    return yes(AGAIN, good, tried.cause.sentence, limit, "look at how the drive's fault is reset")
+
+
+def _reset(rig: Rig) -> None:
+    """Take back the fault that the watchdog left, where the rig has a way to."""
+    reset = getattr(rig, "reset_fault", None)
+    if reset is not None:
+        reset()
+
+
+def _overrun(
+    rig: Rig,
+    settings: Settings,
+    time: Timebase,
+    limits: CommissioningSettings,
+    watchdog_s: float,
+) -> Check:
+    """Fall silent while the joint moves slowly; see how long it went on, and bring it back."""
+    rate_hz = settings.rig.tick_rate_hz
+    speed_rad_s = rad_from_deg(limits.swing_speed_deg_s)
+    most_s = watchdog_s + limits.watchdog_margin_s
+    before = after = math.nan
+    n = round(SETTLE_S * rate_hz)
+    velocity = np.minimum(np.arange(1, n + 1) / (0.5 * n), 1.0) * speed_rad_s
+
+    def silence(loop: ControlLoop) -> None:
+        nonlocal before, after
+        before = rig.read().angle_rad
+        listen(rig, time, rate_hz, 2.0 * most_s + SETTLE_S, write_rad_s=None)
+        after = float(listen(rig, time, rate_hz, SETTLE_S).angle_rad[-1])
+
+    tried = trial(
+        rig,
+        settings,
+        time,
+        [hold(SETTLE_S), follow(np.cumsum(velocity) / rate_hz, velocity), silence],
+    )
+    if math.isnan(after):
+        why = "remove the reason and commission again"
+        return yes(WATCHDOG, False, stopped_for(tried.cause), "tried", why)
+    went_on_s = abs(after - before) / speed_rad_s
+    _reset(rig)
+    back = way(-after, 0.5 * speed_rad_s, 1.0 / rate_hz)
+    trial(rig, settings, time, [hold(SETTLE_S), follow(np.cumsum(back) / rate_hz, back)])
+    remedy = "the drive goes on when the computer is dead: set its watchdog and try again"
+    return below(WATCHDOG, went_on_s, "s", most_s + settings.guard.reaction_time_s, remedy)

@@ -1,0 +1,251 @@
+"""Short stretches on a rig: listening without power, and motions through loop and guard.
+
+The loop that commissions a rig is the one that moves a person in it. A trial enables the drive at
+zero velocity, runs its stretches on end, stops and takes the power away again, whatever happens;
+nothing stays energised while an operator is asked or numbers are looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.acquisition import ControlLoop
+from rigidimeter.device.base import Now, Reading, Rig
+from rigidimeter.guard import Cause, Reaction
+from rigidimeter.recording.log import Sample
+from rigidimeter.settings import Settings
+
+__all__ = [
+    "Array",
+    "Heard",
+    "Stretch",
+    "Timebase",
+    "Tried",
+    "follow",
+    "freshen",
+    "hold",
+    "listen",
+    "new_samples",
+    "stopped_for",
+    "trial",
+]
+
+Array = NDArray[np.float64]
+Stretch = Callable[[ControlLoop], object]
+
+FRESHEN_S = 2.5
+FRESH_S = 0.03
+MOST_READS = 400
+"""A read empties at most a part of what piled up while a question waited."""
+
+PILED_UP = {int(Cause.TORQUE_STALE), int(Cause.TORQUE_PACKETS), int(Cause.TORQUE_FROZEN)}
+"""What a sensor says when nobody has listened for a while."""
+
+DURING_TRIAL = -1
+
+
+@dataclass(frozen=True)
+class Timebase:
+    """The clock of the devices, and how to wait on it.
+
+    Parameters
+    ----------
+    now : callable
+        Seconds, the same that the drivers were given.
+    wait_until : callable
+        Returns at a time of that clock, or at once when it has passed; gives the time it then is.
+    """
+
+    now: Now
+    wait_until: Callable[[float], float]
+
+
+class Heard(NamedTuple):
+    """Readings, one a tick, as arrays of the same length.
+
+    `time_s` is when the tick ran, `lateness_s` how late. `sent_rad_s` is what was in force after
+    the tick. `cause` holds what the devices reported at each tick.
+    """
+
+    time_s: Array
+    lateness_s: Array
+    torque_nm: Array
+    torque_time_s: Array
+    angle_rad: Array
+    velocity_rad_s: Array
+    motion_time_s: Array
+    sent_rad_s: Array
+    cause: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What a trial gave; `cause` is why the guard ended it, `Cause.NONE` if it did not."""
+
+    heard: Heard
+    cause: Cause
+
+
+class _Shifted:
+    """Rig and clock of a loop that begins now: the times of the readings count from there."""
+
+    def __init__(self, rig: Rig, time: Timebase, origin_s: float) -> None:
+        self._rig, self._time, self._origin_s = rig, time, origin_s
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._rig, name)
+
+    def read(self, elapsed_ticks: int = 1) -> Reading:
+        reading = self._rig.read(elapsed_ticks)
+        return reading._replace(
+            torque_time_s=reading.torque_time_s - self._origin_s,
+            motion_time_s=reading.motion_time_s - self._origin_s,
+        )
+
+    def wait_until(self, deadline_s: float) -> float:
+        return self._time.wait_until(self._origin_s + deadline_s) - self._origin_s
+
+
+def trial(rig: Rig, settings: Settings, time: Timebase, stretches: Sequence[Stretch]) -> Tried:
+    """Enable the rig at zero velocity, run the stretches, take the power away.
+
+    Raises
+    ------
+    DeviceError
+        If the drive does not come up; it is without power then.
+    """
+    samples: list[Sample] = []
+    freshen(rig, time, settings.rig.tick_rate_hz)
+    try:
+        rig.enable()
+        _empty(rig, time)
+        origin_s = time.now() + 1.0 / settings.rig.tick_rate_hz
+        here: Any = _Shifted(rig, time, origin_s)
+        loop = ControlLoop(_feedforward(settings), here, here, samples.append)
+        try:
+            for stretch in stretches:
+                stretch(loop)
+                if loop.cause is not Cause.NONE:
+                    break
+            cause = loop.cause
+        finally:
+            loop.stop()
+            if loop.cause in (Cause.DRIVE_LOST, Cause.DRIVE_STATE):
+                rig.stop()
+    finally:
+        rig.disable()
+    return Tried(_from_samples(samples), cause)
+
+
+def follow(angle_rad: Array, velocity_rad_s: Array) -> Stretch:
+    """Return the stretch that commands velocities, one a tick; the angle is for the record."""
+    return lambda loop: loop.follow(DURING_TRIAL, angle_rad.tolist(), velocity_rad_s.tolist())
+
+
+def hold(duration_s: float) -> Stretch:
+    """Return the stretch that stands still."""
+    return lambda loop: loop.hold(duration_s)
+
+
+def listen(
+    rig: Rig,
+    time: Timebase,
+    tick_rate_hz: float,
+    duration_s: float,
+    *,
+    write_rad_s: float | None = 0.0,
+    until: Callable[[Reading], bool] = lambda _: False,
+) -> Heard:
+    """Read at every tick without loop and guard, and write one velocity or nothing at all.
+
+    For a rig without power, for one that is not written to, and for one that must not move; it ends
+    early when `until` says so.
+    """
+    rows: list[tuple[float, ...]] = []
+    start_s = time.now() + 1.0 / tick_rate_hz
+    for k in range(round(duration_s * tick_rate_hz)):
+        due_s = start_s + k / tick_rate_hz
+        now_s = time.wait_until(due_s)
+        reading = rig.read()
+        sent = rig.write(write_rad_s) if write_rad_s is not None else 0.0
+        rows.append(
+            (
+                now_s,
+                now_s - due_s,
+                reading.torque_nm,
+                reading.torque_time_s,
+                reading.angle_rad,
+                reading.velocity_rad_s,
+                reading.motion_time_s,
+                sent,
+                reading.cause,
+            )
+        )
+        if until(reading):
+            break
+    return _heard(rows)
+
+
+def freshen(rig: Rig, time: Timebase, tick_rate_hz: float) -> None:
+    """Read away what piled up while nobody listened, without power, until the news are new."""
+    _empty(rig, time)
+    listen(rig, time, tick_rate_hz, FRESHEN_S, until=lambda r: r.cause not in PILED_UP)
+
+
+def _empty(rig: Rig, time: Timebase) -> None:
+    for _ in range(MOST_READS):
+        if time.now() - rig.read().torque_time_s < FRESH_S:
+            return
+
+
+def new_samples(stamps_s: Array) -> NDArray[np.bool_]:
+    """Return which ticks brought a sample that no tick before had."""
+    newest = np.maximum.accumulate(np.where(np.isfinite(stamps_s), stamps_s, -math.inf))
+    fresh = np.zeros(len(newest), dtype=bool)
+    fresh[:1] = True
+    fresh[1:] = newest[1:] > newest[:-1]
+    return fresh
+
+
+def stopped_for(cause: Cause) -> str:
+    """Return the words for a trial that the guard ended."""
+    how = "stopped" if cause.reaction > Reaction.HOLD else "held"
+    return f"the guard {how} the rig: {cause.sentence}"
+
+
+def _feedforward(settings: Settings) -> Settings:
+    """Return the settings with no correction by the reading: what is commanded is known exactly."""
+    controller = settings.controller.model_copy(update={"tracking_gain_per_s": 0.0})
+    return settings.model_copy(update={"controller": controller})
+
+
+def _from_samples(samples: Sequence[Sample]) -> Heard:
+    return _heard(
+        [
+            (
+                s.time_s,
+                s.lateness_s,
+                s.torque_nm,
+                s.torque_time_s,
+                s.angle_rad,
+                s.velocity_rad_s,
+                s.motion_time_s,
+                s.velocity_command_rad_s,
+                s.cause,
+            )
+            for s in samples
+        ]
+    )
+
+
+def _heard(rows: Sequence[tuple[float, ...]]) -> Heard:
+    table = np.array(rows, dtype=np.float64).reshape(-1, 9)
+    time, late, torque, torque_time, angle, velocity, motion_time, sent, cause = table.T
+    causes = cause.astype(np.int64)
+    return Heard(time, late, torque, torque_time, angle, velocity, motion_time, sent, causes)

@@ -1,0 +1,151 @@
+"""The operator's console in a terminal: a line of status, and orders typed as words.
+
+It is called about twenty times a second by the process whose silence stops the loop, so it never
+waits: not for a key, and not for a terminal that takes no output.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import select
+import time
+from collections.abc import Callable
+from typing import IO
+
+from rigidimeter.acquisition.board import Board, Condition, Flag, LiveEstimate, LoopStatus, Role
+from rigidimeter.acquisition.states import Command, Order, State
+from rigidimeter.guard import Cause
+
+__all__ = ["KEYS", "Terminal", "order_of", "status_line"]
+
+KEYS = {
+    "p": Command.PAUSE,
+    "n": Command.PAUSE_NOW,
+    "r": Command.RESUME,
+    "s": Command.STOP,
+    "a": Command.ABORT,
+    "h": Command.HALT,
+}
+"""What is typed, with Enter: pause after the epoch, pause now, resume, stop, abort, halt."""
+
+HELP = (
+    "p pause after this epoch, n pause now, r resume, s stop after this epoch, a abort, "
+    "h halt (power off), e emergency stop, set NAME VALUE; each with Enter"
+)
+EVERY_S = 1.0
+
+
+def order_of(text: str) -> Order | None:
+    """Return the order that was typed; None if it is none.
+
+    ``set damping_nm_s_rad 2.0`` changes a parameter; its bounds are the loop's to judge.
+    """
+    words = text.split()
+    if not words:
+        return None
+    if words[0] == "set" and len(words) == 3:
+        try:
+            return Order(Command.CHANGE, words[1], float(words[2]))
+        except ValueError:
+            return None
+    by_name = {command.name.lower(): command for command in KEYS.values()}
+    command = KEYS.get(words[0]) or by_name.get(words[0].lower())
+    return Order(command) if command is not None and len(words) == 1 else None
+
+
+def status_line(status: LoopStatus, live: LiveEstimate | None) -> str:
+    """Return what the operator reads, in one line."""
+    where = f"epoch {status.epoch}" if status.epoch >= 0 else "rest"
+    parts = [
+        f"{status.time_s:8.1f} s",
+        f"{State(status.state).name.lower()}, {where}",
+        f"{math.degrees(status.angle_rad):+6.1f} deg",
+        f"{status.torque_nm:+6.2f} N·m",
+    ]
+    if status.missed_deadlines:
+        parts.append(f"{status.missed_deadlines} deadlines missed")
+    if live is not None and math.isfinite(live.stiffness_nm_rad):
+        parts.append(
+            f"J {live.inertia_kg_m2:.4f} B {live.damping_nm_s_rad:.3f} "
+            f"K {live.stiffness_nm_rad:.2f} (live)"
+        )
+    if status.cause:
+        parts.append(Cause(status.cause).sentence)
+    return " | ".join(parts)
+
+
+class Terminal:
+    """Shows the board and posts orders.
+
+    Parameters
+    ----------
+    keyboard : file or None
+        Lines are read from it as they come; None for nobody.
+    screen : file
+    now : callable
+        Monotonic seconds.
+    """
+
+    def __init__(
+        self,
+        keyboard: IO[str] | None,
+        screen: IO[str],
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._keyboard, self._screen, self._now = keyboard, screen, now
+        self._shown_s = -math.inf
+        self._typed = b""
+        self._troubles: dict[Role, str] = {}
+        if keyboard is not None:
+            self._say(HELP)
+
+    def __call__(self, board: Board) -> None:
+        """Look at keyboard and board once."""
+        self._listen(board)
+        for role in (Role.RECORDER, Role.ESTIMATOR):
+            note = board.note(role) if board.condition(role) is Condition.TROUBLE else ""
+            if note and self._troubles.get(role) != note:
+                self._say(note)
+            self._troubles[role] = note
+        if self._now() - self._shown_s < EVERY_S:
+            return
+        status = board.status()
+        if status is not None and status.tick >= 0:
+            self._shown_s = self._now()
+            self._say(status_line(status, board.live()))
+
+    def _listen(self, board: Board) -> None:
+        if self._keyboard is None:
+            return
+        descriptor = self._keyboard.fileno()
+        while select.select([descriptor], [], [], 0.0)[0]:
+            read = os.read(descriptor, 1024)
+            if not read:  # nobody types any more
+                self._keyboard = None
+                return
+            self._typed += read
+        *lines, self._typed = self._typed.split(b"\n")
+        for line in lines:
+            self._obey(line.decode(errors="replace").strip(), board)
+
+    def _obey(self, text: str, board: Board) -> None:
+        if text in ("e", "emergency"):
+            board.raise_flag(Flag.EMERGENCY_STOP)
+            self._say("emergency stop")
+            return
+        order = order_of(text)
+        if order is None:
+            self._say(HELP)
+            return
+        try:
+            board.post(order)
+        except ValueError as error:
+            self._say(str(error))
+            return
+        self._say(f"ordered: {order.command.name.lower().replace('_', ' ')}")
+
+    def _say(self, text: str) -> None:
+        if select.select([], [self._screen.fileno()], [], 0.0)[1]:
+            self._screen.write(text + "\n")
+            self._screen.flush()

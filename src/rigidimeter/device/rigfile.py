@@ -1,0 +1,144 @@
+"""RIG.toml: which devices make up a rig, each with the settings of its driver.
+
+    name = "elbow rig, room 12"
+
+    [torque_sensor]
+    driver = "ati-rdt"
+    address = "192.168.1.1"
+
+    [drive]
+    driver = "cia402"
+    channel = "can0"
+
+A driver is one of the names below, or ``package.module:Class``. A driver class carries its settings
+as `Settings` and is made with ``Class(settings, now)``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from rigidimeter.device.base import Now
+from rigidimeter.device.composed import ComposedRig
+from rigidimeter.errors import UserError
+from rigidimeter.settings.messages import sentence
+
+__all__ = ["DRIVERS", "RigFile", "load_rig"]
+
+DRIVERS: Mapping[str, Mapping[str, str]] = {
+    "torque_sensor": {
+        "ati-rdt": "rigidimeter.device.ati_rdt:AtiRdt",
+        "ati-analogue": "rigidimeter.device.ati_analogue:AtiAnalogue",
+    },
+    "drive": {
+        "cia402": "rigidimeter.device.cia402:Cia402Drive",
+        "ascii": "rigidimeter.device.ascii_drive:AsciiDrive",
+    },
+    "enable_line": {"serial-line": "rigidimeter.device.enable_line:SerialEnableLine"},
+}
+"""The drivers that come along, by role and name."""
+
+REQUIRED = ("torque_sensor", "drive")
+
+
+@dataclass(frozen=True)
+class RigFile:
+    """A rig as its file describes it, checked, nothing connected.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+    devices : mapping
+        Class and settings by role.
+    digest : str
+        Of what the file says: a commissioning record holds for one of these.
+    """
+
+    path: Path
+    name: str
+    devices: Mapping[str, tuple[type[Any], Any]]
+    digest: str
+
+    def build(self, now: Now, tick_rate_hz: float) -> ComposedRig:
+        """Make the devices; nothing is connected yet."""
+        made = {role: driver(settings, now) for role, (driver, settings) in self.devices.items()}
+        return ComposedRig(
+            made["torque_sensor"], made["drive"], tick_rate_hz, made.get("enable_line")
+        )
+
+
+def load_rig(path: Path) -> RigFile:
+    """Read RIG.toml.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, or names a device, a driver or a value that does not exist.
+    """
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except UnicodeDecodeError:
+        raise UserError(f"{path}: is not a text file in UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise UserError(f"{path}: is not valid TOML: {error}") from None
+    unknown = sorted(set(values) - set(DRIVERS) - {"name"})
+    if unknown:
+        raise UserError(f"{path}: unknown key {unknown[0]}; known are name, {', '.join(DRIVERS)}")
+    missing = [role for role in REQUIRED if role not in values]
+    if missing:
+        raise UserError(f"{path}: has no [{missing[0]}] table, which names a driver")
+    devices = {role: _device(path, role, values[role]) for role in DRIVERS if role in values}
+    name = values.get("name", path.stem)
+    if not isinstance(name, str):
+        raise UserError(f"{path}: name must be text, got {name!r}")
+    digest = hashlib.sha256(repr(sorted_values(values)).encode()).hexdigest()
+    return RigFile(path, name, devices, digest)
+
+
+def sorted_values(values: Any) -> Any:
+    """Return nested mappings as sorted pairs: the same for the same meaning, however written."""
+    if isinstance(values, Mapping):
+        return sorted((key, sorted_values(value)) for key, value in values.items())
+    return values
+
+
+def _device(path: Path, role: str, table: Any) -> tuple[type[Any], Any]:
+    if not isinstance(table, dict) or not isinstance(table.get("driver"), str):
+        known = ", ".join(DRIVERS[role])
+        raise UserError(f"{path}: [{role}] must name its driver: {known}, or package.module:Class")
+    driver = _driver(path, role, table["driver"])
+    values = {key: value for key, value in table.items() if key != "driver"}
+    try:
+        return driver, driver.Settings.model_validate(values)
+    except ValidationError as error:
+        lines = [sentence(driver.Settings, values, detail) for detail in error.errors()]
+        raise UserError(f"{path}, [{role}]: " + "; ".join(lines)) from None
+
+
+def _driver(path: Path, role: str, name: str) -> Any:
+    place = DRIVERS[role].get(name, name)
+    module, _, attribute = place.partition(":")
+    if not attribute:
+        known = ", ".join(DRIVERS[role])
+        raise UserError(
+            f"{path}, [{role}]: there is no driver {name!r}; known are {known}, and others are "
+            "written package.module:Class"
+        )
+    try:
+        driver = getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise UserError(f"{path}, [{role}]: driver {name!r} cannot be loaded ({error})") from None
+    if not hasattr(driver, "Settings"):
+        raise UserError(f"{path}, [{role}]: {name!r} is no driver: it has no Settings")
+    return driver

@@ -1,0 +1,103 @@
+"""The object dictionary of the emulated servo: what a master may ask and set.
+
+As the predefined connection set has it: one command message (0x1400), two messages of measurements
+(0x1800, 0x1801), with mappings that a master may change.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = [
+    "COMMAND_MESSAGES",
+    "INVALID",
+    "MEASUREMENT_MESSAGES",
+    "PROFILE_VELOCITY",
+    "dictionary",
+]
+
+NAME = "emulated servo"
+COMMAND_MESSAGES = (0x1400,)
+MEASUREMENT_MESSAGES = (0x1800, 0x1801)
+I8, I16, I32, U8, U16, U32, TEXT = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x09
+INVALID = 1 << 31
+PROFILE_VELOCITY, PROFILE_VELOCITY_ONLY = 3, 0x04
+
+
+@dataclass(frozen=True)
+class Entry:
+    index: int
+    subindex: int
+    name: str
+    kind: int
+    access: str = "rw"
+    default: int | str = 0
+
+
+def _entries(node_id: int) -> tuple[Entry, ...]:
+    return (
+        Entry(0x1000, 0, "device type", U32, "const", 0x00020192),
+        Entry(0x1001, 0, "error register", U8, "ro"),
+        Entry(0x1005, 0, "SYNC identifier", U32, "rw", 0x80),
+        Entry(0x1008, 0, "device name", TEXT, "const", NAME),
+        Entry(0x100A, 0, "software version", TEXT, "const", "1.0"),
+        Entry(0x1014, 0, "emergency identifier", U32, "ro", 0x80 + node_id),
+        Entry(0x1016, 0, "number of heartbeats", U8, "const", 1),
+        Entry(0x1016, 1, "heartbeat 1", U32),
+        Entry(0x1017, 0, "heartbeat time", U16),
+        Entry(0x1018, 0, "number of identities", U8, "const", 4),
+        Entry(0x1018, 1, "vendor", U32, "const", 0x0000_0402),
+        Entry(0x1018, 2, "product", U32, "const", 1),
+        Entry(0x1018, 3, "revision", U32, "const", 0x0001_0000),
+        Entry(0x1018, 4, "serial", U32, "const", 1000 + node_id),
+        *_message(0x1400, 0x200 + node_id, (0x6040_0010,)),
+        *_message(0x1800, 0x180 + node_id, (0x6041_0010,)),
+        *_message(0x1801, INVALID | 0x280 + node_id, ()),
+        Entry(0x6007, 0, "abort-connection option", I16, "rw", 1),
+        Entry(0x603F, 0, "error code", U16, "ro"),
+        Entry(0x6040, 0, "controlword", U16),
+        Entry(0x6041, 0, "statusword", U16, "ro"),
+        Entry(0x605A, 0, "quick-stop option", I16, "rw", 2),
+        Entry(0x6060, 0, "mode of operation", I8),
+        Entry(0x6061, 0, "mode of operation display", I8, "ro"),
+        Entry(0x6064, 0, "actual position", I32, "ro"),
+        Entry(0x606C, 0, "actual velocity", I32, "ro"),
+        Entry(0x607F, 0, "max profile velocity", U32, "rw", 0xFFFF_FFFF),
+        Entry(0x6083, 0, "profile acceleration", U32, "rw", 1_000_000),
+        Entry(0x6084, 0, "profile deceleration", U32, "rw", 1_000_000),
+        Entry(0x6085, 0, "quick-stop deceleration", U32, "rw", 1_000_000),
+        Entry(0x60FF, 0, "target velocity", I32),
+        Entry(0x6502, 0, "supported modes", U32, "const", PROFILE_VELOCITY_ONLY),
+    )
+
+
+def _message(index: int, identifier: int, mapped: tuple[int, ...]) -> tuple[Entry, ...]:
+    slots = (*mapped, *(0,) * 8)[:8]
+    return (
+        Entry(index, 0, "highest subindex", U8, "const", 5),
+        Entry(index, 1, "identifier", U32, "rw", identifier),
+        Entry(index, 2, "transmission type", U8, "rw", 255),
+        Entry(index, 3, "inhibit time", U16),
+        Entry(index, 5, "event timer", U16),
+        Entry(index + 0x200, 0, "number of entries", U8, "rw", len(mapped)),
+        *(Entry(index + 0x200, k, f"entry {k}", U32, "rw", s) for k, s in enumerate(slots, 1)),
+    )
+
+
+def dictionary(objectdictionary: Any, node_id: int) -> Any:
+    """Return the object dictionary, made with `canopen.objectdictionary`."""
+    whole = objectdictionary.ObjectDictionary()
+    entries = _entries(node_id)
+    several = {entry.index for entry in entries if entry.subindex}
+    for entry in entries:
+        variable = objectdictionary.ODVariable(entry.name, entry.index, entry.subindex)
+        variable.data_type, variable.access_type = entry.kind, entry.access
+        variable.default = entry.default
+        if entry.index not in several:
+            whole.add_object(variable)
+            continue
+        if entry.index not in whole:
+            whole.add_object(objectdictionary.ODRecord(f"object 0x{entry.index:04X}", entry.index))
+        whole[entry.index].add_member(variable)
+    return whole

@@ -1,0 +1,22 @@
+"""The last word before the wire: limits, plausibility, and a latch that keeps the first cause."""
+
+from rigidimeter.guard.causes import REACTIONS, Cause, Reaction
+from rigidimeter.guard.limits import GuardLimits, GuardState, guard_limits, guard_state, released
+from rigidimeter.guard.replay import Replayed, replay
+from rigidimeter.guard.step import Limited, guard_step, why_ended
+
+__all__ = [
+    "REACTIONS",
+    "Cause",
+    "GuardLimits",
+    "GuardState",
+    "Limited",
+    "Reaction",
+    "Replayed",
+    "guard_limits",
+    "guard_state",
+    "guard_step",
+    "released",
+    "replay",
+    "why_ended",
+]

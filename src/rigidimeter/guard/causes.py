@@ -1,0 +1,125 @@
+"""Why a rig is stopped, and how: the reaction that belongs to each cause.
+
+Devices, loop and guard name a cause by the same numbers, so that the record, the console and the
+hazard table speak of the same things. The first cause is kept; a later one can make the reaction
+stronger, never weaker.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+__all__ = ["REACTIONS", "Cause", "Reaction"]
+
+
+class Reaction(IntEnum):
+    """What is done, from the weakest to the strongest.
+
+    HOLD: the velocity is ramped to zero and held there; the operator may go on.
+    RAMP: the velocity is ramped to zero, then the power is taken away; latched (category 1).
+    CUT: the power is taken away at once; latched (category 0).
+    """
+
+    NONE = 0
+    HOLD = 1
+    RAMP = 2
+    CUT = 3
+
+
+class Cause(IntEnum):
+    """Why the guard latched."""
+
+    NONE = 0
+    TORQUE_NOT_FINITE = 1
+    MOTION_NOT_FINITE = 2
+    COMMAND_NOT_FINITE = 3
+    POSITION_LIMIT_EXCEEDED = 4
+    MOTION_STALE = 5
+    TORQUE_STALE = 6
+    TORQUE_FROZEN = 7
+    TORQUE_SATURATED = 8
+    TORQUE_STATUS = 9
+    TORQUE_PACKETS = 10
+    SENSOR_CHANGED = 11
+    NOT_FOLLOWING = 12
+    OVERSPEED = 13
+    TORQUE_HIGH = 14
+    TORQUE_TOO_HIGH = 15
+    POWER_HIGH = 16
+    ENERGY_HIGH = 17
+    DRIVE_FAULT = 18
+    DRIVE_STATE = 19
+    DRIVE_LOST = 20
+    EMERGENCY_STOP = 21
+    OPERATOR_HALT = 22
+    DEADLINES_MISSED = 23
+    STALLED = 24
+    CONSOLE_LOST = 25
+    RECORDER_LOST = 26
+    RECORD_OVERFLOW = 27
+    SOFTWARE = 28
+    SIGNAL = 29
+    STAMP_AHEAD = 30
+
+    @property
+    def sentence(self) -> str:
+        """What happened, in words."""
+        return _SENTENCES[self]
+
+    @property
+    def reaction(self) -> Reaction:
+        """What is done about it."""
+        return Reaction(REACTIONS[self])
+
+
+_SENTENCES = {
+    Cause.NONE: "no fault",
+    Cause.TORQUE_NOT_FINITE: "the torque sensor gave a number that is not finite",
+    Cause.MOTION_NOT_FINITE: "the angle or velocity reading was not finite",
+    Cause.COMMAND_NOT_FINITE: "the controller asked for a velocity that is not finite",
+    Cause.POSITION_LIMIT_EXCEEDED: "the angle was beyond the position limit",
+    Cause.MOTION_STALE: "no new angle reading arrived in time",
+    Cause.TORQUE_STALE: "no new torque reading arrived in time",
+    Cause.TORQUE_FROZEN: "the torque sensor kept sending one and the same sample",
+    Cause.TORQUE_SATURATED: "the torque sensor was saturated",
+    Cause.TORQUE_STATUS: "the torque sensor reported an error of its own",
+    Cause.TORQUE_PACKETS: "too many packets of the torque sensor were lost, repeated or damaged",
+    Cause.SENSOR_CHANGED: "the torque sensor came back with other units or another calibration",
+    Cause.NOT_FOLLOWING: "the angle did not change as the drive was told",
+    Cause.OVERSPEED: "the joint was faster than the speed limit",
+    Cause.TORQUE_HIGH: "the torque was above the limit",
+    Cause.TORQUE_TOO_HIGH: "the torque was far above the limit",
+    Cause.POWER_HIGH: "the power into or out of the joint was above the limit",
+    Cause.ENERGY_HIGH: "more energy went to and fro between rig and joint within a second than the "
+    "limit allows, as in an unstable contact",
+    Cause.DRIVE_FAULT: "the drive reported a fault",
+    Cause.DRIVE_STATE: "the drive left the state or the mode it was put in",
+    Cause.DRIVE_LOST: "the drive no longer answered",
+    Cause.EMERGENCY_STOP: "the emergency stop was pressed",
+    Cause.OPERATOR_HALT: "the operator halted the rig",
+    Cause.DEADLINES_MISSED: "the loop missed its deadline too often in a row",
+    Cause.STALLED: "the loop stood still for too long",
+    Cause.CONSOLE_LOST: "the operator's console no longer answered",
+    Cause.RECORDER_LOST: "the recorder no longer answered",
+    Cause.RECORD_OVERFLOW: "the recorder fell too far behind",
+    Cause.SOFTWARE: "the program failed",
+    Cause.SIGNAL: "the program was told to end",
+    Cause.STAMP_AHEAD: "a reading bore the time of a moment still to come",
+}
+
+_HOLD = {Cause.TORQUE_HIGH, Cause.POWER_HIGH}
+_CUT = {Cause.EMERGENCY_STOP, Cause.OPERATOR_HALT}
+
+REACTIONS = tuple(
+    int(
+        Reaction.NONE
+        if cause is Cause.NONE
+        else Reaction.HOLD
+        if cause in _HOLD
+        else Reaction.CUT
+        if cause in _CUT
+        else Reaction.RAMP
+    )
+    for cause in Cause
+)
+"""The reaction to each cause, by its number: a plain table, so that compiled code can look too."""

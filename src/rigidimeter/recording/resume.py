@@ -1,0 +1,82 @@
+"""What is left of an interrupted session, in the order that was drawn for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.design import PlannedEpoch
+from rigidimeter.errors import UserError
+from rigidimeter.recording.epochs import session_settings
+from rigidimeter.recording.folder import EVENTS, read_manifest
+from rigidimeter.recording.log import read_events
+from rigidimeter.settings import Settings
+
+__all__ = ["Rest", "rest_of"]
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What is left of a session.
+
+    Parameters
+    ----------
+    settings : Settings
+        As the session was begun with.
+    epochs : tuple of PlannedEpoch
+        Those that were not run to their end, with their own numbers and rests.
+    done : int
+        How many were.
+    continues : dict
+        What the manifest of the new session says of the old one.
+    """
+
+    settings: Settings
+    epochs: tuple[PlannedEpoch, ...]
+    done: int
+    continues: dict[str, Any]
+
+
+def rest_of(folder: Path) -> Rest:
+    """Return what is left of a session, however it ended.
+
+    An epoch is done when it ended with success, or for a reason of its own after which the session
+    went on: an arm that came to the limit comes there again. The one in which the session ended is
+    run again.
+
+    Raises
+    ------
+    UserError
+        If the folder is no session folder, or was recorded without a protocol.
+    """
+    manifest = read_manifest(folder)
+    events, _ = read_events(folder / EVENTS) if (folder / EVENTS).is_file() else ([], False)
+    planned: list[PlannedEpoch] = []
+    for entry in manifest["protocol"]:
+        try:
+            planned.append(PlannedEpoch(**entry))
+        except TypeError:
+            raise UserError(
+                f"{folder}/manifest.json: protocol holds {entry!r}, which is no planned epoch"
+            ) from None
+    if not planned:
+        raise UserError(f"{folder}: the session has no protocol to go on with")
+    ended = [event for event in events if event.get("event") == "epoch_ended"]
+    done = {event["epoch"] for event in ended if event["outcome"] == "success"}
+    done |= {event["epoch"] for event in ended[:-1] if event["outcome"] == "fail"}
+    if ended and ended[-1]["outcome"] == "fail" and _went_on(events, ended[-1]):
+        done.add(ended[-1]["epoch"])
+    left = tuple(epoch for epoch in planned if epoch.number not in done)
+    return Rest(
+        session_settings(folder),
+        left,
+        len(planned) - len(left),
+        {"folder": folder.name, "created_utc": manifest["created_utc"]},
+    )
+
+
+def _went_on(events: list[dict[str, Any]], last: dict[str, Any]) -> bool:
+    """Whether the session outlived its last epoch: it did not end with that one's reason."""
+    end = next((event for event in events if event.get("event") == "session_ended"), None)
+    return end is not None and end["reason"] != last["reason"]

@@ -1,0 +1,164 @@
+"""Measure every fault's reaction and write the table of `docs/reference/hazards.md`.
+
+    python -m tests.faults.measure              runs the tests, about four minutes
+    python -m tests.faults.measure LINES.jsonl  takes what a run noted
+
+Only what stands between the two marks in the document is replaced.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+from tests.faults.rigs import RIGS
+
+ROOT = Path(__file__).parents[2]
+DOCUMENT = ROOT / "docs" / "reference" / "hazards.md"
+BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+
+FAULTS: dict[int, tuple[str, str, str]] = {
+    1: ("NaN or Inf in torque, angle, parameter, perturbation or command",
+        "guard, before the filter's state; settings and drivers refuse it", "S1"),
+    2: ("sensor packets stop", "guard: age of the torque above `stale_s`", "S1"),
+    3: ("packets flow, sequence or value frozen", "RDT driver: nothing fresh for `frozen_s`", "S1"),
+    4: ("saturation bit or serious status", "RDT driver: the status word", "S1"),
+    5: ("lost, repeated, reordered, short, damaged packets; backlog",
+        "RDT driver: more than `tolerated_packets` in `packet_window_s`", "counted, then S1"),
+    6: ("units or calibration changed on reconnect; bias under load",
+        "RDT driver: the page; session: zeroing", "no run"),
+    7: ("drive fault, emergency message, unexpected state or mode",
+        "drive driver: status word, mode, emergency", "S1"),
+    8: ("drive's heartbeat or measurements lost",
+        "drive driver: `lost_s`; guard: `stale_s`", "S1, enable contact opened"),
+    9: ("loop killed, stopped, hung", "the drive's own watchdog", "the drive stops itself"),
+    10: ("restart with a stale target", "enable reads the target back", "no motion"),
+    11: ("deadlines missed", "loop: lateness of each tick", "S1"),
+    12: ("wall clock jumps an hour", "none needed: monotonic time only", "no effect"),
+    13: ("running at the position limit at full speed", "guard: v ≤ √(2·a·d)",
+         "held back; the epoch does not count"),
+    14: ("limit exceeded, encoder jump or sign flip", "guard: position, expected angle", "S1"),
+    15: ("motion is not what was commanded; overspeed", "guard: expected angle, speed",
+         "S1, then without power"),
+    16: ("spasm, tremor: torque, power, energy", "guard: torque, power, energy in 1 s",
+         "SH or S1 by limit"),
+    17: ("contact oscillation", "guard: energy in 1 s, power, torque", "SH or S1"),
+    18: ("emergency stop pressed, released", "a flag the loop reads each tick", "S0"),
+    19: ("console lost or frozen", "loop: the console's heartbeat", "S1"),
+    20: ("exception, signal, failure half-way through enable", "session: its way out",
+         "S1; every step tried"),
+    21: ("disk full, recorder hangs", "loop: recorder's heartbeat, samples that wait", "S1"),
+    22: ("parameters changed while running", "session: bounds", "bounded, no bump, logged"),
+    23: ("two faults at once, a fault while stopping", "guard: latch",
+         "first cause, stronger stop"),
+}  # fmt: skip
+"""Fault, what detects it, reaction: S0, S1 and SH as in the document."""
+
+VIRTUAL_CANNOT = "the simulated rig lives in the loop"
+NOT_CARRIED = {
+    (5, "virtual"): "no packets",
+    (9, "virtual"): VIRTUAL_CANNOT,
+}
+"""Why a rig cannot have a fault."""
+
+
+def measure() -> Path:
+    """Run all the tests of the faults; return where they noted what they measured."""
+    path = Path(tempfile.mkdtemp()) / "measured.jsonl"
+    tests = sorted(str(p) for p in Path(__file__).parent.glob("test_faults_*.py"))
+    ran = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-m", "slow or not slow", *tests],
+        cwd=ROOT,
+        env={**os.environ, "RIGIDIMETER_MEASURED": str(path)},
+        check=False,
+    )
+    if ran.returncode:
+        sys.exit("a test failed: nothing was written")
+    return path
+
+
+def table(notes: list[dict[str, Any]]) -> str:
+    """Return the table, one row a fault, the slowest case of each rig."""
+    of: dict[tuple[int, str], list[dict[str, Any]]] = defaultdict(list)
+    for note in notes:
+        of[note["fault"], note["rig"]].append(note)
+    lines = [
+        "| # | Fault | Detected by | Reaction | Virtual | RDT + CANopen | RDT + ASCII | Tests |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for number, (fault, detected, reaction) in FAULTS.items():
+        cells = [_cell(number, rig, of[number, rig]) for rig in RIGS]
+        found = (note["test"] for rig in RIGS for note in of[number, rig])
+        tests = "<br>".join(f"`{name.split('::')[1]}`" for name in dict.fromkeys(found))
+        lines.append(
+            f"| {number} | {fault} | {detected} | {reaction} | {' | '.join(cells)} | {tests} |"
+        )
+    return "\n".join(lines)
+
+
+def _cell(number: int, rig: str, notes: list[dict[str, Any]]) -> str:
+    """Return what a rig needed at most, by kind of time."""
+    if not notes:
+        return f"– ({NOT_CARRIED.get((number, rig), 'not tried')})"
+    parts = []
+    for name, word in (
+        ("detected_s", "named"),
+        ("power_off_s", "power off"),
+        ("zero_s", "zero sent"),
+        ("rest_s", "at rest"),
+        ("opened_s", "contact"),
+    ):
+        times = [note[name] for note in notes if note.get(name) is not None]
+        if times:
+            parts.append(f"{word} {_ms(min(times), max(times))}")
+    return "<br>".join(parts) or "<br>".join(dict.fromkeys(note["case"] for note in notes))
+
+
+def _ms(least: float, most: float) -> str:
+    # Where the fault's own time is nominal, a sample may seem to come before it.
+    low, high = max(0, round(1e3 * least)), max(0, round(1e3 * most))
+    return f"{high} ms" if low == high else f"{low}–{high} ms"
+
+
+def cases(notes: list[dict[str, Any]]) -> str:
+    """Return every case on a line of its own."""
+    lines = [
+        "| # | Case | Rig | Bound | Named | At rest |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    order = {rig: k for k, rig in enumerate(RIGS)}
+    for note in sorted(notes, key=lambda n: (n["fault"], order[n["rig"]], n["case"])):
+        times = [note.get(name) for name in ("bound_s", "detected_s", "rest_s")]
+        shown = ["" if t is None else f"{1e3 * t:.0f} ms" for t in times]
+        lines.append(f"| {note['fault']} | {note['case']} | {note['rig']} | {' | '.join(shown)} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Write the table into the document."""
+    path = Path(sys.argv[1]) if len(sys.argv) > 1 else measure()
+    notes = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    missing = sorted(set(FAULTS) - {note["fault"] for note in notes})
+    if missing:
+        sys.exit(f"nothing was measured of fault {missing[0]}")
+    text = DOCUMENT.read_text(encoding="utf-8")
+    head, _, rest = text.partition(BEGIN)
+    _, _, tail = rest.partition(END)
+    load = os.getloadavg()[0]
+    python = f"Python {platform.python_version()}, {os.cpu_count()} processors, load {load:.1f}"
+    body = (
+        f"\n\nMeasured with {python}; {len(notes)} cases.\n\n{table(notes)}\n\n"
+        f"### Every case\n\n{cases(notes)}\n\n"
+    )
+    DOCUMENT.write_text(f"{head}{BEGIN}{body}{END}{tail}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

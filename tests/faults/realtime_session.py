@@ -1,0 +1,76 @@
+"""A session in processes of its own, for tests that kill one of them; not a test itself.
+
+`python realtime_session.py FOLDER SECONDS [live]` prints how it ended as JSON. The file `pids.json`
+beside the folder names the processes.
+"""
+
+import json
+import sys
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+
+from rigidimeter.acquisition.board import Condition, Role
+from rigidimeter.acquisition.realtime import DeadlineClock
+from rigidimeter.acquisition.recorder import Patience, Recording
+from rigidimeter.acquisition.supervise import Realtime, supervise
+from rigidimeter.guard import Cause
+from rigidimeter.recording.log import Sample
+from rigidimeter.settings import Settings
+
+RATE_HZ = 500
+PATIENCE = Patience(
+    look_s=0.05, loop_lost_s=1.0, recorder_lost_s=1.0, console_lost_s=1.0, hung_s=2.0, disk_s=3.0
+)
+
+
+def ticks(duration_s, side):
+    """Write an epoch of ticks until it is over or there is a cause to stop."""
+    sink = side.sink
+    side.ready()
+    sink.session_started()
+    sink.epoch_started(1, "one", "prbs", "rest", 0.0)
+    clock = DeadlineClock()
+    cause = tick = 0
+    while not cause and tick < duration_s * RATE_HZ:
+        due_s = tick / RATE_HZ
+        now_s = clock.wait_until(due_s)
+        sink.sample(Sample(tick, now_s, now_s - due_s, 1, 0.0, *[float(tick)] * 8, 0))
+        cause = side.outside.cause(now_s)
+        tick += 1
+    outcome, reason = ("fail", Cause(cause).sentence) if cause else ("success", "")
+    sink.epoch_ended(1, tick / RATE_HZ, outcome, reason)
+    sink.close(tick / RATE_HZ, outcome, reason)
+
+
+def main() -> None:
+    folder, duration_s = Path(sys.argv[1]), float(sys.argv[2])
+    seen: dict[str, object] = {}
+
+    def console(board) -> None:
+        pids = {role.name: board.pid(role) for role in Role}
+        if seen.get("pids") != pids:
+            seen["pids"] = pids
+            part = folder.with_name("pids.part")
+            part.write_text(json.dumps(pids))
+            part.replace(folder.with_name("pids.json"))
+        if board.condition(Role.RECORDER) is Condition.TROUBLE:
+            seen["trouble"] = board.note(Role.RECORDER)
+        status, live = board.status(), board.live()
+        if status is not None:
+            seen["tick"] = status.tick
+        if live is not None:
+            seen["live_tick"] = live.tick
+
+    ended = supervise(
+        partial(ticks, duration_s),
+        Recording(folder, Settings(), virtual=True),
+        realtime=Realtime(priority=0, lock_memory=False, live_estimate="live" in sys.argv),
+        patience=PATIENCE,
+        console=console,
+    )
+    print(json.dumps({**asdict(ended), "seen": seen}))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,424 @@
+"""Three rigs that go wrong when told to: one simulated, two on true wires.
+
+    virtual        `SimulatedRig` behind a wrapper that spoils readings and commands, on a simulated
+                   clock: times are exact and the same every time
+    rdt_canopen    `AtiRdt` over UDP at 1 kHz and `Cia402Drive` over CANopen, in real time
+    rdt_ascii      `AtiRdt` over UDP at 1 kHz and `AsciiDrive` on a pseudo-terminal, in real time
+
+On the wires the peers' threads share the process with the loop, which makes it later than it would
+be alone. So every bound in real time is that of the settings plus `SLACK_S` plus the largest
+lateness that the trial itself recorded; on the virtual rig nothing is added. The threads ask for a
+real-time priority, as the loop of a true rig does, so that other programs disturb them less; where
+the arm's own trace shows that they stood still all the same, the trial says nothing about the rig
+and is run again (`DISTURBED_S`, and `conftest`).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rigidimeter.acquisition.clock import SimulatedClock
+from rigidimeter.acquisition.realtime import DeadlineClock
+from rigidimeter.device import SimulatedRig
+from rigidimeter.device.ascii_drive import AsciiDrive
+from rigidimeter.device.ati_rdt import AtiRdt
+from rigidimeter.device.base import DeviceError
+from rigidimeter.device.cia402 import Cia402Drive
+from rigidimeter.device.composed import ComposedRig
+from rigidimeter.emulation.arm import EmulatedArm
+from rigidimeter.emulation.ascii import AsciiPeer
+from rigidimeter.emulation.cia402 import Cia402Peer
+from rigidimeter.emulation.rdt import RdtPeer
+from rigidimeter.joint import JointDynamics
+from rigidimeter.settings import Settings, parse_settings
+
+CANOPEN, ASCII = "rdt_canopen", "rdt_ascii"
+WIRES = (CANOPEN, ASCII)
+RIGS = ("virtual", *WIRES)
+
+SLACK_S = 0.03
+"""What a busy machine may add on a wire: three peers' threads and a loop in one process."""
+
+DISTURBED_S = 0.02
+"""The sensor's thread looks at the arm every millisecond: a longer gap is the machine's doing."""
+
+JOINT = JointDynamics(0.0045, 0.1368, 1.751)
+
+_EPOCH = {
+    "sinusoid": {
+        "amplitude_deg": 10.0,
+        "frequency_hz": 2.0,
+        "motion_s": 1.0,
+        "duration_s": 1.0,
+        "taper_s": 0.1,
+    },
+    "prbs": {"duration_s": 1.0},
+    "protocol": {"blocks": [{"task": "sinusoid", "epochs": 1}], "rests_s": [0.5], "return_s": 0.5},
+}
+
+SETTINGS: dict[str, dict[str, Any]] = {
+    "virtual": _EPOCH,
+    CANOPEN: {
+        **_EPOCH,
+        "rig": {
+            "tick_rate_hz": 500.0,
+            "torque": {"rate_hz": 500.0},
+            "motion": {"rate_hz": 500.0},
+        },
+        "guard": {"reaction_time_s": 0.03},
+        "loop": {"missed_in_a_row": 100, "stall_s": 0.5},
+    },
+    ASCII: {
+        **_EPOCH,
+        "rig": {"tick_rate_hz": 50.0, "torque": {"rate_hz": 50.0}, "motion": {"rate_hz": 50.0}},
+        "controller": {"torque_cutoff_hz": 10.0},
+        "guard": {
+            "reaction_time_s": 0.1,
+            "speed_limit_deg_s": 80.0,
+            "acceleration_limit_deg_s2": 1500.0,
+        },
+        "loop": {"missed_in_a_row": 100, "stall_s": 0.5},
+        "sinusoid": {**_EPOCH["sinusoid"], "amplitude_deg": 4.0},
+    },
+}
+"""The speed at which a fault finds the arm is 126 deg/s; on the slow serial line 50 deg/s."""
+
+CANOPEN_DRIVE: dict[str, Any] = {
+    # A drive must brake at least as hard as the guard thinks it does: 6000 deg/s² = 105 rad/s².
+    "acceleration_rad_s2": 120.0,
+    "deceleration_rad_s2": 120.0,
+    "quick_stop_rad_s2": 120.0,
+    "command_deadline_s": 0.1,
+    "drive_watchdog_s": 0.2,
+    "lost_s": 0.05,
+    "enable_timeout_s": 0.3,
+}
+ASCII_DRIVE: dict[str, Any] = {"counts_per_turn": 360_000.0}
+
+_channels = itertools.count()
+
+stood_still: list[float] = []
+"""The longest gap in the trace of each arm since this was last cleared."""
+
+
+class Wrong(NamedTuple):
+    """One thing gone wrong: at the sensor, at the drive, or with the arm itself."""
+
+    where: str
+    name: str
+    value: Any = None
+
+
+class WatchedArm(EmulatedArm):
+    """Keeps when it was where, and how fast: the truth, whatever the wires say."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        self.trace: list[tuple[float, float, float]] = []
+        super().__init__(*arguments, **options)
+
+    def _advance(self) -> None:
+        super()._advance()
+        self.trace.append((self._at_s, self._state.angle_rad, self._state.velocity_rad_s))
+
+
+class SpoiledRig:
+    """The virtual rig, and what can be wrong with it."""
+
+    def __init__(self, inner: SimulatedRig) -> None:
+        self.inner = inner
+        self.habits: dict[str, Any] = {}
+        self.trace: list[tuple[float, float, float]] = []
+        self._held: Any = None
+        self._angle_held = math.nan
+        self.connect, self.configure = inner.connect, inner.configure
+        self.zero, self.stop = inner.zero, inner.stop
+        self.powered = False
+
+    def enable(self) -> None:
+        if "refuse enable" in self.habits:
+            raise DeviceError("drive: did not come up; its supply voltage must be on")
+        self.powered = True
+        self.inner.enable()
+
+    def disable(self) -> None:
+        self.powered = False
+        self.inner.disable()
+
+    def close(self) -> None:
+        self.disable()
+
+    @property
+    def counts(self) -> dict[str, int]:
+        return {}
+
+    def read(self, elapsed_ticks: int = 1) -> Any:
+        for _ in range(elapsed_ticks - 1):
+            self._see(self.inner.read())
+        true = self._see(self.inner.read())
+        reading, habits = true, self.habits
+        if "push" in habits:
+            # The drive is stiff: what the subject does shows in the torque and nowhere else.
+            reading = reading._replace(torque_nm=reading.torque_nm - habits["push"])
+        if "tremor" in habits:
+            amplitude_nm, frequency_hz = habits["tremor"]
+            phase = 2 * math.pi * frequency_hz * true.torque_time_s
+            reading = reading._replace(torque_nm=reading.torque_nm + amplitude_nm * math.sin(phase))
+        if "torque is" in habits:
+            reading = reading._replace(torque_nm=habits["torque is"])
+        if "angle is" in habits:
+            reading = reading._replace(angle_rad=habits["angle is"])
+        if "velocity is" in habits:
+            reading = reading._replace(velocity_rad_s=habits["velocity is"])
+        if "torque stops" in habits:
+            self._held = self._held or reading
+            reading = reading._replace(
+                torque_nm=self._held.torque_nm, torque_time_s=self._held.torque_time_s
+            )
+        if "motion stops" in habits:
+            self._held = self._held or reading
+            reading = self._held._replace(
+                torque_nm=reading.torque_nm, torque_time_s=reading.torque_time_s
+            )
+        if "encoder frozen" in habits:
+            if math.isnan(self._angle_held):
+                self._angle_held = true.angle_rad
+            reading = reading._replace(angle_rad=self._angle_held)
+        if "encoder jump" in habits:
+            reading = reading._replace(angle_rad=reading.angle_rad + habits["encoder jump"])
+        if "encoder sign" in habits:
+            reading = reading._replace(
+                angle_rad=-reading.angle_rad, velocity_rad_s=-reading.velocity_rad_s
+            )
+        if "reports" in habits:
+            reading = reading._replace(cause=int(habits["reports"]))
+        if "raises" in habits:
+            raise habits["raises"]
+        return reading
+
+    def _see(self, reading: Any) -> Any:
+        self.trace.append((reading.motion_time_s, reading.angle_rad, reading.velocity_rad_s))
+        return reading
+
+    def write(self, velocity_rad_s: float) -> float:
+        if "does not follow" in self.habits:
+            self.inner.write(0.0)
+            return velocity_rad_s
+        if "runs away" in self.habits:
+            self.inner.write(self.habits["runs away"])
+            return velocity_rad_s if self.powered else 0.0
+        return self.inner.write(velocity_rad_s)
+
+
+class Line:
+    """A hardware enable that says when it was opened."""
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self.closed = False
+        self.opened_s = math.nan
+
+    def close_contact(self) -> None:
+        self.closed = True
+
+    def open_contact(self) -> None:
+        if self.closed:
+            self.opened_s = self._now()
+        self.closed = False
+
+
+class VirtualClock(SimulatedClock):
+    """On time, but for given ticks, which are late by so much."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self.rate_hz, self.time_s = rate_hz, 0.0
+        self.late: dict[int, float] = {}
+
+    def wait_until(self, deadline_s: float) -> float:
+        self.time_s = deadline_s + self.late.pop(round(deadline_s * self.rate_hz), 0.0)
+        return self.time_s
+
+    def now_s(self) -> float:
+        return self.time_s
+
+
+class RealClock(DeadlineClock):
+    """The loop's own clock, but for given ticks, which are late by so much."""
+
+    def __init__(self, rate_hz: float) -> None:
+        super().__init__()
+        self.rate_hz = rate_hz
+        self.late: dict[int, float] = {}
+
+    def wait_until(self, deadline_s: float) -> float:
+        now_s = super().wait_until(deadline_s)
+        late_s = self.late.pop(round(deadline_s * self.rate_hz), 0.0)
+        if not late_s:
+            return now_s
+        return super().wait_until(deadline_s + late_s)
+
+
+@dataclass
+class Bench:
+    """A rig with everything behind it."""
+
+    name: str
+    settings: Settings
+    clock: Any
+    rig: Any
+    sensor_peer: Any = None
+    drive_peer: Any = None
+    arm: Any = None
+    line: Any = None
+    drive: Any = None
+    facts: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def rate_hz(self) -> float:
+        return self.settings.rig.tick_rate_hz
+
+    @property
+    def virtual(self) -> bool:
+        return self.name == "virtual"
+
+    def misbehave(self, wrong: Wrong) -> None:
+        if self.virtual:
+            self.rig.habits[wrong.name] = wrong.value
+        elif wrong.where == "arm":
+            self.arm.voluntary_nm = wrong.value
+        else:
+            peer = self.sensor_peer if wrong.where == "sensor" else self.drive_peer
+            peer.misbehave(wrong.name, *(() if wrong.value is None else (wrong.value,)))
+
+    def behave(self) -> None:
+        if self.virtual:
+            self.rig.habits.clear()
+        else:
+            self.sensor_peer.behave()
+            self.drive_peer.behave()
+
+    @property
+    def powered(self) -> bool:
+        """Whether the drive has power: its own word, not the driver's."""
+        if self.virtual:
+            return bool(self.rig.powered)
+        state = self.drive_peer.state()
+        return bool(state["power"] if "power" in state else state["powered"])
+
+    def trace(self) -> Any:
+        """Return time on the loop's clock, angle and velocity of the arm itself."""
+        if self.virtual:
+            return np.array(self.rig.trace)
+        with self.arm._lock:
+            trace = np.array(self.arm.trace)
+        # The arm's time is that of the machine.
+        trace[:, 0] += self.clock.now_s() - time.monotonic()
+        return trace
+
+    def settle(self, longest_s: float = 0.6) -> None:
+        """Live on until the arm is at rest, or for so long."""
+        if self.virtual:
+            habits, self.rig.habits = self.rig.habits, {}
+            for _ in range(round(0.3 * self.rate_hz)):
+                SpoiledRig.read(self.rig)
+            self.rig.habits = habits
+            return
+        until_s = time.monotonic() + longest_s
+        still = 0
+        while time.monotonic() < until_s and still < 5:  # once may be on its way back
+            still = still + 1 if abs(self.arm.motion()[1]) < 1e-3 else 0
+            time.sleep(0.005)
+
+
+TOO_SLOW = ("keeps up with", "too short for a cycle", "no answer", "stopped answering")
+"""What a driver says of a serial peer whose thread did not run for a while."""
+
+
+def configured(rig: ComposedRig) -> dict[str, Any]:
+    """Configure; a busy machine may make the serial peer too slow for a moment."""
+    for _ in range(10):
+        try:
+            return dict(rig.configure())
+        except DeviceError as error:
+            if not any(words in str(error) for words in TOO_SLOW):
+                raise
+            slow = error
+            time.sleep(0.1)
+    raise slow
+
+
+@contextmanager
+def bench(name: str, connected: bool = True, **tables: Any) -> Iterator[Bench]:
+    """Give a rig, connected and configured; all it stands on ends with it."""
+    values = {**SETTINGS[name]}
+    for table, more in tables.items():
+        values[table] = {**values.get(table, {}), **more}
+    settings = parse_settings(values)
+    rate_hz = settings.rig.tick_rate_hz
+    if name == "virtual":
+        subject = settings.subject["OFF"]
+        inner = SimulatedRig(settings.rig, subject, np.random.default_rng(1))
+        yield Bench(name, settings, VirtualClock(rate_hz), SpoiledRig(inner))
+        return
+    with _priority():
+        yield from _on_wires(name, settings, connected)
+
+
+@contextmanager
+def _priority() -> Iterator[None]:
+    """Ask for a real-time priority, which threads that are started inherit."""
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    with suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            os.sched_setscheduler(0, *before)
+
+
+def _on_wires(name: str, settings: Settings, connected: bool) -> Iterator[Bench]:
+    rate_hz = settings.rig.tick_rate_hz
+    clock = RealClock(rate_hz)
+    arm = WatchedArm(JOINT)
+    line = Line(clock.now_s)
+    with RdtPeer(arm, rate_hz=1000.0) as sensor_peer:
+        sensor = AtiRdt(
+            AtiRdt.Settings(
+                address="127.0.0.1", port=sensor_peer.port, http_port=sensor_peer.http_port
+            ),
+            clock.now_s,
+        )
+        drive_peer: Any
+        drive: Any
+        if name == CANOPEN:
+            wire = {"interface": "virtual", "channel": f"faults {next(_channels)}"}
+            drive_peer = Cia402Peer(arm, **wire)
+            drive = Cia402Drive(Cia402Drive.Settings(**wire, **CANOPEN_DRIVE), clock.now_s)
+        else:
+            drive_peer = AsciiPeer(arm)
+            drive = AsciiDrive(
+                AsciiDrive.Settings(port=drive_peer.port, **ASCII_DRIVE), clock.now_s
+            )
+        rig = ComposedRig(sensor, drive, rate_hz, line)
+        made = Bench(name, settings, clock, rig, sensor_peer, drive_peer, arm, line, drive)
+        try:
+            if connected:
+                rig.connect()
+                made.facts = configured(rig)
+            yield made
+        finally:
+            seen_s = [at_s for at_s, _, _ in arm.trace]
+            stood_still.append(max(np.diff(seen_s), default=0.0))
+            try:
+                rig.close()
+            finally:
+                drive_peer.close()

@@ -1,0 +1,110 @@
+"""A session in processes of its own, on a rig that its file describes: for tests to kill.
+
+    python -m tests.faults.session RIG.toml FOLDER
+
+Prints one line of JSON with the process ids when the loop runs, and one with the ending.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.acquisition import run_session
+from rigidimeter.acquisition.board import Board, Condition, Role
+from rigidimeter.acquisition.realtime import DeadlineClock
+from rigidimeter.acquisition.recorder import Patience, Recording
+from rigidimeter.acquisition.supervise import LoopSide, Realtime, supervise
+from rigidimeter.design import plan
+from rigidimeter.device.rigfile import load_rig
+from rigidimeter.settings import Settings, parse_settings
+
+RATE_HZ = {"cia402": 500.0, "ascii": 50.0}
+SPEED_DEG_S = {"cia402": 126.0, "ascii": 38.0}
+PATIENCE = Patience(
+    loop_lost_s=0.5, stopping_s=3.0, hung_s=1.5, console_lost_s=0.5, recorder_lost_s=1.0
+)
+
+
+def settings_for(drive: str) -> Settings:
+    """Return settings under which the arm swings to and fro for a while."""
+    rate_hz = RATE_HZ[drive]
+    slow = drive == "ascii"
+    guard: dict[str, Any] = {"reaction_time_s": 0.03}
+    if slow:
+        guard = {
+            "reaction_time_s": 0.12,
+            "speed_limit_deg_s": 60.0,
+            "acceleration_limit_deg_s2": 1500.0,
+            "stale_s": 0.2,
+            "following_limit_deg": 4.0,
+        }
+    return parse_settings(
+        {
+            "rig": {
+                "tick_rate_hz": rate_hz,
+                "torque": {"rate_hz": rate_hz},
+                "motion": {"rate_hz": rate_hz},
+            },
+            "controller": {"torque_cutoff_hz": 10.0},
+            "guard": guard,
+            "loop": {"missed_in_a_row": 100, "stall_s": 0.4},
+            "sinusoid": {
+                "amplitude_deg": 3.0 if slow else 10.0,
+                "frequency_hz": 2.0,
+                "motion_s": 20.0,
+                "duration_s": 20.0,
+            },
+            "protocol": {
+                "blocks": [{"task": "sinusoid", "epochs": 1}],
+                "rests_s": [0.5],
+                "return_s": 0.5,
+            },
+        }
+    )
+
+
+def run_loop(settings: Settings, rig_path: Path, side: LoopSide) -> None:
+    """Run the session; the target of the loop's process."""
+    clock = DeadlineClock()
+    rig = load_rig(rig_path).build(clock.now_s, settings.rig.tick_rate_hz)
+    protocol = plan(settings.protocol, settings.prbs, settings.sinusoid, 1)
+    try:
+        rig.connect()
+        rig.configure()
+        side.ready()
+        run_session(protocol, settings, rig, clock, side.sink, outside=side.outside)
+    finally:
+        rig.close()
+
+
+class Console:
+    """Says who is who, once."""
+
+    said = False
+
+    def __call__(self, board: Board) -> None:
+        if not self.said and board.condition(Role.LOOP) is Condition.RUNNING:
+            self.said = True
+            print(json.dumps({role.name: board.pid(role) for role in Role}), flush=True)
+
+
+def main(rig: str, folder: str) -> None:
+    drive = "ascii" if 'driver = "ascii"' in Path(rig).read_text() else "cia402"
+    settings = settings_for(drive)
+    ended = supervise(
+        partial(run_loop, settings, Path(rig)),
+        Recording(Path(folder), settings, seeds={"session": 1}),
+        realtime=Realtime(live_estimate=False, attended=False),
+        patience=PATIENCE,
+        console=Console(),
+    )
+    print(json.dumps(asdict(ended)), flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,19 @@
+"""Mutants that do the same as the guard, by name, each with the reason."""
+
+SLOWER = "looks closer where it need not; what it finds there does not limit"
+NEAR = "step.py guard_step: "
+
+EQUIVALENT: dict[str, str] = {
+    "replay.py replay: Cause.NONE → Cause.SOFTWARE": "a guard at the start holds nothing",
+    "step.py guard_step: 1 → 0": "elapsed_ticks if not given: none counts as one",
+    "step.py guard_step: sent > 0 → sent >= 0": "at rest neither side limits",
+    NEAR + "speed * speed / (2.0 * limits.acceleration_rad_s2) → "
+    "speed * speed * (2.0 * limits.acceleration_rad_s2)": SLOWER,
+    NEAR + "2.0 * limits.acceleration_rad_s2 → 2.0 / limits.acceleration_rad_s2": SLOWER,
+    NEAR + "2.0 → 1.9801980198019802": SLOWER,
+    NEAR + "if left < speed * (reach_s + dt + held_s) + stopping: ... → if True: ...": SLOWER,
+    NEAR + "left < speed * (reach_s + dt + held_s) + stopping → "
+    "left <= speed * (reach_s + dt + held_s) + stopping": SLOWER,
+    "step.py _farthest_in_flight: 1 → 0": "none back gives 0, which is where it starts",
+    "step.py _stoppable_speed: distance_rad <= 0.0 → distance_rad < 0.0": "the root gives 0, too",
+}

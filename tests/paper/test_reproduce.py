@@ -1,0 +1,324 @@
+"""The ledger: its rule, its schema, and the numbers of each contradiction."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+from rigidimeter.errors import UserError
+from rigidimeter.joint import JointDynamics
+from rigidimeter.reproduce import (
+    AGREES,
+    DIFFERS,
+    MAKERS,
+    SECTIONS,
+    UNPUBLISHED,
+    VERDICTS,
+    Check,
+    Row,
+    Workshop,
+    ledger_text,
+    make_rows,
+    printed,
+    render_page,
+    write_ledger,
+)
+from rigidimeter.reproduce.controller import position_sd_deg
+from rigidimeter.reproduce.counts import cycles_counted
+from rigidimeter.reproduce.effects import n_from, p_from, r_from
+from rigidimeter.reproduce.highpass import highpass_errors_percent
+from rigidimeter.reproduce.ledger import bounded, near, rounded, within_percent
+from rigidimeter.reproduce.noise import noise_runs
+from rigidimeter.reproduce.scores import (
+    scaled,
+    scored,
+    work_change_percent,
+    work_closed_form_j,
+)
+from rigidimeter.reproduce.voluntary import voluntary_errors_percent
+
+SMALL = {
+    "ratings": {"OFF": 27, "DBS": 12},
+    "sinusoid": {"OFF": 6, "DBS": 4},
+    "prbs": {"OFF": 5, "DBS": 4},
+}
+HEAVY = {  # made of simulations
+    "sec-1-voluntary-ols", "sec-1-voluntary-iv", "sec-3.4-mean", "sec-3.4-sd", "sec-3.4-noise",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def workshop() -> Workshop:
+    return Workshop(7, runs=24, pooled_epochs=4, counts=SMALL)
+
+
+@pytest.fixture(scope="module")
+def rows(workshop: Workshop) -> dict[str, Row]:
+    return {row.id: row for row in make_rows(workshop)}
+
+
+def check_of(row: Row, what: str) -> Check:
+    return next(check for check in row.checks if check.what.startswith(what))
+
+
+# The rule ---------------------------------------------------------------------------------------
+
+
+def row_with(*checks: Check, **changes: object) -> Row:
+    return replace(
+        Row("r", "Sec. 0", "p", "o", "as printed", (near("x", "m", 1.0, 1.0, 0.1),)),
+        checks=checks,
+        **changes,
+    )
+
+
+def test_a_verdict_follows_from_the_numbers() -> None:
+    inside = within_percent("x", "m", 4.0, 4.6, 50.0)
+    assert (inside.low, inside.high) == (2.0, 6.0)
+    outside = replace(inside, ours=6.1)
+    assert row_with(inside).verdict == AGREES
+    assert row_with(outside).verdict == DIFFERS
+    assert row_with(inside, outside).verdict == DIFFERS
+    assert row_with(replace(inside, ours=math.nan)).verdict == DIFFERS
+    assert row_with(inside, unpublished="no data").verdict == UNPUBLISHED
+
+
+def test_the_reason_goes_with_the_verdict() -> None:
+    check = near("x", "m", 1.0, 1.05, 0.1)
+    row = row_with(check, because={AGREES: "Alike."})
+    assert row.reason == "Alike."
+    turned = replace(row, checks=(replace(check, ours=2.0),))
+    assert turned.verdict == DIFFERS
+    assert turned.reason == "x: 2.000 m is outside what would agree (0.9000 to 1.100)."
+
+
+def test_rounding_allows_half_of_the_last_digit() -> None:
+    assert rounded("r", "1", 0.35, 0.3549, 0.01).within
+    assert rounded("r", "1", 0.35, 0.355, 0.01).within
+    assert not rounded("r", "1", 0.35, 0.3551, 0.01).within
+    assert bounded("y", "%", -3.0, high=-0.5).within
+    assert not bounded("y", "%", 0.0, high=-0.5).within
+
+
+def test_a_row_needs_something_that_decides() -> None:
+    with pytest.raises(ValueError, match="neither a check"):
+        Row("r", "s", "p", "o", "reading", ())
+
+
+def test_another_paper_would_get_another_verdict(
+    workshop: Workshop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Print what we compute, and the rows that differ agree; print nonsense, and others differ."""
+    monkeypatch.setattr(printed, "APP_A_DAMPING_TOTAL", 0.088)
+    monkeypatch.setattr(printed, "APP_A_INERTIA_TOTAL", 0.0057)
+    monkeypatch.setattr(printed, "POSITION_SD_DEG", 16.0)
+    monkeypatch.setattr(printed, "EQUATION_8", JointDynamics(0.0026, 0.044, 0.85))
+    monkeypatch.setattr(printed, "SEC_34_SD", (8e-6, 2.63e-4, 1.39e-3))
+    now = {
+        row_id: MAKERS[row_id](workshop).verdict
+        for row_id in (
+            "app-a-damping", "app-a-inertia", "app-a-units", "sec-2.4.2-units", "eq-8",
+            "sec-3.4-sd", "sec-3.4-noise",
+        )
+    }  # fmt: skip
+    assert now == {
+        "app-a-damping": AGREES,
+        "app-a-inertia": AGREES,
+        "app-a-units": AGREES,
+        "sec-2.4.2-units": DIFFERS,
+        "eq-8": DIFFERS,
+        "sec-3.4-sd": AGREES,
+        "sec-3.4-noise": AGREES,
+    }
+
+
+# The ledger -------------------------------------------------------------------------------------
+
+
+def test_every_row_has_its_place_on_the_page() -> None:
+    listed = [row_id for ids in SECTIONS.values() for row_id in ids]
+    assert sorted(listed) == sorted(MAKERS)
+    wanted = {f"eq-{n}" for n in range(1, 9)} | {"table-1", "table-2"}
+    wanted |= {"fig-3a", "fig-3b", "fig-6a", "fig-6b", "fig-7"}
+    wanted |= {f"fig-4{part}" for part in "abcd"}
+    wanted |= {f"fig-{n}{part}" for n in (5, 8) for part in "abc"}
+    assert wanted <= set(listed)
+
+
+def test_verdicts(rows: dict[str, Row]) -> None:
+    found = {verdict: {r.id for r in rows.values() if r.verdict == verdict} for verdict in VERDICTS}
+    assert found[UNPUBLISHED] == {
+        "fig-4b", "fig-4c", "fig-4d", "fig-5a", "fig-5b", "fig-5c", "fig-7", "fig-8a", "fig-8b",
+        "fig-8c", "table-2",
+    }  # fmt: skip
+    assert found[DIFFERS] == {
+        "eq-2", "eq-6-highpass", "eq-6-highpass-per-radian", "eq-8-largest", "fig-6b",
+        "table-2-mupdrs", "table-2-stiffness", "p-mupdrs", "p-work", "p-viscosity", "p-stiffness",
+        "sec-1-voluntary-ols", "sec-2.3-cycles-epoch", "sec-3.1-f-test", "sec-3.2-cancel",
+        "sec-3.4-sd", "sec-3.4-noise", "sec-4-better", "k-printed", "app-a-units", "app-a-inertia",
+        "app-a-damping",
+    }  # fmt: skip
+
+
+def test_what_stands_for_unpublished_data_says_so(rows: dict[str, Row]) -> None:
+    for row in rows.values():
+        if row.verdict == UNPUBLISHED:
+            assert row.virtual, row.id
+            assert "not published" in row.reason
+            assert "irtual" in row.ours
+
+
+def test_the_files(rows: dict[str, Row], tmp_path) -> None:
+    page = write_ledger(list(rows.values()), tmp_path, seed=7)
+    ledger = json.loads((tmp_path / "ledger.json").read_text(encoding="utf-8"))
+    assert [entry["id"] for entry in ledger] == list(rows)
+    for entry in ledger:
+        for key in ("id", "source", "paper", "ours", "verdict", "reason", "reading"):
+            assert isinstance(entry[key], str), entry["id"]
+            assert entry[key], entry["id"]
+        assert entry["verdict"] in VERDICTS
+        assert bool(entry["checks"]) != (entry["verdict"] == UNPUBLISHED)
+        for figure in entry["figures"]:
+            assert (tmp_path / figure).read_text(encoding="utf-8").startswith("<?xml")
+    text = page.read_text(encoding="utf-8")
+    assert "http-equiv" in text
+    assert 'src="http' not in text
+    for row_id in rows:
+        assert f'id="{row_id}"' in text
+
+
+def test_the_same_seed_gives_the_same_bytes(rows: dict[str, Row]) -> None:
+    again = make_rows(Workshop(7, runs=24, pooled_epochs=4, counts=SMALL), ["fig-5a", "fig-5c"])
+    assert ledger_text(again) == ledger_text([rows["fig-5a"], rows["fig-5c"]])
+    assert again[1].pictures[0].svg == rows["fig-5c"].pictures[0].svg
+    assert render_page(again, 7) == render_page([rows["fig-5a"], rows["fig-5c"]], 7)
+
+
+def test_an_unknown_row_is_refused_with_the_names() -> None:
+    with pytest.raises(UserError, match="--only fig-9: there is no such row; the rows are eq-1"):
+        make_rows(Workshop(), ["fig-9"])
+
+
+# The contradictions, as numbers -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("clock_hz", [20.0, 22.6])
+def test_units_by_the_position_sd(clock_hz: float) -> None:
+    assert 4.0 <= position_sd_deg("per degree", clock_hz) <= 6.0
+    assert 15.0 <= position_sd_deg("per radian", clock_hz) <= 22.0
+
+
+def test_units_row_reads_per_degree(rows: dict[str, Row]) -> None:
+    assert rows["app-a-units"].reading.startswith("Read per degree")
+    assert "is unstable" in rows["app-a-units"].ours
+    assert "is stable" in rows["sec-2.4.2-units"].ours
+
+
+def test_sums_of_appendix_a(rows: dict[str, Row]) -> None:
+    assert rows["app-a-inertia"].checks[0].ours == pytest.approx(0.00567, abs=5e-6)
+    assert rows["app-a-damping"].checks[0].ours == pytest.approx(0.088)
+
+
+def test_corners_of_equation_8(rows: dict[str, Row]) -> None:
+    assert rows["sec-2.4.3-bandwidth"].checks[0].ours == pytest.approx(3.44, abs=0.005)
+    assert rows["eq-8-largest"].checks[0].ours == pytest.approx(6.84, abs=0.005)
+    assert rows["eq-8-largest"].ours.count("Hz") == 10  # eight corners, the largest, the nominal
+    assert "the very bandwidth of the nominal arm" in rows["eq-8-largest"].reason
+
+
+def test_equation_2_without_increment_is_nothing(rows: dict[str, Row], workshop: Workshop) -> None:
+    assert check_of(rows["eq-2"], "Σ M / n").ours == pytest.approx(0.0, abs=1e-9)
+    area = check_of(rows["eq-2"], "Σ M Δθ").ours
+    assert area == pytest.approx(work_closed_form_j(printed.FIG_6, workshop.settings), rel=1e-3)
+
+
+def test_work_against_stiffness(workshop: Workshop) -> None:
+    settings = workshop.settings
+    stiffer = scaled(printed.FIG_6, 1.0, 1.75)
+    closed = math.pi * 0.13 * 2 * math.pi * math.radians(20.0) ** 2
+    assert work_closed_form_j(stiffer, settings) == pytest.approx(closed)
+    assert scored(stiffer, settings).work_j == pytest.approx(closed, rel=1e-3)
+    assert work_change_percent(settings, 100.0, stiffness=1.75) == pytest.approx(0.0, abs=0.005)
+    left = [work_change_percent(settings, rate, "left", stiffness=1.75) for rate in (100.0, 50.0)]
+    assert left == pytest.approx([-3.4, -7.0], abs=0.1)
+    late = work_change_percent(settings, 100.0, "trapezoid", 0.01, stiffness=1.75)
+    assert late == pytest.approx(-7.0, abs=0.1)
+    expected = work_closed_form_j(stiffer, settings, 0.01) / work_closed_form_j(
+        printed.FIG_6, settings, 0.01
+    )
+    assert late == pytest.approx(100 * (expected - 1))
+
+
+def test_highpass_on_the_position_alone() -> None:
+    K = {
+        (reading, way, alike): highpass_errors_percent(reading, way, alike=alike)[2]
+        for reading in ("per degree", "per radian")
+        for way in ("causal", "zero phase")
+        for alike in (False, True)
+    }
+    assert K["per degree", "causal", False] == pytest.approx(-46.0, abs=2.0)
+    assert K["per degree", "zero phase", False] == pytest.approx(23.0, abs=2.0)
+    assert K["per radian", "zero phase", False] == pytest.approx(4.0, abs=1.0)
+    for (_, _, alike), error in K.items():
+        if alike:
+            assert abs(error) < 0.02
+
+
+def test_voluntary_torque_biases_least_squares_and_not_instruments() -> None:
+    found = voluntary_errors_percent(Workshop())
+    assert found["bandlimited"][:2] == pytest.approx([-40.0, -64.0], abs=10.0)  # SD 6 over seeds
+    assert found["expected"][:2] == pytest.approx([-43.4, -68.7], abs=1.0)
+    assert max(map(abs, found["iv"])) < 5.0
+
+
+def test_noise_of_section_3_4(workshop: Workshop) -> None:
+    found = noise_runs(workshop)
+    ratio = found.bound / found.bound[2]
+    assert ratio.tolist() == pytest.approx([0.0057, 0.19, 1.0], rel=0.05)
+    assert found.sd / found.bound == pytest.approx([1.1, 1.1, 1.1], abs=0.45)
+    implied = found.noise_sd_nm * printed.SEC_34_SD[2] / found.bound[2]
+    assert implied == pytest.approx(5e-6, rel=0.05)
+
+
+def test_cycles(workshop: Workshop) -> None:
+    assert cycles_counted(workshop, 10.0) == 8
+    assert cycles_counted(workshop, 20.0) == 18
+
+
+def test_p_against_r_and_n() -> None:
+    """Table 2 and the text: r from p and N, p from r and N, N from p and r."""
+    assert r_from(4.3e-4, 138) == pytest.approx(0.300, abs=5e-4)
+    assert r_from(2.8e-4, 138) == pytest.approx(0.309, abs=5e-4)
+    assert r_from(5.6e-4, 138) == pytest.approx(0.294, abs=5e-4)
+    assert r_from(1.8e-4, 101) == pytest.approx(0.373, abs=5e-4)
+    assert r_from(1.8e-3, 101) == pytest.approx(0.311, abs=5e-4)
+    assert [r_from(p, 39) for p in (0.02, 0.04)] == pytest.approx([0.37, 0.33], abs=5e-3)
+    for p, n in ((0.04, 39), (4e-4, 101)):
+        r = r_from(p, n)
+        assert p_from(r, n) == pytest.approx(p)
+        assert n_from(p, r) == pytest.approx(n)
+
+
+def test_f_test_without_intercept_is_not_the_contrast(rows: dict[str, Row]) -> None:
+    check = rows["sec-3.1-f-test"].checks[0]
+    assert check.ours < 1e-3 * check.paper
+
+
+def test_stiffness_is_printed_three_ways(rows: dict[str, Row]) -> None:
+    assert rows["k-printed"].checks[0].ours == pytest.approx(100 * (1.751 / 1.130 - 1))
+
+
+@pytest.mark.slow
+def test_the_whole_paper_keeps_its_verdicts_with_other_seeds() -> None:
+    for seed in (1, 2, 3):
+        verdicts = {r.id: r.verdict for r in make_rows(Workshop(seed), sorted(HEAVY))}
+        assert verdicts == {
+            "sec-1-voluntary-ols": DIFFERS,
+            "sec-1-voluntary-iv": AGREES,
+            "sec-3.4-mean": AGREES,
+            "sec-3.4-sd": DIFFERS,
+            "sec-3.4-noise": DIFFERS,
+        }

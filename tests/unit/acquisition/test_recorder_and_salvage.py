@@ -1,0 +1,206 @@
+import errno
+
+import numpy as np
+import pytest
+
+from rigidimeter.acquisition.board import Board
+from rigidimeter.acquisition.recorder import Recorder, Recording
+from rigidimeter.acquisition.ring import EventRing, SampleRing
+from rigidimeter.acquisition.salvage import salvage
+from rigidimeter.acquisition.sink import RingSink
+from rigidimeter.errors import UserError
+from rigidimeter.recording import folder as folder_module
+from rigidimeter.recording.log import Sample, append_line, read_events, read_samples
+from rigidimeter.settings import Settings
+
+RATE_HZ = 1000.0
+
+
+def sample(k: int) -> Sample:
+    return Sample(k, k / RATE_HZ, 0.0, 1, *[k + 0.5] * 9, 0)
+
+
+class Rig:
+    def __init__(self, folder, capacity=1000):
+        self.folder = folder
+        self.samples, self.events = SampleRing.create(capacity), EventRing.create(32, 512)
+        self.board = Board.create()
+        self.sink = RingSink(self.samples, self.events, self.board, RATE_HZ)
+        self.writer = Recording(folder, Settings(), virtual=True).writer()
+        self.recorder = Recorder(self.writer, self.samples, self.events, self.board, RATE_HZ)
+        self.tick = 0
+
+    def run(self, ticks):
+        for _ in range(ticks):
+            self.sink.sample(sample(self.tick))
+            self.tick += 1
+
+    def begin(self):
+        self.sink.session_started()
+        self.sink.epoch_started(1, "one", "prbs", "rest", 0.0)
+
+    def end(self):
+        self.sink.epoch_ended(1, self.tick / RATE_HZ, "success", "")
+        self.sink.close(self.tick / RATE_HZ, "success", "")
+
+    def kill(self):
+        """Leave the files as a recorder does that was killed."""
+        for file in (self.writer._log._file, self.writer._events):
+            file.close()
+
+    def salvage(self):
+        return salvage(self.folder, self.samples, self.events, "the recorder was killed", RATE_HZ)
+
+    def ticks(self):
+        columns = read_samples(self.folder / "samples.arrows")
+        np.testing.assert_array_equal(columns["tick"], np.arange(columns["tick"].size))
+        np.testing.assert_array_equal(columns["torque_nm"], columns["tick"] + 0.5)
+        return columns["tick"].size
+
+    def kinds(self):
+        events, torn = read_events(self.folder / "events.jsonl")
+        assert not torn
+        return [event["event"] for event in events]
+
+    def close(self):
+        if not self.writer._events.closed:
+            self.kill()
+        for part in (self.samples, self.events, self.board):
+            part.memory.unlink()
+            part.close()
+
+
+@pytest.fixture
+def rig(tmp_path):
+    rig = Rig(tmp_path / "s")
+    yield rig
+    rig.close()
+
+
+def test_everything_is_recorded(rig):
+    rig.begin()
+    for _ in range(7):
+        rig.run(333)
+        rig.recorder.drain()
+        assert (rig.samples.lag(), rig.events.lag()) == (0, 0)
+    rig.end()
+    rig.recorder.drain()
+    assert rig.recorder.ended
+    assert rig.ticks() == 7 * 333
+    assert rig.kinds() == ["session_started", "epoch_started", "epoch_ended", "session_ended"]
+
+
+def test_a_loop_that_died_leaves_a_closed_session(rig):
+    rig.begin()
+    rig.run(50)
+    rig.recorder.drain()
+    rig.recorder.close("the loop died")
+    rig.recorder.drain()
+    events, _ = read_events(rig.folder / "events.jsonl")
+    assert [(e["event"], e.get("outcome"), e.get("reason")) for e in events[-2:]] == [
+        ("epoch_ended", "fail", "the loop died"),
+        ("session_ended", "fail", "the loop died"),
+    ]
+    assert rig.ticks() == 50
+
+
+@pytest.mark.parametrize("room", [0, 1, 500, 5000])
+def test_a_full_disk_loses_and_repeats_nothing(rig, room, monkeypatch):
+    rig.begin()
+    rig.run(50)
+    rig.recorder.drain()
+    left = room
+
+    class Full:
+        """A file that takes only so many bytes more, and says so as the system does."""
+
+        def __init__(self, file):
+            self._file = file
+
+        def write(self, data):
+            nonlocal left
+            if left == 0:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            n = self._file.write(data[:left])
+            left -= n
+            return n
+
+        def __getattr__(self, name):
+            return getattr(self._file, name)
+
+    file, events = rig.writer._log._file, rig.writer._events
+    rig.writer._log._file, rig.writer._events = Full(file), Full(events)
+    rig.run(500)
+    rig.end()
+    for _ in range(3):
+        with pytest.raises(OSError, match="No space"):
+            rig.recorder.drain()
+    assert rig.samples.lag() > 0
+    assert rig.ticks() == rig.samples.recorded
+    rig.writer._log._file, rig.writer._events = file, events
+    rig.recorder.drain()
+    assert rig.recorder.ended
+    assert rig.ticks() == 550
+    assert rig.kinds() == ["session_started", "epoch_started", "epoch_ended", "session_ended"]
+
+
+def test_samples_that_found_no_room_are_told(rig):
+    rig.begin()
+    rig.run(1100)
+    rig.end()
+    rig.recorder.drain()
+    events, _ = read_events(rig.folder / "events.jsonl")
+    assert events[-2]["event"] == "record_lost"
+    assert events[-2]["samples"] == 100
+
+
+@pytest.mark.parametrize("cursor_behind", [False, True])
+@pytest.mark.parametrize("torn", [0, 700])
+def test_salvage_completes_the_folder_once(rig, cursor_behind, torn):
+    rig.begin()
+    rig.run(900)
+    rig.recorder.drain()
+    rig.run(350)
+    rig.recorder.drain()
+    if cursor_behind:  # killed after a write, before its cursor moved
+        rig.samples.recorded -= 100
+        rig.events.recorded -= 1
+    if torn:  # killed within a write
+        with (rig.folder / "samples.arrows").open("ab", buffering=0) as file:
+            append_line(file, b"\xff\xff\xff\xff\x18\x01\x00\x00" + bytes(torn))
+        with (rig.folder / "events.jsonl").open("ab", buffering=0) as file:
+            append_line(file, b'{"event": "epoch_en')
+    rig.run(123)
+    rig.end()
+    rig.kill()
+    found = rig.salvage()
+    assert (found.samples, found.events, found.missing_samples) == (123, 2, 0)
+    assert rig.ticks() == 1373
+    assert [kind for kind in rig.kinds() if kind != "record_salvaged"] == [
+        "session_started",
+        "epoch_started",
+        "epoch_ended",
+        "session_ended",
+    ]
+    before = (rig.folder / "samples.arrows").read_bytes(), rig.kinds()
+    assert rig.salvage().samples == 0
+    assert before == ((rig.folder / "samples.arrows").read_bytes(), rig.kinds())
+
+
+def test_salvage_closes_what_the_loop_did_not(rig):
+    rig.begin()
+    rig.run(123)
+    rig.kill()
+    assert rig.salvage().samples == 123
+    events, _ = read_events(rig.folder / "events.jsonl")
+    assert events[-1]["outcome"] == "fail"
+    assert events[-1]["reason"] == "the recorder was killed"
+    assert rig.ticks() == 123
+
+
+def test_salvage_leaves_a_living_recorder_alone(rig):
+    rig.begin()
+    rig.run(10)
+    with pytest.raises(UserError, match="still being recorded"):
+        rig.salvage()
+    assert folder_module.EVENTS == "events.jsonl"

@@ -1,0 +1,163 @@
+"""`rigidimeter compare TABLE --value`: any table in two groups."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigidimeter.statistics import rank_biserial, ranksum
+
+
+def table(path: Path, m: int = 20, n: int = 12) -> tuple[Path, dict[str, np.ndarray]]:
+    g = np.random.default_rng(1)
+    shared = g.standard_normal(m + n)
+    shift = np.repeat([1.2, 0.0], [m, n])
+    columns = {
+        "a": shift + shared,
+        "b": 0.3 * shift + shared + 0.2 * g.standard_normal(m + n),
+        "c": -shift + g.standard_normal(m + n),
+    }
+    lines = ["condition,day,a,b,c"]
+    for k in range(m + n):
+        name = "OFF" if k < m else "DBS"
+        cells = [repr(float(columns[key][k])) for key in "abc"]
+        lines.append(",".join([name, f"{name}{k % 5}", *cells]))
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    return path, columns
+
+
+@pytest.fixture
+def compared(rigidimeter, tmp_path):
+    def run(path: Path, *options: str):
+        out = tmp_path / "out.json"
+        ran = rigidimeter("compare", path, "--json", out, *options)
+        return ran, json.loads(out.read_text("utf-8")) if out.exists() else None
+
+    return run
+
+
+def test_one_column_is_the_rank_sum_test(compared, tmp_path) -> None:
+    path, columns = table(tmp_path / "t.csv")
+    ran, found = compared(path, "--value", "a", "--by", "condition")
+    assert ran.status == 0, ran.err
+    x, y = columns["a"][:20], columns["a"][20:]
+    test = ranksum(x, y)
+    assert found["schema"] == "rigidimeter.comparison/1"
+    for key in ("z", "p", "r", "shift", "shift_low", "shift_high"):
+        assert found[key] == getattr(test, key)
+    assert set(found["groups"]) == {"OFF", "DBS"}
+    assert set(found["groups"]["OFF"]) == {"n", "median", "q1", "q3"}
+    assert found["groups"]["DBS"]["median"] == np.median(y)
+    assert found["rank_biserial"] == pytest.approx(rank_biserial(x, y))
+    assert found["r_low"] < found["r"] < found["r_high"]
+    assert found["convention"] == "OFF minus DBS"
+    assert found["p_holm"] == found["p"]
+    assert len(found["comparisons"]) == 1
+    assert "rank-biserial" in ran.out
+
+
+def test_several_columns_are_adjusted_and_compared(compared, tmp_path) -> None:
+    path, _ = table(tmp_path / "t.csv")
+    ran, found = compared(path, "--value", "a", "--value", "b", "--value", "c")
+    assert [row["value"] for row in found["comparisons"]] == ["a", "b", "c"]
+    assert found["z"] == found["comparisons"][0]["z"]
+    assert all(row["p_holm"] >= row["p"] for row in found["comparisons"])
+    one, two, _ = found["effect_differences"]
+    assert (one["first"], one["second"], one["paired"]) == ("a", "b", True)
+    assert one["low"] > 0  # a parts the groups better than b, from the same rows
+    assert two["low"] < 0 < two["high"]  # c as well as a, the other way round
+    assert "Which parts the groups better" in ran.out
+    again = compared(path, "--value", "a", "--value", "b", "--value", "c")[1]
+    assert again == found
+
+
+def test_measures_of_different_rows_are_independent_or_paired_by_session(
+    compared, tmp_path
+) -> None:
+    path = tmp_path / "t.csv"
+    g = np.random.default_rng(2)
+    lines = ["condition,session,stiffness,work"]
+    for k in range(80):
+        name, level = ("OFF", 1.0) if k % 8 < 5 else ("DBS", 0.0)
+        value = f"{level + g.standard_normal():.6f}"
+        cells = f"{value}," if k % 2 else f",{value}"
+        lines.append(f"{name},s{k // 8},{cells}")
+    path.write_text("\n".join(lines) + "\n")
+    options = ("--value", "stiffness", "--value", "work")
+    _, apart = compared(path, *options)
+    assert not apart["effect_differences"][0]["paired"]
+    ran, together = compared(path, *options, "--session", "session")
+    assert together["effect_differences"][0]["paired"], ran.out
+
+
+def test_excluded_epochs_and_empty_cells_are_left_out_and_said(compared, tmp_path) -> None:
+    path, _ = table(tmp_path / "t.csv")
+    lines = path.read_text().splitlines()
+    cells = lines[1].split(",")
+    lines[1] = ",".join([*cells[:2], "", *cells[3:]])
+    lines = [lines[0] + ",outcome", *(line + ",included" for line in lines[1:])]
+    lines[2] = lines[2].replace("included", "excluded")
+    path.write_text("\n".join(lines))
+    _, found = compared(path, "--value", "a")
+    assert found["groups"]["OFF"]["n"] == 18
+    assert any("no a in line 2; left out" in notice for notice in found["notices"])
+    assert any("excluded or failed in line 3" in notice for notice in found["notices"])
+
+
+def test_two_values_give_medians_and_no_test(compared, tmp_path) -> None:
+    path, _ = table(tmp_path / "t.csv", 5, 2)
+    ran, found = compared(path, "--value", "a")
+    assert ran.status == 0
+    assert found["p"] is None
+    assert found["r"] is None
+    assert found["groups"]["DBS"]["n"] == 2
+    assert "a test needs 3 values in each group; there are 5 in OFF and 2 in DBS" in ran.out
+
+
+def test_three_against_three_cannot_show_a_difference(compared, tmp_path) -> None:
+    path, _ = table(tmp_path / "t.csv", 3, 3)
+    _, found = compared(path, "--value", "a")
+    assert "exact p of 0.1" in found["notices"][0]
+
+
+def test_more_groups_are_chosen_by_name(compared, tmp_path) -> None:
+    path, _ = table(tmp_path / "t.csv")
+    ran, _ = compared(path, "--value", "a", "--by", "day")
+    assert ran.status == 1
+    assert "has 10 groups" in ran.err
+    ran, found = compared(
+        path, "--value", "a", "--by", "day", "--reference", "OFF1", "--other", "OFF0"
+    )
+    assert found["convention"] == "OFF1 minus OFF0"
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--value", "x"), "there is no column x; its columns are condition, day, a, b, c"),
+        (("--value", "a", "--by", "x"), "there is no column x"),
+        (("--value", "day"), "line 2: day is 'OFF0', which is not a number"),
+        (("--value", "a", "--reference", "ON"), "--reference ON: column condition of"),
+        (("--value", "a", "--reference", "OFF", "--other", "OFF"), "are both OFF"),
+        (("--value", "a", "--csv", "x.csv"), "--csv is not written with --value"),
+        (("--value", "a", "--session", "x"), "Name the right one with --session"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(compared, tmp_path, options, sentence: str) -> None:
+    path, _ = table(tmp_path / "t.csv")
+    ran, found = compared(path, *options)
+    assert ran.status == 1
+    assert sentence in ran.err
+    assert ran.err.count("\n") == 1
+    assert found is None
+
+
+def test_one_group_and_two_tables_are_refused(rigidimeter, tmp_path) -> None:
+    path, _ = table(tmp_path / "t.csv")
+    ran = rigidimeter("compare", path, path, "--value", "a")
+    assert "--value takes one table, but 2 inputs" in ran.err
+    path.write_text("condition,a\nOFF,1\nOFF,2\n")
+    assert "needs two groups" in rigidimeter("compare", path, "--value", "a").err
+    path.write_text("condition,a\nOFF,1\nDBS,\n")
+    assert "a has no value in DBS" in rigidimeter("compare", path, "--value", "a").err

@@ -1,0 +1,334 @@
+"""The serial drive against its peer on a pseudo-terminal: every habit, and a computer that dies."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from rigidimeter.device.ascii_drive import AsciiDrive
+from rigidimeter.device.base import DeviceError
+from rigidimeter.emulation.arm import EmulatedArm
+from rigidimeter.emulation.ascii import MISBEHAVIOURS, AsciiPeer
+from rigidimeter.guard import Cause
+from rigidimeter.joint import JointDynamics
+
+COUNTS_PER_TURN = 360_000.0
+TICK_S = 0.02
+SPEED_RAD_S = 0.5
+HORIZON_S = 0.1
+DECELERATION_DEG_S2 = 500.0
+
+
+class Wire:
+    """A peer, its arm, and as many drivers as a test wants, one after the other."""
+
+    def __init__(self) -> None:
+        self.arm = EmulatedArm(JointDynamics(0.08, 0.5, 2.0))
+        self.peer = AsciiPeer(self.arm, counts_per_turn=COUNTS_PER_TURN)
+        self.drives: list[AsciiDrive] = []
+
+    def drive(self, **settings):
+        values = {
+            "port": self.peer.port,
+            "counts_per_turn": COUNTS_PER_TURN,
+            "horizon_s": HORIZON_S,
+            "deceleration_deg_s2": DECELERATION_DEG_S2,
+            "lost_s": 0.15,
+        }
+        drive = AsciiDrive(AsciiDrive.Settings(**(values | settings)), time.monotonic)
+        for before in self.drives:
+            before.close()  # one program at a time has the port
+        self.drives.append(drive)
+        drive.connect()
+        return drive
+
+    def enabled(self, **settings):
+        drive = self.drive(**settings)
+        drive.configure()
+        drive.enable()
+        return drive
+
+    def run(self, drive, velocity_rad_s, for_s, tick_s=TICK_S):
+        """Run a loop; return the sample and what was sent last."""
+        end_s = time.monotonic() + for_s
+        while True:
+            sample = drive.read()
+            sent = drive.write(velocity_rad_s)
+            if time.monotonic() > end_s:
+                return sample, sent
+            time.sleep(tick_s)
+
+    def cause(self, drive, velocity_rad_s=0.0, for_s=0.5):
+        """Run a loop until a cause is named; return it."""
+        end_s = time.monotonic() + for_s
+        while time.monotonic() < end_s:
+            sample = drive.read()
+            if sample.cause:
+                return Cause(sample.cause)
+            drive.write(velocity_rad_s)
+            time.sleep(TICK_S)
+        return Cause.NONE
+
+    def close(self):
+        for drive in self.drives:
+            drive.close()
+        self.peer.close()
+
+
+@pytest.fixture
+def wire():
+    made = Wire()
+    yield made
+    made.close()
+
+
+def test_the_arm_follows_and_the_stamps_are_those_of_the_samples(wire):
+    drive = wire.enabled()
+    sample, sent = wire.run(drive, SPEED_RAD_S, 0.6)
+    angle_rad, velocity_rad_s = wire.arm.motion()
+    age_s = time.monotonic() - sample.time_s
+    assert sent == pytest.approx(SPEED_RAD_S, abs=1e-5)
+    assert velocity_rad_s == pytest.approx(sent, rel=0.1)
+    assert sample.velocity_rad_s == pytest.approx(sent, rel=0.1)
+    # Where the arm was at the stamp: 5 ms at this speed, with a busy machine's delays in it.
+    assert sample.angle_rad == pytest.approx(angle_rad - velocity_rad_s * age_s, abs=2.5e-3)
+    assert sample.cause == 0
+
+
+def test_sign_and_offset_turn_the_joint_about(wire):
+    drive = wire.enabled(sign=-1, angle_offset_deg=10.0)
+    sample, _ = wire.run(drive, SPEED_RAD_S, 0.4)
+    assert wire.arm.motion()[1] == pytest.approx(-SPEED_RAD_S, rel=0.1)
+    assert sample.velocity_rad_s == pytest.approx(SPEED_RAD_S, rel=0.1)
+    assert sample.angle_rad > math.radians(10.0)
+
+
+def test_facts_are_read_from_the_drive(wire):
+    facts = wire.drive().configure()
+    assert (facts.model, facts.serial) == ("EMU-055-18", "4711")
+    assert facts.watchdog_s == HORIZON_S
+    assert wire.peer.state()["baud"] == 115200
+    assert facts.values["deceleration_counts_s2"] == pytest.approx(500_000.0)
+
+
+def test_velocity_mode_asks_for_a_watchdog_of_hardware(wire):
+    with pytest.raises(DeviceError, match="external_watchdog = true"):
+        wire.drive(mode="velocity").configure()
+    drive = wire.drive(mode="velocity", external_watchdog=True)
+    assert drive.configure().watchdog_s is None
+
+
+def test_a_horizon_too_short_for_the_wire_is_refused(wire):
+    with pytest.raises(DeviceError, match=r"horizon_s = 0\.02 is too short"):
+        wire.drive(horizon_s=0.02).configure()
+
+
+def test_a_velocity_above_the_limit_is_sent_at_the_limit(wire):
+    drive = wire.enabled(max_velocity_deg_s=30.0)
+    _, sent = wire.run(drive, 5.0, 0.4)
+    assert sent == pytest.approx(math.radians(30.0), abs=1e-5)
+    assert wire.arm.motion()[1] == pytest.approx(sent, rel=0.1)
+
+
+def test_slowing_down_never_turns_the_arm_back(wire):
+    drive = wire.enabled(deceleration_deg_s2=200.0)
+    wire.run(drive, SPEED_RAD_S, 0.4)
+    slowest = SPEED_RAD_S
+    for _ in range(25):
+        drive.read()
+        drive.write(0.05)
+        time.sleep(0.02)
+        slowest = min(slowest, wire.arm.motion()[1])
+    assert slowest > -0.05
+
+
+@pytest.mark.parametrize(
+    ("habit", "value", "cause"),
+    [
+        ("silent", 1, Cause.DRIVE_LOST),
+        ("half_replies", 1, Cause.DRIVE_LOST),
+        ("garbage", 1, Cause.DRIVE_LOST),
+        ("slow_replies", 0.2, Cause.DRIVE_LOST),
+        ("wrong_baud", 38400, Cause.DRIVE_LOST),
+        ("error_replies", 33, Cause.DRIVE_FAULT),
+        ("fault", 0, Cause.DRIVE_FAULT),
+        ("power_lost", 1, Cause.DRIVE_STATE),
+        ("changes_state", 11, Cause.DRIVE_STATE),
+        ("encoder_jump", 20_000, Cause.NOT_FOLLOWING),
+        ("encoder_sign_flip", 1, Cause.NOT_FOLLOWING),
+    ],
+)
+def test_what_goes_wrong_is_named_and_the_arm_comes_to_rest(wire, habit, value, cause):
+    drive = wire.enabled()
+    wire.run(drive, SPEED_RAD_S, 0.3)
+    wire.peer.misbehave(habit, value)
+    began_s = time.monotonic()
+    assert wire.cause(drive, SPEED_RAD_S) is cause
+    assert time.monotonic() - began_s < 0.4
+    # The guard would ramp now; a drive that does not hear it ends its move.
+    wire.run(drive, 0.0, HORIZON_S + 0.2)
+    assert abs(wire.arm.motion()[1]) < 0.02
+    assert drive.read().cause == cause, "the first cause is kept"
+
+
+@pytest.mark.parametrize(
+    ("habit", "value", "measured_rad_s"),
+    [("does_not_follow", 1, 0.0), ("runs_away", 1.2, 1.2), ("encoder_frozen", 1, SPEED_RAD_S)],
+)
+def test_what_the_guard_must_see_is_passed_on_as_it_is(wire, habit, value, measured_rad_s):
+    drive = wire.enabled()
+    wire.run(drive, SPEED_RAD_S, 0.3)
+    wire.peer.misbehave(habit, value)
+    sample, sent = wire.run(drive, SPEED_RAD_S if habit != "encoder_frozen" else 0.0, 0.3)
+    assert sample.cause == 0
+    assert sample.velocity_rad_s == pytest.approx(measured_rad_s, abs=0.1)
+    assert abs(sample.velocity_rad_s - sent) > 0.3
+
+
+def test_every_misbehaviour_has_a_test():
+    tested = {
+        mark
+        for test in (
+            test_what_goes_wrong_is_named_and_the_arm_comes_to_rest,
+            test_what_the_guard_must_see_is_passed_on_as_it_is,
+        )
+        for mark in (case[0] for case in test.pytestmark[0].args[1])
+    }
+    assert tested | {"stale_target"} == set(MISBEHAVIOURS)
+
+
+def test_a_stale_target_that_does_not_go_is_refused_before_power(wire):
+    wire.peer.misbehave("stale_target", 5000)
+    with pytest.raises(DeviceError, match="0x2f is 5000 after 0 was written"):
+        wire.drive().configure()
+    wire.peer.behave()
+    drive = wire.drive()
+    drive.configure()
+    wire.peer.misbehave("stale_target", 5000)
+    with pytest.raises(DeviceError, match="0x2f is 5000"):
+        drive.enable()
+    assert not any(request == "s r0x24 21" for _, request, _ in wire.peer.log)
+
+
+def test_a_stale_target_of_a_session_before_moves_nothing(wire):
+    drive = wire.enabled()
+    wire.run(drive, SPEED_RAD_S, 0.2)
+    before = wire.drives.pop()
+    before._line.close()  # as when the program is killed: nothing is said to the drive
+    before._line = None
+    again = wire.enabled()
+    angle_rad = wire.arm.motion()[0]
+    wire.run(again, 0.0, 0.2)
+    assert wire.arm.motion()[0] == pytest.approx(angle_rad, abs=1e-3)
+
+
+def test_a_latched_fault_is_cleared_once_and_one_that_stays_is_refused(wire):
+    wire.peer.misbehave("fault", 3)
+    wire.peer.behave()
+    facts = wire.drive().configure()
+    assert facts.values["latched_faults_before"] == 1 << 3
+    wire.peer.misbehave("power_lost")
+    drive = wire.drives[-1]
+    with pytest.raises(DeviceError, match="enable input not active"):
+        drive.enable()
+    assert wire.peer.state()["desired_state"] == 0
+
+
+def test_a_drive_that_is_not_there_is_named():
+    drive = AsciiDrive(
+        AsciiDrive.Settings(port="/dev/no-such-port", counts_per_turn=1.0), time.monotonic
+    )
+    with pytest.raises(DeviceError, match="no-such-port"):
+        drive.connect()
+    drive.close()
+
+
+def test_a_drive_that_says_nothing_is_named(wire):
+    wire.peer.misbehave("silent")
+    with pytest.raises(DeviceError, match=r"no answer on .* at 9600 or 115200 baud"):
+        wire.drive().configure()
+
+
+@pytest.mark.parametrize("baud", [9600, 57600, 115200])
+def test_commands_keep_up_with_the_rate_the_facts_state(wire, baud, record_property):
+    horizon_s = 0.5 if baud == 9600 else HORIZON_S
+    drive = wire.drive(baud=baud, horizon_s=horizon_s, lost_s=0.2)
+    facts = drive.configure()
+    rate_hz = facts.fastest_tick_rate_hz
+    # Characters alone allow this; what the drive and the computer add makes it less.
+    assert rate_hz <= baud / 10 / 92
+    drive.enable()
+    ticks = max(6, round(0.6 * rate_hz))
+    began_s = time.monotonic()
+    for tick in range(ticks):
+        drive.read()
+        drive.write(0.1)
+        time.sleep(max(0.0, began_s + (tick + 1) * 1.05 / rate_hz - time.monotonic()))
+    skipped = drive.counts["skipped"] / ticks
+    print(f"{baud} baud: {rate_hz:.1f} ticks/s, {100 * skipped:.0f} % of commands skipped")
+    record_property("ticks_per_s", rate_hz)
+    assert skipped < 0.5
+
+
+SCRIPT = """
+import sys, time
+from rigidimeter.device.ascii_drive import AsciiDrive
+settings = AsciiDrive.Settings(
+    port=sys.argv[1], counts_per_turn=float(sys.argv[2]), horizon_s=float(sys.argv[3]),
+    deceleration_deg_s2=float(sys.argv[4]), lost_s=0.5)
+drive = AsciiDrive(settings, time.monotonic)
+drive.connect(); drive.configure(); drive.enable()
+while True:
+    sample = drive.read()
+    drive.write(float(sys.argv[5]))
+    print(sample.velocity_rad_s, flush=True)
+    time.sleep(0.02)
+"""
+
+
+def test_the_drive_stops_by_itself_when_the_computer_dies():
+    wires = {signal.SIGSTOP: Wire(), signal.SIGKILL: Wire()}
+    programs = {}
+    try:
+        for how, wire in wires.items():
+            values = [wire.peer.port, COUNTS_PER_TURN, HORIZON_S, DECELERATION_DEG_S2, SPEED_RAD_S]
+            programs[how] = subprocess.Popen(
+                [sys.executable, "-c", SCRIPT, *map(str, values)], stdout=subprocess.PIPE, text=True
+            )
+        for how, wire in wires.items():
+            _dies_at_speed(how, wire, programs[how])
+    finally:
+        for program in programs.values():
+            program.kill()
+            program.communicate()
+        for wire in wires.values():
+            wire.close()
+
+
+def _dies_at_speed(how, wire, program):
+    for line in program.stdout:
+        if float(line) > 0.95 * SPEED_RAD_S:
+            break
+    time.sleep(0.1)
+    os.kill(program.pid, how)
+    # What was on the wire then still arrives; the last command is the one the drive took.
+    time.sleep(0.02)
+    last_s = moving_s = max(at for at, request, _ in list(wire.peer.log) if request == "t 1")
+    while time.monotonic() < last_s + 1.0:
+        if abs(wire.arm.motion()[1]) > 0.01 * SPEED_RAD_S:
+            moving_s = time.monotonic()
+        time.sleep(0.001)
+    taken_s = moving_s - last_s
+    braking_s = SPEED_RAD_S / math.radians(DECELERATION_DEG_S2)
+    print(
+        f"{how.name}: at rest {taken_s:.3f} s after the last command "
+        f"(horizon {HORIZON_S} s, braking {braking_s:.3f} s)"
+    )
+    # The arm comes after the generator by its position loop: to 1 % in five times 1/60 s.
+    assert 0.5 * HORIZON_S < taken_s < HORIZON_S + braking_s + 5 / 60

@@ -1,0 +1,180 @@
+"""Every driver that comes along, through the checks that any driver must pass."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigidimeter.device.ascii_drive import AsciiDrive
+from rigidimeter.device.ati_analogue import AtiAnalogue
+from rigidimeter.device.ati_rdt import AtiRdt
+from rigidimeter.device.cia402 import Cia402Drive
+from rigidimeter.device.conformance import (
+    DRIVE_CHECKS,
+    SENSOR_CHECKS,
+    DriveBench,
+    OtherEnd,
+    SensorBench,
+)
+from rigidimeter.device.replay import ReplayDrive, ReplaySensor
+from rigidimeter.emulation.arm import EmulatedArm
+from rigidimeter.emulation.ascii import AsciiPeer
+from rigidimeter.emulation.cia402 import Cia402Peer
+from rigidimeter.emulation.rdt import RdtPeer
+from rigidimeter.joint import JointDynamics
+
+JOINT = JointDynamics(0.08, 0.5, 2.0)
+CHANNEL = count()
+
+
+class FakeReader:
+    """Six noisy voltages a millisecond, until it is told to be silent."""
+
+    def __init__(self) -> None:
+        self.silent = False
+        self._rng = np.random.default_rng(1)
+        self._taken_s = time.monotonic()
+
+    def start(self) -> str:
+        self._taken_s = time.monotonic()
+        return "fake"
+
+    def read(self) -> np.ndarray:
+        ready = 0 if self.silent else int((time.monotonic() - self._taken_s) * 1000.0)
+        self._taken_s += ready / 1000.0
+        return 0.01 * self._rng.standard_normal((ready, 6))
+
+    def stop(self) -> None:
+        self.silent = True
+
+
+@contextmanager
+def analogue() -> Iterator[SensorBench]:
+    reader = FakeReader()
+    table = Path(__file__).with_name("ati_identity.toml")
+    settings = AtiAnalogue.Settings(channels="Dev1/ai0:5", calibration=str(table))
+
+    def make() -> AtiAnalogue:
+        reader.silent = False
+        return AtiAnalogue(settings, time.monotonic, reader)
+
+    yield SensorBench(make, time.monotonic, lambda: setattr(reader, "silent", True))
+
+
+@contextmanager
+def rdt() -> Iterator[SensorBench]:
+    with RdtPeer(EmulatedArm(JOINT)) as peer:
+        settings = AtiRdt.Settings(
+            address=peer.address, port=peer.port, http_port=peer.http_port, timeout_s=0.5
+        )
+        yield SensorBench(
+            lambda: AtiRdt(settings, time.monotonic),
+            time.monotonic,
+            lambda: peer.misbehave("silent"),
+        )
+
+
+def record(ticks: int = 5000) -> dict[str, np.ndarray]:
+    time_s = np.arange(ticks) / 1000.0
+    angle_rad = 0.1 * np.sin(time_s)
+    return {
+        "torque_nm": 2.0 * angle_rad,
+        "torque_time_s": time_s,
+        "angle_rad": angle_rad,
+        "velocity_rad_s": 0.1 * np.cos(time_s),
+        "motion_time_s": time_s,
+    }
+
+
+@contextmanager
+def replayed_sensor() -> Iterator[SensorBench]:
+    yield SensorBench(lambda: ReplaySensor(record()))
+
+
+@contextmanager
+def ascii_bench(mode: str) -> Iterator[DriveBench]:
+    arm = EmulatedArm(JOINT)
+    peer = AsciiPeer(arm)
+    settings = AsciiDrive.Settings(
+        port=peer.port,
+        counts_per_turn=360_000.0,
+        mode=mode,
+        external_watchdog=mode == "velocity",
+        lost_s=0.15,
+    )
+    try:
+        yield DriveBench(
+            lambda: AsciiDrive(settings, time.monotonic),
+            time.monotonic,
+            lambda: peer.misbehave("silent"),
+            OtherEnd(lambda: bool(peer.state()["power"]), lambda: arm.motion()[1]),
+            settle_s=0.3,
+        )
+    finally:
+        peer.close()
+
+
+@contextmanager
+def cia402() -> Iterator[DriveBench]:
+    arm = EmulatedArm(JOINT)
+    channel = f"conformance {next(CHANNEL)}"
+    peer = Cia402Peer(arm, interface="virtual", channel=channel)
+    settings = Cia402Drive.Settings(
+        interface="virtual",
+        channel=channel,
+        # A busy machine may hold a thread up for longer than a real loop ever is.
+        heartbeat_s=0.02,
+        drive_watchdog_s=0.3,
+        command_deadline_s=0.15,
+        lost_s=0.12,
+        max_velocity_rad_s=3.0,
+    )
+    try:
+        yield DriveBench(
+            lambda: Cia402Drive(settings, time.monotonic),
+            time.monotonic,
+            lambda: peer.misbehave("die"),
+            OtherEnd(lambda: bool(peer.state()["power"]), lambda: arm.motion()[1]),
+            tick_s=0.005,
+            settle_s=0.3,
+        )
+    finally:
+        peer.close()
+
+
+@contextmanager
+def replayed_drive() -> Iterator[DriveBench]:
+    yield DriveBench(lambda: ReplayDrive(record()), tick_s=0.001, settle_s=0.1)
+
+
+SENSORS = {"ati-analogue": analogue, "ati-rdt": rdt, "replay": replayed_sensor}
+DRIVES = {
+    "ascii-moves": lambda: ascii_bench("moves"),
+    "ascii-velocity": lambda: ascii_bench("velocity"),
+    "cia402": cia402,
+    "replay": replayed_drive,
+}
+
+
+@pytest.mark.parametrize("check", SENSOR_CHECKS, ids=lambda check: check.__name__)
+@pytest.mark.parametrize("bench", SENSORS.values(), ids=SENSORS.keys())
+def test_sensor(
+    bench: Callable[[], AbstractContextManager[SensorBench]], check: Callable[[SensorBench], None]
+) -> None:
+    with bench() as made:
+        check(made)
+
+
+@pytest.mark.parametrize("check", DRIVE_CHECKS, ids=lambda check: check.__name__)
+@pytest.mark.parametrize("bench", DRIVES.values(), ids=DRIVES.keys())
+def test_drive(
+    bench: Callable[[], AbstractContextManager[DriveBench]], check: Callable[[DriveBench], None]
+) -> None:
+    with bench() as made:
+        check(made)

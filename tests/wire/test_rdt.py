@@ -1,0 +1,477 @@
+"""The sensor's driver against a sensor on a true wire, doing everything wrong in turn."""
+
+import itertools
+import socket
+import struct
+import time
+
+import pytest
+
+from rigidimeter.device.ati_rdt import AtiRdt
+from rigidimeter.device.base import DeviceError
+from rigidimeter.emulation.arm import EmulatedArm
+from rigidimeter.emulation.rdt import MISBEHAVIOURS, RdtPeer
+from rigidimeter.guard import Cause
+from rigidimeter.joint import JointDynamics
+
+ANGLE_RAD = 0.3
+STIFFNESS_NM_RAD = 2.0
+TORQUE_NM = STIFFNESS_NM_RAD * ANGLE_RAD
+NOISE_NM = 0.005
+
+
+@pytest.fixture
+def arm():
+    arm = EmulatedArm(JointDynamics(0.08, 0.8, STIFFNESS_NM_RAD), noise_sd_nm=NOISE_NM)
+    arm.place(ANGLE_RAD)
+    return arm
+
+
+@pytest.fixture
+def peer(arm):
+    with RdtPeer(arm) as peer:
+        yield peer
+
+
+@pytest.fixture
+def sensor_of():
+    """Make a driver of a peer; all are closed in the end."""
+    made = []
+
+    def make(peer, now=time.monotonic, **settings):
+        # A busy machine may hold a thread up for longer than a real sensor ever is.
+        values = {"timeout_s": 1.0, "tolerated_packets": 5, "frozen_s": 0.1, **settings}
+        sensor = AtiRdt(
+            AtiRdt.Settings(
+                address="127.0.0.1", port=peer.port, http_port=peer.http_port, **values
+            ),
+            now,
+        )
+        made.append(sensor)
+        sensor.connect()
+        return sensor
+
+    yield make
+    for sensor in made:
+        sensor.close()
+
+
+@pytest.fixture
+def sensor(peer, sensor_of):
+    sensor = sensor_of(peer)
+    sensor.configure()
+    return sensor
+
+
+def watch(sensor, duration_s):
+    """Read at 1 kHz; return the samples."""
+    samples = []
+    until_s = time.monotonic() + duration_s
+    while time.monotonic() < until_s:
+        samples.append(sensor.read())
+        time.sleep(0.001)
+    return samples
+
+
+def first_cause(sensor, within_s=2.0):
+    """Read at 1 kHz until there is a cause; return it with the time that took."""
+    start_s = time.monotonic()
+    while (elapsed_s := time.monotonic() - start_s) < within_s:
+        cause = sensor.read().cause
+        if cause:
+            return Cause(cause), elapsed_s
+        time.sleep(0.001)
+    return Cause.NONE, elapsed_s
+
+
+def newest(samples):
+    return samples[-1].torque_nm
+
+
+def bad_counts(sensor):
+    return {name: n for name, n in sensor.counts.items() if n and name != "received"}
+
+
+def test_what_arrives_is_what_was_sent_to_the_count(peer, sensor):
+    samples = watch(sensor, 0.3)
+    sent = dict(peer.sent)
+    assert len({sample.sequence for sample in samples}) > 50
+    for sample in samples:
+        assert sample.torque_nm == pytest.approx(sent[sample.sequence], abs=0.51e-6)
+        assert sample.raw[5] == round(-sent[sample.sequence] * 1e6)
+        assert sample.cause == Cause.NONE
+    assert bad_counts(sensor) == {}
+
+
+def test_the_torque_is_the_arms(arm, sensor):
+    torques = [sample.torque_nm for sample in watch(sensor, 0.2)]
+    assert sum(torques) / len(torques) == pytest.approx(TORQUE_NM, abs=NOISE_NM)
+
+
+@pytest.mark.parametrize("unit", ["Nmm", "lbf-in", "lbf-ft", "N-m"])
+def test_the_torque_does_not_depend_on_the_sensors_unit(arm, sensor_of, unit):
+    with RdtPeer(arm, torque_unit=unit, force_unit="lbf") as peer:
+        sensor = sensor_of(peer)
+        facts = sensor.configure()
+        sample = watch(sensor, 0.03)[-1]
+        assert sample.torque_nm == pytest.approx(dict(peer.sent)[sample.sequence], abs=0.51e-6)
+        assert facts.values["force_unit"] == "lbf"
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_lever_arms_weigh_the_forces(peer, sensor_of, sign):
+    sensor = sensor_of(peer, weights=[0.25, 0.0, -0.5, 0.0, 1.0, 0.5], sign=sign)
+    sensor.configure()
+    for sample in watch(sensor, 0.02):
+        fx, _, fz, _, ty, tz = (count / 1e6 for count in sample.raw)
+        expected_nm = sign * (0.25 * fx - 0.5 * fz + ty + 0.5 * tz)
+        assert sample.torque_nm == pytest.approx(expected_nm, abs=1e-12)
+
+
+def test_what_the_sensor_says_of_itself_is_kept(peer, sensor_of):
+    facts = sensor_of(peer).configure()
+    assert (facts.model, facts.serial) == ("Emulated Net F/T", "FT00001")
+    assert facts.fastest_tick_rate_hz == 1000.0
+    assert facts.values["counts_per_torque"] == 1e6
+    assert facts.values["torque_unit"] == "Nm"
+
+
+def test_configuring_waits_for_the_first_sample_and_closing_stops_the_stream(peer, sensor):
+    sample = sensor.read()
+    assert sample.sequence >= 1
+    assert abs(time.monotonic() - sample.time_s) < 0.5
+    sensor.close()
+    sensor.close()
+    time.sleep(0.05)
+    sent = len(peer.sent)
+    time.sleep(0.05)
+    assert len(peer.sent) == sent
+    assert peer.requests[-1] == 0
+    assert sensor.read().sequence == sample.sequence
+
+
+def test_connecting_says_nothing_to_the_sensor(peer, sensor_of):
+    sensor_of(peer)
+    time.sleep(0.05)
+    assert not peer.requests
+
+
+RUNNING = [
+    ("frozen_sequence", None, Cause.TORQUE_FROZEN, "repeated"),
+    ("frozen_ft_sequence", None, Cause.TORQUE_FROZEN, None),
+    ("frozen_values", None, Cause.TORQUE_FROZEN, None),
+    ("frozen_record", None, Cause.TORQUE_FROZEN, "repeated"),
+    ("saturated", None, Cause.TORQUE_SATURATED, None),
+    ("serious_status", None, Cause.TORQUE_STATUS, None),
+    ("serious_status", 0x80000000, Cause.TORQUE_STATUS, None),
+    ("one_bad_status", None, Cause.TORQUE_STATUS, None),
+    ("warning", None, Cause.NONE, "warnings"),
+    ("lose", None, Cause.TORQUE_PACKETS, "lost"),
+    ("lose_once", 3, Cause.NONE, "lost"),
+    ("lose_once", 6, Cause.TORQUE_PACKETS, "lost"),
+    ("duplicate", None, Cause.TORQUE_PACKETS, "repeated"),
+    ("duplicate", 1, Cause.TORQUE_PACKETS, "repeated"),
+    ("duplicate_once", None, Cause.NONE, "repeated"),
+    ("reorder", None, Cause.TORQUE_PACKETS, "reordered"),
+    ("reorder_once", None, Cause.NONE, "reordered"),
+    ("short", None, Cause.TORQUE_PACKETS, "short"),
+    ("short", 1, Cause.TORQUE_PACKETS, "short"),
+    ("long", None, Cause.TORQUE_PACKETS, "damaged"),
+    ("garbage", None, Cause.TORQUE_PACKETS, "damaged"),
+    ("garbage", 1, Cause.TORQUE_PACKETS, "damaged"),
+    ("backlog", None, Cause.NONE, None),
+    ("flood", None, Cause.TORQUE_PACKETS, "repeated"),
+    ("restart", None, Cause.TORQUE_PACKETS, None),
+    ("foreign", None, Cause.NONE, "foreign"),
+    ("bias", None, Cause.NONE, None),
+    ("spike", 20, Cause.NONE, None),
+    ("silent", None, Cause.NONE, None),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "cause", "count"), RUNNING)
+def test_a_fault_while_running_has_its_cause_and_is_counted(
+    peer, sensor, name, value, cause, count
+):
+    watch(sensor, 0.05)
+    assert bad_counts(sensor) == {}
+    peer.misbehave(name, value)
+    found, after_s = first_cause(sensor, 0.25 if cause is Cause.NONE else 2.0)
+    assert found is cause
+    if count is not None:
+        assert sensor.counts[count] > 0
+    if cause is Cause.TORQUE_FROZEN:
+        assert after_s > 0.09
+
+
+@pytest.mark.parametrize("name", ["lose", "duplicate", "reorder", "short", "garbage", "foreign"])
+def test_a_damaged_stream_never_gives_a_torque_that_was_not_sent(peer, sensor, name):
+    peer.misbehave(name, 2)
+    samples = watch(sensor, 0.1)
+    sent = dict(peer.sent)
+    for sample in samples:
+        assert sample.torque_nm == pytest.approx(sent[sample.sequence], abs=0.51e-6)
+    sequences = [sample.sequence for sample in samples]
+    assert sequences == sorted(sequences)  # the newest wins
+
+
+def test_silence_is_told_by_the_age_alone(peer, sensor):
+    watch(sensor, 0.02)
+    peer.misbehave("silent")
+    time.sleep(0.02)
+    last = sensor.read()
+    time.sleep(0.1)
+    after = sensor.read()
+    assert after == last
+    assert time.monotonic() - after.time_s > 0.09
+    peer.behave()
+    peer.misbehave("lose_once", 0)  # nothing lost: only the silence is
+    time.sleep(0.05)
+    # What the silence swallowed was numbered and is missed.
+    assert sensor.read().cause == Cause.TORQUE_PACKETS
+
+
+@pytest.mark.parametrize("name", ["frozen_sequence", "frozen_ft_sequence", "frozen_record"])
+def test_a_sample_that_stands_still_ages_at_once(peer, sensor, name):
+    peer.misbehave(name)
+    samples = watch(sensor, 0.08)
+    assert len({sample.time_s for sample in samples[20:]}) == 1
+
+
+def test_a_backlog_gives_its_newest_and_no_loss(peer, sensor):
+    peer.misbehave("backlog", 0.05)
+    samples = watch(sensor, 0.3)
+    times = sorted({sample.time_s for sample in samples})
+    longest_s = max(b - a for a, b in itertools.pairwise(times))
+    assert longest_s > 0.04
+    assert sensor.counts["lost"] == 0
+    assert all(sample.cause == Cause.NONE for sample in samples)
+
+
+def test_a_loop_held_up_loses_nothing_at_7_khz(arm, sensor_of):
+    with RdtPeer(arm, rate_hz=7000.0) as peer:
+        sensor = sensor_of(peer)
+        sensor.configure()
+        before = sensor.read()
+        time.sleep(0.15)
+        behind = sensor.read()
+        assert behind.sequence > before.sequence
+        assert behind.time_s == before.time_s  # newer ones wait: its age is not known
+        for _ in range(20):
+            sensor.read()
+        sample = sensor.read()
+        assert sensor.counts["lost"] == 0
+        assert sensor.counts["received"] > 500
+        assert peer.sent[-1][0] - sample.sequence < 200
+
+
+def test_a_read_ends_whatever_arrives(peer, sensor):
+    peer.misbehave("flood", 2000)
+    time.sleep(0.05)
+    peer.misbehave("silent")
+    received = sensor.counts["received"]
+    sensor.read()
+    assert sensor.counts["received"] - received <= 256
+
+
+def test_a_bias_under_load_and_a_spike_pass_to_the_guard(peer, sensor):
+    peer.misbehave("bias", 3.0)
+    time.sleep(0.02)
+    assert newest(watch(sensor, 0.02)) == pytest.approx(TORQUE_NM + 3.0, abs=10 * NOISE_NM)
+    peer.behave()
+    peer.misbehave("spike", 2)
+    time.sleep(0.02)
+    assert max(sample.torque_nm for sample in watch(sensor, 0.05)) > 45.0
+
+
+def test_the_sequence_wraps_around_without_loss(arm, sensor_of):
+    with RdtPeer(arm, first_sequence=2**32 - 40) as peer:
+        sensor = sensor_of(peer)
+        sensor.configure()
+        samples = watch(sensor, 0.2)
+        assert samples[-1].sequence < 1000
+        assert bad_counts(sensor) == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("unknown_units", None, "scfgtu.*'cubit-stone'.*Nm, Nmm"),
+        ("rdt_disabled", None, "comrdte.*'Disabled'"),
+        ("page_status", None, "analog board supply too low"),
+        ("http_silent", None, "no answer within 0.3 s"),
+        ("http_slow", 1.0, "no answer within 0.3 s"),
+        ("http_drip", 0.05, "does not end within 0.3 s"),
+        ("http_error", None, "answers 500"),
+        ("http_garbage", None, "not the page of a Net F/T"),
+        ("deaf", None, "no sample from 127.0.0.1"),
+        ("silent", None, "no sample from 127.0.0.1"),
+        ("short", 1, "no sample.*'short': [1-9]"),
+        ("foreign", None, None),
+        ("serious_status", None, "analog board supply too low"),
+        ("saturated", None, "saturated"),
+    ],
+)
+def test_a_sensor_that_cannot_be_used_is_refused(peer, sensor_of, name, value, words):
+    peer.misbehave(name, value)
+    sensor = sensor_of(peer, timeout_s=0.3)
+    if words is None:
+        sensor.configure()
+        return
+    began_s = time.monotonic()
+    with pytest.raises(DeviceError, match=words) as refused:
+        sensor.configure()
+    assert str(refused.value).startswith("torque sensor at 127.0.0.1: ")
+    assert time.monotonic() - began_s < 2.0
+    peer.behave()
+    sensor.configure()  # and it can be used when it is right again
+
+
+def test_every_misbehaviour_is_tried():
+    elsewhere = {"changed_units", "changed_calibration", "changed_bias"}
+    pages = {"unknown_units", "rdt_disabled", "page_status", "deaf"}
+    http = {name for name in MISBEHAVIOURS if name.startswith("http_")}
+    assert {name for name, *_ in RUNNING} | elsewhere | pages | http == set(MISBEHAVIOURS)
+
+
+def test_no_web_server_and_no_sensor_are_refused(arm, sensor_of):
+    with RdtPeer(arm) as peer:
+        pass
+    sensor = sensor_of(peer, timeout_s=0.3)
+    with pytest.raises(DeviceError, match=r"no answer.*check the sensor's power"):
+        sensor.configure()
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("changed_units", "torque_unit 'Nm' became 'lbf-in'"),
+        ("changed_calibration", "serial 'FT00001' became 'FT99999', calibration 0 became 7"),
+        ("changed_bias", "bias"),
+    ],
+)
+def test_a_sensor_that_comes_back_changed_is_refused(peer, sensor_of, sensor, name, words):
+    sensor.close()
+    peer.misbehave(name)
+    sensor.connect()
+    with pytest.raises(DeviceError, match=f"came back changed.*{words}"):
+        sensor.configure()
+    sensor_of(peer).configure()  # a new session looks at it with fresh eyes
+    peer.behave()
+    sensor.connect()
+    sensor.configure()
+    assert sensor.read().cause == Cause.NONE
+
+
+@pytest.mark.parametrize(
+    ("expected", "words"),
+    [
+        ({"expected_serial": "FT2"}, "serial is 'FT00001' where expected_serial is 'FT2'"),
+        ({"expected_calibration": 3}, "calibration is 0 where"),
+        ({"expected_torque_unit": "Nmm"}, "torque_unit is 'Nm' where"),
+        ({"expected_force_unit": "lbf"}, "force_unit is 'N' where"),
+        ({"expected_rate_hz": 7000.0}, "rate_hz is 1000.0 where"),
+    ],
+)
+def test_a_sensor_that_is_not_the_expected_one_is_refused(peer, sensor_of, expected, words):
+    sensor = sensor_of(peer, **expected)
+    with pytest.raises(DeviceError, match=words):
+        sensor.configure()
+    assert not peer.requests  # it was never asked to send
+
+
+def test_the_expected_sensor_is_taken_however_its_unit_is_spelled(peer, sensor_of):
+    sensor_of(
+        peer, expected_serial="FT00001", expected_calibration=0, expected_torque_unit="N-m"
+    ).configure()
+
+
+def test_a_bias_is_refused_under_load_and_set_without(arm, peer, sensor):
+    with pytest.raises(DeviceError, match=r"load of 0\.6.*at most 0\.2 N·m"):
+        sensor.set_bias()
+    assert 0x42 not in peer.requests
+    arm.place(0.05)
+    time.sleep(0.05)
+    sensor.set_bias()
+    time.sleep(0.05)
+    assert newest(watch(sensor, 0.02)) == pytest.approx(0.0, abs=10 * NOISE_NM)
+    sensor.connect()
+    sensor.configure()  # a bias it set itself is no change
+
+
+def test_a_bias_is_refused_while_the_samples_cannot_be_used(peer, sensor):
+    peer.misbehave("saturated")
+    with pytest.raises(DeviceError, match="saturated"):
+        sensor.set_bias()
+
+
+def test_everything_at_once_stops_and_the_peer_lives_on(peer, sensor):
+    for name in MISBEHAVIOURS:
+        if name not in ("silent", "deaf", "backlog", "restart", "frozen_record"):
+            peer.misbehave(name, None if name.startswith("http") else 3)
+    assert first_cause(sensor)[0] in (Cause.TORQUE_STATUS, Cause.TORQUE_SATURATED)
+    peer.behave()
+    sensor.connect()
+    sensor.configure()
+    assert all(sample.cause == Cause.NONE for sample in watch(sensor, 0.05))
+
+
+def test_two_faults_at_once_show_the_graver(peer, sensor):
+    peer.misbehave("lose", 2)
+    peer.misbehave("frozen_values")
+    peer.misbehave("saturated")
+    assert first_cause(sensor)[0] is Cause.TORQUE_SATURATED
+    assert all(sample.cause == Cause.TORQUE_SATURATED for sample in watch(sensor, 0.2))
+
+
+def test_a_wall_clock_that_jumps_has_no_effect(peer, sensor, monkeypatch):
+    monkeypatch.setattr(time, "time", lambda: 0.0)
+    assert all(sample.cause == Cause.NONE for sample in watch(sensor, 0.1))
+
+
+def test_a_wire_that_is_taken_away_does_not_raise(peer, sensor):
+    sensor._socket.close()  # as a network interface that goes down
+    before = sensor.read()
+    causes = [sensor.read().cause for _ in range(10)]
+    assert causes[-1] == Cause.TORQUE_PACKETS
+    assert sensor.read().time_s == before.time_s
+    sensor.close()
+
+
+def test_the_peer_ignores_what_is_no_request(peer):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        for data in (b"", b"x" * 8, struct.pack(">HHI", 0x4321, 2, 0), b"x" * 60):
+            stranger.sendto(data, ("127.0.0.1", peer.port))
+    time.sleep(0.05)
+    assert not peer.requests
+    assert not peer.sent
+    with pytest.raises(ValueError, match="no misbehaviour"):
+        peer.misbehave("sulk")
+
+
+@pytest.mark.parametrize("unit", ["Nm", "Nmm"])
+def test_a_client_that_others_wrote_sees_the_same_torque(arm, sensor_of, unit):
+    pynetft = pytest.importorskip("pynetft")
+    to_nm = {"N-m": 1.0, "N-mm": 1e-3}
+    with RdtPeer(arm, torque_unit=unit) as theirs, RdtPeer(arm, seed=2) as peer:
+        config = pynetft.Config(
+            sensor_host="127.0.0.1", rdt_port=theirs.port, http_port=theirs.http_port
+        )
+        sensor = sensor_of(peer)
+        sensor.configure()
+        ours, seen = [], []
+        with pynetft.Client(config, queue_size=1000) as client:
+            for sample in client.samples(timeout=2.0):
+                scale = to_nm[sample.torque_unit.value]
+                seen.append((sample.rdt_sequence, -sample.torque[2] * scale))
+                ours.append(sensor.read().torque_nm)
+                if len(seen) == 200:
+                    break
+            health = client.health()
+        sent = dict(theirs.sent)
+        for sequence, torque_nm in seen:
+            assert torque_nm == pytest.approx(sent[sequence], abs=0.51e-6)
+        mean, their_mean = sum(ours) / 200, sum(torque for _, torque in seen) / 200
+        assert their_mean == pytest.approx(TORQUE_NM, abs=NOISE_NM)
+        assert mean == pytest.approx(their_mean, abs=NOISE_NM)
+        assert (health.lost_count, health.malformed_count, health.device_error_count) == (0, 0, 0)
