@@ -59,7 +59,9 @@ def measured(request):
         facts = {"fault": fault, "rig": rig, "case": case, "bound_s": bound_s, **times_s}
         facts["test"] = f"{Path(request.node.path).name}::{request.function.__name__}"
         for name, value in facts.items():
-            request.node.user_properties.append((name, value.item() if isinstance(value, np.generic) else value))
+            request.node.user_properties.append(
+                (name, value.item() if isinstance(value, np.generic) else value)
+            )
         if OUT in os.environ:
             with Path(os.environ[OUT]).open("a", encoding="utf-8") as file:
                 file.write(json.dumps(facts) + "\n")

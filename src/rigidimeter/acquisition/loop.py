@@ -29,7 +29,6 @@ from rigidimeter.control import (
     tracking_step,
 )
 from rigidimeter.device.base import Reading, Rig
-from rigidimeter.errors import UserError
 from rigidimeter.guard import (
     REACTIONS,
     Cause,
@@ -38,6 +37,7 @@ from rigidimeter.guard import (
     guard_limits,
     guard_state,
     guard_step,
+    released,
 )
 from rigidimeter.recording.log import Sample
 from rigidimeter.settings import Settings
@@ -152,17 +152,20 @@ class ControlLoop:
         """What the guard's cause asks for."""
         return Reaction(self._guard.reaction)
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether the last command was zero."""
+        return self._guard.velocity_rad_s == 0.0
+
     def release(self) -> None:
         """Forget the cause of a hold, from rest: the operator goes on.
 
         Raises
         ------
-        UserError
-            If the guard has stopped the rig rather than held it.
+        ValueError
+            If the guard has stopped the rig rather than held it, or is not at rest.
         """
-        if self.reaction > Reaction.HOLD:
-            raise UserError(f"the rig was stopped: {self.cause.sentence}; a run cannot go on")
-        self._guard = guard_state(self._limits)
+        self._guard = released(self._guard)
 
     def change_controller(self, inertia_kg_m2: float, damping_nm_s_rad: float) -> None:
         """Go on with another admittance; the velocity, its only memory, stays as it is."""

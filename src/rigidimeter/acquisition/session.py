@@ -29,6 +29,9 @@ Progress = Callable[[float], None]
 LOOK_S = 0.1
 """A paused run looks so often whether it may go on."""
 
+BRAKE_S = 0.1
+"""For so long a drive that left its state brakes by its own ramp before its power goes."""
+
 
 @dataclass(frozen=True)
 class SessionResult:
@@ -135,8 +138,12 @@ class _Session:
             # A device may take long to come up. The clock is not set back for that: it is the
             # drivers' clock too, and their heartbeats would cease meanwhile.
             self._loop.begin()
+            self._writer.event(
+                "rig_enabled", time_s=self._loop.time_s, origin_rad=self._rig.origin_rad
+            )
             if not zero_first or self._zero():
                 self._epochs()
+            self._conclude()
         except KeyboardInterrupt:
             self._outcome, self._reason = "abort", "interrupted by the operator"
         except Exception as error:
@@ -153,29 +160,54 @@ class _Session:
 
     def _epochs(self) -> None:
         """Run what is in the queue, pausing where asked."""
-        rests = (self._settings.protocol.return_s, self._settings.protocol.return_s)
-        while self._queue:
-            if self._state.state is State.PAUSED and not self._wait(rests):
-                return
-            if self._state.state is not State.RUNNING:
-                break
+        while self._queue and self._ready():
             planned = self._queue.popleft()
-            passage = self._epoch(planned)
+            self._epoch(planned)
             self._become(epoch_over(self._state))
             if self._failed() or not self._held():
                 return
             if self._state.state is State.RUNNING:
-                passage = self._loop.rest(planned.rest_s, self._settings.protocol.return_s)
-                if passage.cause is not Cause.NONE and (self._failed() or not self._held()):
+                self._loop.rest(planned.rest_s, self._settings.protocol.return_s)
+                if self._failed() or not self._held():
                     return
-        if self._loop.reaction is Reaction.HOLD:
-            self._cause = self._loop.cause
-            self._reason = f"the guard held the rig in the last epoch: {self._cause.sentence}"
+
+    def _ready(self) -> bool:
+        """Wait out a pause and return to where epochs begin; return whether the session goes on."""
+        return_s = self._settings.protocol.return_s
+        self._become(epoch_over(self._state))
+        while self._in(State.PAUSED):
+            if self._loop.reaction is Reaction.NONE:
+                self._loop.rest(return_s, return_s)
+            while self._in(State.PAUSED) and not self._failed():
+                self._loop.hold(LOOK_S)
+            if self._in(State.RUNNING):
+                while not self._loop.at_rest and not self._failed():
+                    self._loop.hold(LOOK_S)
+                self._loop.release()
+                # A whole way back, whatever was ordered before it: an epoch begins at its place.
+                self._loop.rest(return_s, return_s)
+            if self._failed() or not self._held():
+                return False
+            self._become(epoch_over(self._state))
+        return self._in(State.RUNNING)
+
+    def _in(self, state: State) -> bool:
+        return self._state.state is state
+
+    def _conclude(self) -> None:
+        """Say how the session ended where nothing has said so yet."""
+        left = len(self._queue)
+        if self._reason:
+            return
         if self._state.state is State.STOPPING:
-            left = len(self._queue)
             what = "aborted" if self._state.aborted else "stopped"
             self._reason = f"{what} by the operator with {left} epochs left"
             self._outcome = "abort" if self._state.aborted else "success"
+        elif left:
+            self._outcome, self._reason = "fail", f"ended with {left} epochs left"
+        elif self._loop.reaction is Reaction.HOLD:
+            self._cause = self._loop.cause
+            self._reason = f"the guard held the rig in the last epoch: {self._cause.sentence}"
 
     def _epoch(self, planned: PlannedEpoch) -> Passage:
         """Run one epoch and close it."""
@@ -224,12 +256,21 @@ class _Session:
         self._next_number += 1
 
     def _zero(self) -> bool:
-        """Zero the torque sensor while the joint stands still; return whether all is well."""
+        """Zero the torque sensor while the joint stands still; return whether all is well.
+
+        What was heard before a hold or an order is thrown away: a zero is made from the whole time
+        or not at all.
+        """
         limits = self._settings.zeroing
-        zeroing = Zeroing(limits)
-        passage = self._loop.hold(limits.duration_s, zeroing.hear)
-        if passage.cause is not Cause.NONE:
-            return not self._failed() and self._held()
+        while True:
+            zeroing = Zeroing(limits)
+            passage = self._loop.hold(limits.duration_s, zeroing.hear)
+            if self._failed() or not self._held():
+                return False
+            if passage.cause is Cause.NONE and not passage.interrupted:
+                break
+            if not self._ready():
+                return False
         bias_nm, noise_sd_nm, why = zeroing.result()
         self._writer.event(
             "sensor_zeroed",
@@ -258,8 +299,10 @@ class _Session:
         """If the guard holds the rig, pause; without an operator that is the end."""
         if self._loop.reaction is Reaction.NONE:
             return True
+        if self._state.state is State.STOPPING:
+            return True
         if self._outside.attended:
-            self._become(Run(State.PAUSED))
+            self._become(Run(State.PAUSED, stop_next=self._state.stop_next))
             return True
         self._cause = self._loop.cause
         self._outcome = "fail"
@@ -267,20 +310,6 @@ class _Session:
             f"the guard held the rig and nobody was there to go on: {self._cause.sentence}"
         )
         return False
-
-    def _wait(self, rest: tuple[float, float]) -> bool:
-        """Stand still until the operator goes on; return whether the session does."""
-        if self._loop.reaction is Reaction.NONE:
-            self._loop.rest(*rest)  # what interrupts it is looked at below
-        while self._state.state is State.PAUSED:
-            self._loop.hold(LOOK_S)
-            if self._failed():
-                return False
-        if self._state.state is State.RUNNING and self._loop.reaction is Reaction.HOLD:
-            self._loop.release()
-            passage = self._loop.rest(*rest)
-            return passage.cause is Cause.NONE or (not self._failed() and self._held())
-        return not self._failed()
 
     def _obey(self, order: Order) -> bool:
         """Take an order; return whether the stretch that runs ends now."""
@@ -300,9 +329,8 @@ class _Session:
             self._rig.disable()
             self._cause, self._outcome = Cause.OPERATOR_HALT, "fail"
             self._reason = Cause.OPERATOR_HALT.sentence
-        return self._state.at_once or (
-            before.state is State.PAUSED and self._state.state is not State.PAUSED
-        )
+        ends_rest = order.command is Command.STOP and self._current is None
+        return self._state.at_once or ends_rest
 
     def _change(self, order: Order) -> dict[str, Any]:
         """Change a parameter within its bounds; return what happened, for the record."""
@@ -344,5 +372,7 @@ class _Session:
         try:
             if self._loop.cause in (Cause.DRIVE_LOST, Cause.DRIVE_STATE):
                 self._rig.stop()
+            if self._loop.cause is Cause.DRIVE_STATE:  # it answers: let it come to rest
+                self._loop.hold(BRAKE_S)
         finally:
             self._rig.disable()

@@ -89,16 +89,16 @@ def after(run: Run, command: Command) -> Run:
             return Run(State.STOPPING, at_once=True, aborted=True)
     if state is State.PAUSED:
         if command is Command.RESUME:
-            return Run(State.RUNNING)
+            return Run(State.RUNNING, stop_next=run.stop_next)
         if command is Command.STOP:
             return Run(State.STOPPING)
         if command is Command.ABORT:
-            return Run(State.STOPPING, aborted=True)
+            return Run(State.STOPPING, at_once=True, aborted=True)
     return run
 
 
 def epoch_over(run: Run) -> Run:
-    """Return the run at the end of an epoch: what was to come, comes."""
+    """Return the run at the end of an epoch or a rest: what was to come, comes."""
     if run.state is not State.RUNNING:
         return run._replace(at_once=False)
     if run.stop_next:

@@ -257,8 +257,10 @@ class _Interrupts:
     def _asked(self, number: int, _: FrameType | None) -> None:
         self._count += 1
         if number == signal.SIGINT and self._count == 1:
-            with suppress(ValueError):  # so many wait that nobody takes them
+            try:
                 self._board.post(Order(Command.ABORT))
+            except ValueError:  # so many orders wait that nobody takes them
+                self._board.raise_flag(Flag.END_ASKED)
         else:
             self._board.raise_flag(Flag.END_ASKED)
 

@@ -100,7 +100,6 @@ def draw_sampling(
         parts[row] = drive(rig.drive_bandwidth_hz, rig.drive_damping_ratio, length_s)
     newest = np.searchsorted(np.maximum.accumulate(arrives_s), until_s, side="right") - 1
     taken = np.searchsorted(in_order_s, until_s, side="right")
-    under_way = int((taken - newest).max())
     return Sampling(
         _whole(taken),
         _whole(newest),
@@ -108,7 +107,6 @@ def draw_sampling(
         _whole(part),
         readonly(left),
         readonly(parts),
-        1 << under_way.bit_length(),
     )
 
 

@@ -70,9 +70,7 @@ class Sampling(NamedTuple):
     `taken`, `newest` and `seen_s` have one entry a tick: how many samples have been taken, which is
     the newest that has arrived, and its stamp. `part` and `left` have one entry a sample: where in
     its tick it was taken (`NOW`, `BEFORE` or a row of `parts`), and the part of that tick left.
-    A row of `parts` holds the coefficients of a `Drive` for the part of a tick. `ring` is a power
-    of two above the number of samples that are ever under way: so many are remembered, not all, so
-    that they stay in the nearest cache.
+    A row of `parts` holds the coefficients of a `Drive` for the part of a tick.
     """
 
     taken: Integers
@@ -81,7 +79,6 @@ class Sampling(NamedTuple):
     part: Integers
     left: Floats
     parts: Floats
-    ring: int
 
 
 class Columns(NamedTuple):
@@ -126,12 +123,11 @@ def run_epoch(
     )
     J, B, K = joint
     # Arrays are named once, before the first tick: each look into a tuple would count references.
-    torque_taken, torque_newest, torque_seen_s, torque_part, torque_left, torque_parts, torque_ring = torque
-    motion_taken, motion_newest, motion_seen_s, motion_part, _, motion_parts, motion_ring = motion
+    torque_taken, torque_newest, torque_seen_s, torque_part, torque_left, torque_parts = torque
+    motion_taken, motion_newest, motion_seen_s, motion_part, _, motion_parts = motion
     out_torque, out_angle, out_velocity, out_request, out_command, out_limited = columns
-    torques = np.empty(torque_ring)
-    angles, velocities = np.empty(motion_ring), np.empty(motion_ring)
-    torque_place, motion_place = torque_ring - 1, motion_ring - 1
+    torques = np.empty(torque_part.shape[0])
+    angles, velocities = np.empty(motion_part.shape[0]), np.empty(motion_part.shape[0])
     next_torque = next_motion = limited_ticks = 0
     command = voluntary = 0.0
     limit_time_s = math.nan
@@ -151,19 +147,19 @@ def run_epoch(
             measured = noise_nm[next_torque] + arm_torque_nm(
                 J, B, K, angle, velocity, acceleration, acting
             )
-            torques[next_torque & torque_place] = quantised(measured, torque_step)
+            torques[next_torque] = quantised(measured, torque_step)
             next_torque += 1
         while next_motion < motion_taken[tick]:
             angle, velocity, _ = _state_at(
                 motion_part[next_motion], motion_parts, state, before, command
             )
-            angles[next_motion & motion_place] = quantised(angle, angle_step)
-            velocities[next_motion & motion_place] = quantised(velocity, velocity_step)
+            angles[next_motion] = quantised(angle, angle_step)
+            velocities[next_motion] = quantised(velocity, velocity_step)
             next_motion += 1
 
         due_s = tick / rate_hz
-        torque_nm = torques[torque_newest[tick] & torque_place]
-        seen = motion_newest[tick] & motion_place
+        torque_nm = torques[torque_newest[tick]]
+        seen = motion_newest[tick]
         angle, velocity = angles[seen], velocities[seen]
         smooth_nm = torque_nm
         if isfinite(torque_nm):

@@ -73,6 +73,7 @@ def commission(
     from rigidimeter.settings import load_settings
 
     rigfile, chosen = load_rig(rig), load_settings(settings)
+    claim = rigfile.claim()
     if not yes and not sys.stdin.isatty():
         raise UserError("nobody is there to consent; give --yes, or use a terminal")
     operator = Operator(
@@ -95,6 +96,7 @@ def commission(
         software=__version__,
         signed_by=signed_by,
     )
+    claim.close()
     path = out or record_path(rig)
     write_record(path, found)
     typer.echo(table(found))

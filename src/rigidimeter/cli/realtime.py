@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +15,16 @@ if TYPE_CHECKING:
 
 __all__ = ["run_loop"]
 
+HOME_TOLERANCE_RAD = 0.05
+"""A session is gone on with from where it began, within 3 deg."""
+
 
 def run_loop(
-    settings: Settings, protocol: Protocol, rig_path: Path | None, side: LoopSide
+    settings: Settings,
+    protocol: Protocol,
+    rig_path: Path | None,
+    home_rad: float | None,
+    side: LoopSide,
 ) -> None:
     """Run a session; the target of the loop's process.
 
@@ -25,17 +34,39 @@ def run_loop(
     protocol : Protocol
     rig_path : Path or None
         RIG.toml; the virtual rig if not given.
+    home_rad : float or None
+        Where the joint stood, on the drive's scale, when the session began that this goes on with.
     side : LoopSide
         Rings, board and what prepares the process.
     """
-    from rigidimeter.acquisition import run_session
     from rigidimeter.acquisition.realtime import DeadlineClock
 
     clock = DeadlineClock()
     if rig_path is None:
         rig, new_joint = _virtual(settings, protocol)
+        claim: AbstractContextManager[Any] = nullcontext()
     else:
-        rig, new_joint = _real(rig_path, settings, clock), lambda _: {}
+        # What is slow to load is loaded before the sensor's samples flow.
+        import rigidimeter.commissioning  # noqa: F401
+        from rigidimeter.device.rigfile import load_rig
+
+        claim = load_rig(rig_path).claim()
+        rig, new_joint = _real(rig_path, settings, clock, home_rad), lambda _: {}
+    with claim:
+        _run(settings, protocol, rig, new_joint, clock, side, rig_path)
+
+
+def _run(
+    settings: Settings,
+    protocol: Protocol,
+    rig: Any,
+    new_joint: Any,
+    clock: Any,
+    side: LoopSide,
+    rig_path: Path | None,
+) -> None:
+    from rigidimeter.acquisition import run_session
+
     try:
         rig.connect()
         facts = rig.configure()
@@ -43,7 +74,11 @@ def run_loop(
             from rigidimeter.commissioning import check_record
             from rigidimeter.device.rigfile import load_rig
 
-            check_record(load_rig(rig_path), facts, settings, settings.commissioning)
+            record = check_record(load_rig(rig_path), facts, settings, settings.commissioning)
+            if record.not_tried:
+                what = ", ".join(record.not_tried)
+                print(f"Not tried when the rig was commissioned: {what}.", file=sys.stderr)
+                side.sink.event("not_commissioned", checks=list(record.not_tried))
         side.sink.event("rig_configured", **facts)
         side.ready()
         run_session(
@@ -75,7 +110,9 @@ def _virtual(settings: Settings, protocol: Protocol) -> tuple[Any, Any]:
     return rig, new_joint
 
 
-def _real(path: Path, settings: Settings, clock: Any) -> Any:
+def _real(path: Path, settings: Settings, clock: Any, home_rad: float | None) -> Any:
+    from rigidimeter.device.composed import Home
     from rigidimeter.device.rigfile import load_rig
 
-    return load_rig(path).build(clock.now_s, settings.rig.tick_rate_hz)
+    home = Home(home_rad, HOME_TOLERANCE_RAD) if home_rad is not None else None
+    return load_rig(path).build(clock.now_s, settings.rig.tick_rate_hz, home)

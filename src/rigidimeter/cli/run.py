@@ -6,7 +6,7 @@ import sys
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -63,6 +63,7 @@ def run(
     from rigidimeter.device.rigfile import load_rig
 
     settings, planned, continues = _planned(protocol, resume, seed)
+    home_rad = continues.get("origin_rad") if rig is not None else None
     _offer(out)
     if rig is not None:
         load_rig(rig)  # what is wrong with it is said before any process starts
@@ -74,12 +75,12 @@ def run(
         virtual=rig is None,
         continues=continues,
     )
-    attended = not unattended and sys.stdin.isatty()
+    attended = not unattended and sys.stdin is not None and sys.stdin.isatty()
     ended = supervise(
-        partial(run_loop, settings, planned, rig),
+        partial(run_loop, settings, planned, rig, home_rad),
         recording,
         realtime=Realtime(priority=priority, cpu=cpu, attended=attended),
-        console=Terminal(sys.stdin if not unattended else None, sys.stdout),
+        console=Terminal(sys.stdin if attended else None, sys.stdout),
     )
     for remark in ended.remarks:
         typer.echo(remark, err=True)
@@ -94,7 +95,7 @@ def run(
 
 def _planned(
     path: Path | None, resume: Path | None, seed: int | None
-) -> tuple[Settings, Protocol, dict[str, object]]:
+) -> tuple[Settings, Protocol, dict[str, Any]]:
     """Return settings, the epochs to run, and what they continue."""
     from rigidimeter.design import Protocol, plan
     from rigidimeter.recording.resume import rest_of

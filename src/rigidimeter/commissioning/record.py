@@ -123,6 +123,13 @@ class CommissioningRecord:
         return not self.failed and not self.missing
 
 
+LIMITS = ("guard", "loop", "zeroing", "prbs", "sinusoid")
+"""Tables whose numbers may be smaller than those a record was made with, never larger."""
+
+EXACT = ("reaction_time_s", "stale_s", "duration_s")
+"""Numbers among them that must be the same."""
+
+
 def record_path(rig: Path) -> Path:
     """Return where the record of a rig file lies."""
     return rig.with_name(f"{rig.stem}.commissioned.json")
@@ -143,11 +150,18 @@ def kept_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
 
 def covered(settings: Settings) -> dict[str, Any]:
     """Return what of the settings a record holds for."""
-    guard = settings.guard
     return {
         "tick_rate_hz": settings.rig.tick_rate_hz,
         "controller": settings.controller.model_dump(mode="json"),
-        "guard": {"reaction_time_s": guard.reaction_time_s, "stale_s": guard.stale_s},
+        "guard": settings.guard.model_dump(mode="json"),
+        "loop": settings.loop.model_dump(mode="json"),
+        "zeroing": settings.zeroing.model_dump(mode="json"),
+        "validity_days": settings.commissioning.validity_days,
+        "prbs": {"amplitude_nm": settings.prbs.amplitude_nm},
+        "sinusoid": {
+            "amplitude_deg": settings.sinusoid.amplitude_deg,
+            "frequency_hz": settings.sinusoid.frequency_hz,
+        },
         "arms": {
             name: [arm.inertia_kg_m2, arm.damping_nm_s_rad, arm.stiffness_nm_rad]
             for name, arm in settings.subject.items()
@@ -235,6 +249,7 @@ def check_record(
             f"it and {again}"
         )
     days = (limits or CommissioningSettings()).validity_days
+    days = min(days, record.covered.get("validity_days", days))
     today = now_utc or datetime.now(UTC)
     age = today - datetime.fromisoformat(record.made_utc)
     if not timedelta(days=-1) <= age <= timedelta(days=days):
@@ -271,13 +286,12 @@ def _same_controller(path: Path, before: Mapping[str, Any], now: Mapping[str, An
             f"{path}: covers rig.tick_rate_hz = {before['tick_rate_hz']:g} Hz, not "
             f"{now['tick_rate_hz']:g} Hz; {again}"
         )
-    for table in ("controller", "guard"):
+    for table in ("controller", *LIMITS):
         for key, value in now[table].items():
-            if before[table].get(key) != value:
-                raise UserError(
-                    f"{path}: covers {table}.{key} = {before[table].get(key)!r}, not {value!r}; "
-                    f"{again}"
-                )
+            tried = before.get(table, {}).get(key)
+            tighter = table in LIMITS and key not in EXACT and tried is not None and value <= tried
+            if value != tried and not tighter:
+                raise UserError(f"{path}: covers {table}.{key} = {tried!r}, not {value!r}; {again}")
     arms = list(before["arms"].values())
     for name, arm in now["arms"].items():
         if arm not in arms:

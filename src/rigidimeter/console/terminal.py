@@ -42,6 +42,8 @@ def order_of(text: str) -> Order | None:
     ``set damping_nm_s_rad 2.0`` changes a parameter; its bounds are the loop's to judge.
     """
     words = text.split()
+    if words and words[0].lower() != "set":
+        words = [word.lower() for word in words]
     if not words:
         return None
     if words[0] == "set" and len(words) == 3:
@@ -49,8 +51,10 @@ def order_of(text: str) -> Order | None:
             return Order(Command.CHANGE, words[1], float(words[2]))
         except ValueError:
             return None
-    by_name = {command.name.lower(): command for command in KEYS.values()}
-    command = KEYS.get(words[0]) or by_name.get(words[0].lower())
+    if words == ["stop"]:  # in a hurry one types the word: it ends what moves, now
+        return Order(Command.ABORT)
+    by_name = {command.name.lower().replace("_", " "): command for command in KEYS.values()}
+    command = KEYS.get(words[0]) or by_name.get(words[0])
     return Order(command) if command is not None and len(words) == 1 else None
 
 
@@ -121,8 +125,10 @@ class Terminal:
         descriptor = self._keyboard.fileno()
         while select.select([descriptor], [], [], 0.0)[0]:
             read = os.read(descriptor, 1024)
-            if not read:  # nobody types any more
+            if not read:  # nobody can type any more, so nobody can stop the rig from here
                 self._keyboard = None
+                board.raise_flag(Flag.END_ASKED)
+                self._say("the keyboard is gone: the rig stops")
                 return
             self._typed += read
         *lines, self._typed = self._typed.split(b"\n")
@@ -130,11 +136,15 @@ class Terminal:
             self._obey(line.decode(errors="replace").strip(), board)
 
     def _obey(self, text: str, board: Board) -> None:
-        if text in ("e", "emergency"):
+        if text[:1].lower() == "e":
             board.raise_flag(Flag.EMERGENCY_STOP)
             self._say("emergency stop")
             return
         order = order_of(text)
+        if order is None and text and not text.lower().startswith("set"):
+            # Whoever types in a hurry means that something is wrong.
+            order = Order(Command.PAUSE_NOW)
+            self._say(f"{text!r} is no order: pausing now")
         if order is None:
             self._say(HELP)
             return

@@ -185,6 +185,16 @@ class AtiRdt:
         """Packets received, lost, repeated, reordered, damaged, short, foreign, and warnings."""
         return dict(self._stream.counts)
 
+    def restart(self) -> None:
+        """Ask for the samples anew: those that piled up while nobody read are not lost ones.
+
+        Raises
+        ------
+        DeviceError
+            If none comes.
+        """
+        self._start()
+
     def set_bias(self, watch_s: float = 0.1) -> None:
         """Let the sensor call its present load zero; only at rest and without load.
 

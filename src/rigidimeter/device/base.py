@@ -38,7 +38,7 @@ Now = Callable[[], float]
 
 
 class DeviceError(UserError):
-    """A device cannot be used; the sentence names the device, what was found, what would be right."""
+    """A device cannot be used: the sentence names it, what was found, and what would be right."""
 
 
 @dataclass(frozen=True)
@@ -210,6 +210,10 @@ class Rig(Protocol):
 
     def zero(self, bias_nm: float) -> None:
         """Take `bias_nm` off every torque from now on."""
+
+    @property
+    def origin_rad(self) -> float:
+        """The drive's own angle where the joint stood when it was enabled: angle 0 of the rig."""
 
     @property
     def counts(self) -> Mapping[str, int]:

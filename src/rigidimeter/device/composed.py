@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import Any, NamedTuple
 
 from rigidimeter.device.base import (
     DeviceError,
@@ -24,10 +24,36 @@ from rigidimeter.device.base import (
 from rigidimeter.device.enable_line import EnableLine
 from rigidimeter.guard import REACTIONS, Cause
 
-__all__ = ["ComposedRig"]
+__all__ = ["ComposedRig", "Home"]
 
 ATTEMPTS, ATTEMPT_S = 50, 0.002
 """How often, and after how long, devices are asked for their first sample once enabled."""
+
+
+class Home(NamedTuple):
+    """Where the joint must stand when it is enabled, on the drive's own scale.
+
+    After a stop the joint stands anywhere. To begin from there would move the position limits with
+    it, and take the torque that holds it there for the sensor's zero.
+    """
+
+    angle_rad: float
+    tolerance_rad: float
+
+    def check(self, angle_rad: float) -> None:
+        """Refuse a joint that stands elsewhere.
+
+        Raises
+        ------
+        DeviceError
+            Says where it stands and where it must.
+        """
+        if not abs(angle_rad - self.angle_rad) <= self.tolerance_rad:
+            raise DeviceError(
+                f"drive: the joint stands at {math.degrees(angle_rad):.1f} deg of the drive's "
+                f"scale; it must be within {math.degrees(self.tolerance_rad):.1f} deg of "
+                f"{math.degrees(self.angle_rad):.1f} deg, so bring it there by hand and try again"
+            )
 
 
 class ComposedRig:
@@ -41,6 +67,8 @@ class ComposedRig:
         Of the loop; a device that cannot keep up is refused.
     line : EnableLine, optional
         The hardware enable.
+    home : Home, optional
+        Where the joint must stand to be enabled.
     """
 
     def __init__(
@@ -49,8 +77,9 @@ class ComposedRig:
         drive: VelocityDrive,
         tick_rate_hz: float,
         line: EnableLine | None = None,
+        home: Home | None = None,
     ) -> None:
-        self._sensor, self._drive, self._line = sensor, drive, line
+        self._sensor, self._drive, self._line, self._home = sensor, drive, line, home
         self._tick_rate_hz = tick_rate_hz
         self._bias_nm = 0.0
         self._origin_rad = 0.0
@@ -95,10 +124,15 @@ class ComposedRig:
             power then.
         """
         try:
+            restart = getattr(self._sensor, "restart", None)
+            if restart is not None:  # nobody has read for as long as setting up took
+                restart()
             if self._line is not None:
                 self._line.close_contact()
             self._drive.enable()
             self._origin_rad = self._fresh_angle_rad()
+            if self._home is not None:
+                self._home.check(self._origin_rad)
         except BaseException:
             self.disable()
             raise
@@ -148,6 +182,11 @@ class ComposedRig:
             motion.status,
             cause,
         )
+
+    @property
+    def origin_rad(self) -> float:
+        """The drive's own angle where the joint stood when it was enabled."""
+        return self._origin_rad
 
     def write(self, velocity_rad_s: float) -> float:
         """Send a velocity; return what was sent."""

@@ -1,6 +1,8 @@
 """RIG.toml: which devices make up a rig, each with the settings of its driver.
 
     name = "elbow rig, room 12"
+    home_deg = 0.0             # where the joint must stand to be enabled, on the drive's scale
+    home_tolerance_deg = 3.0
 
     [torque_sensor]
     driver = "ati-rdt"
@@ -16,18 +18,20 @@ as `Settings` and is made with ``Class(settings, now)``.
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import importlib
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from pydantic import ValidationError
 
 from rigidimeter.device.base import Now
-from rigidimeter.device.composed import ComposedRig
+from rigidimeter.device.composed import ComposedRig, Home
 from rigidimeter.errors import UserError
 from rigidimeter.settings.messages import sentence
 
@@ -47,6 +51,8 @@ DRIVERS: Mapping[str, Mapping[str, str]] = {
 """The drivers that come along, by role and name."""
 
 REQUIRED = ("torque_sensor", "drive")
+HOME: Mapping[str, float | None] = {"home_deg": None, "home_tolerance_deg": 3.0}
+"""Keys of the initial position, and what they are when absent."""
 
 
 @dataclass(frozen=True)
@@ -61,18 +67,43 @@ class RigFile:
         Class and settings by role.
     digest : str
         Of what the file says: a commissioning record holds for one of these.
+    home : Home or None
+        Where the joint must stand to be enabled.
     """
 
     path: Path
     name: str
     devices: Mapping[str, tuple[type[Any], Any]]
     digest: str
+    home: Home | None = None
 
-    def build(self, now: Now, tick_rate_hz: float) -> ComposedRig:
-        """Make the devices; nothing is connected yet."""
+    def claim(self) -> BinaryIO:
+        """Keep this rig for this process until the file that is returned is closed.
+
+        Raises
+        ------
+        UserError
+            If another process has it.
+        """
+        file = self.path.open("rb")
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            file.close()
+            raise UserError(
+                f"{self.path}: another program uses this rig; end that one first"
+            ) from None
+        return file
+
+    def build(self, now: Now, tick_rate_hz: float, home: Home | None = None) -> ComposedRig:
+        """Make the devices; nothing is connected yet. `home` goes before that of the file."""
         made = {role: driver(settings, now) for role, (driver, settings) in self.devices.items()}
         return ComposedRig(
-            made["torque_sensor"], made["drive"], tick_rate_hz, made.get("enable_line")
+            made["torque_sensor"],
+            made["drive"],
+            tick_rate_hz,
+            made.get("enable_line"),
+            home or self.home,
         )
 
 
@@ -92,9 +123,11 @@ def load_rig(path: Path) -> RigFile:
         raise UserError(f"{path}: is not a text file in UTF-8") from None
     except tomllib.TOMLDecodeError as error:
         raise UserError(f"{path}: is not valid TOML: {error}") from None
-    unknown = sorted(set(values) - set(DRIVERS) - {"name"})
+    unknown = sorted(set(values) - set(DRIVERS) - {"name", *HOME})
     if unknown:
-        raise UserError(f"{path}: unknown key {unknown[0]}; known are name, {', '.join(DRIVERS)}")
+        raise UserError(
+            f"{path}: unknown key {unknown[0]}; known are name, {', '.join((*HOME, *DRIVERS))}"
+        )
     missing = [role for role in REQUIRED if role not in values]
     if missing:
         raise UserError(f"{path}: has no [{missing[0]}] table, which names a driver")
@@ -103,7 +136,17 @@ def load_rig(path: Path) -> RigFile:
     if not isinstance(name, str):
         raise UserError(f"{path}: name must be text, got {name!r}")
     digest = hashlib.sha256(repr(sorted_values(values)).encode()).hexdigest()
-    return RigFile(path, name, devices, digest)
+    return RigFile(path, name, devices, digest, _home(path, values))
+
+
+def _home(path: Path, values: Mapping[str, Any]) -> Home | None:
+    angle, tolerance = (values.get(key, default) for key, default in HOME.items())
+    for key, value in zip(HOME, (angle, tolerance), strict=True):
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
+            raise UserError(f"{path}: {key} must be a number of degrees, got {value!r}")
+    if angle is None:
+        return None
+    return Home(math.radians(angle), math.radians(tolerance))
 
 
 def sorted_values(values: Any) -> Any:

@@ -124,6 +124,11 @@ class SimulatedRig:
         self._bias_nm = bias_nm
 
     @property
+    def origin_rad(self) -> float:
+        """The arm begins at its initial position."""
+        return 0.0
+
+    @property
     def counts(self) -> Mapping[str, int]:
         """Nothing is lost on the way."""
         return {}

@@ -112,10 +112,11 @@ def guard_step(
     ring, newest, sent_before, angle, age, origin, energy, cause, reaction = state
     oldest, passed = ring.size - 1, max(elapsed_ticks, 1)
     elapsed_s = passed * dt
+    sum_rad = ring[newest]
     for _ in range(min(passed, oldest)):
-        before = newest
-        newest = before + 1 if before < oldest else 0
-        ring[newest] = ring[before] + sent_before * dt
+        newest = newest + 1 if newest < oldest else 0
+        sum_rad += sent_before * dt
+        ring[newest] = sum_rad
     age += elapsed_s
     motion_finite = isfinite(angle_rad) and isfinite(velocity_rad_s) and isfinite(age_s)
     speed_now, torque_now = 0.0, 0.0
@@ -152,11 +153,13 @@ def guard_step(
         astray,
         energy,
     )
-    if REACTIONS[reported] >= REACTIONS[found]:  # a device knows better why than what was found
+    # A device knows better why than what was found; most ticks name nothing.
+    if reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found]:
         found = reported
-    if cause == _NO_CAUSE:
-        cause = found
-    reaction = max(reaction, REACTIONS[found])
+    if found != _NO_CAUSE:
+        if cause == _NO_CAUSE:
+            cause = found
+        reaction = max(reaction, REACTIONS[found])
 
     sent, limited = requested_rad_s, _NOT_LIMITED
     if cause != _NO_CAUSE:

@@ -72,7 +72,11 @@ def rest_of(folder: Path) -> Rest:
         session_settings(folder),
         left,
         len(planned) - len(left),
-        {"folder": folder.name, "created_utc": manifest["created_utc"]},
+        {
+            "folder": folder.name,
+            "created_utc": manifest["created_utc"],
+            **{k: e[k] for e in events if e.get("event") == "rig_enabled" for k in ("origin_rad",)},
+        },
     )
 
 

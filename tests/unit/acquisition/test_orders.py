@@ -76,7 +76,7 @@ def test_a_pause_comes_after_the_epoch_and_ends_with_resume(tmp_path):
     assert result.outcome == "success"
     assert ended(events) == [(1, "success"), (2, "success"), (3, "success")]
     second = samples["tick"][samples["epoch"] == 2][0]
-    assert second == 1000
+    assert second == 1100  # after a whole way back
     held = samples["velocity_command_rad_s"][700:1000]
     assert not held.any()
 
@@ -203,6 +203,67 @@ def test_a_run_does_not_begin_on_a_sensor_under_load(tmp_path, subject, bias_nm,
     assert result.outcome == "fail"
     assert words in result.reason
     assert labels(events) == []
+
+
+def test_an_epoch_after_a_pause_begins_where_epochs_begin(tmp_path):
+    values = {"protocol": {**VALUES["protocol"], "blocks": [{"task": "sinusoid", "epochs": 1}]}}
+    desk = Desk({300: Command.PAUSE_NOW, 310: Command.RESUME})
+    _, events, samples = run(tmp_path / "s", desk, values=values)
+    assert labels(events) == ["1", "1r"]
+    again = samples["angle_rad"][samples["epoch"] == 2]
+    assert abs(again[0]) < math.radians(0.5)
+
+
+@pytest.mark.parametrize("order", [Command.PAUSE_NOW, None])
+def test_a_zero_is_made_from_the_whole_time_or_not_at_all(tmp_path, order):
+    """An order or a hold in the middle of it: it is made again, never left out."""
+    settings = parse_settings(VALUES)
+    rig = SimulatedRig(settings.rig, settings.subject["OFF"], np.random.default_rng(1))
+    rig.zero(-0.9)
+    if order is None:
+        desk = Desk({200: Command.RESUME}, {20: Cause.TORQUE_HIGH})
+    else:
+        desk = Desk({20: order, 200: Command.RESUME})
+    result, events, _ = run(tmp_path / "s", desk, rig=rig, zero_first=True)
+    zeroed = [e for e in events if e["event"] == "sensor_zeroed"]
+    assert [e["bias_nm"] for e in zeroed] == [pytest.approx(0.9, abs=0.002)]
+    assert zeroed[0]["time_s"] > 2.9
+    assert result.outcome == "success"
+
+
+def test_an_abort_while_zeroing_is_an_abort(tmp_path):
+    result, events, _ = run(tmp_path / "s", Desk({3: Command.ABORT}), zero_first=True)
+    assert result.outcome == "abort"
+    assert labels(events) == []
+
+
+def test_a_second_hold_on_the_way_back_is_another_pause(tmp_path):
+    causes = {150: Cause.TORQUE_HIGH, 350: Cause.TORQUE_HIGH}
+    desk = Desk({300: Command.RESUME, 600: Command.RESUME}, causes)
+    result, events, _ = run(tmp_path / "s", desk)
+    assert ended(events) == [(1, "fail"), (2, "success"), (3, "success")]
+    assert result.outcome == "success"
+
+
+def test_an_ordered_stop_outlives_a_hold(tmp_path):
+    desk = Desk({100: Command.STOP, 600: Command.RESUME}, {150: Cause.TORQUE_HIGH})
+    result, events, _ = run(tmp_path / "s", desk)
+    assert ended(events) == [(1, "fail")]
+    assert result.reason == "stopped by the operator with 2 epochs left"
+
+
+def test_a_stop_in_a_rest_ends_it(tmp_path):
+    _, events, samples = run(tmp_path / "s", Desk({450: Command.STOP}))
+    assert ended(events) == [(1, "success")]
+    assert samples["tick"][-1] < 480
+
+
+def test_a_release_waits_for_rest_and_forgets_nothing_in_flight(tmp_path):
+    values = {"guard": {"acceleration_limit_deg_s2": 300.0, "reaction_time_s": 0.03}}
+    desk = Desk({152: Command.RESUME}, {150: Cause.TORQUE_HIGH})
+    _, _, samples = run(tmp_path / "s", desk, values=values)
+    change = np.abs(np.diff(samples["velocity_command_rad_s"]))
+    assert change.max() <= math.radians(300.0) / 200.0 * (1 + 1e-9)
 
 
 def test_missed_deadlines_are_left_out_not_made_up_for(tmp_path):

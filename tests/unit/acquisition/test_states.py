@@ -61,7 +61,8 @@ def test_reset_leads_to_idle_and_moves_nothing():
 def test_from_a_pause_one_goes_on_stops_or_aborts():
     assert after(PAUSED, Command.RESUME) == RUNNING
     assert after(PAUSED, Command.STOP) == Run(State.STOPPING)
-    assert after(PAUSED, Command.ABORT) == Run(State.STOPPING, aborted=True)
+    assert after(PAUSED, Command.ABORT) == Run(State.STOPPING, at_once=True, aborted=True)
+    assert after(Run(State.PAUSED, stop_next=True), Command.RESUME).stop_next
     assert after(PAUSED, Command.PAUSE) == PAUSED
 
 
