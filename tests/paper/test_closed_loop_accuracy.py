@@ -44,7 +44,9 @@ def test_read_per_radian_the_motion_would_be_four_times_as_large(simulate, seed)
             seed=seed,
             controller=per_radian,
             guard={"position_limit_deg": 180.0, "speed_limit_deg_s": 1000.0,
-                   "acceleration_limit_deg_s2": 100000.0},
+                   "acceleration_limit_deg_s2": 100000.0, "following_limit_deg": 45.0,
+                   "torque_limit_nm": 200.0, "torque_stop_nm": 400.0, "power_limit_w": 1000.0,
+                   "energy_limit_j": 1000.0},
         )
     )  # fmt: skip
     assert np.rad2deg(epoch.channels["angle_rad"].values.std()) > 12.0

@@ -138,9 +138,9 @@ class _Session:
             # A device may take long to come up. The clock is not set back for that: it is the
             # drivers' clock too, and their heartbeats would cease meanwhile.
             self._loop.begin()
-            self._writer.event(
-                "rig_enabled", time_s=self._loop.time_s, origin_rad=self._rig.origin_rad
-            )
+            if zero_first:
+                origin_rad = self._rig.origin_rad
+                self._writer.event("rig_enabled", time_s=self._loop.time_s, origin_rad=origin_rad)
             if not zero_first or self._zero():
                 self._epochs()
             self._conclude()
