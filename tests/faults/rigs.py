@@ -133,6 +133,8 @@ class WatchedArm(EmulatedArm):
 class SpoiledRig:
     """The virtual rig, and what can be wrong with it."""
 
+    origin_rad = 0.0
+
     def __init__(self, inner: SimulatedRig) -> None:
         self.inner = inner
         self.habits: dict[str, Any] = {}

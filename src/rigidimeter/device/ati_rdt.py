@@ -75,6 +75,7 @@ class AtiRdt:
         self._now = now
         self._device = f"torque sensor at {settings.address}"
         self._socket: socket.socket | None = None
+        self._configured = False
         self._sensor = ("", 0)
         self._page: SensorPage | None = None
         self._gains = [math.nan] * 6
@@ -123,7 +124,7 @@ class AtiRdt:
             weight * scale for weight, scale in zip(settings.weights, scales, strict=True)
         ]
         self._start()
-        self._page = page
+        self._page, self._configured = page, True
         values = asdict(page)
         values |= {"sign": settings.sign, "weights": " ".join(f"{w:g}" for w in settings.weights)}
         values["receive_buffer_bytes"] = self._socket.getsockopt(*RECEIVE_BUFFER)
@@ -191,8 +192,10 @@ class AtiRdt:
         Raises
         ------
         DeviceError
-            If none comes.
+            If none comes, or the sensor was not configured since it was connected.
         """
+        if not self._configured:
+            raise DeviceError(f"{self._device}: it is not configured; configure it first")
         self._start()
 
     def set_bias(self, watch_s: float = 0.1) -> None:
@@ -233,6 +236,7 @@ class AtiRdt:
     def close(self) -> None:
         """Stop the samples and close the wire. Safe to call at any time, and twice."""
         wire, self._socket = self._socket, None
+        self._configured = False
         if wire is None:
             return
         try:
