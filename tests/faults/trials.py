@@ -54,6 +54,8 @@ class Desk:
 class Tap:
     """Stands between loop and rig: acts before a given tick, notes when power was taken away."""
 
+    origin_rad = 0.0
+
     def __init__(self, bench: Bench, acts: dict[int, Callable[[], None]]) -> None:
         self._bench, self._rig, self._acts = bench, bench.rig, dict(acts)
         self.ticks = 0
