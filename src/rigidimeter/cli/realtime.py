@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import sys
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rigidimeter.acquisition.realtime import DeadlineClock
     from rigidimeter.acquisition.supervise import LoopSide
     from rigidimeter.design import PlannedEpoch, Protocol
+    from rigidimeter.device.base import Rig
     from rigidimeter.settings import Settings
 
 __all__ = ["run_loop"]
@@ -44,42 +46,45 @@ def run_loop(
     clock = DeadlineClock()
     if rig_path is None:
         rig, new_joint = _virtual(settings, protocol)
-        claim: AbstractContextManager[Any] = nullcontext()
-    else:
-        # What is slow to load is loaded before the sensor's samples flow.
-        import rigidimeter.commissioning  # noqa: F401
-        from rigidimeter.device.rigfile import load_rig
+        _run(settings, protocol, rig, new_joint, clock, side, lambda _: ())
+        return
+    # What is slow to load is loaded before the sensor's samples flow.
+    from rigidimeter.commissioning import check_record
+    from rigidimeter.device.composed import Home
+    from rigidimeter.device.rigfile import load_rig
 
-        claim = load_rig(rig_path).claim()
-        rig, new_joint = _real(rig_path, settings, clock, home_rad), lambda _: {}
-    with claim:
-        _run(settings, protocol, rig, new_joint, clock, side, rig_path)
+    rigfile = load_rig(rig_path)
+    home = Home(home_rad, HOME_TOLERANCE_RAD) if home_rad is not None else None
+    rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, home)
+
+    def approve(facts: Mapping[str, Any]) -> tuple[str, ...]:
+        return check_record(rigfile, facts, settings, settings.commissioning).not_tried
+
+    with rigfile.claim():
+        _run(settings, protocol, rig, lambda _: {}, clock, side, approve)
 
 
 def _run(
     settings: Settings,
     protocol: Protocol,
-    rig: Any,
-    new_joint: Any,
-    clock: Any,
+    rig: Rig,
+    new_joint: Callable[[PlannedEpoch], Mapping[str, Any]],
+    clock: DeadlineClock,
     side: LoopSide,
-    rig_path: Path | None,
+    approve: Callable[[Mapping[str, Any]], Sequence[str]],
 ) -> None:
+    """Set up the rig and run; `approve` refuses it or says which checks were never made."""
     from rigidimeter.acquisition import run_session
 
     try:
         rig.connect()
         facts = rig.configure()
-        if rig_path is not None:
-            from rigidimeter.commissioning import check_record
-            from rigidimeter.device.rigfile import load_rig
-
-            record = check_record(load_rig(rig_path), facts, settings, settings.commissioning)
-            if record.not_tried:
-                what = ", ".join(record.not_tried)
-                print(f"Not tried when the rig was commissioned: {what}.", file=sys.stderr)
-                side.sink.event("not_commissioned", checks=list(record.not_tried))
+        not_tried = approve(facts)
         side.sink.event("rig_configured", **facts)
+        if not_tried:
+            what = ", ".join(not_tried)
+            print(f"Not tried when the rig was commissioned: {what}.", file=sys.stderr)
+            side.sink.event("not_commissioned", checks=list(not_tried))
         side.ready()
         run_session(
             protocol,
@@ -96,7 +101,9 @@ def _run(
         rig.close()
 
 
-def _virtual(settings: Settings, protocol: Protocol) -> tuple[Any, Any]:
+def _virtual(
+    settings: Settings, protocol: Protocol
+) -> tuple[Rig, Callable[[PlannedEpoch], Mapping[str, Any]]]:
     import numpy as np
 
     from rigidimeter.device import SimulatedRig
@@ -108,11 +115,3 @@ def _virtual(settings: Settings, protocol: Protocol) -> tuple[Any, Any]:
         return {"true_joint": asdict(rig.new_epoch(settings.subject[planned.condition]))}
 
     return rig, new_joint
-
-
-def _real(path: Path, settings: Settings, clock: Any, home_rad: float | None) -> Any:
-    from rigidimeter.device.composed import Home
-    from rigidimeter.device.rigfile import load_rig
-
-    home = Home(home_rad, HOME_TOLERANCE_RAD) if home_rad is not None else None
-    return load_rig(path).build(clock.now_s, settings.rig.tick_rate_hz, home)

@@ -23,11 +23,10 @@ from rigidimeter.device.base import (
     DeviceError,
     DeviceFacts,
     MotionSample,
-    Reading,
     TorqueSample,
 )
 
-__all__ = ["ReplayDrive", "ReplayRig", "ReplaySensor"]
+__all__ = ["ReplayDrive", "ReplaySensor"]
 
 TORQUE = ("torque_nm", "torque_time_s")
 MOTION = ("angle_rad", "velocity_rad_s", "motion_time_s")
@@ -69,9 +68,9 @@ class _Track:
         span_s = times[-1] - times[0]
         return (self.length - 1) / span_s if span_s > 0.0 else 1.0
 
-    def advance(self, ticks: int = 1) -> None:
-        """Go on by so many ticks, no farther than to the last."""
-        self.tick = min(self.tick + ticks, self.length - 1)
+    def advance(self) -> None:
+        """Go on by a tick, no farther than to the last."""
+        self.tick = min(self.tick + 1, self.length - 1)
 
     def value(self, name: str, default: int = 0) -> Any:
         """Return a column's value at this tick."""
@@ -79,19 +78,11 @@ class _Track:
         return default if values is None else values[max(self.tick, 0)]
 
 
-class ReplaySensor:
-    """A `TorqueSensor` that plays a record.
+class _Player:
+    """What the two devices have in common: a wire that is a record."""
 
-    Parameters
-    ----------
-    columns : mapping
-        Arrays of one length by name.
-    shift_s : float
-        Added to every stamp.
-    """
-
-    def __init__(self, columns: Mapping[str, ArrayLike], *, shift_s: float = 0.0) -> None:
-        self._track = _Track(columns, TORQUE, shift_s)
+    def __init__(self, track: _Track, time: str, watchdog_s: float | None) -> None:
+        self._track, self._time, self._watchdog_s = track, time, watchdog_s
         self._connected = self._playing = False
         self._received = 0
 
@@ -111,20 +102,43 @@ class ReplaySensor:
             raise DeviceError("replay: configure before connect; call connect first")
         self._track.tick = -1
         self._playing = True
-        rate_hz = self._track.rate_hz("torque_time_s")
-        return DeviceFacts("replay", "", rate_hz, values={"ticks": self._track.length})
+        rate_hz = self._track.rate_hz(self._time)
+        return DeviceFacts("replay", "", rate_hz, self._watchdog_s, {"ticks": self._track.length})
 
     @property
     def finished(self) -> bool:
         """Whether the last tick has been read."""
         return self._track.tick >= self._track.length - 1
 
-    def read(self) -> TorqueSample:
-        """Return the sample of the next tick."""
-        track = self._track
+    def close(self) -> None:
+        """Play no further."""
+        self._connected = self._playing = False
+
+    def _next(self) -> _Track:
+        """Go on by a tick while it plays."""
         if self._playing:
             self._received += not self.finished
-            track.advance()
+            self._track.advance()
+        return self._track
+
+
+class ReplaySensor(_Player):
+    """A `TorqueSensor` that plays a record.
+
+    Parameters
+    ----------
+    columns : mapping
+        Arrays of one length by name.
+    shift_s : float
+        Added to every stamp.
+    """
+
+    def __init__(self, columns: Mapping[str, ArrayLike], *, shift_s: float = 0.0) -> None:
+        super().__init__(_Track(columns, TORQUE, shift_s), "torque_time_s", None)
+
+    def read(self) -> TorqueSample:
+        """Return the sample of the next tick."""
+        track = self._next()
         return TorqueSample(
             track.value("torque_nm"),
             track.value("torque_time_s"),
@@ -139,44 +153,15 @@ class ReplaySensor:
         """How many ticks were played."""
         return {"received": self._received, "lost": 0, "repeated": 0, "reordered": 0, "damaged": 0}
 
-    def close(self) -> None:
-        """Play no further."""
-        self._connected = self._playing = False
 
-
-class ReplayDrive:
+class ReplayDrive(_Player):
     """A `VelocityDrive` that plays a record; parameters as of `ReplaySensor`."""
 
     def __init__(self, columns: Mapping[str, ArrayLike], *, shift_s: float = 0.0) -> None:
-        self._track = _Track(columns, MOTION, shift_s)
-        self._connected = self._playing = self._enabled = False
-        self._received = 0
-        self.written: list[float] = []
-
-    def connect(self) -> None:
-        """Nothing to open."""
-        self._connected = True
-
-    def configure(self) -> DeviceFacts:
-        """Go back to the first tick.
-
-        Raises
-        ------
-        DeviceError
-            If it was not connected: a replay keeps the order that a wire asks for.
-        """
-        if not self._connected:
-            raise DeviceError("replay: configure before connect; call connect first")
-        self._track.tick = -1
-        self._playing = True
-        rate_hz = self._track.rate_hz("motion_time_s")
         # A record stands still when nobody reads it, at once.
-        return DeviceFacts("replay", "", rate_hz, 0.0, {"ticks": self._track.length})
-
-    @property
-    def finished(self) -> bool:
-        """Whether the last tick has been read."""
-        return self._track.tick >= self._track.length - 1
+        super().__init__(_Track(columns, MOTION, shift_s), "motion_time_s", 0.0)
+        self._enabled = False
+        self.written: list[float] = []
 
     def enable(self) -> None:
         """Take note of commands from now on.
@@ -192,10 +177,7 @@ class ReplayDrive:
 
     def read(self) -> MotionSample:
         """Return the sample of the next tick."""
-        track = self._track
-        if self._playing:
-            self._received += not self.finished
-            track.advance()
+        track = self._next()
         return MotionSample(
             track.value("angle_rad"),
             track.value("velocity_rad_s"),
@@ -230,84 +212,5 @@ class ReplayDrive:
 
     def close(self) -> None:
         """Play no further."""
-        self._connected = self._playing = self._enabled = False
-
-
-class ReplayRig:
-    """A `Rig` that plays a record: both devices on one track of ticks.
-
-    Parameters
-    ----------
-    columns : mapping
-        Arrays of one length by name.
-    shift_s : float
-        Added to every stamp.
-    """
-
-    def __init__(self, columns: Mapping[str, ArrayLike], *, shift_s: float = 0.0) -> None:
-        self._track = _Track(columns, TORQUE + MOTION, shift_s)
-        self._bias_nm = 0.0
-        self._enabled = False
-        self.written: list[float] = []
-
-    def connect(self) -> None:
-        """Nothing to open."""
-
-    def configure(self) -> Mapping[str, Any]:
-        """Go back to the first tick."""
-        self._track.tick = -1
-        return {"replay": {"ticks": self._track.length}}
-
-    @property
-    def finished(self) -> bool:
-        """Whether the last tick has been read."""
-        return self._track.tick >= self._track.length - 1
-
-    def enable(self) -> None:
-        """Take note of commands from now on."""
-        self._enabled = True
-
-    def read(self, elapsed_ticks: int = 1) -> Reading:
-        """Return the reading so many ticks after the one before."""
-        track = self._track
-        track.advance(elapsed_ticks)
-        return Reading(
-            track.value("torque_nm") - self._bias_nm,
-            track.value("torque_time_s"),
-            track.value("angle_rad"),
-            track.value("velocity_rad_s"),
-            track.value("motion_time_s"),
-            track.value("torque_sequence", track.tick),
-            track.value("torque_status"),
-            track.value("motion_sequence", track.tick),
-            track.value("motion_status"),
-            track.value("cause"),
-        )
-
-    def write(self, velocity_rad_s: float) -> float:
-        """Take note of a velocity; without being enabled, of none."""
-        if not self._enabled:
-            return 0.0
-        self.written.append(velocity_rad_s)
-        return velocity_rad_s
-
-    def zero(self, bias_nm: float) -> None:
-        """Take `bias_nm` off every torque from now on."""
-        self._bias_nm = bias_nm
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """How many ticks were played."""
-        return {"received": self._track.tick + 1}
-
-    def stop(self) -> None:
-        """Take note of no more commands."""
-        self._enabled = False
-
-    def disable(self) -> None:
-        """Take note of no more commands."""
-        self._enabled = False
-
-    def close(self) -> None:
-        """Take note of no more commands."""
+        super().close()
         self._enabled = False

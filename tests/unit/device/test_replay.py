@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rigidimeter.device.base import DeviceError
-from rigidimeter.device.replay import ReplayDrive, ReplayRig, ReplaySensor
+from rigidimeter.device.composed import ComposedRig
+from rigidimeter.device.replay import ReplayDrive, ReplaySensor
 
 TIMES = np.array([0.0, 0.001, 0.003])
 COLUMNS = {
@@ -18,26 +19,30 @@ COLUMNS = {
 }
 
 
-def test_a_rig_plays_tick_by_tick_and_then_grows_stale():
-    rig = ReplayRig(COLUMNS, shift_s=100.0)
-    rig.connect()
-    rig.configure()
-    rig.zero(0.25)
-    first = rig.read()
-    assert (first.torque_nm, first.torque_time_s, first.motion_time_s) == (0.75, 100.0, 100.5)
-    assert rig.read().angle_rad == 0.2
-    assert not rig.finished
-    last = rig.read()
+def playing(device):
+    device.connect()
+    device.configure()
+    return device
+
+
+def test_a_record_is_played_tick_by_tick_and_then_grows_stale():
+    sensor = playing(ReplaySensor(COLUMNS, shift_s=100.0))
+    first = sensor.read()
+    assert (first.torque_nm, first.time_s) == (1.0, 100.0)
+    assert sensor.read().torque_nm == 2.0
+    assert not sensor.finished
+    last = sensor.read()
     assert math.isnan(last.torque_nm), "a record is passed on as it is"
-    assert rig.finished
-    assert rig.read().motion_time_s == last.motion_time_s
+    assert sensor.finished
+    assert sensor.read().time_s == last.time_s
 
 
-def test_a_missed_tick_is_skipped():
-    rig = ReplayRig(COLUMNS)
-    rig.configure()
-    rig.read()
-    assert rig.read(2).angle_rad == 0.3
+def test_both_devices_make_a_rig():
+    rig = ComposedRig(ReplaySensor(COLUMNS), ReplayDrive(COLUMNS), tick_rate_hz=100.0)
+    rig.connect()
+    assert set(rig.configure()) == {"torque_sensor", "drive"}
+    rig.zero(0.25)
+    assert rig.read().torque_nm == 0.75
 
 
 def test_commands_are_noted_and_move_nothing():
@@ -62,15 +67,15 @@ def test_causes_and_sequences_of_the_record_are_played():
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("device", "change", "message"),
     [
-        ({"angle_rad": [0.1]}, "column 'angle_rad' has shape"),
-        ({"torque_nm": np.zeros((3, 2))}, "column 'torque_nm' has shape"),
+        (ReplayDrive, {"velocity_rad_s": [0.1]}, "column 'velocity_rad_s' has shape"),
+        (ReplaySensor, {"torque_nm": np.zeros((3, 2))}, "column 'torque_nm' has shape"),
     ],
 )
-def test_columns_of_another_length_are_refused(change, message):
+def test_columns_of_another_length_are_refused(device, change, message):
     with pytest.raises(DeviceError, match=message):
-        ReplayRig({**COLUMNS, **change})
+        device({**COLUMNS, **change})
 
 
 def test_a_missing_column_is_named():
