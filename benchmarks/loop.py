@@ -25,12 +25,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigidimeter.acquisition.board import Board
-from rigidimeter.acquisition.realtime import DeadlineClock
-from rigidimeter.acquisition.recorder import Recording
+from rigidimeter.acquisition.processes.board import Board
+from rigidimeter.acquisition.processes.realtime import DeadlineClock
+from rigidimeter.acquisition.processes.recorder import Recording
+from rigidimeter.acquisition.processes.supervise import (
+    Ended,
+    LoopSide,
+    LoopTarget,
+    Realtime,
+    supervise,
+)
 from rigidimeter.acquisition.session import run_session
 from rigidimeter.acquisition.states import Command, Order
-from rigidimeter.acquisition.supervise import Ended, LoopSide, LoopTarget, Realtime, supervise
 from rigidimeter.design import plan
 from rigidimeter.device import SimulatedRig
 from rigidimeter.recording.log import read_samples

@@ -23,9 +23,9 @@ import numpy as np
 
 from benchmarks import loop
 from rigidimeter.acquisition import run_session
-from rigidimeter.acquisition.realtime import DeadlineClock
-from rigidimeter.acquisition.recorder import Recording
-from rigidimeter.acquisition.supervise import LoopSide, LoopTarget, Realtime, supervise
+from rigidimeter.acquisition.processes.realtime import DeadlineClock
+from rigidimeter.acquisition.processes.recorder import Recording
+from rigidimeter.acquisition.processes.supervise import LoopSide, LoopTarget, Realtime, supervise
 from rigidimeter.design import Protocol, plan
 from rigidimeter.device.rigfile import load_rig
 from rigidimeter.recording import read_session

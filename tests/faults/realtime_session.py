@@ -10,10 +10,10 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from rigidimeter.acquisition.board import Condition, Role
-from rigidimeter.acquisition.realtime import DeadlineClock
-from rigidimeter.acquisition.recorder import Patience, Recording
-from rigidimeter.acquisition.supervise import Realtime, supervise
+from rigidimeter.acquisition.processes.board import Condition, Role
+from rigidimeter.acquisition.processes.realtime import DeadlineClock
+from rigidimeter.acquisition.processes.recorder import Patience, Recording
+from rigidimeter.acquisition.processes.supervise import Realtime, supervise
 from rigidimeter.guard import Cause
 from rigidimeter.recording.log import Sample
 from rigidimeter.settings import Settings

@@ -27,17 +27,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rigidimeter.acquisition.clock import SimulatedClock
-from rigidimeter.acquisition.realtime import DeadlineClock
+from rigidimeter.acquisition.processes.realtime import DeadlineClock
 from rigidimeter.device import SimulatedRig
-from rigidimeter.device.ascii_drive import AsciiDrive
-from rigidimeter.device.ati_rdt import AtiRdt
+from rigidimeter.device.ascii.drive import AsciiDrive
+from rigidimeter.device.ati.rdt import AtiRdt
 from rigidimeter.device.base import DeviceError
-from rigidimeter.device.cia402 import Cia402Drive
+from rigidimeter.device.cia402.drive import Cia402Drive
 from rigidimeter.device.composed import ComposedRig
 from rigidimeter.emulation.arm import EmulatedArm
 from rigidimeter.emulation.ascii import AsciiPeer
-from rigidimeter.emulation.cia402 import Cia402Peer
-from rigidimeter.emulation.rdt import RdtPeer
+from rigidimeter.emulation.cia402.node import Cia402Peer
+from rigidimeter.emulation.rdt.sensor import RdtPeer
 from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import Settings, parse_settings
 

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.acquisition import run_session
-from rigidimeter.acquisition.board import Board, Condition, Role
-from rigidimeter.acquisition.realtime import DeadlineClock
-from rigidimeter.acquisition.recorder import Patience, Recording
-from rigidimeter.acquisition.supervise import LoopSide, Realtime, supervise
+from rigidimeter.acquisition.processes.board import Board, Condition, Role
+from rigidimeter.acquisition.processes.realtime import DeadlineClock
+from rigidimeter.acquisition.processes.recorder import Patience, Recording
+from rigidimeter.acquisition.processes.supervise import LoopSide, Realtime, supervise
 from rigidimeter.design import plan
 from rigidimeter.device.rigfile import load_rig
 from rigidimeter.settings import Settings, parse_settings

@@ -18,9 +18,9 @@ from tests.faults.trials import (
     run,
 )
 
-from rigidimeter.acquisition.board import Board, Role
-from rigidimeter.acquisition.ring import SampleRing
-from rigidimeter.acquisition.sink import BoardOutside
+from rigidimeter.acquisition.processes.board import Board, Role
+from rigidimeter.acquisition.processes.ring import SampleRing
+from rigidimeter.acquisition.processes.sink import BoardOutside
 from rigidimeter.acquisition.states import NOTHING, Command, Order
 from rigidimeter.device.base import DeviceError
 from rigidimeter.device.composed import ComposedRig

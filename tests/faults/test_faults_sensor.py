@@ -7,7 +7,7 @@ import pytest
 from tests.faults.rigs import ASCII, CANOPEN, RIGS, WIRES, Wrong, bench
 from tests.faults.trials import AT_S, assert_stopped, assert_whole, run
 
-from rigidimeter.device.ati_rdt import AtiRdt
+from rigidimeter.device.ati.rdt import AtiRdt
 from rigidimeter.device.base import DeviceError
 from rigidimeter.errors import UserError
 from rigidimeter.guard import Cause

@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from rigidimeter.device.ascii_drive import AsciiDrive
+from rigidimeter.device.ascii.drive import AsciiDrive
 from rigidimeter.device.base import DeviceError
 from rigidimeter.emulation.arm import EmulatedArm
 from rigidimeter.emulation.ascii import MISBEHAVIOURS, AsciiPeer
@@ -278,7 +278,7 @@ def test_commands_keep_up_with_the_rate_the_facts_state(wire, baud, record_prope
 
 SCRIPT = """
 import sys, time
-from rigidimeter.device.ascii_drive import AsciiDrive
+from rigidimeter.device.ascii.drive import AsciiDrive
 settings = AsciiDrive.Settings(
     port=sys.argv[1], counts_per_turn=float(sys.argv[2]), horizon_s=float(sys.argv[3]),
     deceleration_deg_s2=float(sys.argv[4]), lost_s=0.5)

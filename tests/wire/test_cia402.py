@@ -14,10 +14,10 @@ import canopen
 import pytest
 
 from rigidimeter.device.base import DeviceError, MotionSample
-from rigidimeter.device.cia402 import Cia402Drive, Cia402Settings
-from rigidimeter.device.cia402_states import State
+from rigidimeter.device.cia402.drive import Cia402Drive, Cia402Settings
+from rigidimeter.device.cia402.states import State
 from rigidimeter.emulation import EmulatedArm
-from rigidimeter.emulation.cia402 import MISBEHAVIOURS, Cia402Peer
+from rigidimeter.emulation.cia402.node import MISBEHAVIOURS, Cia402Peer
 from rigidimeter.guard import Cause
 from rigidimeter.joint import JointDynamics
 
@@ -464,7 +464,7 @@ def test_frames_that_make_no_sense_are_counted(wire):
 def test_the_peer_is_a_drive_to_the_profile_that_others_wrote(wire):
     from canopen.objectdictionary import ObjectDictionary
 
-    from rigidimeter.emulation.cia402_objects import dictionary
+    from rigidimeter.emulation.cia402.objects import dictionary
 
     peer = wire.peer
     bus = can.Bus(interface="virtual", channel=wire.channel)
@@ -513,7 +513,7 @@ def test_the_peer_is_a_drive_to_the_profile_that_others_wrote(wire):
 PEER = """
 import sys
 from rigidimeter.emulation import EmulatedArm
-from rigidimeter.emulation.cia402 import Cia402Peer
+from rigidimeter.emulation.cia402.node import Cia402Peer
 from rigidimeter.joint import JointDynamics
 
 arm = EmulatedArm(JointDynamics(0.08, 0.5, 10.0))
@@ -527,7 +527,7 @@ peer.close()
 
 DRIVER = """
 import sys, time
-from rigidimeter.device.cia402 import Cia402Drive, Cia402Settings
+from rigidimeter.device.cia402.drive import Cia402Drive, Cia402Settings
 
 drive = Cia402Drive(
     Cia402Settings(

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from rigidimeter.acquisition.realtime import DeadlineClock
+from rigidimeter.acquisition.processes.realtime import DeadlineClock
 from rigidimeter.commissioning import (
     CommissioningRecord,
     Operator,
@@ -207,7 +207,7 @@ def test_a_dead_sensor_is_caught_and_the_record_says_so(
 
     # What it asks of the system would last for the tests after it.
     monkeypatch.setattr(
-        "rigidimeter.acquisition.realtime.prepare_loop_process", lambda: SimpleNamespace()
+        "rigidimeter.acquisition.processes.realtime.prepare_loop_process", lambda: SimpleNamespace()
     )
     can_bench.misbehave("torque", "silent")
     out = can_bench.rig.with_name("dead.json")

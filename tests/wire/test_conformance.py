@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.device.ascii_drive import AsciiDrive
-from rigidimeter.device.ati_analogue import AtiAnalogue
-from rigidimeter.device.ati_rdt import AtiRdt
-from rigidimeter.device.cia402 import Cia402Drive
+from rigidimeter.device.ascii.drive import AsciiDrive
+from rigidimeter.device.ati.analogue import AtiAnalogue
+from rigidimeter.device.ati.rdt import AtiRdt
+from rigidimeter.device.cia402.drive import Cia402Drive
 from rigidimeter.device.conformance import (
     DRIVE_CHECKS,
     SENSOR_CHECKS,
@@ -25,8 +25,8 @@ from rigidimeter.device.conformance import (
 from rigidimeter.device.replay import ReplayDrive, ReplaySensor
 from rigidimeter.emulation.arm import EmulatedArm
 from rigidimeter.emulation.ascii import AsciiPeer
-from rigidimeter.emulation.cia402 import Cia402Peer
-from rigidimeter.emulation.rdt import RdtPeer
+from rigidimeter.emulation.cia402.node import Cia402Peer
+from rigidimeter.emulation.rdt.sensor import RdtPeer
 from rigidimeter.joint import JointDynamics
 
 JOINT = JointDynamics(0.08, 0.5, 2.0)

@@ -7,10 +7,10 @@ import time
 
 import pytest
 
-from rigidimeter.device.ati_rdt import AtiRdt
+from rigidimeter.device.ati.rdt import AtiRdt
 from rigidimeter.device.base import DeviceError
 from rigidimeter.emulation.arm import EmulatedArm
-from rigidimeter.emulation.rdt import MISBEHAVIOURS, RdtPeer
+from rigidimeter.emulation.rdt.sensor import MISBEHAVIOURS, RdtPeer
 from rigidimeter.guard import Cause
 from rigidimeter.joint import JointDynamics
 

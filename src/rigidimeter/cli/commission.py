@@ -66,7 +66,7 @@ def commission(
     from datetime import UTC, datetime
 
     from rigidimeter import __version__
-    from rigidimeter.acquisition.realtime import DeadlineClock, prepare_loop_process
+    from rigidimeter.acquisition.processes.realtime import DeadlineClock, prepare_loop_process
     from rigidimeter.commissioning import Operator, Timebase, record_path, write_record
     from rigidimeter.commissioning import commission as try_rig
     from rigidimeter.device.rigfile import load_rig

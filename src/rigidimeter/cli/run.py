@@ -56,8 +56,8 @@ def run(
       rigidimeter run protocol.toml --rig rig.toml --out session
       rigidimeter run --resume session --rig rig.toml --out session-2
     """
-    from rigidimeter.acquisition.recorder import Recording
-    from rigidimeter.acquisition.supervise import Realtime, supervise
+    from rigidimeter.acquisition.processes.recorder import Recording
+    from rigidimeter.acquisition.processes.supervise import Realtime, supervise
     from rigidimeter.cli.realtime import run_loop
     from rigidimeter.console import Terminal
     from rigidimeter.device.rigfile import load_rig

@@ -13,7 +13,14 @@ import time
 from collections.abc import Callable
 from typing import IO
 
-from rigidimeter.acquisition.board import Board, Condition, Flag, LiveEstimate, LoopStatus, Role
+from rigidimeter.acquisition.processes.board import (
+    Board,
+    Condition,
+    Flag,
+    LiveEstimate,
+    LoopStatus,
+    Role,
+)
 from rigidimeter.acquisition.states import Command, Order, State
 from rigidimeter.guard import Cause
 

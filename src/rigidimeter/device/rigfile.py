@@ -39,12 +39,12 @@ __all__ = ["DRIVERS", "RigFile", "load_rig"]
 
 DRIVERS: Mapping[str, Mapping[str, str]] = {
     "torque_sensor": {
-        "ati-rdt": "rigidimeter.device.ati_rdt:AtiRdt",
-        "ati-analogue": "rigidimeter.device.ati_analogue:AtiAnalogue",
+        "ati-rdt": "rigidimeter.device.ati.rdt:AtiRdt",
+        "ati-analogue": "rigidimeter.device.ati.analogue:AtiAnalogue",
     },
     "drive": {
-        "cia402": "rigidimeter.device.cia402:Cia402Drive",
-        "ascii": "rigidimeter.device.ascii_drive:AsciiDrive",
+        "cia402": "rigidimeter.device.cia402.drive:Cia402Drive",
+        "ascii": "rigidimeter.device.ascii.drive:AsciiDrive",
     },
     "enable_line": {"serial-line": "rigidimeter.device.enable_line:SerialEnableLine"},
 }

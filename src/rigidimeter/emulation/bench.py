@@ -34,8 +34,9 @@ from pathlib import Path
 from typing import IO, Any, Literal
 
 from rigidimeter.emulation import ascii as ascii_peer
-from rigidimeter.emulation import cia402, rdt
 from rigidimeter.emulation.arm import EmulatedArm
+from rigidimeter.emulation.cia402 import node as cia402
+from rigidimeter.emulation.rdt import sensor as rdt
 from rigidimeter.errors import UserError
 from rigidimeter.joint import JointDynamics
 

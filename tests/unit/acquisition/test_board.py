@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from rigidimeter.acquisition.board import (
+from rigidimeter.acquisition.processes.board import (
     Board,
     Condition,
     Flag,
@@ -10,8 +10,8 @@ from rigidimeter.acquisition.board import (
     LoopStatus,
     Role,
 )
-from rigidimeter.acquisition.ring import EventRing, SampleRing
-from rigidimeter.acquisition.sink import BoardOutside, RingSink
+from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
+from rigidimeter.acquisition.processes.sink import BoardOutside, RingSink
 from rigidimeter.acquisition.states import NOTHING, Command, Order, Run, State
 from rigidimeter.guard import Cause
 from rigidimeter.recording.log import Sample

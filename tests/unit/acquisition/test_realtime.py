@@ -5,8 +5,12 @@ import time
 
 import pytest
 
-from rigidimeter.acquisition.processes import Watched
-from rigidimeter.acquisition.realtime import DeadlineClock, _relative_sleep, prepare_loop_process
+from rigidimeter.acquisition.processes.realtime import (
+    DeadlineClock,
+    _relative_sleep,
+    prepare_loop_process,
+)
+from rigidimeter.acquisition.processes.watched import Watched
 
 
 def test_the_clock_wakes_at_its_deadlines():

@@ -3,11 +3,11 @@ import errno
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition.board import Board
-from rigidimeter.acquisition.recorder import Recorder, Recording
-from rigidimeter.acquisition.ring import EventRing, SampleRing
-from rigidimeter.acquisition.salvage import salvage
-from rigidimeter.acquisition.sink import RingSink
+from rigidimeter.acquisition.processes.board import Board
+from rigidimeter.acquisition.processes.recorder import Recorder, Recording
+from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
+from rigidimeter.acquisition.processes.salvage import salvage
+from rigidimeter.acquisition.processes.sink import RingSink
 from rigidimeter.errors import UserError
 from rigidimeter.recording import folder as folder_module
 from rigidimeter.recording.log import Sample, append_line, read_events, read_samples

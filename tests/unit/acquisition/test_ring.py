@@ -4,8 +4,8 @@ import time
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition.ring import ROW, EventRing, Reader, SampleReader, SampleRing
-from rigidimeter.acquisition.shared import Memory
+from rigidimeter.acquisition.processes.ring import ROW, EventRing, Reader, SampleReader, SampleRing
+from rigidimeter.acquisition.processes.shared import Memory
 from rigidimeter.recording.log import Sample, sample_dtypes
 
 

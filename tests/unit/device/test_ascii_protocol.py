@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigidimeter.device.ascii_protocol import get, move_target, parse, seconds, set_
+from rigidimeter.device.ascii.protocol import get, move_target, parse, seconds, set_
 
 
 @pytest.mark.parametrize("text", ["", "v", "v 1 2", "ok!", "x 3", "v one", "e"])

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.device.ati_analogue import AtiAnalogue, ReaderError
-from rigidimeter.device.ati_calibration import AXES, read_calibration
+from rigidimeter.device.ati.analogue import AtiAnalogue, ReaderError
+from rigidimeter.device.ati.calibration import AXES, read_calibration
 from rigidimeter.device.base import DeviceError
 from rigidimeter.guard import Cause
 

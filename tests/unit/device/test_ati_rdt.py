@@ -3,9 +3,8 @@ import struct
 
 import pytest
 
-from rigidimeter.device.ati_rdt import AtiRdt
-from rigidimeter.device.base import DeviceError
-from rigidimeter.device.rdt_packets import (
+from rigidimeter.device.ati.rdt import AtiRdt
+from rigidimeter.device.ati.rdt_packets import (
     COUNTS,
     SET_BIAS,
     START_REALTIME,
@@ -14,7 +13,8 @@ from rigidimeter.device.rdt_packets import (
     request,
     status_words,
 )
-from rigidimeter.device.rdt_page import FORCE_UNITS_N, TORQUE_UNITS_NM, changes, parse_page
+from rigidimeter.device.ati.rdt_page import FORCE_UNITS_N, TORQUE_UNITS_NM, changes, parse_page
+from rigidimeter.device.base import DeviceError
 from rigidimeter.guard import Cause
 
 

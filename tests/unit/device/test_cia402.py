@@ -6,9 +6,9 @@ import pytest
 from pydantic import ValidationError
 
 from rigidimeter.device.base import DeviceError
-from rigidimeter.device.cia402 import Cia402Drive, Cia402Settings
-from rigidimeter.device.cia402_setup import objects, scale
-from rigidimeter.device.cia402_states import (
+from rigidimeter.device.cia402.drive import Cia402Drive, Cia402Settings
+from rigidimeter.device.cia402.setup import objects, scale
+from rigidimeter.device.cia402.states import (
     NEXT_CONTROL,
     Control,
     State,

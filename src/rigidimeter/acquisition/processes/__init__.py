@@ -1,0 +1,1 @@
+"""The processes around the loop, the memory they share, and what they ask of the machine."""

@@ -1,0 +1,112 @@
+"""The live estimator's process: J, B and K from the ring to the board while the arm moves.
+
+It reads the samples as the console does: where it falls behind it misses some, begins anew, and
+says how many. Nothing waits for it.
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.acquisition.processes.board import Board, Condition, LiveEstimate, Role
+from rigidimeter.acquisition.processes.ring import Reader, SampleReader, SampleRing
+from rigidimeter.acquisition.processes.watched import leave_signals_to_the_console
+from rigidimeter.estimation.online import (
+    STATE_SIZE,
+    compiled_online_step,
+    online_design,
+    online_reading,
+)
+from rigidimeter.settings import OnlineSettings
+
+__all__ = ["Estimator", "estimator_main"]
+
+LOOK_S = 0.1
+
+
+class Estimator:
+    """The online estimate, fed with rows of the ring.
+
+    Parameters
+    ----------
+    settings : OnlineSettings
+    rate_hz : float
+    """
+
+    def __init__(self, settings: OnlineSettings, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
+        self._design = online_design(settings, rate_hz)
+        self._values = np.array(self._design)
+        self._step = compiled_online_step()
+        self._step(self._values, np.zeros(STATE_SIZE), 0.0, 0.0, 0.0)  # compile now, not later
+        self._state: Any = np.zeros(STATE_SIZE)
+        self._missed = 0
+
+    def take(self, rows: NDArray[np.void], missed: int) -> LiveEstimate:
+        """Take samples; after a gap the filters and the memory begin anew."""
+        if missed:
+            self._missed += missed
+            self._state = np.zeros(STATE_SIZE)
+        step, values, state = self._step, self._values, self._state
+        columns = (rows[name].tolist() for name in ("torque_nm", "angle_rad", "velocity_rad_s"))
+        for torque_nm, angle_rad, velocity_rad_s in zip(*columns, strict=True):
+            step(values, state, torque_nm, angle_rad, velocity_rad_s)
+        found = online_reading(self._design, state, self._rate_hz)
+        return LiveEstimate(
+            tick=int(rows["tick"][-1]),
+            resting=int(found.resting),
+            missed_samples=self._missed,
+            time_s=float(rows["time_s"][-1]),
+            inertia_kg_m2=found.inertia_kg_m2,
+            inertia_kg_m2_se=found.inertia_kg_m2_se,
+            damping_nm_s_rad=found.damping_nm_s_rad,
+            damping_nm_s_rad_se=found.damping_nm_s_rad_se,
+            stiffness_nm_rad=found.stiffness_nm_rad,
+            stiffness_nm_rad_se=found.stiffness_nm_rad_se,
+            memory_s=found.memory_s,
+        )
+
+
+def estimator_main(
+    settings: OnlineSettings, rate_hz: float, names: tuple[str, str, str], lost_s: float
+) -> None:
+    """Estimate until the loop has ended; the target of the estimator's process.
+
+    Parameters
+    ----------
+    settings : OnlineSettings
+    rate_hz : float
+    names : tuple of str
+        Of the sample ring, the event ring and the board.
+    lost_s : float
+        Recorder and loop both silent for so long have ended.
+    """
+    leave_signals_to_the_console()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    ring, board = SampleRing.attach(names[0]), Board.attach(names[2])
+    try:
+        board.join(Role.ESTIMATOR)
+        estimator = Estimator(settings, rate_hz)
+        reader = SampleReader(ring, Reader.ESTIMATOR)
+        board.set_condition(Role.ESTIMATOR, Condition.RUNNING)
+        while _worth_it(board, lost_s):
+            board.beat(Role.ESTIMATOR)
+            rows, missed = reader.read()
+            if rows.size:
+                board.show_live(estimator.take(rows, missed))
+            time.sleep(LOOK_S)
+        board.set_condition(Role.ESTIMATOR, Condition.DONE)
+    finally:
+        ring.close()
+        board.close()
+
+
+def _worth_it(board: Board, lost_s: float) -> bool:
+    if board.condition(Role.LOOP) in (Condition.DONE, Condition.FAILED):
+        return False
+    return min(board.age_s(Role.LOOP), board.age_s(Role.RECORDER)) < lost_s

@@ -1,0 +1,206 @@
+"""The loop's side of the rings and the board: where it writes, and what it looks at every tick."""
+
+from __future__ import annotations
+
+import math
+import time
+from time import monotonic_ns
+from typing import Any
+
+from rigidimeter.acquisition.processes.board import Board, Condition, LoopStatus, Nanoseconds, Role
+from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
+from rigidimeter.acquisition.states import Order, Run, State
+from rigidimeter.guard import Cause
+from rigidimeter.recording.folder import Ending
+from rigidimeter.recording.log import Sample
+
+__all__ = ["BoardOutside", "RingSink"]
+
+SHOWN_S = 0.02
+"""How often the loop shows itself."""
+
+_NONE = int(Cause.NONE)
+_EMERGENCY_STOP, _SIGNAL = int(Cause.EMERGENCY_STOP), int(Cause.SIGNAL)
+_CONSOLE_LOST, _RECORDER_LOST = int(Cause.CONSOLE_LOST), int(Cause.RECORDER_LOST)
+_RECORD_OVERFLOW = int(Cause.RECORD_OVERFLOW)
+
+
+class RingSink:
+    """Takes samples and events as a `SessionWriter` does, never waits, and touches no file.
+
+    Parameters
+    ----------
+    samples : SampleRing
+    events : EventRing
+    board : Board
+        The loop's heart beats there with every sample, and its status is shown now and then.
+    tick_rate_hz : float
+        A tick that is later than a whole one has missed its deadline.
+    """
+
+    def __init__(
+        self, samples: SampleRing, events: EventRing, board: Board, tick_rate_hz: float
+    ) -> None:
+        self._samples, self._events, self._board = samples, events, board
+        self._push = samples.push
+        self._words = board.memory.words
+        self._heart = board.places()[-1]
+        self._interval_s = 1.0 / tick_rate_hz
+        self._missed = 0
+        self._state = State.IDLE
+        self._begun = False
+        self._show_s = -math.inf
+        self.closed = False
+        self.last_time_s = 0.0
+
+    def sample(self, sample: Sample) -> None:
+        """Record one tick."""
+        self._push(sample)
+        self.last_time_s = time_s = sample.time_s
+        self._words[self._heart] = monotonic_ns()
+        if sample.lateness_s >= self._interval_s:
+            self._missed += 1
+        if time_s >= self._show_s:
+            self._show_s = time_s + SHOWN_S
+            self._show(sample)
+
+    def _show(self, sample: Sample) -> None:
+        if not self._begun:
+            self._begun = True
+            self._board.set_condition(Role.LOOP, Condition.RUNNING)
+        self._board.show(
+            LoopStatus(
+                state=self._state,
+                tick=sample.tick,
+                epoch=sample.epoch,
+                cause=sample.cause,
+                missed_deadlines=self._missed,
+                time_s=sample.time_s,
+                angle_rad=sample.angle_rad,
+                velocity_rad_s=sample.velocity_rad_s,
+                torque_nm=sample.torque_nm,
+                perturbation_nm=sample.perturbation_nm,
+                velocity_command_rad_s=sample.velocity_command_rad_s,
+            )
+        )
+
+    def state_changed(self, run: Run) -> None:
+        """Take the state of the run, to be shown with the next sample."""
+        self._state = run.state
+        self._show_s = -math.inf
+        if run.state in (State.STOPPING, State.FAULTED):
+            self.stopping()
+
+    def event(self, kind: str, **facts: Any) -> None:
+        """Record something that happened.
+
+        Raises
+        ------
+        ValueError
+            If it is too long for a slot of the ring, or not what JSON can say.
+        """
+        self._events.push(self._samples.written, {"event": kind, **facts})
+
+    def session_started(self) -> None:
+        """Say that the loop runs."""
+        self.event("session_started", time_s=0.0)
+
+    def epoch_started(
+        self, number: int, label: str, task: str, condition: str, time_s: float, **facts: Any
+    ) -> None:
+        """Say that an epoch begins, with whatever facts belong to it."""
+        self.event(
+            "epoch_started",
+            epoch=number,
+            label=label,
+            task=task,
+            condition=condition,
+            time_s=time_s,
+            **facts,
+        )
+
+    def epoch_ended(
+        self, number: int, time_s: float, outcome: Ending, reason: str, **facts: Any
+    ) -> None:
+        """Close an epoch."""
+        self.event(
+            "epoch_ended", epoch=number, time_s=time_s, outcome=outcome, reason=reason, **facts
+        )
+
+    def stopping(self) -> None:
+        """Say that no more ticks are due: what follows may take longer than a tick may."""
+        self._board.beat(Role.LOOP)
+        self._board.set_condition(Role.LOOP, Condition.STOPPING)
+
+    def close(self, time_s: float, outcome: Ending, reason: str) -> None:
+        """Close the session with its outcome; only the first time counts."""
+        if self.closed:
+            return
+        self.closed = True
+        self.stopping()
+        self.event("session_ended", time_s=time_s, outcome=outcome, reason=reason)
+
+    def lag(self) -> int:
+        """Return how many samples wait for the recorder."""
+        return self._samples.lag()
+
+
+class BoardOutside:
+    """Answers the loop every tick: is there a cause to stop, is there an order.
+
+    Parameters
+    ----------
+    board : Board
+    samples : SampleRing
+    console_lost_s : float
+        An older heartbeat of the console is a cause to stop: a dead-man's switch.
+    recorder_lost_s : float
+        The same for the recorder. It may be long: what is not in the file stays in the ring.
+    most_lag : int
+        More samples than that waiting for the recorder are a cause to stop.
+    attended : bool
+        Whether an operator is there who can go on after a hold.
+    now_ns : callable
+        CLOCK_MONOTONIC in nanoseconds.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        samples: SampleRing,
+        *,
+        console_lost_s: float = 1.0,
+        recorder_lost_s: float = 5.0,
+        most_lag: int | None = None,
+        attended: bool = True,
+        now_ns: Nanoseconds = time.monotonic_ns,
+    ) -> None:
+        self.attended = attended
+        self._board, self._samples = board, samples
+        self._console_ns = round(1e9 * console_lost_s)
+        self._recorder_ns = round(1e9 * recorder_lost_s)
+        self._most_lag = samples.capacity // 2 if most_lag is None else most_lag
+        self._now_ns = now_ns
+        self._words = board.memory.words
+        self._places = board.places()
+
+    def cause(self, now_s: float) -> int:
+        """Return a `guard.Cause` to stop for, 0 if there is none."""
+        words = self._words
+        emergency, ended, console, recorder, _ = self._places
+        if words[emergency]:
+            return _EMERGENCY_STOP
+        if words[ended]:
+            return _SIGNAL
+        now_ns = self._now_ns()
+        if now_ns - words[console] > self._console_ns:
+            return _CONSOLE_LOST
+        if now_ns - words[recorder] > self._recorder_ns:
+            return _RECORDER_LOST
+        if self._samples.lag() > self._most_lag:
+            return _RECORD_OVERFLOW
+        return _NONE
+
+    def order(self) -> Order:
+        """Return the next order that was not taken yet, `NOTHING` if there is none."""
+        return self._board.take()

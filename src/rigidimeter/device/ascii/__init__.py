@@ -1,0 +1,1 @@
+"""Servos of the Copley kind that speak ASCII on a serial line."""

@@ -1,0 +1,1 @@
+"""CiA 402 servos over CANopen, in profile-velocity mode."""

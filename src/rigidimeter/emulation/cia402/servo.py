@@ -1,0 +1,202 @@
+"""The servo behind the wire: its state, what it makes the arm do, and what it does wrong.
+
+It knows its objects by their numbers, and nothing of messages.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+from rigidimeter.emulation.arm import EmulatedArm
+from rigidimeter.emulation.cia402.machine import POWERED, Phase, after_control
+
+__all__ = [
+    "COMMUNICATION_ERROR",
+    "DEFAULTS",
+    "GENERIC_ERROR",
+    "MISBEHAVIOURS",
+    "LastStop",
+    "Servo",
+]
+
+MISBEHAVIOURS = {
+    "fault": "brakes, reports a fault (value: its code), and cannot be reset",
+    "emergency": "sends an emergency message (value: its code) but goes on moving",
+    "leave operation": "takes its own power away, as when its hardware enable opens",
+    "change mode": "is in another mode of operation (value: which)",
+    "stop measurements": "answers no SYNC any more",
+    "stop heartbeat": "sends no heartbeat any more",
+    "die": "hears and says nothing any more; its own watchdogs go on",
+    "reboot": "restarts: no power, no settings, no watchdog",
+    "refuse enable": "does not go beyond switched on",
+    "stale target": "keeps an old target velocity (value: in rad/s) whatever is written",
+    "does not follow": "takes commands and stands still",
+    "runs away": "moves at a velocity of its own (value: in rad/s) while it has power",
+    "encoder frozen": "reports the position and velocity of this moment for ever",
+    "encoder jump": "reports a position that is off (value: by how many rad)",
+    "encoder sign": "reports position and velocity with the wrong sign",
+    "slow answers": "answers questions late (value: by how many s)",
+    "wrong watchdog": "takes the heartbeat watchdog but keeps another (value: of how many ms)",
+    "ignores quick stop": "goes on when told to stop quickly",
+}
+"""What it can be told to do wrong."""
+
+DEFAULTS = {
+    "fault": 0x2310,
+    "emergency": 0x4210,
+    "change mode": 1,
+    "stale target": 0.5,
+    "runs away": 6.0,
+    "encoder jump": 1.0,
+    "slow answers": 0.5,
+    "wrong watchdog": 0,
+}
+
+AT_REST_RAD_S = 0.01
+GENERIC_ERROR, COMMUNICATION_ERROR = 0x01, 0x11
+QUICK_STOP_HOLDS = 5
+"""From this quick-stop option on, the motor keeps its power at rest."""
+
+
+class LastStop(NamedTuple):
+    """How the arm last came to rest under a quick stop."""
+
+    reason: str = ""
+    began_s: float = math.nan
+    rest_s: float = math.nan
+
+
+class Objects(Protocol):
+    """What the servo uses of the node around it."""
+
+    def value(self, index: int, subindex: int = 0) -> int:
+        """Return an object's value."""
+
+    def emergency(self, code: int, register: int) -> None:
+        """Send an emergency message."""
+
+    def changed(self) -> None:
+        """Tell that the state is another."""
+
+    def note(self, event: str) -> None:
+        """Write down what happened."""
+
+
+class Servo:
+    """A drive and its state; whoever calls it takes turns.
+
+    Parameters
+    ----------
+    arm : EmulatedArm
+    node : Objects
+    units_per_rad : float
+        Of position, velocity and acceleration.
+    now : callable
+        Monotonic time in s.
+    """
+
+    def __init__(
+        self, arm: EmulatedArm, node: Objects, units_per_rad: float, now: Callable[[], float]
+    ) -> None:
+        self._arm, self._node, self._now = arm, node, now
+        self._units_per_rad = units_per_rad
+        self._control = 0
+        self.phase = Phase.SWITCH_ON_DISABLED
+        self.wrong: dict[str, Any] = {}
+        """What it does wrong, with the values."""
+        self.last_stop = LastStop()
+
+    def restart(self) -> None:
+        """Be as after power-up."""
+        self.go(Phase.SWITCH_ON_DISABLED, "restart")
+        self._control = 0
+
+    def target(self) -> float:
+        """Return the target velocity in force, in its units."""
+        if "stale target" in self.wrong:
+            return float(self.wrong["stale target"]) * self._units_per_rad
+        most = self._node.value(0x607F)
+        return max(-most, min(most, self._node.value(0x60FF)))
+
+    def measured(self) -> tuple[int, int]:
+        """Return the position and velocity it reports, in its units."""
+        if isinstance(frozen := self.wrong.get("encoder frozen"), tuple):
+            return frozen
+        angle_rad, velocity_rad_s = self._arm.motion()
+        angle_rad += self.wrong.get("encoder jump", 0.0)
+        sign = -1 if "encoder sign" in self.wrong else 1
+        units = sign * self._units_per_rad
+        return round(angle_rad * units), round(velocity_rad_s * units)
+
+    def control(self, control: int) -> None:
+        """Take a controlword."""
+        before, self._control = self._control, control
+        if control & 0x06 == 0x02 and "ignores quick stop" in self.wrong:
+            return
+        phase = after_control(self.phase, control, before)
+        if phase is Phase.OPERATION_ENABLED and "refuse enable" in self.wrong:
+            phase = Phase.SWITCHED_ON
+        if self.phase is Phase.FAULT and "fault" in self.wrong:
+            phase = Phase.FAULT
+        self.go(phase, f"controlword 0x{control:02X}")
+
+    def go(self, phase: Phase, why: str) -> None:
+        """Be in a state."""
+        if phase is self.phase:
+            return
+        before, self.phase = self.phase, phase
+        self._node.note(f"{before.name} -> {phase.name}: {why}")
+        if phase in (Phase.QUICK_STOP_ACTIVE, Phase.FAULT_REACTION):
+            self.last_stop = LastStop(why, self._now())
+        self.move()
+        self._node.changed()
+
+    def move(self) -> None:
+        """Tell the arm what follows from state and target."""
+        if self.phase not in POWERED:
+            self._arm.release()
+        elif "runs away" in self.wrong:
+            self._arm.command(self.wrong["runs away"])
+        elif self.phase is not Phase.OPERATION_ENABLED:
+            self._arm.command(0.0, self._node.value(0x6085) / self._units_per_rad)
+        elif "does not follow" in self.wrong:
+            self._arm.command(0.0)
+        else:
+            wanted_rad_s = self.target() / self._units_per_rad
+            speeds_up = abs(wanted_rad_s) > abs(self._arm.motion()[1])
+            ramp = self._node.value(0x6083 if speeds_up else 0x6084) / self._units_per_rad
+            self._arm.command(wanted_rad_s, ramp)
+
+    def fault(self, code: int, why: str) -> None:
+        """Brake, then be in fault."""
+        self._node.emergency(code, GENERIC_ERROR)
+        self.go(Phase.FAULT_REACTION if self.phase in POWERED else Phase.FAULT, why)
+
+    def connection_lost(self, code: int, why: str) -> None:
+        """Do what is set for a master that fell silent."""
+        self._node.emergency(code, COMMUNICATION_ERROR)
+        if self.phase is not Phase.OPERATION_ENABLED:
+            return
+        option = self._node.value(0x6007)
+        if option == 1:
+            self.go(Phase.FAULT_REACTION, why)
+        elif option == 2:
+            self.go(Phase.SWITCH_ON_DISABLED, why)
+        elif option == 3:
+            self.go(Phase.QUICK_STOP_ACTIVE, why)
+
+    def watch_rest(self, now_s: float) -> None:
+        """Go on from a quick stop once the arm rests."""
+        if self.phase not in (Phase.QUICK_STOP_ACTIVE, Phase.FAULT_REACTION):
+            return
+        if abs(self._arm.motion()[1]) > AT_REST_RAD_S:
+            return
+        if math.isnan(self.last_stop.rest_s):
+            self.last_stop = self.last_stop._replace(rest_s=now_s)
+            self._node.note("at rest")
+        if self.phase is Phase.FAULT_REACTION:
+            self.go(Phase.FAULT, "at rest")
+        elif self._node.value(0x605A) < QUICK_STOP_HOLDS:
+            self.go(Phase.SWITCH_ON_DISABLED, "at rest after a quick stop")

@@ -1,0 +1,1 @@
+"""An ATI network sensor on loopback."""
