@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import hypothesis
 import pytest
 
 from rigidimeter.cli.main import main
@@ -12,6 +13,10 @@ from rigidimeter.cli.virtual import run_virtual_session
 from rigidimeter.settings import parse_settings
 
 Simulate = Callable[..., Path]
+
+# The same examples in every run: a failure is the change's, not the day's.
+hypothesis.settings.register_profile("fixed", derandomize=True)
+hypothesis.settings.load_profile("fixed")
 
 
 @pytest.fixture

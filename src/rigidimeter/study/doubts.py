@@ -1,0 +1,77 @@
+"""What looks wrong with an analysis as a whole, and what to do about it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimeter.records import Analysis, Notice
+
+__all__ = ["doubts"]
+
+DIFFERENT_INERTIA = 0.15
+"""Sources whose median J differ by more than this hardly are one joint."""
+
+
+def doubts(analysis: Analysis) -> tuple[Notice, ...]:
+    """Return what looks wrong with an analysis as a whole, and what to do about it."""
+    return (*_misfit_doubts(analysis), *_source_doubts(analysis), *_sign_doubts(analysis))
+
+
+def _misfit_doubts(analysis: Analysis) -> tuple[Notice, ...]:
+    return tuple(
+        Notice("warning", f"{fit.condition or 'all epochs'}: {finding.text}; {finding.remedy}")
+        for fit in analysis.pooled
+        for finding in fit.findings
+    )
+
+
+def _source_doubts(analysis: Analysis) -> tuple[Notice, ...]:
+    """Say so when sources differ in J: one median for all would put the difference into K."""
+    by_source: dict[str, list[float]] = {}
+    for fit in analysis.fits:
+        if fit.outcome.included:
+            by_source.setdefault(fit.source, []).append(fit.inertia_kg_m2)
+    medians = {source: float(np.median(values)) for source, values in by_source.items()}
+    if len(medians) < 2 or min(medians.values()) <= 0:
+        return ()
+    low, high = min(medians, key=lambda s: medians[s]), max(medians, key=lambda s: medians[s])
+    if medians[high] / medians[low] - 1 < DIFFERENT_INERTIA:
+        return ()
+    text = (
+        f"the median J of {high} ({medians[high]:.4g} kg·m²) is "
+        f"{100 * (medians[high] / medians[low] - 1):.0f} % above that of {low} "
+        f"({medians[low]:.4g} kg·m²); B and K at one median J are then wrong for both. Analyse "
+        "different joints or subjects apart"
+    )
+    return (Notice("warning", text),)
+
+
+def _sign_doubts(analysis: Analysis) -> tuple[Notice, ...]:
+    included = [fit for fit in analysis.fits if fit.outcome.included]
+    of_all = f"of {len(included)} included epochs"
+    turned = [
+        fit
+        for fit in included
+        if max(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad) < 0
+    ]
+    if turned:
+        text = (
+            f"J, B and K are all negative in {len(turned)} {of_all}: the torque has the wrong "
+            "sign; a sensor that reports the joint's reaction needs --reaction"
+        )
+        return (Notice("warning", text),)
+    massless = [fit for fit in included if fit.inertia_kg_m2 <= 0]
+    if massless:
+        text = (
+            f"J is not greater than zero in {len(massless)} {of_all}, which no joint can be: the "
+            "channels are too slow, too noisy or late against each other for an inertia this small"
+        )
+        return (Notice("warning", text),)
+    negative = [fit for fit in included if min(fit.damping_nm_s_rad, fit.stiffness_nm_rad) < 0]
+    if negative:
+        text = (
+            f"B or K is negative in {len(negative)} {of_all}: the subject may have pushed, or the "
+            "channels are late against each other; look at R² before using them"
+        )
+        return (Notice("warning", text),)
+    return ()
