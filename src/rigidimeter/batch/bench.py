@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +42,11 @@ class Bench:
     ticks: int
     torque: Sampling | None
     motion: Sampling | None
+
+    @cached_property
+    def tick_s(self) -> NDArray[np.float64]:
+        """When each tick is due, in s from the first."""
+        return readonly(np.arange(self.ticks) / self.settings.rig.tick_rate_hz)
 
 
 def bench(settings: Settings, ticks: int) -> Bench:
@@ -100,11 +107,14 @@ def draw_sampling(
         parts[row] = drive(rig.drive_bandwidth_hz, rig.drive_damping_ratio, length_s)
     newest = np.searchsorted(np.maximum.accumulate(arrives_s), until_s, side="right") - 1
     taken = np.searchsorted(in_order_s, until_s, side="right")
+    assert newest[0] >= 0  # each sensor has a sample before the first tick
+    seen_s = (arrives_s - sensor.stamp_latency_s)[newest]
     return Sampling(
-        _whole(taken),
-        _whole(newest),
-        readonly((arrives_s - sensor.stamp_latency_s)[newest]),
-        _whole(part),
+        _whole(taken, np.uint32),
+        _whole(newest, np.uint32),
+        readonly(seen_s),
+        readonly(np.arange(ticks) / rig.tick_rate_hz - seen_s),
+        _whole(part, np.int32),
         readonly(left),
         readonly(parts),
     )
@@ -118,7 +128,7 @@ def _through(end_s: float, blocks: Iterator[NDArray[np.float64]]) -> Iterator[ND
             return
 
 
-def _whole(values: NDArray[np.int64] | NDArray[np.int32]) -> NDArray[np.int32]:
-    array = values.astype(np.int32)
+def _whole(values: NDArray[Any], kind: type[np.integer[Any]]) -> NDArray[Any]:
+    array = values.astype(kind)
     array.setflags(write=False)
     return array

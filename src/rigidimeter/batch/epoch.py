@@ -14,7 +14,7 @@ is below runs in the interpreter just as well, with the same bits.
 from __future__ import annotations
 
 import math
-from math import isfinite
+from math import isfinite, isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +41,7 @@ POSITION_LIMITED = int(Limited.POSITION)
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int32]
+Counts = NDArray[np.uint32]
 
 
 class Coefficients(NamedTuple):
@@ -67,15 +68,17 @@ class Joint(NamedTuple):
 class Sampling(NamedTuple):
     """When one sensor samples and when the loop learns of it; no state of the rig changes it.
 
-    `taken`, `newest` and `seen_s` have one entry a tick: how many samples have been taken, which is
-    the newest that has arrived, and its stamp. `part` and `left` have one entry a sample: where in
-    its tick it was taken (`NOW`, `BEFORE` or a row of `parts`), and the part of that tick left.
-    A row of `parts` holds the coefficients of a `Drive` for the part of a tick.
+    `taken`, `newest`, `seen_s` and `age_s` have one entry a tick: how many samples have been taken,
+    which is the newest that has arrived, its stamp, and how old that is. `part` and `left` have one
+    entry a sample: where in its tick it was taken (`NOW`, `BEFORE` or a row of `parts`), and the
+    part of that tick left. A row of `parts` holds the coefficients of a `Drive` for the part of a
+    tick. What is never negative is said to be so: no index is then counted from an array's end.
     """
 
-    taken: Integers
-    newest: Integers
+    taken: Counts
+    newest: Counts
     seen_s: Floats
+    age_s: Floats
     part: Integers
     left: Floats
     parts: Floats
@@ -123,14 +126,14 @@ def run_epoch(
     )
     J, B, K = joint
     # Arrays are named once, before the first tick: each look into a tuple would count references.
-    torque_taken, torque_newest, torque_seen_s, torque_part, torque_left, torque_parts = torque
-    motion_taken, motion_newest, motion_seen_s, motion_part, _, motion_parts = motion
+    torque_taken, torque_newest, _, torque_age_s, torque_part, torque_left, torque_parts = torque
+    motion_taken, motion_newest, _, motion_age_s, motion_part, _, motion_parts = motion
     out_torque, out_angle, out_velocity, out_request, out_command, out_limited = columns
     torques = np.empty(torque_part.shape[0])
     angles, velocities = np.empty(motion_part.shape[0]), np.empty(motion_part.shape[0])
     next_torque = next_motion = limited_ticks = 0
-    command = voluntary = 0.0
     limit_time_s = math.nan
+    command = voluntary = 0.0
     cause = guard.cause
     ticks = perturbation_nm.shape[0]
     for tick in range(perturbation_nm.shape[0]):
@@ -157,7 +160,6 @@ def run_epoch(
             velocities[next_motion] = quantised(velocity, velocity_step)
             next_motion += 1
 
-        due_s = tick / rate_hz
         torque_nm = torques[torque_newest[tick]]
         seen = motion_newest[tick]
         angle, velocity = angles[seen], velocities[seen]
@@ -174,13 +176,13 @@ def run_epoch(
             torque_nm,
             angle,
             velocity,
-            due_s - motion_seen_s[tick],
-            due_s - torque_seen_s[tick],
+            motion_age_s[tick],
+            torque_age_s[tick],
         )
         if limited:
             limited_ticks += 1
-            if limited == POSITION_LIMITED and not limit_time_s <= due_s:
-                limit_time_s = due_s
+            if limited == POSITION_LIMITED and isnan(limit_time_s):
+                limit_time_s = tick / rate_hz
         out_torque[tick] = torque_nm
         out_angle[tick] = angle
         out_velocity[tick] = velocity

@@ -120,8 +120,9 @@ def run_row(
     for name, value in zip(("cause", "limit_time_s", "limited_ticks"), result, strict=True):
         rows[name][row] = value
     rows["ticks"][row] = ticks
-    for name in (*Columns._fields, *jittering):
-        rows[name][row, ticks:] = 0 if name == "limited" else np.nan
+    if ticks < bench.ticks:
+        for name in (*Columns._fields, *jittering):
+            rows[name][row, ticks:] = 0 if name == "limited" else np.nan
 
 
 def batch_of(
@@ -142,7 +143,7 @@ def batch_of(
         first=first,
         joints=tuple(joints),
         conditions=tuple(conditions),
-        time_s=np.arange(bench.ticks) / bench.settings.rig.tick_rate_hz,
+        time_s=bench.tick_s,
         perturbation_nm=perturbation_nm,
         **columns,
     )

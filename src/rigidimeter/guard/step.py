@@ -162,11 +162,11 @@ def guard_step(
         reaction = max(reaction, REACTIONS[found])
 
     sent, limited = requested_rad_s, _NOT_LIMITED
+    change = limits.acceleration_rad_s2 * dt
     if cause != _NO_CAUSE:
         sent, limited = 0.0, int(Limited.LATCHED)
-    change = limits.acceleration_rad_s2 * dt
-    if reaction == _CUT:
-        change = abs(sent_before)  # nothing is left to ramp
+        if reaction == _CUT:
+            change = abs(sent_before)  # nothing is left to ramp
     if sent > sent_before + change:
         sent, limited = sent_before + change, max(limited, int(Limited.ACCELERATION))
     elif sent < sent_before - change:
@@ -176,7 +176,7 @@ def guard_step(
 
     # Toward the nearer limit, no faster than can still be stopped in the distance left when the
     # next step comes late.
-    toward = 1.0 if sent > 0 else -1.0
+    toward = math.copysign(1.0, sent)
     left = limits.position_rad - toward * angle
     reach_s = old_s + reaction_time_s
     held_s = dt + limits.gap_s

@@ -32,7 +32,7 @@ def quantised(value: float, resolution: float) -> float:
     """
     if resolution == 0.0:
         return value
-    steps = value / resolution
+    steps = value * (1.0 / resolution)
     if not abs(steps) < _MOST_STEPS:
         return value
     return ((steps + _WHOLE_ONLY) - _WHOLE_ONLY) * resolution
