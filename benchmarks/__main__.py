@@ -14,9 +14,9 @@ import numpy as np
 
 from benchmarks import batch, estimation, online
 from benchmarks.paired import REPEATS, Row, in_ms, paired
-from rigidimeter.cli.virtual import run_virtual_session
 from rigidimeter.recording import ReadOptions, read_recording
 from rigidimeter.settings import parse_settings
+from rigidimeter.virtual.session import run_virtual_session
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "benchmarks.md"
 

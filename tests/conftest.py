@@ -9,8 +9,8 @@ import hypothesis
 import pytest
 
 from rigidimeter.cli.main import main
-from rigidimeter.cli.virtual import run_virtual_session
 from rigidimeter.settings import parse_settings
+from rigidimeter.virtual.session import run_virtual_session
 
 Simulate = Callable[..., Path]
 

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from rigidimeter.acquisition.processes.board import Condition, Role
-from rigidimeter.acquisition.processes.realtime import DeadlineClock
+from rigidimeter.acquisition.processes.deadline import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.supervise import Realtime, supervise
 from rigidimeter.guard import Cause

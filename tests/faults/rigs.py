@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rigidimeter.acquisition.clock import SimulatedClock
-from rigidimeter.acquisition.processes.realtime import DeadlineClock
+from rigidimeter.acquisition.processes.deadline import DeadlineClock
 from rigidimeter.device import SimulatedRig
 from rigidimeter.device.ascii.drive import AsciiDrive
 from rigidimeter.device.ati.rdt import AtiRdt
@@ -225,7 +225,7 @@ class Line:
 
     def __init__(self, now: Callable[[], float]) -> None:
         self._now = now
-        self.closed = False
+        self.closed = self.port_closed = False
         self.opened_s = math.nan
 
     def close_contact(self) -> None:
@@ -235,6 +235,10 @@ class Line:
         if self.closed:
             self.opened_s = self._now()
         self.closed = False
+
+    def close(self) -> None:
+        self.open_contact()
+        self.port_closed = True
 
 
 class VirtualClock(SimulatedClock):

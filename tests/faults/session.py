@@ -16,7 +16,7 @@ from typing import Any
 
 from rigidimeter.acquisition import run_session
 from rigidimeter.acquisition.processes.board import Board, Condition, Role
-from rigidimeter.acquisition.processes.realtime import DeadlineClock
+from rigidimeter.acquisition.processes.deadline import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.supervise import LoopSide, Realtime, supervise
 from rigidimeter.design import plan

@@ -145,7 +145,14 @@ class SharedDesk:
         self.board, self.ring = Board.create(), SampleRing.create(100_000)
         now_ns = lambda: 10**9 + round(1e9 * made.clock.now_s())  # noqa: E731
         self.board._now_ns = now_ns
-        self.outside = BoardOutside(self.board, self.ring, now_ns=now_ns, **options)
+        self.suspended_s = 0.0
+        self.outside = BoardOutside(
+            self.board,
+            self.ring,
+            now_ns=now_ns,
+            boot_ns=lambda: now_ns() + round(1e9 * self.suspended_s),
+            **options,
+        )
         self.attended = False
         self.alive = {Role.CONSOLE, Role.RECORDER}
         self.records = True
@@ -188,6 +195,19 @@ def shared_desk():
     yield make
     for desk in made:
         desk.close()
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_fault_11_suspended(rig, tmp_path, shared_desk, measured):
+    """The computer sleeps for a minute: no tick is late, for the loop's clock slept too."""
+    with bench(rig) as made:
+        desk = shared_desk(made)
+        trial = run(made, tmp_path / "s", lambda: setattr(desk, "suspended_s", 60.0), desk=desk)
+        bound_s = 1 / made.rate_hz
+        assert_stopped(trial, Cause.STALLED, bound_s)
+        # The drive has stopped by itself meanwhile: nothing is set going again.
+        assert trial.samples["velocity_command_rad_s"][trial.first] == 0.0
+        measured(11, rig, "suspended for 60 s", trial, bound_s)
 
 
 @pytest.mark.parametrize("rig", RIGS)
@@ -371,6 +391,16 @@ def test_fault_20_every_step_of_the_way_out_is_tried(rig):
     with pytest.raises(RuntimeError):
         composed.close()
     assert (drive, sensor, line.closed) == (["disable", "close"], ["close"], False)
+    assert line.port_closed
+
+
+def test_fault_20_a_contact_that_cannot_be_opened_spares_no_step():
+    sensor, drive, line = [], [], []
+    composed = ComposedRig(Stubborn(sensor), Stubborn(drive), 50.0, Stubborn(line))
+    with pytest.raises(RuntimeError):
+        composed.close()
+    assert (drive, sensor) == (["disable", "close"], ["close"])
+    assert line == ["open_contact", "close"]
 
 
 @pytest.mark.parametrize("rig", RIGS)

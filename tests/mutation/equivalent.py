@@ -6,7 +6,6 @@ NEAR = "step.py guard_step: "
 EQUIVALENT: dict[str, str] = {
     "replay.py replay: Cause.NONE → Cause.SOFTWARE": "a guard at the start holds nothing",
     "step.py guard_step: 1 → 0": "elapsed_ticks if not given: none counts as one",
-    "step.py guard_step: sent > 0 → sent >= 0": "at rest neither side limits",
     NEAR + "speed * speed / (2.0 * limits.acceleration_rad_s2) → "
     "speed * speed * (2.0 * limits.acceleration_rad_s2)": SLOWER,
     NEAR + "2.0 * limits.acceleration_rad_s2 → 2.0 / limits.acceleration_rad_s2": SLOWER,

@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
+from tests.unit.virtual.tiny import tiny
 
 from rigidimeter.errors import UserError
 from rigidimeter.joint import JointDynamics
@@ -40,19 +43,25 @@ from rigidimeter.reproduce.scores import (
 )
 from rigidimeter.reproduce.voluntary import voluntary_errors_percent
 
-SMALL = {
-    "ratings": {"OFF": 27, "DBS": 12},
-    "sinusoid": {"OFF": 6, "DBS": 4},
-    "prbs": {"OFF": 5, "DBS": 4},
-}
 HEAVY = {  # made of simulations
     "sec-1-voluntary-ols", "sec-1-voluntary-iv", "sec-3.4-mean", "sec-3.4-sd", "sec-3.4-noise",
 }  # fmt: skip
 
 
 @pytest.fixture(scope="module")
-def workshop() -> Workshop:
-    return Workshop(7, runs=24, pooled_epochs=4, counts=SMALL)
+def study_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("paper") / "virtual-study"
+
+
+def small_workshop(folder: Path) -> Workshop:
+    """Return a workshop whose virtual study is made once and then read."""
+    small = tiny(prbs=4, sinusoid=4)
+    return Workshop(7, runs=24, pooled_epochs=4, design=small, folder=folder, processes=1)
+
+
+@pytest.fixture(scope="module")
+def workshop(study_folder: Path) -> Workshop:
+    return small_workshop(study_folder)
 
 
 @pytest.fixture(scope="module")
@@ -190,11 +199,38 @@ def test_the_files(rows: dict[str, Row], tmp_path) -> None:
         assert f'id="{row_id}"' in text
 
 
-def test_the_same_seed_gives_the_same_bytes(rows: dict[str, Row]) -> None:
-    again = make_rows(Workshop(7, runs=24, pooled_epochs=4, counts=SMALL), ["fig-5a", "fig-5c"])
+def test_the_same_seed_gives_the_same_bytes(rows: dict[str, Row], study_folder: Path) -> None:
+    again = make_rows(small_workshop(study_folder), ["fig-5a", "fig-5c"])
     assert ledger_text(again) == ledger_text([rows["fig-5a"], rows["fig-5c"]])
     assert again[1].pictures[0].svg == rows["fig-5c"].pictures[0].svg
     assert render_page(again, 7) == render_page([rows["fig-5a"], rows["fig-5c"]], 7)
+
+
+def test_the_virtual_study_is_kept_as_a_study_folder(
+    rows: dict[str, Row], study_folder: Path
+) -> None:
+    assert (study_folder / "study.toml").is_file()
+    assert (study_folder / "sessions.csv").is_file()
+    assert any(row.virtual for row in rows.values())
+
+
+def test_another_seed_does_not_take_the_study_that_is_there(
+    rows: dict[str, Row], study_folder: Path
+) -> None:
+    other = Workshop(8, design=tiny(), folder=study_folder, processes=1)
+    with pytest.raises(UserError, match=r"is the virtual study of .* seed 7.*not of .* seed 8"):
+        _ = other.study
+
+
+def test_the_whole_study_has_the_counts_of_table_1() -> None:
+    assert Workshop().counts == printed.COUNTS
+
+
+def test_every_measure_of_the_virtual_study_has_its_day_test(workshop: Workshop) -> None:
+    found = workshop.day_test("stiffness_nm_rad")
+    assert (found.n_days_x, found.n_days_y) == (2, 2)
+    off, dbs = (workshop.comparison("stiffness_nm_rad").values[name] for name in ("OFF", "DBS"))
+    assert found.estimate == pytest.approx(np.mean(off) - np.mean(dbs))  # as many on each day
 
 
 def test_an_unknown_row_is_refused_with_the_names() -> None:

@@ -533,6 +533,7 @@ drive = Cia402Drive(
     Cia402Settings(
         interface="udp_multicast", channel=sys.argv[1], port=int(sys.argv[2]), lost_s=1.0,
         heartbeat_s=0.02, drive_watchdog_s=0.3, command_deadline_s=float(sys.argv[3]),
+        quick_stop_rad_s2=60.0,  # a ramp that the arm can follow: it rings after a steeper one
     ),
     time.monotonic,
 )

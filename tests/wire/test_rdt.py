@@ -363,6 +363,38 @@ def test_a_sensor_that_comes_back_changed_is_refused(peer, sensor_of, sensor, na
     assert sensor.read().cause == Cause.NONE
 
 
+def test_a_sensor_that_was_refused_is_not_started_again(peer, sensor):
+    """Enabling a rig asks for the samples anew; that must not pass by what configuring found."""
+    sensor.restart()  # as it is, it may
+    assert sensor.read().sequence >= 0
+    sensor.close()
+    peer.misbehave("changed_units")
+    sensor.connect()
+    with pytest.raises(DeviceError, match="came back changed"):
+        sensor.configure()
+    asked = len(peer.requests)
+    with pytest.raises(DeviceError, match="it is not configured; configure it first"):
+        sensor.restart()
+    assert len(peer.requests) == asked
+    assert sensor.read().sequence < 0
+    peer.behave()
+    with pytest.raises(DeviceError, match="it is not configured"):  # well again, not looked at
+        sensor.restart()
+    sensor.configure()
+    sensor.restart()
+    assert sensor.read().cause == Cause.NONE
+
+
+def test_a_sensor_that_gave_no_sample_is_not_started_again(peer, sensor_of):
+    sensor = sensor_of(peer)
+    peer.misbehave("deaf")
+    for _ in range(2):
+        with pytest.raises(DeviceError, match="no sample"):
+            sensor.configure()
+        with pytest.raises(DeviceError, match="it is not configured"):
+            sensor.restart()
+
+
 @pytest.mark.parametrize(
     ("expected", "words"),
     [

@@ -9,13 +9,13 @@ follows is limited by the guard like anything else.
 from __future__ import annotations
 
 import math
+from typing import Any
 
+from rigidimeter.acquisition.loop import ControlLoop
+from rigidimeter.acquisition.states import Order
 from rigidimeter.settings import ControllerSettings
 
-__all__ = ["PARAMETERS", "bounds"]
-
-PARAMETERS = ("inertia_kg_m2", "damping_nm_s_rad", "perturbation_scale")
-"""Names in a fixed order: a place in it is what travels between processes."""
+__all__ = ["Parameters", "bounds"]
 
 MOST = 10.0
 
@@ -26,7 +26,7 @@ def bounds(name: str, controller: ControllerSettings) -> tuple[float, float]:
     Parameters
     ----------
     name : str
-        One of `PARAMETERS`.
+        As the operator typed it.
     controller : ControllerSettings
         Of the protocol.
     """
@@ -36,3 +36,34 @@ def bounds(name: str, controller: ControllerSettings) -> tuple[float, float]:
         value = getattr(controller, name)
         return value, MOST * value
     return math.nan, math.nan
+
+
+class Parameters:
+    """The parameters as they are while a session runs.
+
+    Parameters
+    ----------
+    controller : ControllerSettings
+        Of the protocol.
+    """
+
+    def __init__(self, controller: ControllerSettings) -> None:
+        self._protocol = controller
+        self._values = {
+            "inertia_kg_m2": controller.inertia_kg_m2,
+            "damping_nm_s_rad": controller.damping_nm_s_rad,
+        }
+
+    def change(self, order: Order, loop: ControlLoop) -> dict[str, Any]:
+        """Change a parameter within its bounds; return what happened, for the record."""
+        low, high = bounds(order.name, self._protocol)
+        facts = {"name": order.name, "value": order.value if math.isfinite(order.value) else None}
+        if not low <= order.value <= high:
+            return {**facts, "refused": f"must be between {low:g} and {high:g}"}
+        if order.name == "perturbation_scale":
+            facts["before"], loop.scale = loop.scale, order.value
+        else:
+            facts["before"] = self._values[order.name]
+            self._values[order.name] = order.value
+            loop.change_controller(**self._values)
+        return facts

@@ -1,96 +1,38 @@
-"""One tick: wait, read, filter, control, guard, write, record.
+"""What is asked of the joint, tick for tick: to give way, to follow, to return, to stand still.
 
-The loop sees the rig only through `device.base` and takes its clock as an argument. What is
-recorded is what was sent after the guard.
-
-A tick that comes late is not made up for: the ticks whose time has passed are left out, the
-controller steps over the time that did pass (at most `LONGEST_STEP` ticks of it), and perturbation
-and position go on where the time is.
+After missed ticks the controller steps over the time that did pass (at most `LONGEST_STEP` ticks of
+it), and perturbation and position go on where the time is.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 from rigidimeter.acquisition.clock import Clock
-from rigidimeter.acquisition.outside import Alone, Outside
-from rigidimeter.acquisition.states import Command, Order
+from rigidimeter.acquisition.outside import Outside
+from rigidimeter.acquisition.states import Order
+from rigidimeter.acquisition.tick import REST, Passage, Recorder, Ticks
 from rigidimeter.control import (
     Admittance,
-    Biquad,
-    BiquadState,
     admittance,
     admittance_step,
-    biquad_step,
-    butterworth_lowpass,
     minimum_jerk,
     tracking_step,
 )
 from rigidimeter.device.base import Reading, Rig
-from rigidimeter.guard import (
-    REACTIONS,
-    Cause,
-    Limited,
-    Reaction,
-    guard_limits,
-    guard_state,
-    guard_step,
-    released,
-)
-from rigidimeter.recording.log import Sample
 from rigidimeter.settings import Settings
 
 __all__ = ["REST", "ControlLoop", "Passage"]
 
-REST = -1
-"""The epoch number of samples between epochs."""
-
 LONGEST_STEP = 5
 """The controller steps over at most so many ticks at once, however many were missed."""
 
-POSITION_LIMITED, CUT = int(Limited.POSITION), int(Reaction.CUT)
-STALLED = int(Cause.STALLED)
 
-Recorder = Callable[[Sample], None]
-Controller = Callable[[Reading, float, int], tuple[float, float, float]]
-"""Takes reading, filtered torque and place; gives velocity, perturbation and target."""
-
-
-class Passage(NamedTuple):
-    """How a stretch of ticks went.
-
-    `limit_time_s` is when the position limit first held the command back, NaN if it never did;
-    `cause` is why the guard latched, `Cause.NONE` if it did not; `limited_ticks` is how many
-    commands the guard changed, for whatever limit; `missed_ticks` how many were left out;
-    `interrupted` whether an operator ended it.
-    """
-
-    limit_time_s: float
-    cause: Cause
-    limited_ticks: int
-    missed_ticks: int = 0
-    interrupted: bool = False
-
-
-class ControlLoop:
+class ControlLoop(Ticks):
     """Run stretches of ticks on a rig: the perturbed admittance, or following a position.
 
-    Parameters
-    ----------
-    settings : Settings
-    rig : Rig
-        Enabled by whoever made it.
-    clock : Clock
-    record : callable
-        Takes one `Sample` a tick.
-    progress : callable
-        Takes the session time, about once a second of it.
-    outside : Outside
-        Asked at every tick.
-    ordered : callable
-        Takes an order of the operator; returns whether the stretch that runs ends now.
+    The arguments are those of `Ticks`.
     """
 
     def __init__(
@@ -103,31 +45,10 @@ class ControlLoop:
         outside: Outside | None = None,
         ordered: Callable[[Order], bool] = lambda _: False,
     ) -> None:
-        self._progress = progress
-        self._rate_hz = settings.rig.tick_rate_hz
-        self._interval_s = 1.0 / self._rate_hz
-        self._second = round(self._rate_hz)
-        self._rig = rig
-        self._clock = clock
-        self._record = record
-        self._outside = outside or Alone()
-        self._ordered = ordered
+        super().__init__(settings, rig, clock, record, progress, outside, ordered)
         controller = settings.controller
         self._steps = self._admittances(controller.inertia_kg_m2, controller.damping_nm_s_rad)
         self._tracking_gain = controller.tracking_gain_per_s
-        self._lowpass: Biquad = butterworth_lowpass(controller.torque_cutoff_hz, self._rate_hz)
-        self._filter = BiquadState()
-        self._limits = guard_limits(settings)
-        self._guard = guard_state(self._limits)
-        self._missed_limit = settings.loop.missed_in_a_row
-        self._stall_ticks = settings.loop.stall_s * self._rate_hz
-        self._tick = 0
-        self._elapsed = 1
-        self._late_in_a_row = 0
-        self._missed_ticks = 0
-        self._limit_time_s = math.nan
-        self._limited_ticks = 0
-        self._angle_rad = 0.0
         self.scale = 1.0
 
     def _admittances(self, inertia_kg_m2: float, damping_nm_s_rad: float) -> list[Admittance]:
@@ -136,36 +57,6 @@ class ControlLoop:
             admittance(inertia_kg_m2, damping_nm_s_rad, ticks * self._interval_s)
             for ticks in range(1, LONGEST_STEP + 1)
         ]
-
-    @property
-    def time_s(self) -> float:
-        """When the next tick is due."""
-        return self._tick / self._rate_hz
-
-    @property
-    def cause(self) -> Cause:
-        """Why the guard latched."""
-        return Cause(self._guard.cause)
-
-    @property
-    def reaction(self) -> Reaction:
-        """What the guard's cause asks for."""
-        return Reaction(self._guard.reaction)
-
-    @property
-    def at_rest(self) -> bool:
-        """Whether the last command was zero."""
-        return self._guard.velocity_rad_s == 0.0
-
-    def release(self) -> None:
-        """Forget the cause of a hold, from rest: the operator goes on.
-
-        Raises
-        ------
-        ValueError
-            If the guard has stopped the rig rather than held it, or is not at rest.
-        """
-        self._guard = released(self._guard)
 
     def change_controller(self, inertia_kg_m2: float, damping_nm_s_rad: float) -> None:
         """Go on with another admittance; the velocity, its only memory, stays as it is."""
@@ -218,163 +109,5 @@ class ControlLoop:
 
         return self._run(REST, round(duration_s * self._rate_hz), command, latched=True)
 
-    def begin(self) -> None:
-        """Leave out the ticks that went by while the rig was enabled, which takes its time."""
-        while (late := self._ticks_late()) > 0:
-            self._rig.read(late)
-            self._tick += late
-
-    def _ticks_late(self) -> int:
-        """Wait for the tick that is due, and return how many whole ticks late that is."""
-        return math.floor(self._clock.wait_until(self.time_s) * self._rate_hz) - self._tick
-
-    def stop(self) -> None:
-        """Ramp the velocity to zero within the acceleration limit.
-
-        A tick that fails, say because its sample cannot be recorded, does not end the ramp. It goes
-        on without reading and recording, and the failure is raised after it.
-        """
-
-        def command(_: Reading, __: float, ___: int) -> tuple[float, float, float]:
-            return 0.0, 0.0, math.nan
-
-        try:
-            for _ in range(round(self._rate_hz)):
-                if self._guard.velocity_rad_s == 0.0:
-                    return
-                self._run_tick(REST, 0, command)
-        except BaseException:
-            self._ramp_unrecorded()
-            raise
-
-    def _ramp_unrecorded(self) -> None:
-        """Only write: what else a tick does has failed."""
-        # The ramp takes its time, however late the failure made it.
-        self._tick += max(self._ticks_late(), 0)
-        change = self._limits.acceleration_rad_s2 * self._interval_s
-        while (velocity := self._guard.velocity_rad_s) != 0.0:
-            velocity = math.copysign(max(abs(velocity) - change, 0.0), velocity)
-            self._guard = self._guard._replace(velocity_rad_s=velocity)
-            self._clock.wait_until(self.time_s)
-            self._rig.write(velocity)
-            self._tick += 1
-
     def _age_ticks(self, reading: Reading) -> int:
         return round(self._tick - reading.motion_time_s * self._rate_hz)
-
-    def _run(self, epoch: int, n: int, command: Controller, latched: bool = False) -> Passage:
-        """Run `n` ticks' time; a guard that latches ends it, unless it was latched from the start.
-
-        `latched` allows that: the rig stands still, held.
-        """
-        self._limit_time_s = math.nan
-        self._limited_ticks = self._missed_ticks = 0
-        known = self._guard.reaction if latched else 0
-        interrupted = False
-        k = 0
-        while k < n:
-            k = self._run_tick(epoch, k, command, n - 1) + 1
-            if self._guard.reaction > known:
-                break
-            order = self._outside.order()
-            if order.command is not Command.NONE and self._ordered(order):
-                interrupted = True
-                break
-            if self._tick % self._second == 0:
-                self._progress(self.time_s)
-        return Passage(
-            self._limit_time_s,
-            Cause(self._guard.cause),
-            self._limited_ticks,
-            self._missed_ticks,
-            interrupted,
-        )
-
-    def _run_tick(self, epoch: int, k: int, command: Controller, last: int = 0) -> int:
-        """Run one tick, and return the place it had: later than `k` if ticks were missed."""
-        due_s = self._tick / self._rate_hz
-        now_s = self._clock.wait_until(due_s)
-        lateness_s = now_s - due_s
-        late = 0
-        if lateness_s >= self._interval_s:
-            late = self._miss(int(lateness_s * self._rate_hz))
-            k = min(k + self._elapsed - 1, last)
-            due_s = self._tick / self._rate_hz
-        else:
-            self._elapsed, self._late_in_a_row = 1, 0
-        reading = self._rig.read(self._elapsed)
-        torque_nm, torque_s, angle, velocity, motion_s = reading[:5]
-        if math.isfinite(torque_nm):  # a bad number must not enter the filter's memory
-            self._filter, smooth_nm = biquad_step(self._lowpass, self._filter, torque_nm)
-        else:
-            smooth_nm = torque_nm
-        request, perturbation_nm, target = command(reading, smooth_nm, k)
-        if late == STALLED:
-            # A drive with a watchdog has stopped by now, and a ramp down from the velocity before
-            # would set the arm going again; one without brakes by its own ramp.
-            self._guard = self._guard._replace(velocity_rad_s=0.0)
-        was_cut = self._guard.reaction
-        self._guard, allowed, limited = guard_step(
-            self._limits,
-            self._guard,
-            request,
-            torque_nm,
-            angle,
-            velocity,
-            due_s - motion_s,
-            due_s - torque_s,
-            # A loop that stood still comes first: the drive's own watchdog follows from it.
-            _graver(_graver(late, reading.cause), self._outside.cause(now_s)),
-            self._elapsed,
-        )
-        if self._guard.reaction == CUT and was_cut != CUT:
-            self._rig.disable()
-        sent = self._rig.write(allowed)
-        if limited:
-            self._limited_ticks += 1
-            if limited == POSITION_LIMITED and not self._limit_time_s <= due_s:
-                self._limit_time_s = due_s
-        if math.isfinite(angle):
-            self._angle_rad = angle
-        self._record(
-            Sample(
-                self._tick,
-                now_s,
-                lateness_s,
-                epoch,
-                perturbation_nm,
-                torque_nm,
-                torque_s,
-                angle,
-                velocity,
-                motion_s,
-                target,
-                request,
-                sent,
-                limited,
-                reading.torque_sequence,
-                reading.torque_status,
-                reading.motion_sequence,
-                reading.motion_status,
-                self._guard.cause,
-            )
-        )
-        self._tick += 1
-        return k
-
-    def _miss(self, ticks: int) -> int:
-        """Leave out the ticks whose time has passed; return a cause if they were too many."""
-        self._tick += ticks
-        self._elapsed = ticks + 1
-        self._missed_ticks += ticks
-        self._late_in_a_row += 1
-        if ticks >= self._stall_ticks:
-            return int(Cause.STALLED)
-        if self._late_in_a_row >= self._missed_limit:
-            return int(Cause.DEADLINES_MISSED)
-        return int(Cause.NONE)
-
-
-def _graver(cause: int, other: int) -> int:
-    """Return the cause with the stronger reaction: an emergency stop is not masked by a fault."""
-    return other if REACTIONS[other] > REACTIONS[cause] else cause

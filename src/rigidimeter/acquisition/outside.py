@@ -20,7 +20,8 @@ class Outside(Protocol):
     def cause(self, now_s: float) -> int:
         """Return a `guard.Cause` to stop for, 0 if there is none.
 
-        A console or a recorder that no longer answers, an emergency stop, a signal.
+        A console or a recorder that no longer answers, an emergency stop, a signal, a computer
+        that was suspended.
         """
 
     def order(self) -> Order:

@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rigidimeter.acquisition.changes import bounds
 from rigidimeter.acquisition.clock import Clock
-from rigidimeter.acquisition.loop import ControlLoop, Passage
-from rigidimeter.acquisition.outside import Alone, Outside, Sink
-from rigidimeter.acquisition.states import Command, Order, Run, State, after, epoch_over
+from rigidimeter.acquisition.conduct import Conduct
+from rigidimeter.acquisition.loop import Passage
+from rigidimeter.acquisition.outside import Outside, Sink
+from rigidimeter.acquisition.states import Command, Run, State, after, epoch_over
 from rigidimeter.acquisition.zeroing import Zeroing
 from rigidimeter.design import PlannedEpoch, Protocol, prbs_nm, sinusoid
 from rigidimeter.device.base import Rig
@@ -88,7 +88,7 @@ def run_session(
     return session.run(zero_first)
 
 
-class _Session:
+class _Session(Conduct):
     """One run; see `run_session`."""
 
     def __init__(
@@ -103,31 +103,15 @@ class _Session:
         outside: Outside | None,
         state_changed: Callable[[Run], None],
     ) -> None:
-        self._settings = settings
-        self._rig = rig
-        self._writer = writer
+        super().__init__(settings, rig, clock, writer, progress, outside, state_changed)
         self._before_epoch = before_epoch
-        self._outside = outside or Alone()
-        self._state_changed = state_changed
-        self._loop = ControlLoop(
-            settings, rig, clock, writer.sample, progress, self._outside, self._obey
-        )
         self._perturbation = prbs_nm(settings.prbs, settings.rig.tick_rate_hz).tolist()
         self._angle, self._velocity = (
             values.tolist() for values in sinusoid(settings.sinusoid, settings.rig.tick_rate_hz)
         )
         self._queue = deque(protocol.epochs)
         self._next_number = max((epoch.number for epoch in protocol.epochs), default=0) + 1
-        self._controller = {
-            "inertia_kg_m2": settings.controller.inertia_kg_m2,
-            "damping_nm_s_rad": settings.controller.damping_nm_s_rad,
-        }
-        self._state = Run()
-        self._current: PlannedEpoch | None = None
         self._epochs_run = self._epochs_good = 0
-        self._outcome: Ending = "success"
-        self._reason = ""
-        self._cause = Cause.NONE
 
     def run(self, zero_first: bool) -> SessionResult:
         """Run all epochs, whatever comes."""
@@ -143,7 +127,7 @@ class _Session:
                 self._writer.event("rig_enabled", time_s=self._loop.time_s, origin_rad=origin_rad)
             if not zero_first or self._zero():
                 self._epochs()
-            self._conclude()
+            self._conclude(len(self._queue))
         except KeyboardInterrupt:
             self._outcome, self._reason = "abort", "interrupted by the operator"
         except Exception as error:
@@ -190,24 +174,6 @@ class _Session:
                 return False
             self._become(epoch_over(self._state))
         return self._in(State.RUNNING)
-
-    def _in(self, state: State) -> bool:
-        return self._state.state is state
-
-    def _conclude(self) -> None:
-        """Say how the session ended where nothing has said so yet."""
-        left = len(self._queue)
-        if self._reason:
-            return
-        if self._state.state is State.STOPPING:
-            what = "aborted" if self._state.aborted else "stopped"
-            self._reason = f"{what} by the operator with {left} epochs left"
-            self._outcome = "abort" if self._state.aborted else "success"
-        elif left:
-            self._outcome, self._reason = "fail", f"ended with {left} epochs left"
-        elif self._loop.reaction is Reaction.HOLD:
-            self._cause = self._loop.cause
-            self._reason = f"the guard held the rig in the last epoch: {self._cause.sentence}"
 
     def _epoch(self, planned: PlannedEpoch) -> Passage:
         """Run one epoch and close it."""
@@ -284,72 +250,6 @@ class _Session:
             return False
         self._rig.zero(bias_nm)
         return True
-
-    def _failed(self) -> bool:
-        """Whether the guard stopped the rig; the reason is kept."""
-        if self._loop.reaction <= Reaction.HOLD:
-            return False
-        self._cause = self._loop.cause
-        self._outcome = "fail"
-        self._reason = f"the guard stopped the rig: {self._cause.sentence}"
-        self._become(Run(State.FAULTED))
-        return True
-
-    def _held(self) -> bool:
-        """If the guard holds the rig, pause; without an operator that is the end."""
-        if self._loop.reaction is Reaction.NONE:
-            return True
-        if self._state.state is State.STOPPING:
-            return True
-        if self._outside.attended:
-            self._become(Run(State.PAUSED, stop_next=self._state.stop_next))
-            return True
-        self._cause = self._loop.cause
-        self._outcome = "fail"
-        self._reason = (
-            f"the guard held the rig and nobody was there to go on: {self._cause.sentence}"
-        )
-        return False
-
-    def _obey(self, order: Order) -> bool:
-        """Take an order; return whether the stretch that runs ends now."""
-        facts: dict[str, Any] = {}
-        if order.command is Command.CHANGE:
-            facts = self._change(order)
-        before = self._state
-        self._become(after(before, order.command))
-        self._writer.event(
-            "order",
-            time_s=self._loop.time_s,
-            command=order.command.name.lower(),
-            state=self._state.state.name.lower(),
-            **facts,
-        )
-        if order.command is Command.HALT:
-            self._rig.disable()
-            self._cause, self._outcome = Cause.OPERATOR_HALT, "fail"
-            self._reason = Cause.OPERATOR_HALT.sentence
-        ends_rest = order.command is Command.STOP and self._current is None
-        return self._state.at_once or ends_rest
-
-    def _change(self, order: Order) -> dict[str, Any]:
-        """Change a parameter within its bounds; return what happened, for the record."""
-        low, high = bounds(order.name, self._settings.controller)
-        facts = {"name": order.name, "value": order.value if math.isfinite(order.value) else None}
-        if not low <= order.value <= high:
-            return {**facts, "refused": f"must be between {low:g} and {high:g}"}
-        if order.name == "perturbation_scale":
-            facts["before"], self._loop.scale = self._loop.scale, order.value
-        else:
-            facts["before"] = self._controller[order.name]
-            self._controller[order.name] = order.value
-            self._loop.change_controller(**self._controller)
-        return facts
-
-    def _become(self, run: Run) -> None:
-        if run != self._state:
-            self._state = run
-            self._state_changed(run)
 
     def _close(self) -> None:
         """Stop, disable, close: every step is tried even when one before it fails."""

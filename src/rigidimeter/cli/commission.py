@@ -26,7 +26,9 @@ def commission(
     yes: Annotated[
         bool,
         typer.Option(
-            "--yes", help="Consent to every question beforehand; the emergency stop is not tried."
+            "--yes",
+            help="Consent to every motion beforehand. What only a person can tell is not tried, so "
+            "the record is good for an emulated rig only.",
         ),
     ] = False,
     known_torque: Annotated[
@@ -54,9 +56,10 @@ def commission(
 ) -> None:
     """Try a rig, without anyone in it, and write a record that later runs ask for.
 
-    First without power: what the devices say, rates, noise, lateness. Then, with your consent, by a
-    small slow motion: directions, units, delays, stability of the protocol's controller, watchdog
-    and emergency stop. Fasten a spring or a weight like a relaxed arm's to the joint.
+    First without power: what the devices say, rates, noise, lateness, mechanical stops. Then, with
+    your consent, by a small slow motion: directions, units, delays, stability of the protocol's
+    controller, watchdog and emergency stop. Fasten a spring or a weight like a relaxed arm's to the
+    joint. On hardware a person must be there, and sign.
 
     \b
     For example:
@@ -66,57 +69,61 @@ def commission(
     from datetime import UTC, datetime
 
     from rigidimeter import __version__
-    from rigidimeter.acquisition.processes.realtime import DeadlineClock, prepare_loop_process
+    from rigidimeter.acquisition.processes.deadline import DeadlineClock
+    from rigidimeter.acquisition.processes.realtime import prepare_loop_process
     from rigidimeter.commissioning import Operator, Timebase, record_path, write_record
     from rigidimeter.commissioning import commission as try_rig
     from rigidimeter.device.rigfile import load_rig
     from rigidimeter.settings import load_settings
 
     rigfile, chosen = load_rig(rig), load_settings(settings)
-    claim = rigfile.claim()
     if not yes and not sys.stdin.isatty():
-        raise UserError("nobody is there to consent; give --yes, or use a terminal")
+        raise UserError("nobody is there to answer; use a terminal, or --yes on an emulated rig")
+    if not rigfile.emulated and not signed_by.strip():
+        raise UserError(
+            f"{rig}: is a rig of hardware; say who answers for it with --signed-by NAME"
+        )
     operator = Operator(
         ask=(lambda _: True) if yes else _ask,
         say=lambda what: typer.echo(what, err=True),
-        presses=not yes,
+        present=not yes,
         known_torque_nm=known_torque,
         known_angle_deg=known_angle,
     )
     typer.echo(str(prepare_loop_process()), err=True)
     clock = DeadlineClock()
-    found = try_rig(
-        rigfile.build(clock.now_s, chosen.rig.tick_rate_hz),
-        rigfile,
-        chosen,
-        Timebase(clock.now_s, clock.wait_until),
-        operator,
-        limits=chosen.commissioning,
-        made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
-        software=__version__,
-        signed_by=signed_by,
-    )
-    claim.close()
+    with rigfile.claim():
+        found = try_rig(
+            rigfile.build(clock.now_s, chosen.rig.tick_rate_hz),
+            rigfile,
+            chosen,
+            Timebase(clock.now_s, clock.wait_until),
+            operator,
+            limits=chosen.commissioning,
+            made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
+            software=__version__,
+            signed_by=signed_by,
+        )
     path = out or record_path(rig)
     write_record(path, found)
     typer.echo(table(found))
     typer.echo(f"Record: {path}")
-    if found.failed:
-        raise UserError(f"{rig}: not fit for a person: {found.failed[0].sentence}")
-    if found.missing:
-        raise UserError(
-            f"{rig}: not fit for a person: {found.missing[0]!r} was not possible; the "
-            "table says why"
-        )
+    if found.objection:
+        raise UserError(f"{rig}: not fit for a person: {found.objection}")
     if found.not_tried:
         typer.echo(f"Not tried: {', '.join(found.not_tried)}.")
+    what = "this emulated rig, with nobody in it" if found.emulated else "this rig"
+    typer.echo(
+        f"Good for {what}, its devices and this controller, for "
+        f"{chosen.commissioning.validity_days:g} days."
+    )
 
 
 def table(record: CommissioningRecord) -> str:
     """Return the checks as lines, each with its remedy below where it has one."""
-    lines = []
+    lines = [f"      {'check':<40}  {'found':<28}  must be"]
     for check in record.checks:
-        mark = {"passed": "ok  ", "failed": "FAIL"}.get(check.outcome, "  – ")
+        mark = {"passed": "ok  ", "failed": "FAIL"}.get(check.outcome, "–   ")
         words = "" if check.value is None else check.words
         lines.append(f"{mark}  {check.name:<40}  {words:<28}  {check.limit}")
         if check.remedy:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,9 +11,12 @@ from rigidimeter.cli.compare_show import comparison_document, comparison_lines
 from rigidimeter.cli.compare_table import compare_table
 from rigidimeter.cli.inputs import Recordings, analyse_inputs, keep_inputs, say, status
 from rigidimeter.cli.options import reads_recordings
+from rigidimeter.cli.study.analysed import KeyOption, analysed_study, study_of
+from rigidimeter.cli.study.show import study_lines
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
+    from rigidimeter.cli.study.analysed import Analysed
     from rigidimeter.study import Comparison
 
 __all__ = ["COMPARISONS_SCHEMA", "compare"]
@@ -61,12 +63,16 @@ def compare(
     resamples: Annotated[
         int, typer.Option("--resamples", min=100, metavar="N", help="Of the bootstrap.")
     ] = 9999,
+    key: KeyOption = None,
 ) -> None:
     """Compare two conditions in J, B, K, angular impulse and work, or in columns of a table.
 
     Median and quartiles, the two-sided Wilcoxon rank-sum test (asymptotic, ties and continuity
     corrected), effect size r = z/√N, and the Hodges-Lehmann shift with its 95 % interval. Inputs
     are session folders, recordings, or one JSON file that `rigidimeter estimate` wrote.
+
+    A study folder (with a study.toml) adds tests in which days count, effect sizes, the examiners'
+    ratings, other methods and every exclusion, and keeps the analysis in its folder analysis.
 
     With --value the input is one table as CSV. Then r and the rank-biserial correlation have
     bootstrap intervals, several columns are adjusted by Holm, and every two are compared in how
@@ -75,6 +81,7 @@ def compare(
     \b
     For example:
       rigidimeter compare demo-study/sessions/day-1 demo-study/sessions/day-2
+      rigidimeter compare study
       rigidimeter compare before.csv after.csv --condition OFF --condition DBS
       rigidimeter compare estimates.json --reference OFF --other DBS --csv table.csv
       rigidimeter compare ratings.csv --value score --by condition --json comparison.json
@@ -84,10 +91,19 @@ def compare(
             recordings, value, by, (reference, other), session, seed, resamples, json_out, csv_out
         )
         return
+    if (folder := study_of(recordings, key)) is not None:
+        keep_inputs((json_out, csv_out), recordings.paths)
+        found = analysed_study(
+            folder, recordings, key, pair=(reference, other), seed=seed, resamples=resamples
+        )
+        _write_study(found, folder, json_out, csv_out)
+        typer.echo("\n".join([*_lines(found.study.comparisons), *study_lines(found.cohort)]))
+        _say_changes(found, folder)
+        raise typer.Exit(found.status)
     from rigidimeter.recording import read_estimates, write_json, write_text
     from rigidimeter.report import csv_text, results_table
     from rigidimeter.study import compare as compare_analysis
-    from rigidimeter.study import conditions
+    from rigidimeter.study import comparison_row, conditions
 
     keep_inputs((json_out, csv_out), recordings.paths)
     exit_status = 0
@@ -125,7 +141,7 @@ def compare(
             {
                 "schema": COMPARISONS_SCHEMA,
                 "method": analysis.method,
-                "comparisons": [_row(comparison) for comparison in comparisons],
+                "comparisons": [comparison_row(comparison) for comparison in comparisons],
             },
         )
     if csv_out is not None:
@@ -160,32 +176,33 @@ def _compare_columns(
     typer.echo("\n".join(comparison_lines(found)))
 
 
-def _row(comparison: Comparison) -> dict[str, Any]:
-    names = [comparison.reference, comparison.other]
-    return {
-        "measure": comparison.measure,
-        "unit": comparison.unit,
-        "reference": comparison.reference,
-        "other": comparison.other,
-        "groups": {
-            name: {
-                key: value if value == value else None
-                for key, value in asdict(comparison.summaries[name]).items()
-            }
-            | {"excluded": comparison.excluded[name]}
-            for name in names
-        },
-        "test": "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected",
-        **(asdict(comparison.test) if comparison.test is not None else {}),
-        "remark": comparison.remark,
-    }
+def _write_study(
+    found: Analysed, folder: Path, json_out: Path | None, csv_out: Path | None
+) -> None:
+    from rigidimeter.recording import write_json, write_text
+    from rigidimeter.report import csv_text, results_table
+    from rigidimeter.study import study_document
+
+    if json_out is not None:
+        write_json(json_out, study_document(found.study, found.cohort, str(folder)))
+    if csv_out is not None:
+        write_text(csv_out, csv_text(results_table(found.study.comparisons)))
+
+
+def _say_changes(found: Analysed, folder: Path) -> None:
+    typer.echo("")
+    if found.cohort.changes:
+        typer.echo("Since the last analysis:")
+    for change in found.cohort.changes:
+        typer.echo(f"  {change}")
+    typer.echo(f"{folder / 'analysis'}: estimates.json, comparison.json and tables")
 
 
 def _lines(comparisons: tuple[Comparison, ...]) -> list[str]:
     lines = ["Wilcoxon rank-sum test, two-sided, asymptotic, tie and continuity corrected", ""]
     for c in comparisons:
         lines.append(f"{c.title} ({c.unit})")
-        for name in (c.reference, c.other):
+        for name in filter(None, (c.reference, c.other)):
             s = c.summaries[name]
             lines.append(
                 f"  {name:>10}: n {s.n:3d}, excluded {c.excluded[name]:2d}, median {s.median:.4g} "

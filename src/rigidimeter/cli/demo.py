@@ -104,8 +104,8 @@ def _simulate(settings: list[dict[str, Any]], folders: list[Path]) -> None:
     from multiprocessing import get_context
 
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.cli.virtual import session_length_s
     from rigidimeter.settings import parse_settings
+    from rigidimeter.virtual.session import session_length_s
 
     total_s = sum(session_length_s(parse_settings(values)) for values in settings)
     context = get_context("spawn")
@@ -134,8 +134,8 @@ def _run_day(index: int, values: dict[str, Any], folder: str, reached: Any) -> N
     """Run one session in its own process, reporting its time as it goes."""
     import sys
 
-    from rigidimeter.cli.virtual import run_virtual_session
     from rigidimeter.settings import parse_settings
+    from rigidimeter.virtual.session import run_virtual_session
 
     def reach(time_s: float) -> None:
         reached[index] = time_s

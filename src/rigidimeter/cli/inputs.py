@@ -15,7 +15,15 @@ if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score, Task
     from rigidimeter.settings import Settings
 
-__all__ = ["Inputs", "Recordings", "analyse_inputs", "keep_inputs", "say", "status"]
+__all__ = [
+    "Inputs",
+    "Recordings",
+    "adjusted",
+    "analyse_inputs",
+    "keep_inputs",
+    "say",
+    "status",
+]
 
 
 @dataclass(frozen=True)
@@ -116,13 +124,24 @@ def _read(wanted: Recordings) -> Inputs:
         notices += remarks
     if not epochs:
         raise UserError(" / ".join(n.text for n in notices) or "no epoch was found")
-    chosen = chosen if chosen is not None else load_settings(None)
-    if wanted.band_hz is not None:
-        chosen = _with_band(chosen, wanted.band_hz)
-    if wanted.controller is not None:
-        chosen = _with_controller(chosen, wanted.controller)
+    chosen = adjusted(chosen if chosen is not None else load_settings(None), wanted)
     paths = tuple(dict.fromkeys(wanted.paths))
     return Inputs(tuple(epochs), tuple(notices), chosen, paths, wanted.method)
+
+
+def adjusted(settings: Settings, wanted: Recordings) -> Settings:
+    """Return the settings with the band and the controller that options give.
+
+    Raises
+    ------
+    UserError
+        If one is out of its range.
+    """
+    if wanted.band_hz is not None:
+        settings = _with_band(settings, wanted.band_hz)
+    if wanted.controller is not None:
+        settings = _with_controller(settings, wanted.controller)
+    return settings
 
 
 def analyse_inputs(inputs: Inputs) -> Analysis:

@@ -28,6 +28,7 @@ from rigidimeter.cli.report import report
 from rigidimeter.cli.reproduce import reproduce
 from rigidimeter.cli.run import run
 from rigidimeter.cli.simulate import simulate
+from rigidimeter.cli.study import study
 from rigidimeter.errors import UserError
 
 __all__ = ["main"]
@@ -81,6 +82,7 @@ for command in (
     demo,
 ):
     app.command()(command)
+app.add_typer(study)
 
 
 def _terminated(_signal: int, _frame: FrameType | None) -> None:

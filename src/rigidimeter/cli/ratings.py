@@ -74,12 +74,12 @@ def ratings(
       rigidimeter ratings ratings.csv --score updrs --examiner rater --scale 0 4 --step 1
       rigidimeter ratings ratings.csv --random subject/day --contrast OFF DBS
     """
-    from rigidimeter.cli.ratings_rows import RANDOM, groupings, ratings_of
     from rigidimeter.cli.ratings_show import model_notices, ratings_document, ratings_lines
     from rigidimeter.recording import write_json
     from rigidimeter.recording.labelled import read_labelled
     from rigidimeter.records import Notice
     from rigidimeter.statistics import fit_mixed
+    from rigidimeter.study.ratings import RANDOM, groupings, ratings_of
 
     keep_inputs((json_out,), (table,))
     chosen = tuple(dict.fromkeys(random or ["examiner"]))

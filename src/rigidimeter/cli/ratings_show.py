@@ -8,8 +8,8 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rigidimeter.cli.ratings_rows import Ratings
     from rigidimeter.statistics import Contrast, Mixed
+    from rigidimeter.study.ratings import Ratings
 
 __all__ = ["RATINGS_SCHEMA", "model_notices", "ratings_document", "ratings_lines"]
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rigidimeter.acquisition.processes.realtime import DeadlineClock
-    from rigidimeter.acquisition.processes.supervise import LoopSide
+    from rigidimeter.acquisition.processes.deadline import DeadlineClock
+    from rigidimeter.acquisition.processes.loop_process import LoopSide
     from rigidimeter.design import PlannedEpoch, Protocol
     from rigidimeter.device.base import Rig
     from rigidimeter.settings import Settings
@@ -41,7 +41,7 @@ def run_loop(
     side : LoopSide
         Rings, board and what prepares the process.
     """
-    from rigidimeter.acquisition.processes.realtime import DeadlineClock
+    from rigidimeter.acquisition.processes.deadline import DeadlineClock
 
     clock = DeadlineClock()
     if rig_path is None:

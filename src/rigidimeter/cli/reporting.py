@@ -10,8 +10,9 @@ from rigidimeter.errors import UserError
 if TYPE_CHECKING:
     from rigidimeter.cli.inputs import Inputs
     from rigidimeter.records import Analysis
+    from rigidimeter.study import Study
 
-__all__ = ["make_report"]
+__all__ = ["make_report", "write_page"]
 
 
 def make_report(title: str, inputs: Inputs, analysis: Analysis, out: Path) -> Path:
@@ -22,12 +23,10 @@ def make_report(title: str, inputs: Inputs, analysis: Analysis, out: Path) -> Pa
     UserError
         If the folder cannot be written.
     """
-    from rigidimeter.cli.progress import Meter
     from rigidimeter.cli.provenance import provenance
-    from rigidimeter.report import write_report
     from rigidimeter.study import Study, compare
 
-    study = Study(
+    made = Study(
         title=title,
         settings=inputs.settings,
         epochs=inputs.epochs,
@@ -36,6 +35,20 @@ def make_report(title: str, inputs: Inputs, analysis: Analysis, out: Path) -> Pa
         notices=inputs.notices,
         provenance=provenance(inputs.paths, inputs.settings),
     )
+    return write_page(made, out)
+
+
+def write_page(study: Study, out: Path) -> Path:
+    """Write the report of a study with progress; return the page's path.
+
+    Raises
+    ------
+    UserError
+        If the folder cannot be written.
+    """
+    from rigidimeter.cli.progress import Meter
+    from rigidimeter.report import write_report
+
     try:
         with Meter("report", 1.0) as meter:
             return write_report(study, out, meter.reach)

@@ -62,7 +62,7 @@ def run(
     from rigidimeter.console import Terminal
     from rigidimeter.device.rigfile import load_rig
 
-    settings, planned, continues = _planned(protocol, resume, seed)
+    settings, planned, continues = _planned(protocol, resume, seed, virtual=rig is None)
     home_rad = continues.get("origin_rad") if rig is not None else None
     _offer(out)
     if rig is not None:
@@ -87,14 +87,14 @@ def run(
     good, of = _counted(out)
     typer.echo(f"{good} of {of} epochs ended with success; session in {out}")
     if ended.outcome != "success":
-        again = f"; go on with `rigidimeter run --resume {out} --out NEW`" if good < of else ""
+        again = f"; go on with `{_going_on(out, rig)}`" if good < of else ""
         raise UserError(
             f"{out}: the session ended with {ended.outcome or 'no outcome'}: {ended.reason}{again}"
         )
 
 
 def _planned(
-    path: Path | None, resume: Path | None, seed: int | None
+    path: Path | None, resume: Path | None, seed: int | None, *, virtual: bool
 ) -> tuple[Settings, Protocol, dict[str, Any]]:
     """Return settings, the epochs to run, and what they continue."""
     from rigidimeter.design import Protocol, plan
@@ -114,6 +114,15 @@ def _planned(
             + (f"{path}" if path is not None else "--seed")
         )
     rest = rest_of(resume)
+    if rest.virtual != virtual:
+        raise UserError(
+            f"{resume}: was recorded on "
+            + (
+                "the virtual rig and goes on only there; leave out --rig"
+                if rest.virtual
+                else "hardware and goes on only there; name its rig file with --rig RIG.toml"
+            )
+        )
     if not rest.epochs:
         raise UserError(f"{resume}: nothing is left to run, all {rest.done} epochs are done")
     typer.echo(f"{rest.done} epochs are done; {len(rest.epochs)} are left")
@@ -131,8 +140,15 @@ def _offer(out: Path) -> None:
     if rest.epochs:
         raise UserError(
             f"{out}: holds a session of which {len(rest.epochs)} epochs are left; go on with "
-            f"`rigidimeter run --resume {out} --out NEW`, or name a new folder"
+            f"`{_going_on(out, None if rest.virtual else 'RIG.toml')}`, or name a new folder"
         )
+
+
+def _going_on(out: Path, rig: Path | str | None) -> str:
+    """Return the command that goes on with a session."""
+    return " ".join(
+        ["rigidimeter run --resume", str(out), *(["--rig", str(rig)] if rig else []), "--out NEW"]
+    )
 
 
 def _counted(folder: Path) -> tuple[int, int]:

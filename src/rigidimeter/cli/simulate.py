@@ -9,17 +9,12 @@ import typer
 
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.errors import UserError
+from rigidimeter.virtual.rates import PAPER_RATES
 
 if TYPE_CHECKING:
     from rigidimeter.settings import Settings
 
 __all__ = ["PAPER_RATES", "simulate"]
-
-PAPER_RATES: dict[str, Any] = {
-    "torque": {"rate_hz": 100.0},
-    "motion": {"rate_hz": 50.0, "jitter_s": 0.005},
-}
-"""Sec. 2.2: torque at 100 samples/s, angle and velocity at 50 with sporadic jitter."""
 
 
 def simulate(
@@ -62,8 +57,8 @@ def simulate(
       rigidimeter simulate --out session --task prbs --condition DBS --epochs 12 --paper-rates
     """
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.cli.virtual import run_virtual_session, session_length_s
     from rigidimeter.settings import load_settings
+    from rigidimeter.virtual.session import run_virtual_session, session_length_s
 
     if task not in (None, "prbs", "sinusoid"):
         raise UserError(f"--task {task}: must be prbs or sinusoid")

@@ -1,14 +1,15 @@
 """Whether a rig is fit for a person's arm: checks on the devices, and a record of them."""
 
+from rigidimeter.commissioning.byhand import Operator
 from rigidimeter.commissioning.checks import Check, Outcome
+from rigidimeter.commissioning.coverage import check_record
 from rigidimeter.commissioning.record import (
     CommissioningRecord,
-    check_record,
     read_record,
     record_path,
     write_record,
 )
-from rigidimeter.commissioning.sequence import Operator, commission
+from rigidimeter.commissioning.sequence import commission
 from rigidimeter.commissioning.trial import Timebase
 
 __all__ = [

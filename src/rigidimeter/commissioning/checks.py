@@ -6,9 +6,22 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Check", "Outcome", "above", "below", "impossible", "within", "yes"]
+__all__ = [
+    "Check",
+    "Outcome",
+    "above",
+    "below",
+    "impossible",
+    "number",
+    "untried",
+    "within",
+    "yes",
+]
 
-Outcome = Literal["passed", "failed", "not possible here"]
+Outcome = Literal["passed", "failed", "not possible here", "not tried"]
+
+
+NOBODY = "only a person can tell; commission again without --yes"
 
 
 @dataclass(frozen=True)
@@ -26,7 +39,7 @@ class Check:
     limit : str
         What it must be, in words and numbers.
     outcome : str
-        "passed", "failed" or "not possible here".
+        "passed", "failed", "not possible here", or "not tried" where nobody was there to do it.
     remedy : str
         What to do about it; empty where it passed.
     """
@@ -46,7 +59,7 @@ class Check:
     @property
     def words(self) -> str:
         """What was found, with its unit."""
-        return self.value if isinstance(self.value, str) else _number(self.value, self.unit)
+        return self.value if isinstance(self.value, str) else number(self.value, self.unit)
 
     @property
     def sentence(self) -> str:
@@ -56,18 +69,18 @@ class Check:
 
 def below(name: str, value: float, unit: str, limit: float, remedy: str) -> Check:
     """Return the check that a number is at most a limit; one that is not finite is not."""
-    return _check(name, value, unit, f"at most {_number(limit, unit)}", value <= limit, remedy)
+    return _check(name, value, unit, f"at most {number(limit, unit)}", value <= limit, remedy)
 
 
 def above(name: str, value: float, unit: str, limit: float, remedy: str) -> Check:
     """Return the check that a number is at least a limit."""
-    return _check(name, value, unit, f"at least {_number(limit, unit)}", value >= limit, remedy)
+    return _check(name, value, unit, f"at least {number(limit, unit)}", value >= limit, remedy)
 
 
 def within(name: str, value: float, unit: str, wanted: float, percent: float, remedy: str) -> Check:
     """Return the check that a number is as wanted, but for so many percent."""
     good = abs(value - wanted) <= 0.01 * percent * abs(wanted)
-    return _check(name, value, unit, f"{_number(wanted, unit)} ± {percent:g} %", good, remedy)
+    return _check(name, value, unit, f"{number(wanted, unit)} ± {percent:g} %", good, remedy)
 
 
 def yes(name: str, good: bool, found: str, limit: str, remedy: str) -> Check:
@@ -80,10 +93,24 @@ def impossible(name: str, limit: str, why: str) -> Check:
     return Check(name, None, "", limit, "not possible here", why)
 
 
+def untried(name: str, limit: str) -> Check:
+    """Return a check that takes a person, and nobody was there."""
+    return Check(name, None, "", limit, "not tried", NOBODY)
+
+
 def _check(name: str, value: float, unit: str, limit: str, good: bool, remedy: str) -> Check:
     kept = float(value) if math.isfinite(value) else None
     return Check(name, kept, unit, limit, "passed" if good else "failed", "" if good else remedy)
 
 
-def _number(value: float | None, unit: str) -> str:
-    return "not measurable" if value is None else f"{value:.4g} {unit}".removesuffix(" 1").rstrip()
+def number(value: float | None, unit: str) -> str:
+    """Return a number with its unit; a time below a second in ms.
+
+    >>> number(0.0013, "s"), number(2.5, "s"), number(1.0, "1"), number(None, "s")
+    ('1.3 ms', '2.5 s', '1', 'not measurable')
+    """
+    if value is None:
+        return "not measurable"
+    if unit == "s" and abs(value) < 1.0:
+        value, unit = 1000.0 * value, "ms"
+    return f"{value:.4g} {unit}".removesuffix(" 1").rstrip()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rigidimeter.commissioning.checks import Check, impossible, yes
+from rigidimeter.commissioning.checks import Check, impossible, number, yes
 from rigidimeter.foresight import Margins, loop_stability, near_instability
 from rigidimeter.settings import Settings
 
@@ -52,10 +52,8 @@ def margin_checks(
         numbers[f"delay_margin_s_{name}"] = margins.delay_margin_s
     for name, margins in stability.worst.items():
         words = _words(margins)
-        what = (
-            f"{settings.margins.joint_factor_low:g} to {settings.margins.joint_factor_high:g} times"
-        )
-        check = f"stability with {name}'s arm {what}"
+        low, high = settings.margins.joint_factor_low, settings.margins.joint_factor_high
+        check = f"stability with arms {low:g} to {high:g} times {name}'s"
         checks.append(yes(check, margins.stable, words, "stable", remedy))
     return checks, numbers
 
@@ -65,5 +63,5 @@ def _words(margins: Margins) -> str:
         return "unstable"
     return (
         f"{margins.gain_margin_db:.3g} dB, {margins.phase_margin_deg:.3g} deg, "
-        f"{1000 * margins.delay_margin_s:.3g} ms more"
+        f"bears {number(float(f'{margins.delay_margin_s:.3g}'), 's')} more delay"
     )

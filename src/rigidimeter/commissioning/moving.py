@@ -191,7 +191,7 @@ def step_checks(tried: Tried, settings: Settings) -> tuple[list[Check], Followin
         ),
     ]
     name = "delay from command to torque"
-    limit = "known, for the margins"
+    limit = "known"
     if seen.explained < EXPLAINED:
         why = "no arm shows in the torque; fasten a spring or a relaxed arm's weight to the joint"
         checks.append(impossible(name, limit, why))

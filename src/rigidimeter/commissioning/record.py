@@ -1,8 +1,10 @@
 """The commissioning record: what was checked on which rig, for which controller, and how it went.
 
-`RIG.commissioned.json` lies beside `RIG.toml`. It holds for the rig file, the devices and the
-controller it was made with, for a number of days. Its digest is a seal against accidents, a file
-that was edited or cut short; it is no signature and keeps nobody from forging one.
+`RIG.commissioned.json` lies beside `RIG.toml`. Its digest is a seal against accidents, a file that
+was edited or cut short; it is no signature and keeps nobody from forging one. What it holds for is
+said by `coverage`.
+
+A rig of hardware asks for more than an emulated one: what only a person can tell, and a name.
 """
 
 from __future__ import annotations
@@ -13,23 +15,18 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 from rigidimeter.commissioning.checks import Check
-from rigidimeter.device.rigfile import RigFile
 from rigidimeter.errors import UserError
-from rigidimeter.settings import Settings
-from rigidimeter.settings.commissioning import CommissioningSettings
 
 __all__ = [
+    "A_PERSON_TELLS",
     "MUST_PASS",
     "SCHEMA",
     "CommissioningRecord",
-    "check_record",
-    "covered",
-    "kept_facts",
+    "plain",
     "read_record",
     "record_path",
     "write_record",
@@ -40,6 +37,8 @@ SCHEMA = "rigidimeter.commissioning/1"
 MUST_PASS = (
     "devices read back",
     "watchdog configured",
+    "loop stalls before the watchdog",
+    "braking of the drive",
     "watchdog",
     "faults at rest",
     "torque samples",
@@ -50,14 +49,19 @@ MUST_PASS = (
     "angle per command",
     "velocity per change of angle",
     "torque against motion",
-    "the joint moved as said",
     "delay from command to motion",
     "delay from command to torque",
 )
-"""Checks without which nobody is put into the rig; beside them, none may have failed."""
+"""Checks without which a rig is not run; beside them, none may have failed."""
 
-VOLATILE = {"status", "bias", "cycle_s", "latched_faults_before"}
-"""Values that devices report and that change without meaning another calibration."""
+A_PERSON_TELLS = (
+    "mechanical stops",
+    "the joint moved as said",
+    "emergency stop",
+    "hardware enable drops the power",
+    "stays stopped after the release",
+)
+"""Checks without which nobody is put into a rig of hardware; an emulated one holds no person."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,8 @@ class CommissioningRecord:
         ISO 8601.
     signed_by : str
         Who answers for it.
+    emulated : bool
+        Whether no device of it is one of hardware.
     """
 
     rig_name: str
@@ -92,6 +98,7 @@ class CommissioningRecord:
     software: str
     made_utc: str
     signed_by: str = ""
+    emulated: bool = False
     schema: str = field(default=SCHEMA)
 
     @property
@@ -101,33 +108,39 @@ class CommissioningRecord:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """What must be passed and was not even possible."""
-        passed = {check.name for check in self.checks if check.passed}
-        failed = {check.name for check in self.failed}
-        stable = any(name.startswith("stability with") for name in passed | failed)
-        lacking = [name for name in MUST_PASS if name not in passed | failed]
+        """What must be passed and was not tried, or not even possible."""
+        settled = {check.name for check in self.checks if check.outcome in ("passed", "failed")}
+        needed = MUST_PASS if self.emulated else (*MUST_PASS, *A_PERSON_TELLS)
+        lacking = [name for name in needed if name not in settled]
+        stable = any(name.startswith("stability with") for name in settled)
         return tuple(lacking if stable else [*lacking, "stability"])
 
     @property
     def not_tried(self) -> tuple[str, ...]:
-        """What was not possible and may be missing; said, not refused."""
-        return tuple(
-            check.name
-            for check in self.checks
-            if check.outcome == "not possible here" and check.name not in self.missing
-        )
+        """What was not tried or not possible and may be missing; said, not refused."""
+        open_ = ("not possible here", "not tried")
+        names = (check.name for check in self.checks if check.outcome in open_)
+        return tuple(name for name in names if name not in self.missing)
+
+    @property
+    def objection(self) -> str:
+        """The first reason not to run this rig, in a clause; empty if there is none."""
+        if self.failed:
+            return f"a check failed: {self.failed[0].sentence}"
+        if self.missing:
+            name = self.missing[0]
+            why = next((check.remedy for check in self.checks if check.name == name), "")
+            if not why:
+                why = "put right what prevented it, or what failed before it, and commission again"
+            return f"the check {name!r} is missing: {why}"
+        if not self.emulated and not self.signed_by.strip():
+            return "nobody has signed for it: commission again with --signed-by NAME"
+        return ""
 
     @property
     def passed(self) -> bool:
-        """Whether a person may be put into the rig as far as the checks go."""
-        return not self.failed and not self.missing
-
-
-LIMITS = ("guard", "loop", "zeroing", "prbs", "sinusoid")
-"""Tables whose numbers may be smaller than those a record was made with, never larger."""
-
-EXACT = ("reaction_time_s", "stale_s", "duration_s")
-"""Numbers among them that must be the same."""
+        """Whether the rig may be run: one of hardware with a person in it."""
+        return not self.objection
 
 
 def record_path(rig: Path) -> Path:
@@ -135,43 +148,9 @@ def record_path(rig: Path) -> Path:
     return rig.with_name(f"{rig.stem}.commissioned.json")
 
 
-def kept_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the facts that must be the same at every run."""
-    return {
-        role: {
-            "model": found["model"],
-            "serial": found["serial"],
-            "watchdog_s": found["watchdog_s"],
-            "values": {k: v for k, v in found["values"].items() if k not in VOLATILE},
-        }
-        for role, found in facts.items()
-    }
-
-
-def covered(settings: Settings) -> dict[str, Any]:
-    """Return what of the settings a record holds for."""
-    return {
-        "tick_rate_hz": settings.rig.tick_rate_hz,
-        "controller": settings.controller.model_dump(mode="json"),
-        "guard": settings.guard.model_dump(mode="json"),
-        "loop": settings.loop.model_dump(mode="json"),
-        "zeroing": settings.zeroing.model_dump(mode="json"),
-        "validity_days": settings.commissioning.validity_days,
-        "prbs": {"amplitude_nm": settings.prbs.amplitude_nm},
-        "sinusoid": {
-            "amplitude_deg": settings.sinusoid.amplitude_deg,
-            "frequency_hz": settings.sinusoid.frequency_hz,
-        },
-        "arms": {
-            name: [arm.inertia_kg_m2, arm.damping_nm_s_rad, arm.stiffness_nm_rad]
-            for name, arm in settings.subject.items()
-        },
-    }
-
-
 def write_record(path: Path, record: CommissioningRecord) -> None:
     """Write the record with its digest, whole or not at all."""
-    values = _plain({**asdict(record), "passed": record.passed})
+    values = plain({**asdict(record), "passed": record.passed})
     values["digest"] = _digest(values)
     part = path.with_name(path.name + ".part")
     part.write_text(json.dumps(values, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
@@ -205,110 +184,17 @@ def read_record(path: Path) -> CommissioningRecord:
     return CommissioningRecord(**values)
 
 
-def check_record(
-    rigfile: RigFile,
-    facts: Mapping[str, Any],
-    settings: Settings,
-    limits: CommissioningSettings | None = None,
-    *,
-    now_utc: datetime | None = None,
-    path: Path | None = None,
-) -> CommissioningRecord:
-    """Return the record if it holds for this rig, these devices and these settings, today.
-
-    Parameters
-    ----------
-    rigfile : RigFile
-    facts : mapping
-        What the rig's `configure` returned.
-    settings : Settings
-        Of the protocol that is to run.
-    limits : CommissioningSettings, optional
-        Says for how many days a record holds.
-    now_utc : datetime, optional
-        Today, where that is not the clock's.
-    path : Path, optional
-        The record, where it does not lie beside the rig file.
-
-    Raises
-    ------
-    UserError
-        With what does not hold, in one sentence.
-    """
-    path = path or record_path(rigfile.path)
-    record = read_record(path)
-    again = "commission the rig again"
-    if record.rig_digest != rigfile.digest:
-        raise UserError(f"{path}: is for another content of {rigfile.path}; {again}")
-    _same_devices(path, record.facts, kept_facts(facts))
-    if record.failed:
-        raise UserError(f"{path}: a check failed: {record.failed[0].sentence}")
-    if record.missing:
-        raise UserError(
-            f"{path}: the check {record.missing[0]!r} was not possible; put right what prevented "
-            f"it and {again}"
-        )
-    days = (limits or CommissioningSettings()).validity_days
-    days = min(days, record.covered.get("validity_days", days))
-    today = now_utc or datetime.now(UTC)
-    age = today - datetime.fromisoformat(record.made_utc)
-    if not timedelta(days=-1) <= age <= timedelta(days=days):
-        raise UserError(
-            f"{path}: is of {record.made_utc[:10]}, and a record holds for {days:g} days; {again}"
-        )
-    _same_controller(path, record.covered, _plain(covered(settings)))
-    return record
-
-
-def _same_devices(path: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    now = _plain(now)
-    for role in sorted({*before, *now}):
-        old, new = before.get(role, {}), now.get(role, {})
-        for key in ("model", "serial", "watchdog_s"):
-            if old.get(key) != new.get(key):
-                raise UserError(
-                    f"{path}: {role} had {key} {old.get(key)!r} and now has {new.get(key)!r}; "
-                    "commission the rig again"
-                )
-        old, new = old.get("values", {}), new.get("values", {})
-        for key in sorted({*old, *new}):
-            if old.get(key) != new.get(key):
-                raise UserError(
-                    f"{path}: {role} had {key} = {old.get(key)!r} and now has {new.get(key)!r}; "
-                    "set it back, or commission the rig again"
-                )
-
-
-def _same_controller(path: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    again = "commission again with --settings of this protocol"
-    if before["tick_rate_hz"] != now["tick_rate_hz"]:
-        raise UserError(
-            f"{path}: covers rig.tick_rate_hz = {before['tick_rate_hz']:g} Hz, not "
-            f"{now['tick_rate_hz']:g} Hz; {again}"
-        )
-    for table in ("controller", *LIMITS):
-        for key, value in now[table].items():
-            tried = before.get(table, {}).get(key)
-            tighter = table in LIMITS and key not in EXACT and tried is not None and value <= tried
-            if value != tried and not tighter:
-                raise UserError(f"{path}: covers {table}.{key} = {tried!r}, not {value!r}; {again}")
-    arms = list(before["arms"].values())
-    for name, arm in now["arms"].items():
-        if arm not in arms:
-            raise UserError(f"{path}: does not cover the arm of [subject.{name}]; {again}")
-
-
 def _digest(values: Mapping[str, Any]) -> str:
     text = json.dumps(values, sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return what JSON keeps of a value: a number that is not finite becomes null."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     return value

@@ -8,20 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from rigidimeter.commissioning.checks import Check, above, below, impossible, within, yes
+from rigidimeter.commissioning.checks import Check, above, below, impossible, number, yes
 from rigidimeter.commissioning.trial import Array, Heard, new_samples
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
 from rigidimeter.settings.commissioning import CommissioningSettings
 
-__all__ = ["facts_checks", "known_checks", "lateness", "noise_checks", "rate_checks"]
+__all__ = ["facts_checks", "lateness", "lost_check", "noise_checks", "rate_checks"]
 
 BAD_COUNTS = ("lost", "damaged", "short", "reordered", "repeated", "refused", "unsent")
 FEWEST_VALUES = 3
+BRAKING = "braking_rad_s2"
+"""What a drive's facts call the slowest of its own ways to brake."""
 
 
-def facts_checks(facts: Mapping[str, Any], limits: CommissioningSettings) -> list[Check]:
-    """Check what the devices said of themselves."""
+def facts_checks(
+    facts: Mapping[str, Any], settings: Settings, limits: CommissioningSettings
+) -> list[Check]:
+    """Check what the devices said of themselves, and hold it against guard and loop."""
     sensor, drive = facts["torque_sensor"], facts["drive"]
     who = [f"{found['model'] or 'unknown'} {found['serial']}".strip() for found in (sensor, drive)]
     watchdog_s = drive["watchdog_s"]
@@ -29,12 +33,49 @@ def facts_checks(facts: Mapping[str, Any], limits: CommissioningSettings) -> lis
     name, what = "watchdog configured", "the drive must stop by itself when nobody commands it"
     if watchdog_s is None:
         checks.append(
-            yes(name, False, "none", f"at most {limits.watchdog_longest_s:g} s", f"{what}; set it")
+            yes(
+                name,
+                False,
+                "none",
+                f"at most {number(limits.watchdog_longest_s, 's')}",
+                f"{what}; set it",
+            )
         )
     else:
         remedy = f"{what}; shorten its watchdog in the rig file"
         checks.append(below(name, watchdog_s, "s", limits.watchdog_longest_s, remedy))
-    return checks
+        checks.append(_stalls_first(watchdog_s, settings))
+    return [*checks, _braking(drive["values"].get(BRAKING), settings)]
+
+
+def _stalls_first(watchdog_s: float, settings: Settings) -> Check:
+    """Check that a loop that stands still says so before the drive stops by itself."""
+    stall_s = settings.loop.stall_s
+    return yes(
+        "loop stalls before the watchdog",
+        stall_s < watchdog_s,
+        number(stall_s, "s"),
+        f"below the drive's {number(watchdog_s, 's')}",
+        f"set loop.stall_s in the settings below {watchdog_s:g} s: after a longer standstill the "
+        "drive has stopped by itself, and the loop would go on as if it had not",
+    )
+
+
+def _braking(braking_rad_s2: float | None, settings: Settings) -> Check:
+    """Check that the drive brakes no slower than the guard counts on."""
+    name, wanted = "braking of the drive", settings.guard.acceleration_limit_deg_s2
+    if braking_rad_s2 is None:
+        why = f"the driver does not say how hard its drive brakes; let its facts have {BRAKING}"
+        return impossible(name, f"at least {wanted:.4g} deg/s²", why)
+    return above(
+        name,
+        math.degrees(braking_rad_s2),
+        "deg/s²",
+        wanted,
+        "the guard brakes for the position limit with guard.acceleration_limit_deg_s2, and this "
+        "drive would cross it: raise the drive's decelerations in the rig file, or lower the "
+        "guard's limit in the settings",
+    )
 
 
 def rate_checks(
@@ -149,23 +190,4 @@ def lateness(heard: Heard, settings: Settings) -> Check:
         "s",
         1.0 / settings.rig.tick_rate_hz,
         "give the loop a processor of its own and a real-time priority, or lower rig.tick_rate_hz",
-    )
-
-
-def known_checks(
-    name: str, unit: str, found: float | None, wanted: float | None, percent: float
-) -> Check:
-    """Check a torque or an angle that the operator knows by another instrument."""
-    if wanted is None or found is None:
-        return impossible(
-            name, f"as known ± {percent:g} %", f"give a known {name.split()[-1]} to compare with"
-        )
-    return within(
-        name,
-        found,
-        unit,
-        wanted,
-        percent,
-        "sign, units or calibration in the rig file are wrong; nothing inside the rig can show "
-        "this but such a comparison",
     )

@@ -13,7 +13,8 @@ from collections.abc import Callable
 import numpy as np
 
 from rigidimeter.acquisition import ControlLoop
-from rigidimeter.commissioning.checks import Check, below, impossible, yes
+from rigidimeter.commissioning.byhand import Operator, told
+from rigidimeter.commissioning.checks import Check, below, impossible, untried, yes
 from rigidimeter.commissioning.moving import way
 from rigidimeter.commissioning.trial import (
     Heard,
@@ -45,7 +46,8 @@ REPORTS = (Cause.DRIVE_FAULT, Cause.DRIVE_STATE, Cause.DRIVE_LOST, Cause.EMERGEN
 WATCHDOG, REPORT = "watchdog", "watchdog reported"
 RESTART = "stays stopped after the watchdog"
 AGAIN = "comes back after confirmation"
-STOP, RELEASE = "emergency stop", "stays stopped after the release"
+STOP, POWER = "emergency stop", "hardware enable drops the power"
+RELEASE = "stays stopped after the release"
 
 
 def watchdog_checks(
@@ -100,29 +102,54 @@ def watchdog_checks(
 
 
 def emergency_stop_checks(
-    rig: Rig, settings: Settings, time: Timebase, limits: CommissioningSettings, ask: Ask | None
+    rig: Rig, settings: Settings, time: Timebase, limits: CommissioningSettings, operator: Operator
 ) -> list[Check]:
-    """Let the operator press the emergency stop; `ask` is None where nobody is there."""
-    limit = "seen at once"
+    """Let the operator press the emergency stop, tell whether the power went, and release it."""
+    limits_of = {STOP: "seen at once", POWER: "yes", RELEASE: f"at most {MOST_DEG:g} deg"}
     wait_s = limits.emergency_stop_wait_s
-    if ask is None:
-        why = "nobody was there to press it; commission with an operator"
-        return [impossible(STOP, limit, why), impossible(RELEASE, "", why)]
-    if not ask(
+    if not operator.present:
+        return [untried(name, limit) for name, limit in limits_of.items()]
+
+    def none_of(names: tuple[str, ...], why: str) -> list[Check]:
+        return [impossible(name, limits_of[name], why) for name in names]
+
+    if not operator.ask(
         f"Emergency stop: after you agree the drive has power for {wait_s:g} s and stands still; "
-        "press the emergency stop within that time. Ready?"
+        "press the emergency stop within that time, and watch the drive's power lamp or contactor. "
+        "Ready?"
     ):
-        why = "the operator did not agree to it"
-        return [impossible(STOP, limit, why), impossible(RELEASE, "", why)]
-    tried = trial(rig, settings, time, [hold(wait_s)])
-    seen = tried.cause in REPORTS
+        return none_of((STOP, POWER, RELEASE), "the operator did not agree to it")
+    before = after = 0
+
+    def wait(loop: ControlLoop) -> None:
+        nonlocal before, after
+        before = rig.read().motion_status
+        loop.hold(wait_s)
+        after = rig.read().motion_status
+
+    tried = trial(rig, settings, time, [wait])
+    # A driver may give the drive up by its own clock; one that was switched off says nothing.
+    said = after != before or tried.cause is Cause.DRIVE_LOST
+    seen = tried.cause in REPORTS and said
     words = tried.cause.sentence if tried.cause is not Cause.NONE else f"nothing in {wait_s:g} s"
     remedy = "the emergency stop must take the drive's power away: look at its wiring"
-    checks = [yes(STOP, seen, words, limit, remedy)]
+    checks = [yes(STOP, seen, words, limits_of[STOP], remedy)]
     if not seen:
-        return [*checks, impossible(RELEASE, "", "the emergency stop was not seen")]
-    if not ask("Release the emergency stop again, and keep hands off the joint. Released?"):
-        return [*checks, impossible(RELEASE, "", "the operator did not release it")]
+        return [*checks, *none_of((POWER, RELEASE), "the emergency stop was not seen")]
+    checks.append(
+        told(
+            operator,
+            POWER,
+            "Did the drive's power go by itself at the moment you pressed (lamp or contactor), "
+            "without this program?",
+            "the stop must open the hardware enable or the supply: one that only asks a program "
+            "is none",
+        )
+    )
+    if not operator.ask(
+        "Release the emergency stop again, and keep hands off the joint. Released?"
+    ):
+        return [*checks, *none_of((RELEASE,), "the operator did not release it")]
     freshen(rig, time, settings.rig.tick_rate_hz)
     return [*checks, _stayed(RELEASE, _tempt(rig, time, settings.rig.tick_rate_hz))]
 
@@ -159,7 +186,7 @@ def _again(rig: Rig, settings: Settings, time: Timebase, ask: Ask) -> Check:
         _reset(rig)
         tried = trial(rig, settings, time, [hold(SETTLE_S)])
     except DeviceError as error:
-        return yes(AGAIN, False, str(error), limit, "look at how the drive's fault is reset")
+        return yes(AGAIN, False, "refused", limit, str(error))
     good = tried.cause is Cause.NONE
     return yes(AGAIN, good, tried.cause.sentence, limit, "look at how the drive's fault is reset")
 

@@ -49,20 +49,19 @@ def order_of(text: str) -> Order | None:
     ``set damping_nm_s_rad 2.0`` changes a parameter; its bounds are the loop's to judge.
     """
     words = text.split()
-    if words and words[0].lower() != "set":
-        words = [word.lower() for word in words]
     if not words:
         return None
-    if words[0] == "set" and len(words) == 3:
+    if words[0].lower() == "set" and len(words) == 3:
         try:
             return Order(Command.CHANGE, words[1], float(words[2]))
         except ValueError:
             return None
-    if words == ["stop"]:  # in a hurry one types the word: it ends what moves, now
+    said = " ".join(words).lower()
+    if said == "stop":  # in a hurry one types the word: it ends what moves, now
         return Order(Command.ABORT)
     by_name = {command.name.lower().replace("_", " "): command for command in KEYS.values()}
-    command = KEYS.get(words[0]) or by_name.get(words[0])
-    return Order(command) if command is not None and len(words) == 1 else None
+    command = (KEYS | by_name).get(said)
+    return Order(command) if command is not None else None
 
 
 def status_line(status: LoopStatus, live: LiveEstimate | None) -> str:
@@ -136,7 +135,7 @@ class Terminal:
                 self._keyboard = None
                 board.raise_flag(Flag.END_ASKED)
                 self._say("the keyboard is gone: the rig stops")
-                return
+                break  # but what was typed before it went still counts
             self._typed += read
         *lines, self._typed = self._typed.split(b"\n")
         for line in lines:

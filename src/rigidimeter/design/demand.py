@@ -8,6 +8,16 @@ in Eq. 5, without voluntary torque, is then
 
 and the free arm is the same without J_p, B_p and K_p. Torque filter, drive and a subject who
 moves come on top.
+
+The room that the guard keeps free before its position limit, at a speed v toward it, is
+
+    r(v) = v (τ + g + T) + v² / (2 a),
+
+with τ its reaction time, within which the drive may still do what it was told before; g how late
+the next step may come and T the tick until it is due, through both of which the last command stays
+in force; and a its acceleration limit. A joint that reaches θ at 1 rad/s with τ = 0.1 s, g =
+0.005 s, T = 0.001 s and a = 2 rad/s² needs 0.106 + 0.25 rad beyond θ. The guard slows a motion down
+as soon as |θ| + r(v) passes its limit.
 """
 
 from __future__ import annotations
@@ -20,7 +30,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from rigidimeter.joint import JointDynamics
-from rigidimeter.settings import ControllerSettings, GuardSettings
+from rigidimeter.settings import GAP_S, ControllerSettings, GuardSettings
 from rigidimeter.units import deg_from_rad, rad_from_deg
 
 __all__ = ["Demand", "beyond_limits", "demand", "ideal_response", "time_constant_s"]
@@ -37,9 +47,8 @@ class Demand:
     peak_angle_rad, peak_speed_rad_s, peak_acceleration_rad_s2 : float
         Largest magnitudes; the acceleration from tick to tick, starting from rest.
     reach_rad : float
-        The largest angle including the room to stop, v τ + v²/(2a) in the direction of the motion,
-        with τ the guard's reaction time and a its acceleration limit: the guard slows the motion
-        where this passes its position limit.
+        The largest angle including the room r(v) that the guard keeps free in the direction of the
+        motion: it slows the motion where this passes its position limit.
     """
 
     angle_sd_rad: float
@@ -108,12 +117,20 @@ def demand(
         Ticks a second.
     guard : GuardSettings
         Whose reaction time and acceleration limit set the room to stop.
+
+    Examples
+    --------
+    >>> guard = GuardSettings(acceleration_limit_deg_s2=math.degrees(2.0), reaction_time_s=0.1)
+    >>> round(demand([0.5], [1.0], 1000.0, guard).reach_rad, 9)
+    0.856
     """
     angle = np.asarray(angle_rad, dtype=np.float64)
     velocity = np.asarray(velocity_rad_s, dtype=np.float64)
     speed = np.abs(velocity)
     braking_rad_s2 = rad_from_deg(guard.acceleration_limit_deg_s2)
-    room = speed * guard.reaction_time_s + speed**2 / (2.0 * braking_rad_s2)
+    tick_s = 1.0 / rate_hz
+    held_s = guard.reaction_time_s + max(GAP_S, tick_s) + tick_s
+    room = speed * held_s + speed**2 / (2.0 * braking_rad_s2)
     reach = np.maximum(np.abs(angle), angle * np.sign(velocity) + room)
     acceleration = np.diff(velocity, prepend=0.0) * rate_hz
     return Demand(

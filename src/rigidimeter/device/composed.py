@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
@@ -226,11 +227,14 @@ class ComposedRig:
             self._drive.disable()
 
     def close(self) -> None:
-        """Take the power away and close the wires, each even if another fails."""
-        try:
-            self.disable()
-        finally:
-            try:
-                self._drive.close()
-            finally:
-                self._sensor.close()
+        """Take the power away and close the wires and the contact's port, each even if one fails.
+
+        What fails last is raised, with what failed before it as its context.
+        """
+        with ExitStack() as steps:  # tries all of them, the last one first
+            port = getattr(self._line, "close", None)  # a contact may have none
+            if port is not None:
+                steps.callback(port)
+            steps.callback(self._sensor.close)
+            steps.callback(self._drive.close)
+            steps.callback(self.disable)

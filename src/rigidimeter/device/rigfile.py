@@ -77,6 +77,17 @@ class RigFile:
     digest: str
     home: Home | None = None
 
+    @property
+    def emulated(self) -> bool:
+        """Whether every device says of its settings that they reach no hardware.
+
+        It follows from the wires, not from a word in the file: loopback, a pseudo-terminal, a CAN
+        bus without wires. A driver that says nothing is taken for one of hardware.
+        """
+        return bool(self.devices) and all(
+            getattr(settings, "emulated", False) for _, settings in self.devices.values()
+        )
+
     def claim(self) -> BinaryIO:
         """Keep this rig for this process until the file that is returned is closed.
 

@@ -24,6 +24,7 @@ from collections import deque
 from typing import Any
 
 from rigidimeter.emulation.arm import EmulatedArm
+from rigidimeter.emulation.trapezoid import Ramps, Trapezoid
 
 __all__ = ["MISBEHAVIOURS", "AsciiPeer"]
 
@@ -92,11 +93,8 @@ class AsciiPeer:
         self._registers = {0x24: OFF, 0x2F: 0, 0x36: 1000, 0x37: 1000, 0x90: POWER_UP_BAUD}
         self._registers |= dict.fromkeys((0xA4, 0xC8, 0xCA, 0xCB), 0)
         self._registers |= dict.fromkeys((0xCC, 0xCD, 0xCF), 10_000)
-        self._place = self._counts()[0]
-        self._speed = 0.0
-        self._target = self._place
-        self._limit = 0.0
-        self._aborting = True
+        place = self._counts()[0]
+        self._generator = Trapezoid(place, place)
         self._generated_s = time.monotonic()
         self._frozen: tuple[int, int] | None = None
         self._running = True
@@ -113,7 +111,7 @@ class AsciiPeer:
         with self._lock:
             if name == "fault":
                 self._registers[0xA4] |= 1 << int(value)
-                self._speed = 0.0
+                self._generator.speed = 0.0
             elif name == "encoder_frozen":
                 self._frozen = self._seen()
             elif name == "changes_state":
@@ -219,7 +217,7 @@ class AsciiPeer:
             case ["s", name, number] if (register := _register(name)) is not None:
                 return self._write(register, number)
             case ["t", "0"]:
-                self._aborting = True
+                self._generator.aborting = True
                 return "ok"
             case ["t", "1"]:
                 return self._start_move()
@@ -248,8 +246,7 @@ class AsciiPeer:
             value = self._registers[0xA4] & ~value
         if register == 0x24 and value != self._registers[0x24]:
             # Power comes and goes at rest, where the arm is.
-            self._place, self._speed, self._aborting = self._counts()[0], 0.0, True
-            self._target = self._place
+            self._generator.rest(self._counts()[0])
         self._registers[register] = value
         return "ok"
 
@@ -286,40 +283,34 @@ class AsciiPeer:
             status |= ENABLE_OPEN
         if not self._powered():
             status |= NO_PWM
-        elif self._speed != 0.0:
+        elif self._generator.speed != 0.0:
             status |= MOVING
         return status
 
     def _start_move(self) -> str:
         if not self._powered() or self._registers[0x24] != MOVES:
             return "e 22"
-        distance = self._registers[0xCA]
+        generator, target = self._generator, float(self._registers[0xCA])
         if self._registers[0xC8] == 256:
-            self._target = (self._place if self._aborting else self._target) + distance
-        elif self._registers[0xC8] == 0:
-            self._target = distance
-        else:
+            target += generator.place if generator.aborting else generator.target
+        elif self._registers[0xC8] != 0:
             return "e 22"
-        self._limit = 0.1 * self._registers[0xCB]
-        self._aborting = False
+        generator.move(target, 0.1 * self._registers[0xCB])
         return "ok"
 
     def _wanted(self) -> float:
-        """Return the velocity in counts/s that the generator heads for."""
+        """Return the velocity in counts/s that the drive heads for."""
         if not self._powered():
             return 0.0
         if self._registers[0x24] == VELOCITY:
             return 0.1 * self._registers[0x2F]
-        if self._aborting:
-            return 0.0
-        left = self._target - self._place
-        braking = math.sqrt(2.0 * self._deceleration() * abs(left))
-        return math.copysign(min(self._limit, braking), left) if left else 0.0
+        return self._generator.wanted(self._ramps())
 
-    def _deceleration(self) -> float:
+    def _ramps(self) -> Ramps:
         if self._registers[0x24] == VELOCITY:
-            return 1000.0 * self._registers[0x37]
-        return 10.0 * self._registers[0xCF if self._aborting else 0xCD]
+            return Ramps(1000.0 * self._registers[0x36], 1000.0 * self._registers[0x37])
+        down = self._registers[0xCF if self._generator.aborting else 0xCD]
+        return Ramps(10.0 * self._registers[0xCC], 10.0 * down)
 
     def _generate(self) -> None:
         """Bring the generator to now, and let the arm follow it."""
@@ -333,26 +324,19 @@ class AsciiPeer:
         elif not self._powered() or "does_not_follow" in self._habits:
             self._arm.command(0.0)
         else:
-            error = self._place - self._counts()[0] if self._registers[0x24] == MOVES else 0.0
-            self._arm.command((self._speed + LOOP_GAIN_S * error) / self._per_rad)
+            generator, moves = self._generator, self._registers[0x24] == MOVES
+            error = generator.place - self._counts()[0] if moves else 0.0
+            self._arm.command((generator.speed + LOOP_GAIN_S * error) / self._per_rad)
 
     def _step(self, step_s: float) -> None:
-        wanted = self._wanted()
-        velocity_mode = self._registers[0x24] == VELOCITY
-        faster = 1000.0 * self._registers[0x36] if velocity_mode else 10.0 * self._registers[0xCC]
-        speeding_up = wanted * self._speed >= 0.0 and abs(wanted) > abs(self._speed)
-        change = (faster if speeding_up else self._deceleration()) * step_s
+        generator = self._generator
         if not self._powered():
-            self._place, self._speed = self._counts()[0], 0.0
-            return
-        self._speed += max(-change, min(change, wanted - self._speed))
-        left = self._target - self._place
-        way = self._speed * step_s
-        arrives = not velocity_mode and not self._aborting and abs(self._speed) <= 2.0 * change
-        if arrives and abs(left) <= max(1.0, abs(way)):
-            self._place, self._speed = self._target, 0.0
+            # The target of a move before stays, as it would in such a drive.
+            generator.place, generator.speed = self._counts()[0], 0.0
+        elif self._registers[0x24] == VELOCITY:
+            generator.run(0.1 * self._registers[0x2F], self._ramps(), step_s)
         else:
-            self._place += way
+            generator.step(self._ramps(), step_s)
 
 
 def _register(name: str) -> int | None:

@@ -28,13 +28,17 @@ class Rest:
         Those that were not run to their end, with their own numbers and rests.
     done : int
         How many were.
+    virtual : bool
+        Whether it was recorded on the virtual rig.
     continues : dict
-        What the manifest of the new session says of the old one.
+        What the manifest of the new session says of the old one; its `origin_rad`, where it is
+        known, is where the joint stood when the first of them was begun.
     """
 
     settings: Settings
     epochs: tuple[PlannedEpoch, ...]
     done: int
+    virtual: bool
     continues: dict[str, Any]
 
 
@@ -67,16 +71,17 @@ def rest_of(folder: Path) -> Rest:
     done |= {event["epoch"] for event in ended[:-1] if event["outcome"] == "fail"}
     if ended and ended[-1]["outcome"] == "fail" and _went_on(events, ended[-1]):
         done.add(ended[-1]["epoch"])
+    # Each session may begin a little off where the one before began, so the first one counts: the
+    # limits must not move on with every session.
+    origins = [manifest.get("continues", {}), *events]
+    origin = next(({"origin_rad": o["origin_rad"]} for o in origins if "origin_rad" in o), {})
     left = tuple(epoch for epoch in planned if epoch.number not in done)
     return Rest(
         session_settings(folder),
         left,
         len(planned) - len(left),
-        {
-            "folder": folder.name,
-            "created_utc": manifest["created_utc"],
-            **{k: e[k] for e in events if e.get("event") == "rig_enabled" for k in ("origin_rad",)},
-        },
+        manifest["virtual"],
+        {"folder": folder.name, "created_utc": manifest["created_utc"], **origin},
     )
 
 

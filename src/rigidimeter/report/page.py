@@ -14,18 +14,25 @@ from markupsafe import Markup
 
 from rigidimeter import __version__
 from rigidimeter.records import Fit, Score
+from rigidimeter.report.cohort import cohort_view
+from rigidimeter.report.conclusions import cohort_verdict
 from rigidimeter.report.measures import condition_name, conditions, short_names, verdict
 from rigidimeter.report.methods import interval_basis, method_title, pooled_basis
 from rigidimeter.report.numbers import interval, number, p_value
 from rigidimeter.report.pictures import (
     Picture,
+    day_pictures,
     distribution_pictures,
+    effect_pictures,
     impedance_pictures,
     loop_pictures,
     perturbation_pictures,
+    rating_pictures,
+    sensitivity_pictures,
     torque_pictures,
     voluntary_pictures,
 )
+from rigidimeter.report.prose import methods_prose
 from rigidimeter.report.table import Cell, Column, Table, csv_text
 from rigidimeter.report.tables import all_tables
 from rigidimeter.study import Comparison, Study
@@ -45,6 +52,10 @@ class Pair:
 
 
 DRAWN: Mapping[str, Callable[[Study], list[Picture]]] = {
+    "effects": effect_pictures,
+    "days": day_pictures,
+    "ratings": rating_pictures,
+    "sensitivity": sensitivity_pictures,
     "distributions": distribution_pictures,
     "perturbation": perturbation_pictures,
     "impedance": impedance_pictures,
@@ -60,7 +71,8 @@ def write_report(
 ) -> Path:
     """Write ``report.html``, ``tables/*.csv`` and ``figures/*.svg`` into a folder.
 
-    The same study gives the same bytes.
+    A study folder also gets ``methods.txt``, the paragraph of methods as plain text. The same
+    study gives the same bytes.
 
     Parameters
     ----------
@@ -89,6 +101,8 @@ def write_report(
     for group in pictures.values():
         for picture in group:
             _write(out / "figures" / f"{picture.name}.svg", picture.svg)
+    if study.cohort is not None:
+        _write(out / "methods.txt", methods_prose(study, study.cohort).text)
     page = out / "report.html"
     _write(page, render_page(study, tables, pictures))
     return page
@@ -105,13 +119,17 @@ def render_page(
     folder = resources.files("rigidimeter.report")
     names = short_names([*(e.source for e in study.epochs), *_sources(study)])
     environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        loader=jinja2.FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
     )
     environment.filters["data_uri"] = _data_uri
     environment.globals["show"] = lambda cell, column: _shown(cell, column, names)
     environment.globals["ends"] = _ends
     environment.globals["shown_columns"] = lambda table: _shown_columns(table, len(names) > 1)
-    template = environment.from_string((folder / "page.html").read_text(encoding="utf-8"))
+    template = environment.get_template("page.html")
     return template.render(
         study=study,
         # The style is this package's own file, so it may stand as it is.
@@ -120,7 +138,7 @@ def render_page(
         pictures=pictures,
         pairs=(pairs := _pairs(study.comparisons)),
         uncompared=len(conditions(study)) > 2 * len(pairs),
-        verdict=verdict(study),
+        verdict=_verdict(study),
         virtual=sum(epoch.virtual for epoch in study.epochs),
         sources=Counter(epoch.source for epoch in study.epochs),
         source_names=names,
@@ -129,6 +147,7 @@ def render_page(
         interval_basis=interval_basis(study.analysis.method, study.settings.estimation),
         pooled_basis=pooled_basis(study.analysis.method),
         version=__version__,
+        cohort=cohort_view(study, _unlisted(tables)),
     )
 
 
@@ -136,6 +155,18 @@ def _sources(study: Study) -> list[str]:
     analysis = study.analysis
     results: tuple[Fit | Score, ...] = (*analysis.fits, *analysis.fixed_inertia, *analysis.scores)
     return [result.source for result in results]
+
+
+def _verdict(study: Study) -> str:
+    """Return what days show where there are days, else what epochs show."""
+    by_days = cohort_verdict(study.cohort) if study.cohort is not None else ""
+    return by_days or verdict(study)
+
+
+def _unlisted(tables: Mapping[str, Table]) -> int:
+    """Return how many recorded epochs of a study folder neither count nor are listed."""
+    account = tables.get("account")
+    return sum(int(row[-1] or 0) for row in account.rows) if account is not None else 0
 
 
 def _data_uri(svg: str) -> str:
@@ -148,6 +179,8 @@ def _shown(cell: Cell, column: Column, names: Mapping[str, str]) -> str:
         return "(no condition)" if column.kind == "condition" else "–"
     if column.kind == "source":
         return names.get(str(cell), str(cell))
+    if column.kind == "p" and isinstance(cell, float):
+        return p_value(cell)
     if isinstance(cell, float):
         return f"{cell:g}" if column.kind == "setting" else number(cell * column.page_factor)
     return str(cell)

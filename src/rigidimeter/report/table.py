@@ -20,6 +20,7 @@ Kind = Literal[
     "outcome",
     "count",
     "number",
+    "p",
     "setting",
 ]
 

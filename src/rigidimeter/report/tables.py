@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from rigidimeter.records import Outcome
+from rigidimeter.report.cohort_tables import cohort_tables
 from rigidimeter.report.design import design_table, epoch_counts, epoch_duration_s, settings_table
 from rigidimeter.report.estimates import HOW, WHO, delays_table, fits_table, pooled_table
 from rigidimeter.report.findings import finding_kinds, findings_table
@@ -37,6 +38,7 @@ def all_tables(study: Study) -> dict[str, Table]:
         _exclusions(study),
         _notices(study),
         _provenance(study),
+        *cohort_tables(study),
     )
     return {table.name: table for table in tables}
 

@@ -183,12 +183,18 @@ def better_than_work(workshop: Workshop) -> Row:
     )
 
 
-def rating_model(ratings: tuple[Rating, ...]) -> Mixed:
-    """Fit the model of Sec. 2.2: a mean for each condition, no intercept, examiners at random."""
+def rating_model(ratings: tuple[Rating, ...], *, days: bool = False) -> Mixed:
+    """Fit the model of Sec. 2.2: a mean for each condition, no intercept, examiners at random.
+
+    With `days`, each day has an offset as well: its scores are of one state of the subject.
+    """
+    groups = {"examiner": [rating.examiner for rating in ratings]}
+    if days:
+        groups["day"] = [rating.day for rating in ratings]
     return fit_mixed(
         [rating.score for rating in ratings],
         [rating.condition for rating in ratings],
-        {"examiner": [rating.examiner for rating in ratings]},
+        groups,
     )
 
 

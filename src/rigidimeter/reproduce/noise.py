@@ -20,9 +20,9 @@ from rigidimeter.report.numbers import number
 from rigidimeter.reproduce import printed
 from rigidimeter.reproduce.ledger import AGREES, DIFFERS, Row, bounded, within_percent
 from rigidimeter.reproduce.truth import TRUTH, Array, fitted, signed, unbiased
-from rigidimeter.reproduce.virtual import PAPER_RATES
 from rigidimeter.reproduce.workshop import Workshop
 from rigidimeter.settings import parse_settings
+from rigidimeter.virtual.rates import PAPER_RATES
 
 __all__ = ["ROWS", "NoiseRuns", "noise_runs"]
 

@@ -17,11 +17,13 @@ from rigidimeter.estimation import Signals, aligned, epoch_signals
 from rigidimeter.estimation.bandlimited import zero_phase_band
 from rigidimeter.foresight import closed_loop_motion
 from rigidimeter.joint import JointDynamics
+from rigidimeter.records import Channel
 from rigidimeter.report.numbers import number
 from rigidimeter.report.pictures import Picture
 from rigidimeter.reproduce.figures import svg_text, traces
 from rigidimeter.reproduce.ledger import Row
 from rigidimeter.reproduce.workshop import Workshop
+from rigidimeter.settings import Settings
 
 __all__ = ["ROWS"]
 
@@ -36,10 +38,11 @@ class _Torques(NamedTuple):
     measured: Signals
     simulated: Signals
     joint: JointDynamics
+    start_s: float
 
 
 def _torques(workshop: Workshop) -> _Torques:
-    study, analysis = workshop.study, workshop.fits
+    study, analysis = workshop.study, workshop.analysis
     settings = study.settings
     off = sorted(
         (f for f in analysis.fixed_inertia if f.condition == "OFF" and f.outcome.included),
@@ -47,16 +50,19 @@ def _torques(workshop: Workshop) -> _Torques:
     )
     fit = off[(len(off) - 1) // 2]
     joint = JointDynamics(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad)
-    epoch = next(epoch for epoch in study.prbs if epoch.label == fit.epoch)
+    named = (fit.source, fit.epoch)
+    epoch = next(epoch for epoch in study.epochs if (epoch.source, epoch.label) == named)
     measured = epoch_signals(aligned(epoch, analysis.delays), "bandlimited", settings.estimation)
-    return _Torques(measured, _simulated(workshop, measured, joint), joint)
+    perturbation = epoch.channels["perturbation_nm"]
+    start_s = float(perturbation.time_s[0])
+    return _Torques(measured, _simulated(settings, perturbation, measured, joint), joint, start_s)
 
 
-def _simulated(workshop: Workshop, measured: Signals, joint: JointDynamics) -> Signals:
+def _simulated(
+    settings: Settings, perturbation: Channel, measured: Signals, joint: JointDynamics
+) -> Signals:
     """Return the motion, and the torque, that the perturbation alone causes in the closed loop."""
-    settings = workshop.study.settings
     rate_hz = settings.rig.tick_rate_hz
-    perturbation = workshop.study.prbs[0].channels["perturbation_nm"]
     motion = closed_loop_motion(perturbation.values, settings, joint)
 
     def there(values: Array) -> Array:
@@ -83,7 +89,8 @@ def _figure_4(
 ) -> Row:
     found = _torques(workshop)
     signals, simulated, joint = found.measured, found.simulated, found.joint
-    inside = (signals.time_s >= _WINDOW_S[0]) & (signals.time_s <= _WINDOW_S[1])
+    time_s = signals.time_s - found.start_s  # the session has begun earlier
+    inside = (time_s >= _WINDOW_S[0]) & (time_s <= _WINDOW_S[1])
     drawn: dict[str, Array] = {}
     text = ""
     if part == "torque":
@@ -105,7 +112,7 @@ def _figure_4(
     text += f"simulated misses estimated by {number(share, 3)} % (SD)"
     drawn |= {"estimated": estimated, "simulated": other}
     picture = traces(
-        signals.time_s[inside],
+        time_s[inside],
         {name: values[inside] for name, values in drawn.items()},
         float(np.max(np.abs(signals.torque_nm[inside]))),  # one scale for all three figures
         "OFF, virtual data",

@@ -8,6 +8,12 @@ from rigidimeter.statistics.contrasts import (
     joint_test,
     pairwise,
 )
+from rigidimeter.statistics.days import (
+    DayDifference,
+    day_difference,
+    day_medians,
+    exact_ranksum,
+)
 from rigidimeter.statistics.effects import (
     EffectDifference,
     Effects,
@@ -38,6 +44,7 @@ from rigidimeter.statistics.summary import Summary, summarise
 
 __all__ = [
     "Contrast",
+    "DayDifference",
     "EffectDifference",
     "Effects",
     "JointTest",
@@ -51,9 +58,12 @@ __all__ = [
     "compare_effects",
     "compare_published",
     "contrast",
+    "day_difference",
+    "day_medians",
     "difference",
     "effect_from_p",
     "effect_sizes",
+    "exact_ranksum",
     "fit_mixed",
     "holm",
     "joint_test",

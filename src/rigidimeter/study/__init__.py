@@ -6,38 +6,51 @@ installed.
 
 from rigidimeter.study.analysis import analyse, checked, task_of
 from rigidimeter.study.comparison import MEASURES, Comparison, Measure, compare, conditions
+from rigidimeter.study.document import comparison_row, study_document
 from rigidimeter.study.doubts import doubts
+from rigidimeter.study.kept import UNCHANGED, keep
 from rigidimeter.study.results import (
     Cohort,
     Condition,
     DayMedian,
     DayTest,
     Exclusion,
+    LeftOut,
     MeasureEffect,
     RatingsFound,
     SensitivityRow,
     SessionEntry,
     Study,
 )
+from rigidimeter.study.whole import StudyRead, analyse_study, read_study, steps
 
 __all__ = [
     "MEASURES",
+    "UNCHANGED",
     "Cohort",
     "Comparison",
     "Condition",
     "DayMedian",
     "DayTest",
     "Exclusion",
+    "LeftOut",
     "Measure",
     "MeasureEffect",
     "RatingsFound",
     "SensitivityRow",
     "SessionEntry",
     "Study",
+    "StudyRead",
     "analyse",
+    "analyse_study",
     "checked",
     "compare",
+    "comparison_row",
     "conditions",
     "doubts",
+    "keep",
+    "read_study",
+    "steps",
+    "study_document",
     "task_of",
 ]

@@ -46,6 +46,7 @@ def analyse(
     settings: Settings,
     method: str = "auto",
     *,
+    delays: Sequence[Delay] | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Analysis:
     """Fit every perturbation epoch and score every sinusoidal one.
@@ -61,6 +62,9 @@ def analyse(
     settings : Settings
     method : str
         A name of `estimation.METHODS`; ``auto`` chooses by what was recorded.
+    delays : sequence of Delay, optional
+        Of every source, as another analysis of the same epochs found them: they do not depend on
+        the method, and cost the most.
     progress : callable
         Called with the name of each epoch once it is done, in either stage.
     """
@@ -70,14 +74,14 @@ def analyse(
     reason = ""
     if method == "auto":
         method, reason = choose_method(fitted)
-    delays: tuple[Delay, ...] = ()
+    used: Sequence[Delay] = ()
     if method != "published":  # which is kept as it was printed
         by_source: dict[str, list[Epoch]] = {epoch.source: [] for epoch in everything}
         for epoch in fitted:
             by_source[epoch.source].append(epoch)
-        delays = estimate_delays(by_source, settings)
-        everything = [aligned(epoch, delays) for epoch in everything]
-        fitted = [aligned(epoch, delays) for epoch in fitted]
+        used = estimate_delays(by_source, settings) if delays is None else delays
+        everything = [aligned(epoch, used) for epoch in everything]
+        fitted = [aligned(epoch, used) for epoch in fitted]
     scores = []
     for epoch, task in zip(everything, tasks, strict=True):
         if task == "sinusoid":
@@ -115,7 +119,7 @@ def analyse(
         inertia_kg_m2,
         tuple(scores),
         tuple(pooled),
-        delays,
+        tuple(used),
         reason,
     )
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from rigidimeter.records import Analysis, Fit, Score
 from rigidimeter.statistics import RankSum, Summary, ranksum, summarise
 
-__all__ = ["MEASURES", "Comparison", "Measure", "compare", "conditions"]
+__all__ = ["MEASURES", "Comparison", "Measure", "compare", "compare_results", "conditions"]
 
 FEWEST_FOR_TEST = 3
 """Below this many values in a condition there is no rank-sum test."""
@@ -97,18 +97,19 @@ def compare(
     rest = [name for name in names if name != first]
     second = other if other is not None else (rest[0] if rest else "")
     return tuple(
-        _comparison(measure, results, first, second)
+        compare_results(measure, results, first, second)
         for measure in MEASURES
         if (results := measure.results(analysis))
     )
 
 
-def _comparison(
+def compare_results(
     measure: Measure,
     results: Sequence[Fit | Score],
     reference: str,
     other: str,
 ) -> Comparison:
+    """Compare two conditions in one measure; an empty `other` gives summaries alone."""
     groups = [reference, other] if other else [reference]
     values = {
         name: tuple(

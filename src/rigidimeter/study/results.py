@@ -17,6 +17,7 @@ __all__ = [
     "DayMedian",
     "DayTest",
     "Exclusion",
+    "LeftOut",
     "MeasureEffect",
     "RatingsFound",
     "SensitivityRow",
@@ -130,7 +131,8 @@ class RatingsFound:
     """What the examiners' scores say: `fit` by condition and examiner, and the contrast.
 
     `rows` are (condition, examiner, subject, day, score) in the order of the table; the corrected
-    scores in `fit` go with them.
+    scores in `fit` go with them. `contrast_days` is the same contrast with an offset for every day
+    too, None where the days cannot be told.
     """
 
     source: str
@@ -140,6 +142,7 @@ class RatingsFound:
     reference: str
     other: str
     notices: tuple[str, ...] = ()
+    contrast_days: Contrast | None = None
 
 
 @dataclass(frozen=True)
@@ -171,7 +174,7 @@ class Exclusion:
     """One epoch that does not count, who said so, and why.
 
     `by` is ``protocol`` (ended early or was repeated), ``check`` (a diagnostic), ``estimate`` (no
-    fit) or ``operator`` (the study's table of exclusions).
+    fit) or ``operator`` (the study's table of exclusions; `who` is whom it names).
     """
 
     subject: str
@@ -181,6 +184,21 @@ class Exclusion:
     epoch: str
     task: str
     by: Literal["protocol", "check", "estimate", "operator"]
+    reason: str
+    who: str = ""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """One recording of the table that does not count at all, and why.
+
+    `condition` is as the table has it, a code or a name.
+    """
+
+    path: str
+    subject: str
+    day: str
+    condition: str
     reason: str
 
 
@@ -205,6 +223,12 @@ class Cohort:
     exclusions : tuple of Exclusion
     virtual : bool
         Every session comes from the virtual rig.
+    changes : tuple of str
+        What is new since the last analysis was kept, in sentences.
+    left_out : tuple of LeftOut
+        Recordings of the table that do not count.
+    several : bool
+        J was held at each subject's own median, for there are several subjects.
     """
 
     conditions: tuple[Condition, ...]
@@ -219,6 +243,8 @@ class Cohort:
     exclusions: tuple[Exclusion, ...]
     virtual: bool = False
     changes: tuple[str, ...] = field(default=())
+    left_out: tuple[LeftOut, ...] = ()
+    several: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
 import math
+import time
 
 import pytest
 
@@ -107,7 +108,13 @@ def sample(k: int) -> Sample:
 def test_causes_to_stop(board, rings, now):
     samples, _ = rings
     outside = BoardOutside(
-        board, samples, console_lost_s=0.5, recorder_lost_s=2.0, most_lag=6, now_ns=now
+        board,
+        samples,
+        console_lost_s=0.5,
+        recorder_lost_s=2.0,
+        most_lag=6,
+        now_ns=now,
+        boot_ns=now,
     )
     board.beat(Role.CONSOLE)
     board.beat(Role.RECORDER)
@@ -127,6 +134,57 @@ def test_causes_to_stop(board, rings, now):
     assert outside.cause(0.0) == Cause.SIGNAL
     board.raise_flag(Flag.EMERGENCY_STOP)
     assert outside.cause(0.0) == Cause.EMERGENCY_STOP
+
+
+@pytest.fixture
+def outside(board, rings, now):
+    board.beat(Role.CONSOLE)
+    board.beat(Role.RECORDER)
+    before = Time()
+    before.ns = now.ns + 7_000_000_000  # suspended for 7 s since it was started, but not by us
+    return BoardOutside(board, rings[0], stall_s=0.1, now_ns=now, boot_ns=before), before
+
+
+def test_a_suspended_computer_has_stood_still(board, outside, now):
+    outside, boot = outside
+    assert outside.cause(0.0) == Cause.NONE
+    for clock in (now, boot):  # time goes by: no difference
+        clock.ns += 400_000_000
+    assert outside.cause(0.0) == Cause.NONE
+    boot.ns += 99_000_000  # less than a stall
+    assert outside.cause(0.0) == Cause.NONE
+    boot.ns += 2_000_000
+    assert outside.cause(0.0) == Cause.STALLED
+    board.raise_flag(Flag.END_ASKED)  # the ramp that a signal asks for would set the arm going
+    for clock in (now, boot):
+        clock.ns += 500_000_000
+    assert outside.cause(0.0) == Cause.STALLED
+    board.raise_flag(Flag.EMERGENCY_STOP)
+    assert outside.cause(0.0) == Cause.EMERGENCY_STOP
+
+
+def test_a_loop_held_up_between_two_clocks_was_not_suspended(board, rings, now):
+    board.beat(Role.CONSOLE)
+    board.beat(Role.RECORDER)
+    held_up_ns = 0
+
+    def held_up():
+        at = now.ns
+        now.ns += held_up_ns
+        return at
+
+    outside = BoardOutside(board, rings[0], stall_s=0.1, now_ns=held_up, boot_ns=held_up)
+    held_up_ns = 500_000_000
+    assert outside.cause(0.0) == Cause.NONE
+
+
+def test_the_two_clocks_are_those_of_the_machine(board, rings):
+    real = Board(board.memory)
+    real.beat(Role.CONSOLE)
+    real.beat(Role.RECORDER)
+    outside = BoardOutside(real, rings[0], stall_s=0.1)
+    time.sleep(0.15)
+    assert outside.cause(0.0) == Cause.NONE
 
 
 def test_the_sink_keeps_events_in_their_place(board, rings):

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition import RealTimeClock, SimulatedClock, run_session
+from rigidimeter.acquisition import ControlLoop, RealTimeClock, SimulatedClock, run_session
 from rigidimeter.design import plan
 from rigidimeter.device import Reading, SimulatedRig
 from rigidimeter.recording import SessionWriter
@@ -110,6 +110,28 @@ def test_the_arm_returns_to_where_it_began(tmp_path):
     samples = read_samples(tmp_path / "s" / "samples.arrows")
     assert np.abs(samples["angle_rad"][:1000]).max() > 0.05
     assert abs(samples["angle_rad"][1990]) < 0.005
+
+
+def test_a_ramp_to_rest_takes_as_long_as_it_needs():
+    """2 s at these limits: what were left of it after a second would be cut with the power."""
+    guard = {"speed_limit_deg_s": 40.0, "acceleration_limit_deg_s2": 20.0}
+    settings = parse_settings({"guard": {**guard, "position_limit_deg": 180.0}})
+    rig = SimulatedRig(settings.rig, settings.subject["OFF"], np.random.default_rng(1))
+    samples = []
+    loop = ControlLoop(settings, rig, SimulatedClock(), samples.append)
+    rig.enable()
+    rate_hz = settings.rig.tick_rate_hz
+    n = round(2.5 * rate_hz)
+    speed_rad_s = math.radians(40.0)
+    loop.follow(1, [speed_rad_s * k / rate_hz for k in range(n)], [speed_rad_s] * n)
+    at = len(samples)
+    fastest = samples[-1].velocity_command_rad_s
+    assert fastest == pytest.approx(speed_rad_s)
+    loop.stop()
+    sent = np.array([sample.velocity_command_rad_s for sample in samples[at - 1 :]])
+    assert sent[-1] == 0.0
+    assert len(sent) - 1 == pytest.approx(2.0 * rate_hz, abs=1)
+    np.testing.assert_allclose(np.diff(sent)[:-1], -math.radians(20.0) / rate_hz, rtol=1e-9)
 
 
 def test_what_comes_before_an_epoch_is_stored_with_it(tmp_path):

@@ -1,15 +1,14 @@
 import gc
 import multiprocessing
 import os
+import signal
 import time
 
 import pytest
 
-from rigidimeter.acquisition.processes.realtime import (
-    DeadlineClock,
-    _relative_sleep,
-    prepare_loop_process,
-)
+from rigidimeter.acquisition.processes import realtime
+from rigidimeter.acquisition.processes.deadline import DeadlineClock, _relative_sleep
+from rigidimeter.acquisition.processes.realtime import Prepared, prepare_loop_process
 from rigidimeter.acquisition.processes.watched import Watched
 
 
@@ -43,10 +42,10 @@ def prepared_in_child(pipe, **options) -> None:
     pipe.send((prepared, str(prepared), os.sched_getaffinity(0), gc.isenabled()))
 
 
-def in_child(**options):
+def in_child(main=prepared_in_child, **options):
     context = multiprocessing.get_context("fork")
     here, there = context.Pipe()
-    process = context.Process(target=prepared_in_child, args=(there,), kwargs=options)
+    process = context.Process(target=main, args=(there,), kwargs=options)
     process.start()
     found = here.recv()
     process.join()
@@ -72,6 +71,65 @@ def test_what_is_refused_is_said_and_not_raised():
     if len(os.sched_getaffinity(0)) > 1:
         assert prepared.cpu is None
         assert "Processor 4000 was refused" in text
+
+
+def prepared_in_order(pipe) -> None:
+    """Say in what order the slow steps and the priority come."""
+    steps = []
+    collect = gc.collect
+    gc.collect = lambda: (steps.append("collect"), collect())
+    realtime._checked = lambda _: steps.append("lock")
+    realtime._beside = lambda *_: steps.append("look") or []
+    os.sched_setscheduler = lambda *_: steps.append("priority")
+    prepare_loop_process()
+    pipe.send(steps)
+
+
+def test_the_priority_comes_after_all_that_takes_long():
+    """At a real-time priority the work before it would hold up another loop on the processor."""
+    steps = in_child(prepared_in_order)
+    assert set(steps) == {"collect", "lock", "look", "priority"}
+    assert steps.index("priority") == len(steps) - 1
+
+
+def test_what_share_of_the_time_there_is_is_said():
+    share = realtime._real_time_share()
+    assert share is None or 0.0 <= share <= 1.0
+    prepared = Prepared(80, 0.95, 1, True, 1, True, ())
+    assert "SCHED_FIFO at priority 80 for at most 95 % of the time, processor 1" in str(prepared)
+    for all_of_it in (1.0, None):
+        assert "%" not in str(Prepared(80, all_of_it, 1, True, 1, True, ()))
+
+
+@pytest.fixture
+def rival():
+    """Another program that runs in real time on the last processor; it sleeps."""
+    pid = os.fork()
+    if pid == 0:
+        time.sleep(60)
+        os._exit(0)
+    try:
+        os.sched_setaffinity(pid, {max(os.sched_getaffinity(0))})
+        try:
+            os.sched_setscheduler(pid, os.SCHED_FIFO, os.sched_param(7))
+        except PermissionError:
+            pytest.skip("no real-time priority is permitted here")
+        yield pid
+    finally:
+        os.kill(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+
+
+def test_other_programs_in_real_time_are_named(rival):
+    last = max(os.sched_getaffinity(0))
+    (sentence,) = realtime._beside([last], 80, 0.95)
+    assert sentence.startswith(f"On processor {last} there run in real time, too: ")
+    assert f"({rival}) at priority 7" in sentence
+    assert "One of 80 or more delays the loop" in sentence
+    assert "all stand still once they were busy for 95 % of a second" in sentence
+    (sentence,) = realtime._beside([last], 80, 1.0)
+    assert "stand still" not in sentence
+    assert f"({rival})" not in " ".join(realtime._beside([last + 1], 80, 0.95))
 
 
 def test_a_process_that_ended_is_gone_before_it_is_waited_for():

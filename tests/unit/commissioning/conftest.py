@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -84,7 +85,12 @@ class FakeDrive:
 
     def configure(self) -> DeviceFacts:
         watchdog_s = self._faults.get("watchdog_s", 0.1)
-        return DeviceFacts("fake drive", "D1", 1e4, watchdog_s, {"cycle_s": self._now()})
+        values = {
+            "cycle_s": self._now(),
+            "braking_rad_s2": self._faults.get("braking_rad_s2", 120.0),
+        }
+        known = {name: value for name, value in values.items() if value is not None}
+        return DeviceFacts("fake drive", "D1", 1e4, watchdog_s, known)
 
     def enable(self) -> None:
         if self._pressed():
@@ -114,6 +120,8 @@ class FakeDrive:
         angle, velocity = self._arm.motion()
         scale = self._faults.get("angle_scale", 1.0)
         status, cause = self._status, self._cause
+        if self._on and self._now() >= self._faults.get("given_up_s", math.inf):
+            cause = Cause.DRIVE_STATE
         if "silent_watchdog" in self._faults:
             status, cause = 0, Cause.NONE
         return MotionSample(
@@ -145,6 +153,15 @@ class FakeDrive:
 Commissioned = Callable[..., CommissioningRecord]
 
 
+def at_hand(question: str, world: World) -> bool:
+    """Agree to everything, and press and release the emergency stop when told to."""
+    if question.startswith("Emergency"):
+        world.faults["pressed_at_s"] = world.time.now() + 1.0
+    if question.startswith("Release"):
+        world.faults.pop("pressed_at_s", None)
+    return True
+
+
 class World(NamedTuple):
     """What a test's operator can lay hands on."""
 
@@ -174,11 +191,13 @@ def commissioned(settings: Settings, rigfile: RigFile, monkeypatch: Any) -> Comm
         *,
         joint: tuple[float, float, float] = (0.0045, 0.1368, 1.751),
         noise_sd_nm: float = 0.005,
-        ask: Callable[[str, World], bool] = lambda *_: True,
-        presses: bool = False,
+        ask: Callable[[str, World], bool] = at_hand,
+        present: bool = True,
         known_torque_nm: float | None = None,
         known_angle_deg: float | None = None,
         tables: Mapping[str, Any] | None = None,
+        emulated: bool = False,
+        signed_by: str = "A. Weber",
         **faults: Any,
     ) -> CommissioningRecord:
         time = FakeTime()
@@ -196,20 +215,22 @@ def commissioned(settings: Settings, rigfile: RigFile, monkeypatch: Any) -> Comm
             FakeSensor(arm, time.now, faults), FakeDrive(arm, time.now, faults), RATE_HZ
         )
         chosen = settings if tables is None else settings.model_copy(update=dict(tables))
+        wires = {"drive": (object, SimpleNamespace(emulated=emulated))}
         return commission(
             rig,
-            rigfile,
+            replace(rigfile, devices=wires),
             chosen,
             Timebase(time.now, time.wait_until),
             Operator(
                 ask=lambda question: ask(question, world),
-                presses=presses,
+                present=present,
                 known_torque_nm=known_torque_nm,
                 known_angle_deg=known_angle_deg,
             ),
             limits=QUICK,
             made_utc="2026-01-01T00:00:00+00:00",
             software="0",
+            signed_by=signed_by,
         )
 
     return run

@@ -4,7 +4,9 @@ import math
 from typing import Any
 
 import pytest
+from tests.unit.commissioning.conftest import at_hand
 
+from rigidimeter.commissioning.record import A_PERSON_TELLS
 from rigidimeter.settings import SubjectSettings
 
 
@@ -21,12 +23,80 @@ def test_a_healthy_rig_passes_and_its_numbers_are_right(commissioned: Any) -> No
     assert record.numbers["motion_delay_s"] == pytest.approx(0.02, abs=1e-3)
     assert record.numbers["torque_delay_s"] == pytest.approx(0.02, abs=2e-3)
     assert record.numbers["bandwidth_hz"] == pytest.approx(50.0, rel=0.05)
-    assert set(record.not_tried) == {
-        "known torque",
-        "known angle",
-        "emergency stop",
-        "stays stopped after the release",
-    }
+    assert set(record.not_tried) == {"known torque", "known angle"}
+
+
+def test_a_flag_answers_for_nobody(commissioned: Any) -> None:
+    """With --yes what only a person can tell is not asked: good for an emulated rig only."""
+    asked: list[str] = []
+
+    def consent(question: str, _: Any) -> bool:
+        asked.append(question)
+        return True
+
+    record = commissioned(ask=consent, present=False)
+    outcomes = {check.name: check.outcome for check in record.checks}
+    assert {outcomes[name] for name in A_PERSON_TELLS} == {"not tried"}
+    assert len(asked) == 2  # to the motions, and to power after the watchdog
+    assert failed(record) == []
+    assert not record.passed
+    assert record.missing == A_PERSON_TELLS
+    assert record.objection == (
+        "the check 'mechanical stops' is missing: only a person can tell; commission again "
+        "without --yes"
+    )
+    emulated = commissioned(ask=consent, present=False, emulated=True, signed_by="")
+    assert emulated.passed
+    assert set(A_PERSON_TELLS) < set(emulated.not_tried)
+
+
+def test_what_was_known_is_not_compared_when_nobody_is_there(commissioned: Any) -> None:
+    record = commissioned(present=False, emulated=True, known_torque_nm=2.0, known_angle_deg=10.0)
+    outcomes = {check.name: check.outcome for check in record.checks}
+    assert (outcomes["known torque"], outcomes["known angle"]) == ("not tried", "not tried")
+    assert record.passed
+
+
+def test_somebody_signs_for_hardware(commissioned: Any) -> None:
+    assert commissioned().passed
+    record = commissioned(signed_by=" ")
+    assert not record.passed
+    assert "--signed-by" in record.objection
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ("mechanical stops", "mechanical stops"),
+        ("power go by itself", "hardware enable drops the power"),
+        ("joint move first", "the joint moved as said"),
+    ],
+)
+def test_an_operator_who_says_no_fails_the_check(commissioned: Any, words: str, name: str) -> None:
+    def ask(question: str, world: Any) -> bool:
+        return at_hand(question, world) and words not in question
+
+    assert failed(commissioned(ask=ask)) == [name]
+    assert failed(commissioned(ask=ask, emulated=True)) == [name]
+
+
+def test_a_drive_must_brake_as_the_guard_counts_on(commissioned: Any, settings: Any) -> None:
+    assert failed(commissioned(braking_rad_s2=60.0)) == ["braking of the drive"]
+    record = commissioned(braking_rad_s2=None)
+    assert failed(record) == []
+    assert record.missing == ("braking of the drive",)
+    slower = settings.guard.model_copy(update={"acceleration_limit_deg_s2": 3000.0})
+    assert commissioned(braking_rad_s2=60.0, tables={"guard": slower}).passed
+
+
+@pytest.mark.parametrize(("stall_s", "good"), [(0.099, True), (0.1, False), (0.2, False)])
+def test_the_loop_notices_a_stall_before_the_drive_stops(
+    commissioned: Any, settings: Any, stall_s: float, good: bool
+) -> None:
+    loop = settings.loop.model_copy(update={"stall_s": stall_s})
+    record = commissioned(tables={"loop": loop})
+    assert failed(record) == ([] if good else ["loop stalls before the watchdog"])
+    assert good or "set loop.stall_s in the settings below 0.1 s" in record.failed[0].sentence
 
 
 @pytest.mark.parametrize(
@@ -66,9 +136,9 @@ def test_a_wrong_scale_moves_the_joint_by_little(commissioned: Any) -> None:
     """57 times too far is met by the nudge and the guard, not by the swing."""
     arms = []
 
-    def ask(_: str, world: Any) -> bool:
+    def ask(question: str, world: Any) -> bool:
         arms.append(world.arm)
-        return True
+        return at_hand(question, world)
 
     commissioned(command_scale=57.3, ask=ask)
     assert abs(arms[0].motion()[0]) < 0.5
@@ -77,12 +147,12 @@ def test_a_wrong_scale_moves_the_joint_by_little(commissioned: Any) -> None:
 def test_nothing_moves_without_consent(commissioned: Any) -> None:
     moved: list[float] = []
 
-    def ask(_: str, world: Any) -> bool:
+    def ask(question: str, world: Any) -> bool:
         moved.append(world.arm.motion()[0])
-        return False
+        return question.startswith("Without power")
 
     record = commissioned(ask=ask)
-    assert moved == [0.0]
+    assert moved == [0.0, 0.0]
     assert failed(record) == []
     assert not record.passed
     assert "watchdog" in record.missing
@@ -107,10 +177,12 @@ def test_an_arm_that_does_not_show_leaves_the_rig_unfit(commissioned: Any) -> No
 
 
 def test_a_drive_that_says_nothing_is_watched_in_motion(commissioned: Any) -> None:
-    record = commissioned(silent_watchdog=True)
+    # Nor would it say that the emergency stop was pressed.
+    quiet = {"silent_watchdog": True, "present": False, "emulated": True}
+    record = commissioned(**quiet)
     assert record.passed
     assert "watchdog reported" in record.not_tried
-    assert "watchdog" in failed(commissioned(silent_watchdog=True, deaf_watchdog=True))
+    assert "watchdog" in failed(commissioned(deaf_watchdog=True, **quiet))
 
 
 @pytest.mark.parametrize("restarts", [False, True])
@@ -118,21 +190,29 @@ def test_the_emergency_stop_is_seen_and_its_release_restarts_nothing(
     commissioned: Any, restarts: bool
 ) -> None:
     def ask(question: str, world: Any) -> bool:
-        if question.startswith("Emergency"):
-            world.faults["pressed_at_s"] = world.time.now() + 1.0
-        if question.startswith("Release"):
-            del world.faults["pressed_at_s"]
-            world.faults.update({"restarts": True} if restarts else {})
-        return True
+        if question.startswith("Release") and restarts:
+            world.faults["restarts"] = True
+        return at_hand(question, world)
 
-    record = commissioned(ask=ask, presses=True)
+    record = commissioned(ask=ask)
     outcomes = {check.name: check.outcome for check in record.checks}
     assert outcomes["emergency stop"] == "passed"
     assert failed(record) == (["stays stopped after the release"] if restarts else [])
 
 
 def test_an_emergency_stop_that_does_nothing_fails(commissioned: Any) -> None:
-    assert failed(commissioned(presses=True)) == ["emergency stop"]
+    assert failed(commissioned(ask=lambda *_: True)) == ["emergency stop"]
+
+
+def test_a_driver_that_gives_up_is_no_emergency_stop(commissioned: Any) -> None:
+    """The drive says nothing of it: nobody has pressed yet."""
+
+    def ask(question: str, world: Any) -> bool:
+        if question.startswith("Emergency"):
+            world.faults["given_up_s"] = world.time.now() + 1.0
+        return True
+
+    assert failed(commissioned(ask=ask)) == ["emergency stop"]
 
 
 @pytest.mark.parametrize(
@@ -156,7 +236,7 @@ def test_what_the_operator_knows_is_compared(
             world.push_nm[0] = 2.0
         elif question.startswith("Take the torque off"):
             world.push_nm[0] = 0.0
-        return True
+        return at_hand(question, world)
 
     record = commissioned(ask=ask, known_torque_nm=2.0, known_angle_deg=10.0, **faults)
     assert failed(record) == wrong

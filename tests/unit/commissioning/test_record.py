@@ -1,9 +1,11 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,7 +18,9 @@ from rigidimeter.commissioning import (
     record_path,
     write_record,
 )
-from rigidimeter.commissioning.record import MUST_PASS, covered, kept_facts
+from rigidimeter.commissioning.checks import untried
+from rigidimeter.commissioning.coverage import EXACT, LIMITS, covered, kept_facts
+from rigidimeter.commissioning.record import A_PERSON_TELLS, MUST_PASS
 from rigidimeter.device.rigfile import RigFile
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings, parse_settings
@@ -47,7 +51,7 @@ def rigfile(tmp_path: Path) -> RigFile:
 
 @pytest.fixture
 def record(rigfile: RigFile) -> CommissioningRecord:
-    names = (*MUST_PASS, "stability with OFF")
+    names = (*MUST_PASS, *A_PERSON_TELLS, "stability with OFF")
     record = CommissioningRecord(
         rig_name="rig",
         rig_digest="abc",
@@ -182,11 +186,101 @@ def test_a_failed_check_is_refused(rigfile: RigFile, record: CommissioningRecord
         check(rigfile)
 
 
-@pytest.mark.parametrize("name", [*MUST_PASS, "stability with OFF"])
+@pytest.mark.parametrize("name", [*MUST_PASS, *A_PERSON_TELLS, "stability with OFF"])
 def test_nothing_that_matters_may_be_missing(
     rigfile: RigFile, record: CommissioningRecord, name: str
 ) -> None:
     fewer = tuple(check for check in record.checks if check.name != name)
     write_record(record_path(rigfile.path), replace(record, checks=fewer))
-    with pytest.raises(UserError, match="was not possible"):
+    said = "stability" if name.startswith("stability") else name
+    with pytest.raises(UserError, match=f"the check '{re.escape(said)}' is missing"):
         check(rigfile)
+
+
+@pytest.mark.parametrize("name", A_PERSON_TELLS)
+def test_what_a_flag_answered_for_is_good_for_an_emulated_rig_only(
+    rigfile: RigFile, record: CommissioningRecord, name: str
+) -> None:
+    checks = [c if c.name != name else untried(name, "yes") for c in record.checks]
+    loose = replace(record, checks=tuple(checks), signed_by="")
+    write_record(record_path(rigfile.path), loose)
+    with pytest.raises(UserError, match=f"'{name}' is missing: only a person can tell"):
+        check(rigfile)
+    emulated = replace(rigfile, devices={"drive": (object, SimpleNamespace(emulated=True))})
+    write_record(record_path(rigfile.path), replace(loose, emulated=True))
+    assert check(emulated).not_tried == (name,)
+    with pytest.raises(UserError, match="was made without hardware, and this rig has some"):
+        check(rigfile)
+
+
+def test_hardware_wants_a_name(rigfile: RigFile, record: CommissioningRecord) -> None:
+    write_record(record_path(rigfile.path), replace(record, signed_by=" "))
+    with pytest.raises(UserError, match=r"nobody has signed for it: .* --signed-by NAME"):
+        check(rigfile)
+
+
+def test_the_record_is_looked_at_before_the_devices(
+    rigfile: RigFile, record: CommissioningRecord
+) -> None:
+    assert check(rigfile, None).passed
+    write_record(record_path(rigfile.path), replace(record, signed_by=""))
+    with pytest.raises(UserError, match="nobody has signed"):
+        check(rigfile, None)
+
+
+def test_one_device_of_hardware_makes_a_rig_of_hardware(rigfile: RigFile) -> None:
+    emulated, true = SimpleNamespace(emulated=True), SimpleNamespace()
+    assert replace(rigfile, devices={"drive": (object, emulated)}).emulated
+    mixed = {"torque_sensor": (object, true), "drive": (object, emulated)}
+    assert not replace(rigfile, devices=mixed).emulated
+    assert not replace(rigfile, devices={}).emulated
+
+
+COVERED = [
+    (table, key)
+    for table, fields in covered(Settings()).items()
+    if table in LIMITS
+    for key in fields
+]
+"""Every number of the tables in which a protocol may ask for less."""
+
+
+def test_every_field_of_guard_loop_and_zeroing_is_covered() -> None:
+    walked = {table: {key for of, key in COVERED if of == table} for table in LIMITS}
+    settings = Settings()
+    for table in ("guard", "loop", "zeroing"):
+        assert walked[table] == set(type(getattr(settings, table)).model_fields)
+    assert walked["prbs"] == {"amplitude_nm"}
+    assert walked["sinusoid"] == {"amplitude_deg", "frequency_hz"}
+
+
+def with_value(table: str, key: str, factor: float) -> Settings:
+    """Return the default settings with one number changed, whatever the checks would say."""
+    settings = Settings()
+    section = getattr(settings, table)
+    value = getattr(section, key)
+    changed = value + (1 if factor > 1 else -1) if isinstance(value, int) else factor * value
+    return settings.model_copy(update={table: section.model_copy(update={key: changed})})
+
+
+@pytest.mark.parametrize(("table", "key"), COVERED)
+def test_tighter_is_covered_and_looser_is_not(
+    rigfile: RigFile, record: CommissioningRecord, table: str, key: str
+) -> None:
+    tighter = with_value(table, key, 0.99)
+    with pytest.raises(UserError, match=rf"covers {table}\.{key} = .*, not "):
+        check(rigfile, settings=with_value(table, key, 1.01))
+    if key in EXACT:
+        with pytest.raises(UserError, match=rf"covers {table}\.{key} = "):
+            check(rigfile, settings=tighter)
+    else:
+        assert check(rigfile, settings=tighter).passed
+
+
+@pytest.mark.parametrize("key", type(Settings().controller).model_fields)
+@pytest.mark.parametrize("factor", [0.99, 1.01])
+def test_another_controller_is_never_covered(
+    rigfile: RigFile, record: CommissioningRecord, key: str, factor: float
+) -> None:
+    with pytest.raises(UserError, match=rf"covers controller\.{key} = "):
+        check(rigfile, settings=with_value("controller", key, factor))

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from rigidimeter.design import beyond_limits, demand, ideal_response, sinusoid, time_constant_s
+from rigidimeter.guard import Limited, guard_limits, guard_state, guard_step
 from rigidimeter.joint import JointDynamics
-from rigidimeter.settings import ControllerSettings, GuardSettings, SinusoidSettings
+from rigidimeter.settings import (
+    ControllerSettings,
+    GuardSettings,
+    SinusoidSettings,
+    parse_settings,
+)
 
 CONTROLLER = ControllerSettings(inertia_kg_m2=0.5, damping_nm_s_rad=2.0)
 RATE_HZ = 1000.0
@@ -55,11 +61,46 @@ def test_demand_of_the_sinusoid() -> None:
 def test_reach_adds_the_room_to_stop_in_the_direction_of_motion() -> None:
     guard = GuardSettings(acceleration_limit_deg_s2=math.degrees(2.0), reaction_time_s=0.1)
     outward = demand([0.5], [1.0], RATE_HZ, guard)
-    assert outward.reach_rad == pytest.approx(0.5 + 0.1 + 0.25)
+    held_s = 0.1 + 0.005 + 0.001  # to react, a step that is late, the tick
+    assert outward.reach_rad == pytest.approx(0.5 + held_s + 0.25)
     inward = demand([0.5], [-1.0], RATE_HZ, guard)
     assert inward.reach_rad == 0.5
     through = demand([0.0], [1.0], RATE_HZ, guard)
-    assert through.reach_rad == pytest.approx(0.35)
+    assert through.reach_rad == pytest.approx(held_s + 0.25)
+
+
+def test_a_slow_loop_may_be_a_tick_late() -> None:
+    guard = GuardSettings(acceleration_limit_deg_s2=math.degrees(2.0), reaction_time_s=0.1)
+    assert demand([0.0], [1.0], 50.0, guard).reach_rad == pytest.approx(0.1 + 0.02 + 0.02 + 0.25)
+
+
+@pytest.mark.parametrize("rate_hz", [1000.0, 60.0])
+@pytest.mark.parametrize("speed_rad_s", [0.3, 2.0])
+def test_the_guard_lets_through_what_has_this_room_and_slows_what_has_not(
+    rate_hz: float, speed_rad_s: float
+) -> None:
+    """The room is the guard's own: at a constant speed, one step before the place and at it."""
+    sensor = {"rate_hz": rate_hz}
+    settings = parse_settings(
+        {
+            "rig": {"tick_rate_hz": rate_hz, "torque": sensor, "motion": sensor},
+            "guard": {"reaction_time_s": 0.05},
+        }
+    )
+    limits = guard_limits(settings)
+    room_rad = demand([0.0], [speed_rad_s], rate_hz, settings.guard).reach_rad
+    step_rad = speed_rad_s / rate_hz
+    state, angle_rad, last_rad = guard_state(limits), -0.5, math.nan
+    limited = 0
+    while limited < int(Limited.POSITION):
+        last_rad = angle_rad
+        state, sent, limited = guard_step(
+            limits, state, speed_rad_s, 0.0, angle_rad, state.velocity_rad_s, 0.0
+        )
+        angle_rad += sent / rate_hz
+    # The reading is as new as can be and the drive has done what it was told, so that the sum of
+    # what is in flight counts once more what lies behind: whole ticks of the reaction time.
+    assert limits.position_rad - last_rad == pytest.approx(room_rad, abs=2.0 * step_rad)
 
 
 def test_a_start_at_speed_is_an_acceleration() -> None:

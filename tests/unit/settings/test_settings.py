@@ -124,3 +124,14 @@ def test_every_number_states_its_unit():
                     assert name.endswith(suffix)
 
     walk(Settings)
+
+
+@pytest.mark.parametrize("name", ["torque", "motion"])
+def test_a_stamp_that_takes_off_too_much_makes_a_reading_old(name):
+    """The guard goes by the stamp: 0.06 s old at most by it, however short the latency is."""
+    sensor = {"rate_hz": 100.0, "latency_s": 0.001, "stamp_latency_s": 0.05}
+    values = {"rig": {name: sensor}, "guard": {"reaction_time_s": 0.2, "stale_s": 0.055}}
+    with pytest.raises(UserError, match=rf"too short for rig\.{name}, .* may be 0\.06 s old"):
+        parse_settings(values)
+    values["guard"]["stale_s"] = 0.065
+    parse_settings(values)

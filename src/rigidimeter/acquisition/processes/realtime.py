@@ -1,85 +1,37 @@
-"""What a process asks of the operating system before it runs a real-time loop, and how it waits.
+"""What a process asks of the operating system before it runs a real-time loop.
 
 Each of these is a request. A laptop may refuse all of them and the session still runs, with later
 ticks; so what was refused, and what to do about it, is said in a sentence and stored with the
 session.
+
+The priority comes last. To lock the memory and to collect the garbage of all that was imported is
+more than a tenth of a second of work; at a real-time priority it would hold up the loop of another
+program on the same processor for as long.
+
+Linux lets the real-time programs of a processor be busy for a share of each period, 95 % of 1 s
+unless set otherwise; then all of them stand still for the rest, 50 ms. A loop alone is never so
+busy. Beside another real-time program, of whatever priority, it may be.
 """
 
 from __future__ import annotations
 
 import ctypes
-import errno
 import gc
 import os
-import sys
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from contextlib import suppress
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
+from rigidimeter.acquisition.processes.deadline import DeadlineClock
 from rigidimeter.acquisition.processes.shared import ORDERED
 
 __all__ = ["DeadlineClock", "Prepared", "prepare_loop_process"]
 
-CLOCK_MONOTONIC, TIMER_ABSTIME = 1, 1
 MCL_CURRENT, MCL_FUTURE = 1, 2
 PR_SET_TIMERSLACK = 29
-
-Sleep = Callable[[int], None]
-
-
-class _Timespec(ctypes.Structure):
-    _fields_ = (("tv_sec", ctypes.c_long), ("tv_nsec", ctypes.c_long))
-
-
-def _absolute_sleep() -> Sleep | None:
-    """Return a sleep until a time of CLOCK_MONOTONIC in nanoseconds; None where there is none."""
-    if not sys.platform.startswith("linux"):
-        return None
-    nanosleep = ctypes.CDLL(None).clock_nanosleep
-    nanosleep.argtypes = [
-        ctypes.c_int,
-        ctypes.c_int,
-        ctypes.POINTER(_Timespec),
-        ctypes.c_void_p,
-    ]
-    nanosleep.restype = ctypes.c_int
-    until = _Timespec()
-    pointer = ctypes.pointer(until)
-
-    def sleep(until_ns: int) -> None:
-        until.tv_sec, until.tv_nsec = divmod(until_ns, 1_000_000_000)
-        while nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, pointer, None) == errno.EINTR:
-            pass  # a signal's handler has run; the deadline is still the same
-
-    return sleep
-
-
-def _relative_sleep(until_ns: int) -> None:
-    remaining_ns = until_ns - time.monotonic_ns()
-    if remaining_ns > 0:
-        time.sleep(1e-9 * remaining_ns)
-
-
-class DeadlineClock:
-    """CLOCK_MONOTONIC since the session's start, waited for by absolute deadlines.
-
-    The kernel is told when to wake, not how long to sleep, so nothing is lost when the process is
-    interrupted between reading the clock and going to sleep. No change of the wall clock is felt.
-    """
-
-    def __init__(self) -> None:
-        self._sleep: Sleep = _absolute_sleep() or _relative_sleep
-        self._start_ns = time.monotonic_ns()
-
-    def now_s(self) -> float:
-        """Return the seconds since the session's start."""
-        return 1e-9 * (time.monotonic_ns() - self._start_ns)
-
-    def wait_until(self, deadline_s: float) -> float:
-        """Return at the deadline, or at once when it has passed; return the time it then is."""
-        self._sleep(self._start_ns + round(1e9 * deadline_s))
-        return 1e-9 * (time.monotonic_ns() - self._start_ns)
+KERNEL_THREAD = 0x00200000  # of the flags in /proc/PID/stat
 
 
 @dataclass(frozen=True)
@@ -90,6 +42,9 @@ class Prepared:
     ----------
     priority : int or None
         Of SCHED_FIFO; None if it was refused.
+    real_time_share : float or None
+        What part of a processor's time its real-time programs may take together, 1 for all of it;
+        None where that is not known.
     cpu : int or None
         The only processor it runs on.
     memory_locked : bool
@@ -99,10 +54,11 @@ class Prepared:
     collector_off : bool
         Whether Python looks for cycles of objects while the loop runs.
     refused : tuple of str
-        A sentence for each request that was not granted.
+        A sentence for each request that was not granted, and for what else can delay the loop.
     """
 
     priority: int | None
+    real_time_share: float | None
     cpu: int | None
     memory_locked: bool
     timer_slack_ns: int | None
@@ -114,8 +70,10 @@ class Prepared:
         return {**asdict(self), "refused": list(self.refused)}
 
     def __str__(self) -> str:
+        share = self.real_time_share
+        upto = f" for at most {100 * share:.3g} % of the time" if share and share < 1 else ""
         granted = [
-            f"SCHED_FIFO at priority {self.priority}" if self.priority else "",
+            f"SCHED_FIFO at priority {self.priority}{upto}" if self.priority else "",
             f"processor {self.cpu} alone" if self.cpu is not None else "",
             "memory locked" if self.memory_locked else "",
             f"timer slack {self.timer_slack_ns} ns" if self.timer_slack_ns else "",
@@ -140,13 +98,6 @@ def prepare_loop_process(
     lock_memory : bool
     """
     refused: list[str] = []
-    has_priority = bool(priority) and _tried(
-        lambda: os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority)),
-        f"The priority {priority} of SCHED_FIFO was refused ({{}}), so other programs can delay "
-        "the loop; allow it with `ulimit -r 90`, an rtprio line in /etc/security/limits.conf or "
-        "CAP_SYS_NICE.",
-        refused,
-    )
     processors = sorted(os.sched_getaffinity(0))
     wanted = ({cpu} if cpu is not None else set(processors[-1:])) if len(processors) > 1 else set()
     if not _tried(
@@ -176,8 +127,20 @@ def prepare_loop_process(
     gc.collect()
     gc.freeze()
     gc.disable()
+    share = _real_time_share()
+    beside = _beside(wanted or processors, priority, share)
+    has_priority = bool(priority) and _tried(
+        lambda: os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority)),
+        f"The priority {priority} of SCHED_FIFO was refused ({{}}), so other programs can delay "
+        "the loop; allow it with `ulimit -r 90`, an rtprio line in /etc/security/limits.conf or "
+        "CAP_SYS_NICE.",
+        refused,
+    )
+    if has_priority:
+        refused += beside
     return Prepared(
         priority=priority if has_priority else None,
+        real_time_share=share,
         cpu=next(iter(wanted), None),
         memory_locked=locked,
         timer_slack_ns=1 if slack else None,
@@ -202,3 +165,48 @@ def _checked(result: int) -> None:
     if result != 0:
         code = ctypes.get_errno()
         raise OSError(code, os.strerror(code))
+
+
+def _real_time_share() -> float | None:
+    """Return what part of a processor's time the real-time programs may take, None if unknown.
+
+    A control group may allow less than the system does.
+    """
+    kernel, groups = Path("/proc/sys/kernel"), Path("/sys/fs/cgroup/cpu")
+    places = [(kernel / "sched_rt_runtime_us", kernel / "sched_rt_period_us")]
+    with suppress(OSError):
+        for line in Path("/proc/self/cgroup").read_text().splitlines():
+            _, controllers, path = line.split(":", 2)
+            if "cpu" in controllers.split(","):
+                mine = groups / path.lstrip("/")
+                places.append((mine / "cpu.rt_runtime_us", mine / "cpu.rt_period_us"))
+    shares = []
+    for runtime, period in places:
+        with suppress(OSError, ValueError):
+            runtime_us, period_us = int(runtime.read_text()), int(period.read_text())
+            shares.append(1.0 if runtime_us < 0 else min(runtime_us / period_us, 1.0))
+    return min(shares, default=None)
+
+
+def _beside(processors: Collection[int], priority: int, share: float | None) -> list[str]:
+    """Return a sentence if other programs run in real time on one of the processors."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError, ValueError, IndexError):
+            head, _, rest = path.read_text(errors="replace").rpartition(")")
+            fields, (pid, _, name) = rest.split(), head.partition(" (")
+            flags, its_priority, policy = int(fields[6]), int(fields[37]), int(fields[38])
+            if policy not in (os.SCHED_FIFO, os.SCHED_RR) or flags & KERNEL_THREAD:
+                continue
+            if int(pid) != os.getpid() and os.sched_getaffinity(int(pid)) & set(processors):
+                found.append(f"{name} ({pid}) at priority {its_priority}")
+    if not found:
+        return []
+    still = ""
+    if share is not None and share < 1:
+        still = f", and all stand still once they were busy for {100 * share:.3g} % of a second"
+    return [
+        f"On processor {', '.join(map(str, sorted(processors)))} there run in real time, too: "
+        f"{', '.join(found)}. One of {priority} or more delays the loop while it is busy{still}; "
+        "end them, or give the loop another processor."
+    ]

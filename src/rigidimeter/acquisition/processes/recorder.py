@@ -1,39 +1,26 @@
-"""The recorder's process: from the rings into the session folder.
+"""From the rings into the session folder: what is recorded, and how it is brought there.
 
-Its cursor in a ring moves only when what it read is in the file, so whatever happens to it, nothing
-is lost that the ring can hold. It beats its heart between any two writes. What the system has been
-given is put on the disk about once a second and at the end of every epoch, by a thread of its own:
-a slow disk may hold that up for long.
-
-A disk that does not take a write is tried again and again, and the operator told so. When the loop
-has ended, or is not heard of, the session is closed with that as the reason.
+The recorder's cursor in a ring moves only when what it read is in the file, so whatever happens to
+it, nothing is lost that the ring can hold. It beats its heart between any two writes. What the
+system has been given is put on the disk about once a second and at the end of every epoch.
 """
 
 from __future__ import annotations
 
 import json
-import math
-import os
-import signal
-import sys
-import threading
-import time
-import traceback
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.acquisition.processes.board import Board, Condition, Flag, Role
+from rigidimeter.acquisition.processes.board import Board, Role
 from rigidimeter.acquisition.processes.ring import ROW, Event, EventRing, SampleRing
-from rigidimeter.acquisition.processes.watched import Watched, leave_signals_to_the_console
-from rigidimeter.errors import UserError
 from rigidimeter.recording.folder import SessionWriter
 from rigidimeter.recording.log import BATCH_S
 from rigidimeter.settings import Settings
 
-__all__ = ["Patience", "Recorder", "Recording", "recorder_main"]
+__all__ = ["Patience", "Recorder", "Recording"]
 
 
 @dataclass(frozen=True)
@@ -95,50 +82,6 @@ class Patience:
     hung_s: float = 8.0
     console_lost_s: float = 1.0
     recorder_lost_s: float = 5.0
-
-
-class _Syncing:
-    """A thread that has files put on the disk when asked; it may hang, the asker does not."""
-
-    def __init__(self, descriptors: tuple[int, ...], board: Board) -> None:
-        # Copies, so that a file that is closed meanwhile is not mistaken for another.
-        self._descriptors = tuple(os.dup(descriptor) for descriptor in descriptors)
-        self._board = board
-        self._asked = threading.Semaphore(0)
-        self._ending = False
-        self.busy = False
-        self._samples = 0
-        self.error = ""
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def ask(self, samples: int) -> None:
-        if not self.busy:
-            self.busy = True
-            self._samples = samples
-            self._asked.release()
-
-    def _run(self) -> None:
-        while True:
-            self._asked.acquire()
-            if self._ending:
-                return
-            try:
-                for descriptor in self._descriptors:
-                    os.fsync(descriptor)
-                self._board.synced_samples = self._samples
-                self.error = ""
-            except OSError as error:
-                self.error = error.strerror or str(error)
-            self.busy = False
-
-    def close(self) -> None:
-        self._ending = True
-        self._asked.release()
-        self._thread.join(timeout=1.0)
-        if not self._thread.is_alive():
-            for descriptor in self._descriptors:
-                os.close(descriptor)
 
 
 class Recorder:
@@ -249,144 +192,3 @@ class Recorder:
         elif kind == "epoch_ended":
             self._open_epoch = None
             self.epoch_ended = True
-
-
-def recorder_main(
-    recording: Recording, names: tuple[str, str, str], patience: Patience, console_pid: int
-) -> None:
-    """Record until the session is closed; the target of the recorder's process.
-
-    Parameters
-    ----------
-    recording : Recording
-    names : tuple of str
-        Of the sample ring, the event ring and the board.
-    patience : Patience
-    console_pid : int
-        The process that started this one.
-    """
-    leave_signals_to_the_console()
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends with the session, not before
-    samples, events = SampleRing.attach(names[0]), EventRing.attach(names[1])
-    board = Board.attach(names[2])
-    board.join(Role.RECORDER)
-    try:
-        writer = recording.writer()
-        board.set_condition(Role.RECORDER, Condition.READY, "")
-        rate_hz = recording.settings.rig.tick_rate_hz
-        recorder = Recorder(writer, samples, events, board, rate_hz)
-        ended_well = _record(recorder, writer, board, samples, patience, recording, console_pid)
-        board.set_condition(Role.RECORDER, Condition.DONE if ended_well else Condition.FAILED)
-    except UserError as error:
-        board.set_condition(Role.RECORDER, Condition.FAILED, str(error))
-        sys.exit(1)
-    except BaseException as error:
-        board.set_condition(
-            Role.RECORDER, Condition.FAILED, f"the recorder failed: {type(error).__name__}: {error}"
-        )
-        traceback.print_exc()
-        sys.exit(1)
-    finally:
-        if os.getppid() != console_pid and not _loop_lives(board):
-            for memory in (samples.memory, events.memory, board.memory):
-                memory.unlink()
-        for part in (samples, events, board):
-            part.close()
-
-
-def _loop_lives(board: Board) -> bool:
-    pid = board.pid(Role.LOOP)
-    return bool(pid) and Watched(pid).alive()
-
-
-def _record(
-    recorder: Recorder,
-    writer: SessionWriter,
-    board: Board,
-    samples: SampleRing,
-    patience: Patience,
-    recording: Recording,
-    console_pid: int,
-) -> bool:
-    """Record until the session is closed; return whether it is in the files."""
-    syncing = _Syncing(writer.descriptors(), board)
-    loop: Watched | None = None
-    since_s: float | None = None  # the disk has taken nothing since then
-    over_s: float | None = None  # the loop has ended since then
-    synced_s = time.monotonic()
-    try:
-        while True:
-            board.beat(Role.RECORDER)
-            if loop is None and board.pid(Role.LOOP):
-                loop = Watched(board.pid(Role.LOOP))
-            why = _loop_lost(board, loop, patience, console_pid)
-            now_s = time.monotonic()
-            try:
-                recorder.drain()
-                if why and not recorder.closing:
-                    recorder.close(why)
-                    recorder.drain()
-                if since_s is not None:
-                    recorder.note("recording_resumed", after_s=round(now_s - since_s, 3))
-                    since_s = None
-                board.set_condition(Role.RECORDER, Condition.RUNNING, syncing.error)
-            except OSError as error:
-                since_s = since_s or now_s
-                board.set_condition(
-                    Role.RECORDER,
-                    Condition.TROUBLE,
-                    f"{recording.folder}: nothing can be written there "
-                    f"({error.strerror or error}); {samples.lag()} samples wait: make room",
-                )
-            if recorder.ended:
-                return _synced(syncing, board, samples, patience, recording)
-            over_s = over_s or (now_s if why or recorder.closing else None)
-            if since_s is not None and over_s is not None and now_s - over_s > patience.disk_s:
-                return False
-            if recorder.epoch_ended or now_s - synced_s >= patience.sync_s:
-                recorder.epoch_ended, synced_s = False, now_s
-                syncing.ask(samples.recorded)
-            time.sleep(patience.look_s)
-    finally:
-        syncing.close()
-
-
-def _synced(
-    syncing: _Syncing, board: Board, samples: SampleRing, patience: Patience, recording: Recording
-) -> bool:
-    """Wait until the closed files are on the disk, as long as that is reasonable."""
-    until_s = time.monotonic() + patience.disk_s
-    asked = False
-    while time.monotonic() < until_s:
-        board.beat(Role.RECORDER)
-        if not syncing.busy:
-            if asked and not syncing.error:
-                return True
-            asked = True
-            syncing.ask(samples.recorded)
-        time.sleep(0.005)
-    board.set_condition(
-        Role.RECORDER,
-        Condition.TROUBLE,
-        f"{recording.folder}: is written, but the disk has not confirmed it",
-    )
-    return True
-
-
-def _loop_lost(board: Board, loop: Watched | None, patience: Patience, console_pid: int) -> str:
-    """Return why no more samples will come; nothing while they may."""
-    if loop is None:
-        if os.getppid() != console_pid or board.flag(Flag.END_ASKED):
-            return "the loop was never started"
-        return ""
-    if not loop.alive():
-        return "the loop's process ended without closing the session"
-    # While it starts it may wait for devices, and nothing moves.
-    limits_s = {
-        Condition.RUNNING: patience.loop_lost_s,
-        Condition.STOPPING: patience.stopping_s,
-    }
-    limit_s = limits_s.get(board.condition(Role.LOOP), math.inf)
-    if board.age_s(Role.LOOP) > limit_s:
-        return f"the loop's process did not answer for {limit_s:g} s"
-    return ""

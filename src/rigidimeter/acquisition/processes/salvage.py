@@ -4,16 +4,23 @@ A ring keeps what the recorder had not written, and some of what it had. Which o
 the file itself says, by the last tick in a whole batch, so nothing is written twice and nothing
 left out, wherever the recorder was killed. The samples are written anew to a file beside the old
 one, which then takes its place; a fault half-way leaves the old one as it was.
+
+Whoever is left does it, once the recorder has ended or was ended (`complete`).
 """
 
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from rigidimeter.acquisition.processes.board import Condition, Role
+from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.ring import ROW, EventRing, SampleRing
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.watched import Watched
 from rigidimeter.errors import UserError
 from rigidimeter.recording.folder import EVENTS, SAMPLES, lock, read_manifest
 from rigidimeter.recording.log import (
@@ -26,7 +33,7 @@ from rigidimeter.recording.log import (
 )
 from rigidimeter.recording.recover import recover
 
-__all__ = ["Salvage", "salvage"]
+__all__ = ["Salvage", "complete", "salvage"]
 
 
 @dataclass(frozen=True)
@@ -90,6 +97,62 @@ def salvage(
         os.fsync(file.fileno())
     recover(folder, reason)
     return Salvage(added, len(lines), samples.refused)
+
+
+def complete(
+    me: Role,
+    shared: SessionMemory,
+    recording: Recording,
+    recorder: Watched,
+    patience: Patience,
+    remarks: list[str],
+) -> None:
+    """See the recorder to its end; if that is not a good one, do its work.
+
+    Parameters
+    ----------
+    me : Role
+        Whose heart beats meanwhile.
+    shared : SessionMemory
+    recording : Recording
+    recorder : Watched
+    patience : Patience
+    remarks : list of str
+        What the operator should know is added to them.
+    """
+    board = shared.board
+    since_s = time.monotonic()
+    hung = False
+    # One that has done its work no longer beats, and may take a while to leave.
+    while recorder.alive() and not hung and board.condition(Role.RECORDER) is not Condition.DONE:
+        board.beat(me)
+        # A heart that beat before the wait began may have been silent for a good reason.
+        silent_s = min(board.age_s(Role.RECORDER), time.monotonic() - since_s)
+        hung = silent_s > patience.hung_s
+        time.sleep(0.02)
+    if hung:
+        remarks.append(f"the recorder did not answer for {patience.hung_s:g} s and was ended")
+        recorder.kill()
+        until_s = time.monotonic() + 2.0
+        while recorder.alive() and time.monotonic() < until_s:
+            time.sleep(0.01)
+    if board.condition(Role.RECORDER) is Condition.DONE:
+        late = shared.samples.lag()
+        if late:
+            remarks.append(f"{late} samples came after the session was closed")
+        return
+    note = board.note(Role.RECORDER)
+    reason = note or ("the recorder hung" if hung else "the recorder was killed")
+    try:
+        salvage(
+            recording.folder,
+            shared.samples,
+            shared.events,
+            reason,
+            recording.settings.rig.tick_rate_hz,
+        )
+    except (UserError, OSError) as error:
+        remarks.append(f"{recording.folder}: the session could not be completed ({error})")
 
 
 def _samples(path: Path, ring: SampleRing, tick_rate_hz: float) -> int:

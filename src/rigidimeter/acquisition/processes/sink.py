@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 from time import monotonic_ns
 from typing import Any
 
@@ -16,11 +17,15 @@ from rigidimeter.recording.log import Sample
 
 __all__ = ["BoardOutside", "RingSink"]
 
+CLOCK_BOOTTIME = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
+"""Goes on while the computer is suspended, where the system has such a clock."""
+
 SHOWN_S = 0.02
 """How often the loop shows itself."""
 
 _NONE = int(Cause.NONE)
 _EMERGENCY_STOP, _SIGNAL = int(Cause.EMERGENCY_STOP), int(Cause.SIGNAL)
+_STALLED = int(Cause.STALLED)
 _CONSOLE_LOST, _RECORDER_LOST = int(Cause.CONSOLE_LOST), int(Cause.RECORDER_LOST)
 _RECORD_OVERFLOW = int(Cause.RECORD_OVERFLOW)
 
@@ -145,8 +150,15 @@ class RingSink:
         return self._samples.lag()
 
 
+_boot_ns: Nanoseconds = partial(time.clock_gettime_ns, CLOCK_BOOTTIME)
+
+
 class BoardOutside:
     """Answers the loop every tick: is there a cause to stop, is there an order.
+
+    CLOCK_MONOTONIC stands still while the computer is suspended, so no heartbeat ages and no tick
+    is late afterwards. CLOCK_BOOTTIME goes on: what it is ahead grows by the time of the suspension
+    and by nothing else. A loop that was away so long has stood still, whatever its own clock says.
 
     Parameters
     ----------
@@ -158,10 +170,12 @@ class BoardOutside:
         The same for the recorder. It may be long: what is not in the file stays in the ring.
     most_lag : int
         More samples than that waiting for the recorder are a cause to stop.
+    stall_s : float
+        A suspension of more than that is a cause to stop, and stays one.
     attended : bool
         Whether an operator is there who can go on after a hold.
-    now_ns : callable
-        CLOCK_MONOTONIC in nanoseconds.
+    now_ns, boot_ns : callable
+        CLOCK_MONOTONIC and CLOCK_BOOTTIME in nanoseconds.
     """
 
     def __init__(
@@ -172,15 +186,21 @@ class BoardOutside:
         console_lost_s: float = 1.0,
         recorder_lost_s: float = 5.0,
         most_lag: int | None = None,
+        stall_s: float = 0.1,
         attended: bool = True,
         now_ns: Nanoseconds = time.monotonic_ns,
+        boot_ns: Nanoseconds = _boot_ns,
     ) -> None:
         self.attended = attended
         self._board, self._samples = board, samples
         self._console_ns = round(1e9 * console_lost_s)
         self._recorder_ns = round(1e9 * recorder_lost_s)
         self._most_lag = samples.capacity // 2 if most_lag is None else most_lag
-        self._now_ns = now_ns
+        self._now_ns, self._boot_ns = now_ns, boot_ns
+        # The clock that goes on is read first: what goes by between the two readings makes the
+        # difference smaller, and so never looks like a suspension.
+        awake_ns = max(boot_ns() - now_ns() for _ in range(3))
+        self._suspended_ns = awake_ns + round(1e9 * stall_s)
         self._words = board.memory.words
         self._places = board.places()
 
@@ -190,9 +210,12 @@ class BoardOutside:
         emergency, ended, console, recorder, _ = self._places
         if words[emergency]:
             return _EMERGENCY_STOP
+        boot_ns = self._boot_ns()
+        now_ns = self._now_ns()
+        if boot_ns - now_ns > self._suspended_ns:
+            return _STALLED
         if words[ended]:
             return _SIGNAL
-        now_ns = self._now_ns()
         if now_ns - words[console] > self._console_ns:
             return _CONSOLE_LOST
         if now_ns - words[recorder] > self._recorder_ns:

@@ -15,24 +15,27 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import sys
 import threading
 import time
 import traceback
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from types import FrameType
 from typing import Any
 
 from rigidimeter.acquisition.processes.board import Board, Condition, Flag, Role
-from rigidimeter.acquisition.processes.realtime import Prepared, prepare_loop_process
-from rigidimeter.acquisition.processes.recorder import Patience, Recording, recorder_main
-from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
-from rigidimeter.acquisition.processes.salvage import Salvage, salvage
-from rigidimeter.acquisition.processes.sink import BoardOutside, RingSink
-from rigidimeter.acquisition.processes.watched import Watched, leave_signals_to_the_console
+from rigidimeter.acquisition.processes.loop_process import (
+    LoopSide,
+    LoopTarget,
+    Realtime,
+    loop_main,
+)
+from rigidimeter.acquisition.processes.recorder import Patience, Recording
+from rigidimeter.acquisition.processes.recorder_process import recorder_main
+from rigidimeter.acquisition.processes.salvage import Salvage, complete
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.watched import Watched
 from rigidimeter.acquisition.states import Command, Order
 from rigidimeter.errors import UserError
 from rigidimeter.recording.folder import EVENTS
@@ -43,48 +46,6 @@ __all__ = ["Ended", "LoopSide", "LoopTarget", "Realtime", "supervise"]
 RING_S = 60.0
 """For how long the recorder may write nothing before samples are lost."""
 LOOK_S = 0.05
-
-
-@dataclass(frozen=True)
-class Realtime:
-    """What the loop's process asks for; see `prepare_loop_process`.
-
-    Attributes
-    ----------
-    priority : int
-        Of SCHED_FIFO; 0 asks for none.
-    cpu : int or None
-    lock_memory : bool
-    live_estimate : bool
-        Whether J, B and K are estimated while the session runs.
-    attended : bool
-        Whether an operator is there who can go on after a hold.
-    """
-
-    priority: int = 80
-    cpu: int | None = None
-    lock_memory: bool = True
-    live_estimate: bool = True
-    attended: bool = True
-
-
-@dataclass(frozen=True)
-class LoopSide:
-    """What the loop's target is given.
-
-    `ready` is to be called once the rig is configured and all objects are made, just before the
-    first tick: it prepares the process, stores what was permitted, and returns it.
-    """
-
-    sink: RingSink
-    outside: BoardOutside
-    board: Board
-    ready: Callable[[], Prepared]
-
-
-LoopTarget = Callable[[LoopSide], object]
-"""Runs the session and closes the sink. It must be picklable: a function of a module, or a
-`functools.partial` of one."""
 
 
 @dataclass(frozen=True)
@@ -111,48 +72,6 @@ class Ended:
     samples: int
     salvaged: Salvage | None
     remarks: tuple[str, ...]
-
-
-class _Shared:
-    """Rings and board, made or attached to."""
-
-    def __init__(self, samples: SampleRing, events: EventRing, board: Board) -> None:
-        self.samples, self.events, self.board = samples, events, board
-
-    @classmethod
-    def create(cls, tick_rate_hz: float, ring_s: float) -> _Shared:
-        samples = SampleRing.create(max(16, round(ring_s * tick_rate_hz)))
-        try:
-            events = EventRing.create()
-            try:
-                return cls(samples, events, Board.create())
-            except BaseException:
-                _drop(events.memory)
-                raise
-        except BaseException:
-            _drop(samples.memory)
-            raise
-
-    @classmethod
-    def attach(cls, names: tuple[str, str, str]) -> _Shared:
-        return cls(SampleRing.attach(names[0]), EventRing.attach(names[1]), Board.attach(names[2]))
-
-    @property
-    def names(self) -> tuple[str, str, str]:
-        return self.samples.name, self.events.name, self.board.name
-
-    def unlink(self) -> None:
-        for part in (self.samples, self.events, self.board):
-            part.memory.unlink()
-
-    def close(self) -> None:
-        for part in (self.samples, self.events, self.board):
-            part.close()
-
-
-def _drop(memory: Any) -> None:
-    memory.unlink()
-    memory.close()
 
 
 def supervise(
@@ -188,7 +107,7 @@ def supervise(
     """
     realtime, patience = realtime or Realtime(), patience or Patience()
     context = multiprocessing.get_context("spawn")
-    shared = _Shared.create(recording.settings.rig.tick_rate_hz, ring_s)
+    shared = SessionMemory.create(recording.settings.rig.tick_rate_hz, ring_s)
     board = shared.board
     board.join(Role.CONSOLE)
     processes: list[BaseProcess] = []
@@ -203,9 +122,7 @@ def supervise(
         with _Interrupts(board):
             me = os.getpid()
             recorder = start("recorder", recorder_main, recording, shared.names, patience, me)
-            loop = start(
-                "loop", _loop_main, target, recording, shared.names, realtime, patience, me
-            )
+            loop = start("loop", loop_main, target, recording, shared.names, realtime, patience, me)
             _await_recorder(recorder, board)
             rig = recording.settings.rig
             estimator = None
@@ -221,7 +138,7 @@ def supervise(
             remarks = _see_through(loop, recorder, board, patience, console)
             watched = Watched(recorder.pid or 0)
             try:
-                _complete(Role.CONSOLE, shared, recording, watched, patience, remarks)
+                complete(Role.CONSOLE, shared, recording, watched, patience, remarks)
             finally:
                 watched.close()
             if estimator is not None:
@@ -301,7 +218,11 @@ def _see_through(
             traceback.print_exc()
             remarks.append(f"the console failed ({type(error).__name__}: {error})")
             board.raise_flag(Flag.END_ASKED)
-        if not recorder_told and not recorder.is_alive() and not _is_over(board):
+        if (
+            not recorder_told
+            and not recorder.is_alive()
+            and board.condition(Role.RECORDER) is not Condition.DONE
+        ):
             recorder_told = True
             remarks.append(f"the recorder ended while the loop ran ({_how(recorder)})")
         silent = board.age_s(Role.LOOP) > patience.hung_s
@@ -316,59 +237,11 @@ def _see_through(
     return remarks
 
 
-def _is_over(board: Board) -> bool:
-    return board.condition(Role.RECORDER) is Condition.DONE
-
-
 def _how(process: BaseProcess) -> str:
     code = process.exitcode
     if code is None:
         return "it still runs"
     return f"signal {signal.Signals(-code).name}" if code < 0 else f"exit status {code}"
-
-
-def _complete(
-    me: Role,
-    shared: _Shared,
-    recording: Recording,
-    recorder: Watched,
-    patience: Patience,
-    remarks: list[str],
-) -> None:
-    """See the recorder to its end; if that is not a good one, do its work."""
-    board = shared.board
-    since_s = time.monotonic()
-    hung = False
-    # One that has done its work no longer beats, and may take a while to leave.
-    while recorder.alive() and not hung and not _is_over(board):
-        board.beat(me)
-        # A heart that beat before the wait began may have been silent for a good reason.
-        silent_s = min(board.age_s(Role.RECORDER), time.monotonic() - since_s)
-        hung = silent_s > patience.hung_s
-        time.sleep(0.02)
-    if hung:
-        remarks.append(f"the recorder did not answer for {patience.hung_s:g} s and was ended")
-        recorder.kill()
-        until_s = time.monotonic() + 2.0
-        while recorder.alive() and time.monotonic() < until_s:
-            time.sleep(0.01)
-    if _is_over(board):
-        late = shared.samples.lag()
-        if late:
-            remarks.append(f"{late} samples came after the session was closed")
-        return
-    note = board.note(Role.RECORDER)
-    reason = note or ("the recorder hung" if hung else "the recorder was killed")
-    try:
-        salvage(
-            recording.folder,
-            shared.samples,
-            shared.events,
-            reason,
-            recording.settings.rig.tick_rate_hz,
-        )
-    except (UserError, OSError) as error:
-        remarks.append(f"{recording.folder}: the session could not be completed ({error})")
 
 
 def _outcome(recording: Recording) -> tuple[str, str, Salvage | None]:
@@ -400,82 +273,3 @@ def _estimator_main(*arguments: Any) -> None:
     from rigidimeter.acquisition.processes.live import estimator_main
 
     estimator_main(*arguments)
-
-
-def _loop_main(
-    target: LoopTarget,
-    recording: Recording,
-    names: tuple[str, str, str],
-    realtime: Realtime,
-    patience: Patience,
-    console_pid: int,
-) -> None:
-    """Run the target; the main function of the loop's process."""
-    leave_signals_to_the_console()
-    shared = _Shared.attach(names)
-    board = shared.board
-    signal.signal(signal.SIGTERM, lambda *_: board.raise_flag(Flag.END_ASKED))
-    board.join(Role.LOOP)
-    if not _recorder_is_there(board, console_pid):
-        shared.close()
-        sys.exit(1)
-    recorder = Watched(board.pid(Role.RECORDER))
-    rate_hz = recording.settings.rig.tick_rate_hz
-    sink = RingSink(shared.samples, shared.events, board, rate_hz)
-    outside = BoardOutside(
-        board,
-        shared.samples,
-        console_lost_s=patience.console_lost_s,
-        recorder_lost_s=patience.recorder_lost_s,
-        attended=realtime.attended,
-    )
-
-    def ready() -> Prepared:
-        for part in (shared.samples, shared.events, shared.board):
-            part.memory.touch()
-        prepared = prepare_loop_process(
-            priority=realtime.priority, cpu=realtime.cpu, lock_memory=realtime.lock_memory
-        )
-        sink.event("loop_prepared", **prepared.facts())
-        print(prepared, file=sys.stderr, flush=True)
-        return prepared
-
-    code = 0
-    try:
-        target(LoopSide(sink, outside, board, ready))
-        sink.close(sink.last_time_s, "fail", "the loop ended without closing the session")
-    except UserError as error:  # a sentence, which stands in the record and is shown at the end
-        code = 1
-        sink.close(sink.last_time_s, "fail", str(error))
-    except BaseException as error:
-        code = 1
-        traceback.print_exc()
-        with suppress(ValueError):
-            sink.close(sink.last_time_s, "fail", f"{type(error).__name__}: {error}")
-    finally:
-        board.set_condition(Role.LOOP, Condition.FAILED if code else Condition.DONE)
-        _leave_real_time()
-        remarks: list[str] = []
-        _complete(Role.LOOP, shared, recording, recorder, patience, remarks)
-        for remark in remarks:
-            print(remark, file=sys.stderr, flush=True)
-        if os.getppid() != console_pid:
-            shared.unlink()
-        shared.close()
-    sys.exit(code)
-
-
-def _recorder_is_there(board: Board, console_pid: int) -> bool:
-    """Wait for the recorder; return False if it will not come."""
-    while board.condition(Role.RECORDER) not in (Condition.READY, Condition.RUNNING):
-        failed = board.condition(Role.RECORDER) is Condition.FAILED
-        if failed or board.flag(Flag.END_ASKED) or os.getppid() != console_pid:
-            return False
-        time.sleep(0.005)
-    return True
-
-
-def _leave_real_time() -> None:
-    """Be an ordinary process again: what follows takes time and touches files."""
-    with suppress(OSError):
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

@@ -16,8 +16,10 @@ by turns.
 `read` and `write` only exchange batches with a thread that carries them (see `line`); a
 command that meets an unfinished cycle is not sent, and `write` returns the one still in force.
 The velocity is the drive's own register: it differentiates at its control rate, where the stamps of
-a serial line, a millisecond apart, would put their jitter into a difference. The position's stamp
-is the end of the request, found from the end of the reply and the time its characters take.
+a serial line, a millisecond apart, would put their jitter into a difference.
+
+A loop that was held up for longer than the horizon finds a drive that has stopped by itself, and
+must not set it going again: commands are zero from then on, as after any fault, until `enable`.
 
 What is from memory of the programmer's guide stands in `protocol`. A USB adapter adds its
 latency timer to every reply; set it to 1 ms.
@@ -29,34 +31,17 @@ import math
 from collections.abc import Mapping
 from typing import ClassVar
 
-from rigidimeter.device.ascii.line import AsciiLine, Exchange
-from rigidimeter.device.ascii.protocol import (
-    DISABLED_BITS,
-    FAULT_BITS,
-    Reply,
-    get,
-    move_target,
-    named_bits,
-    parse,
-    seconds,
-    set_,
-)
-from rigidimeter.device.ascii.setup import (
-    OFF,
-    PATIENCE,
-    POWER_UP_BAUD,
-    STATUS_FAULTS,
-    AsciiDriveSettings,
-    AsciiTalk,
-)
+from rigidimeter.device.ascii.feedback import Feedback
+from rigidimeter.device.ascii.line import AsciiLine
+from rigidimeter.device.ascii.protocol import get, move_target, set_
+from rigidimeter.device.ascii.settings import AsciiDriveSettings, open_port
+from rigidimeter.device.ascii.setup import OFF, PATIENCE, AsciiTalk
 from rigidimeter.device.base import DeviceError, DeviceFacts, MotionSample, Now
 from rigidimeter.guard import Cause
 
 __all__ = ["AsciiDrive", "AsciiDriveSettings"]
 
 VELOCITY, MOVES = 11, 21
-STATUS_DISABLED = sum(1 << bit for bit in DISABLED_BITS)
-DAMAGED_IN_A_ROW = 3
 CYCLES_IN_HORIZON = 3
 
 
@@ -88,15 +73,10 @@ class AsciiDrive:
         self._powered = self._commanding = False
         self._cycle_s = 0.0
         self._sent = 0  # in 0.1 counts/s, on the drive's side of the sign
-        self._position = self._speed = self._status = 0
-        self._position_s = -math.inf
-        self._sequence = -1
+        self._commanded_s = -math.inf
         self._cycle = 0
-        self._cause = Cause.NONE
-        self._heard_s = 0.0
-        self._damaged_in_a_row = 0
-        self._refused = self._asked_why = False
-        self._counts = dict.fromkeys(("received", "lost", "damaged", "refused", "skipped"), 0)
+        self._asked_why = False
+        self._heard = Feedback(settings.baud, self._jump, self._fastest, self._state_on)
 
     # -- life ---------------------------------------------------------------------------------
 
@@ -110,20 +90,7 @@ class AsciiDrive:
         """
         if self._line is not None:
             return
-        try:
-            import serial
-        except ImportError as error:
-            raise DeviceError(
-                "a serial drive needs pyserial: pip install 'rigidimeter[serial]'"
-            ) from error
-        s = self._settings
-        try:
-            port = serial.Serial(
-                s.port, POWER_UP_BAUD, timeout=s.lost_s, write_timeout=s.lost_s, exclusive=True
-            )
-        except (OSError, ValueError) as error:
-            raise DeviceError(f"drive: port {s.port!r} cannot be opened: {error}") from error
-        self._line = AsciiLine(port, self._now)
+        self._line = AsciiLine(open_port(self._settings), self._now)
 
     def configure(self) -> DeviceFacts:
         """Set the baud rate, take the power away, set the profile and read everything back.
@@ -164,6 +131,7 @@ class AsciiDrive:
             "latched_faults_before": latched,
             "counts_per_turn": s.counts_per_turn,
             "deceleration_counts_s2": self._deceleration,
+            "braking_rad_s2": self._deceleration / abs(self._per_rad),
             "external_watchdog": int(s.external_watchdog),
         }
         return DeviceFacts(
@@ -191,86 +159,75 @@ class AsciiDrive:
             raise
 
     def _enable(self) -> None:
-        talk = self._talking()
-        state = talk.value(0x24)
-        if state != OFF:
-            raise DeviceError(f"drive: desired state is {state} before enable; 0 would be right")
-        talk.set(0x2F, 0)
-        talk.set(0xCB, 0)
-        before = talk.value(0x32)
-        talk.set(0xCA, before)
-        talk.command(set_(0x24, self._state_on))
         self._powered = True
-        state, status = talk.value(0x24), talk.value(0xA0)
-        if state != self._state_on or status & (STATUS_FAULTS | STATUS_DISABLED):
-            why = named_bits(status, FAULT_BITS | DISABLED_BITS) or "no reason given"
-            raise DeviceError(
-                f"drive: desired state {state}, event status 0x{status:x} after enable ({why}); "
-                f"state {self._state_on} without these bits would be right"
-            )
-        moved = talk.value(0x32) - before
-        if abs(moved) > self._jump:
-            raise DeviceError(f"drive: moved {moved} counts on enable; it must stand still")
+        self._talking().energise(self._state_on, self._jump)
         self._sent = 0
         self._start_sampling()
+        self._commanded_s = self._now()
         self._commanding = True
 
     # -- the loop -----------------------------------------------------------------------------
 
     def read(self) -> MotionSample:
         """Return the newest sample without waiting; the one before again if there is none."""
-        line = self._line
+        line, heard = self._line, self._heard
         if line is not None and self._configured:
             while (exchange := line.take()) is not None:
-                self._hear(exchange)
-            if line.busy and self._now() - self._heard_s > self._settings.lost_s + self._cycle_s:
-                self._latch(Cause.DRIVE_LOST)
+                heard.hear(exchange, commanding=self._commanding)
+            now_s = self._now()
+            if line.busy and now_s - heard.heard_s > self._settings.lost_s + self._cycle_s:
+                heard.latch(Cause.DRIVE_LOST)
+            self._mind_the_horizon(now_s)
             if not self._commanding and not line.busy:
                 self._send()
-        if self._sequence < 0:
+        if heard.sequence < 0:
             return MotionSample(math.nan, math.nan, -math.inf, cause=int(Cause.DRIVE_LOST))
         return MotionSample(
-            self._position / self._per_rad + self._offset_rad,
-            0.1 * self._speed / self._per_rad,
-            self._position_s,
-            self._sequence,
-            (self._position, self._speed),
-            self._status,
-            int(self._cause),
+            heard.position / self._per_rad + self._offset_rad,
+            0.1 * heard.speed / self._per_rad,
+            heard.position_s,
+            heard.sequence,
+            (heard.position, heard.speed),
+            heard.status,
+            int(heard.cause),
         )
 
     def write(self, velocity_rad_s: float) -> float:
         """Send a velocity and return the one in force: this one, or the last if the wire is busy.
 
         It is limited to `max_velocity_deg_s`. One that is not finite is sent as zero and latched.
+        After a fault, or a pause in which the drive has stopped by itself, zero is sent.
         """
-        line = self._line
+        line, heard = self._line, self._heard
         if line is None or not self._commanding:
             return 0.0
+        self._mind_the_horizon(self._now())
         if not math.isfinite(velocity_rad_s):
-            self._latch(Cause.COMMAND_NOT_FINITE)
+            heard.latch(Cause.COMMAND_NOT_FINITE)
             velocity_rad_s = 0.0
-        if self._cause in (Cause.DRIVE_LOST, Cause.NOT_FOLLOWING):
-            # No target can be built on a position that is not known: the move in force ends.
+        if heard.cause not in (Cause.NONE, Cause.COMMAND_NOT_FINITE):
+            # Power that comes back, or an answer, must not set the arm going again; and no target
+            # can be built on a position that is not known. The move in force ends.
             velocity_rad_s = 0.0
         if line.busy:
-            self._counts["skipped"] += 1
-        elif self._refused and self._cause is Cause.NONE:
+            heard.counts["skipped"] += 1
+        elif heard.refused and heard.cause is Cause.NONE:
             # A drive without power refuses to move, and so does a faulty one: ask which it is.
             if self._asked_why:
-                self._latch(Cause.DRIVE_FAULT)
+                heard.latch(Cause.DRIVE_FAULT)
             self._asked_why = True
             self._send(ask_all=True)
         else:
             counts_s = max(-self._fastest, min(self._fastest, velocity_rad_s * self._per_rad))
             self._sent = round(10.0 * counts_s)
+            self._commanded_s = self._now()
             self._send(*self._requests(0.1 * self._sent))
         return 0.1 * self._sent / self._per_rad
 
     @property
     def counts(self) -> Mapping[str, int]:
         """Replies received, lost, damaged, refused (``e``), and commands skipped on a busy wire."""
-        return dict(self._counts)
+        return dict(self._heard.counts)
 
     # -- the end ------------------------------------------------------------------------------
 
@@ -304,10 +261,11 @@ class AsciiDrive:
             return (set_(0x2F, round(10.0 * counts_s)),)
         if counts_s == 0.0:
             return ("t 0",)
-        moving = max(-self._fastest, min(self._fastest, 0.1 * self._speed))
-        age_s = min(max(self._now() - self._position_s, 0.0), 2.0 * self._cycle_s)
+        heard = self._heard
+        moving = max(-self._fastest, min(self._fastest, 0.1 * heard.speed))
+        age_s = min(max(self._now() - heard.position_s, 0.0), 2.0 * self._cycle_s)
         target = move_target(
-            self._position + moving * age_s,
+            heard.position + moving * age_s,
             moving,
             counts_s,
             self._deceleration,
@@ -318,67 +276,25 @@ class AsciiDrive:
     def _send(self, *commands: str, ask_all: bool = False) -> None:
         line = self._line
         if line is not None:
-            self._heard_s = self._now()
+            self._heard.heard_s = self._now()
             self._cycle += 1
             turns = (0xA0, 0x24) if ask_all else ((0x24,) if self._cycle % 2 else (0xA0,))
             line.submit(*commands, *map(get, (0x32, 0x18, *turns)))
 
-    def _hear(self, exchange: Exchange) -> None:
-        request, text, at_s = exchange
-        if text is None:
-            self._counts["lost"] += 1
-            self._latch(Cause.DRIVE_LOST)
+    def _mind_the_horizon(self, now_s: float) -> None:
+        """Notice that the last move has ended by itself, since none came to renew it."""
+        line = self._line
+        if not self._commanding or self._settings.mode != "moves" or line is None or line.busy:
             return
-        self._heard_s = at_s
-        reply = parse(text)
-        if reply.kind == "e":
-            self._counts["refused"] += 1
-            if request == "t 1" and not self._refused:
-                self._refused = True
-            else:
-                self._latch(Cause.DRIVE_FAULT)
-        elif reply.kind != ("v" if request.startswith("g") else "ok"):
-            self._counts["damaged"] += 1
-            self._damaged_in_a_row += 1
-            if self._damaged_in_a_row >= DAMAGED_IN_A_ROW:
-                self._latch(Cause.DRIVE_LOST)
-        else:
-            self._counts["received"] += 1
-            self._damaged_in_a_row = 0
-            self._take(request, reply, at_s - seconds(len(text) + 1, self._settings.baud))
-
-    def _take(self, request: str, reply: Reply, asked_s: float) -> None:
-        if request == get(0x32):
-            reach = self._jump + self._fastest * max(0.0, asked_s - self._position_s)
-            if self._sequence >= 0 and abs(reply.value - self._position) > reach:
-                self._latch(Cause.NOT_FOLLOWING)
-            self._position, self._position_s = reply.value, asked_s
-            self._sequence += 1
-        elif request == get(0x18):
-            self._speed = reply.value
-        elif request == get(0xA0):
-            self._status = reply.value
-            if reply.value & STATUS_FAULTS:
-                self._latch(Cause.DRIVE_FAULT)
-            elif self._commanding and reply.value & STATUS_DISABLED:
-                self._latch(Cause.DRIVE_STATE)
-        elif request == get(0x24) and self._commanding and reply.value != self._state_on:
-            self._latch(Cause.DRIVE_STATE)
-
-    def _latch(self, cause: Cause) -> None:
-        if self._cause is Cause.NONE:
-            self._cause = cause
+        if now_s - self._commanded_s > self._settings.horizon_s:
+            self._heard.latch(Cause.DRIVE_STATE)
 
     def _start_sampling(self) -> None:
         """Begin again from a fresh sample, without the causes of a life before."""
-        self._cause = Cause.NONE
-        self._damaged_in_a_row = 0
-        self._refused = self._asked_why = False
-        self._sequence = -1
+        self._asked_why = False
         talk = self._talking()
-        for register in (0x32, 0x18, 0xA0):
-            self._take(get(register), Reply("v", talk.value(register)), self._now())
-        self._heard_s = self._now()
+        position, speed, status = (talk.value(register) for register in (0x32, 0x18, 0xA0))
+        self._heard.begin(position, speed, status, self._now())
 
     def _talking(self) -> AsciiTalk:
         if self._line is None:
@@ -390,4 +306,4 @@ class AsciiDrive:
         if self._line is not None and self._speaking:
             text = self._line.ask(request, PATIENCE * self._settings.lost_s)
             if text != "ok":
-                self._latch(Cause.DRIVE_LOST)
+                self._heard.latch(Cause.DRIVE_LOST)

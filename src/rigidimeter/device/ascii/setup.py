@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from statistics import median
-from typing import Literal
-
-from pydantic import Field
 
 from rigidimeter.device.ascii.line import AsciiLine
 from rigidimeter.device.ascii.protocol import (
+    DISABLED_BITS,
     FAULT_BITS,
     Reply,
     get,
@@ -17,45 +15,25 @@ from rigidimeter.device.ascii.protocol import (
     seconds,
     set_,
 )
+from rigidimeter.device.ascii.settings import POWER_UP_BAUD, AsciiDriveSettings
 from rigidimeter.device.base import DeviceError, Now
-from rigidimeter.settings.base import Section, quantity
 
-__all__ = ["OFF", "PATIENCE", "POWER_UP_BAUD", "STATUS_FAULTS", "AsciiDriveSettings", "AsciiTalk"]
+__all__ = [
+    "OFF",
+    "PATIENCE",
+    "STATUS_DISABLED",
+    "STATUS_FAULTS",
+    "AsciiTalk",
+]
 
-POWER_UP_BAUD = 9600
 OFF = 0
 STATUS_FAULTS = sum(1 << bit for bit in FAULT_BITS)
+STATUS_DISABLED = sum(1 << bit for bit in DISABLED_BITS)
 MEASURED_CYCLES = 7
 MARGIN = 1.4
 """On the median cycle: a tick that meets an unfinished cycle sends no command at all."""
 PATIENCE = 4.0
 """A question waits this many times the longest reply: for its turn, and for its answer."""
-
-
-class AsciiDriveSettings(Section):
-    """How the drive is wired and what it may do.
-
-    Parameters
-    ----------
-    port : str
-        Serial port, such as ``/dev/ttyUSB0``.
-    counts_per_turn : float
-        Encoder counts for one turn of the joint, gear included.
-    """
-
-    port: str
-    counts_per_turn: float = Field(gt=0.0, le=1e9, json_schema_extra={"unit": "counts"})
-    baud: Literal[9600, 19200, 38400, 57600, 115200] = 115200
-    sign: Literal[1, -1] = 1
-    angle_offset_deg: float = quantity(0.0, "deg", -360.0, 360.0)
-    mode: Literal["moves", "velocity"] = "moves"
-    external_watchdog: bool = False
-    horizon_s: float = quantity(0.1, "s", 0.01, 1.0)
-    max_velocity_deg_s: float = quantity(90.0, "deg/s", 0.0, 720.0, above=True)
-    acceleration_deg_s2: float = quantity(2000.0, "deg/s²", 0.0, 100_000.0, above=True)
-    deceleration_deg_s2: float = quantity(2000.0, "deg/s²", 0.0, 100_000.0, above=True)
-    lost_s: float = quantity(0.1, "s", 0.01, 2.0)
-    jump_deg: float = quantity(2.0, "deg", 0.0, 90.0, above=True)
 
 
 class AsciiTalk:
@@ -187,16 +165,50 @@ class AsciiTalk:
         self.set(0x2F, 0)
         self.set(0xCB, 0)
         self.set(0xC8, 0)
-        braking = max(1, round(deceleration / 10.0))
+        moves, velocity = (max(1, round(deceleration / unit)) for unit in (10.0, 1000.0))
         for register, value in (
             (0xCC, max(1, round(acceleration / 10.0))),
-            (0xCD, braking),
-            (0xCF, braking),
+            (0xCD, moves),
+            (0xCF, moves),
             (0x36, max(1, round(acceleration / 1000.0))),
-            (0x37, max(1, round(deceleration / 1000.0))),
+            (0x37, velocity),
         ):
             self.set(register, value)
-        return 10.0 * braking
+        return 10.0 * moves if self._settings.mode == "moves" else 1000.0 * velocity
+
+    def energise(self, state_on: int, most_counts: float) -> None:
+        """Write zero velocity and a target where the arm is, read them back, then energise.
+
+        Parameters
+        ----------
+        state_on : int
+            The desired state of a drive with power.
+        most_counts : float
+            How far the arm may move meanwhile.
+
+        Raises
+        ------
+        DeviceError
+            If a target is not zero, or the drive does not come up at rest.
+        """
+        state = self.value(0x24)
+        if state != OFF:
+            raise DeviceError(f"drive: desired state is {state} before enable; 0 would be right")
+        self.set(0x2F, 0)
+        self.set(0xCB, 0)
+        before = self.value(0x32)
+        self.set(0xCA, before)
+        self.command(set_(0x24, state_on))
+        state, status = self.value(0x24), self.value(0xA0)
+        if state != state_on or status & (STATUS_FAULTS | STATUS_DISABLED):
+            why = named_bits(status, FAULT_BITS | DISABLED_BITS) or "no reason given"
+            raise DeviceError(
+                f"drive: desired state {state}, event status 0x{status:x} after enable ({why}); "
+                f"state {state_on} without these bits would be right"
+            )
+        moved = self.value(0x32) - before
+        if abs(moved) > most_counts:
+            raise DeviceError(f"drive: moved {moved} counts on enable; it must stand still")
 
     def measured_cycle_s(self, now: Now) -> float:
         """Return how long to allow for a cycle of the loop, tried with requests of its length.

@@ -42,6 +42,11 @@ class AtiRdtSettings(Section):
     frozen_s: float = quantity(0.05, "s", 0.001, 10.0)
     bias_limit_nm: float = quantity(0.2, "N·m", 0.0, 100.0)
 
+    @property
+    def emulated(self) -> bool:
+        """Whether the address is of this computer: no sensor is inside it."""
+        return self.address == "localhost" or self.address.startswith("127.")
+
     @model_validator(mode="after")
     def _some_weight(self) -> Self:
         if not any(self.weights):

@@ -41,6 +41,8 @@ from rigidimeter.guard import Cause
 __all__ = ["Cia402Drive", "Cia402Settings"]
 
 MOST_FRAMES_A_READ = 64
+BRAKING = (0x6084, 0x6085)
+"""Profile and quick-stop deceleration."""
 
 
 class Cia402Drive:
@@ -129,6 +131,8 @@ class Cia402Drive:
         values: dict[str, str | float | int] = {"firmware (0x100A)": firmware, **found}
         values.update({entry.label: "absent" for entry in absent})
         values.update({k: value for k, value in identity.items() if value is not None})
+        ramps = [found[entry.label] for entry in self._objects if entry.index in BRAKING]
+        values["braking_rad_s2"] = min(ramps) / self._scale.units_per_rad_s2
         return DeviceFacts(
             model=name or f"vendor {identity['vendor']}, product {identity['product']}",
             serial="" if identity["serial"] is None else str(identity["serial"]),

@@ -42,6 +42,9 @@ class Cia402Settings(Section):
     socketcan it is set by the operating system, and here only says how fast a loop may be. `port`
     is used by udp_multicast alone. `command_deadline_s` 0 asks for no such deadline; a drive that
     has none keeps its heartbeat watchdog.
+
+    The decelerations are above what `guard.acceleration_limit_deg_s2` is by default, for the guard
+    counts on a drive that brakes no slower; commissioning compares the two.
     """
 
     interface: str = "socketcan"
@@ -58,8 +61,8 @@ class Cia402Settings(Section):
     zero_counts: int = quantity(0, "counts", -(2**31), 2**31 - 1)
     max_velocity_rad_s: float = quantity(4.0, "rad/s", 0.0, 100.0, above=True)
     acceleration_rad_s2: float = quantity(60.0, "rad/s²", 0.0, 1e4, above=True)
-    deceleration_rad_s2: float = quantity(60.0, "rad/s²", 0.0, 1e4, above=True)
-    quick_stop_rad_s2: float = quantity(60.0, "rad/s²", 0.0, 1e4, above=True)
+    deceleration_rad_s2: float = quantity(120.0, "rad/s²", 0.0, 1e4, above=True)
+    quick_stop_rad_s2: float = quantity(120.0, "rad/s²", 0.0, 1e4, above=True)
     quick_stop_option: Literal[2, 6] = 2
     abort_option: Literal[1, 2, 3] = 3
     heartbeat_s: float = quantity(0.02, "s", 0.001, 1.0)
@@ -68,6 +71,13 @@ class Cia402Settings(Section):
     lost_s: float = quantity(0.02, "s", 0.001, 1.0)
     sdo_timeout_s: float = quantity(0.3, "s", 0.01, 5.0)
     enable_timeout_s: float = quantity(2.0, "s", 0.05, 30.0)
+
+    @property
+    def emulated(self) -> bool:
+        """Whether the bus is one that no drive hangs on."""
+        return self.interface in ("virtual", "udp_multicast") or (
+            self.interface == "socketcan" and self.channel.startswith("vcan")
+        )
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

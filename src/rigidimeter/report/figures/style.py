@@ -22,7 +22,9 @@ from matplotlib.figure import Figure
 
 __all__ = [
     "GREY",
+    "MARKERS",
     "condition_colours",
+    "condition_markers",
     "drawable",
     "listed",
     "note",
@@ -32,8 +34,10 @@ __all__ = [
 ]
 
 GREY = "#555555"
+WARN = "#8A3B00"
 _BY_NAME = {"OFF": "#D55E00", "DBS": "#0072B2"}
 _OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS = "osD^vP*X"
 
 _FONT = "DejaVu Sans"  # comes with matplotlib, so the report looks alike everywhere
 _STYLE: dict[Any, Any] = {
@@ -71,10 +75,15 @@ def styled() -> Iterator[None]:
         yield
 
 
-def svg_text(figure: Figure) -> str:
-    """Return the figure as an SVG document: the same figure gives the same text."""
+def svg_text(figure: Figure, mark: str = "") -> str:
+    """Return the figure as an SVG document: the same figure gives the same text.
+
+    `mark` is written above everything, for what must never be taken for a measurement.
+    """
     file = io.StringIO()
     with styled():
+        if mark:
+            figure.suptitle(mark, x=0.995, ha="right", fontsize=8, style="italic", color=WARN)
         figure.savefig(file, format="svg", metadata={"Date": None, "Creator": "rigidimeter"})
     # A clipping path is named after its place in memory; it is named by its order instead.
     text = file.getvalue()
@@ -91,6 +100,12 @@ def condition_colours(conditions: Iterable[str]) -> dict[str, str]:
     others = [name for name in names if name not in _BY_NAME]
     free = {name: _OTHERS[i % len(_OTHERS)] for i, name in enumerate(others)}
     return {name: _BY_NAME.get(name) or free[name] for name in names}
+
+
+def condition_markers(conditions: Iterable[str]) -> dict[str, str]:
+    """Return a marker for each condition, so that grey print tells them apart too."""
+    names = dict.fromkeys(conditions)
+    return {name: MARKERS[place % len(MARKERS)] for place, name in enumerate(names)}
 
 
 def drawable(text: str) -> str:

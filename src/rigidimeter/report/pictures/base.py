@@ -7,14 +7,18 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TypeVar
 
+from matplotlib.figure import Figure
+
 from rigidimeter.estimation import aligned
 from rigidimeter.records import Epoch, Fit, Score
+from rigidimeter.report.figures import svg_text
 from rigidimeter.report.measures import conditions, short_names
 from rigidimeter.study import Study
 
 __all__ = [
     "Picture",
     "analysed_epoch",
+    "drawn",
     "origin_s",
     "place",
     "representative_fits",
@@ -31,6 +35,15 @@ class Picture:
     svg: str
     alt: str
     caption: str
+
+
+def drawn(study: Study, figure: Figure) -> str:
+    """Return the figure as SVG, marked where what it shows was simulated."""
+    cohort = study.cohort is not None and study.cohort.virtual
+    some = sum(epoch.virtual for epoch in study.epochs)
+    if cohort or (some and some == len(study.epochs)):
+        return svg_text(figure, "virtual data")
+    return svg_text(figure, "some of the data are virtual" if some else "")
 
 
 _Result = TypeVar("_Result", Fit, Score)

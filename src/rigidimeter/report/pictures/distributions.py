@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rigidimeter.report.figures import condition_colours, distribution, svg_text
+from rigidimeter.report.figures import condition_colours, distribution
 from rigidimeter.report.measures import Measure, condition_name, conditions, measures
 from rigidimeter.report.numbers import interval, number, p_and_r
-from rigidimeter.report.pictures.base import Picture
+from rigidimeter.report.pictures.base import Picture, drawn
 from rigidimeter.statistics import summarise
 from rigidimeter.study import Study
 
@@ -18,7 +18,8 @@ def distribution_pictures(study: Study) -> list[Picture]:
     return [
         Picture(
             f"distribution_{measure.name}",
-            svg_text(
+            drawn(
+                study,
                 distribution(
                     measure.label,
                     {condition_name(key): values for key, values in measure.values.items()},
@@ -29,7 +30,7 @@ def distribution_pictures(study: Study) -> list[Picture]:
                         for key, found in measure.estimates.items()
                     },
                     pooled={condition_name(key): e for key, e in measure.pooled.items()},
-                )
+                ),
             ),
             f"{measure.title}, every included epoch a point. {_in_words(measure)}",
             f"{measure.title}.",

@@ -12,7 +12,6 @@ from rigidimeter.report.figures import (
     loop_limits,
     perturbation,
     spectrum,
-    svg_text,
     torque_limit_nm,
     torque_parts,
 )
@@ -21,6 +20,7 @@ from rigidimeter.report.numbers import number
 from rigidimeter.report.pictures.base import (
     Picture,
     analysed_epoch,
+    drawn,
     origin_s,
     place,
     representative_fits,
@@ -52,14 +52,14 @@ def perturbation_pictures(study: Study) -> list[Picture]:
     return [
         Picture(
             "perturbation",
-            svg_text(perturbation(channel, origin_s(epoch))),
+            drawn(study, perturbation(channel, origin_s(epoch))),
             f"Torque perturbation {whose}: it switches between levels up to {number(size)} N·m "
             f"for {number(channel.time_s[-1] - channel.time_s[0])} s.",
             f"The torque perturbation as commanded, {whose}.",
         ),
         Picture(
             "perturbation_spectrum",
-            svg_text(spectrum(channel, (low, high))),
+            drawn(study, spectrum(channel, (low, high))),
             f"Power spectral density of the perturbation with the wanted band, {low:g} to "
             f"{high:g} Hz, marked.",
             f"Its power spectral density (Hann-windowed periodogram of the whole), the wanted "
@@ -103,7 +103,7 @@ def torque_pictures(study: Study) -> list[Picture]:
         pictures.append(
             Picture(
                 f"torque_{position}_{slug(fit.condition)}",
-                svg_text(figure),
+                drawn(study, figure),
                 f"{name}: measured and modelled torque of epoch {fit.epoch}, and the parts of "
                 f"inertia, damping and stiffness. VAF {number(fit.vaf_percent)} %.",
                 f"{name}: {place(study, fit)}, an included epoch with a middle VAF "
@@ -144,7 +144,7 @@ def loop_pictures(study: Study) -> list[Picture]:
         pictures.append(
             Picture(
                 f"loop_{position}_{slug(score.condition)}",
-                svg_text(loop(cycles, colours[score.condition], limits, f"{work} per cycle")),
+                drawn(study, loop(cycles, colours[score.condition], limits, f"{work} per cycle")),
                 f"{name}: torque against angle of epoch {score.epoch}, {cycles.n_cycles} cycles "
                 f"at {number(cycles.frequency_hz, 3)} Hz, work {work} per cycle.",
                 f"{name}: {place(study, score)}, an included epoch with a middle work; "

@@ -13,12 +13,12 @@ from rigidimeter.estimation.closedloop.spectral import impedance as without_mode
 from rigidimeter.estimation.diagnostics import reconstructed_torque_nm
 from rigidimeter.joint import JointDynamics
 from rigidimeter.records import Epoch, Fit
-from rigidimeter.report.figures import condition_colours, svg_text
+from rigidimeter.report.figures import condition_colours
 from rigidimeter.report.figures.impedance import Response, impedance
 from rigidimeter.report.figures.voluntary import density, voluntary_spectrum
 from rigidimeter.report.measures import condition_name, conditions, split_pooled
 from rigidimeter.report.numbers import number
-from rigidimeter.report.pictures.base import Picture, analysed_epoch
+from rigidimeter.report.pictures.base import Picture, analysed_epoch, drawn
 from rigidimeter.study import Study
 
 __all__ = ["impedance_pictures", "voluntary_pictures"]
@@ -70,7 +70,7 @@ def impedance_pictures(study: Study) -> list[Picture]:
     return [
         Picture(
             "impedance",
-            svg_text(figure),
+            drawn(study, figure),
             f"Torque over angle against frequency at {first.frequency_hz.size} lines of the "
             f"perturbation from {number(first.frequency_hz[0], 3)} to "
             f"{number(first.frequency_hz[-1], 3)} Hz: magnitude, phase and coherence, with the "
@@ -152,7 +152,7 @@ def voluntary_pictures(study: Study) -> list[Picture]:
     return [
         Picture(
             "voluntary_spectrum",
-            svg_text(figure),
+            drawn(study, figure),
             f"Power spectral density of what J, B and K leave of the torque, "
             f"{number(band_hz[0], 3)} to {number(band_hz[1], 3)} Hz. {'; '.join(labels.values())}.",
             f"Every included epoch thin, the mean of each condition thick. SD by epoch, in N·m: "

@@ -14,11 +14,11 @@ from rigidimeter.report.figures.style import note
 __all__ = ["traces"]
 
 _LOOKS = {
-    "measured": ("#C4C4C4", 4.0),
-    "estimated": ("#E69F00", 2.2),
-    "simulated": ("#0072B2", 0.8),
+    "measured": ("#C4C4C4", 4.0, "-"),
+    "estimated": ("#E69F00", 2.2, "-"),
+    "simulated": ("#222222", 0.9, (0, (4, 3))),
 }
-"""Colour and width: lines that coincide show beside each other."""
+"""Colour, width and dashes: lines that coincide show beside each other, in grey print too."""
 
 
 def traces(
@@ -43,8 +43,8 @@ def traces(
         figure = Figure(figsize=(7.4, 2.5))
         axes = figure.add_subplot()
         for name, values in torques_nm.items():
-            colour, width = _LOOKS[name]
-            axes.plot(time_s, values, color=colour, linewidth=width, label=name)
+            colour, width, dashes = _LOOKS[name]
+            axes.plot(time_s, values, color=colour, linewidth=width, linestyle=dashes, label=name)
         axes.set_xlim(time_s[0], time_s[-1])
         axes.set_ylim(-1.1 * limit_nm, 1.3 * limit_nm)
         axes.set_xlabel("Time since the start of the epoch (s)")

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.labelled import Labelled
+from rigidimeter.statistics import nested
 
-if TYPE_CHECKING:
-    from rigidimeter.recording.labelled import Labelled
-
-__all__ = ["RANDOM", "Rating", "Ratings", "groupings", "ratings_of"]
+__all__ = ["RANDOM", "Rating", "Ratings", "groupings", "oddities", "ratings_of"]
 
 RANDOM = ("examiner", "subject", "subject/day")
 FEWEST = 3
@@ -101,17 +99,27 @@ def ratings_of(
             f"{table.source} holds ratings of one condition only ({named.pop()}); a contrast needs "
             "two, by name in the column that --condition gives"
         )
-    notices += _odd(table.source, rows, scale[0], step)
-    notices += _repeated(table.source, rows, "day" in present)
-    notices += _single(rows, random)
+    notices += oddities(table.source, rows, random, scale[0], step, with_day="day" in present)
     notices += _unmodelled(rows, random)
     return Ratings(tuple(rows), tuple(left_out), tuple(notices))
 
 
+def oddities(
+    source: str,
+    rows: Sequence[Rating],
+    random: Sequence[str],
+    low: float,
+    step: float,
+    *,
+    with_day: bool,
+) -> list[str]:
+    """Say what is odd about ratings that are used all the same."""
+    said = _odd(source, rows, low, step) + _repeated(source, rows, with_day)
+    return said + _single(rows, random)
+
+
 def groupings(rows: Sequence[Rating], random: Sequence[str]) -> dict[str, list[str]]:
     """Return the labels of each grouping; ``subject/day`` stands for subject and day within."""
-    from rigidimeter.statistics import nested
-
     found: dict[str, list[str]] = {}
     for name in random:
         outer = name.partition("/")[0]

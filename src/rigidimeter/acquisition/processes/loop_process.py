@@ -1,0 +1,160 @@
+"""The loop's process: the rig, the control loop, nothing else.
+
+It waits for the recorder, runs its target, and closes the record whatever the target did. Only then
+is it an ordinary process again, and completes the session if the recorder could not.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+
+from rigidimeter.acquisition.processes.board import Board, Condition, Flag, Role
+from rigidimeter.acquisition.processes.realtime import Prepared, prepare_loop_process
+from rigidimeter.acquisition.processes.recorder import Patience, Recording
+from rigidimeter.acquisition.processes.salvage import complete
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.sink import BoardOutside, RingSink
+from rigidimeter.acquisition.processes.watched import Watched, leave_signals_to_the_console
+from rigidimeter.errors import UserError
+
+__all__ = ["LoopSide", "LoopTarget", "Realtime", "loop_main"]
+
+
+@dataclass(frozen=True)
+class Realtime:
+    """What the loop's process asks for; see `prepare_loop_process`.
+
+    Attributes
+    ----------
+    priority : int
+        Of SCHED_FIFO; 0 asks for none.
+    cpu : int or None
+    lock_memory : bool
+    live_estimate : bool
+        Whether J, B and K are estimated while the session runs.
+    attended : bool
+        Whether an operator is there who can go on after a hold.
+    """
+
+    priority: int = 80
+    cpu: int | None = None
+    lock_memory: bool = True
+    live_estimate: bool = True
+    attended: bool = True
+
+
+@dataclass(frozen=True)
+class LoopSide:
+    """What the loop's target is given.
+
+    `ready` is to be called once the rig is configured and all objects are made, just before the
+    first tick: it prepares the process, stores what was permitted, and returns it.
+    """
+
+    sink: RingSink
+    outside: BoardOutside
+    board: Board
+    ready: Callable[[], Prepared]
+
+
+LoopTarget = Callable[[LoopSide], object]
+"""Runs the session and closes the sink. It must be picklable: a function of a module, or a
+`functools.partial` of one."""
+
+
+def loop_main(
+    target: LoopTarget,
+    recording: Recording,
+    names: tuple[str, str, str],
+    realtime: Realtime,
+    patience: Patience,
+    console_pid: int,
+) -> None:
+    """Run the target, and see the record closed after it; the target of the loop's process.
+
+    Parameters
+    ----------
+    target : callable
+    recording : Recording
+    names : tuple of str
+        Of the sample ring, the event ring and the board.
+    realtime : Realtime
+    patience : Patience
+    console_pid : int
+        The process that started this one.
+    """
+    leave_signals_to_the_console()
+    shared = SessionMemory.attach(names)
+    board = shared.board
+    signal.signal(signal.SIGTERM, lambda *_: board.raise_flag(Flag.END_ASKED))
+    board.join(Role.LOOP)
+    if not _recorder_is_there(board, console_pid):
+        shared.close()
+        sys.exit(1)
+    recorder = Watched(board.pid(Role.RECORDER))
+    rate_hz = recording.settings.rig.tick_rate_hz
+    sink = RingSink(shared.samples, shared.events, board, rate_hz)
+    outside = BoardOutside(
+        board,
+        shared.samples,
+        console_lost_s=patience.console_lost_s,
+        recorder_lost_s=patience.recorder_lost_s,
+        stall_s=recording.settings.loop.stall_s,
+        attended=realtime.attended,
+    )
+
+    def ready() -> Prepared:
+        shared.touch()
+        prepared = prepare_loop_process(
+            priority=realtime.priority, cpu=realtime.cpu, lock_memory=realtime.lock_memory
+        )
+        sink.event("loop_prepared", **prepared.facts())
+        print(prepared, file=sys.stderr, flush=True)
+        return prepared
+
+    code = 0
+    try:
+        target(LoopSide(sink, outside, board, ready))
+        sink.close(sink.last_time_s, "fail", "the loop ended without closing the session")
+    except UserError as error:  # a sentence, which stands in the record and is shown at the end
+        code = 1
+        sink.close(sink.last_time_s, "fail", str(error))
+    except BaseException as error:
+        code = 1
+        traceback.print_exc()
+        with suppress(ValueError):
+            sink.close(sink.last_time_s, "fail", f"{type(error).__name__}: {error}")
+    finally:
+        board.set_condition(Role.LOOP, Condition.FAILED if code else Condition.DONE)
+        _leave_real_time()
+        remarks: list[str] = []
+        complete(Role.LOOP, shared, recording, recorder, patience, remarks)
+        for remark in remarks:
+            print(remark, file=sys.stderr, flush=True)
+        if os.getppid() != console_pid:
+            shared.unlink()
+        shared.close()
+    sys.exit(code)
+
+
+def _recorder_is_there(board: Board, console_pid: int) -> bool:
+    """Wait for the recorder; return False if it will not come."""
+    while board.condition(Role.RECORDER) not in (Condition.READY, Condition.RUNNING):
+        failed = board.condition(Role.RECORDER) is Condition.FAILED
+        if failed or board.flag(Flag.END_ASKED) or os.getppid() != console_pid:
+            return False
+        time.sleep(0.005)
+    return True
+
+
+def _leave_real_time() -> None:
+    """Be an ordinary process again: what follows takes time and touches files."""
+    with suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

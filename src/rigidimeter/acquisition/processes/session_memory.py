@@ -1,0 +1,68 @@
+"""The memory that the processes of one session share: the rings and the board."""
+
+from __future__ import annotations
+
+from rigidimeter.acquisition.processes.board import Board
+from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
+from rigidimeter.acquisition.processes.shared import Memory
+
+__all__ = ["SessionMemory"]
+
+
+class SessionMemory:
+    """Rings and board, made by the console or attached to by the others.
+
+    Parameters
+    ----------
+    samples : SampleRing
+    events : EventRing
+    board : Board
+    """
+
+    def __init__(self, samples: SampleRing, events: EventRing, board: Board) -> None:
+        self.samples, self.events, self.board = samples, events, board
+
+    @classmethod
+    def create(cls, tick_rate_hz: float, ring_s: float) -> SessionMemory:
+        """Make all three, or none: rings for `ring_s` of samples, and a board."""
+        samples = SampleRing.create(max(16, round(ring_s * tick_rate_hz)))
+        try:
+            events = EventRing.create()
+            try:
+                return cls(samples, events, Board.create())
+            except BaseException:
+                _drop(events.memory)
+                raise
+        except BaseException:
+            _drop(samples.memory)
+            raise
+
+    @classmethod
+    def attach(cls, names: tuple[str, str, str]) -> SessionMemory:
+        """Attach to what another process made, by its names."""
+        return cls(SampleRing.attach(names[0]), EventRing.attach(names[1]), Board.attach(names[2]))
+
+    @property
+    def names(self) -> tuple[str, str, str]:
+        """What the others attach by."""
+        return self.samples.name, self.events.name, self.board.name
+
+    def touch(self) -> None:
+        """Have every page in this process's page table."""
+        for part in (self.samples, self.events, self.board):
+            part.memory.touch()
+
+    def unlink(self) -> None:
+        """Remove the names: the memory goes with the last process that has it."""
+        for part in (self.samples, self.events, self.board):
+            part.memory.unlink()
+
+    def close(self) -> None:
+        """Let go of the memory."""
+        for part in (self.samples, self.events, self.board):
+            part.close()
+
+
+def _drop(memory: Memory) -> None:
+    memory.unlink()
+    memory.close()

@@ -1,0 +1,136 @@
+"""A study folder on the command line: read, analysed and kept, with progress and sentences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rigidimeter.cli.inputs import Recordings, adjusted, say
+from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.records import Fit, Score
+    from rigidimeter.study import Cohort, Study
+
+__all__ = ["Analysed", "KeyOption", "analysed_study", "study_of"]
+
+KeyOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--key",
+        metavar="FILE",
+        help="Blinding key of a study folder (code,condition), where it is kept elsewhere.",
+    ),
+]
+
+_OF_RECORDINGS = {
+    "--column": "column",
+    "--rate-hz": "rate_hz",
+    "--reaction": "reaction",
+    "--epoch-length-s": "epoch_length_s",
+    "--condition": "condition",
+    "--task": "task",
+}
+
+
+@dataclass(frozen=True)
+class Analysed:
+    """An analysed study, where it lies, and the status to end with: 1 where an input was bad."""
+
+    study: Study
+    cohort: Cohort
+    paths: tuple[Path, ...]
+    status: int
+
+
+def study_of(recordings: Recordings, key: Path | None) -> Path | None:
+    """Return the study folder among the inputs; None if there is none.
+
+    Raises
+    ------
+    UserError
+        If a study folder is named beside other inputs, or an option does not go with what is named.
+    """
+    from rigidimeter.recording.study_folder import is_study
+    from rigidimeter.recording.study_toml import STUDY_FILE
+
+    studies = [path for path in recordings.paths if is_study(path)]
+    if not studies:
+        if key is not None:
+            raise UserError(
+                f"--key {key}: goes with a study folder, but {recordings.paths[0]} is none: it "
+                f"has no {STUDY_FILE}"
+            )
+        return None
+    if len(recordings.paths) > 1:
+        raise UserError(
+            f"{studies[0]}: is a study folder and names its own recordings; give it alone, or add "
+            "the other recordings to its sessions.csv"
+        )
+    for option, name in _OF_RECORDINGS.items():
+        if getattr(recordings, name):
+            raise UserError(
+                f"{option}: is for single recordings; those of a study folder are session folders, "
+                "or files with the standard names"
+            )
+    return studies[0]
+
+
+def analysed_study(
+    folder: Path,
+    recordings: Recordings,
+    key: Path | None,
+    *,
+    pair: tuple[str | None, str | None] = (None, None),
+    seed: int = 1,
+    resamples: int = 9999,
+) -> Analysed:
+    """Read and analyse a study folder, keep the analysis in it, and say what is wrong or new.
+
+    Raises
+    ------
+    UserError
+        If there is nothing to analyse.
+    """
+    from rigidimeter.cli.progress import Meter
+    from rigidimeter.cli.provenance import provenance
+    from rigidimeter.settings import load_settings
+    from rigidimeter.study import analyse_study, keep, read_study, steps
+
+    chosen = load_settings(recordings.settings) if recordings.settings is not None else None
+    read = read_study(folder, key=key, settings=chosen, method=recordings.method, pair=pair)
+    read = replace(read, settings=adjusted(read.settings, recordings))
+    with Meter("study", steps(read)) as meter:
+        study = analyse_study(
+            read, seed=seed, resamples=resamples, progress=lambda _: meter.advance()
+        )
+    say(study.notices)
+    bad = any(notice.level == "error" for notice in study.notices)
+    bad |= _say_failed(study)
+    cohort = study.cohort
+    assert cohort is not None
+    try:
+        changes = keep(read, study, cohort, seed, resamples)
+    except UserError as error:
+        typer.echo(f"error: the analysis is not kept: {error}", err=True)
+        changes, bad = [], True
+    cohort = replace(cohort, changes=tuple(changes))
+    paths = tuple(folder / session.path for session in cohort.sessions)
+    tables = (path for name, path in read.folder.files.items() if name != "key")
+    study = replace(study, cohort=cohort, provenance=provenance((*tables, *paths), study.settings))
+    return Analysed(study, cohort, paths, int(bad))
+
+
+def _say_failed(study: Study) -> bool:
+    results: list[Fit | Score] = [*study.analysis.fits, *study.analysis.scores]
+    failed = [
+        (result.source, result.epoch, result.outcome.reason)
+        for result in results
+        if result.outcome.kind == "failed"
+    ]
+    for source, epoch, reason in failed:
+        typer.echo(f"error: {source}, epoch {epoch}: {reason}", err=True)
+    return bool(failed)

@@ -1,0 +1,156 @@
+"""What a commissioning record holds for: the rig file, the devices, the controller, some days.
+
+A protocol may ask for less than the record was made with, never for more: its limits, amplitudes
+and speeds may be smaller. Where smaller is not safer, the value must be the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.commissioning.record import CommissioningRecord, plain, read_record, record_path
+from rigidimeter.device.rigfile import RigFile
+from rigidimeter.errors import UserError
+from rigidimeter.settings import Settings
+from rigidimeter.settings.commissioning import CommissioningSettings
+
+__all__ = ["EXACT", "LIMITS", "check_record", "covered", "kept_facts"]
+
+VOLATILE = {"status", "bias", "cycle_s", "latched_faults_before"}
+"""Values that devices report and that change without meaning another calibration."""
+
+
+LIMITS = ("guard", "loop", "zeroing", "prbs", "sinusoid")
+"""Tables whose numbers may be smaller than those a record was made with, never larger."""
+
+EXACT = ("reaction_time_s", "stale_s", "duration_s")
+"""Numbers among them that must be the same."""
+
+
+def kept_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the facts that must be the same at every run."""
+    return {
+        role: {
+            "model": found["model"],
+            "serial": found["serial"],
+            "watchdog_s": found["watchdog_s"],
+            "values": {k: v for k, v in found["values"].items() if k not in VOLATILE},
+        }
+        for role, found in facts.items()
+    }
+
+
+def covered(settings: Settings) -> dict[str, Any]:
+    """Return what of the settings a record holds for."""
+    return {
+        "tick_rate_hz": settings.rig.tick_rate_hz,
+        "controller": settings.controller.model_dump(mode="json"),
+        "guard": settings.guard.model_dump(mode="json"),
+        "loop": settings.loop.model_dump(mode="json"),
+        "zeroing": settings.zeroing.model_dump(mode="json"),
+        "validity_days": settings.commissioning.validity_days,
+        "prbs": {"amplitude_nm": settings.prbs.amplitude_nm},
+        "sinusoid": {
+            "amplitude_deg": settings.sinusoid.amplitude_deg,
+            "frequency_hz": settings.sinusoid.frequency_hz,
+        },
+        "arms": {
+            name: [arm.inertia_kg_m2, arm.damping_nm_s_rad, arm.stiffness_nm_rad]
+            for name, arm in settings.subject.items()
+        },
+    }
+
+
+def check_record(
+    rigfile: RigFile,
+    facts: Mapping[str, Any] | None,
+    settings: Settings,
+    limits: CommissioningSettings | None = None,
+    *,
+    now_utc: datetime | None = None,
+    path: Path | None = None,
+) -> CommissioningRecord:
+    """Return the record if it holds for this rig, these devices and these settings, today.
+
+    Parameters
+    ----------
+    rigfile : RigFile
+    facts : mapping or None
+        What the rig's `configure` returned; None before it is connected, when the devices are not
+        compared yet.
+    settings : Settings
+        Of the protocol that is to run.
+    limits : CommissioningSettings, optional
+        Says for how many days a record holds.
+    now_utc : datetime, optional
+        Today, where that is not the clock's.
+    path : Path, optional
+        The record, where it does not lie beside the rig file.
+
+    Raises
+    ------
+    UserError
+        With what does not hold, in one sentence.
+    """
+    path = path or record_path(rigfile.path)
+    record = read_record(path)
+    again = "commission the rig again"
+    if record.rig_digest != rigfile.digest:
+        raise UserError(f"{path}: is for another content of {rigfile.path}; {again}")
+    if record.emulated and not rigfile.emulated:
+        raise UserError(f"{path}: was made without hardware, and this rig has some; {again}")
+    if facts is not None:
+        _same_devices(path, record.facts, kept_facts(facts))
+    if record.objection:
+        raise UserError(f"{path}: {record.objection}")
+    days = (limits or CommissioningSettings()).validity_days
+    days = min(days, record.covered.get("validity_days", days))
+    today = now_utc or datetime.now(UTC)
+    age = today - datetime.fromisoformat(record.made_utc)
+    if not timedelta(days=-1) <= age <= timedelta(days=days):
+        raise UserError(
+            f"{path}: is of {record.made_utc[:10]}, and a record holds for {days:g} days; {again}"
+        )
+    _same_controller(path, record.covered, plain(covered(settings)))
+    return record
+
+
+def _same_devices(path: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+    now = plain(now)
+    for role in sorted({*before, *now}):
+        old, new = before.get(role, {}), now.get(role, {})
+        for key in ("model", "serial", "watchdog_s"):
+            if old.get(key) != new.get(key):
+                raise UserError(
+                    f"{path}: {role} had {key} {old.get(key)!r} and now has {new.get(key)!r}; "
+                    "commission the rig again"
+                )
+        old, new = old.get("values", {}), new.get("values", {})
+        for key in sorted({*old, *new}):
+            if old.get(key) != new.get(key):
+                raise UserError(
+                    f"{path}: {role} had {key} = {old.get(key)!r} and now has {new.get(key)!r}; "
+                    "set it back, or commission the rig again"
+                )
+
+
+def _same_controller(path: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+    again = "commission again with --settings of this protocol"
+    if before["tick_rate_hz"] != now["tick_rate_hz"]:
+        raise UserError(
+            f"{path}: covers rig.tick_rate_hz = {before['tick_rate_hz']:g} Hz, not "
+            f"{now['tick_rate_hz']:g} Hz; {again}"
+        )
+    for table in ("controller", *LIMITS):
+        for key, value in now[table].items():
+            tried = before.get(table, {}).get(key)
+            tighter = table in LIMITS and key not in EXACT and tried is not None and value <= tried
+            if value != tried and not tighter:
+                raise UserError(f"{path}: covers {table}.{key} = {tried!r}, not {value!r}; {again}")
+    arms = list(before["arms"].values())
+    for name, arm in now["arms"].items():
+        if arm not in arms:
+            raise UserError(f"{path}: does not cover the arm of [subject.{name}]; {again}")

@@ -1,0 +1,201 @@
+"""The study folder: `study.toml`, and tables of sessions, ratings, exclusions and blinding codes.
+
+    study.toml      title, the two conditions and their stimulation, the rating scale
+    sessions.csv    path, subject, day, condition [, part] [, note]
+    ratings.csv     subject, day, condition, examiner, score
+    exclusions.csv  path, epoch, reason, by
+    key.csv         code, condition
+
+Only the first two must exist. What is wrong with one row is a notice of level `error`, and the row
+is left out; what leaves nothing to go on with is a `UserError`. Nothing is decided here about what
+the rows mean.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.labelled import Labelled, read_labelled
+from rigidimeter.recording.study_toml import STUDY_FILE, StudyToml, read_study_toml
+from rigidimeter.records import Notice
+
+__all__ = ["TABLE_COLUMNS", "Row", "StudyFolder", "is_study", "read_study_folder"]
+
+
+TABLE_COLUMNS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "sessions": (("path", "subject", "day", "condition"), ("part", "note")),
+    "ratings": (("subject", "day", "condition", "examiner", "score"), ("note",)),
+    "exclusions": (("path", "epoch", "reason"), ("by", "note")),
+    "key": (("code", "condition"), ("note",)),
+}
+"""The columns of each table: those that it must have, and those that it may have."""
+
+_MAY_BE_EMPTY = ("note", "part", "by")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of a table: its file and line, and its cells by column."""
+
+    source: str
+    line: int
+    cells: Mapping[str, str]
+
+    @property
+    def where(self) -> str:
+        """File and line, as sentences begin."""
+        return f"{self.source}, line {self.line}"
+
+    def __getitem__(self, column: str) -> str:
+        """Return a cell; of a column that the table lacks it is empty."""
+        return self.cells.get(column, "")
+
+    def number(self, column: str) -> float | None:
+        """Return a cell as a number, None where it is missing.
+
+        Raises
+        ------
+        UserError
+            If it is neither.
+        """
+        return Labelled(self.source, {column: (self[column],)}, (self.line,)).number(column, 0)
+
+
+@dataclass(frozen=True)
+class StudyFolder:
+    """What a study folder holds, row by row.
+
+    Attributes
+    ----------
+    folder : Path
+    about : StudyToml
+    sessions, ratings, exclusions : tuple of Row
+    key : tuple of Row or None
+        None where there is no blinding key.
+    files : mapping of str to Path
+        The tables and `study.toml` that exist, by the name under which a digest is kept.
+    notices : tuple of Notice
+        What is wrong with single rows and columns.
+    """
+
+    folder: Path
+    about: StudyToml
+    sessions: tuple[Row, ...]
+    ratings: tuple[Row, ...]
+    exclusions: tuple[Row, ...]
+    key: tuple[Row, ...] | None
+    files: Mapping[str, Path]
+    notices: tuple[Notice, ...]
+
+
+def is_study(path: Path) -> bool:
+    """Whether the path is a folder with a `study.toml`."""
+    return (path / STUDY_FILE).is_file()
+
+
+def read_study_folder(folder: Path, key: Path | None = None) -> StudyFolder:
+    """Read a study folder's description and tables; `key` is a blinding key kept elsewhere.
+
+    Raises
+    ------
+    UserError
+        If `study.toml` or a table cannot be read, a column that must exist is missing, or there is
+        no session.
+    """
+    about = read_study_toml(folder / STUDY_FILE)
+    notices: list[Notice] = []
+    files = {STUDY_FILE: folder / STUDY_FILE}
+    tables: dict[str, tuple[Row, ...] | None] = {}
+    for name in TABLE_COLUMNS:
+        path = folder / getattr(about, name)
+        named = name in about.model_fields_set or name == "sessions"
+        if name == "key" and key is not None:
+            path, named = key, True
+        if not path.exists():
+            if named:
+                raise UserError(
+                    f"{path}: there is no such file, but {_namer(name, key)} names it as the table "
+                    f"with the columns {', '.join(TABLE_COLUMNS[name][0])}"
+                )
+            tables[name] = None
+            continue
+        # A key is known by its role: it may lie anywhere, and its place is nobody's business.
+        files["key" if name == "key" else getattr(about, name)] = path
+        tables[name] = _read_table(path, name, notices)
+    if not tables["sessions"]:
+        raise UserError(
+            f"{folder / about.sessions}: holds no session; write a row with "
+            "path,subject,day,condition for each"
+        )
+    return StudyFolder(
+        folder,
+        about,
+        tables["sessions"] or (),
+        tables["ratings"] or (),
+        tables["exclusions"] or (),
+        tables["key"],
+        files,
+        tuple(notices),
+    )
+
+
+def _namer(name: str, key: Path | None) -> str:
+    if name == "key" and key is not None:
+        return "--key"
+    return STUDY_FILE
+
+
+def _read_table(path: Path, name: str, notices: list[Notice]) -> tuple[Row, ...]:
+    if _has_no_rows(path):
+        return ()
+    table = read_labelled(path)
+    needed, allowed = TABLE_COLUMNS[name]
+    present = tuple(table.columns)
+    missing = [column for column in needed if column not in present]
+    if missing:
+        spare = [column for column in present if column not in (*needed, *allowed)]
+        near = difflib.get_close_matches(missing[0], spare, n=1, cutoff=0.5)
+        hint = f" (the nearest is {near[0]})" if near else ""
+        raise UserError(
+            f"{path}: there is no column {missing[0]}{hint}; its columns are {', '.join(present)}, "
+            f"and it must have {', '.join(needed)}"
+        )
+    notices += _unknown_columns(path, present, (*needed, *allowed))
+    return tuple(_rows(table, needed, notices))
+
+
+def _unknown_columns(path: Path, present: Sequence[str], known: Sequence[str]) -> Iterable[Notice]:
+    for column in present:
+        if column in known or column.startswith("column "):
+            continue
+        free = [name for name in known if name not in present]
+        near = difflib.get_close_matches(column, free, n=1, cutoff=0.6)
+        nearest = f"the nearest that is known is {near[0]}" if near else "it means nothing here"
+        yield Notice("warning", f"{path}: column {column} is not read; {nearest}")
+
+
+def _rows(table: Labelled, needed: Sequence[str], notices: list[Notice]) -> Iterable[Row]:
+    for index, line in enumerate(table.lines):
+        where = f"{table.source}, line {line}"
+        cells = {name: cells[index] for name, cells in table.columns.items()}
+        empty = [name for name in needed if name not in _MAY_BE_EMPTY and not cells[name]]
+        if empty:
+            notices.append(
+                Notice("error", f"{where}: no {' and '.join(empty)} is given; the row is left out")
+            )
+            continue
+        yield Row(table.source, line, cells)
+
+
+def _has_no_rows(path: Path) -> bool:
+    """Whether the file has one line of names and nothing below, as a new study has it."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeError):
+        return False  # `read_labelled` says what is wrong
+    lines = [line for line in text.splitlines() if line.strip(" ,;\t") and line[:1] != "#"]
+    return len(lines) == 1

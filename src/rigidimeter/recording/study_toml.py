@@ -1,0 +1,171 @@
+"""`study.toml`: what a study is, which two conditions it compares, and how they differ.
+
+Strict as the settings are: an unknown key is refused with the nearest known one, a number out of
+its range with the range and the unit.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, ValidationError, model_validator
+from pydantic_core import ErrorDetails
+
+from rigidimeter.errors import UserError
+from rigidimeter.settings.base import Section
+from rigidimeter.settings.messages import sentence
+
+__all__ = [
+    "STUDY_FILE",
+    "STUDY_SCHEMA",
+    "AnalysisTable",
+    "ConditionTable",
+    "RatingTable",
+    "StudyToml",
+    "read_study_toml",
+]
+
+STUDY_FILE = "study.toml"
+STUDY_SCHEMA = "rigidimeter.study/1"
+
+
+def _optional(unit: str, low: float, high: float) -> Any:
+    return Field(None, ge=low, le=high, json_schema_extra={"unit": unit})
+
+
+def _text(default: Any, least: int = 1, most: int = 200) -> Any:
+    return Field(default, min_length=least, max_length=most)
+
+
+class ConditionTable(Section):
+    """``[conditions.NAME]``: how people call it, and the stimulation if there is one."""
+
+    title: str = _text("", 0)
+    frequency_hz: float | None = _optional("Hz", 0.0, 1000.0)
+    amplitude_v: float | None = _optional("V", 0.0, 50.0)
+    amplitude_ma: float | None = _optional("mA", 0.0, 50.0)
+    pulse_width_us: float | None = _optional("µs", 0.0, 10000.0)
+    electrodes: str = _text("", 0)
+    wash_in_min: float | None = _optional("min", 0.0, 100000.0)
+
+    @model_validator(mode="after")
+    def _one_amplitude(self) -> Self:
+        if self.amplitude_v is not None and self.amplitude_ma is not None:
+            raise ValueError(
+                "amplitude_v and amplitude_ma are both given; a stimulator holds one of them, so "
+                "give the one that it holds"
+            )
+        return self
+
+
+class RatingTable(Section):
+    """``[rating]``: lowest and highest score, and the step of the scale (0 for none)."""
+
+    scale: list[float] = Field(
+        default_factory=lambda: [0.0, 3.0], min_length=2, max_length=2,
+        json_schema_extra={"unit": "1"},
+    )  # fmt: skip
+    step: float = Field(0.5, ge=0.0, le=100.0, json_schema_extra={"unit": "1"})
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.scale[0] < self.scale[1]:
+            raise ValueError(
+                f"scale = [{self.scale[0]:g}, {self.scale[1]:g}] must be the lowest score and then "
+                "the highest"
+            )
+        return self
+
+
+class AnalysisTable(Section):
+    """``[analysis]``: the method of estimation, as ``--method`` takes it."""
+
+    method: str = _text("auto", 1, 40)
+
+
+class StudyToml(Section):
+    """All of `study.toml` but its schema."""
+
+    title: str = _text(...)
+    reference: str = _text(..., 1, 40)
+    other: str = _text(..., 1, 40)
+    sessions: str = _text("sessions.csv")
+    ratings: str = _text("ratings.csv")
+    exclusions: str = _text("exclusions.csv")
+    key: str = _text("key.csv")
+    conditions: dict[str, ConditionTable] = Field(default_factory=dict)
+    rating: RatingTable = RatingTable()
+    analysis: AnalysisTable = AnalysisTable()
+
+    @model_validator(mode="after")
+    def _two_conditions(self) -> Self:
+        if self.reference == self.other:
+            raise ValueError(f"reference and other are both {self.reference!r}; name two")
+        for key in ("reference", "other"):
+            name = getattr(self, key)
+            if self.conditions and name not in self.conditions:
+                raise ValueError(
+                    f"{key} = {name!r}, but there is no [conditions.{name}]; there are: "
+                    f"{', '.join(self.conditions)}"
+                )
+        return self
+
+
+def read_study_toml(path: Path) -> StudyToml:
+    """Read and check a `study.toml`.
+
+    Raises
+    ------
+    UserError
+        Naming each offending key, its value, and what would be right.
+    """
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except UnicodeDecodeError:
+        raise UserError(f"{path}: is not a text file in UTF-8") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise UserError(f"{path}: is not valid TOML: {error}") from None
+    schema = values.pop("schema", None)
+    if schema is None:
+        raise UserError(
+            f'{path}: schema is missing; its first line must be schema = "{STUDY_SCHEMA}"'
+        )
+    if schema != STUDY_SCHEMA:
+        raise UserError(f"{path}: schema is {schema!r}; this version reads {STUDY_SCHEMA!r}")
+    try:
+        return StudyToml.model_validate(values)
+    except ValidationError as error:
+        told = "; ".join(dict.fromkeys(_told(values, detail) for detail in error.errors()))
+        raise UserError(f"{path}: {told}") from None
+
+
+def _told(values: Mapping[str, Any], detail: ErrorDetails) -> str:
+    where = ".".join(map(str, detail["loc"]))
+    kind, shown = detail["type"], detail["input"]
+    if kind == "missing":
+        return f'{where} is missing; write {where} = "..."'
+    if kind == "string_type":
+        return f'{where} = {shown} is not allowed: it must be a text, as in {where} = "{shown}"'
+    if kind in ("too_short", "too_long") and where == "rating.scale":
+        return f"{where} = {shown} is not allowed: it must be the lowest and the highest score"
+    if kind in ("float_type", "greater_than_equal", "less_than_equal") and isinstance(
+        field := _condition_field(detail["loc"]), str
+    ):
+        return f"{where} = {shown!r} is not allowed: it must be {field}"
+    return sentence(StudyToml, values, detail)
+
+
+def _condition_field(where: Sequence[str | int]) -> str | None:
+    """Return what an optional number of a condition must be."""
+    field = ConditionTable.model_fields.get(str(where[-1]))
+    if field is None or where[0] != "conditions" or not isinstance(field.json_schema_extra, dict):
+        return None
+    unit = field.json_schema_extra["unit"]
+    ends = {name: getattr(m, name) for m in field.metadata for name in ("ge", "le")
+            if hasattr(m, name)}  # fmt: skip
+    return f"a number of at least {ends['ge']:g} {unit} and at most {ends['le']:g} {unit}"

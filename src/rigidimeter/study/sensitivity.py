@@ -1,0 +1,104 @@
+"""The conclusion by other roads: other estimators, and the inertia held or fitted freely."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal
+
+from rigidimeter.records import Analysis, Fit, Notice
+from rigidimeter.study.comparison import FEWEST_FOR_TEST, MEASURES, Measure, compare_results
+from rigidimeter.study.daywise import day_test, valued
+from rigidimeter.study.results import SensitivityRow, SessionEntry
+
+__all__ = ["SENSITIVITY_METHODS", "sensitivity_rows"]
+
+SENSITIVITY_METHODS = ("published", "bandlimited", "iv")
+"""The estimators that a study is analysed with besides the chosen one."""
+
+_INERTIA, _DAMPING, _STIFFNESS = MEASURES[:3]
+
+
+def sensitivity_rows(
+    analyses: Mapping[str, Analysis],
+    chosen: str,
+    sessions: Mapping[str, SessionEntry],
+    pair: tuple[str, str],
+) -> tuple[list[SensitivityRow], list[Notice]]:
+    """Return one row for each measure, method and stage; a method that cannot says why.
+
+    Parameters
+    ----------
+    analyses : mapping of str to Analysis
+        By method.
+    chosen : str
+        The method of the study's own conclusion, with B and K at fixed inertia.
+    sessions : mapping of str to SessionEntry
+        By source.
+    pair : (str, str)
+    """
+    rows: list[SensitivityRow] = []
+    notices: list[Notice] = []
+    for method, analysis in analyses.items():
+        lacking = _lacking(analysis.fits, pair)
+        if lacking:
+            text = f"the sensitivity analysis has no {method}: {lacking}"
+            notices.append(Notice("warning", text))
+            continue
+        for measure, inertia, fits in _stages(analysis):
+            rows.append(_row(measure, inertia, fits, method, chosen, sessions, pair))
+    return rows, notices
+
+
+def _stages(
+    analysis: Analysis,
+) -> Iterator[tuple[Measure, Literal["fixed", "free"], Sequence[Fit]]]:
+    for measure in (_DAMPING, _STIFFNESS):
+        yield measure, "fixed", analysis.fixed_inertia
+    for measure in (_INERTIA, _DAMPING, _STIFFNESS):
+        yield measure, "free", analysis.fits
+
+
+def _lacking(fits: Sequence[Fit], pair: tuple[str, str]) -> str:
+    """Return why these fits give no test, else nothing; a failure says its own reason."""
+    counts = {
+        name: sum(fit.outcome.included and fit.condition == name for fit in fits) for name in pair
+    }
+    if min(counts.values()) >= FEWEST_FOR_TEST:
+        return ""
+    told = " and ".join(
+        f"{n} epochs in {name or 'a second condition'}" for name, n in counts.items()
+    )
+    failed = next((fit.outcome.reason for fit in fits if fit.outcome.kind == "failed"), "")
+    return f"it leaves {told}" + (f" ({failed})" if failed else "")
+
+
+def _row(
+    measure: Measure,
+    inertia: Literal["fixed", "free"],
+    fits: Sequence[Fit],
+    method: str,
+    chosen: str,
+    sessions: Mapping[str, SessionEntry],
+    pair: tuple[str, str],
+) -> SensitivityRow:
+    compared = compare_results(measure, fits, *pair)
+    by_days = day_test(compared, valued(measure.name, fits, sessions))
+    test = compared.test
+    stage = "free" if measure is _INERTIA else "fixed"
+    return SensitivityRow(
+        measure=measure.name,
+        title=measure.title,
+        unit=measure.unit,
+        method=method,
+        inertia=inertia,
+        n_reference=compared.summaries[pair[0]].n,
+        n_other=compared.summaries[pair[1]].n,
+        shift=test.shift if test else math.nan,
+        shift_low=test.shift_low if test else math.nan,
+        shift_high=test.shift_high if test else math.nan,
+        p=test.p if test else math.nan,
+        r=test.r if test else math.nan,
+        p_day=by_days.p,
+        chosen=method == chosen and inertia == stage,
+    )

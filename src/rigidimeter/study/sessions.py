@@ -1,0 +1,262 @@
+"""From the table of sessions to epochs: what can be read is, what cannot is said.
+
+A session is left out, with a sentence, if it is missing or unreadable, was interrupted, is there
+twice, disagrees with the table about its condition, or was commanded otherwise than most.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePath
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording import (
+    ReadOptions,
+    is_session,
+    read_recording,
+    read_session,
+    session_settings,
+)
+from rigidimeter.recording.folder import EVENTS, MANIFEST, SAMPLES
+from rigidimeter.recording.log import read_events
+from rigidimeter.recording.study_folder import Row, StudyFolder
+from rigidimeter.records import Epoch, Notice
+from rigidimeter.settings import Settings
+from rigidimeter.study.analysis import task_of
+from rigidimeter.study.commanded import commanded_otherwise
+from rigidimeter.study.naming import Naming
+from rigidimeter.study.results import LeftOut, SessionEntry
+
+__all__ = ["Gathered", "Session", "gather", "source_of"]
+
+
+@dataclass(frozen=True)
+class Session:
+    """One recording that was read: its row in the table, its epochs, its settings if it has any."""
+
+    row: Row
+    entry: SessionEntry
+    epochs: tuple[Epoch, ...]
+    settings: Settings | None
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """Every recording of a study that counts, and what became of the others.
+
+    Attributes
+    ----------
+    sessions : tuple of Session
+        In the order of the table.
+    left_out : tuple of LeftOut
+    digests : mapping of str to str
+        SHA-256 of every file of every recording in the table, by its path below the study.
+    notices : tuple of Notice
+    """
+
+    sessions: tuple[Session, ...]
+    left_out: tuple[LeftOut, ...]
+    digests: dict[str, str]
+    notices: tuple[Notice, ...]
+
+    @property
+    def epochs(self) -> tuple[Epoch, ...]:
+        """The epochs of all sessions in order."""
+        return tuple(epoch for session in self.sessions for epoch in session.epochs)
+
+    @property
+    def settings(self) -> Settings | None:
+        """The settings of the first session that has any."""
+        return next((s.settings for s in self.sessions if s.settings is not None), None)
+
+
+class _Refused(Exception):
+    """One session does not count, for the reason given."""
+
+
+def source_of(path: str) -> str:
+    """Return a path of the table as epochs carry it."""
+    return PurePath(path).as_posix()
+
+
+def gather(
+    read: StudyFolder, names: Naming, *, progress: Callable[[str], None] = lambda _: None
+) -> Gathered:
+    """Read every session of the table.
+
+    Raises
+    ------
+    UserError
+        If not one can be read.
+    """
+    sessions: list[Session] = []
+    left_out: list[LeftOut] = []
+    notices: list[Notice] = []
+    digests: dict[str, str] = {}
+    at: dict[Path, Row] = {}
+    samples: dict[str, Row] = {}
+
+    def leave_out(row: Row, reason: str) -> None:
+        text = reason if reason.startswith(row.where) else f"{row.where}: {reason}"
+        notices.append(Notice("error", f"{text}; the session is left out"))
+        bare = text.replace(f"{read.folder}/", "")
+        left_out.append(
+            LeftOut(source_of(row["path"]), row["subject"], row["day"], row["condition"], bare)
+        )
+
+    for row in read.sessions:
+        try:
+            session, said = _read(read, row, names, at, samples, digests)
+        except (_Refused, UserError) as error:
+            leave_out(row, str(error))
+        else:
+            sessions.append(session)
+            notices += said
+        progress(row["path"])
+    for find in (_twice, commanded_otherwise):
+        for row, reason in find([(s.row, s.entry, s.epochs, s.settings) for s in sessions]):
+            leave_out(row, reason)
+            sessions = [session for session in sessions if session.row is not row]
+    notices += _other_settings(sessions)
+    if not sessions:
+        raise UserError(
+            f"{read.folder}: no session is left to analyse: "
+            + " / ".join(n.text for n in notices if n.level == "error")
+        )
+    return Gathered(tuple(sessions), tuple(left_out), digests, tuple(notices))
+
+
+def _read(
+    read: StudyFolder,
+    row: Row,
+    names: Naming,
+    at: dict[Path, Row],
+    samples: dict[str, Row],
+    digests: dict[str, str],
+) -> tuple[Session, list[Notice]]:
+    path, source = read.folder / row["path"], source_of(row["path"])
+    place = path.resolve()
+    if place in at:
+        raise _Refused(f"{path} is in the table already ({_line(at[place])})")
+    at[place] = row
+    if not path.exists():
+        raise _Refused(f"{path}: there is no such session folder or recording")
+    from_session = is_session(path)
+    if not from_session and path.is_dir():
+        raise _Refused(f"{path}: is not a session folder, it has no {MANIFEST}")
+    for name in (MANIFEST, SAMPLES, EVENTS) if from_session else ("",):
+        if (path / name).is_file():
+            digests[str(PurePath(source) / name)] = file_digest(path / name)
+    # Before the condition is looked at: a copy under another name is no less a copy.
+    digest = digests.get(str(PurePath(source) / (SAMPLES if from_session else "")), "")
+    if digest and digest in samples:
+        first = samples[digest]
+        raise _Refused(
+            f"{path} holds the same samples as {first['path']} ({_line(first)}); take the copy out"
+        )
+    samples[digest] = row
+    condition = names.named(row["condition"])
+    if condition is None:
+        raise _Refused(names.unknown(row["condition"]))
+    settings = session_settings(path) if from_session else None
+    if from_session:
+        events, _ = read_events(path / EVENTS) if (path / EVENTS).is_file() else ([], False)
+        if not any(event.get("event") == "session_ended" for event in events):
+            raise _Refused(
+                f"{path}: the session was interrupted and never closed; close it with "
+                f"`rigidimeter recover {path}`"
+            )
+        epochs, said = read_session(path)
+    else:
+        epochs, said = read_recording(path, ReadOptions())
+    said = [*said, *_agrees(path, row, condition, epochs, names)]
+    tasks = [task_of(epoch, settings or Settings()) for epoch in epochs]
+    entry = SessionEntry(
+        row["subject"], row["day"], condition, row["condition"], row["path"], source
+    )
+    kept = tuple(
+        replace(epoch, source=source, condition=condition, task=task)
+        for epoch, task in zip(epochs, tasks, strict=True)
+    )
+    return Session(row, entry, kept, settings), said
+
+
+def _agrees(
+    path: Path, row: Row, condition: str, epochs: Sequence[Epoch], names: Naming
+) -> list[Notice]:
+    """Hold the condition of the table against those that the recording names."""
+    said = []
+    for recorded in dict.fromkeys(epoch.condition for epoch in epochs if epoch.condition):
+        if names.blinded and recorded in names.defined and recorded not in names.known:
+            text = (
+                f"{path}: records its condition by name, so who sees the folder is not blinded; "
+                "the code of the table is used"
+            )
+            said.append(Notice("warning", text))
+            continue
+        found = names.named(recorded)
+        if found is None:
+            raise _Refused(f"{path} records a condition of its own: {names.unknown(recorded)}")
+        if found != condition:
+            by = "" if recorded == found else f" (code {recorded})"
+            raise _Refused(
+                f"the table says {condition}, but {path} records {found}{by}; one of them is wrong"
+            )
+    return said
+
+
+_Read = tuple[Row, SessionEntry, tuple[Epoch, ...], Settings | None]
+
+
+def _twice(sessions: Sequence[_Read]) -> list[tuple[Row, str]]:
+    """Find a day of a subject that is there twice with the same condition, task and part."""
+    seen: dict[tuple[str, ...], Row] = {}
+    found = []
+    for row, entry, epochs, _ in sessions:
+        for task in dict.fromkeys(epoch.task or "" for epoch in epochs):
+            key = (entry.subject, entry.day, entry.condition, task, row["part"])
+            if key in seen:
+                part = f", part {row['part']}" if row["part"] else ""
+                found.append(
+                    (
+                        row,
+                        f"subject {entry.subject}, day {entry.day}, {entry.condition}, {task}"
+                        f"{part} is in the table already ({_line(seen[key])}); if both are parts "
+                        "of one day, tell them apart in the column part",
+                    )
+                )
+                break
+            seen[key] = row
+    return found
+
+
+def _other_settings(sessions: Sequence[Session]) -> list[Notice]:
+    """Say where sessions were recorded with other settings that the analysis uses or shows."""
+    with_settings = [(s.entry, s.settings) for s in sessions if s.settings is not None]
+    said = []
+    for entry, settings in with_settings[1:]:
+        first_entry, first = with_settings[0]
+        differing = [
+            name
+            for name in ("guard", "rig", "estimation", "scores", "diagnostics")
+            if getattr(settings, name) != getattr(first, name)
+        ]
+        if differing:
+            text = (
+                f"{entry.path}: was recorded with other settings than {first_entry.path} in "
+                f"{', '.join(differing)}; those of {first_entry.path} are used for all"
+            )
+            said.append(Notice("warning", text))
+    return said
+
+
+def file_digest(path: Path) -> str:
+    """Return the SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _line(row: Row) -> str:
+    return f"line {row.line}"

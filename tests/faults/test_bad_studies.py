@@ -1,0 +1,323 @@
+"""Studies with something wrong: one clear sentence each, nothing lost, the rest analysed."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from tests.small_study import edit, record, scored_study, study
+
+__all__ = ["edit", "scored_study", "study"]
+
+
+@pytest.fixture
+def compared(rigidimeter, study):
+    """Compare the study; return status, what was printed, and the kept comparison if any."""
+
+    def run(*options: object):
+        ran = rigidimeter("compare", study, "--resamples", 100, *options)
+        assert "Traceback" not in ran.err
+        kept = study / "analysis/comparison.json"
+        return ran, json.loads(kept.read_text()) if kept.exists() else None
+
+    return run
+
+
+def errors(err: str) -> list[str]:
+    return [line for line in err.splitlines() if line.startswith(("error", "rigidimeter:"))]
+
+
+def only_error(ran, *pieces: str) -> None:
+    """Assert that one error holds these pieces, and that the rest was analysed."""
+    (line,) = errors(ran.err)
+    for piece in pieces:
+        assert piece in line
+    assert ran.status == 1
+    assert "Angular impulse" in ran.out
+
+
+def test_a_sound_study_says_nothing(compared) -> None:
+    ran, found = compared()
+    assert (ran.status, errors(ran.err)) == (0, [])
+    assert found["left_out"] == []
+    assert found["notices"] == []
+
+
+def test_a_rating_outside_the_scale(compared, study, edit) -> None:
+    edit(study / "ratings.csv", "M1,1,OFF,A,2.0", "M1,1,OFF,A,20")
+    ran, found = compared()
+    only_error(ran, "ratings.csv, line 2: score is 20, outside the scale of 0 to 3")
+    assert found["ratings"]["n"] == 17
+
+
+def test_a_rating_that_is_no_number(compared, study, edit) -> None:
+    edit(study / "ratings.csv", "M1,1,OFF,A,2.0", "M1,1,OFF,A,two")
+    only_error(compared()[0], "ratings.csv, line 2", "'two'", "not a number")
+
+
+def test_an_examiner_with_one_rating_is_a_notice(compared, study) -> None:
+    with (study / "ratings.csv").open("a") as file:
+        file.write("M1,3,OFF,D,2\n")
+    ran, _ = compared()
+    assert (ran.status, errors(ran.err)) == (0, [])
+    assert "examiner D gave one rating" in ran.err
+
+
+def test_one_condition_only(compared, study) -> None:
+    path = study / "sessions.csv"
+    lines = [line for line in path.read_text().splitlines() if ",DBS" not in line]
+    path.write_text("\n".join(lines) + "\n")
+    (study / "ratings.csv").unlink()
+    ran, found = compared()
+    only_error(ran, "no session in DBS, only in OFF")
+    assert found["comparisons"][0]["groups"]["OFF"]["n"] == 6
+
+
+def test_fewer_than_three_epochs(compared, study) -> None:
+    path = study / "sessions.csv"
+    lines = [line for line in path.read_text().splitlines() if line[-5:] not in ("3,DBS", "4,DBS")]
+    path.write_text("\n".join(lines) + "\n")
+    ran, _ = compared()
+    only_error(ran, "no test of Angular impulse, Work", "there are 6 in OFF and 2 in DBS")
+
+
+def test_the_same_path_twice(compared, study) -> None:
+    with (study / "sessions.csv").open("a") as file:
+        file.write("./sessions/1-OFF,M1,9,OFF\n")
+    ran, found = compared()
+    only_error(ran, "line 8", "in the table already (line 2)")
+    assert len(found["sessions"]) == 6
+    assert found["left_out"][0]["day"] == "9"
+
+
+def test_a_copy_under_another_name(compared, study) -> None:
+    shutil.copytree(study / "sessions/1-OFF", study / "sessions/9-OFF")
+    with (study / "sessions.csv").open("a") as file:
+        file.write("sessions/9-OFF,M1,9,OFF\n")
+    only_error(compared()[0], "line 8", "same samples as sessions/1-OFF (line 2)")
+
+
+def test_a_day_twice_without_part(compared, study) -> None:
+    record(study / "sessions/again", "OFF", 99, task="sinusoid")
+    with (study / "sessions.csv").open("a") as file:
+        file.write("sessions/again,M1,1,OFF\n")
+    only_error(
+        compared()[0], "line 8: subject M1, day 1, OFF, sinusoid", "already (line 2)", "column part"
+    )
+
+
+@pytest.mark.parametrize("table", ["sessions", "ratings"])
+def test_an_unknown_condition(compared, study, edit, table) -> None:
+    edit(study / f"{table}.csv", ",OFF", ",OF")
+    only_error(compared()[0], f"{table}.csv, line 2: condition OF is unknown; the nearest is OFF")
+
+
+def test_a_key_to_an_unknown_condition(compared, study) -> None:
+    (study / "key.csv").write_text("code,condition\nA,OFF\nB,DSB\n")
+    only_error(compared()[0], "key.csv, line 3: code B stands for DSB", "OFF, DBS")
+
+
+def test_a_key_that_is_not_there(compared, study) -> None:
+    ran, _ = compared("--key", study / "nokey.csv")
+    assert ran.status == 1
+    assert errors(ran.err) == [
+        f"rigidimeter: {study}/nokey.csv: there is no such file, but --key names it as the table "
+        "with the columns code, condition"
+    ]
+
+
+def test_the_table_and_the_recording_disagree(compared, study, edit) -> None:
+    edit(study / "sessions.csv", "sessions/1-OFF,M1,1,OFF", "sessions/1-OFF,M1,1,DBS")
+    ran, found = compared()
+    only_error(ran, "the table says DBS, but", "sessions/1-OFF records OFF", "left out")
+    assert len(found["sessions"]) == 5
+
+
+def test_another_version_of_the_protocol(compared, study) -> None:
+    shutil.rmtree(study / "sessions/3-DBS")
+    swing = {"duration_s": 6.0, "motion_s": 6.0, "frequency_hz": 2.0, "taper_s": 0.5}
+    record(
+        study / "sessions/3-DBS",
+        "DBS",
+        9,
+        task="sinusoid",
+        sinusoid={**swing, "amplitude_deg": 7.0},
+    )
+    ran, found = compared()
+    only_error(ran, "sessions/3-DBS", "sinusoid.amplitude_deg = 7.0", "amplitude_deg = 8.0",
+               "5 of 6 sessions")  # fmt: skip
+    assert [out["path"] for out in found["left_out"]] == ["sessions/3-DBS"]
+
+
+def test_what_the_task_does_not_use_makes_no_other_version(compared, study) -> None:
+    shutil.rmtree(study / "sessions/3-DBS")
+    record(study / "sessions/3-DBS", "DBS", 9, task="sinusoid", prbs={"duration_s": 9.0})
+    assert compared()[0].status == 0
+
+
+def test_a_missing_path(compared, study, edit) -> None:
+    edit(study / "sessions.csv", "sessions/1-OFF", "sessions/1-OF")
+    only_error(compared()[0], "line 2", "sessions/1-OF: there is no such session")
+
+
+def test_an_interrupted_session(compared, study, rigidimeter) -> None:
+    events = study / "sessions/4-DBS/events.jsonl"
+    lines = events.read_text().splitlines()
+    assert "session_ended" in lines[-1]
+    events.write_text("\n".join(lines[:-1]) + "\n")
+    ran, _ = compared()
+    only_error(ran, "was interrupted", f"rigidimeter recover {study}/sessions/4-DBS")
+    assert rigidimeter("recover", study / "sessions/4-DBS").status == 0
+    assert compared()[0].status == 0
+
+
+def test_equal_stimulation_in_both_is_a_notice(compared, study, edit) -> None:
+    edit(
+        study / "study.toml",
+        'title = "stimulation off"',
+        "frequency_hz = 130.0\namplitude_ma = 0.32\npulse_width_us = 60.0",
+    )
+    ran, _ = compared()
+    assert (ran.status, errors(ran.err)) == (0, [])
+    assert "OFF and DBS have the same stimulation settings" in ran.err
+
+
+def test_tables_as_a_spreadsheet_writes_them(compared, study) -> None:
+    for name in ("sessions.csv", "ratings.csv"):
+        text = (study / name).read_text().replace(".", ",") if name == "ratings.csv" else ""
+        text = text or (study / name).read_text()
+        rows = text.splitlines()
+        if name == "ratings.csv":
+            rows = [row.replace(",", ";", 4) for row in rows]
+        else:
+            rows = [row.replace(",", ";") for row in rows]
+        (study / name).write_bytes(("\ufeff" + "\r\n".join(rows) + "\r\n").encode())
+    ran, found = compared()
+    assert (ran.status, errors(ran.err)) == (0, [])
+    assert found["ratings"]["n"] == 18
+
+
+def test_an_unknown_column_is_named_with_the_nearest(compared, study, edit) -> None:
+    edit(study / "sessions.csv", "condition\n", "condition,notes\n")
+    text = (study / "sessions.csv").read_text().splitlines()
+    (study / "sessions.csv").write_text("\n".join([text[0], *(f"{row},x" for row in text[1:])]))
+    ran, _ = compared()
+    assert ran.status == 0
+    assert "column notes is not read; the nearest that is known is note" in ran.err
+
+
+def test_a_missing_column(compared, study, edit) -> None:
+    edit(study / "sessions.csv", "subject", "subjct")
+    ran, _ = compared()
+    (line,) = errors(ran.err)
+    assert "there is no column subject (the nearest is subjct)" in line
+    assert ran.status == 1
+
+
+@pytest.mark.parametrize(
+    ("row", "told"),
+    [
+        ("sessions/1-OFF,9,coughed,NB", "sessions/1-OFF has no epoch 9; its epochs are 1, 2"),
+        ("sessions/1-OF,1,coughed,NB", "is no session of sessions.csv; the nearest is"),
+    ],
+)
+def test_an_exclusion_that_meets_no_epoch(compared, study, row, told) -> None:
+    (study / "exclusions.csv").write_text(f"path,epoch,reason,by\n{row}\n")
+    only_error(compared()[0], "exclusions.csv, line 2", told)
+
+
+def test_an_exclusion_without_a_reason(compared, study) -> None:
+    (study / "exclusions.csv").write_text("path,epoch,reason,by\nsessions/1-OFF,1,,NB\n")
+    only_error(compared()[0], "exclusions.csv, line 2: no reason is given")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("title =", "titel =", "titel is not a setting; the nearest is title"),
+        ("frequency_hz = 130.0", "frequency_hz = -1", "at least 0 Hz and at most 1000 Hz"),
+        ("amplitude_ma = 0.32", "amplitude_ma = 0.3\namplitude_v = 2.0", "are both given"),
+        ('other = "DBS"', 'other = "OFF"', "reference and other are both 'OFF'"),
+        ('other = "DBS"', 'other = "DSB"', "there is no [conditions.DSB]"),
+        ("study/1", "study/9", "this version reads 'rigidimeter.study/1'"),
+        ('schema = "rigidimeter.study/1"\n', "", "schema is missing"),
+        ('title = "Small study"', 'title = "', "is not valid TOML"),
+        ('title = "Small study"', 'title = "T"\nratings = "r.csv"', "r.csv: there is no such file"),
+    ],
+)
+def test_a_description_that_is_wrong(compared, study, edit, old, new, told) -> None:
+    edit(study / "study.toml", old, new)
+    ran, found = compared()
+    (line,) = errors(ran.err)
+    assert told in line
+    assert ran.status == 1
+    assert found is None
+
+
+def test_an_unknown_method(compared, study) -> None:
+    with (study / "study.toml").open("a") as file:
+        file.write('[analysis]\nmethod = "ivv"\n')
+    (line,) = errors(compared()[0].err)
+    assert "ivv: there is no such method; the nearest is iv" in line
+
+
+def test_no_session_is_left(compared, study) -> None:
+    shutil.rmtree(study / "sessions")
+    ran, _ = compared()
+    assert ran.status == 1
+    assert "no session is left to analyse" in errors(ran.err)[0]
+
+
+def test_a_study_beside_other_inputs(rigidimeter, study) -> None:
+    ran = rigidimeter("compare", study, study / "sessions/1-OFF")
+    assert ran.status == 1
+    assert "is a study folder and names its own recordings" in ran.err
+
+
+def test_an_option_of_recordings(compared) -> None:
+    ran, _ = compared("--condition", "OFF")
+    assert ran.status == 1
+    assert "--condition: is for single recordings" in ran.err
+
+
+def test_a_key_without_a_study(rigidimeter, study) -> None:
+    ran = rigidimeter("compare", study / "sessions/1-OFF", "--key", study / "key.csv")
+    assert ran.status == 1
+    assert "goes with a study folder" in ran.err
+
+
+def test_a_folder_that_cannot_be_written_loses_no_result(compared, study) -> None:
+    (study / "analysis").write_text("a file in its place")
+    ran, _ = compared()
+    only_error(ran, "the analysis is not kept", "analysis: cannot be written")
+
+
+def test_the_comparison_as_json_is_the_kept_one(compared, study, tmp_path) -> None:
+    _, found = compared("--json", tmp_path / "out.json")
+    assert json.loads((tmp_path / "out.json").read_text()) == found
+
+
+def test_a_report_of_a_study(rigidimeter, study, tmp_path) -> None:
+    ran = rigidimeter("report", study, "--out", tmp_path / "page")
+    assert ran.status == 0
+    assert (tmp_path / "page/report.html").is_file()
+    assert "Small study" in (tmp_path / "page/report.html").read_text()
+    ran = rigidimeter("report", study, "--out", study)
+    assert ran.status == 1
+    assert "name another folder" in ran.err
+
+
+def test_a_new_study_is_complete_and_never_written_over(rigidimeter, tmp_path: Path) -> None:
+    folder = tmp_path / "fresh"
+    assert rigidimeter("study", "new", folder, "--title", 'A "title"').status == 0
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "exclusions.csv", "ratings.csv", "sessions.csv", "study.toml",
+    ]  # fmt: skip
+    before = (folder / "study.toml").read_bytes()
+    ran = rigidimeter("study", "new", folder)
+    assert ran.status == 1
+    assert "is there already" in ran.err
+    assert (folder / "study.toml").read_bytes() == before
+    ran = rigidimeter("compare", folder)
+    assert ran.status == 1
+    assert "sessions.csv: holds no session" in ran.err

@@ -1,0 +1,80 @@
+"""`rigidimeter run --resume` on hardware: the joint must stand where the session began."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from types import SimpleNamespace
+
+import pytest
+
+from rigidimeter.cli.realtime import HOME_TOLERANCE_RAD
+from rigidimeter.design import plan
+from rigidimeter.device.composed import Home
+from rigidimeter.device.rigfile import RigFile
+from rigidimeter.recording import SessionWriter
+from rigidimeter.settings import parse_settings
+
+RIG = """
+home_deg = 10.0
+[torque_sensor]
+driver = "ati-rdt"
+address = "127.0.0.1"
+[drive]
+driver = "ascii"
+port = "/dev/no-such"
+counts_per_turn = 1000
+"""
+
+
+class BuiltError(Exception):
+    """The rig would be connected next."""
+
+
+@pytest.fixture
+def seen(monkeypatch):
+    """Run the loop's target in this process up to where the rig is made; keep what was told."""
+    seen = SimpleNamespace(home=None, continues=None)
+
+    def build(_, now, tick_rate_hz, home=None):
+        seen.home = home
+        raise BuiltError
+
+    def supervise(target, recording, **_):
+        seen.continues = recording.continues
+        target(SimpleNamespace())
+
+    monkeypatch.setattr(RigFile, "build", build)
+    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", supervise)
+    return seen
+
+
+@pytest.fixture
+def resume(tmp_path, rigidimeter):
+    """Go on with a session that noted this origin, on a rig whose file names another home."""
+
+    def run(origin_rad):
+        settings = parse_settings({})
+        epochs = plan(settings.protocol, settings.prbs, settings.sinusoid, 1).epochs
+        planned = [asdict(epoch) for epoch in epochs]
+        writer = SessionWriter(tmp_path / "s", settings, planned, {}, virtual=False)
+        if origin_rad is not None:
+            writer.event("rig_enabled", time_s=0.0, origin_rad=origin_rad)
+        writer.close(0.0, "abort", "aborted by the operator")
+        rig = tmp_path / "rig.toml"
+        rig.write_text(RIG)
+        with pytest.raises(BuiltError):
+            rigidimeter("run", "--resume", tmp_path / "s", "--rig", rig, "--out", tmp_path / "n")
+
+    return run
+
+
+def test_the_home_is_where_the_session_began(seen, resume):
+    resume(0.25)
+    assert seen.home == Home(0.25, HOME_TOLERANCE_RAD)
+    assert seen.continues["origin_rad"] == 0.25
+
+
+def test_a_session_that_began_nowhere_leaves_the_home_to_the_rig_file(seen, resume):
+    resume(None)
+    assert seen.home is None
+    assert "origin_rad" not in seen.continues

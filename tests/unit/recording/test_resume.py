@@ -1,0 +1,114 @@
+"""What is left of a session, where its joint stood, and on which rig it may go on."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import pytest
+
+from rigidimeter.design import plan
+from rigidimeter.errors import UserError
+from rigidimeter.recording import SessionWriter
+from rigidimeter.recording.resume import rest_of
+from rigidimeter.settings import parse_settings
+
+SETTINGS = parse_settings({"protocol": {"blocks": [{"epochs": 3}], "rests_s": [4.0]}})
+EPOCHS = plan(SETTINGS.protocol, SETTINGS.prbs, SETTINGS.sinusoid, 1).epochs
+
+
+@pytest.fixture
+def session(tmp_path):
+    """Make a session folder in which the first `done` epochs ended with success."""
+
+    def make(name, *, done=1, origin_rad=None, virtual=False, continues=None, closed=True):
+        folder = tmp_path / name
+        planned = [asdict(epoch) for epoch in EPOCHS]
+        writer = SessionWriter(
+            folder, SETTINGS, planned, {"session": 1}, virtual=virtual, continues=continues
+        )
+        writer.session_started()
+        if origin_rad is not None:
+            writer.event("rig_enabled", time_s=0.0, origin_rad=origin_rad)
+        for epoch in EPOCHS[:done]:
+            writer.epoch_started(epoch.number, epoch.label, epoch.task, epoch.condition, 0.0)
+            writer.epoch_ended(epoch.number, 1.0, "success", "")
+        if closed:
+            writer.close(1.0, "abort", "aborted by the operator")
+        else:
+            writer.close_files()
+        return folder
+
+    return make
+
+
+def test_what_was_not_run_to_its_end_is_left(session):
+    rest = rest_of(session("s", done=1))
+    assert rest.epochs == EPOCHS[1:]
+    assert rest.done == 1
+    assert rest.settings == SETTINGS
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_it_goes_on_from_where_the_joint_stood(session, closed):
+    rest = rest_of(session("s", origin_rad=-0.25, closed=closed))
+    assert rest.continues["folder"] == "s"
+    assert rest.continues["origin_rad"] == -0.25
+
+
+def test_a_rig_that_was_never_enabled_stood_nowhere(session):
+    assert "origin_rad" not in rest_of(session("s", done=0)).continues
+
+
+def test_the_place_of_the_first_session_counts(session):
+    """Within 3 deg each time, the limits would else move on with every session."""
+    first = rest_of(session("one", origin_rad=0.10))
+    second = rest_of(session("two", origin_rad=0.14, continues=first.continues))
+    assert second.continues["origin_rad"] == 0.10
+
+
+def test_a_session_that_ended_before_it_was_enabled_hands_the_place_on(session):
+    first = rest_of(session("one", origin_rad=0.10))
+    second = rest_of(session("two", done=0, continues=first.continues))
+    assert second.continues["origin_rad"] == 0.10
+
+
+@pytest.fixture
+def no_session(monkeypatch):
+    def supervise(*_, **__):
+        raise AssertionError("a session was started")
+
+    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", supervise)
+
+
+@pytest.mark.usefixtures("no_session")
+def test_a_virtual_session_does_not_go_on_on_a_real_rig(session, rigidimeter, tmp_path):
+    folder = session("s", virtual=True)
+    rig = tmp_path / "rig.toml"
+    ran = rigidimeter("run", "--resume", folder, "--rig", rig, "--out", tmp_path / "n")
+    assert ran.status != 0
+    assert f"{folder}: was recorded on the virtual rig and goes on only there" in ran.err
+    assert not (tmp_path / "n").exists()
+
+
+@pytest.mark.usefixtures("no_session")
+def test_a_real_session_does_not_go_on_on_the_virtual_rig(session, rigidimeter, tmp_path):
+    folder = session("s", virtual=False)
+    ran = rigidimeter("run", "--resume", folder, "--out", tmp_path / "n")
+    assert ran.status != 0
+    assert "was recorded on hardware and goes on only there; name its rig file" in ran.err
+    assert not (tmp_path / "n").exists()
+
+
+@pytest.mark.usefixtures("no_session")
+@pytest.mark.parametrize(("virtual", "option"), [(True, ""), (False, " --rig RIG.toml")])
+def test_the_way_on_is_offered(session, rigidimeter, virtual, option):
+    folder = session("s", virtual=virtual)
+    ran = rigidimeter("run", "--out", folder)
+    assert ran.status != 0
+    assert f"rigidimeter run --resume {folder}{option} --out NEW" in ran.err
+
+
+def test_a_session_without_a_protocol_cannot_go_on(tmp_path):
+    SessionWriter(tmp_path / "s", SETTINGS, [], {}, virtual=True).close(0.0, "fail", "")
+    with pytest.raises(UserError, match="no protocol to go on with"):
+        rest_of(tmp_path / "s")

@@ -1,0 +1,188 @@
+"""A study folder from its tables to its conclusions, held against the parts done by hand."""
+
+import csv
+import math
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.small_study import DAYS, record
+
+from rigidimeter.recording import read_session
+from rigidimeter.records import Fit
+from rigidimeter.settings import Settings
+from rigidimeter.statistics import day_difference, difference, fit_mixed, holm, ranksum
+from rigidimeter.study import Study, analyse, analyse_study, compare, read_study
+
+RESAMPLES = 200
+
+
+def analysed(folder: Path, **options) -> Study:
+    return analyse_study(read_study(folder, **options), resamples=RESAMPLES)
+
+
+@pytest.fixture(scope="module")
+def whole(fitted_study: Path) -> Study:
+    return analysed(fitted_study)
+
+
+def test_the_analysis_is_that_of_its_sessions(fitted_study: Path, whole: Study) -> None:
+    epochs = []
+    for condition in DAYS:
+        for day in DAYS[condition]:
+            epochs += read_session(fitted_study / f"sessions/{day}-{condition}")[0]
+    by_hand = analyse(epochs, whole.settings)
+    values = [fit.stiffness_nm_rad for fit in by_hand.fixed_inertia]
+    assert [fit.stiffness_nm_rad for fit in whole.analysis.fixed_inertia] == values
+    expected = compare(by_hand, "OFF", "DBS")
+    for ours, theirs in zip(whole.comparisons, expected, strict=True):
+        assert ours.test == theirs.test
+    assert not [notice for notice in whole.notices if notice.level == "error"]
+
+
+def test_days_are_tested_by_the_days_of_the_table(whole: Study) -> None:
+    by_day = {condition: [d for d in DAYS[condition] for _ in range(2)] for condition in DAYS}
+    assert whole.cohort is not None
+    for comparison, test in zip(whole.comparisons, whole.cohort.day_tests, strict=True):
+        expected = day_difference(
+            comparison.values["OFF"], comparison.values["DBS"], by_day["OFF"], by_day["DBS"]
+        )
+        assert test.estimate == pytest.approx(expected.estimate)
+        assert (test.p, test.df, test.p_days) == (expected.p, expected.df, expected.p_days)
+        assert (test.days_reference, test.days_other) == (3, 3)
+    third = [d for d in whole.cohort.days if d.measure == "stiffness_nm_rad"][2]
+    fits = [f for f in whole.analysis.fixed_inertia if f.source == "sessions/3-OFF"]
+    assert (third.day, third.condition, third.n) == ("3", "OFF", 2)
+    assert third.median == pytest.approx(np.median([f.stiffness_nm_rad for f in fits]))
+
+
+def test_ratings_and_effects(fitted_study: Path, whole: Study) -> None:
+    cohort = whole.cohort
+    assert cohort is not None
+    assert cohort.ratings is not None
+    with (fitted_study / "ratings.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    fit = fit_mixed(
+        [float(row["score"]) for row in rows],
+        [row["condition"] for row in rows],
+        {"examiner": [row["examiner"] for row in rows]},
+    )
+    assert cohort.ratings.contrast == difference(fit, "OFF", "DBS")
+    corrected = {name: [] for name in DAYS}
+    for row, score in zip(rows, fit.corrected.tolist(), strict=True):
+        corrected[row["condition"]].append(score)
+    found = {effect.measure: effect for effect in cohort.effects}
+    assert found["rating"].effects.test == ranksum(corrected["OFF"], corrected["DBS"])
+    expected = holm([effect.effects.test.p for effect in cohort.effects])
+    assert tuple(effect.p_holm for effect in cohort.effects) == expected
+    assert len(cohort.differences) == math.comb(len(cohort.effects), 2)
+    assert all(difference.paired for difference in cohort.differences.values())
+    assert cohort.virtual
+    assert not cohort.blinded
+
+
+def test_every_method_stands_beside_the_chosen_one(whole: Study) -> None:
+    assert whole.cohort is not None
+    rows = whole.cohort.sensitivity
+    assert [row.method for row in rows] == ["published"] * 5 + ["bandlimited"] * 5 + ["iv"] * 5
+    chosen = {row.measure: row for row in rows if row.chosen}
+    assert {row.method for row in chosen.values()} == {"iv"}
+    for comparison in whole.comparisons:
+        assert comparison.test is not None
+        assert chosen[comparison.measure].p == comparison.test.p
+        assert chosen[comparison.measure].shift == comparison.test.shift
+    assert chosen["inertia_kg_m2"].inertia == "free"
+    assert chosen["stiffness_nm_rad"].inertia == "fixed"
+
+
+def test_another_measure_moves_no_other_number(study: Path) -> None:
+    first = analysed(study)
+    (study / "ratings.csv").unlink()
+    second = analysed(study)
+    assert first.cohort is not None
+    assert second.cohort is not None
+    assert first.cohort.effects[0].effects == second.cohort.effects[0].effects
+    assert second.cohort.ratings is None
+
+
+def test_a_key_gives_codes_their_conditions(study: Path) -> None:
+    expected = analysed(study)
+    for name in ("sessions.csv", "ratings.csv"):
+        path = study / name
+        lines = path.read_text().splitlines()
+        coded = [line.replace(",OFF", ",Q").replace(",DBS", ",Z") for line in lines]
+        path.write_text("\n".join(coded) + "\n")
+    key = study.parent / "elsewhere.csv"
+    key.write_text("code,condition\nQ,OFF\nZ,DBS\n")
+    found = analysed(study, key=key)
+    assert [c.test for c in found.comparisons] == [c.test for c in expected.comparisons]
+    assert found.cohort is not None
+    assert found.cohort.sessions[0].code == "Q"
+    blinded = analysed(study)
+    assert blinded.cohort is not None
+    assert blinded.cohort.blinded
+    assert [c.name for c in blinded.cohort.conditions] == ["Q", "Z"]
+    assert {epoch.condition for epoch in blinded.epochs} == {"Q", "Z"}
+    assert any("blinded" in notice.text for notice in blinded.notices)
+    assert [c.test for c in blinded.comparisons] == [c.test for c in expected.comparisons]
+    assert blinded.cohort.ratings is not None
+    assert blinded.cohort.ratings.reference == "Q"
+
+
+def test_codes_in_the_recordings_go_through_the_key(study: Path, edit) -> None:
+    shutil.rmtree(study / "sessions/1-OFF")
+    settings = {"Q": {"damping_nm_s_rad": 0.13}, "OFF": {}, "DBS": {}}
+    record(study / "sessions/1-OFF", "Q", 5, task="sinusoid", subject=settings)
+    edit(study / "sessions.csv", "M1,1,OFF", "M1,1,Q")
+    (study / "key.csv").write_text("code,condition\nQ,OFF\n")
+    found = analysed(study)
+    assert {epoch.condition for epoch in found.epochs} == {"OFF", "DBS"}
+    assert not [notice for notice in found.notices if notice.level == "error"]
+
+
+def test_the_operator_takes_an_epoch_out_with_name_and_reason(study: Path) -> None:
+    (study / "exclusions.csv").write_text("path,epoch,reason,by\n./sessions/2-OFF,2,coughed,NB\n")
+    found = analysed(study)
+    assert found.cohort is not None
+    (exclusion,) = found.cohort.exclusions
+    assert (exclusion.by, exclusion.reason, exclusion.who) == ("operator", "coughed", "NB")
+    assert (exclusion.source, exclusion.epoch, exclusion.day) == ("sessions/2-OFF", "2", "2")
+    assert found.comparisons[0].excluded == {"OFF": 1, "DBS": 0}
+
+
+def test_several_subjects_each_have_their_median_inertia(monkeypatch, fitted_study: Path) -> None:
+    """Epochs of two subjects, the second twice as heavy: J is held at each one's own."""
+    from rigidimeter.study import whole as module
+
+    def fake(epochs, settings, method, **_):
+        from rigidimeter.records import Analysis, Outcome
+
+        fits = tuple(
+            Fit(e.source, e.label, e.condition, method, Outcome(), 1.0 + len(epochs))
+            for e in epochs
+        )
+        return Analysis(method, fits, fits, 1.0 + len(epochs), ())
+
+    monkeypatch.setattr(module, "analyse", fake)
+    read = read_study(fitted_study)
+    sessions = {s.entry.source: s.entry for s in read.gathered.sessions}
+    sessions["sessions/1-OFF"] = replace(sessions["sessions/1-OFF"], subject="M2")
+    found, notices = module._analysed(read.epochs, sessions, Settings(), "iv", lambda _: None)
+    assert sorted({fit.inertia_kg_m2 for fit in found.fits}) == [3.0, 11.0]
+    assert "M2 3, M1 11" in notices[-1].text
+
+
+def test_parts_tell_two_sessions_of_one_day_apart(study: Path, edit) -> None:
+    record(study / "sessions/1b", "OFF", 77, task="sinusoid")
+    edit(
+        study / "sessions.csv", "path,subject,day,condition\n", "path,subject,day,condition,part\n"
+    )
+    text = (study / "sessions.csv").read_text().splitlines()
+    rows = [f"{line}," for line in text[1:]] + ["sessions/1b,M1,1,OFF,b"]
+    (study / "sessions.csv").write_text("\n".join([text[0], *rows]) + "\n")
+    found = analysed(study)
+    assert found.comparisons[0].summaries["OFF"].n == 8
+    assert found.cohort is not None
+    assert found.cohort.day_tests[0].days_reference == 3

@@ -1,0 +1,122 @@
+"""The folder: what `compare` reads, the same bytes from any number of processes."""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.unit.virtual.tiny import SHORT, tiny
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording import read_session, session_settings
+from rigidimeter.study import analyse, compare
+from rigidimeter.virtual.design import PAPER, PUSHING
+from rigidimeter.virtual.folder import study_length_s, write_virtual_study
+from rigidimeter.virtual.plan import plan_study
+
+
+def bytes_of(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("virtual") / "study"
+    write_virtual_study(place, tiny(), 3, processes=1)
+    return place
+
+
+def test_two_processes_write_the_same_bytes(folder: Path, tmp_path: Path) -> None:
+    seen: list[float] = []
+    write_virtual_study(tmp_path / "study", tiny(), 3, processes=2, progress=seen.append)
+    one, two = bytes_of(folder), bytes_of(tmp_path / "study")
+    assert one == two
+    assert len(one) == 4 * 3 + 3
+    assert seen == sorted(seen)
+    assert seen[-1] == pytest.approx(study_length_s(plan_study(tiny(), 3)))
+
+
+def test_the_tables_name_every_session(folder: Path) -> None:
+    study = tomllib.loads((folder / "study.toml").read_text(encoding="utf-8"))
+    assert study["schema"] == "rigidimeter.study/1"
+    assert (study["reference"], study["other"]) == ("OFF", "DBS")
+    assert study["conditions"]["DBS"] == {
+        "title": "stimulation on",
+        "frequency_hz": 130.0,
+        "amplitude_ma": 0.32,
+        "pulse_width_us": 60.0,
+        "wash_in_min": 15.0,
+        "electrodes": "bipolar",
+    }
+    assert study["rating"] == {"scale": [0.0, 3.0], "step": 0.5}
+    sessions = rows_of(folder / study["sessions"])
+    assert [(row["day"], row["condition"]) for row in sessions] == [
+        ("1", "OFF"), ("1", "DBS"), ("2", "DBS"), ("2", "OFF"),
+    ]  # fmt: skip
+    for row in sessions:
+        epochs, notices = read_session(folder / row["path"])
+        assert not [notice for notice in notices if notice.level == "error"]
+        assert {epoch.condition for epoch in epochs} == {row["condition"]}
+        assert sorted(epoch.task for epoch in epochs) == ["prbs", "sinusoid"]
+        assert all(epoch.virtual for epoch in epochs)
+    ratings = rows_of(folder / study["ratings"])
+    assert len(ratings) == 4 * 3
+    assert ratings[0].keys() == {"subject", "day", "condition", "examiner", "score"}
+
+
+def test_its_sessions_are_estimated_and_compared(folder: Path) -> None:
+    paths = [folder / row["path"] for row in rows_of(folder / "sessions.csv")]
+    epochs = [epoch for path in paths for epoch in read_session(path)[0]]
+    found = {c.measure: c for c in compare(analyse(epochs, session_settings(paths[0])))}
+    assert all(len(values) == 2 for c in found.values() for values in c.values.values())
+    assert found["inertia_kg_m2"].summaries["OFF"].median == pytest.approx(0.0045, rel=0.15)
+
+
+def test_nothing_is_written_over(folder: Path) -> None:
+    with pytest.raises(UserError, match="is there already"):
+        write_virtual_study(folder, tiny(), 3, processes=1)
+
+
+def test_a_session_that_fails_is_named(tmp_path: Path) -> None:
+    impossible = {**SHORT, "zeroing": {"duration_s": 0.1, "bias_limit_nm": 0.001}}
+    noisy = {**impossible, "rig": {"torque": {"noise_sd_nm": 5.0}}}
+    with pytest.raises(UserError, match="day-1-OFF: the session ended with fail"):
+        write_virtual_study(tmp_path / "study", replace(tiny(), settings=noisy), 3, processes=1)
+    assert not (tmp_path / "study" / "study.toml").exists()
+
+
+@pytest.mark.slow
+def test_pushing_moves_the_published_estimate_and_not_the_instrumental_one(
+    tmp_path: Path,
+) -> None:
+    """Equal joints; in DBS the subject pushes with a fifth of the perturbation."""
+    design = replace(
+        tiny(PUSHING, prbs=6, sinusoid=0),
+        settings=PAPER.settings,
+        **{
+            f"{level}_{what}_cv_percent": 0.0
+            for level in ("day", "epoch")
+            for what in ("inertia", "damping", "stiffness")
+        },
+    )
+    plans = write_virtual_study(tmp_path / "study", design, 3, processes=1)
+    epochs = [e for plan in plans for e in read_session(tmp_path / "study" / plan.folder)[0]]
+    shift_percent = {}
+    for method in ("published", "iv"):
+        found = {c.measure: c for c in compare(analyse(epochs, plans[0].settings, method))}
+        damping = found["damping_nm_s_rad"].summaries
+        shift_percent[method] = 100 * (damping["DBS"].median / damping["OFF"].median - 1)
+    assert shift_percent["published"] < -30.0
+    assert abs(shift_percent["iv"]) < 15.0  # six epochs with 0.2 N·m: an SE of about 6 %
