@@ -28,6 +28,7 @@ from rigidimeter.recording import (
     read_recording,
 )
 from rigidimeter.recording.log import SAMPLE_UNITS, read_events
+from rigidimeter.recording.study_toml import read_study_toml
 from rigidimeter.recording.tables.columns import LABELS
 from rigidimeter.records import CHANNEL_UNITS, Analysis, Delay, Finding, Fit, Outcome, Score
 from rigidimeter.settings import Settings, load_settings, parse_settings
@@ -79,10 +80,26 @@ def table(path: Path, heading: str) -> dict[str, str]:
 
 
 @cache
-def help_of(command: str) -> str:
-    result = RUN.invoke(app, [command, "--help"] if command else ["--help"])
+def help_of(*command: str) -> str:
+    result = RUN.invoke(app, [*command, "--help"])
     assert result.exit_code == 0, result.output
     return result.output
+
+
+def below(*command: str) -> list[str]:
+    """Return the names of the commands below a group; of a command, none."""
+    _, _, listed = help_of(*command).partition("\nCommands:\n")
+    return re.findall(r"^  ([a-z]+)  ", listed, re.M)
+
+
+def command_of(words: list[str]) -> tuple[str, ...]:
+    """Return those of the words that name a command: `study new` of `study new FOLDER`."""
+    command: tuple[str, ...] = ()
+    for word in words:
+        if word not in below(*command):
+            break
+        command = (*command, word)
+    return command
 
 
 SHELL = list(commands(ALL_BLOCKS))
@@ -103,9 +120,10 @@ def test_a_command_line_is_one_that_exists(where: str, words: list[str]) -> None
     elif words[0] == "python":
         assert (ROOT / words[1]).is_file(), where
     elif words[0] == "rigidimeter":
-        shown = help_of(words[1])
-        assert not shown.startswith("Usage: rigidimeter [OPTIONS] COMMAND"), where
-        for word in words[2:]:
+        command = command_of(words[1:])
+        shown = help_of(*command)
+        assert not below(*command), where
+        for word in words[1 + len(command) :]:
             if word.startswith("-"):
                 assert re.search(rf"(?<![\w-]){re.escape(word)}(?![\w-])", shown), (where, word)
     else:
@@ -119,12 +137,11 @@ def test_the_readme_begins_with_make_demo_and_make_test() -> None:
 
 def test_the_readme_lists_every_command_and_no_other() -> None:
     listed = {name.removeprefix("rigidimeter ") for name in table(ROOT / "README.md", "Commands")}
-    shown = help_of("").split("Commands:")[1]
-    assert listed == set(re.findall(r"^  ([a-z]+)  ", shown, re.M))
+    assert listed == set(below())
 
 
 def test_options_named_in_running_text_exist() -> None:
-    known = set(re.findall(r"--[a-z][a-z-]*", "".join(map(help_of, _subcommands()))))
+    known = set(re.findall(r"--[a-z][a-z-]*", "".join(_every_help())))
     for path in DOCUMENTS:
         text = re.sub(r"^```.*?^```$", "", path.read_text("utf-8"), flags=re.DOTALL | re.M)
         for code in re.findall(r"`([^`\n]+)`", text):
@@ -132,8 +149,9 @@ def test_options_named_in_running_text_exist() -> None:
                 assert option in known | {"--help", "--version"}, (path, code)
 
 
-def _subcommands() -> list[str]:
-    return re.findall(r"^  ([a-z]+)  ", help_of("").split("Commands:")[1], re.M)
+def _every_help(*command: str) -> list[str]:
+    pages = [_every_help(*command, name) for name in below(*command)]
+    return [help_of(*command), *(text for page in pages for text in page)]
 
 
 def test_the_readme_lists_the_columns_that_are_read() -> None:
@@ -153,8 +171,12 @@ REFUSED = [
 
 
 @pytest.mark.parametrize("block", TOML, ids=lambda block: block.where)
-def test_a_settings_example_is_accepted(block: Block) -> None:
-    parse_settings(tomllib.loads(block.text))
+def test_a_toml_example_is_accepted(block: Block, tmp_path: Path) -> None:
+    if block.text.startswith('schema = "rigidimeter.study/1"'):
+        (tmp_path / "study.toml").write_text(block.text, "utf-8")
+        read_study_toml(tmp_path / "study.toml")
+    else:
+        parse_settings(tomllib.loads(block.text))
 
 
 @pytest.mark.parametrize(("block", "after"), REFUSED, ids=[block.where for block, _ in REFUSED])

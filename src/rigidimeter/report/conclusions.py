@@ -200,27 +200,50 @@ def _sizes(rows: Sequence[SensitivityRow]) -> str:
 
 
 def _why(shown: Sequence[SensitivityRow], absent: Sequence[SensitivityRow]) -> str:
-    """Tell torque of the subject's own from mere lack of precision, where the intervals can."""
+    """Tell torque of the subject's own from mere lack of precision, where the intervals can.
+
+    Such torque pulls all of least squares, so what one of its methods shows and another does not
+    has another reason.
+    """
+    every = [*shown, *absent]
     instrumental = [row for row in absent if row.method not in LEAST_SQUARES]
     least = [row for row in shown if row.method in LEAST_SQUARES]
+    unmoved = [row for row in absent if row.method in LEAST_SQUARES]
+    if not instrumental and not least:
+        return (
+            "Torque of the subject’s own pulls least squares, and can hide a difference as well "
+            "as make one."
+        )
     if not instrumental or not least:
-        if all(row.method in LEAST_SQUARES for row in absent) and not least:
-            return (
-                "Torque of the subject’s own pulls least squares, and can hide a difference as "
-                "well as make one."
-            )
-        return ""
+        return _alike(every) or _sizes(every)
     one = next((row for row in instrumental if row.chosen), instrumental[0])
     inside = [row for row in least if one.shift_low <= row.shift <= one.shift_high]
     ends = interval(one.shift_low, one.shift_high, 3)
     if inside:
         return (
-            f"The interval of “{one.method}” {ends} holds the shift of "
-            f"{_names(inside, [*shown, *absent])} too: a lack of precision could be the reason."
+            f"The interval of “{one.method}” {ends} holds the shift of {_names(inside, every)} "
+            "too: a lack of precision could be the reason."
+        )
+    text = f"The interval of “{one.method}” {ends} leaves that shift out."
+    if {row.method for row in unmoved} - {row.method for row in least}:
+        return (
+            f"{text} Voluntary torque would pull {_names(unmoved, every)} too, so it is not the "
+            "likely reason."
         )
     return (
-        f"The interval of “{one.method}” {ends} leaves that shift out. Voluntary torque "
-        "would do this: it pulls least squares and not the instrumental estimate."
+        f"{text} Voluntary torque would do this: it pulls least squares and not the instrumental "
+        "estimate."
+    )
+
+
+def _alike(rows: Sequence[SensitivityRow]) -> str:
+    """Say so where every shift lies in the interval of the one that is used."""
+    one = next((row for row in rows if row.chosen), None)
+    if one is None or not all(one.shift_low <= row.shift <= one.shift_high for row in rows):
+        return ""
+    return (
+        f"All shifts lie in the interval of “{one.method}”, "
+        f"{interval(one.shift_low, one.shift_high, 3)}: they differ in p more than in size."
     )
 
 

@@ -129,6 +129,26 @@ def test_voluntary_torque_is_named_where_the_intervals_say_so(study: Study) -> N
     assert "Voluntary torque would do this" in text
 
 
+def test_voluntary_torque_is_not_blamed_where_other_least_squares_are_not_moved(
+    study: Study,
+) -> None:
+    text = said(
+        study,
+        ("published", "fixed", 0.3, 0.1),
+        ("bandlimited", "fixed", 0.0, 0.1),
+        ("iv", "fixed", 0.0, 0.1),
+    )
+    assert "that “published” shows is not shown by “bandlimited” and “iv”" in text
+    assert "would pull “bandlimited” too, so it is not the likely reason" in text
+    assert "would do this" not in text
+
+
+def test_shifts_that_differ_in_p_alone_are_called_so(study: Study) -> None:
+    text = said(study, ("iv", "fixed", 0.3, 0.1), ("iv", "free", 0.33, 0.7))
+    assert "shows is not shown by “iv” (J free)" in text
+    assert "they differ in p more than in size" in text
+
+
 def test_lack_of_precision_is_not_taken_for_voluntary_torque(study: Study) -> None:
     text = said(study, ("published", "fixed", 0.3, 0.1), ("iv", "fixed", 0.25, 1.2))
     assert "Voluntary torque" not in text
