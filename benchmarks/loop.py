@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rigidimeter.acquisition.processes.board import Board
-from rigidimeter.acquisition.processes.realtime import DeadlineClock
+from rigidimeter.acquisition.processes.deadline import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Recording
 from rigidimeter.acquisition.processes.supervise import (
     Ended,

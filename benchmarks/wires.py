@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks import loop
 from rigidimeter.acquisition import run_session
-from rigidimeter.acquisition.processes.realtime import DeadlineClock
+from rigidimeter.acquisition.processes.deadline import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Recording
 from rigidimeter.acquisition.processes.supervise import LoopSide, LoopTarget, Realtime, supervise
 from rigidimeter.design import Protocol, plan

@@ -31,7 +31,7 @@ RIG = {"cia402": "rdt_canopen", "ascii": "rdt_ascii"}
 WATCHDOG_S = {"cia402": 0.1, "ascii": 0.1}
 """The emulated servo's command deadline; the horizon of a serial drive's moves."""
 
-BRAKING_DEG_S2 = {"cia402": math.degrees(60.0), "ascii": 2000.0}
+BRAKING_DEG_S2 = {"cia402": math.degrees(120.0), "ascii": 7000.0}
 """The quick stop that the rig file leaves at its default; the serial drive's deceleration."""
 
 SLACK_S = 0.05

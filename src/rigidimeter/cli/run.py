@@ -59,6 +59,7 @@ def run(
     from rigidimeter.acquisition.processes.recorder import Recording
     from rigidimeter.acquisition.processes.supervise import Realtime, supervise
     from rigidimeter.cli.realtime import run_loop
+    from rigidimeter.commissioning import check_record
     from rigidimeter.console import Terminal
     from rigidimeter.device.rigfile import load_rig
 
@@ -66,7 +67,8 @@ def run(
     home_rad = continues.get("origin_rad") if rig is not None else None
     _offer(out)
     if rig is not None:
-        load_rig(rig)  # what is wrong with it is said before any process starts
+        # What is wrong with the rig or its record is said before any process starts.
+        check_record(load_rig(rig), None, settings, settings.commissioning)
     recording = Recording(
         out,
         settings,

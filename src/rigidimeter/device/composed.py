@@ -232,9 +232,8 @@ class ComposedRig:
         What fails last is raised, with what failed before it as its context.
         """
         with ExitStack() as steps:  # tries all of them, the last one first
-            port = getattr(self._line, "close", None)  # a contact may have none
-            if port is not None:
-                steps.callback(port)
+            if self._line is not None:
+                steps.callback(self._line.close)
             steps.callback(self._sensor.close)
             steps.callback(self._drive.close)
             steps.callback(self.disable)

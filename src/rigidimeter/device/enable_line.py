@@ -39,6 +39,9 @@ class EnableLine(Protocol):
     def open_contact(self) -> None:
         """Take the power away; safe at any time, and twice."""
 
+    def close(self) -> None:
+        """Open the contact and close the port; safe twice."""
+
 
 class SerialEnableLineSettings(Section):
     """Which line of which port drives the relay.

@@ -9,20 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.guard.causes import Cause, Reaction
-from rigidimeter.settings import Settings
+from rigidimeter.settings import GAP_S, Settings
 from rigidimeter.units import rad_from_deg
 
 __all__ = ["GuardLimits", "GuardState", "guard_limits", "guard_state", "released"]
 
 OVERSPEED = 1.25
 """A joint this much above the speed limit is out of the drive's control."""
-
-GAP_S = 0.005
-"""The position limit is kept also when a step comes this late, or a tick late if ticks are longer.
-
-So long a loop under a real-time schedule is late; a program that stands still for longer is for the
-drive's own watchdog and the mechanical stops.
-"""
 
 UNDONE = 0.1
 """The part of the reaction time by which a second-order drive is still off where the reaction time

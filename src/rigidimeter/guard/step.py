@@ -3,7 +3,8 @@
 The guard knows nothing of the controller. Whatever velocity is asked for, it sends one that
 
 - is finite,
-- changes by at most a·Δt a step, also when the step comes late,
+- changes by at most a·Δt a step, also when the step comes late; only a ramp to zero that has begun
+  makes up for late steps, `LONGEST_BRAKING` of them at once,
 - is at most the speed limit,
 - lets the joint stop before the position limit: v ≤ √(2 a d), less what is covered until the next
   step, with d the distance left. That step may come late by `gap_s`.
@@ -111,6 +112,7 @@ def guard_step(
     ticks_per_s = 1.0 / dt
     ring, newest, sent_before, angle, age, origin, energy, cause, reaction = state
     oldest, passed = ring.size - 1, max(elapsed_ticks, 1)
+    was_latched = cause != _NO_CAUSE
     elapsed_s = passed * dt
     sum_rad = ring[newest]
     for _ in range(min(passed, oldest)):
@@ -165,6 +167,8 @@ def guard_step(
     change = limits.acceleration_rad_s2 * dt
     if cause != _NO_CAUSE:
         sent, limited = 0.0, int(Limited.LATCHED)
+        if was_latched:  # a ramp begun goes on in real time, however late the step
+            change *= min(passed, LONGEST_BRAKING)
         if reaction == _CUT:
             change = abs(sent_before)  # nothing is left to ramp
     if sent > sent_before + change:
@@ -193,6 +197,9 @@ def guard_step(
     after = GuardState(ring, newest, sent, angle, age, origin, energy, cause, reaction)
     return after, sent, limited
 
+
+LONGEST_BRAKING = 5
+"""A late step brakes for at most so many ticks at once: a loop that is later has stalled."""
 
 _FORGOTTEN_S = 0.5
 """How fast the expected angle follows the measured one."""

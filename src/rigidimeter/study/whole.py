@@ -25,7 +25,7 @@ from rigidimeter.study.doubts import doubts
 from rigidimeter.study.effectwise import Measured, effects_of, ratings_measured
 from rigidimeter.study.exclusions import exclusions_of, operators_exclusions
 from rigidimeter.study.naming import Naming, naming
-from rigidimeter.study.rated import rated
+from rigidimeter.study.examiners import rated
 from rigidimeter.study.results import Cohort, SessionEntry, Study
 from rigidimeter.study.sensitivity import SENSITIVITY_METHODS, sensitivity_rows
 from rigidimeter.study.sessions import Gathered, gather

@@ -44,6 +44,7 @@ def seen(monkeypatch):
         target(SimpleNamespace())
 
     monkeypatch.setattr(RigFile, "build", build)
+    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: None)
     monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", supervise)
     return seen
 
@@ -78,3 +79,15 @@ def test_a_session_that_began_nowhere_leaves_the_home_to_the_rig_file(seen, resu
     resume(None)
     assert seen.home is None
     assert "origin_rad" not in seen.continues
+
+
+def test_a_rig_without_a_record_is_refused_before_any_process_starts(
+    tmp_path, monkeypatch, rigidimeter
+):
+    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
+    rig = tmp_path / "rig.toml"
+    rig.write_text(RIG)
+    result = rigidimeter("run", "--rig", rig, "--out", tmp_path / "s")
+    assert result.status == 1
+    assert "rigidimeter commission" in result.err
+    assert not (tmp_path / "s").exists()

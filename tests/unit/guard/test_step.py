@@ -364,6 +364,21 @@ def test_a_hold_ramps_to_rest_and_stays(sign):
     assert (state.cause, state.reaction) == (Cause.TORQUE_HIGH, Reaction.HOLD)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("elapsed", "ticks"), [(1, 1), (2, 2), (5, 5), (6, 5), (400, 5)])
+def test_a_ramp_that_has_begun_makes_up_for_late_steps(sign, elapsed, ticks):
+    # 8 rad/s² · 0.125 s is 1 rad/s a tick.
+    state, _, _ = step(at(sign * 8.0, BINARY), limits=BINARY, reported=Cause.TORQUE_STALE)
+    assert state.velocity_rad_s == sign * 7.0
+    _, sent, limited = step(state, limits=BINARY, elapsed=elapsed)
+    assert (sent, limited) == (sign * (7.0 - ticks), Limited.LATCHED)
+
+
+def test_a_ramp_begins_with_one_ticks_worth_however_late():
+    _, sent, _ = step(at(8.0, BINARY), limits=BINARY, reported=Cause.TORQUE_STALE, elapsed=4)
+    assert sent == 7.0
+
+
 def test_while_latched_the_speed_limit_still_holds():
     state = at(5.0, cause=int(Cause.SIGNAL), reaction=int(Reaction.RAMP))
     assert step(state, 5.0)[1:] == (3.0, Limited.LATCHED)

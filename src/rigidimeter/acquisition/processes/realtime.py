@@ -24,10 +24,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.acquisition.processes.deadline import DeadlineClock
 from rigidimeter.acquisition.processes.shared import ORDERED
 
-__all__ = ["DeadlineClock", "Prepared", "prepare_loop_process"]
+__all__ = ["Prepared", "prepare_loop_process"]
 
 MCL_CURRENT, MCL_FUTURE = 1, 2
 PR_SET_TIMERSLACK = 29

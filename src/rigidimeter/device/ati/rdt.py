@@ -115,6 +115,7 @@ class AtiRdt:
         """
         if self._socket is None:
             raise DeviceError(f"{self._device}: it is not connected; connect before configuring")
+        self._configured = False
         settings, page = self._settings, self._fetch()
         self._check(page)
         force = settings.sign * page.newton_per_count
