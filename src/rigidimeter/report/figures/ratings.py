@@ -92,7 +92,7 @@ def ratings(
                 label=listed(f"examiner {examiner}"),
             )
         figure.legend(loc="outside upper left", ncols=6, handletextpad=0.2)
-        raw.set_ylabel("Score (1)")
+        raw.set_ylabel("Score")
         note(raw, "as given")
         note(corrected, f"less the examiner's offset; bar: mean, {interval}")
     return figure
