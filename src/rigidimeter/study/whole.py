@@ -23,9 +23,9 @@ from rigidimeter.study.comparison import FEWEST_FOR_TEST, MEASURES, Comparison, 
 from rigidimeter.study.daywise import day_medians_of, day_test, valued
 from rigidimeter.study.doubts import doubts
 from rigidimeter.study.effectwise import Measured, effects_of, ratings_measured
+from rigidimeter.study.examiners import rated
 from rigidimeter.study.exclusions import exclusions_of, operators_exclusions
 from rigidimeter.study.naming import Naming, naming
-from rigidimeter.study.examiners import rated
 from rigidimeter.study.results import Cohort, SessionEntry, Study
 from rigidimeter.study.sensitivity import SENSITIVITY_METHODS, sensitivity_rows
 from rigidimeter.study.sessions import Gathered, gather

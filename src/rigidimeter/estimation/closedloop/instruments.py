@@ -44,8 +44,7 @@ def instrumental(observations: Sequence[Observation], values: Array) -> list[Pro
         if key not in made:
             rate_hz = perturbation.mean_rate_hz
             response = loop.response(perturbation.values, rate_hz, stable(values))
-            parts = [on_grid(part, perturbation, lines.grid) for part in response]
-            made[key] = response_lines(lines.grid, parts)
+            made[key] = response_lines(lines.grid, on_grid(response, perturbation, lines.grid))
         problems.append(Problem(made[key], lines.motion, lines.torque_nm))
     return problems
 
@@ -56,10 +55,10 @@ def stable(values: Array) -> tuple[float, float, float]:
     return float(J), float(B), float(K)
 
 
-def on_grid(values: Array, ticks: Channel, grid: Grid) -> Array:
-    """Bring a signal from the ticks onto the grid; without interpolation where they coincide."""
+def on_grid(parts: Sequence[Array], ticks: Channel, grid: Grid) -> list[Array]:
+    """Bring signals from the ticks onto the grid; without interpolation where they coincide."""
     place = (grid.time_s - ticks.time_s[0]) * ticks.mean_rate_hz
-    nearest = np.clip(np.rint(place).astype(np.intp), 0, values.size - 1)
+    nearest = np.clip(np.rint(place).astype(np.intp), 0, ticks.time_s.size - 1)
     if np.max(np.abs(ticks.time_s[nearest] - grid.time_s)) < SAME_TIME / ticks.mean_rate_hz:
-        return np.asarray(values[nearest], dtype=np.float64)
-    return np.asarray(CubicSpline(ticks.time_s, values)(grid.time_s), dtype=np.float64)
+        return [part[nearest] for part in parts]
+    return list(CubicSpline(ticks.time_s, np.stack(parts), axis=1)(grid.time_s))

@@ -42,7 +42,7 @@ def output_error(observations: Sequence[Observation], values: Array) -> list[Pro
             response = loop.response(perturbation.values, rate_hz, stable(values))
             slopes = loop.sensed(response, rate_hz, stable(values))
             torque = used @ np.stack(response)
-            parts = [on_grid(part, perturbation, lines.grid) for part in (torque, *slopes)]
+            parts = on_grid((torque, *slopes), perturbation, lines.grid)
             spectra = response_lines(lines.grid, parts)
             made[key] = spectra[:, 0], spectra[:, 1:]
         simulated, slope = made[key]

@@ -17,6 +17,7 @@ FFT needs special care.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -93,10 +94,10 @@ class LoopModel:
         stiffer joint also moves less.
         """
         n = motion.angle_rad.size
-        z, damping = _circle(n, rate_hz)
-        _, _, loop_gain = self._transfer(z, rate_hz, parameters)
+        opened = _opened(self, n, rate_hz)
+        around = 1 + opened.gain(parameters)
         return [
-            fft.irfft(fft.rfft(part * damping, _length(n)) / (1 + loop_gain))[:n] / damping
+            fft.irfft(fft.rfft(part * opened.damping, _length(n)) / around)[:n] / opened.damping
             for part in motion
         ]
 
@@ -105,36 +106,52 @@ class LoopModel:
     ) -> list[Response]:
         """Return the responses to several perturbations of one length."""
         n = perturbations[0].size
-        z, damping = _circle(n, rate_hz)
-        motion, admittance, loop_gain = self._transfer(z, rate_hz, parameters)
+        opened = _opened(self, n, rate_hz)
+        around = 1 + opened.gain(parameters)
         made = []
         for perturbation in perturbations:
-            spectrum = fft.rfft(perturbation * damping, _length(n))
-            command = spectrum * admittance / (1 + loop_gain)
-            parts = (fft.irfft(command * part, _length(n))[:n] / damping for part in motion)
+            spectrum = fft.rfft(perturbation * opened.damping, _length(n))
+            command = spectrum * opened.admittance / around
+            parts = (
+                fft.irfft(command * part, _length(n))[:n] / opened.damping for part in opened.motion
+            )
             made.append(Response(*parts))
         return made
 
-    def _transfer(
-        self, z: Complex, rate_hz: float, parameters: tuple[float, float, float]
-    ) -> tuple[tuple[Complex, Complex, Complex], Complex, Complex]:
-        """Return (D_a, D_v, D_θ), A, and the loop gain A H z^(−τ) (J D_a + B D_v + K D_θ)."""
+
+class _Opened(NamedTuple):
+    """What of the loop does not change with the joint.
+
+    The damping of a record, and at the frequencies of its FFT (D_a, D_v, D_θ), A and A H z^(−τ).
+    """
+
+    damping: Array
+    motion: tuple[Complex, Complex, Complex]
+    admittance: Complex
+    path: Complex
+
+    def gain(self, parameters: tuple[float, float, float]) -> Complex:
+        """Return the loop gain A H z^(−τ) (J D_a + B D_v + K D_θ)."""
         J, B, K = parameters
-        interval_s = 1.0 / rate_hz
-        rate = self.damping_nm_s_rad / self.inertia_kg_m2
-        decay = np.exp(-rate * interval_s)
-        gain = (
-            -np.expm1(-rate * interval_s) / self.damping_nm_s_rad
-            if rate > 0
-            else interval_s / self.inertia_kg_m2
-        )
-        admittance = gain / (1 - decay / z)
-        motion = self.drive.transfer(z, interval_s)
-        path = _butterworth(z, self.torque_cutoff_hz, rate_hz) * z ** (
-            -self.torque_delay_s * rate_hz
-        )
-        impedance = J * motion[0] + B * motion[1] + K * motion[2]
-        return motion, admittance, admittance * path * impedance
+        return self.path * (J * self.motion[0] + B * self.motion[1] + K * self.motion[2])
+
+
+@lru_cache(maxsize=8)
+def _opened(loop: LoopModel, n: int, rate_hz: float) -> _Opened:
+    """Return the opened loop for records of `n` ticks; an estimate asks for it many times."""
+    z, damping = _circle(n, rate_hz)
+    interval_s = 1.0 / rate_hz
+    rate = loop.damping_nm_s_rad / loop.inertia_kg_m2
+    decay = np.exp(-rate * interval_s)
+    gain = (
+        -np.expm1(-rate * interval_s) / loop.damping_nm_s_rad
+        if rate > 0
+        else interval_s / loop.inertia_kg_m2
+    )
+    admittance = gain / (1 - decay / z)
+    late = z ** (-loop.torque_delay_s * rate_hz)
+    path = admittance * (_butterworth(z, loop.torque_cutoff_hz, rate_hz) * late)
+    return _Opened(damping, loop.drive.transfer(z, interval_s), admittance, path)
 
 
 def loop_model(settings: Settings, torque_rate_hz: float, drive: DriveModel) -> LoopModel:
