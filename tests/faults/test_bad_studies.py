@@ -160,6 +160,43 @@ def test_a_missing_path(compared, study, edit) -> None:
     only_error(compared()[0], "line 2", "sessions/1-OF: there is no such session")
 
 
+@pytest.mark.parametrize("path", ["/elsewhere/1-OFF", "../1-OFF", "sessions/../../1-OFF"])
+def test_a_path_outside_the_study(compared, study, edit, path) -> None:
+    edit(study / "sessions.csv", "sessions/1-OFF", path)
+    only_error(compared()[0], f"line 2: path is {path}, outside the study folder; copy or link")
+
+
+def test_a_path_that_the_system_refuses(compared, study, edit) -> None:
+    edit(study / "sessions.csv", "sessions/1-OFF", "s" * 300)
+    only_error(compared()[0], "sessions.csv, line 2: sss", "too long", "left out")
+
+
+def test_links_in_a_circle(compared, study, edit) -> None:
+    (study / "sessions/round").symlink_to("round")
+    edit(study / "sessions.csv", "sessions/1-OFF", "sessions/round")
+    (study / "exclusions.csv").write_text("path,epoch,reason\nsessions/round,1,coughed\n")
+    only_error(compared()[0], "line 2", "sessions/round: there is no such session")
+
+
+def test_an_epoch_excluded_twice(compared, study) -> None:
+    (study / "exclusions.csv").write_text(
+        "path,epoch,reason,by\nsessions/1-OFF,1,coughed,NB\n./sessions/1-OFF,1,moved,XY\n"
+    )
+    ran, found = compared()
+    assert ran.status == 0
+    assert "exclusions.csv, line 3: epoch 1 of ./sessions/1-OFF is out already (line 2)" in ran.err
+    assert [out["reason"] for out in found["exclusions"]] == ["coughed"]
+
+
+def test_subjects_without_a_fit_hold_no_inertia(compared, study) -> None:
+    for name in ("sessions.csv", "ratings.csv"):
+        path = study / name
+        path.write_text(path.read_text().replace("M1,3", "M2,3").replace("M1,4", "M2,4"))
+    ran, _ = compared()
+    assert ran.status == 0
+    assert "nan" not in ran.err
+
+
 def test_an_interrupted_session(compared, study, rigidimeter) -> None:
     events = study / "sessions/4-DBS/events.jsonl"
     lines = events.read_text().splitlines()
@@ -236,6 +273,11 @@ def test_an_exclusion_without_a_reason(compared, study) -> None:
     [
         ("title =", "titel =", "titel is not a setting; the nearest is title"),
         ("frequency_hz = 130.0", "frequency_hz = -1", "at least 0 Hz and at most 1000 Hz"),
+        ("frequency_hz = 130.0", "frequency_hz = nan", "at least 0 Hz and at most 1000 Hz"),
+        ("[conditions.OFF]", "[rating]\nscale = [0, nan]\n[conditions.OFF]", "must be two numbers"),
+        ("[conditions.OFF]", "[conditions]\nON = 5\n[conditions.OFF]", "be a table, as in [cond"),
+        ('title = "Small study"', 'title = "T"\nratings = "/r.csv"', "outside the study folder"),
+        ('title = "Small study"', 'title = "T"\nsessions = "../s.csv"', "name a file in it"),
         ("amplitude_ma = 0.32", "amplitude_ma = 0.3\namplitude_v = 2.0", "are both given"),
         ('other = "DBS"', 'other = "OFF"', "reference and other are both 'OFF'"),
         ('other = "DBS"', 'other = "DSB"', "there is no [conditions.DSB]"),
@@ -290,6 +332,27 @@ def test_a_folder_that_cannot_be_written_loses_no_result(compared, study) -> Non
     (study / "analysis").write_text("a file in its place")
     ran, _ = compared()
     only_error(ran, "the analysis is not kept", "analysis: cannot be written")
+    assert "comparison.json and tables" not in ran.out
+
+
+@pytest.mark.parametrize("name", ["study.toml", "ratings.csv", "analysis/comparison.json"])
+def test_the_studys_own_files_are_never_written_over(compared, study, name) -> None:
+    compared()
+    before = (study / name).read_bytes()
+    ran, _ = compared("--json", study / name)
+    assert ran.status == 1
+    assert f"{name}: is read or written already" in ran.err
+    assert (study / name).read_bytes() == before
+
+
+def test_one_offset_a_day_is_chosen_in_the_description(compared, study) -> None:
+    ran, each = compared()
+    assert "an offset for each day and each condition within a day (" in ran.out
+    with (study / "study.toml").open("a") as file:
+        file.write("\n[analysis]\none_offset_a_day = true\n")
+    ran, one = compared()
+    assert "an offset for each day (" in ran.out
+    assert [test["df"] for test in one["day_tests"]] != [test["df"] for test in each["day_tests"]]
 
 
 def test_the_comparison_as_json_is_the_kept_one(compared, study, tmp_path) -> None:

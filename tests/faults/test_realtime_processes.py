@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigidimeter.acquisition.processes.supervise import OF_THE_TERMINAL, _undisturbed
+from rigidimeter.guard import Cause
 from rigidimeter.recording.log import read_events, read_samples
 
 SCRIPT = Path(__file__).with_name("realtime_session.py")
@@ -164,6 +166,28 @@ def test_the_console_is_killed(session):
     wait_for(lambda: not run.mine & memory())
     assert {ending[2] for ending in run.endings()} == {"the operator's console no longer answered"}
     run.ticks()
+
+
+def test_the_terminal_is_closed(session):
+    """The loop is told at once; it need not wait until the console has been silent for long."""
+    run = session(60.0)
+    run.running()
+    run.process.send_signal(signal.SIGHUP)
+    ended = run.ended()
+    assert ended["outcome"] == "fail"
+    assert ended["reason"] == Cause.SIGNAL.sentence
+    run.ticks()
+    run.endings()
+
+
+def test_signals_of_the_terminal_wait_while_a_process_loads():
+    """They reach the whole group, and one that loads has not come to where it ignores them."""
+    code = "import signal; print(*map(int, signal.pthread_sigmask(signal.SIG_BLOCK, [])))"
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    with _undisturbed():
+        child = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert {int(number) for number in child.stdout.split()} >= set(OF_THE_TERMINAL)
+    assert signal.pthread_sigmask(signal.SIG_BLOCK, []) == before
 
 
 def test_the_console_is_stopped_and_goes_on(session):

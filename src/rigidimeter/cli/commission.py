@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
+import os
+import signal
 import sys
+import threading
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -77,6 +84,8 @@ def commission(
     from rigidimeter.settings import load_settings
 
     rigfile, chosen = load_rig(rig), load_settings(settings)
+    path = out or record_path(rig)
+    _check_before(path, {"--known-torque-nm": known_torque, "--known-angle-deg": known_angle})
     if not yes and not sys.stdin.isatty():
         raise UserError("nobody is there to answer; use a terminal, or --yes on an emulated rig")
     if not rigfile.emulated and not signed_by.strip():
@@ -92,7 +101,7 @@ def commission(
     )
     typer.echo(str(prepare_loop_process()), err=True)
     clock = DeadlineClock()
-    with rigfile.claim():
+    with rigfile.claim(), _interrupted_once(path):
         found = try_rig(
             rigfile.build(clock.now_s, chosen.rig.tick_rate_hz),
             rigfile,
@@ -104,7 +113,6 @@ def commission(
             software=__version__,
             signed_by=signed_by,
         )
-    path = out or record_path(rig)
     write_record(path, found)
     typer.echo(table(found))
     typer.echo(f"Record: {path}")
@@ -117,6 +125,47 @@ def commission(
         f"Good for {what}, its devices and this controller, for "
         f"{chosen.commissioning.validity_days:g} days."
     )
+
+
+@contextlib.contextmanager
+def _interrupted_once(record: Path) -> Iterator[None]:
+    """Let Ctrl-C, SIGTERM and the closing of the terminal end it, once, and say what that left.
+
+    A second one would break off the steps that bring the drive to rest and take its power away.
+    """
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {}
+
+    def ended(_: int, __: FrameType | None) -> None:
+        for number in signals:
+            signal.signal(number, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is threading.main_thread():
+        before = {number: signal.signal(number, ended) for number in signals}
+    try:
+        yield
+    except (KeyboardInterrupt, typer.Abort):
+        raise UserError(
+            f"interrupted: the rig was stopped, and {record} was not written; commission again"
+        ) from None
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _check_before(record: Path, known: Mapping[str, float | None]) -> None:
+    """Refuse what would only be found wrong once everything was tried."""
+    if not record.parent.is_dir() or not os.access(record.parent, os.W_OK):
+        raise UserError(
+            f"{record}: the record cannot be written, for {record.parent} is no folder that can "
+            "be written to; name another with --out FILE"
+        )
+    if record.is_dir():
+        raise UserError(f"{record}: is a folder; name a file for the record with --out FILE")
+    for option, value in known.items():
+        if value is not None and not (math.isfinite(value) and value != 0):
+            raise UserError(f"{option} {value:g}: must be a number other than 0")
 
 
 def table(record: CommissioningRecord) -> str:

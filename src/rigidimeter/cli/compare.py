@@ -11,7 +11,7 @@ from rigidimeter.cli.compare_show import comparison_document, comparison_lines
 from rigidimeter.cli.compare_table import compare_table
 from rigidimeter.cli.inputs import Recordings, analyse_inputs, keep_inputs, say, status
 from rigidimeter.cli.options import reads_recordings
-from rigidimeter.cli.study.analysed import KeyOption, analysed_study, study_of
+from rigidimeter.cli.study.analysed import KeyOption, analysed_study, study_files, study_of
 from rigidimeter.cli.study.show import study_lines
 from rigidimeter.errors import UserError
 
@@ -92,7 +92,7 @@ def compare(
         )
         return
     if (folder := study_of(recordings, key)) is not None:
-        keep_inputs((json_out, csv_out), recordings.paths)
+        keep_inputs((json_out, csv_out), study_files(folder, key))
         found = analysed_study(
             folder, recordings, key, pair=(reference, other), seed=seed, resamples=resamples
         )
@@ -195,7 +195,8 @@ def _say_changes(found: Analysed, folder: Path) -> None:
         typer.echo("Since the last analysis:")
     for change in found.cohort.changes:
         typer.echo(f"  {change}")
-    typer.echo(f"{folder / 'analysis'}: estimates.json, comparison.json and tables")
+    if found.kept:
+        typer.echo(f"{folder / 'analysis'}: estimates.json, comparison.json and tables")
 
 
 def _lines(comparisons: tuple[Comparison, ...]) -> list[str]:

@@ -55,6 +55,8 @@ def emulate(
 
     if drive not in ("cia402", "ascii"):
         raise UserError(f"--drive {drive}: must be cia402 or ascii")
+    if rig_out is not None:
+        _check_target(rig_out)
     try:
         arm = JointDynamics(*joint)
         bench = Bench(
@@ -77,6 +79,25 @@ def emulate(
             serve(bench, rig_out)
         except KeyboardInterrupt:
             typer.echo("rigidimeter: emulation ended", err=True)
+
+
+def _check_target(rig_out: Path) -> None:
+    """Refuse to write over anything but the rig file of an earlier emulation."""
+    from rigidimeter.device.rigfile import load_rig
+
+    if not rig_out.parent.is_dir():
+        raise UserError(f"--rig-out {rig_out}: there is no folder {rig_out.parent}; make it first")
+    if not rig_out.exists():
+        return
+    try:
+        emulated = load_rig(rig_out).emulated
+    except UserError:
+        emulated = False
+    if not emulated:
+        raise UserError(
+            f"--rig-out {rig_out}: is there already and is no rig file of an emulated rig; name "
+            "another file, nothing is written over"
+        )
 
 
 if __name__ == "__main__":

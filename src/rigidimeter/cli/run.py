@@ -67,8 +67,11 @@ def run(
     home_rad = continues.get("origin_rad") if rig is not None else None
     _offer(out)
     if rig is not None:
-        # What is wrong with the rig or its record is said before any process starts.
-        check_record(load_rig(rig), None, settings, settings.commissioning)
+        # What is wrong with the rig or its record is said before any process starts, and so is
+        # that another has the rig; the loop's process then claims it.
+        rigfile = load_rig(rig)
+        check_record(rigfile, None, settings, settings.commissioning)
+        rigfile.claim().close()
     recording = Recording(
         out,
         settings,
@@ -115,6 +118,7 @@ def _planned(
             "--resume goes on with the settings and the seed of the session; leave out "
             + (f"{path}" if path is not None else "--seed")
         )
+    _ended(resume)
     rest = rest_of(resume)
     if rest.virtual != virtual:
         raise UserError(
@@ -129,6 +133,20 @@ def _planned(
         raise UserError(f"{resume}: nothing is left to run, all {rest.done} epochs are done")
     typer.echo(f"{rest.done} epochs are done; {len(rest.epochs)} are left")
     return rest.settings, Protocol(rest.settings.seed, rest.epochs), dict(rest.continues)
+
+
+def _ended(session: Path) -> None:
+    """Refuse a session that is still being recorded: what is left of it is not known yet."""
+    from rigidimeter.recording.folder import EVENTS, lock
+
+    events = session / EVENTS
+    if not events.is_file():
+        return
+    with events.open("rb") as file:
+        if not lock(file):
+            raise UserError(
+                f"{session}: is still being recorded; end that session first, then go on with it"
+            )
 
 
 def _offer(out: Path) -> None:

@@ -110,7 +110,12 @@ def check_record(
     days = min(days, record.covered.get("validity_days", days))
     today = now_utc or datetime.now(UTC)
     age = today - datetime.fromisoformat(record.made_utc)
-    if not timedelta(days=-1) <= age <= timedelta(days=days):
+    if age < timedelta(days=-1):
+        raise UserError(
+            f"{path}: is of {record.made_utc[:10]}, which is still to come, and a record holds for "
+            f"{days:g} days from then; set the computer's clock right, or {again}"
+        )
+    if age > timedelta(days=days):
         raise UserError(
             f"{path}: is of {record.made_utc[:10]}, and a record holds for {days:g} days; {again}"
         )
@@ -139,10 +144,10 @@ def _same_devices(path: Path, before: Mapping[str, Any], now: Mapping[str, Any])
 
 def _same_controller(path: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
     again = "commission again with --settings of this protocol"
-    if before["tick_rate_hz"] != now["tick_rate_hz"]:
+    tried_hz, tick_rate_hz = before.get("tick_rate_hz"), now["tick_rate_hz"]
+    if tried_hz != tick_rate_hz:
         raise UserError(
-            f"{path}: covers rig.tick_rate_hz = {before['tick_rate_hz']:g} Hz, not "
-            f"{now['tick_rate_hz']:g} Hz; {again}"
+            f"{path}: covers rig.tick_rate_hz = {tried_hz} Hz, not {tick_rate_hz} Hz; {again}"
         )
     for table in ("controller", *LIMITS):
         for key, value in now[table].items():
@@ -150,7 +155,7 @@ def _same_controller(path: Path, before: Mapping[str, Any], now: Mapping[str, An
             tighter = table in LIMITS and key not in EXACT and tried is not None and value <= tried
             if value != tried and not tighter:
                 raise UserError(f"{path}: covers {table}.{key} = {tried!r}, not {value!r}; {again}")
-    arms = list(before["arms"].values())
+    arms = list(before.get("arms", {}).values())
     for name, arm in now["arms"].items():
         if arm not in arms:
             raise UserError(f"{path}: does not cover the arm of [subject.{name}]; {again}")

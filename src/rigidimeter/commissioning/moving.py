@@ -106,7 +106,11 @@ def nudge_check(tried: Tried, settings: Settings) -> Check:
     """Check direction and rough scale of the first motion."""
     found = following(tried.heard, settings.rig.drive_damping_ratio)
     check = within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, NUDGE_PERCENT, _SCALE_REMEDY)
-    if check.passed and tried.cause is not Cause.NONE:
+    if tried.cause is Cause.NONE:
+        return check
+    if tried.cause not in _NOT_AS_COMMANDED:  # a motion cut short tells nothing of the scale
+        return yes(ANGLE_PER_COMMAND, False, stopped_for(tried.cause), check.limit, _REASON_REMEDY)
+    if check.passed:
         return yes(ANGLE_PER_COMMAND, False, stopped_for(tried.cause), check.limit, _SCALE_REMEDY)
     return check
 
@@ -123,7 +127,7 @@ def swing_checks(
             tried.cause is Cause.NONE,
             "yes" if tried.cause is Cause.NONE else stopped_for(tried.cause),
             "yes",
-            "remove the reason and commission again",
+            _REASON_REMEDY,
         ),
         within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, percent, _SCALE_REMEDY),
         within(
@@ -224,6 +228,9 @@ _FIELDS = {
     "damping": "damping_nm_s_rad",
     "stiffness": "stiffness_nm_rad",
 }
+_REASON_REMEDY = "remove the reason and commission again"
+_NOT_AS_COMMANDED = (Cause.POSITION_LIMIT_EXCEEDED, Cause.NOT_FOLLOWING, Cause.OVERSPEED)
+"""What the guard stops for where sign or scale are wrong."""
 _SCALE_REMEDY = (
     "sign, counts per turn, gear ratio or velocity units in the rig file are wrong; "
     "-1 is a wrong sign, 57.3 and 0.0175 are degrees for radians"

@@ -15,6 +15,7 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -179,9 +180,21 @@ def read_record(path: Path) -> CommissioningRecord:
         raise UserError(
             f"{path}: was changed since it was written, for its digest is another; commission again"
         )
-    values.pop("passed")
-    values["checks"] = tuple(Check(**check) for check in values["checks"])
-    return CommissioningRecord(**values)
+    try:
+        values.pop("passed")
+        values["checks"] = tuple(Check(**check) for check in values["checks"])
+        record = CommissioningRecord(**values)
+        made = datetime.fromisoformat(record.made_utc)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise UserError(
+            f"{path}: was written by another version of rigidimeter, "
+            f"{values.get('software', 'which it does not say')} ({error}); commission again"
+        ) from None
+    if made.tzinfo is None:
+        raise UserError(
+            f"{path}: made_utc = {record.made_utc!r} names no time zone; commission again"
+        )
+    return record
 
 
 def _digest(values: Mapping[str, Any]) -> str:

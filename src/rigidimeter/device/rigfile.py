@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from rigidimeter.device.base import Now
 from rigidimeter.device.composed import ComposedRig, Home
@@ -49,6 +49,16 @@ DRIVERS: Mapping[str, Mapping[str, str]] = {
     "enable_line": {"serial-line": "rigidimeter.device.enable_line:SerialEnableLine"},
 }
 """The drivers that come along, by role and name."""
+
+METHODS: Mapping[str, tuple[str, ...]] = {
+    "torque_sensor": ("connect", "configure", "read", "counts", "close"),
+    "drive": (
+        *("connect", "configure", "enable", "read", "write"),
+        *("counts", "stop", "disable", "close"),
+    ),
+    "enable_line": ("close_contact", "open_contact", "close"),
+}
+"""What a class must have to be a device of this role; see `device.base`."""
 
 REQUIRED = ("torque_sensor", "drive")
 HOME: Mapping[str, float | None] = {"home_deg": None, "home_tolerance_deg": 3.0}
@@ -155,6 +165,12 @@ def _home(path: Path, values: Mapping[str, Any]) -> Home | None:
     for key, value in zip(HOME, (angle, tolerance), strict=True):
         if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
             raise UserError(f"{path}: {key} must be a number of degrees, got {value!r}")
+        if value is not None and not math.isfinite(value):
+            raise UserError(f"{path}: {key} must be a finite number of degrees, got {value!r}")
+    if tolerance is None or not 0 < tolerance <= 180:
+        raise UserError(
+            f"{path}: home_tolerance_deg must be above 0 and at most 180 degrees, got {tolerance!r}"
+        )
     if angle is None:
         return None
     return Home(math.radians(angle), math.radians(tolerance))
@@ -183,7 +199,7 @@ def _device(path: Path, role: str, table: Any) -> tuple[type[Any], Any]:
 def _driver(path: Path, role: str, name: str) -> Any:
     place = DRIVERS[role].get(name, name)
     module, _, attribute = place.partition(":")
-    if not attribute:
+    if not attribute or not module or module.startswith("."):
         known = ", ".join(DRIVERS[role])
         raise UserError(
             f"{path}, [{role}]: there is no driver {name!r}; known are {known}, and others are "
@@ -193,6 +209,23 @@ def _driver(path: Path, role: str, name: str) -> Any:
         driver = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as error:
         raise UserError(f"{path}, [{role}]: driver {name!r} cannot be loaded ({error})") from None
-    if not hasattr(driver, "Settings"):
+    except (Exception, SystemExit) as error:  # a module of anybody's, which may raise anything
+        what = f"{type(error).__name__}: {error}"
+        raise UserError(
+            f"{path}, [{role}]: driver {name!r} cannot be loaded, its module fails with {what}"
+        ) from error
+    settings = getattr(driver, "Settings", None)
+    if settings is None:
         raise UserError(f"{path}, [{role}]: {name!r} is no driver: it has no Settings")
+    if not (isinstance(settings, type) and issubclass(settings, BaseModel)):
+        raise UserError(
+            f"{path}, [{role}]: {name!r} is no driver: its Settings must be a class derived from "
+            "rigidimeter.settings.base.Section"
+        )
+    lacking = [method for method in METHODS[role] if not hasattr(driver, method)]
+    if lacking:
+        raise UserError(
+            f"{path}, [{role}]: {name!r} is no driver for a {role.replace('_', ' ')}: it has no "
+            f"{', '.join(lacking)}"
+        )
     return driver

@@ -6,6 +6,7 @@ its range with the range and the unit.
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -25,6 +26,7 @@ __all__ = [
     "ConditionTable",
     "RatingTable",
     "StudyToml",
+    "is_outside",
     "read_study_toml",
 ]
 
@@ -81,9 +83,18 @@ class RatingTable(Section):
 
 
 class AnalysisTable(Section):
-    """``[analysis]``: the method of estimation, as ``--method`` takes it."""
+    """``[analysis]``: how the study is analysed.
+
+    Parameters
+    ----------
+    method : str
+        Of estimation, as ``--method`` takes it.
+    one_offset_a_day : bool
+        Take it that a day moves both its conditions alike (`statistics.day_difference`).
+    """
 
     method: str = _text("auto", 1, 40)
+    one_offset_a_day: bool = False
 
 
 class StudyToml(Section):
@@ -101,6 +112,16 @@ class StudyToml(Section):
     analysis: AnalysisTable = AnalysisTable()
 
     @model_validator(mode="after")
+    def _tables_below(self) -> Self:
+        for name in ("sessions", "ratings", "exclusions"):  # a key may be kept elsewhere
+            if is_outside(getattr(self, name)):
+                raise ValueError(
+                    f"{name} = {getattr(self, name)!r} is outside the study folder; name a file "
+                    f'in it, as in {name} = "{name}.csv"'
+                )
+        return self
+
+    @model_validator(mode="after")
     def _two_conditions(self) -> Self:
         if self.reference == self.other:
             raise ValueError(f"reference and other are both {self.reference!r}; name two")
@@ -112,6 +133,11 @@ class StudyToml(Section):
                     f"{', '.join(self.conditions)}"
                 )
         return self
+
+
+def is_outside(path: str) -> bool:
+    """Whether a path that a study names leads out of its folder."""
+    return os.path.isabs(path) or os.path.normpath(path).split(os.sep)[0] == os.pardir
 
 
 def read_study_toml(path: Path) -> StudyToml:
@@ -151,11 +177,16 @@ def _told(values: Mapping[str, Any], detail: ErrorDetails) -> str:
         return f'{where} is missing; write {where} = "..."'
     if kind == "string_type":
         return f'{where} = {shown} is not allowed: it must be a text, as in {where} = "{shown}"'
-    if kind in ("too_short", "too_long") and where == "rating.scale":
-        return f"{where} = {shown} is not allowed: it must be the lowest and the highest score"
-    if kind in ("float_type", "greater_than_equal", "less_than_equal") and isinstance(
-        field := _condition_field(detail["loc"]), str
-    ):
+    if detail["loc"][:2] == ("rating", "scale"):
+        scale = values["rating"]["scale"]
+        return (
+            f"rating.scale = {scale!r} is not allowed: it must be two numbers, the lowest and the "
+            "highest score"
+        )
+    if kind in ("model_type", "dict_type"):
+        return f"{where} = {shown!r} is not allowed: it must be a table, as in [{where}]"
+    numeric = ("float_type", "finite_number", "greater_than_equal", "less_than_equal")
+    if kind in numeric and isinstance(field := _condition_field(detail["loc"]), str):
         return f"{where} = {shown!r} is not allowed: it must be {field}"
     return sentence(StudyToml, values, detail)
 

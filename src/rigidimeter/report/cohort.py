@@ -62,7 +62,7 @@ class CohortView:
     methods: Prose
     virtual: bool
     blinded: bool
-    several_subjects: bool
+    offsets: str
     own_inertia: bool
     changes: tuple[str, ...]
 
@@ -93,7 +93,7 @@ def cohort_view(study: Study, unlisted: int) -> CohortView | None:
         methods=methods_prose(study, cohort),
         virtual=cohort.virtual,
         blinded=cohort.blinded,
-        several_subjects=len({s.subject for s in cohort.sessions}) > 1,
+        offsets=next((test.model for test in cohort.day_tests if test.model), "each day"),
         own_inertia=cohort.several,
         changes=cohort.changes,
     )

@@ -51,13 +51,11 @@ def test_sentences(study: Study, cohort: Cohort, cite: Cited) -> list[str]:
         )
     tested = [test for test in cohort.day_tests if not math.isnan(test.p)]
     if tested:
-        several = len({s.subject for s in cohort.sessions}) > 1
-        levels = "each subject and each day within a subject" if several else "each day"
         confidence = 100 * tested[0].confidence
         sentences.append(
             "Since epochs of one day are no independent observations, conditions were also "
             "compared by a linear mixed model with a mean for each condition and a random "
-            f"intercept for {levels}, with {confidence:g} % intervals and p as by "
+            f"intercept for {tested[0].model}, with {confidence:g} % intervals and p as by "
             f"{cite.by_name('kenward')}."
         )
         if any(not math.isnan(test.p_days) for test in tested):

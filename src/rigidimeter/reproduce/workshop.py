@@ -113,4 +113,4 @@ class Workshop:
                 values.append(float(getattr(result, measure)))
                 days.append(self.study.days[result.source])
         (x, x_days), (y, y_days) = samples["OFF"], samples["DBS"]
-        return day_difference(x, y, x_days, y_days)
+        return day_difference(x, y, x_days, y_days, one_offset=True)  # so the study is made

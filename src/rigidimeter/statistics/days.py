@@ -52,6 +52,8 @@ class DayDifference:
     day_share : float
         (σ_d² + σ_dc²)/(σ_d² + σ_dc² + σ²): the share of the variance between epochs of one
         condition and subject that is between days. NaN where every day has one epoch of each.
+    offsets : tuple of str
+        What had an offset of its own: ``subject``, ``day``, ``condition in day``.
     confidence : float
     """
 
@@ -65,6 +67,7 @@ class DayDifference:
     n_days_y: int
     p_days: float
     day_share: float
+    offsets: tuple[str, ...]
     confidence: float = 0.95
 
 
@@ -167,6 +170,7 @@ def day_difference(
         n_days_y=len({*nested(subjects[1], days[1])}),
         p_days=_p_of_medians(values, conditions, whose, units),
         day_share=math.nan if single else between / (between + fit.variance_residual),
+        offsets=tuple(groups),
         confidence=confidence,
     )
 

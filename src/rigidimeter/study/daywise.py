@@ -54,8 +54,17 @@ def day_medians_of(measure: Measure, values: Sequence[Valued]) -> list[DayMedian
     return found
 
 
-def day_test(comparison: Comparison, values: Sequence[Valued], confidence: float = 0.95) -> DayTest:
-    """Compare the two conditions of a comparison by days."""
+def day_test(
+    comparison: Comparison,
+    values: Sequence[Valued],
+    confidence: float = 0.95,
+    *,
+    one_offset: bool = False,
+) -> DayTest:
+    """Compare the two conditions of a comparison by days.
+
+    With `one_offset` a day is taken to move both its conditions alike.
+    """
     sides = [
         [v for v in values if v.condition == name]
         for name in (comparison.reference, comparison.other)
@@ -63,6 +72,7 @@ def day_test(comparison: Comparison, values: Sequence[Valued], confidence: float
     days = [len({v.unit for v in side}) for side in sides]
     remark = ""
     numbers = (math.nan,) * 7
+    offsets: tuple[str, ...] = ()
     if min(map(len, sides)) < FEWEST_FOR_TEST:
         remark = comparison.remark
     else:
@@ -75,11 +85,13 @@ def day_test(comparison: Comparison, values: Sequence[Valued], confidence: float
                 [v.day for v in y],
                 x_subjects=[v.subject for v in x],
                 y_subjects=[v.subject for v in y],
+                one_offset=one_offset,
                 confidence=confidence,
             )
         except (ValueError, ArithmeticError) as error:
             remark = str(error)
         else:
+            offsets = d.offsets
             numbers = (d.estimate, d.low, d.high, d.p, d.df, d.p_days, d.day_share)
     estimate, low, high, p, df, p_days, day_share = numbers
     return DayTest(
@@ -98,5 +110,6 @@ def day_test(comparison: Comparison, values: Sequence[Valued], confidence: float
         p_days=p_days,
         day_share=day_share,
         confidence=confidence,
+        offsets=offsets,
         remark=remark,
     )

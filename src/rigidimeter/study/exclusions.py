@@ -9,7 +9,7 @@ from dataclasses import replace
 from rigidimeter.recording.study_folder import Row, StudyFolder
 from rigidimeter.records import Analysis, Epoch, Fit, Notice, Outcome, Score
 from rigidimeter.study.results import Exclusion, SessionEntry
-from rigidimeter.study.sessions import Gathered, source_of
+from rigidimeter.study.sessions import Gathered, place_of, source_of
 
 __all__ = ["exclusions_of", "operators_exclusions"]
 
@@ -22,14 +22,20 @@ def operators_exclusions(
     labels: dict[str, list[str]] = {}
     for source, label in epochs:
         labels.setdefault(source, []).append(label)
-    places = {(read.folder / s.entry.path).resolve(): s.entry.source for s in gathered.sessions}
-    left_out = {(read.folder / out.path).resolve() for out in gathered.left_out}
+    places = {place_of(read.folder / s.entry.path): s.entry.source for s in gathered.sessions}
+    left_out = {place_of(read.folder / out.path) for out in gathered.left_out}
     operator: dict[tuple[str, str], Row] = {}
     notices = []
     for row in read.exclusions:
-        place = (read.folder / row["path"]).resolve()
+        place = place_of(read.folder / row["path"])
         key = (places.get(place, ""), row["epoch"])
-        if key in epochs:
+        if key in operator:
+            text = (
+                f"{row.where}: epoch {row['epoch']} of {row['path']} is out already "
+                f"(line {operator[key].line}); the first reason counts"
+            )
+            notices.append(Notice("warning", text))
+        elif key in epochs:
             operator[key] = row
             by = f" ({row['by']})" if row["by"] else ""
             epochs[key] = replace(epochs[key], closed=Outcome("excluded", f"{row['reason']}{by}"))

@@ -5,14 +5,17 @@
     STUDY/analysis/comparison.json  every conclusion
     STUDY/analysis/*.csv            the same as tables
 
-A file whose bytes would be the same is not written again. `inputs.json` is written last, so a
-folder that was cut off in the middle shows as edited, not as whole.
+A file whose bytes would be the same is not written again. `comparison.json` and then `inputs.json`
+are written last: a run that was cut off leaves those of the run before, and the next one says what
+is new since then.
 """
 
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -35,6 +38,7 @@ INPUTS, COMPARISON = "inputs.json", "comparison.json"
 
 _SHOWN = 12
 _COMPARED = ("shift", "p", "r")
+_SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
 _BY_DAYS = ("estimate", "p", "p_days", "day_share")
 
 
@@ -54,16 +58,16 @@ def keep(read: StudyRead, study: Study, cohort: Cohort, seed: int, resamples: in
     document = study_document(study, cohort, place)
     texts = {
         "estimates.json": _json(estimates_document(study.analysis)),
-        COMPARISON: _json(document),
         **study_tables(study, cohort),
+        COMPARISON: _json(document),
     }
     inputs = _inputs(read, study, seed, resamples)
     results = {name: hashlib.sha256(_bytes(text)).hexdigest() for name, text in texts.items()}
     before = _object(folder / INPUTS)
-    if before is not None and before.get("schema") != INPUTS_SCHEMA:
+    if before is not None and not _is_inputs(before):
         before = None
     said: list[str] = []
-    edited = _edited(folder, before, said)
+    edited = _edited(folder, before, results, said)
     if before is not None:
         said += _new_inputs(before, inputs)
         old = _object(folder / COMPARISON) if COMPARISON not in edited else None
@@ -72,8 +76,11 @@ def keep(read: StudyRead, study: Study, cohort: Cohort, seed: int, resamples: in
     elif (folder / INPUTS).exists():
         said.append(f"{ANALYSIS}/{INPUTS} is damaged, so what has changed since is unknown")
     _write(folder, texts, edited)
-    for name in sorted({*_results(before)} - {*texts} - {*edited}):
-        (folder / name).unlink(missing_ok=True)  # ours, unedited, and no longer a result
+    try:
+        for name in sorted({*_results(before)} - {*texts} - {*edited}):
+            (folder / name).unlink(missing_ok=True)  # ours, unedited, and no longer a result
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written ({error.strerror or error})") from None
     _write_new(folder / INPUTS, _json({**inputs, "results": results}))
     if before is not None and not said:
         said.append(UNCHANGED)
@@ -95,20 +102,36 @@ def _inputs(read: StudyRead, study: Study, seed: int, resamples: int) -> dict[st
     }
 
 
-def _edited(folder: Path, before: Mapping[str, Any] | None, said: list[str]) -> set[str]:
-    """Return the results that are not as they were written."""
-    edited = set()
-    for name, digest in _results(before).items():
-        path = folder / name
-        if not path.is_file():
-            said.append(f"{ANALYSIS}/{name} was taken away; it is written again")
-        elif file_digest(path) != digest:
-            edited.add(name)
-            said.append(
-                f"{ANALYSIS}/{name} was changed by hand after it was written; it is written anew, "
-                f"and the changed one is kept as {name}.edited"
-            )
+def _edited(
+    folder: Path, before: Mapping[str, Any] | None, results: Mapping[str, str], said: list[str]
+) -> dict[str, str]:
+    """Return the results that are not as they were written, and under what name to keep each.
+
+    One that is as it will be written now is none of them: a run that was cut off left it.
+    """
+    edited = {}
+    try:
+        for name, digest in (_results(before) or dict.fromkeys(results, "")).items():
+            path = folder / name
+            if not path.is_file():
+                if digest and name in results:
+                    said.append(f"{ANALYSIS}/{name} was taken away; it is written again")
+            elif file_digest(path) not in (digest, results.get(name)):
+                edited[name] = _free(folder, f"{name}.edited")
+                how = "was changed by hand after it was written" if digest else "was there already"
+                said.append(
+                    f"{ANALYSIS}/{name} {how}; it is written anew, and the one that was there is "
+                    f"kept as {edited[name]}"
+                )
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be read ({error.strerror or error})") from None
     return edited
+
+
+def _free(folder: Path, name: str) -> str:
+    """Return the name, or the first of ``name-2``, ``name-3`` and so on that is not taken."""
+    names = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
+    return next(each for each in names if not (folder / each).exists())
 
 
 def _new_inputs(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
@@ -161,8 +184,11 @@ def _numbers(document: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]
         for d in document["day_tests"]:
             yield f"{d['measure']} by days", {name: d[name] for name in _BY_DAYS}
         for e in document["effects"]:
-            sizes = {"rank-biserial": e["effects"]["rank_biserial"], "p by Holm": e["p_holm"]}
-            yield f"{e['measure']}, effect size", sizes
+            sizes = {name: e["effects"][name] for name in _SIZES}
+            yield f"{e['measure']}, effect size", sizes | {"p by Holm": e["p_holm"]}
+        for d in document["effect_differences"]:
+            row = {name: d[name] for name in ("estimate", "low", "high", "p")}
+            yield f"{d['first']} − {d['second']}, difference of effect sizes", row
         if document["ratings"] is not None:
             contrast = document["ratings"]["contrast"]
             row = {"n": document["ratings"]["n"], "estimate": contrast["estimate"]}
@@ -196,11 +222,11 @@ def _leaves(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, 
             yield prefix + name, value
 
 
-def _write(folder: Path, texts: Mapping[str, str], edited: set[str]) -> None:
+def _write(folder: Path, texts: Mapping[str, str], edited: Mapping[str, str]) -> None:
     try:
         folder.mkdir(exist_ok=True)
-        for name in sorted(edited):
-            (folder / name).replace(folder / f"{name}.edited")
+        for name, aside in edited.items():
+            (folder / name).replace(folder / aside)
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror or error})") from None
     for name, text in texts.items():
@@ -222,7 +248,17 @@ def _results(before: Mapping[str, Any] | None) -> dict[str, str]:
     if not isinstance(results, dict):
         return {}
     # A name is a file of the folder, nothing else: this one may have been edited too.
-    return {name: str(d) for name, d in results.items() if Path(name).name == name}
+    return {
+        name: str(digest)
+        for name, digest in results.items()
+        if Path(name).name == name and name not in ("", os.curdir, os.pardir)
+    }
+
+
+def _is_inputs(found: Mapping[str, Any]) -> bool:
+    """Whether a document is of the form of `_inputs`."""
+    tables = (found.get(name) for name in ("settings", "files"))
+    return found.get("schema") == INPUTS_SCHEMA and all(isinstance(t, dict) for t in tables)
 
 
 def _object(path: Path) -> dict[str, Any] | None:

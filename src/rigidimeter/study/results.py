@@ -73,6 +73,9 @@ class DayMedian:
     q3: float
 
 
+_OFFSETS = {"condition in day": "condition within a day"}
+
+
 @dataclass(frozen=True)
 class DayTest:
     """A comparison in which days count, not epochs.
@@ -83,8 +86,8 @@ class DayTest:
     reference, other : str
         The estimate is reference − other.
     estimate, low, high : float
-        From the mixed model with an offset for every day (and every subject if there are
-        several), with Kenward and Roger's interval at `confidence`.
+        From the mixed model of `statistics.day_difference`, with Kenward and Roger's interval
+        at `confidence`.
     p : float
         Kenward and Roger's.
     df : float
@@ -93,6 +96,8 @@ class DayTest:
         Of the exact rank-sum test of the medians of the days; nan where there are too few.
     day_share : float
         The share of the variance between epochs of one condition that is between days.
+    offsets : tuple of str
+        What had an offset in the model: ``subject``, ``day``, ``condition in day``.
     remark : str
         Why there is no test, else empty.
     """
@@ -112,7 +117,14 @@ class DayTest:
     p_days: float
     day_share: float
     confidence: float = 0.95
+    offsets: tuple[str, ...] = ()
     remark: str = ""
+
+    @property
+    def model(self) -> str:
+        """Of what the model had offsets, in words."""
+        named = [f"each {_OFFSETS.get(name, name)}" for name in self.offsets]
+        return " and ".join([", ".join(named[:-1]), *named[-1:]][len(named) < 2 :])
 
 
 @dataclass(frozen=True)

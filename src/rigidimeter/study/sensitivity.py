@@ -7,7 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 from rigidimeter.records import Analysis, Fit, Notice
-from rigidimeter.study.comparison import FEWEST_FOR_TEST, MEASURES, Measure, compare_results
+from rigidimeter.study.comparison import (
+    FEWEST_FOR_TEST,
+    MEASURES,
+    Comparison,
+    Measure,
+    compare_results,
+)
 from rigidimeter.study.daywise import day_test, valued
 from rigidimeter.study.results import SensitivityRow, SessionEntry
 
@@ -24,6 +30,8 @@ def sensitivity_rows(
     chosen: str,
     sessions: Mapping[str, SessionEntry],
     pair: tuple[str, str],
+    *,
+    one_offset: bool = False,
 ) -> tuple[list[SensitivityRow], list[Notice]]:
     """Return one row for each measure, method and stage; a method that cannot says why.
 
@@ -36,6 +44,8 @@ def sensitivity_rows(
     sessions : mapping of str to SessionEntry
         By source.
     pair : (str, str)
+    one_offset : bool
+        As for `day_test`.
     """
     rows: list[SensitivityRow] = []
     notices: list[Notice] = []
@@ -46,7 +56,12 @@ def sensitivity_rows(
             notices.append(Notice("warning", text))
             continue
         for measure, inertia, fits in _stages(analysis):
-            rows.append(_row(measure, inertia, fits, method, chosen, sessions, pair))
+            compared = compare_results(measure, fits, *pair)
+            values = valued(measure.name, fits, sessions)
+            p_day = day_test(compared, values, one_offset=one_offset).p
+            stage = "free" if measure is _INERTIA else "fixed"
+            used = method == chosen and inertia == stage
+            rows.append(_row(compared, method, inertia, p_day, used))
     return rows, notices
 
 
@@ -74,31 +89,26 @@ def _lacking(fits: Sequence[Fit], pair: tuple[str, str]) -> str:
 
 
 def _row(
-    measure: Measure,
-    inertia: Literal["fixed", "free"],
-    fits: Sequence[Fit],
+    compared: Comparison,
     method: str,
-    chosen: str,
-    sessions: Mapping[str, SessionEntry],
-    pair: tuple[str, str],
+    inertia: Literal["fixed", "free"],
+    p_day: float,
+    chosen: bool,
 ) -> SensitivityRow:
-    compared = compare_results(measure, fits, *pair)
-    by_days = day_test(compared, valued(measure.name, fits, sessions))
     test = compared.test
-    stage = "free" if measure is _INERTIA else "fixed"
     return SensitivityRow(
-        measure=measure.name,
-        title=measure.title,
-        unit=measure.unit,
+        measure=compared.measure,
+        title=compared.title,
+        unit=compared.unit,
         method=method,
         inertia=inertia,
-        n_reference=compared.summaries[pair[0]].n,
-        n_other=compared.summaries[pair[1]].n,
+        n_reference=compared.summaries[compared.reference].n,
+        n_other=compared.summaries[compared.other].n,
         shift=test.shift if test else math.nan,
         shift_low=test.shift_low if test else math.nan,
         shift_high=test.shift_high if test else math.nan,
         p=test.p if test else math.nan,
         r=test.r if test else math.nan,
-        p_day=by_days.p,
-        chosen=method == chosen and inertia == stage,
+        p_day=p_day,
+        chosen=chosen,
     )

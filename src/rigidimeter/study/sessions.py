@@ -7,6 +7,7 @@ twice, disagrees with the table about its condition, or was commanded otherwise 
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
@@ -22,6 +23,7 @@ from rigidimeter.recording import (
 from rigidimeter.recording.folder import EVENTS, MANIFEST, SAMPLES
 from rigidimeter.recording.log import read_events
 from rigidimeter.recording.study_folder import Row, StudyFolder
+from rigidimeter.recording.study_toml import is_outside
 from rigidimeter.records import Epoch, Notice
 from rigidimeter.settings import Settings
 from rigidimeter.study.analysis import task_of
@@ -29,7 +31,7 @@ from rigidimeter.study.commanded import commanded_otherwise
 from rigidimeter.study.naming import Naming
 from rigidimeter.study.results import LeftOut, SessionEntry
 
-__all__ = ["Gathered", "Session", "gather", "source_of"]
+__all__ = ["Gathered", "Session", "gather", "place_of", "source_of"]
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,14 @@ def source_of(path: str) -> str:
     return PurePath(path).as_posix()
 
 
+def place_of(path: Path) -> Path:
+    """Return where a path leads; itself where its links lead nowhere.
+
+    `Path.resolve` raises RuntimeError for links in a circle up to Python 3.12.
+    """
+    return Path(os.path.realpath(path))
+
+
 def gather(
     read: StudyFolder, names: Naming, *, progress: Callable[[str], None] = lambda _: None
 ) -> Gathered:
@@ -111,6 +121,8 @@ def gather(
             session, said = _read(read, row, names, at, samples, digests)
         except (_Refused, UserError) as error:
             leave_out(row, str(error))
+        except OSError as error:  # such as a path too long for the file system
+            leave_out(row, f"{row['path']}: cannot be read ({error.strerror or error})")
         else:
             sessions.append(session)
             notices += said
@@ -137,7 +149,12 @@ def _read(
     digests: dict[str, str],
 ) -> tuple[Session, list[Notice]]:
     path, source = read.folder / row["path"], source_of(row["path"])
-    place = path.resolve()
+    if is_outside(row["path"]):
+        raise _Refused(
+            f"path is {row['path']}, outside the study folder; copy or link the recording into "
+            f"{read.folder} and write its path from there"
+        )
+    place = place_of(path)
     if place in at:
         raise _Refused(f"{path} is in the table already ({_line(at[place])})")
     at[place] = row

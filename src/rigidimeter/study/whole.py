@@ -143,6 +143,7 @@ def analyse_study(
     """
     sessions = {s.entry.source: s.entry for s in read.gathered.sessions}
     pair = read.names.pair
+    one_offset = read.folder.about.analysis.one_offset_a_day
     main, notices = _analysed(read.epochs, sessions, read.settings, read.method, progress)
     comparisons = compare(main, *pair)
     notices += _lacking(comparisons, pair)
@@ -166,7 +167,9 @@ def analyse_study(
                     fitted, sessions, read.settings, method, progress, main.delays or None
                 )
     ordered = {name: analyses[name] for name in SENSITIVITY_METHODS if name in analyses}
-    rows, said = sensitivity_rows({**ordered, **analyses}, main.method, sessions, pair)
+    rows, said = sensitivity_rows(
+        {**ordered, **analyses}, main.method, sessions, pair, one_offset=one_offset
+    )
     notices += said if fitted and all(pair) else []
     cohort = Cohort(
         conditions=read.names.conditions,
@@ -176,7 +179,7 @@ def analyse_study(
             day for measure, values in by_measure.items() for day in day_medians_of(measure, values)
         ),
         day_tests=tuple(
-            day_test(c, values)
+            day_test(c, values, one_offset=one_offset)
             for c, values in zip(comparisons, by_measure.values(), strict=True)
             if c.paired
         ),
@@ -256,8 +259,10 @@ def _analysed(
         delays=tuple(delay for part in parts.values() for delay in part.delays),
         method_reason=". ".join(filter(None, reasons)),
     )
-    held = ", ".join(f"{subject} {part.inertia_kg_m2:.4g}" for subject, part in parts.items())
-    notices.append(Notice("warning", f"J is held at the median of each subject, in kg·m²: {held}"))
+    if included:
+        held = ", ".join(f"{subject} {part.inertia_kg_m2:.4g}" for subject, part in parts.items())
+        text = f"J is held at the median of each subject, in kg·m²: {held}"
+        notices.append(Notice("warning", text))
     return merged, notices
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
+import signal
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import fields
@@ -89,7 +90,10 @@ def _run_beside(plans: Sequence[DayPlan], folder: Path, processes: int, progress
     """Run sessions in processes; end them when we are interrupted."""
     context = get_context("spawn")
     reached = context.Array("d", len(plans), lock=False)
+    # An interrupt from the keyboard goes to all processes; only this one is to hear it.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     with context.Pool(min(processes, len(plans)), _take, (reached,)) as pool:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
         results = [
             pool.apply_async(_run_apart, (index, plan, str(folder)))
             for index, plan in enumerate(plans)
@@ -172,6 +176,7 @@ def _study_toml(design: StudyDesign, seed: int) -> str:
     for condition in design.conditions:
         lines += ["", f"[conditions.{condition.name}]", *_stimulation(condition)]
     lines += ["", "[rating]", f"scale = [{low:.1f}, {high:.1f}]", f"step = {design.rating_step:g}"]
+    lines += ["", "[analysis]", "one_offset_a_day = true  # so it was made: see the assumptions"]
     return "\n".join(lines) + "\n"
 
 

@@ -10,7 +10,7 @@ import pytest
 from rigidimeter.cli.realtime import HOME_TOLERANCE_RAD
 from rigidimeter.design import plan
 from rigidimeter.device.composed import Home
-from rigidimeter.device.rigfile import RigFile
+from rigidimeter.device.rigfile import RigFile, load_rig
 from rigidimeter.recording import SessionWriter
 from rigidimeter.settings import parse_settings
 
@@ -91,3 +91,30 @@ def test_a_rig_without_a_record_is_refused_before_any_process_starts(
     assert result.status == 1
     assert "rigidimeter commission" in result.err
     assert not (tmp_path / "s").exists()
+
+
+def test_a_rig_that_another_uses_is_refused_before_any_process_starts(
+    tmp_path, monkeypatch, rigidimeter
+):
+    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
+    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: None)
+    rig = tmp_path / "rig.toml"
+    rig.write_text(RIG)
+    with load_rig(rig).claim():
+        result = rigidimeter("run", "--rig", rig, "--out", tmp_path / "s")
+    assert result.status == 1
+    assert "another program uses this rig" in result.err
+    assert not (tmp_path / "s").exists()
+
+
+def test_a_session_that_still_runs_is_not_gone_on_with(tmp_path, monkeypatch, rigidimeter):
+    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
+    settings = parse_settings({})
+    epochs = plan(settings.protocol, settings.prbs, settings.sinusoid, 1).epochs
+    planned = [asdict(epoch) for epoch in epochs]
+    running = SessionWriter(tmp_path / "s", settings, planned, {}, virtual=True)
+    result = rigidimeter("run", "--resume", tmp_path / "s", "--out", tmp_path / "n")
+    running.close(0.0, "abort", "aborted by the operator")
+    assert result.status == 1
+    assert "s: is still being recorded; end that session first" in result.err
+    assert not (tmp_path / "n").exists()

@@ -20,7 +20,7 @@ from rigidimeter.commissioning import (
 )
 from rigidimeter.commissioning.checks import untried
 from rigidimeter.commissioning.coverage import EXACT, LIMITS, covered, kept_facts
-from rigidimeter.commissioning.record import A_PERSON_TELLS, MUST_PASS
+from rigidimeter.commissioning.record import A_PERSON_TELLS, MUST_PASS, _digest
 from rigidimeter.device.rigfile import RigFile
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings, parse_settings
@@ -177,6 +177,50 @@ def test_what_does_not_touch_the_loop_may_change(
 ) -> None:
     settings = parse_settings({"seed": 7, "prbs": {"amplitude_nm": 0.5}})
     assert check(rigfile, settings=settings).passed
+
+
+def test_a_record_of_tomorrow_says_to_set_the_clock(
+    rigfile: RigFile, record: CommissioningRecord
+) -> None:
+    write_record(record_path(rigfile.path), replace(record, made_utc="2126-03-09T12:00:00+00:00"))
+    with pytest.raises(UserError, match=r"which is still to come.*set the computer's clock right"):
+        check(rigfile)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"made_utc": "yesterday"}, {"made_utc": None}, {"later": 1}, {"checks": [{"name": "x"}]}],
+)
+def test_a_record_of_another_version_is_refused_with_a_sentence(
+    rigfile: RigFile, record: CommissioningRecord, changes: dict[str, Any]
+) -> None:
+    sealed(rigfile, changes)
+    with pytest.raises(UserError, match=r"written by another version of .*; commission again"):
+        check(rigfile)
+
+
+def test_a_record_without_a_time_zone_is_refused(
+    rigfile: RigFile, record: CommissioningRecord
+) -> None:
+    sealed(rigfile, {"made_utc": "2026-03-01T12:00:00"})
+    with pytest.raises(UserError, match="names no time zone; commission again"):
+        check(rigfile)
+
+
+def test_a_record_that_covers_nothing_is_refused(
+    rigfile: RigFile, record: CommissioningRecord
+) -> None:
+    sealed(rigfile, {"covered": {}})
+    with pytest.raises(UserError, match=r"covers rig\.tick_rate_hz = None Hz, not"):
+        check(rigfile)
+
+
+def sealed(rigfile: RigFile, changes: dict[str, Any]) -> None:
+    """Write the record with other content and a seal that fits."""
+    path = record_path(rigfile.path)
+    values = json.loads(path.read_text(encoding="utf-8")) | changes
+    values.pop("digest")
+    path.write_text(json.dumps(values | {"digest": _digest(values)}), encoding="utf-8")
 
 
 def test_a_failed_check_is_refused(rigfile: RigFile, record: CommissioningRecord) -> None:

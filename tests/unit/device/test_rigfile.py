@@ -92,3 +92,68 @@ def test_a_session_that_is_gone_on_with_brings_its_own_home(rig_file):
     begun = Home(0.3, 0.05)
     assert rig.build(lambda: 0.0, 50.0, begun)._home == begun
     assert rig.build(lambda: 0.0, 50.0)._home == rig.home
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        "home_deg = nan",
+        "home_deg = inf",
+        "home_deg = 0.0\nhome_tolerance_deg = -3.0",
+        "home_deg = 0.0\nhome_tolerance_deg = 0",
+        "home_deg = 0.0\nhome_tolerance_deg = inf",
+        "home_deg = 0.0\nhome_tolerance_deg = 360",
+    ],
+)
+def test_a_home_that_no_joint_or_every_joint_meets_is_refused(rig_file, lines):
+    with pytest.raises(
+        UserError, match=r"home_\w+ must be (a finite number of|above 0 and at most)"
+    ):
+        load_rig(rig_file(f"{lines}\n"))
+
+
+SENSOR = """
+from rigidimeter.settings.base import Section
+class Sensor:
+    Settings = {settings}
+    def connect(self): ...
+    def configure(self): ...
+    def read(self): ...
+    def close(self): ...
+    counts = {{}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("raise RuntimeError('no such card')", "its module fails with RuntimeError: no such card"),
+        ("def (", "its module fails with SyntaxError"),
+        ("raise SystemExit(3)", "its module fails with SystemExit: 3"),
+        ("import no_such_thing", r"cannot be loaded \(No module named 'no_such_thing'\)"),
+        (SENSOR.format(settings=3), "its Settings must be a class derived from"),
+        (SENSOR.format(settings="Section"), "is no driver for a drive: it has no enable, write"),
+    ],
+)
+def test_a_driver_of_another_s_that_is_none_is_refused(tmp_path, monkeypatch, source, words):
+    module = f"driver_{abs(hash(source))}"
+    (tmp_path / f"{module}.py").write_text(source)
+    monkeypatch.syspath_prepend(tmp_path)
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        '[torque_sensor]\ndriver = "ati-rdt"\naddress = "127.0.0.1"\n'
+        f'[drive]\ndriver = "{module}:Sensor"\n'
+    )
+    with pytest.raises(UserError, match=words):
+        load_rig(path)
+
+
+@pytest.mark.parametrize("driver", [":Drive", ".near:Drive", "near:", "near"])
+def test_a_driver_that_names_no_module_is_refused(tmp_path, driver):
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        '[torque_sensor]\ndriver = "ati-rdt"\naddress = "127.0.0.1"\n'
+        f'[drive]\ndriver = "{driver}"\n'
+    )
+    with pytest.raises(UserError, match=r"there is no driver .*; known are cia402, ascii"):
+        load_rig(path)

@@ -302,6 +302,7 @@ def _day_test(
         found.n_days_y,
         found.p_days,
         found.day_share,
+        offsets=found.offsets,
     )
 
 

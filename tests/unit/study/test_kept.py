@@ -5,9 +5,12 @@ from pathlib import Path
 
 import pytest
 
+import rigidimeter.study.kept
 from rigidimeter.study import UNCHANGED, analyse_study, keep, read_study
 
 RESAMPLES = 100
+_DAMAGED = """{"schema": "rigidimeter.study-inputs/1", "settings": [2], "files": {},
+ "results": {"..": "x", "": "y"}}"""
 
 
 def kept(folder: Path, **options) -> list[str]:
@@ -97,6 +100,65 @@ def test_a_result_that_was_edited_is_noticed_and_not_lost(study: Path) -> None:
     assert kept(study) == [UNCHANGED]
 
 
+def test_a_second_edit_does_not_replace_the_first(study: Path) -> None:
+    kept(study)
+    path = study / "analysis/days.csv"
+    written = path.read_text()
+    for text in ("one", "two", "three"):
+        path.write_text(text)
+        kept(study)
+    assert path.read_text() == written
+    names = ("days.csv.edited", "days.csv.edited-2", "days.csv.edited-3")
+    assert [(study / "analysis" / n).read_text() for n in names] == ["one", "two", "three"]
+
+
+def test_an_edit_is_not_lost_where_the_record_is(study: Path) -> None:
+    kept(study)
+    (study / "analysis/inputs.json").unlink()
+    (study / "analysis/days.csv").write_text("mine")
+    (said,) = kept(study)
+    assert "days.csv was there already" in said
+    assert (study / "analysis/days.csv.edited").read_text() == "mine"
+
+
+@pytest.mark.parametrize("written", [0, 3, 7])
+def test_a_run_that_was_cut_off_is_made_up_for(
+    study: Path, monkeypatch: pytest.MonkeyPatch, written: int
+) -> None:
+    kept(study)
+    (study / "ratings.csv").write_text(
+        (study / "ratings.csv").read_text().replace("M1,1,OFF,A,2.0", "M1,1,OFF,A,2.5")
+    )
+    left = iter(range(written))
+    whole = rigidimeter.study.kept._write_new
+
+    def cut_off(path: Path, text: str) -> None:
+        if next(left, None) is None:
+            raise KeyboardInterrupt
+        whole(path, text)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(rigidimeter.study.kept, "_write_new", cut_off)
+        with pytest.raises(KeyboardInterrupt):
+            kept(study)
+    said = kept(study)
+    assert said[0] == "inputs that are changed: ratings.csv"
+    assert any(text.startswith("ratings, contrast: estimate") for text in said)
+    assert not list((study / "analysis").glob("*.edited*"))
+
+
+def test_what_the_seed_moves_is_told(study: Path) -> None:
+    kept(study)
+    read = read_study(study)
+    found = analyse_study(read, seed=2, resamples=RESAMPLES)
+    assert found.cohort is not None
+    said = keep(read, found, found.cohort, 2, RESAMPLES)
+    assert said[0] == "seed: 1 → 2"
+    assert any("effect size: r_low" in text for text in said)
+    assert any("difference of effect sizes: " in text for text in said)
+    assert not any(text.startswith(("work_j:", "impulse_nm_s:")) for text in said)
+
+
 def test_a_result_that_is_gone_is_written_again(study: Path) -> None:
     kept(study)
     (study / "analysis/days.csv").unlink()
@@ -112,7 +174,7 @@ def test_a_table_that_no_longer_exists_is_taken_away(study: Path) -> None:
     assert not (study / "analysis/ratings.csv").exists()
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"schema": "other"}'])
+@pytest.mark.parametrize("text", ["{", "[]", '{"schema": "other"}', _DAMAGED])
 def test_damaged_inputs_are_said(study: Path, text: str) -> None:
     kept(study)
     (study / "analysis/inputs.json").write_text(text)

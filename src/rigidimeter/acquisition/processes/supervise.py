@@ -12,13 +12,14 @@ after both, the loop after the console and the recorder.
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from types import FrameType
@@ -46,6 +47,8 @@ __all__ = ["Ended", "LoopSide", "LoopTarget", "Realtime", "supervise"]
 RING_S = 60.0
 """For how long the recorder may write nothing before samples are lost."""
 LOOK_S = 0.05
+OF_THE_TERMINAL = (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP)
+"""What a terminal sends to every process of a group."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,8 @@ def supervise(
 ) -> Ended:
     """Run a session in processes of its own and return how it ended.
 
-    Ctrl-C asks the loop to abort; a second one, and SIGTERM, make it stop as for a fault.
+    Ctrl-C asks the loop to abort; a second one, SIGTERM, and the closing of the terminal make it
+    stop as for a fault.
 
     Parameters
     ----------
@@ -114,7 +118,8 @@ def supervise(
 
     def start(name: str, main: Callable[..., None], *arguments: object) -> BaseProcess:
         process = context.Process(target=main, args=arguments, name=f"rigidimeter-{name}")
-        process.start()
+        with _undisturbed():
+            process.start()
         processes.append(process)
         return process
 
@@ -157,8 +162,22 @@ def supervise(
         shared.close()
 
 
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Start a process that Ctrl-C and the terminal's end do not reach while it still loads.
+
+    Those go to the whole group of processes, and a new one has not yet come to where it ignores
+    them. It inherits what is blocked here; what comes meanwhile comes to this process afterwards.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_THE_TERMINAL)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 class _Interrupts:
-    """Turns Ctrl-C and SIGTERM into orders to the loop while the session runs."""
+    """Turns the signals of the terminal and SIGTERM into orders to the loop."""
 
     def __init__(self, board: Board) -> None:
         self._board = board
@@ -167,7 +186,10 @@ class _Interrupts:
 
     def __enter__(self) -> _Interrupts:
         if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
+            numbers = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+            if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+                numbers.remove(signal.SIGHUP)  # started with `nohup`, which is meant so
+            for number in numbers:
                 self._before[number] = signal.signal(number, self._asked)
         return self
 
@@ -215,7 +237,8 @@ def _see_through(
                 console(board)
         except Exception as error:
             console_failed = True
-            traceback.print_exc()
+            with contextlib.suppress(OSError):  # of a terminal that is gone
+                traceback.print_exc()
             remarks.append(f"the console failed ({type(error).__name__}: {error})")
             board.raise_flag(Flag.END_ASKED)
         if (

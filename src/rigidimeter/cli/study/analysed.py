@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rigidimeter.records import Fit, Score
     from rigidimeter.study import Cohort, Study
 
-__all__ = ["Analysed", "KeyOption", "analysed_study", "study_of"]
+__all__ = ["Analysed", "KeyOption", "analysed_study", "study_files", "study_of"]
 
 KeyOption = Annotated[
     Path | None,
@@ -38,11 +38,12 @@ _OF_RECORDINGS = {
 
 @dataclass(frozen=True)
 class Analysed:
-    """An analysed study, where it lies, and the status to end with: 1 where an input was bad."""
+    """An analysed study, its sessions, whether it was kept, and the status: 1 with a bad input."""
 
     study: Study
     cohort: Cohort
     paths: tuple[Path, ...]
+    kept: bool
     status: int
 
 
@@ -79,6 +80,14 @@ def study_of(recordings: Recordings, key: Path | None) -> Path | None:
     return studies[0]
 
 
+def study_files(folder: Path, key: Path | None) -> tuple[Path, ...]:
+    """Return the study's own files, which no other output may be written over."""
+    from rigidimeter.recording.study_folder import read_study_folder
+
+    tables = read_study_folder(folder, key).files.values()
+    return folder, *tables, *(folder / "analysis").glob("*")
+
+
 def analysed_study(
     folder: Path,
     recordings: Recordings,
@@ -112,16 +121,17 @@ def analysed_study(
     bad |= _say_failed(study)
     cohort = study.cohort
     assert cohort is not None
+    changes, kept = [], True
     try:
         changes = keep(read, study, cohort, seed, resamples)
     except UserError as error:
         typer.echo(f"error: the analysis is not kept: {error}", err=True)
-        changes, bad = [], True
+        kept = False
     cohort = replace(cohort, changes=tuple(changes))
     paths = tuple(folder / session.path for session in cohort.sessions)
     tables = (path for name, path in read.folder.files.items() if name != "key")
     study = replace(study, cohort=cohort, provenance=provenance((*tables, *paths), study.settings))
-    return Analysed(study, cohort, paths, int(bad))
+    return Analysed(study, cohort, paths, kept, int(bad or not kept))
 
 
 def _say_failed(study: Study) -> bool:

@@ -27,7 +27,8 @@ def study_lines(cohort: Cohort) -> list[str]:
         codes = ", ".join(condition.name for condition in cohort.conditions)
         lines += ["", f"Blinded: the conditions are the codes {codes}; --key FILE tells them."]
     if cohort.day_tests:
-        lines += ["", "Days, not epochs: mixed model with an offset for every day (Kenward-Roger)"]
+        model = next((test.model for test in cohort.day_tests if test.model), "each day")
+        lines += ["", f"Days, not epochs: mixed model with an offset for {model} (Kenward-Roger)"]
         for test in cohort.day_tests:
             lines += _day_test(test)
     lines += _effects(cohort)

@@ -1,0 +1,75 @@
+"""`rigidimeter commission` and `emulate`: what is refused before anything is tried, or written."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pytest
+
+from rigidimeter.cli.commission import _check_before, _interrupted_once
+from rigidimeter.cli.emulate import _check_target
+from rigidimeter.errors import UserError
+
+HARDWARE = """
+[torque_sensor]
+driver = "ati-rdt"
+address = "192.168.1.1"
+[drive]
+driver = "cia402"
+interface = "socketcan"
+channel = "can0"
+"""
+
+
+def test_a_record_that_could_not_be_written_is_said_before_the_trials(tmp_path):
+    _check_before(tmp_path / "record.json", {"--known-torque-nm": None})
+    with pytest.raises(
+        UserError, match=r"the record cannot be written, for .*nowhere is no folder"
+    ):
+        _check_before(tmp_path / "nowhere" / "record.json", {})
+    (tmp_path / "record.json").mkdir()
+    with pytest.raises(UserError, match="is a folder; name a file"):
+        _check_before(tmp_path / "record.json", {})
+
+
+@pytest.mark.parametrize("value", [0.0, float("nan"), float("inf")])
+def test_a_known_torque_that_tells_nothing_is_refused(tmp_path, value):
+    with pytest.raises(UserError, match=r"--known-torque-nm \S+: must be a number other than 0"):
+        _check_before(tmp_path / "record.json", {"--known-torque-nm": value})
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_who_interrupts_twice_does_not_break_off_the_stopping(tmp_path, number):
+    before, steps = signal.getsignal(number), []
+    record = tmp_path / "record.json"
+
+    def trials():
+        try:
+            os.kill(os.getpid(), number)
+        finally:
+            for step in ("stop", "disable", "close"):
+                os.kill(os.getpid(), signal.SIGINT)
+                steps.append(step)
+
+    said = r"the rig was stopped, and .*record\.json was not written"
+    with pytest.raises(UserError, match=said), _interrupted_once(record):
+        trials()
+    assert steps == ["stop", "disable", "close"]
+    assert signal.getsignal(number) == before
+
+
+def test_an_emulation_writes_over_no_rig_file_of_hardware(tmp_path):
+    path = tmp_path / "RIG.toml"
+    _check_target(path)
+    path.write_text(HARDWARE)
+    with pytest.raises(
+        UserError, match=r"RIG\.toml: is there already and is no rig file of an emu"
+    ):
+        _check_target(path)
+    path.write_text(
+        HARDWARE.replace("192.168.1.1", "127.0.0.1").replace("socketcan", "udp_multicast")
+    )
+    _check_target(path)
+    with pytest.raises(UserError, match="there is no folder"):
+        _check_target(tmp_path / "nowhere" / "RIG.toml")

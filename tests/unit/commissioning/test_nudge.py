@@ -1,0 +1,34 @@
+"""A first motion that the guard ended: the remedy names what it ended for."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from rigidimeter.commissioning import moving
+from rigidimeter.commissioning.trial import Tried
+from rigidimeter.guard import Cause
+from rigidimeter.settings import Settings
+
+
+@pytest.mark.parametrize("scale", [0.1, 1.0])
+@pytest.mark.parametrize(
+    ("cause", "remedy"),
+    [
+        (Cause.STALLED, "remove the reason"),
+        (Cause.TORQUE_STALE, "remove the reason"),
+        (Cause.NOT_FOLLOWING, "sign, counts per turn"),
+        (Cause.OVERSPEED, "sign, counts per turn"),
+    ],
+)
+def test_only_a_motion_that_is_not_as_commanded_speaks_of_sign_and_counts(
+    monkeypatch: pytest.MonkeyPatch, cause: Cause, remedy: str, scale: float
+) -> None:
+    monkeypatch.setattr(moving, "following", lambda *_: SimpleNamespace(scale=scale))
+    heard: Any = None
+    check = moving.nudge_check(Tried(heard, cause), Settings())
+    assert check.outcome == "failed"
+    assert check.remedy.startswith(remedy)
+    assert moving.nudge_check(Tried(heard, Cause.NONE), Settings()).passed == (scale == 1.0)
