@@ -15,7 +15,8 @@ EQUIVALENT: dict[str, str] = {
     "left <= speed * (reach_s + dt + held_s) + stopping": SLOWER,
     NEAR + "reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found] → "
     "REACTIONS[reported] >= REACTIONS[found]": "no cause has the least reaction: both are none",
-    NEAR + "if found != _NO_CAUSE: ... → if True: ...": "no cause changes neither cause nor reaction",
+    NEAR
+    + "if found != _NO_CAUSE: ... → if True: ...": "no cause changes neither cause nor reaction",
     "step.py _farthest_in_flight: 1 → 0": "none back gives 0, which is where it starts",
     "step.py _stoppable_speed: distance_rad <= 0.0 → distance_rad < 0.0": "the root gives 0, too",
 }

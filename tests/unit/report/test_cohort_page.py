@@ -221,7 +221,9 @@ def test_several_subjects_are_told_apart() -> None:
     page = shown(made_study(design, several=True))
     assert "2: M1, M2" in words(page, "study")
     assert "6: 6 in OFF and 6 in DBS, 6 in both" in words(page, "study")
-    assert "an offset for each subject, each day and each condition within a day" in words(page, "comparison")
+    assert "an offset for each subject, each day and each condition within a day" in words(
+        page, "comparison"
+    )
     assert "J held at its median over all included epochs of the same subject" in words(page)
 
 
