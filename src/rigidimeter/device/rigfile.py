@@ -21,6 +21,7 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import importlib
+import inspect
 import math
 import tomllib
 from collections.abc import Mapping
@@ -228,4 +229,11 @@ def _driver(path: Path, role: str, name: str) -> Any:
             f"{path}, [{role}]: {name!r} is no driver for a {role.replace('_', ' ')}: it has no "
             f"{', '.join(lacking)}"
         )
+    try:
+        inspect.signature(driver).bind(None, None)
+    except TypeError as error:
+        raise UserError(
+            f"{path}, [{role}]: {name!r} is no driver: it must be made with (settings, now), but "
+            f"{error}"
+        ) from None
     return driver

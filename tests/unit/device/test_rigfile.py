@@ -124,6 +124,13 @@ class Sensor:
 """
 
 
+DRIVE = (
+    SENSOR.format(settings="Section")
+    + "    enable = write = stop = disable = watchdog_s = read\n"
+    + "    def __init__(self): ...\n"
+)
+
+
 @pytest.mark.parametrize(
     ("source", "words"),
     [
@@ -133,6 +140,7 @@ class Sensor:
         ("import no_such_thing", r"cannot be loaded \(No module named 'no_such_thing'\)"),
         (SENSOR.format(settings=3), "its Settings must be a class derived from"),
         (SENSOR.format(settings="Section"), "is no driver for a drive: it has no enable, write"),
+        (DRIVE, r"must be made with \(settings, now\), but too many positional arguments"),
     ],
 )
 def test_a_driver_of_another_s_that_is_none_is_refused(tmp_path, monkeypatch, source, words):
