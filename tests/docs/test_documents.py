@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.small_study import scored_study, study
 from typer.testing import CliRunner
 
 from rigidimeter import __version__
@@ -28,10 +29,12 @@ from rigidimeter.recording import (
     read_recording,
 )
 from rigidimeter.recording.log import SAMPLE_UNITS, read_events
-from rigidimeter.recording.study_toml import read_study_toml
+from rigidimeter.recording.study_toml import STUDY_SCHEMA, read_study_toml
 from rigidimeter.recording.tables.columns import LABELS
 from rigidimeter.records import CHANNEL_UNITS, Analysis, Delay, Finding, Fit, Outcome, Score
 from rigidimeter.settings import Settings, load_settings, parse_settings
+
+__all__ = ["scored_study", "study"]
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
@@ -275,6 +278,20 @@ def test_the_keys_of_the_comparisons_are_documented(tmp_path: Path) -> None:
     groups = set(re.findall(r"`([a-z0-9]+)`", documented["groups"]))
     assert groups == set(tested[0]["groups"]["OFF"])
     assert f"`{document['schema']}`" in FILES.read_text("utf-8")
+
+
+def test_the_keys_of_a_study_are_documented(study: Path) -> None:
+    result = RUN.invoke(app, ["compare", str(study), "--resamples", "100"])
+    assert result.exit_code == 0, result.output
+    document: dict[str, Any] = json.loads((study / "analysis/comparison.json").read_text("utf-8"))
+    assert list(table(FILES, "Top level of a study")) == list(document)
+    assert list(table(FILES, "Each day test")) == list(document["day_tests"][0])
+    kept = {path.name for path in (study / "analysis").iterdir()}
+    section = FILES.read_text("utf-8").split("## Study folder")[1].split("### Top level")[0]
+    assert kept <= set(re.findall(r"`([a-z_]+\.(?:json|csv))`", section))
+    inputs = json.loads((study / "analysis/inputs.json").read_text("utf-8"))
+    for schema in (document["schema"], inputs["schema"], STUDY_SCHEMA):
+        assert f"`{schema}`" in FILES.read_text("utf-8")
 
 
 def _elbow(tmp_path: Path) -> dict[str, str]:
