@@ -58,6 +58,8 @@ def test_sentences(study: Study, cohort: Cohort, cite: Cited) -> list[str]:
             f"intercept for {tested[0].model}, with {confidence:g} % intervals and p as by "
             f"{cite.by_name('kenward')}."
         )
+        if _shared_days(cohort) and "condition in day" not in tested[0].offsets:
+            sentences.append("A day was taken to move both its conditions alike.")
         if any(not math.isnan(test.p_days) for test in tested):
             sentences.append(
                 "The medians of the days were compared by the exact two-sided rank-sum test."
@@ -89,3 +91,8 @@ def test_sentences(study: Study, cohort: Cohort, cite: Cited) -> list[str]:
             f"To see what rests on the method, the comparison was repeated{both} ({named})."
         )
     return sentences
+
+
+def _shared_days(cohort: Cohort) -> bool:
+    days = {(s.subject, s.day) for s in cohort.sessions}
+    return len({(s.subject, s.day, s.condition) for s in cohort.sessions}) > len(days)

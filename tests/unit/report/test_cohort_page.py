@@ -216,6 +216,17 @@ def test_a_blinded_study_keeps_its_codes_and_tells_no_stimulation() -> None:
     assert not re.search(r"130 Hz|stimulation|0\.32 mA|\bOFF\b|\bDBS\b", text)
 
 
+@pytest.mark.parametrize(("both", "one", "told"), [(1, 1, True), (1, 0, False), (0, 1, False)])
+def test_one_offset_a_day_is_told_where_days_have_both(both: bool, one: bool, told: bool) -> None:
+    study = made_study(dataclasses.replace(SMALL, both_on_a_day=bool(both)))
+    assert study.cohort is not None
+    if one:
+        tests = tuple(dataclasses.replace(t, offsets=("day",)) for t in study.cohort.day_tests)
+        study = dataclasses.replace(study, cohort=replace(study.cohort, day_tests=tests))
+    sentence = "A day was taken to move both its conditions alike."
+    assert (sentence in words(shown(study))) is told
+
+
 def test_several_subjects_are_told_apart() -> None:
     design = Design((3, 3), (3, 3), (2, 2), subjects=("M1", "M2"), both_on_a_day=True)
     page = shown(made_study(design, several=True))
