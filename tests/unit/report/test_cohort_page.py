@@ -222,7 +222,9 @@ def test_one_offset_a_day_is_told_where_days_have_both(both: bool, one: bool, to
     assert study.cohort is not None
     if one:
         tests = tuple(dataclasses.replace(t, offsets=("day",)) for t in study.cohort.day_tests)
-        study = dataclasses.replace(study, cohort=replace(study.cohort, day_tests=tests))
+        study = dataclasses.replace(
+            study, cohort=dataclasses.replace(study.cohort, day_tests=tests)
+        )
     sentence = "A day was taken to move both its conditions alike."
     assert (sentence in words(shown(study))) is told
 
