@@ -16,7 +16,7 @@ from benchmarks import batch, estimation, online
 from benchmarks.paired import REPEATS, Row, in_ms, paired
 from rigidimeter.recording import ReadOptions, read_recording
 from rigidimeter.settings import parse_settings
-from rigidimeter.virtual.session import run_virtual_session
+from rigidimeter.virtual.virtual_session import run_virtual_session
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "benchmarks.md"
 

@@ -18,19 +18,19 @@ from typing import Any
 
 import numpy as np
 
-from rigidimeter.batch import simulate_chunks
 from rigidimeter.cli.simulate import PAPER_RATES
+from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import estimate_delays, fit_epochs
-from rigidimeter.estimation.closedloop.estimate import (
+from rigidimeter.estimation.closedloop.closed_loop_fit import (
     CLOSED_LOOP,
     drives,
     least_squares_start,
     observe,
 )
 from rigidimeter.estimation.closedloop.refine import fit_pooled
-from rigidimeter.joint import JointDynamics
 from rigidimeter.records import Channel, Epoch, Fit
 from rigidimeter.settings import EstimationSettings, Settings, parse_settings
+from rigidimeter.virtual.batch import simulate_chunks
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "accuracy.md"
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")

@@ -21,14 +21,14 @@ from scipy import signal
 
 from benchmarks.paired import Row, in_ms, paired
 from rigidimeter.acquisition import ControlLoop, SimulatedClock
-from rigidimeter.batch import Bench, bench, draw_inputs, epoch_generator, simulate_chunks
-from rigidimeter.batch.run import empty_rows, run_row
 from rigidimeter.control import BiquadState, admittance_step, biquad_step
-from rigidimeter.design import prbs_nm
-from rigidimeter.device import SimulatedRig
-from rigidimeter.joint import JointDynamics
+from rigidimeter.devices import SimulatedRig
+from rigidimeter.dynamics import DriveState, arm_torque_nm, drive_step
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.experiment import prbs_nm
 from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.simulation import DriveState, arm_torque_nm, drive_step
+from rigidimeter.virtual.batch import Bench, bench, draw_inputs, epoch_generator, simulate_chunks
+from rigidimeter.virtual.batch.batch_run import empty_rows, run_row
 
 Matrices = tuple[NDArray[np.float64], ...]
 

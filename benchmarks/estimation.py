@@ -9,10 +9,10 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.paired import Row, in_ms, paired
-from rigidimeter.batch import simulate_chunks, simulate_epochs
 from rigidimeter.estimation import fit_epoch, fit_epochs
 from rigidimeter.estimation.closedloop import EpochStream
 from rigidimeter.settings import Settings
+from rigidimeter.virtual.batch import simulate_chunks, simulate_epochs
 
 
 def rows() -> list[Row]:

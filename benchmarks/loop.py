@@ -25,9 +25,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigidimeter.acquisition.processes.board import Board
 from rigidimeter.acquisition.processes.deadline import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Recording
+from rigidimeter.acquisition.processes.shared_status import Board
 from rigidimeter.acquisition.processes.supervise import (
     Ended,
     LoopSide,
@@ -35,11 +35,11 @@ from rigidimeter.acquisition.processes.supervise import (
     Realtime,
     supervise,
 )
-from rigidimeter.acquisition.session import run_session
-from rigidimeter.acquisition.states import Command, Order
-from rigidimeter.design import plan
-from rigidimeter.device import SimulatedRig
-from rigidimeter.recording.log import read_samples
+from rigidimeter.acquisition.run_states import Command, Order
+from rigidimeter.acquisition.session_run import run_session
+from rigidimeter.devices import SimulatedRig
+from rigidimeter.experiment import plan
+from rigidimeter.recording.sample_log import read_samples
 from rigidimeter.settings import Settings, parse_settings
 
 PRIORITY = 80

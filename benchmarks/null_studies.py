@@ -41,25 +41,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.batch import simulate_epochs
+from rigidimeter.dynamics import draw_joint
+from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import fit_epochs, score_epoch
-from rigidimeter.estimation.closedloop import estimate
+from rigidimeter.estimation.closedloop import closed_loop_fit as estimate
 from rigidimeter.estimation.scores import angular_impulse_nm_s, loop_area_j, scoring_cycles
-from rigidimeter.joint import JointDynamics
+from rigidimeter.paper.imposed import imposed_epoch
 from rigidimeter.records import Epoch
-from rigidimeter.reproduce.imposed import imposed_epoch
 from rigidimeter.settings import Settings, SubjectSettings, parse_settings
-from rigidimeter.simulation import draw_joint
 from rigidimeter.statistics import day_difference, difference, exact_ranksum, fit_mixed, ranksum
-from rigidimeter.virtual.design import NULL, PAPER, StudyDesign
-from rigidimeter.virtual.plan import (
-    DayPlan,
-    day_factors,
-    day_joint,
-    draw_ratings,
-    plan_study,
-)
-from rigidimeter.virtual.rates import PAPER_RATES
+from rigidimeter.virtual.batch import simulate_epochs
+from rigidimeter.virtual.paper_rates import PAPER_RATES
+from rigidimeter.virtual.study_design import NULL, PAPER, StudyDesign
+from rigidimeter.virtual.study_plan import DayPlan, day_factors, day_joint, draw_ratings, plan_study
 
 Array = NDArray[np.float64]
 

@@ -26,8 +26,8 @@ from rigidimeter.acquisition import run_session
 from rigidimeter.acquisition.processes.deadline import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Recording
 from rigidimeter.acquisition.processes.supervise import LoopSide, LoopTarget, Realtime, supervise
-from rigidimeter.design import Protocol, plan
-from rigidimeter.device.rigfile import load_rig
+from rigidimeter.devices.rigfile import load_rig
+from rigidimeter.experiment import Protocol, plan
 from rigidimeter.recording import read_session
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.study import analyse

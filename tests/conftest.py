@@ -10,7 +10,7 @@ import pytest
 
 from rigidimeter.cli.main import main
 from rigidimeter.settings import parse_settings
-from rigidimeter.virtual.session import run_virtual_session
+from rigidimeter.virtual.virtual_session import run_virtual_session
 
 Simulate = Callable[..., Path]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rigidimeter.settings import parse_settings
-from rigidimeter.virtual.session import run_virtual_session
+from rigidimeter.virtual.virtual_session import run_virtual_session
 
 TOML = """\
 schema = "rigidimeter.study/1"

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from rigidimeter.estimation import diagnostics
-from rigidimeter.estimation.closedloop.misfit import worst_misfit
+from rigidimeter.estimation.closedloop.lack_of_fit import worst_misfit
 from rigidimeter.settings import DiagnosticLevels, DiagnosticsSettings
 
 ROOT = Path(__file__).parents[2]

@@ -10,12 +10,12 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from rigidimeter.acquisition.processes.board import Condition, Role
 from rigidimeter.acquisition.processes.deadline import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
+from rigidimeter.acquisition.processes.shared_status import Condition, Role
 from rigidimeter.acquisition.processes.supervise import Realtime, supervise
 from rigidimeter.guard import Cause
-from rigidimeter.recording.log import Sample
+from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import Settings
 
 RATE_HZ = 500

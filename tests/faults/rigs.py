@@ -28,17 +28,17 @@ import numpy as np
 
 from rigidimeter.acquisition.clock import SimulatedClock
 from rigidimeter.acquisition.processes.deadline import DeadlineClock
-from rigidimeter.device import SimulatedRig
-from rigidimeter.device.ascii.drive import AsciiDrive
-from rigidimeter.device.ati.rdt import AtiRdt
-from rigidimeter.device.base import DeviceError
-from rigidimeter.device.cia402.drive import Cia402Drive
-from rigidimeter.device.composed import ComposedRig
-from rigidimeter.emulation.arm import EmulatedArm
-from rigidimeter.emulation.ascii import AsciiPeer
-from rigidimeter.emulation.cia402.node import Cia402Peer
-from rigidimeter.emulation.rdt.sensor import RdtPeer
-from rigidimeter.joint import JointDynamics
+from rigidimeter.devices import SimulatedRig
+from rigidimeter.devices.ascii.drive import AsciiDrive
+from rigidimeter.devices.ati.rdt import AtiRdt
+from rigidimeter.devices.base import DeviceError
+from rigidimeter.devices.cia402.drive import Cia402Drive
+from rigidimeter.devices.composed import ComposedRig
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.emulation.ascii_emulator import AsciiPeer
+from rigidimeter.emulation.cia402.cia402_emulator import Cia402Peer
+from rigidimeter.emulation.emulated_arm import EmulatedArm
+from rigidimeter.emulation.rdt.rdt_emulator import RdtPeer
 from rigidimeter.settings import Settings, parse_settings
 
 CANOPEN, ASCII = "rdt_canopen", "rdt_ascii"

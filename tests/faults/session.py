@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.acquisition import run_session
-from rigidimeter.acquisition.processes.board import Board, Condition, Role
 from rigidimeter.acquisition.processes.deadline import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
+from rigidimeter.acquisition.processes.shared_status import Board, Condition, Role
 from rigidimeter.acquisition.processes.supervise import LoopSide, Realtime, supervise
-from rigidimeter.design import plan
-from rigidimeter.device.rigfile import load_rig
+from rigidimeter.devices.rigfile import load_rig
+from rigidimeter.experiment import plan
 from rigidimeter.settings import Settings, parse_settings
 
 RATE_HZ = {"cia402": 500.0, "ascii": 50.0}

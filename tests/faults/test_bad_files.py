@@ -5,8 +5,8 @@ import pytest
 import scipy.io
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.tables.readers import read_recording
-from rigidimeter.recording.tables.table import ReadOptions
+from rigidimeter.recording.formats.readers import read_recording
+from rigidimeter.recording.formats.table_epochs import ReadOptions
 
 HEAD = b"time_s,torque_nm,angle_rad\n"
 ROWS = b"".join(b"%.2f,%d,0.1\n" % (k / 100, k % 7) for k in range(50))

@@ -14,8 +14,8 @@ from tests.faults.trials import (
     run,
 )
 
-from rigidimeter.acquisition.states import Command
-from rigidimeter.device.base import DeviceError
+from rigidimeter.acquisition.run_states import Command
+from rigidimeter.devices.base import DeviceError
 from rigidimeter.guard import Cause, guard_limits
 
 HORIZON_S = 0.1

@@ -18,12 +18,12 @@ from tests.faults.trials import (
     run,
 )
 
-from rigidimeter.acquisition.processes.board import Board, Role
 from rigidimeter.acquisition.processes.ring import SampleRing
+from rigidimeter.acquisition.processes.shared_status import Board, Role
 from rigidimeter.acquisition.processes.sink import BoardOutside
-from rigidimeter.acquisition.states import NOTHING, Command, Order
-from rigidimeter.device.base import DeviceError
-from rigidimeter.device.composed import ComposedRig
+from rigidimeter.acquisition.run_states import NOTHING, Command, Order
+from rigidimeter.devices.base import DeviceError
+from rigidimeter.devices.composed import ComposedRig
 from rigidimeter.guard import Cause, Reaction
 from rigidimeter.units import rad_from_deg
 

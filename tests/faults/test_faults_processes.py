@@ -24,7 +24,7 @@ from tests.faults.session import PATIENCE, RATE_HZ, SPEED_DEG_S
 from tests.wire.bench import EmulatedBench
 
 from rigidimeter.guard import Cause
-from rigidimeter.recording.log import read_samples
+from rigidimeter.recording.sample_log import read_samples
 
 ROOT = Path(__file__).parents[2]
 RIG = {"cia402": "rdt_canopen", "ascii": "rdt_ascii"}

@@ -7,8 +7,8 @@ import pytest
 from tests.faults.rigs import ASCII, CANOPEN, RIGS, WIRES, Wrong, bench
 from tests.faults.trials import AT_S, assert_stopped, assert_whole, run
 
-from rigidimeter.device.ati.rdt import AtiRdt
-from rigidimeter.device.base import DeviceError
+from rigidimeter.devices.ati.rdt import AtiRdt
+from rigidimeter.devices.base import DeviceError
 from rigidimeter.errors import UserError
 from rigidimeter.guard import Cause
 from rigidimeter.settings import parse_settings
@@ -39,7 +39,9 @@ def test_fault_01_not_a_number(rig, case, tmp_path, monkeypatch, measured):
         else:
             perturbation = np.ones(round(made.rate_hz))
             perturbation[round(AT_S * made.rate_hz)] = math.nan
-            monkeypatch.setattr("rigidimeter.acquisition.session.prbs_nm", lambda *_: perturbation)
+            monkeypatch.setattr(
+                "rigidimeter.acquisition.session_run.prbs_nm", lambda *_: perturbation
+            )
             trial, cause = run(made, tmp_path / "s", task="prbs"), Cause.COMMAND_NOT_FINITE
             assert np.isnan(trial.samples["velocity_request_rad_s"][trial.first])
         assert_stopped(trial, cause, tick_s)

@@ -19,11 +19,11 @@ import numpy as np
 from tests.faults.rigs import ASCII, SLACK_S, Bench, Wrong
 
 from rigidimeter.acquisition import run_session
-from rigidimeter.acquisition.states import NOTHING, Order
-from rigidimeter.design import plan
+from rigidimeter.acquisition.run_states import NOTHING, Order
+from rigidimeter.experiment import plan
 from rigidimeter.guard import Cause, Reaction
 from rigidimeter.recording import SessionWriter
-from rigidimeter.recording.log import read_samples
+from rigidimeter.recording.sample_log import read_samples
 
 AT_S = 0.25
 """A fault comes when the imposed motion is fastest, half a period after its start."""

@@ -4,7 +4,7 @@ SLOWER = "looks closer where it need not; what it finds there does not limit"
 NEAR = "step.py guard_step: "
 
 EQUIVALENT: dict[str, str] = {
-    "replay.py replay: Cause.NONE → Cause.SOFTWARE": "a guard at the start holds nothing",
+    "recorded_guard.py replay: Cause.NONE → Cause.SOFTWARE": "a guard at the start holds nothing",
     "step.py guard_step: 1 → 0": "elapsed_ticks if not given: none counts as one",
     NEAR + "speed * speed / (2.0 * limits.acceleration_rad_s2) → "
     "speed * speed * (2.0 * limits.acceleration_rad_s2)": SLOWER,

@@ -29,12 +29,12 @@ TESTS = {
     "limits.py": ("test_limits.py",),
     "watch.py": ("test_watch.py", "test_step.py"),
     "step.py": ("test_step.py",),
-    "replay.py": ("test_replay.py",),
+    "recorded_guard.py": ("test_recorded_guard.py",),
 }
 LONGEST_S = 60
 """A mutant that takes longer goes round for ever: that is seen, too."""
 
-HEAVY = ("scipy.signal", "rigidimeter.settings", "rigidimeter.simulation", "rigidimeter.design")
+HEAVY = ("scipy.signal", "rigidimeter.settings", "rigidimeter.dynamics", "rigidimeter.experiment")
 
 
 class _InPlace(MetaPathFinder, Loader):

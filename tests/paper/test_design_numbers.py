@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.design import (
+from rigidimeter.dynamics import loop_margins, loop_stability
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.experiment import (
     APPENDIX_A,
     check_band,
     corners,
@@ -13,11 +15,10 @@ from rigidimeter.design import (
     ideal_response,
     power_spectrum,
     prbs_nm,
+    predicted_precision,
     sinusoid,
     time_constant_s,
 )
-from rigidimeter.foresight import loop_margins, loop_stability, predicted_precision
-from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import (
     ControllerSettings,
     GuardSettings,

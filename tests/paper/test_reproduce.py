@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from tests.unit.virtual.tiny import tiny
 
+from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.errors import UserError
-from rigidimeter.joint import JointDynamics
-from rigidimeter.reproduce import (
+from rigidimeter.paper import (
     AGREES,
     DIFFERS,
     MAKERS,
@@ -29,19 +29,14 @@ from rigidimeter.reproduce import (
     render_page,
     write_ledger,
 )
-from rigidimeter.reproduce.controller import position_sd_deg
-from rigidimeter.reproduce.counts import cycles_counted
-from rigidimeter.reproduce.effects import n_from, p_from, r_from
-from rigidimeter.reproduce.highpass import highpass_errors_percent
-from rigidimeter.reproduce.ledger import bounded, near, rounded, within_percent
-from rigidimeter.reproduce.noise import noise_runs
-from rigidimeter.reproduce.scores import (
-    scaled,
-    scored,
-    work_change_percent,
-    work_closed_form_j,
-)
-from rigidimeter.reproduce.voluntary import voluntary_errors_percent
+from rigidimeter.paper.comparison_table import bounded, near, rounded, within_percent
+from rigidimeter.paper.controller import position_sd_deg
+from rigidimeter.paper.counts import cycles_counted
+from rigidimeter.paper.highpass import highpass_errors_percent
+from rigidimeter.paper.printed_effects import n_from, p_from, r_from
+from rigidimeter.paper.score_rows import scaled, scored, work_change_percent, work_closed_form_j
+from rigidimeter.paper.sensor_noise import noise_runs
+from rigidimeter.paper.voluntary_torque import voluntary_errors_percent
 
 HEAVY = {  # made of simulations
     "sec-1-voluntary-ols", "sec-1-voluntary-iv", "sec-3.4-mean", "sec-3.4-sd", "sec-3.4-noise",

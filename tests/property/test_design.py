@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigidimeter.design import (
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.experiment import (
     check_band,
     corners,
     demand,
@@ -20,7 +21,6 @@ from rigidimeter.design import (
     prbs_nm,
     sinusoid,
 )
-from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import (
     BlockSettings,
     GuardSettings,

@@ -7,6 +7,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigidimeter.dynamics import DriveState, drive, drive_step
 from rigidimeter.guard import (
     REACTIONS,
     Cause,
@@ -16,7 +17,6 @@ from rigidimeter.guard import (
     guard_state,
     guard_step,
 )
-from rigidimeter.simulation import DriveState, drive, drive_step
 
 DT = 0.001
 LIMITS = GuardLimits(

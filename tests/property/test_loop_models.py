@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidimeter.design import prbs_nm
-from rigidimeter.estimation.closedloop.drive import DriveModel
-from rigidimeter.estimation.closedloop.loop import loop_model
-from rigidimeter.foresight import closed_loop_motion
-from rigidimeter.joint import JointDynamics
+from rigidimeter.dynamics import closed_loop_motion
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.estimation.closedloop.drive_fit import DriveModel
+from rigidimeter.estimation.closedloop.noise_free_loop import loop_model
+from rigidimeter.experiment import prbs_nm
 from rigidimeter.settings import Settings, parse_settings
 
 

@@ -5,14 +5,20 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rigidimeter.batch import simulate_chunks
 from rigidimeter.cli.simulate import PAPER_RATES
-from rigidimeter.design import prbs_nm
 from rigidimeter.estimation import fit_epochs
-from rigidimeter.foresight import PARAMETERS, Precision, Wanted, detect, predicted_precision
+from rigidimeter.experiment import (
+    PARAMETERS,
+    Precision,
+    Wanted,
+    detect,
+    prbs_nm,
+    predicted_precision,
+)
 from rigidimeter.records import Epoch, Fit
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.statistics import ranksum
+from rigidimeter.virtual.batch import simulate_chunks
 
 SESSION = 25
 """Epochs that are fitted together."""

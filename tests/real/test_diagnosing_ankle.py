@@ -8,8 +8,8 @@ import pytest
 from rigidimeter.estimation import epoch_signals, fit_inertia_damping_stiffness
 from rigidimeter.estimation.diagnostics import diagnose
 from rigidimeter.estimation.uncertainty import block_bootstrap, hac_covariance
-from rigidimeter.recording.tables.readers import read_recording
-from rigidimeter.recording.tables.table import ReadOptions
+from rigidimeter.recording.formats.readers import read_recording
+from rigidimeter.recording.formats.table_epochs import ReadOptions
 from rigidimeter.records import Channel
 from rigidimeter.settings import Settings
 

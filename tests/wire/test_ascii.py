@@ -11,12 +11,12 @@ import time
 
 import pytest
 
-from rigidimeter.device.ascii.drive import AsciiDrive
-from rigidimeter.device.base import DeviceError
-from rigidimeter.emulation.arm import EmulatedArm
-from rigidimeter.emulation.ascii import MISBEHAVIOURS, AsciiPeer
+from rigidimeter.devices.ascii.drive import AsciiDrive
+from rigidimeter.devices.base import DeviceError
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.emulation.ascii_emulator import MISBEHAVIOURS, AsciiPeer
+from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.guard import Cause
-from rigidimeter.joint import JointDynamics
 
 COUNTS_PER_TURN = 360_000.0
 TICK_S = 0.02
@@ -319,7 +319,7 @@ def test_commands_keep_up_with_the_rate_the_facts_state(wire, baud, record_prope
 
 SCRIPT = """
 import sys, time
-from rigidimeter.device.ascii.drive import AsciiDrive
+from rigidimeter.devices.ascii.drive import AsciiDrive
 settings = AsciiDrive.Settings(
     port=sys.argv[1], counts_per_turn=float(sys.argv[2]), horizon_s=float(sys.argv[3]),
     deceleration_deg_s2=float(sys.argv[4]), lost_s=0.5)

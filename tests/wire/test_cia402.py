@@ -13,13 +13,13 @@ import can
 import canopen
 import pytest
 
-from rigidimeter.device.base import DeviceError, MotionSample
-from rigidimeter.device.cia402.drive import Cia402Drive, Cia402Settings
-from rigidimeter.device.cia402.states import State
+from rigidimeter.devices.base import DeviceError, MotionSample
+from rigidimeter.devices.cia402.drive import Cia402Drive, Cia402Settings
+from rigidimeter.devices.cia402.state_words import State
+from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.emulation import EmulatedArm
-from rigidimeter.emulation.cia402.node import MISBEHAVIOURS, Cia402Peer
+from rigidimeter.emulation.cia402.cia402_emulator import MISBEHAVIOURS, Cia402Peer
 from rigidimeter.guard import Cause
-from rigidimeter.joint import JointDynamics
 
 # Wide enough for a machine that is busy with other things; the drive's own limits are measured.
 SLACK = {
@@ -513,8 +513,8 @@ def test_the_peer_is_a_drive_to_the_profile_that_others_wrote(wire):
 PEER = """
 import sys
 from rigidimeter.emulation import EmulatedArm
-from rigidimeter.emulation.cia402.node import Cia402Peer
-from rigidimeter.joint import JointDynamics
+from rigidimeter.emulation.cia402.cia402_emulator import Cia402Peer
+from rigidimeter.dynamics.joint import JointDynamics
 
 arm = EmulatedArm(JointDynamics(0.08, 0.5, 10.0))
 peer = Cia402Peer(arm, interface="udp_multicast", channel=sys.argv[1], port=int(sys.argv[2]))
@@ -527,7 +527,7 @@ peer.close()
 
 DRIVER = """
 import sys, time
-from rigidimeter.device.cia402.drive import Cia402Drive, Cia402Settings
+from rigidimeter.devices.cia402.drive import Cia402Drive, Cia402Settings
 
 drive = Cia402Drive(
     Cia402Settings(

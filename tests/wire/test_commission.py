@@ -24,11 +24,11 @@ from rigidimeter.commissioning import (
     record_path,
     write_record,
 )
-from rigidimeter.commissioning.record import A_PERSON_TELLS
-from rigidimeter.device.rigfile import load_rig
+from rigidimeter.commissioning.commissioning_record import A_PERSON_TELLS
+from rigidimeter.devices.rigfile import load_rig
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.settings.commissioning import CommissioningSettings
+from rigidimeter.settings.commissioning_settings import CommissioningSettings
 
 pytest.importorskip("can")
 pytest.importorskip("canopen")
@@ -220,7 +220,8 @@ def test_a_dead_sensor_is_caught_and_the_record_says_so(
 
     # What it asks of the system would last for the tests after it.
     monkeypatch.setattr(
-        "rigidimeter.acquisition.processes.realtime.prepare_loop_process", lambda: SimpleNamespace()
+        "rigidimeter.acquisition.processes.realtime_scheduling.prepare_loop_process",
+        lambda: SimpleNamespace(),
     )
     can_bench.misbehave("torque", "silent")
     out = can_bench.rig.with_name("dead.json")

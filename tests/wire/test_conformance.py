@@ -11,23 +11,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.device.ascii.drive import AsciiDrive
-from rigidimeter.device.ati.analogue import AtiAnalogue
-from rigidimeter.device.ati.rdt import AtiRdt
-from rigidimeter.device.cia402.drive import Cia402Drive
-from rigidimeter.device.conformance import (
+from rigidimeter.devices.ascii.drive import AsciiDrive
+from rigidimeter.devices.ati.analogue import AtiAnalogue
+from rigidimeter.devices.ati.rdt import AtiRdt
+from rigidimeter.devices.cia402.drive import Cia402Drive
+from rigidimeter.devices.conformance import (
     DRIVE_CHECKS,
     SENSOR_CHECKS,
     DriveBench,
     OtherEnd,
     SensorBench,
 )
-from rigidimeter.device.replay import ReplayDrive, ReplaySensor
-from rigidimeter.emulation.arm import EmulatedArm
-from rigidimeter.emulation.ascii import AsciiPeer
-from rigidimeter.emulation.cia402.node import Cia402Peer
-from rigidimeter.emulation.rdt.sensor import RdtPeer
-from rigidimeter.joint import JointDynamics
+from rigidimeter.devices.replay_device import ReplayDrive, ReplaySensor
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.emulation.ascii_emulator import AsciiPeer
+from rigidimeter.emulation.cia402.cia402_emulator import Cia402Peer
+from rigidimeter.emulation.emulated_arm import EmulatedArm
+from rigidimeter.emulation.rdt.rdt_emulator import RdtPeer
 
 JOINT = JointDynamics(0.08, 0.5, 2.0)
 CHANNEL = count()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rigidimeter.device.rigfile import load_rig
+from rigidimeter.devices.rigfile import load_rig
 
 pytest.importorskip("serial")
 

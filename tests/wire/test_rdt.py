@@ -7,12 +7,12 @@ import time
 
 import pytest
 
-from rigidimeter.device.ati.rdt import AtiRdt
-from rigidimeter.device.base import DeviceError
-from rigidimeter.emulation.arm import EmulatedArm
-from rigidimeter.emulation.rdt.sensor import MISBEHAVIOURS, RdtPeer
+from rigidimeter.devices.ati.rdt import AtiRdt
+from rigidimeter.devices.base import DeviceError
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.emulation.emulated_arm import EmulatedArm
+from rigidimeter.emulation.rdt.rdt_emulator import MISBEHAVIOURS, RdtPeer
 from rigidimeter.guard import Cause
-from rigidimeter.joint import JointDynamics
 
 ANGLE_RAD = 0.3
 STIFFNESS_NM_RAD = 2.0

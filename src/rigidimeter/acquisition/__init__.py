@@ -1,8 +1,8 @@
 """The only place with time: the clock, the loop, and the run of a session."""
 
 from rigidimeter.acquisition.clock import Clock, RealTimeClock, SimulatedClock
-from rigidimeter.acquisition.loop import ControlLoop
-from rigidimeter.acquisition.session import SessionResult, run_session
+from rigidimeter.acquisition.control_modes import ControlLoop
+from rigidimeter.acquisition.session_run import SessionResult, run_session
 
 __all__ = [
     "Clock",

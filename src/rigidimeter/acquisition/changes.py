@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rigidimeter.acquisition.loop import ControlLoop
-from rigidimeter.acquisition.states import Order
+from rigidimeter.acquisition.control_modes import ControlLoop
+from rigidimeter.acquisition.run_states import Order
 from rigidimeter.settings import ControllerSettings
 
 __all__ = ["Parameters", "bounds"]

@@ -14,10 +14,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from rigidimeter.acquisition.clock import Clock
-from rigidimeter.acquisition.outside import Alone, Outside
-from rigidimeter.acquisition.states import Command, Order
+from rigidimeter.acquisition.run_states import Command, Order
+from rigidimeter.acquisition.supervision import Alone, Outside
 from rigidimeter.control import Biquad, BiquadState, biquad_step, butterworth_lowpass
-from rigidimeter.device.base import Reading, Rig
+from rigidimeter.devices.base import Reading, Rig
 from rigidimeter.guard import (
     REACTIONS,
     Cause,
@@ -28,7 +28,7 @@ from rigidimeter.guard import (
     guard_step,
     released,
 )
-from rigidimeter.recording.log import Sample
+from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import Settings
 
 __all__ = ["REST", "Controller", "Passage", "Recorder", "Ticks"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import statistics
 
-from rigidimeter.device.base import Reading
+from rigidimeter.devices.base import Reading
 from rigidimeter.settings import ZeroingSettings
 
 __all__ = ["FEWEST", "Zeroing"]

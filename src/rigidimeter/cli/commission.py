@@ -77,10 +77,10 @@ def commission(
 
     from rigidimeter import __version__
     from rigidimeter.acquisition.processes.deadline import DeadlineClock
-    from rigidimeter.acquisition.processes.realtime import prepare_loop_process
+    from rigidimeter.acquisition.processes.realtime_scheduling import prepare_loop_process
     from rigidimeter.commissioning import Operator, Timebase, record_path, write_record
     from rigidimeter.commissioning import commission as try_rig
-    from rigidimeter.device.rigfile import load_rig
+    from rigidimeter.devices.rigfile import load_rig
     from rigidimeter.settings import load_settings
 
     rigfile, chosen = load_rig(rig), load_settings(settings)

@@ -11,12 +11,12 @@ from rigidimeter.cli.compare_show import comparison_document, comparison_lines
 from rigidimeter.cli.compare_table import compare_table
 from rigidimeter.cli.inputs import Recordings, analyse_inputs, keep_inputs, say, status
 from rigidimeter.cli.options import reads_recordings
-from rigidimeter.cli.study.analysed import KeyOption, analysed_study, study_files, study_of
-from rigidimeter.cli.study.show import study_lines
+from rigidimeter.cli.study.study_input import KeyOption, analysed_study, study_files, study_of
+from rigidimeter.cli.study.study_text import study_lines
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.cli.study.analysed import Analysed
+    from rigidimeter.cli.study.study_input import Analysed
     from rigidimeter.study import Comparison
 
 __all__ = ["COMPARISONS_SCHEMA", "compare"]
@@ -101,7 +101,7 @@ def compare(
         _say_changes(found, folder)
         raise typer.Exit(found.status)
     from rigidimeter.recording import read_estimates, write_json, write_text
-    from rigidimeter.report import csv_text, results_table
+    from rigidimeter.reporting import csv_text, results_table
     from rigidimeter.study import compare as compare_analysis
     from rigidimeter.study import comparison_row, conditions
 
@@ -180,7 +180,7 @@ def _write_study(
     found: Analysed, folder: Path, json_out: Path | None, csv_out: Path | None
 ) -> None:
     from rigidimeter.recording import write_json, write_text
-    from rigidimeter.report import csv_text, results_table
+    from rigidimeter.reporting import csv_text, results_table
     from rigidimeter.study import study_document
 
     if json_out is not None:

@@ -14,7 +14,7 @@ from rigidimeter.errors import UserError
 if TYPE_CHECKING:
     import numpy as np
 
-    from rigidimeter.recording.labelled import Labelled
+    from rigidimeter.recording.text_table import Labelled
     from rigidimeter.statistics import EffectDifference, Effects, Summary
 
 __all__ = ["Measured", "TableComparison", "compare_table"]
@@ -83,7 +83,7 @@ def compare_table(
     """
     import numpy as np
 
-    from rigidimeter.recording.labelled import read_labelled
+    from rigidimeter.recording.text_table import read_labelled
     from rigidimeter.statistics import holm
 
     table = read_labelled(path)

@@ -105,7 +105,7 @@ def _simulate(settings: list[dict[str, Any]], folders: list[Path]) -> None:
 
     from rigidimeter.cli.progress import Meter
     from rigidimeter.settings import parse_settings
-    from rigidimeter.virtual.session import session_length_s
+    from rigidimeter.virtual.virtual_session import session_length_s
 
     total_s = sum(session_length_s(parse_settings(values)) for values in settings)
     context = get_context("spawn")
@@ -135,7 +135,7 @@ def _run_day(index: int, values: dict[str, Any], folder: str, reached: Any) -> N
     import sys
 
     from rigidimeter.settings import parse_settings
-    from rigidimeter.virtual.session import run_virtual_session
+    from rigidimeter.virtual.virtual_session import run_virtual_session
 
     def reach(time_s: float) -> None:
         reached[index] = time_s

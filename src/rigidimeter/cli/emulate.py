@@ -50,8 +50,8 @@ def emulate(
       rigidimeter emulate --rig-out RIG.toml
       rigidimeter emulate --drive ascii --joint 0.0045 0.14 1.75 --rig-out RIG.toml
     """
-    from rigidimeter.emulation.bench import Bench, serve
-    from rigidimeter.joint import JointDynamics
+    from rigidimeter.dynamics.joint import JointDynamics
+    from rigidimeter.emulation.emulated_rig import Bench, serve
 
     if drive not in ("cia402", "ascii"):
         raise UserError(f"--drive {drive}: must be cia402 or ascii")
@@ -83,7 +83,7 @@ def emulate(
 
 def _check_target(rig_out: Path) -> None:
     """Refuse to write over anything but the rig file of an earlier emulation."""
-    from rigidimeter.device.rigfile import load_rig
+    from rigidimeter.devices.rigfile import load_rig
 
     if not rig_out.parent.is_dir():
         raise UserError(f"--rig-out {rig_out}: there is no folder {rig_out.parent}; make it first")

@@ -118,12 +118,7 @@ def _epoch(
     from rigidimeter.estimation import band_hz
     from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE, before_fit
     from rigidimeter.estimation.signals import motion_channels
-    from rigidimeter.estimation.terms import (
-        ModelRow,
-        compare_models,
-        fit_terms,
-        motion_from_epoch,
-    )
+    from rigidimeter.estimation.terms import ModelRow, compare_models, fit_terms, motion_from_epoch
 
     settings = every_setting.estimation
     row: dict[str, Any] = {

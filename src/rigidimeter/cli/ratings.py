@@ -76,10 +76,10 @@ def ratings(
     """
     from rigidimeter.cli.ratings_show import model_notices, ratings_document, ratings_lines
     from rigidimeter.recording import write_json
-    from rigidimeter.recording.labelled import read_labelled
+    from rigidimeter.recording.text_table import read_labelled
     from rigidimeter.records import Notice
     from rigidimeter.statistics import fit_mixed
-    from rigidimeter.study.ratings import RANDOM, groupings, ratings_of
+    from rigidimeter.study.rating_table import RANDOM, groupings, ratings_of
 
     keep_inputs((json_out,), (table,))
     chosen = tuple(dict.fromkeys(random or ["examiner"]))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rigidimeter.statistics import Contrast, Mixed
-    from rigidimeter.study.ratings import Ratings
+    from rigidimeter.study.rating_table import Ratings
 
 __all__ = ["RATINGS_SCHEMA", "model_notices", "ratings_document", "ratings_lines"]
 

@@ -10,7 +10,7 @@ import typer
 
 from rigidimeter.cli.inputs import Recordings, analyse_inputs, say, status
 from rigidimeter.cli.options import reads_recordings
-from rigidimeter.cli.study.analysed import KeyOption, analysed_study, study_of
+from rigidimeter.cli.study.study_input import KeyOption, analysed_study, study_of
 from rigidimeter.errors import UserError
 
 __all__ = ["report"]

@@ -47,7 +47,7 @@ def write_page(study: Study, out: Path) -> Path:
         If the folder cannot be written.
     """
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.report import write_report
+    from rigidimeter.reporting import write_report
 
     try:
         with Meter("report", 1.0) as meter:

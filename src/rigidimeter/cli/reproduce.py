@@ -37,7 +37,7 @@ def reproduce(
       rigidimeter reproduce --out paper --only fig-6b --only eq-8-largest
     """
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.reproduce import Workshop, chosen, make_rows, tally, write_ledger
+    from rigidimeter.paper import Workshop, chosen, make_rows, tally, write_ledger
 
     names = [name for text in only or [] for name in text.split(",") if name]
     wanted = chosen(names)

@@ -13,7 +13,7 @@ import typer
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.design import Protocol
+    from rigidimeter.experiment import Protocol
     from rigidimeter.settings import Settings
 
 __all__ = ["run"]
@@ -58,10 +58,10 @@ def run(
     """
     from rigidimeter.acquisition.processes.recorder import Recording
     from rigidimeter.acquisition.processes.supervise import Realtime, supervise
-    from rigidimeter.cli.realtime import run_loop
+    from rigidimeter.cli.realtime_rig import run_loop
     from rigidimeter.commissioning import check_record
     from rigidimeter.console import Terminal
-    from rigidimeter.device.rigfile import load_rig
+    from rigidimeter.devices.rigfile import load_rig
 
     settings, planned, continues = _planned(protocol, resume, seed, virtual=rig is None)
     home_rad = continues.get("origin_rad") if rig is not None else None
@@ -102,7 +102,7 @@ def _planned(
     path: Path | None, resume: Path | None, seed: int | None, *, virtual: bool
 ) -> tuple[Settings, Protocol, dict[str, Any]]:
     """Return settings, the epochs to run, and what they continue."""
-    from rigidimeter.design import Protocol, plan
+    from rigidimeter.experiment import Protocol, plan
     from rigidimeter.recording.resume import rest_of
     from rigidimeter.settings import dump_settings, load_settings, parse_settings
 
@@ -137,7 +137,7 @@ def _planned(
 
 def _ended(session: Path) -> None:
     """Refuse a session that is still being recorded: what is left of it is not known yet."""
-    from rigidimeter.recording.folder import EVENTS, lock
+    from rigidimeter.recording.session_folder import EVENTS, lock
 
     events = session / EVENTS
     if not events.is_file():
@@ -173,8 +173,8 @@ def _going_on(out: Path, rig: Path | str | None) -> str:
 
 def _counted(folder: Path) -> tuple[int, int]:
     """Return how many epochs ended with success, and how many were planned."""
-    from rigidimeter.recording.folder import EVENTS, read_manifest
-    from rigidimeter.recording.log import read_events
+    from rigidimeter.recording.sample_log import read_events
+    from rigidimeter.recording.session_folder import EVENTS, read_manifest
 
     events, _ = read_events(folder / EVENTS)
     good = sum(e.get("event") == "epoch_ended" and e["outcome"] == "success" for e in events)

@@ -9,7 +9,7 @@ import typer
 
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.errors import UserError
-from rigidimeter.virtual.rates import PAPER_RATES
+from rigidimeter.virtual.paper_rates import PAPER_RATES
 
 if TYPE_CHECKING:
     from rigidimeter.settings import Settings
@@ -58,7 +58,7 @@ def simulate(
     """
     from rigidimeter.cli.progress import Meter
     from rigidimeter.settings import load_settings
-    from rigidimeter.virtual.session import run_virtual_session, session_length_s
+    from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s
 
     if task not in (None, "prbs", "sinusoid"):
         raise UserError(f"--task {task}: must be prbs or sinusoid")

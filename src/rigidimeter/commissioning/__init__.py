@@ -1,14 +1,14 @@
 """Whether a rig is fit for a person's arm: checks on the devices, and a record of them."""
 
-from rigidimeter.commissioning.byhand import Operator
 from rigidimeter.commissioning.checks import Check, Outcome
-from rigidimeter.commissioning.coverage import check_record
-from rigidimeter.commissioning.record import (
+from rigidimeter.commissioning.commissioning_record import (
     CommissioningRecord,
     read_record,
     record_path,
     write_record,
 )
+from rigidimeter.commissioning.coverage import check_record
+from rigidimeter.commissioning.manual_checks import Operator
 from rigidimeter.commissioning.sequence import commission
 from rigidimeter.commissioning.trial import Timebase
 

@@ -11,11 +11,16 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.commissioning.record import CommissioningRecord, plain, read_record, record_path
-from rigidimeter.device.rigfile import RigFile
+from rigidimeter.commissioning.commissioning_record import (
+    CommissioningRecord,
+    plain,
+    read_record,
+    record_path,
+)
+from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings
-from rigidimeter.settings.commissioning import CommissioningSettings
+from rigidimeter.settings.commissioning_settings import CommissioningSettings
 
 __all__ = ["EXACT", "LIMITS", "check_record", "covered", "kept_facts"]
 

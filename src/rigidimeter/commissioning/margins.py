@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from rigidimeter.commissioning.checks import Check, impossible, number, yes
-from rigidimeter.foresight import Margins, loop_stability, near_instability
+from rigidimeter.dynamics import Margins, loop_stability, near_instability
 from rigidimeter.settings import Settings
 
 __all__ = ["margin_checks", "on_measured_rig"]

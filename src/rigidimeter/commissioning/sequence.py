@@ -21,11 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from rigidimeter.commissioning.byhand import Operator, known_angle, known_torque, told
 from rigidimeter.commissioning.checks import Check, impossible, yes
+from rigidimeter.commissioning.commissioning_record import CommissioningRecord
 from rigidimeter.commissioning.coverage import covered, kept_facts
+from rigidimeter.commissioning.manual_checks import Operator, known_angle, known_torque, told
 from rigidimeter.commissioning.margins import margin_checks
-from rigidimeter.commissioning.moving import (
+from rigidimeter.commissioning.motion_tests import (
     ANGLE_PER_COMMAND,
     angles,
     drift_check,
@@ -36,8 +37,7 @@ from rigidimeter.commissioning.moving import (
     swing_checks,
     torque_sign,
 )
-from rigidimeter.commissioning.record import CommissioningRecord
-from rigidimeter.commissioning.still import (
+from rigidimeter.commissioning.static_tests import (
     facts_checks,
     lateness,
     lost_check,
@@ -55,11 +55,11 @@ from rigidimeter.commissioning.trial import (
     listen,
     trial,
 )
-from rigidimeter.device.base import DeviceError, Rig
-from rigidimeter.device.rigfile import RigFile
+from rigidimeter.devices.base import DeviceError, Rig
+from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
-from rigidimeter.settings.commissioning import CommissioningSettings
+from rigidimeter.settings.commissioning_settings import CommissioningSettings
 
 __all__ = ["commission"]
 

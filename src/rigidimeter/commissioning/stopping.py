@@ -13,9 +13,9 @@ from collections.abc import Callable
 import numpy as np
 
 from rigidimeter.acquisition import ControlLoop
-from rigidimeter.commissioning.byhand import Operator, told
 from rigidimeter.commissioning.checks import Check, below, impossible, untried, yes
-from rigidimeter.commissioning.moving import way
+from rigidimeter.commissioning.manual_checks import Operator, told
+from rigidimeter.commissioning.motion_tests import way
 from rigidimeter.commissioning.trial import (
     Heard,
     Timebase,
@@ -26,10 +26,10 @@ from rigidimeter.commissioning.trial import (
     stopped_for,
     trial,
 )
-from rigidimeter.device.base import DeviceError, Rig
+from rigidimeter.devices.base import DeviceError, Rig
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
-from rigidimeter.settings.commissioning import CommissioningSettings
+from rigidimeter.settings.commissioning_settings import CommissioningSettings
 from rigidimeter.units import rad_from_deg
 
 __all__ = ["emergency_stop_checks", "watchdog_checks"]

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.acquisition import ControlLoop
-from rigidimeter.device.base import Now, Reading, Rig
+from rigidimeter.devices.base import Now, Reading, Rig
 from rigidimeter.guard import Cause, Reaction
-from rigidimeter.recording.log import Sample
+from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import Settings
 
 __all__ = [

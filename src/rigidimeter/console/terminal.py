@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from typing import IO
 
-from rigidimeter.acquisition.processes.board import (
+from rigidimeter.acquisition.processes.shared_status import (
     Board,
     Condition,
     Flag,
@@ -21,7 +21,7 @@ from rigidimeter.acquisition.processes.board import (
     LoopStatus,
     Role,
 )
-from rigidimeter.acquisition.states import Command, Order, State
+from rigidimeter.acquisition.run_states import Command, Order, State
 from rigidimeter.guard import Cause
 
 __all__ = ["KEYS", "Terminal", "order_of", "status_line"]

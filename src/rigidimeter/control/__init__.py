@@ -6,12 +6,7 @@ in the interpreter and compiled, with the same bits.
 """
 
 from rigidimeter.control.admittance import Admittance, admittance, admittance_step
-from rigidimeter.control.filters import (
-    Biquad,
-    BiquadState,
-    biquad_step,
-    butterworth_lowpass,
-)
+from rigidimeter.control.filters import Biquad, BiquadState, biquad_step, butterworth_lowpass
 from rigidimeter.control.tracking import minimum_jerk, tracking_step
 
 __all__ = [

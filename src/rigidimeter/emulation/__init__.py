@@ -1,5 +1,5 @@
 """Wire peers: a sensor and drives that answer on a true wire, and misbehave when told to."""
 
-from rigidimeter.emulation.arm import EmulatedArm
+from rigidimeter.emulation.emulated_arm import EmulatedArm
 
 __all__ = ["EmulatedArm"]

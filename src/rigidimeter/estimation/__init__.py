@@ -2,17 +2,17 @@
 
 from rigidimeter.estimation.alignment import aligned, estimate_delays
 from rigidimeter.estimation.bandlimited import band_hz
-from rigidimeter.estimation.epochs import (
+from rigidimeter.estimation.least_squares import Solution, fit_inertia_damping_stiffness
+from rigidimeter.estimation.methods import (
     METHODS,
     choose_method,
     epoch_signals,
     fit_epoch,
     fit_epochs,
 )
-from rigidimeter.estimation.leastsquares import Solution, fit_inertia_damping_stiffness
 from rigidimeter.estimation.scores import Cycles, score_epoch, scoring_cycles
 from rigidimeter.estimation.signals import Signals
-from rigidimeter.estimation.sinusoid import find_motion, single_frequency_share
+from rigidimeter.estimation.sinusoid_detection import find_motion, single_frequency_share
 
 __all__ = [
     "METHODS",

@@ -13,18 +13,18 @@ from dataclasses import replace
 import numpy as np
 
 from rigidimeter.estimation.bandlimited import band_hz
-from rigidimeter.estimation.closedloop.delay import SCAN_STEP_S, direct, estimate_delay
-from rigidimeter.estimation.closedloop.drive import DriveModel
-from rigidimeter.estimation.closedloop.estimate import (
+from rigidimeter.estimation.closedloop.closed_loop_fit import (
     closed_loop_obstacle,
     drives,
     least_squares_start,
     observe,
 )
+from rigidimeter.estimation.closedloop.delay import SCAN_STEP_S, direct, estimate_delay
+from rigidimeter.estimation.closedloop.drive_fit import DriveModel
 from rigidimeter.estimation.closedloop.instruments import instrumental
-from rigidimeter.estimation.closedloop.lines import epoch_grid, epoch_lines
-from rigidimeter.estimation.closedloop.loop import loop_model
+from rigidimeter.estimation.closedloop.noise_free_loop import loop_model
 from rigidimeter.estimation.closedloop.refine import Linearise, Observation
+from rigidimeter.estimation.closedloop.spectral_lines import epoch_grid, epoch_lines
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.records import Channel, Delay, Epoch
 from rigidimeter.settings import Settings

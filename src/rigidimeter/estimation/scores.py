@@ -28,7 +28,7 @@ from rigidimeter.estimation.signals import (
     spline,
     uniform_grid,
 )
-from rigidimeter.estimation.sinusoid import find_motion
+from rigidimeter.estimation.sinusoid_detection import find_motion
 from rigidimeter.records import Epoch, Outcome, Score
 from rigidimeter.settings import EstimationSettings, ScoreSettings
 

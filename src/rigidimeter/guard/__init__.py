@@ -2,7 +2,7 @@
 
 from rigidimeter.guard.causes import REACTIONS, Cause, Reaction
 from rigidimeter.guard.limits import GuardLimits, GuardState, guard_limits, guard_state, released
-from rigidimeter.guard.replay import Replayed, replay
+from rigidimeter.guard.recorded_guard import Replayed, replay
 from rigidimeter.guard.step import Limited, guard_step, why_ended
 
 __all__ = [

@@ -1,7 +1,6 @@
 """Files, and nothing but files: sessions, other people's recordings, and estimates."""
 
-from rigidimeter.recording.epochs import is_session, read_session, session_settings
-from rigidimeter.recording.estimates import (
+from rigidimeter.recording.estimate_files import (
     ESTIMATES_SCHEMA,
     estimates_document,
     read_estimates,
@@ -10,9 +9,10 @@ from rigidimeter.recording.estimates import (
     write_json,
     write_text,
 )
-from rigidimeter.recording.folder import SessionWriter, read_manifest
-from rigidimeter.recording.recover import Recovery, recover
-from rigidimeter.recording.tables import ReadOptions, Table, read_recording, read_table
+from rigidimeter.recording.formats import ReadOptions, Table, read_recording, read_table
+from rigidimeter.recording.recovery import Recovery, recover
+from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
+from rigidimeter.recording.session_folder import SessionWriter, read_manifest
 
 __all__ = [
     "ESTIMATES_SCHEMA",

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.design import PlannedEpoch
 from rigidimeter.errors import UserError
-from rigidimeter.recording.epochs import session_settings
-from rigidimeter.recording.folder import EVENTS, read_manifest
-from rigidimeter.recording.log import read_events
+from rigidimeter.experiment import PlannedEpoch
+from rigidimeter.recording.sample_log import read_events
+from rigidimeter.recording.session_epochs import session_settings
+from rigidimeter.recording.session_folder import EVENTS, read_manifest
 from rigidimeter.settings import Settings
 
 __all__ = ["Rest", "rest_of"]

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.labelled import Labelled, read_labelled
 from rigidimeter.recording.study_toml import STUDY_FILE, StudyToml, read_study_toml
+from rigidimeter.recording.text_table import Labelled, read_labelled
 from rigidimeter.records import Notice
 
 __all__ = ["TABLE_COLUMNS", "Row", "StudyFolder", "is_study", "read_study_folder"]

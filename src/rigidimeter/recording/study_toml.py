@@ -16,8 +16,8 @@ from pydantic import Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from rigidimeter.errors import UserError
-from rigidimeter.settings.base import Section
 from rigidimeter.settings.messages import sentence
+from rigidimeter.settings.section import Section
 
 __all__ = [
     "STUDY_FILE",

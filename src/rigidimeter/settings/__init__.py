@@ -1,10 +1,9 @@
 """Validated settings: TOML with the unit in every key."""
 
-from rigidimeter.settings.diagnostics import DiagnosticLevels, DiagnosticsSettings
-from rigidimeter.settings.estimation import EstimationSettings, ScoreSettings
-from rigidimeter.settings.foresight import MarginsSettings, MultisineSettings, OptimiseSettings
+from rigidimeter.settings.diagnostics_settings import DiagnosticLevels, DiagnosticsSettings
+from rigidimeter.settings.estimation_settings import EstimationSettings, ScoreSettings
 from rigidimeter.settings.load import dump_settings, load_settings, parse_settings
-from rigidimeter.settings.loop import (
+from rigidimeter.settings.loop_settings import (
     GAP_S,
     ControllerSettings,
     GuardSettings,
@@ -12,15 +11,24 @@ from rigidimeter.settings.loop import (
     ZeroingSettings,
 )
 from rigidimeter.settings.models import Settings
-from rigidimeter.settings.online import OnlineSettings
-from rigidimeter.settings.protocol import (
+from rigidimeter.settings.online_settings import OnlineSettings
+from rigidimeter.settings.prediction_settings import (
+    MarginsSettings,
+    MultisineSettings,
+    OptimiseSettings,
+)
+from rigidimeter.settings.protocol_settings import (
     BlockSettings,
     PrbsSettings,
     ProtocolSettings,
     SinusoidSettings,
 )
-from rigidimeter.settings.rig import MotionSensorSettings, RigSettings, TorqueSensorSettings
-from rigidimeter.settings.subject import SubjectSettings
+from rigidimeter.settings.rig_settings import (
+    MotionSensorSettings,
+    RigSettings,
+    TorqueSensorSettings,
+)
+from rigidimeter.settings.subject_settings import SubjectSettings
 
 __all__ = [
     "GAP_S",

@@ -13,21 +13,29 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from rigidimeter.settings.base import Section
-from rigidimeter.settings.commissioning import CommissioningSettings
-from rigidimeter.settings.diagnostics import DiagnosticsSettings
-from rigidimeter.settings.estimation import EstimationSettings, ScoreSettings
-from rigidimeter.settings.foresight import MarginsSettings, MultisineSettings, OptimiseSettings
-from rigidimeter.settings.loop import (
+from rigidimeter.settings.commissioning_settings import CommissioningSettings
+from rigidimeter.settings.diagnostics_settings import DiagnosticsSettings
+from rigidimeter.settings.estimation_settings import EstimationSettings, ScoreSettings
+from rigidimeter.settings.loop_settings import (
     ControllerSettings,
     GuardSettings,
     LoopSettings,
     ZeroingSettings,
 )
-from rigidimeter.settings.online import OnlineSettings
-from rigidimeter.settings.protocol import PrbsSettings, ProtocolSettings, SinusoidSettings
-from rigidimeter.settings.rig import MotionSensorSettings, RigSettings, TorqueSensorSettings
-from rigidimeter.settings.subject import SubjectSettings
+from rigidimeter.settings.online_settings import OnlineSettings
+from rigidimeter.settings.prediction_settings import (
+    MarginsSettings,
+    MultisineSettings,
+    OptimiseSettings,
+)
+from rigidimeter.settings.protocol_settings import PrbsSettings, ProtocolSettings, SinusoidSettings
+from rigidimeter.settings.rig_settings import (
+    MotionSensorSettings,
+    RigSettings,
+    TorqueSensorSettings,
+)
+from rigidimeter.settings.section import Section
+from rigidimeter.settings.subject_settings import SubjectSettings
 
 __all__ = ["Settings"]
 

@@ -8,13 +8,21 @@ from rigidimeter.statistics.contrasts import (
     joint_test,
     pairwise,
 )
-from rigidimeter.statistics.days import (
+from rigidimeter.statistics.day_differences import (
     DayDifference,
     day_difference,
     day_medians,
     exact_ranksum,
 )
-from rigidimeter.statistics.effects import (
+from rigidimeter.statistics.effect_from_p import (
+    PublishedDifference,
+    PublishedEffect,
+    compare_published,
+    effect_from_p,
+    largest_r,
+    rank_biserial_interval,
+)
+from rigidimeter.statistics.effect_sizes import (
     EffectDifference,
     Effects,
     TwoGroups,
@@ -24,21 +32,7 @@ from rigidimeter.statistics.effects import (
     rank_biserial,
     two_groups,
 )
-from rigidimeter.statistics.mixed import (
-    LikelihoodRatio,
-    Mixed,
-    fit_mixed,
-    likelihood_ratio,
-    nested,
-)
-from rigidimeter.statistics.published import (
-    PublishedDifference,
-    PublishedEffect,
-    compare_published,
-    effect_from_p,
-    largest_r,
-    rank_biserial_interval,
-)
+from rigidimeter.statistics.mixed import LikelihoodRatio, Mixed, fit_mixed, likelihood_ratio, nested
 from rigidimeter.statistics.ranksum import RankSum, ranksum
 from rigidimeter.statistics.summary import Summary, summarise
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
-from rigidimeter.statistics.likelihood import Point, Products, minimise, products
+from rigidimeter.statistics.profiled_likelihood import Point, Products, minimise, products
 
 __all__ = ["LikelihoodRatio", "Mixed", "fit_mixed", "likelihood_ratio", "nested"]
 

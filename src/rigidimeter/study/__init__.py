@@ -5,10 +5,8 @@ installed.
 """
 
 from rigidimeter.study.analysis import analyse, checked, task_of
+from rigidimeter.study.archive import UNCHANGED, keep
 from rigidimeter.study.comparison import MEASURES, Comparison, Measure, compare, conditions
-from rigidimeter.study.document import comparison_row, study_document
-from rigidimeter.study.doubts import doubts
-from rigidimeter.study.kept import UNCHANGED, keep
 from rigidimeter.study.results import (
     Cohort,
     Condition,
@@ -22,7 +20,9 @@ from rigidimeter.study.results import (
     SessionEntry,
     Study,
 )
-from rigidimeter.study.whole import StudyRead, analyse_study, read_study, steps
+from rigidimeter.study.study_analysis import StudyRead, analyse_study, read_study, steps
+from rigidimeter.study.tables import comparison_row, study_document
+from rigidimeter.study.warnings import doubts
 
 __all__ = [
     "MEASURES",

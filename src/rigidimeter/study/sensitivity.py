@@ -14,7 +14,7 @@ from rigidimeter.study.comparison import (
     Measure,
     compare_results,
 )
-from rigidimeter.study.daywise import day_test, valued
+from rigidimeter.study.day_model import day_test, valued
 from rigidimeter.study.results import SensitivityRow, SessionEntry
 
 __all__ = ["SENSITIVITY_METHODS", "sensitivity_rows"]

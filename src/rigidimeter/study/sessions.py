@@ -20,15 +20,15 @@ from rigidimeter.recording import (
     read_session,
     session_settings,
 )
-from rigidimeter.recording.folder import EVENTS, MANIFEST, SAMPLES
-from rigidimeter.recording.log import read_events
+from rigidimeter.recording.sample_log import read_events
+from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES
 from rigidimeter.recording.study_folder import Row, StudyFolder
 from rigidimeter.recording.study_toml import is_outside
 from rigidimeter.records import Epoch, Notice
 from rigidimeter.settings import Settings
 from rigidimeter.study.analysis import task_of
-from rigidimeter.study.commanded import commanded_otherwise
-from rigidimeter.study.naming import Naming
+from rigidimeter.study.blinding import Naming
+from rigidimeter.study.protocol_check import commanded_otherwise
 from rigidimeter.study.results import LeftOut, SessionEntry
 
 __all__ = ["Gathered", "Session", "gather", "place_of", "source_of"]

@@ -3,7 +3,8 @@ import time
 
 import pytest
 
-from rigidimeter.acquisition.processes.board import (
+from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
+from rigidimeter.acquisition.processes.shared_status import (
     Board,
     Condition,
     Flag,
@@ -11,11 +12,10 @@ from rigidimeter.acquisition.processes.board import (
     LoopStatus,
     Role,
 )
-from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.sink import BoardOutside, RingSink
-from rigidimeter.acquisition.states import NOTHING, Command, Order, Run, State
+from rigidimeter.acquisition.run_states import NOTHING, Command, Order, Run, State
 from rigidimeter.guard import Cause
-from rigidimeter.recording.log import Sample
+from rigidimeter.recording.sample_log import Sample
 
 
 class Time:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rigidimeter.acquisition import ControlLoop, RealTimeClock, SimulatedClock, run_session
-from rigidimeter.design import plan
-from rigidimeter.device import Reading, SimulatedRig
+from rigidimeter.devices import Reading, SimulatedRig
+from rigidimeter.experiment import plan
 from rigidimeter.recording import SessionWriter
-from rigidimeter.recording.log import read_samples
+from rigidimeter.recording.sample_log import read_samples
 from rigidimeter.settings import parse_settings
 
 SETTINGS = parse_settings(

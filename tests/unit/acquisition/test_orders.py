@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from rigidimeter.acquisition import SimulatedClock, run_session
-from rigidimeter.acquisition.states import NOTHING, Command, Order
-from rigidimeter.design import plan, prbs_nm
-from rigidimeter.device import SimulatedRig
+from rigidimeter.acquisition.run_states import NOTHING, Command, Order
+from rigidimeter.devices import SimulatedRig
+from rigidimeter.experiment import plan, prbs_nm
 from rigidimeter.guard import Cause
 from rigidimeter.recording import SessionWriter
-from rigidimeter.recording.log import read_samples
+from rigidimeter.recording.sample_log import read_samples
 from rigidimeter.settings import parse_settings
 
 VALUES = {

@@ -6,10 +6,10 @@ import time
 
 import pytest
 
-from rigidimeter.acquisition.processes import realtime
+from rigidimeter.acquisition.processes import realtime_scheduling as realtime
 from rigidimeter.acquisition.processes.deadline import DeadlineClock, _relative_sleep
-from rigidimeter.acquisition.processes.realtime import Prepared, prepare_loop_process
-from rigidimeter.acquisition.processes.watched import Watched
+from rigidimeter.acquisition.processes.realtime_scheduling import Prepared, prepare_loop_process
+from rigidimeter.acquisition.processes.watchdog import Watched
 
 
 def test_the_clock_wakes_at_its_deadlines():

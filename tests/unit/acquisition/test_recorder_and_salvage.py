@@ -3,14 +3,14 @@ import errno
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition.processes.board import Board
 from rigidimeter.acquisition.processes.recorder import Recorder, Recording
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
-from rigidimeter.acquisition.processes.salvage import salvage
+from rigidimeter.acquisition.processes.ring_recovery import salvage
+from rigidimeter.acquisition.processes.shared_status import Board
 from rigidimeter.acquisition.processes.sink import RingSink
 from rigidimeter.errors import UserError
-from rigidimeter.recording import folder as folder_module
-from rigidimeter.recording.log import Sample, append_line, read_events, read_samples
+from rigidimeter.recording import session_folder as folder_module
+from rigidimeter.recording.sample_log import Sample, append_line, read_events, read_samples
 from rigidimeter.settings import Settings
 
 RATE_HZ = 1000.0

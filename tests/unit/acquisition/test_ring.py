@@ -6,7 +6,7 @@ import pytest
 
 from rigidimeter.acquisition.processes.ring import ROW, EventRing, Reader, SampleReader, SampleRing
 from rigidimeter.acquisition.processes.shared import Memory
-from rigidimeter.recording.log import Sample, sample_dtypes
+from rigidimeter.recording.sample_log import Sample, sample_dtypes
 
 
 def sample(k: int) -> Sample:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rigidimeter.acquisition.states import Command, Run, State, after, epoch_over
+from rigidimeter.acquisition.run_states import Command, Run, State, after, epoch_over
 
 RUNNING, PAUSED = Run(State.RUNNING), Run(State.PAUSED)
 

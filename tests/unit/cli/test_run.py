@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from rigidimeter.cli.realtime import HOME_TOLERANCE_RAD
-from rigidimeter.design import plan
-from rigidimeter.device.composed import Home
-from rigidimeter.device.rigfile import RigFile, load_rig
+from rigidimeter.cli.realtime_rig import HOME_TOLERANCE_RAD
+from rigidimeter.devices.composed import Home
+from rigidimeter.devices.rigfile import RigFile, load_rig
+from rigidimeter.experiment import plan
 from rigidimeter.recording import SessionWriter
 from rigidimeter.settings import parse_settings
 

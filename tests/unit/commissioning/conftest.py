@@ -13,14 +13,14 @@ from typing import Any, NamedTuple
 import pytest
 
 from rigidimeter.commissioning import CommissioningRecord, Operator, Timebase, commission
-from rigidimeter.device.base import DeviceError, DeviceFacts, MotionSample, TorqueSample
-from rigidimeter.device.composed import ComposedRig
-from rigidimeter.device.rigfile import RigFile
-from rigidimeter.emulation.arm import EmulatedArm
+from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, TorqueSample
+from rigidimeter.devices.composed import ComposedRig
+from rigidimeter.devices.rigfile import RigFile
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.guard import Cause
-from rigidimeter.joint import JointDynamics
 from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.settings.commissioning import CommissioningSettings
+from rigidimeter.settings.commissioning_settings import CommissioningSettings
 
 RATE_HZ = 100.0
 QUICK = CommissioningSettings(idle_s=1.0, swings=1, steps_s=1.2, known_torque_s=1.0)
@@ -202,7 +202,7 @@ def commissioned(settings: Settings, rigfile: RigFile, monkeypatch: Any) -> Comm
     ) -> CommissioningRecord:
         time = FakeTime()
         slept = SimpleNamespace(sleep=lambda s: time.wait_until(time.now() + s))
-        monkeypatch.setattr("rigidimeter.device.composed.time", slept)
+        monkeypatch.setattr("rigidimeter.devices.composed.time", slept)
         push_nm = [0.0]
         arm = EmulatedArm(
             JointDynamics(*joint),

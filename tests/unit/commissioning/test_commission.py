@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from tests.unit.commissioning.conftest import at_hand
 
-from rigidimeter.commissioning.record import A_PERSON_TELLS
+from rigidimeter.commissioning.commissioning_record import A_PERSON_TELLS
 from rigidimeter.settings import SubjectSettings
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rigidimeter.commissioning import moving
+from rigidimeter.commissioning import motion_tests as moving
 from rigidimeter.commissioning.trial import Tried
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings

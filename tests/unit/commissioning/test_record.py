@@ -19,9 +19,9 @@ from rigidimeter.commissioning import (
     write_record,
 )
 from rigidimeter.commissioning.checks import untried
+from rigidimeter.commissioning.commissioning_record import A_PERSON_TELLS, MUST_PASS, _digest
 from rigidimeter.commissioning.coverage import EXACT, LIMITS, covered, kept_facts
-from rigidimeter.commissioning.record import A_PERSON_TELLS, MUST_PASS, _digest
-from rigidimeter.device.rigfile import RigFile
+from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings, parse_settings
 

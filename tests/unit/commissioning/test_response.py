@@ -7,7 +7,7 @@ import pytest
 
 from rigidimeter.commissioning.response import arm_seen, following, velocity_scale
 from rigidimeter.commissioning.trial import Heard
-from rigidimeter.simulation import DriveState, arm_torque_nm, drive, drive_step
+from rigidimeter.dynamics import DriveState, arm_torque_nm, drive, drive_step
 
 J, B, K = 0.0045, 0.137, 1.75
 RATE_HZ, FINE = 200.0, 20

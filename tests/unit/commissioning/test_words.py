@@ -62,7 +62,7 @@ def test_a_rig_of_hardware_is_not_tried_without_a_name(tmp_path: Path) -> None:
 def test_the_wires_say_whether_a_rig_is_emulated(
     tmp_path: Path, address: str, interface: str, emulated: bool
 ) -> None:
-    from rigidimeter.device.rigfile import load_rig
+    from rigidimeter.devices.rigfile import load_rig
 
     rig = tmp_path / "RIG.toml"
     rig.write_text(RIG.format(address=address, interface=interface))

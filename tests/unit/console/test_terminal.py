@@ -7,7 +7,7 @@ import os
 
 import pytest
 
-from rigidimeter.acquisition.processes.board import (
+from rigidimeter.acquisition.processes.shared_status import (
     Board,
     Condition,
     Flag,
@@ -15,7 +15,7 @@ from rigidimeter.acquisition.processes.board import (
     LoopStatus,
     Role,
 )
-from rigidimeter.acquisition.states import NOTHING, Command, Order, State
+from rigidimeter.acquisition.run_states import NOTHING, Command, Order, State
 from rigidimeter.console.terminal import KEYS, Terminal, order_of, status_line
 from rigidimeter.guard import Cause
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import band_hz, epoch_signals, fit_epoch
-from rigidimeter.joint import JointDynamics
 from rigidimeter.records import Channel, Epoch, Outcome
 from rigidimeter.settings import EstimationSettings
 

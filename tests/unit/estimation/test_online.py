@@ -13,7 +13,7 @@ from rigidimeter.estimation.online import (
     online_reading,
     online_step,
 )
-from rigidimeter.estimation.tracking import tracking
+from rigidimeter.estimation.tracking_quality import tracking
 from rigidimeter.recording import read_session
 from rigidimeter.settings import OnlineSettings
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from rigidimeter.estimation.published import published_signals
+from rigidimeter.estimation.published_method import published_signals
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import EstimationSettings
 

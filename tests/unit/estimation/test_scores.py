@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import find_motion, score_epoch, scoring_cycles, single_frequency_share
 from rigidimeter.estimation.scores import loop_area_j
-from rigidimeter.joint import JointDynamics
 from rigidimeter.records import Channel, Epoch, Motion, Outcome
 from rigidimeter.settings import EstimationSettings, ScoreSettings
 

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.estimation.tracking import tracking
+from rigidimeter.estimation.tracking_quality import tracking
 
 T = np.arange(0.0, 40.0, 0.01)
 

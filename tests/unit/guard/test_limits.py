@@ -5,14 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.guard import (
-    Cause,
-    GuardLimits,
-    Reaction,
-    guard_limits,
-    guard_state,
-    released,
-)
+from rigidimeter.guard import Cause, GuardLimits, Reaction, guard_limits, guard_state, released
 from rigidimeter.settings import parse_settings
 
 DEG = math.pi / 180.0

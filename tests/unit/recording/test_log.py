@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.log import (
+from rigidimeter.recording.sample_log import (
     SAMPLE_UNITS,
     Sample,
     SampleLog,

@@ -6,8 +6,8 @@ from dataclasses import asdict
 
 import pytest
 
-from rigidimeter.design import plan
 from rigidimeter.errors import UserError
+from rigidimeter.experiment import plan
 from rigidimeter.recording import SessionWriter
 from rigidimeter.recording.resume import rest_of
 from rigidimeter.settings import parse_settings

@@ -12,7 +12,7 @@ from rigidimeter.recording import (
     recover,
     session_settings,
 )
-from rigidimeter.recording.log import SAMPLE_UNITS, read_samples
+from rigidimeter.recording.sample_log import SAMPLE_UNITS, read_samples
 from rigidimeter.settings import Settings
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.design import overview, sinusoid
-from rigidimeter.foresight import loop_stability, near_instability
+from rigidimeter.dynamics import loop_stability, near_instability
+from rigidimeter.experiment import overview, sinusoid
 from rigidimeter.guard.watch import energy_after
 from rigidimeter.settings import GuardSettings, Settings, SubjectSettings, load_settings
 

@@ -14,7 +14,7 @@ from rigidimeter.statistics import (
     nested,
     pairwise,
 )
-from rigidimeter.statistics.likelihood import evaluate, minimise, products
+from rigidimeter.statistics.profiled_likelihood import evaluate, minimise, products
 
 
 def balanced(seed: int, examiners: int = 4, days: int = 6, spread: float = 0.6):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-import rigidimeter.study.kept
+import rigidimeter.study.archive
 from rigidimeter.study import UNCHANGED, analyse_study, keep, read_study
 
 RESAMPLES = 100
@@ -130,7 +130,7 @@ def test_a_run_that_was_cut_off_is_made_up_for(
         (study / "ratings.csv").read_text().replace("M1,1,OFF,A,2.0", "M1,1,OFF,A,2.5")
     )
     left = iter(range(written))
-    whole = rigidimeter.study.kept._write_new
+    whole = rigidimeter.study.archive._write_new
 
     def cut_off(path: Path, text: str) -> None:
         if next(left, None) is None:
@@ -138,7 +138,7 @@ def test_a_run_that_was_cut_off_is_made_up_for(
         whole(path, text)
 
     with monkeypatch.context() as patched:
-        patched.setattr(rigidimeter.study.kept, "_write_new", cut_off)
+        patched.setattr(rigidimeter.study.archive, "_write_new", cut_off)
         with pytest.raises(KeyboardInterrupt):
             kept(study)
     said = kept(study)

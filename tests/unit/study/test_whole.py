@@ -154,7 +154,7 @@ def test_the_operator_takes_an_epoch_out_with_name_and_reason(study: Path) -> No
 
 def test_several_subjects_each_have_their_median_inertia(monkeypatch, fitted_study: Path) -> None:
     """Epochs of two subjects, the second twice as heavy: J is held at each one's own."""
-    from rigidimeter.study import whole as module
+    from rigidimeter.study import study_analysis as module
 
     def fake(epochs, settings, method, **_):
         from rigidimeter.records import Analysis, Outcome

@@ -13,9 +13,9 @@ from tests.unit.virtual.tiny import SHORT, tiny
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read_session, session_settings
 from rigidimeter.study import analyse, compare
-from rigidimeter.virtual.design import PAPER, PUSHING
-from rigidimeter.virtual.folder import study_length_s, write_virtual_study
-from rigidimeter.virtual.plan import plan_study
+from rigidimeter.virtual.study_design import PAPER, PUSHING
+from rigidimeter.virtual.study_plan import plan_study
+from rigidimeter.virtual.virtual_study import study_length_s, write_virtual_study
 
 
 def bytes_of(folder: Path) -> dict[str, bytes]:

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.joint import JointDynamics
-from rigidimeter.reproduce.printed import COUNTS
-from rigidimeter.reproduce.virtual import counts_of
-from rigidimeter.virtual.design import DESIGNS, NULL, PAPER, PUSHING
-from rigidimeter.virtual.plan import draw_ratings, plan_study, spread_evenly
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.paper.printed import COUNTS
+from rigidimeter.paper.virtual_data import counts_of
+from rigidimeter.virtual.study_design import DESIGNS, NULL, PAPER, PUSHING
+from rigidimeter.virtual.study_plan import draw_ratings, plan_study, spread_evenly
 
 
 @pytest.mark.parametrize("name", list(DESIGNS))

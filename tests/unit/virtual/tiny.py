@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rigidimeter.virtual.design import PAPER, StudyDesign
+from rigidimeter.virtual.study_design import PAPER, StudyDesign
 
 SHORT = {
     **PAPER.settings,

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.acquisition.processes.board import Board, Condition, LiveEstimate, Role
 from rigidimeter.acquisition.processes.ring import Reader, SampleReader, SampleRing
-from rigidimeter.acquisition.processes.watched import leave_signals_to_the_console
+from rigidimeter.acquisition.processes.shared_status import Board, Condition, LiveEstimate, Role
+from rigidimeter.acquisition.processes.watchdog import leave_signals_to_the_console
 from rigidimeter.estimation.online import (
     STATE_SIZE,
     compiled_online_step,

@@ -15,13 +15,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
-from rigidimeter.acquisition.processes.board import Board, Condition, Flag, Role
-from rigidimeter.acquisition.processes.realtime import Prepared, prepare_loop_process
+from rigidimeter.acquisition.processes.realtime_scheduling import Prepared, prepare_loop_process
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
-from rigidimeter.acquisition.processes.salvage import complete
+from rigidimeter.acquisition.processes.ring_recovery import complete
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.shared_status import Board, Condition, Flag, Role
 from rigidimeter.acquisition.processes.sink import BoardOutside, RingSink
-from rigidimeter.acquisition.processes.watched import Watched, leave_signals_to_the_console
+from rigidimeter.acquisition.processes.watchdog import Watched, leave_signals_to_the_console
 from rigidimeter.errors import UserError
 
 __all__ = ["LoopSide", "LoopTarget", "Realtime", "loop_main"]

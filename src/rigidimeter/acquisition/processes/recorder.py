@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.acquisition.processes.board import Board, Role
 from rigidimeter.acquisition.processes.ring import ROW, Event, EventRing, SampleRing
-from rigidimeter.recording.folder import SessionWriter
-from rigidimeter.recording.log import BATCH_S
+from rigidimeter.acquisition.processes.shared_status import Board, Role
+from rigidimeter.recording.sample_log import BATCH_S
+from rigidimeter.recording.session_folder import SessionWriter
 from rigidimeter.settings import Settings
 
 __all__ = ["Patience", "Recorder", "Recording"]

@@ -14,14 +14,14 @@ import sys
 import time
 import traceback
 
-from rigidimeter.acquisition.processes.board import Board, Condition, Flag, Role
+from rigidimeter.acquisition.processes.fsync_worker import Syncing
 from rigidimeter.acquisition.processes.recorder import Patience, Recorder, Recording
 from rigidimeter.acquisition.processes.ring import SampleRing
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.syncing import Syncing
-from rigidimeter.acquisition.processes.watched import Watched, leave_signals_to_the_console
+from rigidimeter.acquisition.processes.shared_status import Board, Condition, Flag, Role
+from rigidimeter.acquisition.processes.watchdog import Watched, leave_signals_to_the_console
 from rigidimeter.errors import UserError
-from rigidimeter.recording.folder import SessionWriter
+from rigidimeter.recording.session_folder import SessionWriter
 
 __all__ = ["recorder_main"]
 

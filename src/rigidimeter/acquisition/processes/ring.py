@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.acquisition.processes.shared import Memory
-from rigidimeter.recording.log import Sample, sample_dtypes
+from rigidimeter.recording.sample_log import Sample, sample_dtypes
 
 __all__ = ["ROW", "Event", "EventRing", "Reader", "SampleReader", "SampleRing"]
 

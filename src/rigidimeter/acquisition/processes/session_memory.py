@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rigidimeter.acquisition.processes.board import Board
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.shared import Memory
+from rigidimeter.acquisition.processes.shared_status import Board
 
 __all__ = ["SessionMemory"]
 

@@ -8,12 +8,18 @@ from functools import partial
 from time import monotonic_ns
 from typing import Any
 
-from rigidimeter.acquisition.processes.board import Board, Condition, LoopStatus, Nanoseconds, Role
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
-from rigidimeter.acquisition.states import Order, Run, State
+from rigidimeter.acquisition.processes.shared_status import (
+    Board,
+    Condition,
+    LoopStatus,
+    Nanoseconds,
+    Role,
+)
+from rigidimeter.acquisition.run_states import Order, Run, State
 from rigidimeter.guard import Cause
-from rigidimeter.recording.folder import Ending
-from rigidimeter.recording.log import Sample
+from rigidimeter.recording.sample_log import Sample
+from rigidimeter.recording.session_folder import Ending
 
 __all__ = ["BoardOutside", "RingSink"]
 

@@ -25,22 +25,17 @@ from multiprocessing.process import BaseProcess
 from types import FrameType
 from typing import Any
 
-from rigidimeter.acquisition.processes.board import Board, Condition, Flag, Role
-from rigidimeter.acquisition.processes.loop_process import (
-    LoopSide,
-    LoopTarget,
-    Realtime,
-    loop_main,
-)
+from rigidimeter.acquisition.processes.loop_process import LoopSide, LoopTarget, Realtime, loop_main
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.recorder_process import recorder_main
-from rigidimeter.acquisition.processes.salvage import Salvage, complete
+from rigidimeter.acquisition.processes.ring_recovery import Salvage, complete
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.watched import Watched
-from rigidimeter.acquisition.states import Command, Order
+from rigidimeter.acquisition.processes.shared_status import Board, Condition, Flag, Role
+from rigidimeter.acquisition.processes.watchdog import Watched
+from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.errors import UserError
-from rigidimeter.recording.folder import EVENTS
-from rigidimeter.recording.log import read_events
+from rigidimeter.recording.sample_log import read_events
+from rigidimeter.recording.session_folder import EVENTS
 
 __all__ = ["Ended", "LoopSide", "LoopTarget", "Realtime", "supervise"]
 

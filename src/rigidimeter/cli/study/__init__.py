@@ -2,8 +2,8 @@
 
 import typer
 
-from rigidimeter.cli.study.new import new
-from rigidimeter.cli.study.simulate import simulate
+from rigidimeter.cli.study.new_folder import new
+from rigidimeter.cli.study.virtual import simulate
 
 __all__ = ["study"]
 

@@ -9,8 +9,8 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
-from rigidimeter.emulation.arm import EmulatedArm
-from rigidimeter.emulation.cia402.machine import POWERED, Phase, after_control
+from rigidimeter.emulation.cia402.state_machine import POWERED, Phase, after_control
+from rigidimeter.emulation.emulated_arm import EmulatedArm
 
 __all__ = [
     "COMMUNICATION_ERROR",

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from rigidimeter.estimation.closedloop.lines import SAME_TIME, Grid, response_lines
 from rigidimeter.estimation.closedloop.refine import Observation, Problem
+from rigidimeter.estimation.closedloop.spectral_lines import SAME_TIME, Grid, response_lines
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel
 

@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.estimation.closedloop.lines import Lines
-from rigidimeter.estimation.closedloop.loop import LoopModel
-from rigidimeter.estimation.closedloop.noise import Smoother, drawn_lines, line_covariance
+from rigidimeter.estimation.closedloop.line_noise import Smoother, drawn_lines, line_covariance
+from rigidimeter.estimation.closedloop.noise_free_loop import LoopModel
+from rigidimeter.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel
 

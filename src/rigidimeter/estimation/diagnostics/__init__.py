@@ -7,7 +7,7 @@ from rigidimeter.estimation.diagnostics.channels import (
     saturation,
 )
 from rigidimeter.estimation.diagnostics.diagnose import diagnose, summary
-from rigidimeter.estimation.diagnostics.excitation import (
+from rigidimeter.estimation.diagnostics.excitation_checks import (
     band_share,
     coherence,
     conditioning,

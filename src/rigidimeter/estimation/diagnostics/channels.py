@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigidimeter.estimation.diagnostics.findings import judged
+from rigidimeter.estimation.diagnostics.finding_text import judged
 from rigidimeter.records import Channel, Epoch, Finding
 from rigidimeter.settings import DiagnosticsSettings
 

@@ -13,7 +13,7 @@ from rigidimeter.estimation.diagnostics.channels import (
     position_limit,
     saturation,
 )
-from rigidimeter.estimation.diagnostics.excitation import (
+from rigidimeter.estimation.diagnostics.excitation_checks import (
     band_share,
     coherence,
     conditioning,

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimeter.estimation.diagnostics.findings import judged
+from rigidimeter.estimation.diagnostics.finding_text import judged
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Epoch, Finding
 from rigidimeter.settings import DiagnosticsSettings

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
-from rigidimeter.estimation.diagnostics.findings import judged
-from rigidimeter.estimation.diagnostics.lines import inside, lines
+from rigidimeter.estimation.diagnostics.finding_text import judged
+from rigidimeter.estimation.diagnostics.power_lines import inside, lines
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.records import Channel, Finding
 from rigidimeter.settings import DiagnosticsSettings

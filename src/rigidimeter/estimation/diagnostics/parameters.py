@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rigidimeter.estimation.diagnostics.findings import judged
+from rigidimeter.estimation.diagnostics.finding_text import judged
 from rigidimeter.records import Finding
 from rigidimeter.settings import DiagnosticsSettings
 

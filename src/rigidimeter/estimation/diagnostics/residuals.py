@@ -14,9 +14,9 @@ from scipy import signal
 from scipy.special import digamma
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
-from rigidimeter.estimation.diagnostics.excitation import perturbation_nm
-from rigidimeter.estimation.diagnostics.findings import judged
-from rigidimeter.estimation.diagnostics.lines import inside, lines
+from rigidimeter.estimation.diagnostics.excitation_checks import perturbation_nm
+from rigidimeter.estimation.diagnostics.finding_text import judged
+from rigidimeter.estimation.diagnostics.power_lines import inside, lines
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.records import Epoch, Finding
 from rigidimeter.settings import DiagnosticsSettings

@@ -22,8 +22,8 @@ import numpy as np
 
 from rigidimeter.errors import UserError
 from rigidimeter.estimation.signals import Array
-from rigidimeter.estimation.terms.motion import Motion
 from rigidimeter.estimation.terms.reflex import REFLEX_KINDS
+from rigidimeter.estimation.terms.wideband_motion import Motion
 
 __all__ = ["GROUPS", "REFLEXES", "TERMS", "Term", "parse_terms"]
 

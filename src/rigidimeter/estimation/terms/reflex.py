@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from rigidimeter.estimation.signals import Array
-from rigidimeter.estimation.terms.motion import Motion
+from rigidimeter.estimation.terms.wideband_motion import Motion
 
 __all__ = ["REFLEX_KINDS", "Kernel", "kernel", "pass_through", "stretch_velocity"]
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigidimeter.batch import simulate_epochs
-from rigidimeter.joint import JointDynamics
+from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.records import Epoch
 from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.virtual.batch import simulate_epochs
 
 JOINT = JointDynamics(0.0045, 0.1368, 1.751)
 

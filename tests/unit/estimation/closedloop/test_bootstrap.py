@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.estimation import fit_epochs
-from rigidimeter.estimation.closedloop.noise import drawn_lines
+from rigidimeter.estimation.closedloop.line_noise import drawn_lines
 
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 

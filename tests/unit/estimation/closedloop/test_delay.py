@@ -5,7 +5,7 @@ import pytest
 
 from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.estimation import aligned, estimate_delays
-from rigidimeter.estimation.closedloop.spectral import period_s
+from rigidimeter.estimation.closedloop.periodic_response import period_s
 from rigidimeter.records import Channel
 
 

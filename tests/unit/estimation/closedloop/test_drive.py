@@ -3,9 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.estimation.closedloop.drive import DriveModel, fit_drive
+from rigidimeter.dynamics import DriveState, drive, drive_step
+from rigidimeter.estimation.closedloop.drive_fit import DriveModel, fit_drive
 from rigidimeter.records import Channel, Epoch
-from rigidimeter.simulation import DriveState, drive, drive_step
 
 
 def stepped(commands, bandwidth_hz=40.0, ratio=0.8, interval_s=1e-3):

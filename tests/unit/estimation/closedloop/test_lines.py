@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from rigidimeter.estimation.closedloop.lines import epoch_grid, epoch_lines
-from rigidimeter.estimation.closedloop.noise import Smoother, line_covariance
+from rigidimeter.estimation.closedloop.line_noise import Smoother, line_covariance
+from rigidimeter.estimation.closedloop.spectral_lines import epoch_grid, epoch_lines
 from rigidimeter.records import Channel, Epoch
 
 RATE_HZ = 200.0

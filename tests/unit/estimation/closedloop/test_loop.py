@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from rigidimeter.estimation.closedloop.drive import DriveModel
-from rigidimeter.estimation.closedloop.loop import loop_model
+from rigidimeter.estimation.closedloop.drive_fit import DriveModel
+from rigidimeter.estimation.closedloop.noise_free_loop import loop_model
 
 
 def model(settings, epoch):

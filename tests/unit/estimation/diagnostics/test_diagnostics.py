@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import Signals, epoch_signals, fit_inertia_damping_stiffness
 from rigidimeter.estimation.diagnostics import (
     active_movement,
@@ -31,7 +32,6 @@ from rigidimeter.estimation.diagnostics import (
     summary,
     voluntary_torque,
 )
-from rigidimeter.joint import JointDynamics
 from rigidimeter.records import Channel, Epoch, Finding
 from rigidimeter.settings import DiagnosticLevels, DiagnosticsSettings, EstimationSettings
 

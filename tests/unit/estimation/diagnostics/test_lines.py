@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from rigidimeter.estimation.diagnostics.lines import inside, lines
+from rigidimeter.estimation.diagnostics.power_lines import inside, lines
 
 
 @pytest.mark.parametrize("n", [1000, 1001])

@@ -9,8 +9,8 @@ import pytest
 import scipy.io
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.tables.readers import read_recording, read_table
-from rigidimeter.recording.tables.table import ReadOptions
+from rigidimeter.recording.formats.readers import read_recording, read_table
+from rigidimeter.recording.formats.table_epochs import ReadOptions
 
 NAMES = ("time_s", "torque_nm", "angle_rad")
 

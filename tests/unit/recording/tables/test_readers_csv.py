@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.tables.readers import read_recording, read_table
-from rigidimeter.recording.tables.table import ReadOptions
+from rigidimeter.recording.formats.readers import read_recording, read_table
+from rigidimeter.recording.formats.table_epochs import ReadOptions
 
 PLAIN = "time_s,torque_nm,angle_rad\n0.0,1.5,-0.25\n0.5,-2e-3,0.75\n1.0,3,0\n"
 WANTED = {"time_s": [0, 0.5, 1], "torque_nm": [1.5, -0.002, 3], "angle_rad": [-0.25, 0.75, 0]}

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rigidimeter.recording.tables.columns import Table
-from rigidimeter.recording.tables.readers import read_recording
-from rigidimeter.recording.tables.table import ReadOptions, epochs_from_table
+from rigidimeter.recording.formats.columns import Table
+from rigidimeter.recording.formats.readers import read_recording
+from rigidimeter.recording.formats.table_epochs import ReadOptions, epochs_from_table
 
 N = 400
 

@@ -6,8 +6,8 @@ import pytest
 import scipy.io
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.tables.mat_check import check_mat5
-from rigidimeter.recording.tables.readers import read_table
+from rigidimeter.recording.formats.mat_check import check_mat5
+from rigidimeter.recording.formats.readers import read_table
 
 FOLDER = Path(scipy.io.__file__).parent / "matlab" / "tests" / "data"
 FILES = sorted(FOLDER.glob("*.mat"))

@@ -1,0 +1,200 @@
+"""When the recorder did not end well: write what is still in the rings into its folder.
+
+A ring keeps what the recorder had not written, and some of what it had. Which of the two a row is
+the file itself says, by the last tick in a whole batch, so nothing is written twice and nothing
+left out, wherever the recorder was killed. The samples are written anew to a file beside the old
+one, which then takes its place; a fault half-way leaves the old one as it was.
+
+Whoever is left does it, once the recorder has ended or was ended (`complete`).
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rigidimeter.acquisition.processes.recorder import Patience, Recording
+from rigidimeter.acquisition.processes.ring import ROW, EventRing, SampleRing
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.shared_status import Condition, Role
+from rigidimeter.acquisition.processes.watchdog import Watched
+from rigidimeter.errors import UserError
+from rigidimeter.recording.recovery import recover
+from rigidimeter.recording.sample_log import (
+    BATCH_S,
+    SampleLog,
+    append_event,
+    append_line,
+    read_events,
+    read_samples,
+)
+from rigidimeter.recording.session_folder import EVENTS, SAMPLES, lock, read_manifest
+
+__all__ = ["Salvage", "complete", "salvage"]
+
+
+@dataclass(frozen=True)
+class Salvage:
+    """What was brought from the rings into the folder; `missing_samples` found no room before."""
+
+    samples: int
+    events: int
+    missing_samples: int
+
+
+def salvage(
+    folder: Path, samples: SampleRing, events: EventRing, reason: str, tick_rate_hz: float
+) -> Salvage:
+    """Complete a session folder from the rings, and close it.
+
+    Call it when neither loop nor recorder writes any more. Doing it twice changes nothing.
+
+    Parameters
+    ----------
+    folder : Path
+    samples, events : SampleRing, EventRing
+    reason : str
+        Why it was necessary; an epoch or session that the loop did not close ends with it.
+    tick_rate_hz : float
+        Sets how many samples make a batch.
+
+    Raises
+    ------
+    UserError
+        If the folder holds no session, or somebody writes to it.
+    OSError
+        If the disk does not take it.
+    """
+    read_manifest(folder)
+    path = folder / EVENTS
+    with path.open("ab", buffering=0) as file:
+        if not lock(file):
+            raise UserError(f"{folder}: is still being recorded, so nothing was written to it")
+        known, torn = read_events(path)
+        if torn:  # it is still in the ring
+            content = path.read_bytes()
+            file.truncate(content.rfind(b"\n") + 1)
+        was_closed = any(event.get("event") == "session_ended" for event in known)
+        added = _samples(folder / SAMPLES, samples, tick_rate_hz)
+        lines = _lines(path, events)
+        if (added or lines or torn or not was_closed) and not was_closed:
+            append_event(
+                file,
+                {
+                    "event": "record_salvaged",
+                    "samples": added,
+                    "events": len(lines),
+                    "missing_samples": samples.refused,
+                    "reason": reason,
+                },
+            )
+        for line in lines:
+            append_line(file, line)
+            events.recorded += 1
+        os.fsync(file.fileno())
+    recover(folder, reason)
+    return Salvage(added, len(lines), samples.refused)
+
+
+def complete(
+    me: Role,
+    shared: SessionMemory,
+    recording: Recording,
+    recorder: Watched,
+    patience: Patience,
+    remarks: list[str],
+) -> None:
+    """See the recorder to its end; if that is not a good one, do its work.
+
+    Parameters
+    ----------
+    me : Role
+        Whose heart beats meanwhile.
+    shared : SessionMemory
+    recording : Recording
+    recorder : Watched
+    patience : Patience
+    remarks : list of str
+        What the operator should know is added to them.
+    """
+    board = shared.board
+    since_s = time.monotonic()
+    hung = False
+    # One that has done its work no longer beats, and may take a while to leave.
+    while recorder.alive() and not hung and board.condition(Role.RECORDER) is not Condition.DONE:
+        board.beat(me)
+        # A heart that beat before the wait began may have been silent for a good reason.
+        silent_s = min(board.age_s(Role.RECORDER), time.monotonic() - since_s)
+        hung = silent_s > patience.hung_s
+        time.sleep(0.02)
+    if hung:
+        remarks.append(f"the recorder did not answer for {patience.hung_s:g} s and was ended")
+        recorder.kill()
+        until_s = time.monotonic() + 2.0
+        while recorder.alive() and time.monotonic() < until_s:
+            time.sleep(0.01)
+    if board.condition(Role.RECORDER) is Condition.DONE:
+        late = shared.samples.lag()
+        if late:
+            remarks.append(f"{late} samples came after the session was closed")
+        return
+    note = board.note(Role.RECORDER)
+    reason = note or ("the recorder hung" if hung else "the recorder was killed")
+    try:
+        salvage(
+            recording.folder,
+            shared.samples,
+            shared.events,
+            reason,
+            recording.settings.rig.tick_rate_hz,
+        )
+    except (UserError, OSError) as error:
+        remarks.append(f"{recording.folder}: the session could not be completed ({error})")
+
+
+def _samples(path: Path, ring: SampleRing, tick_rate_hz: float) -> int:
+    """Add the rows that the file has not; return how many."""
+    before = read_samples(path) if path.is_file() else None
+    rows = ring.kept()
+    if before is not None and before["tick"].size:
+        rows = rows[rows["tick"] > before["tick"][-1]]
+    if rows.size:
+        part = path.with_name(f"{path.name}.part")
+        part.unlink(missing_ok=True)
+        log = SampleLog(part, tick_rate_hz)
+        # Batches stay short: a reader may look at one at a time.
+        batch = max(1, int(BATCH_S * tick_rate_hz))
+        if before is not None:
+            for first in range(0, before["tick"].size, 100 * batch):
+                log.append_columns(
+                    {name: column[first : first + 100 * batch] for name, column in before.items()}
+                )
+        for first in range(0, rows.size, batch):
+            some = rows[first : first + batch]
+            log.append_columns({name: some[name] for name in _names()})
+        os.fsync(log.fileno())
+        log.close()
+        part.replace(path)
+    ring.recorded = ring.written
+    return int(rows.size)
+
+
+def _lines(path: Path, ring: EventRing) -> list[bytes]:
+    """Return the lines that the file has not.
+
+    The cursor moves after each line, so only the first can be in the file already.
+    """
+    waiting = [ring.get(number).line for number in range(ring.recorded, ring.written)]
+    if waiting and waiting[0] in path.read_bytes().splitlines(keepends=True)[-4:]:
+        ring.recorded += 1
+        return waiting[1:]
+    return waiting
+
+
+def _names() -> Sequence[str]:
+    names = ROW.names
+    assert names is not None
+    return names

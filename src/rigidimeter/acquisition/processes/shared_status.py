@@ -1,0 +1,323 @@
+"""The board: a page of shared memory on which each process pins what the others may read.
+
+Every value has one writer. Heartbeats are single numbers, nanoseconds of CLOCK_MONOTONIC, which
+all processes of a machine share and which no change of the wall clock moves. Values that belong
+together stand in a block with a sequence count that is odd while the block is written; a reader
+that sees an odd count, or another one after its copy, reads again. A writer killed half-way leaves
+it odd for good, so a reader gives up after some tries and returns nothing.
+
+Orders of the operator go into a ring of their own, in order, none lost: the console writes, the
+loop takes them one by one, and how many it has taken is its acknowledgement.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import struct
+import time
+from collections.abc import Callable
+from enum import IntEnum
+from typing import NamedTuple
+
+from rigidimeter.acquisition.processes.shared import Memory
+from rigidimeter.acquisition.run_states import NOTHING, Command, Order
+from rigidimeter.guard import Cause
+
+__all__ = ["Board", "Condition", "Flag", "LiveEstimate", "LoopStatus", "Nanoseconds", "Role"]
+
+Nanoseconds = Callable[[], int]
+
+
+class Role(IntEnum):
+    """The processes."""
+
+    LOOP = 0
+    RECORDER = 1
+    CONSOLE = 2
+    ESTIMATOR = 3
+
+
+class Condition(IntEnum):
+    """How a process is.
+
+    TROUBLE: it goes on trying, and its note says at what. FAILED: it has given up.
+    """
+
+    ABSENT = 0
+    STARTING = 1
+    READY = 2
+    RUNNING = 3
+    STOPPING = 4
+    TROUBLE = 5
+    DONE = 6
+    FAILED = 7
+
+
+class Flag(IntEnum):
+    """What is raised for the loop to see; each is one number."""
+
+    EMERGENCY_STOP = 0
+    END_ASKED = 1
+
+
+class LoopStatus(NamedTuple):
+    """What the loop shows of itself. `state` is a `states.State`, `cause` a `guard.Cause`."""
+
+    state: int = 0
+    tick: int = -1
+    epoch: int = -1
+    cause: int = int(Cause.NONE)
+    missed_deadlines: int = 0
+    time_s: float = 0.0
+    angle_rad: float = math.nan
+    velocity_rad_s: float = math.nan
+    torque_nm: float = math.nan
+    perturbation_nm: float = math.nan
+    velocity_command_rad_s: float = math.nan
+
+
+class LiveEstimate(NamedTuple):
+    """What the live estimator knows: J, B, K with standard errors, and of what time.
+
+    `missed_samples` is how many it could not read in time, in all.
+    """
+
+    tick: int = -1
+    resting: int = 0
+    missed_samples: int = 0
+    time_s: float = 0.0
+    inertia_kg_m2: float = math.nan
+    inertia_kg_m2_se: float = math.inf
+    damping_nm_s_rad: float = math.nan
+    damping_nm_s_rad_se: float = math.inf
+    stiffness_nm_rad: float = math.nan
+    stiffness_nm_rad_se: float = math.inf
+    memory_s: float = 0.0
+
+
+_KIND = 0x424F415244
+# Words, a cache line of 8 for each writer.
+_HEARTS, _PIDS, _CONDITIONS, _FLAGS = 8, 40, 48, 56
+_ORDERED, _TAKEN = 64, 72
+_SYNCED = 80
+_STATUS, _LIVE = 96, 128
+_ORDERS_BYTE, _NOTES_BYTE = 2048, 4096
+_NOTE_BYTES = 1024
+_ORDER = struct.Struct("@qqd48s")
+_ORDER_SLOTS = 16
+_NAME_BYTES = 48
+_BYTES = _NOTES_BYTE + len(Role) * _NOTE_BYTES
+_TRIES = 1000
+
+
+class _Block:
+    """Values that are read together or not at all."""
+
+    def __init__(self, memory: Memory, word: int, format_: str) -> None:
+        self._words, self._word = memory.words, word
+        self._bytes, self._at = memory.bytes, 8 * (word + 1)
+        self._struct = struct.Struct(format_)
+
+    def write(self, *values: int | float | bytes) -> None:
+        words, word = self._words, self._word
+        count = words[word] | 1  # odd already if the writer before was killed half-way
+        words[word] = count
+        self._struct.pack_into(self._bytes, self._at, *values)
+        words[word] = count + 1
+
+    def read(self) -> tuple[int | float | bytes, ...] | None:
+        words, word = self._words, self._word
+        for _ in range(_TRIES):
+            count = words[word]
+            if not count & 1:
+                values = self._struct.unpack_from(self._bytes, self._at)
+                if words[word] == count:
+                    return values
+        return None
+
+
+class Board:
+    """The board as one process sees it.
+
+    Parameters
+    ----------
+    memory : Memory
+    now_ns : callable
+        CLOCK_MONOTONIC in nanoseconds.
+    """
+
+    def __init__(self, memory: Memory, now_ns: Nanoseconds = time.monotonic_ns) -> None:
+        self.memory = memory
+        self._words = memory.words
+        self._bytes = memory.bytes
+        self._now_ns = now_ns
+        self._status = _Block(memory, _STATUS, "@5q6d")
+        self._live = _Block(memory, _LIVE, "@3q8d")
+        note = f"@q{_NOTE_BYTES - 16}s"
+        self._notes = [
+            _Block(memory, (_NOTES_BYTE + role * _NOTE_BYTES) // 8, note) for role in Role
+        ]
+
+    @classmethod
+    def create(cls) -> Board:
+        """Make a board."""
+        memory = Memory.create(_BYTES)
+        memory.words[0] = _KIND
+        board = cls(memory)
+        board.show(LoopStatus())
+        board.show_live(LiveEstimate())
+        return board
+
+    @classmethod
+    def attach(cls, name: str) -> Board:
+        """Attach to a board by its name."""
+        memory = Memory.attach(name)
+        if memory.words[0] != _KIND:
+            memory.close()
+            raise ValueError(f"shared memory {name} is no board")
+        return cls(memory)
+
+    @property
+    def name(self) -> str:
+        """What another process attaches by."""
+        return self.memory.name
+
+    def close(self) -> None:
+        """Let go of the memory."""
+        self.memory.close()
+
+    # Heartbeats, conditions and notes: each process writes its own.
+
+    def beat(self, role: Role) -> None:
+        """Say that a process is alive, now."""
+        self._words[_HEARTS + 8 * role] = self._now_ns()
+
+    def age_s(self, role: Role) -> float:
+        """Return how long ago a process last said so, infinity if it never did."""
+        beat = self._words[_HEARTS + 8 * role]
+        return 1e-9 * (self._now_ns() - beat) if beat else math.inf
+
+    def join(self, role: Role) -> None:
+        """Come in as one of the processes."""
+        self._words[_PIDS + role] = os.getpid()
+        self.beat(role)
+        self.set_condition(role, Condition.STARTING)
+
+    def pid(self, role: Role) -> int:
+        """Return the id of a process, 0 if it never came in."""
+        return self._words[_PIDS + role]
+
+    def set_condition(self, role: Role, condition: Condition, note: str | None = None) -> None:
+        """Say how a process is, with a sentence for the operator where there is one."""
+        if note is not None:
+            text = note.encode()[: _NOTE_BYTES - 16]
+            self._notes[role].write(len(text), text)
+        self._words[_CONDITIONS + role] = condition
+
+    def condition(self, role: Role) -> Condition:
+        """Return how a process last said it is."""
+        return Condition(self._words[_CONDITIONS + role])
+
+    def note(self, role: Role) -> str:
+        """Return the last sentence of a process."""
+        values = self._notes[role].read()
+        if values is None:
+            return ""
+        length, text = values
+        assert isinstance(length, int)
+        assert isinstance(text, bytes)
+        return text[:length].decode(errors="replace")
+
+    # Flags
+
+    def raise_flag(self, flag: Flag, up: bool = True) -> None:
+        """Raise a flag, or take it down."""
+        self._words[_FLAGS + flag] = int(up)
+
+    def flag(self, flag: Flag) -> bool:
+        """Whether a flag is up."""
+        return self._words[_FLAGS + flag] != 0
+
+    @staticmethod
+    def places() -> tuple[int, int, int, int, int]:
+        """Return where in `memory.words` stands what the loop touches every tick.
+
+        The flags for an emergency stop and for the end, the heartbeats of console, recorder and
+        the loop itself.
+        """
+        return (
+            _FLAGS + Flag.EMERGENCY_STOP,
+            _FLAGS + Flag.END_ASKED,
+            _HEARTS + 8 * Role.CONSOLE,
+            _HEARTS + 8 * Role.RECORDER,
+            _HEARTS + 8 * Role.LOOP,
+        )
+
+    # Orders
+
+    def post(self, order: Order) -> int:
+        """Give an order to the loop; return its number, counted from 1.
+
+        Raises
+        ------
+        ValueError
+            If the name is too long, or so many orders wait that the loop cannot be alive.
+        """
+        name = order.name.encode()
+        if len(name) > _NAME_BYTES:
+            raise ValueError(
+                f"{order.name}: the name of a parameter is at most {_NAME_BYTES} bytes"
+            )
+        number = self._words[_ORDERED]
+        if number - self._words[_TAKEN] >= _ORDER_SLOTS:
+            raise ValueError(f"{_ORDER_SLOTS} orders wait already; the loop does not take them")
+        at = _ORDERS_BYTE + number % _ORDER_SLOTS * _ORDER.size
+        _ORDER.pack_into(self._bytes, at, int(order.command), len(name), order.value, name)
+        self._words[_ORDERED] = number + 1
+        return number + 1
+
+    def take(self) -> Order:
+        """Return the next order, `NOTHING` if there is none; only the loop may."""
+        words = self._words
+        taken = words[_TAKEN]
+        if taken == words[_ORDERED]:
+            return NOTHING
+        at = _ORDERS_BYTE + taken % _ORDER_SLOTS * _ORDER.size
+        command, length, value, name = _ORDER.unpack_from(self._bytes, at)
+        words[_TAKEN] = taken + 1
+        return Order(Command(command), name[:length].decode(), value)
+
+    @property
+    def taken(self) -> int:
+        """The number of the last order that the loop took."""
+        return self._words[_TAKEN]
+
+    # What is shown
+
+    def show(self, status: LoopStatus) -> None:
+        """Show the loop; only the loop may."""
+        self._status.write(*status)
+
+    def status(self) -> LoopStatus | None:
+        """Return what the loop shows; None if it was killed while it wrote."""
+        values = self._status.read()
+        return None if values is None else LoopStatus(*values)  # type: ignore[arg-type]
+
+    def show_live(self, estimate: LiveEstimate) -> None:
+        """Show the live estimate; only the estimator may."""
+        self._live.write(*estimate)
+
+    def live(self) -> LiveEstimate | None:
+        """Return the live estimate; None if its process was killed while it wrote."""
+        values = self._live.read()
+        return None if values is None else LiveEstimate(*values)  # type: ignore[arg-type]
+
+    @property
+    def synced_samples(self) -> int:
+        """How many samples the disk itself has, as far as the system says."""
+        return self._words[_SYNCED]
+
+    @synced_samples.setter
+    def synced_samples(self, count: int) -> None:
+        self._words[_SYNCED] = count

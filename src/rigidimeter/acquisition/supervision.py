@@ -1,0 +1,68 @@
+"""What reaches the loop from outside its process: causes to stop for, and an operator's orders."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from rigidimeter.acquisition.run_states import NOTHING, Order
+from rigidimeter.guard import Cause
+from rigidimeter.recording.sample_log import Sample
+
+__all__ = ["Alone", "Outside", "Sink"]
+
+
+class Outside(Protocol):
+    """Asked at every tick, so it answers within a microsecond or two and never waits."""
+
+    attended: bool
+    """Whether an operator is there who can go on after a hold."""
+
+    def cause(self, now_s: float) -> int:
+        """Return a `guard.Cause` to stop for, 0 if there is none.
+
+        A console or a recorder that no longer answers, an emergency stop, a signal, a computer
+        that was suspended.
+        """
+
+    def order(self) -> Order:
+        """Return the next order that was not taken yet, `NOTHING` if there is none."""
+
+
+class Alone:
+    """Nobody is outside: a session in one process."""
+
+    attended = False
+
+    def cause(self, now_s: float) -> int:
+        """Return no cause."""
+        return int(Cause.NONE)
+
+    def order(self) -> Order:
+        """Return no order."""
+        return NOTHING
+
+
+class Sink(Protocol):
+    """Where samples and events go: a session folder, or the ring before it."""
+
+    def sample(self, sample: Sample) -> None:
+        """Take one tick."""
+
+    def session_started(self) -> None:
+        """Say that the loop runs."""
+
+    def epoch_started(
+        self, number: int, label: str, task: str, condition: str, time_s: float, **facts: Any
+    ) -> None:
+        """Say that an epoch begins."""
+
+    def epoch_ended(
+        self, number: int, time_s: float, outcome: Any, reason: str, **facts: Any
+    ) -> None:
+        """Say that an epoch is over."""
+
+    def event(self, kind: str, **facts: Any) -> None:
+        """Say what else happened that belongs in the record."""
+
+    def close(self, time_s: float, outcome: Any, reason: str) -> None:
+        """Say that the session is over."""

@@ -1,0 +1,117 @@
+"""Compose rig, loop and processes for a session in real time."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rigidimeter.acquisition.processes.deadline import DeadlineClock
+    from rigidimeter.acquisition.processes.loop_process import LoopSide
+    from rigidimeter.devices.base import Rig
+    from rigidimeter.experiment import PlannedEpoch, Protocol
+    from rigidimeter.settings import Settings
+
+__all__ = ["run_loop"]
+
+HOME_TOLERANCE_RAD = 0.05
+"""A session is gone on with from where it began, within 3 deg."""
+
+
+def run_loop(
+    settings: Settings,
+    protocol: Protocol,
+    rig_path: Path | None,
+    home_rad: float | None,
+    side: LoopSide,
+) -> None:
+    """Run a session; the target of the loop's process.
+
+    Parameters
+    ----------
+    settings : Settings
+    protocol : Protocol
+    rig_path : Path or None
+        RIG.toml; the virtual rig if not given.
+    home_rad : float or None
+        Where the joint stood, on the drive's scale, when the session began that this goes on with.
+    side : LoopSide
+        Rings, board and what prepares the process.
+    """
+    from rigidimeter.acquisition.processes.deadline import DeadlineClock
+
+    clock = DeadlineClock()
+    if rig_path is None:
+        rig, new_joint = _virtual(settings, protocol)
+        _run(settings, protocol, rig, new_joint, clock, side, lambda _: ())
+        return
+    # What is slow to load is loaded before the sensor's samples flow.
+    from rigidimeter.commissioning import check_record
+    from rigidimeter.devices.composed import Home
+    from rigidimeter.devices.rigfile import load_rig
+
+    rigfile = load_rig(rig_path)
+    home = Home(home_rad, HOME_TOLERANCE_RAD) if home_rad is not None else None
+    rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, home)
+
+    def approve(facts: Mapping[str, Any]) -> tuple[str, ...]:
+        return check_record(rigfile, facts, settings, settings.commissioning).not_tried
+
+    with rigfile.claim():
+        _run(settings, protocol, rig, lambda _: {}, clock, side, approve)
+
+
+def _run(
+    settings: Settings,
+    protocol: Protocol,
+    rig: Rig,
+    new_joint: Callable[[PlannedEpoch], Mapping[str, Any]],
+    clock: DeadlineClock,
+    side: LoopSide,
+    approve: Callable[[Mapping[str, Any]], Sequence[str]],
+) -> None:
+    """Set up the rig and run; `approve` refuses it or says which checks were never made."""
+    from rigidimeter.acquisition import run_session
+
+    try:
+        rig.connect()
+        facts = rig.configure()
+        not_tried = approve(facts)
+        side.sink.event("rig_configured", **facts)
+        if not_tried:
+            what = ", ".join(not_tried)
+            print(f"Not tried when the rig was commissioned: {what}.", file=sys.stderr)
+            side.sink.event("not_commissioned", checks=list(not_tried))
+        side.ready()
+        run_session(
+            protocol,
+            settings,
+            rig,
+            clock,
+            side.sink,
+            before_epoch=new_joint,
+            outside=side.outside,
+            zero_first=True,
+            state_changed=side.sink.state_changed,
+        )
+    finally:
+        rig.close()
+
+
+def _virtual(
+    settings: Settings, protocol: Protocol
+) -> tuple[Rig, Callable[[PlannedEpoch], Mapping[str, Any]]]:
+    import numpy as np
+
+    from rigidimeter.devices import SimulatedRig
+
+    first = settings.subject[protocol.epochs[0].condition]
+    rig = SimulatedRig(settings.rig, first, np.random.default_rng(settings.seed))
+
+    def new_joint(planned: PlannedEpoch) -> dict[str, Any]:
+        return {"true_joint": asdict(rig.new_epoch(settings.subject[planned.condition]))}
+
+    return rig, new_joint

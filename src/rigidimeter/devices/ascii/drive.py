@@ -1,0 +1,309 @@
+"""A serial servo drive of the Copley kind, commanded so that it stops when nobody commands it.
+
+In its velocity mode such a drive keeps the last velocity for ever: if the computer dies, the arm
+goes on to the mechanical stop. So, in ``mode = "moves"``, every command is a move of its own end:
+the trajectory generator is sent an absolute target a little ahead, at the wanted velocity, and
+each command renews it. The drive keeps the velocity for `horizon_s` after the last command and then
+brakes by its own deceleration: at rest within
+
+    horizon_s + v / deceleration
+
+whatever became of the computer. ``mode = "velocity"`` has no such end, and is refused unless
+`external_watchdog` says that a relay takes the power away when the loop's pulses cease.
+
+One cycle is: target, velocity, start, then position, velocity, and event status or desired state
+by turns.
+`read` and `write` only exchange batches with a thread that carries them (see `line`); a
+command that meets an unfinished cycle is not sent, and `write` returns the one still in force.
+The velocity is the drive's own register: it differentiates at its control rate, where the stamps of
+a serial line, a millisecond apart, would put their jitter into a difference.
+
+A loop that was held up for longer than the horizon finds a drive that has stopped by itself, and
+must not set it going again: commands are zero from then on, as after any fault, until `enable`.
+
+What is from memory of the programmer's guide stands in `protocol`. A USB adapter adds its
+latency timer to every reply; set it to 1 ms.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+from rigidimeter.devices.ascii.ascii_language import get, move_target, set_
+from rigidimeter.devices.ascii.ascii_settings import AsciiDriveSettings, open_port
+from rigidimeter.devices.ascii.feedback import Feedback
+from rigidimeter.devices.ascii.line import AsciiLine
+from rigidimeter.devices.ascii.setup import OFF, PATIENCE, AsciiTalk
+from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, Now
+from rigidimeter.guard import Cause
+
+__all__ = ["AsciiDrive", "AsciiDriveSettings"]
+
+VELOCITY, MOVES = 11, 21
+CYCLES_IN_HORIZON = 3
+
+
+class AsciiDrive:
+    """A `VelocityDrive` on a serial line.
+
+    Parameters
+    ----------
+    settings : AsciiDriveSettings
+    now : callable
+        Monotonic time in s.
+    """
+
+    Settings: ClassVar[type[AsciiDriveSettings]] = AsciiDriveSettings
+
+    def __init__(self, settings: AsciiDriveSettings, now: Now) -> None:
+        self._settings = settings
+        self._now = now
+        per_deg = settings.counts_per_turn / 360.0
+        self._per_rad = settings.sign * settings.counts_per_turn / (2.0 * math.pi)
+        self._offset_rad = math.radians(settings.angle_offset_deg)
+        self._fastest = settings.max_velocity_deg_s * per_deg
+        self._acceleration = settings.acceleration_deg_s2 * per_deg
+        self._braking = self._deceleration = settings.deceleration_deg_s2 * per_deg
+        self._jump = settings.jump_deg * per_deg
+        self._state_on = MOVES if settings.mode == "moves" else VELOCITY
+        self._line: AsciiLine | None = None
+        self._speaking = self._configured = False
+        self._powered = self._commanding = False
+        self._cycle_s = 0.0
+        self._sent = 0  # in 0.1 counts/s, on the drive's side of the sign
+        self._commanded_s = -math.inf
+        self._cycle = 0
+        self._asked_why = False
+        self._heard = Feedback(settings.baud, self._jump, self._fastest, self._state_on)
+
+    # -- life ---------------------------------------------------------------------------------
+
+    def connect(self) -> None:
+        """Open the port at the rate a drive has after power-up; sends nothing.
+
+        Raises
+        ------
+        DeviceError
+            If pyserial is missing or the port cannot be opened.
+        """
+        if self._line is not None:
+            return
+        self._line = AsciiLine(open_port(self._settings), self._now)
+
+    def configure(self) -> DeviceFacts:
+        """Set the baud rate, take the power away, set the profile and read everything back.
+
+        Raises
+        ------
+        DeviceError
+            If the drive does not answer, has a fault, does not take a value, or is too slow for
+            the horizon.
+        """
+        s = self._settings
+        if s.mode == "velocity" and not s.external_watchdog:
+            raise DeviceError(
+                'drive: mode = "velocity" keeps its last velocity when the computer dies; use '
+                'mode = "moves", or set external_watchdog = true if a relay cuts the power then'
+            )
+        self._configured = False
+        talk = self._talking()
+        talk.agree_on_baud()
+        self._speaking = True
+        talk.set(0x24, OFF)
+        self._powered = self._commanding = False
+        latched = talk.clear_faults()
+        self._deceleration = talk.write_profile(self._acceleration, self._braking)
+        self._cycle_s = talk.measured_cycle_s(self._now)
+        if s.mode == "moves" and s.horizon_s < CYCLES_IN_HORIZON * self._cycle_s:
+            raise DeviceError(
+                f"drive: horizon_s = {s.horizon_s:g} is too short for a cycle of "
+                f"{1e3 * self._cycle_s:.1f} ms at {s.baud} baud; at least "
+                f"{CYCLES_IN_HORIZON * self._cycle_s:.3f} would do, or a higher baud"
+            )
+        self._start_sampling()
+        self._configured = True
+        values: dict[str, str | float | int] = {
+            "baud": s.baud,
+            "mode": s.mode,
+            "cycle_s": self._cycle_s,
+            "latched_faults_before": latched,
+            "counts_per_turn": s.counts_per_turn,
+            "deceleration_counts_s2": self._deceleration,
+            "braking_rad_s2": self._deceleration / abs(self._per_rad),
+            "external_watchdog": int(s.external_watchdog),
+        }
+        return DeviceFacts(
+            model=talk.text(0x92),
+            serial=talk.text(0x81),
+            fastest_tick_rate_hz=1.0 / self._cycle_s,
+            watchdog_s=s.horizon_s if s.mode == "moves" else None,
+            values=values,
+        )
+
+    def enable(self) -> None:
+        """Write zero velocity and a target where the arm is, read them back, then energise.
+
+        Raises
+        ------
+        DeviceError
+            If the drive was not configured, a target is not zero, or the drive does not come up.
+        """
+        if not self._configured:
+            raise DeviceError("drive: enable before configure; call connect and configure first")
+        try:
+            self._enable()
+        except DeviceError:
+            self.disable()
+            raise
+
+    def _enable(self) -> None:
+        self._powered = True
+        self._talking().energise(self._state_on, self._jump)
+        self._sent = 0
+        self._start_sampling()
+        self._commanded_s = self._now()
+        self._commanding = True
+
+    # -- the loop -----------------------------------------------------------------------------
+
+    def read(self) -> MotionSample:
+        """Return the newest sample without waiting; the one before again if there is none."""
+        line, heard = self._line, self._heard
+        if line is not None and self._configured:
+            while (exchange := line.take()) is not None:
+                heard.hear(exchange, commanding=self._commanding)
+            now_s = self._now()
+            if line.busy and now_s - heard.heard_s > self._settings.lost_s + self._cycle_s:
+                heard.latch(Cause.DRIVE_LOST)
+            self._mind_the_horizon(now_s)
+            if not self._commanding and not line.busy:
+                self._send()
+        if heard.sequence < 0:
+            return MotionSample(math.nan, math.nan, -math.inf, cause=int(Cause.DRIVE_LOST))
+        return MotionSample(
+            heard.position / self._per_rad + self._offset_rad,
+            0.1 * heard.speed / self._per_rad,
+            heard.position_s,
+            heard.sequence,
+            (heard.position, heard.speed),
+            heard.status,
+            int(heard.cause),
+        )
+
+    def write(self, velocity_rad_s: float) -> float:
+        """Send a velocity and return the one in force: this one, or the last if the wire is busy.
+
+        It is limited to `max_velocity_deg_s`. One that is not finite is sent as zero and latched.
+        After a fault, or a pause in which the drive has stopped by itself, zero is sent.
+        """
+        line, heard = self._line, self._heard
+        if line is None or not self._commanding:
+            return 0.0
+        self._mind_the_horizon(self._now())
+        if not math.isfinite(velocity_rad_s):
+            heard.latch(Cause.COMMAND_NOT_FINITE)
+            velocity_rad_s = 0.0
+        if heard.cause not in (Cause.NONE, Cause.COMMAND_NOT_FINITE):
+            # Power that comes back, or an answer, must not set the arm going again; and no target
+            # can be built on a position that is not known. The move in force ends.
+            velocity_rad_s = 0.0
+        if line.busy:
+            heard.counts["skipped"] += 1
+        elif heard.refused and heard.cause is Cause.NONE:
+            # A drive without power refuses to move, and so does a faulty one: ask which it is.
+            if self._asked_why:
+                heard.latch(Cause.DRIVE_FAULT)
+            self._asked_why = True
+            self._send(ask_all=True)
+        else:
+            counts_s = max(-self._fastest, min(self._fastest, velocity_rad_s * self._per_rad))
+            self._sent = round(10.0 * counts_s)
+            self._commanded_s = self._now()
+            self._send(*self._requests(0.1 * self._sent))
+        return 0.1 * self._sent / self._per_rad
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Replies received, lost, damaged, refused (``e``), and commands skipped on a busy wire."""
+        return dict(self._heard.counts)
+
+    # -- the end ------------------------------------------------------------------------------
+
+    def stop(self) -> None:
+        """Abort the move: the drive brakes by its own deceleration and stays at rest."""
+        self._commanding = False
+        self._sent = 0
+        if self._powered:
+            request = "t 0" if self._settings.mode == "moves" else set_(0x2F, 0)
+            self._try(request)
+
+    def disable(self) -> None:
+        """Take the power away at once; a drive that does not confirm it is named lost."""
+        self._commanding = False
+        self._sent = 0
+        self._powered = False
+        self._try(set_(0x24, OFF))
+
+    def close(self) -> None:
+        """Take the power away and close the port."""
+        self.disable()
+        self._speaking = self._configured = False
+        line, self._line = self._line, None
+        if line is not None:
+            line.close()
+
+    # -- parts --------------------------------------------------------------------------------
+
+    def _requests(self, counts_s: float) -> tuple[str, ...]:
+        if self._settings.mode == "velocity":
+            return (set_(0x2F, round(10.0 * counts_s)),)
+        if counts_s == 0.0:
+            return ("t 0",)
+        heard = self._heard
+        moving = max(-self._fastest, min(self._fastest, 0.1 * heard.speed))
+        age_s = min(max(self._now() - heard.position_s, 0.0), 2.0 * self._cycle_s)
+        target = move_target(
+            heard.position + moving * age_s,
+            moving,
+            counts_s,
+            self._deceleration,
+            self._settings.horizon_s,
+        )
+        return set_(0xCA, target), set_(0xCB, abs(round(10.0 * counts_s))), "t 1"
+
+    def _send(self, *commands: str, ask_all: bool = False) -> None:
+        line = self._line
+        if line is not None:
+            self._heard.heard_s = self._now()
+            self._cycle += 1
+            turns = (0xA0, 0x24) if ask_all else ((0x24,) if self._cycle % 2 else (0xA0,))
+            line.submit(*commands, *map(get, (0x32, 0x18, *turns)))
+
+    def _mind_the_horizon(self, now_s: float) -> None:
+        """Notice that the last move has ended by itself, since none came to renew it."""
+        line = self._line
+        if not self._commanding or self._settings.mode != "moves" or line is None or line.busy:
+            return
+        if now_s - self._commanded_s > self._settings.horizon_s:
+            self._heard.latch(Cause.DRIVE_STATE)
+
+    def _start_sampling(self) -> None:
+        """Begin again from a fresh sample, without the causes of a life before."""
+        self._asked_why = False
+        talk = self._talking()
+        position, speed, status = (talk.value(register) for register in (0x32, 0x18, 0xA0))
+        self._heard.begin(position, speed, status, self._now())
+
+    def _talking(self) -> AsciiTalk:
+        if self._line is None:
+            raise DeviceError("drive: not connected; call connect first")
+        return AsciiTalk(self._line, self._settings)
+
+    def _try(self, request: str) -> None:
+        """Send a request of the way out; a drive that does not grant it is lost, nothing raises."""
+        if self._line is not None and self._speaking:
+            text = self._line.ask(request, PATIENCE * self._settings.lost_s)
+            if text != "ok":
+                self._heard.latch(Cause.DRIVE_LOST)

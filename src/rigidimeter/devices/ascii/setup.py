@@ -1,0 +1,244 @@
+"""Questions put to a serial drive before the loop runs; each waits for its answer and checks it."""
+
+from __future__ import annotations
+
+from statistics import median
+
+from rigidimeter.devices.ascii.ascii_language import (
+    DISABLED_BITS,
+    FAULT_BITS,
+    Reply,
+    get,
+    named_bits,
+    parse,
+    seconds,
+    set_,
+)
+from rigidimeter.devices.ascii.ascii_settings import POWER_UP_BAUD, AsciiDriveSettings
+from rigidimeter.devices.ascii.line import AsciiLine
+from rigidimeter.devices.base import DeviceError, Now
+
+__all__ = [
+    "OFF",
+    "PATIENCE",
+    "STATUS_DISABLED",
+    "STATUS_FAULTS",
+    "AsciiTalk",
+]
+
+OFF = 0
+STATUS_FAULTS = sum(1 << bit for bit in FAULT_BITS)
+STATUS_DISABLED = sum(1 << bit for bit in DISABLED_BITS)
+MEASURED_CYCLES = 7
+MARGIN = 1.4
+"""On the median cycle: a tick that meets an unfinished cycle sends no command at all."""
+PATIENCE = 4.0
+"""A question waits this many times the longest reply: for its turn, and for its answer."""
+
+
+class AsciiTalk:
+    """A conversation over a line; not for the loop, since it waits.
+
+    Parameters
+    ----------
+    line : AsciiLine
+    settings : AsciiDriveSettings
+    """
+
+    def __init__(self, line: AsciiLine, settings: AsciiDriveSettings) -> None:
+        self._line = line
+        self._settings = settings
+        self._patience_s = PATIENCE * settings.lost_s
+
+    def answer(self, request: str) -> Reply | None:
+        """Ask; return None if no answer came, or one that means nothing."""
+        text = self._line.ask(request, self._patience_s)
+        reply = None if text is None else parse(text)
+        return None if reply is None or reply.kind == "?" else reply
+
+    def value(self, register: int) -> int:
+        """Read a register.
+
+        Raises
+        ------
+        DeviceError
+            If it gives no value.
+        """
+        reply = self.answer(get(register))
+        if reply is None or reply.kind != "v":
+            raise DeviceError(
+                f"drive: register 0x{register:02x} gave {_found(reply)}; a value would be right"
+            )
+        return reply.value
+
+    def text(self, register: int) -> str:
+        """Read a register that holds text; empty if the drive has none."""
+        answer = self._line.ask(get(register), self._patience_s)
+        return answer[2:] if answer is not None and answer.startswith("v ") else ""
+
+    def command(self, request: str) -> None:
+        """Send a request that must be granted.
+
+        Raises
+        ------
+        DeviceError
+            If it is not.
+        """
+        reply = self.answer(request)
+        if reply is None or reply.kind != "ok":
+            raise DeviceError(f"drive: {request!r} gave {_found(reply)}; ok would be right")
+
+    def set(self, register: int, value: int) -> None:
+        """Set a register and read it back.
+
+        Raises
+        ------
+        DeviceError
+            If the drive keeps another value.
+        """
+        self.command(set_(register, value))
+        found = self.value(register)
+        if found != value:
+            raise DeviceError(
+                f"drive: register 0x{register:02x} is {found} after {value} was written; "
+                "the drive does not take it"
+            )
+
+    def agree_on_baud(self) -> None:
+        """Find the drive at its first rate, or at the one wanted, and bring it to the latter.
+
+        Raises
+        ------
+        DeviceError
+            If it answers at neither, or does not take the rate.
+        """
+        line, port, baud = self._line, self._line.port, self._settings.baud
+        # A break brings a drive of an earlier session back to its first rate.
+        port.send_break(0.05)
+        for rate in dict.fromkeys((POWER_UP_BAUD, baud)):
+            port.baudrate = rate
+            if self.answer(get(0x90)) is not None:
+                break
+        else:
+            raise DeviceError(
+                f"drive: no answer on {self._settings.port} at {POWER_UP_BAUD} or {baud} baud; "
+                "check the cable, the power and that no other program holds the drive"
+            )
+        if port.baudrate != baud:
+            # At which rate the answer comes is not certain, so it is not looked at.
+            line.ask(set_(0x90, baud), self._patience_s)
+            port.baudrate = baud
+        found = self.answer(get(0x90))
+        if found is None or found.value != baud:
+            raise DeviceError(
+                f"drive: the baud rate is {'unknown' if found is None else found.value} "
+                f"after it was set; {baud} would be right"
+            )
+
+    def clear_faults(self) -> int:
+        """Clear latched faults of a drive without power; return which there were.
+
+        Raises
+        ------
+        DeviceError
+            If one stays.
+        """
+        latched = self.value(0xA4)
+        if latched:
+            self.command(set_(0xA4, latched))
+        status = self.value(0xA0)
+        if status & STATUS_FAULTS:
+            raise DeviceError(
+                f"drive: event status 0x{status:x} has a fault that does not clear "
+                f"({named_bits(status, FAULT_BITS)}); remove its reason and configure again"
+            )
+        return latched
+
+    def write_profile(self, acceleration: float, deceleration: float) -> float:
+        """Set zero velocity, absolute trapezoids and the ramps, given in counts/s².
+
+        Returns
+        -------
+        float
+            The deceleration as the drive has it.
+        """
+        self.set(0x2F, 0)
+        self.set(0xCB, 0)
+        self.set(0xC8, 0)
+        moves, velocity = (max(1, round(deceleration / unit)) for unit in (10.0, 1000.0))
+        for register, value in (
+            (0xCC, max(1, round(acceleration / 10.0))),
+            (0xCD, moves),
+            (0xCF, moves),
+            (0x36, max(1, round(acceleration / 1000.0))),
+            (0x37, velocity),
+        ):
+            self.set(register, value)
+        return 10.0 * moves if self._settings.mode == "moves" else 1000.0 * velocity
+
+    def energise(self, state_on: int, most_counts: float) -> None:
+        """Write zero velocity and a target where the arm is, read them back, then energise.
+
+        Parameters
+        ----------
+        state_on : int
+            The desired state of a drive with power.
+        most_counts : float
+            How far the arm may move meanwhile.
+
+        Raises
+        ------
+        DeviceError
+            If a target is not zero, or the drive does not come up at rest.
+        """
+        state = self.value(0x24)
+        if state != OFF:
+            raise DeviceError(f"drive: desired state is {state} before enable; 0 would be right")
+        self.set(0x2F, 0)
+        self.set(0xCB, 0)
+        before = self.value(0x32)
+        self.set(0xCA, before)
+        self.command(set_(0x24, state_on))
+        state, status = self.value(0x24), self.value(0xA0)
+        if state != state_on or status & (STATUS_FAULTS | STATUS_DISABLED):
+            why = named_bits(status, FAULT_BITS | DISABLED_BITS) or "no reason given"
+            raise DeviceError(
+                f"drive: desired state {state}, event status 0x{status:x} after enable ({why}); "
+                f"state {state_on} without these bits would be right"
+            )
+        moved = self.value(0x32) - before
+        if abs(moved) > most_counts:
+            raise DeviceError(f"drive: moved {moved} counts on enable; it must stand still")
+
+    def measured_cycle_s(self, now: Now) -> float:
+        """Return how long to allow for a cycle of the loop, tried with requests of its length.
+
+        Raises
+        ------
+        DeviceError
+            If the drive stops answering.
+        """
+        line = self._line
+        commands: tuple[str, ...] = (set_(0xCA, -100_000), set_(0xCB, 100_000), "t 0")
+        if self._settings.mode == "velocity":
+            commands = (set_(0x2F, 0),)
+        cycle = (*commands, get(0x32), get(0x18), get(0xA0))
+        taken_s = []
+        for _ in range(MEASURED_CYCLES):
+            began_s = now()
+            line.submit(*cycle)
+            if not line.wait(len(cycle) * self._patience_s):
+                raise DeviceError("drive: stopped answering while its speed was measured")
+            taken_s.append(now() - began_s)
+        line.drop()
+        self.set(0xCB, 0)
+        # Never better than the characters allow, whatever a clock may say.
+        replies = len(commands) * len("ok\r") + 3 * len("v -1234567\r")
+        sent = sum(len(request) + 1 for request in cycle)
+        return max(MARGIN * median(taken_s), seconds(sent + replies, self._settings.baud))
+
+
+def _found(reply: Reply | None) -> str:
+    if reply is None:
+        return "no answer"
+    return f"error {reply.value}" if reply.kind == "e" else reply.kind

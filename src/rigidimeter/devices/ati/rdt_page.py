@@ -1,0 +1,222 @@
+"""What an ATI Net F/T says of itself: the XML page /netftapi2.xml of its web server.
+
+A torque is counts / (counts per unit), in the sensor's unit. Both belong to the configuration that
+is active in the sensor and can be changed there by anybody, so they are read, never assumed.
+"""
+
+from __future__ import annotations
+
+import http.client
+import math
+import xml.etree.ElementTree as ElementTree
+from dataclasses import asdict, dataclass
+
+from rigidimeter.devices.base import DeviceError, Now
+
+__all__ = ["FORCE_UNITS_N", "TORQUE_UNITS_NM", "SensorPage", "changes", "fetch_page", "parse_page"]
+
+POUND_FORCE_N = 4.4482216152605
+KILOGRAM_FORCE_N = 9.80665
+INCH_M = 0.0254
+
+FORCE_UNITS_N = {
+    "N": 1.0,
+    "kN": 1000.0,
+    "lbf": POUND_FORCE_N,
+    "klbf": 1000.0 * POUND_FORCE_N,
+    "kgf": KILOGRAM_FORCE_N,
+}
+"""How many newtons one unit is."""
+
+TORQUE_UNITS_NM = {
+    "Nm": 1.0,
+    "Nmm": 1e-3,
+    "kNm": 1000.0,
+    "lbf-in": POUND_FORCE_N * INCH_M,
+    "lbf-ft": POUND_FORCE_N * 12.0 * INCH_M,
+    "kgf-cm": KILOGRAM_FORCE_N * 0.01,
+}
+"""How many newton metres one unit is."""
+
+# Firmwares spell one unit in several ways.
+_SPELLINGS = {"N-m": "Nm", "N-mm": "Nmm", "kN-m": "kNm", "kg": "kgf", "kg-cm": "kgf-cm"}
+
+LARGEST_PAGE_BYTES = 65536
+
+
+@dataclass(frozen=True)
+class SensorPage:
+    """What bears on the torque; two pages that differ are two different sensors.
+
+    Parameters
+    ----------
+    counts_per_force, counts_per_torque : float
+        Per unit of the sensor.
+    force_unit, torque_unit : str
+        As in `FORCE_UNITS_N` and `TORQUE_UNITS_NM`.
+    rate_hz : float
+        Of the records.
+    serial : str
+        Of the calibrated transducer.
+    calibration, configuration : int
+        Which of those stored in the sensor is active; -1 if it does not say.
+    transform, bias, low_pass : str
+        The tool transformation, the software bias in counts, and the filter, as they are written.
+    model, firmware : str
+    status : int
+        The sensor's status word.
+    """
+
+    counts_per_force: float
+    counts_per_torque: float
+    force_unit: str
+    torque_unit: str
+    rate_hz: float
+    serial: str = ""
+    calibration: int = -1
+    configuration: int = -1
+    transform: str = ""
+    bias: str = ""
+    low_pass: str = ""
+    model: str = ""
+    firmware: str = ""
+    status: int = 0
+
+    @property
+    def newton_per_count(self) -> float:
+        """The weight of one force count."""
+        return FORCE_UNITS_N[self.force_unit] / self.counts_per_force
+
+    @property
+    def newton_metre_per_count(self) -> float:
+        """The weight of one torque count."""
+        return TORQUE_UNITS_NM[self.torque_unit] / self.counts_per_torque
+
+
+def unit_name(written: str) -> str:
+    """Return a unit by the one spelling that is used here."""
+    return _SPELLINGS.get(written, written)
+
+
+def changes(before: SensorPage, after: SensorPage) -> str:
+    """Say what differs between two readings of the page, the status aside; empty if nothing."""
+    old, new = asdict(before), asdict(after)
+    return ", ".join(
+        f"{name} {old[name]!r} became {new[name]!r}"
+        for name in old
+        if name != "status" and old[name] != new[name]
+    )
+
+
+def parse_page(text: bytes, device: str) -> SensorPage:
+    """Read the page.
+
+    Parameters
+    ----------
+    text : bytes
+    device : str
+        Named in refusals.
+
+    Raises
+    ------
+    DeviceError
+        If it is no such page, a unit is unknown, or the sensor is told not to send records.
+    """
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise DeviceError(
+            f"{device}: /netftapi2.xml is not the page of a Net F/T ({error}); "
+            "check that the address is the sensor's"
+        ) from error
+    found = {item.tag: (item.text or "").strip() for item in root.iter()}
+
+    def positive(tag: str) -> float:
+        try:
+            value = float(found.get(tag, ""))
+        except ValueError:
+            value = math.nan
+        if not 0.0 < value < math.inf:
+            raise DeviceError(
+                f"{device}: {tag} in /netftapi2.xml is {found.get(tag, 'missing')!r}; "
+                "it must be a number above zero"
+            )
+        return value
+
+    def whole(tag: str, base: int = 10) -> int:
+        written = found.get(tag, "")
+        try:
+            return int(written, base) if written else -1
+        except ValueError:
+            raise DeviceError(
+                f"{device}: {tag} in /netftapi2.xml is {written!r}; it must be a whole number"
+            ) from None
+
+    def unit(tag: str, known: dict[str, float]) -> str:
+        name = unit_name(found.get(tag, ""))
+        if name not in known:
+            raise DeviceError(
+                f"{device}: the unit {tag} in /netftapi2.xml is {found.get(tag, 'missing')!r}; "
+                f"it must be one of {', '.join(known)}"
+            )
+        return name
+
+    if found.get("comrdte", "Enabled") not in ("Enabled", "1"):
+        raise DeviceError(
+            f"{device}: RDT (comrdte) is {found['comrdte']!r}; "
+            "enable it on the sensor's Communications page"
+        )
+    return SensorPage(
+        counts_per_force=positive("cfgcpf"),
+        counts_per_torque=positive("cfgcpt"),
+        force_unit=unit("scfgfu", FORCE_UNITS_N),
+        torque_unit=unit("scfgtu", TORQUE_UNITS_NM),
+        rate_hz=positive("comrdtrate"),
+        serial=found.get("cfgcalsn", ""),
+        calibration=whole("cfgcalsel"),
+        configuration=whole("setcfgsel"),
+        transform=found.get("cfgtfx", ""),
+        bias=found.get("setbias", ""),
+        low_pass=found.get("setuserfilter", ""),
+        model=found.get("prodname", "Net F/T"),
+        firmware=found.get("mfgdigver", ""),
+        status=max(whole("runstat", 16), 0),
+    )
+
+
+def fetch_page(address: str, port: int, timeout_s: float, device: str, now: Now) -> SensorPage:
+    """Ask the sensor's web server for the page and read it.
+
+    Raises
+    ------
+    DeviceError
+        If there is no answer in time, or not the right one.
+    """
+    give_up_s = now() + timeout_s
+    connection = http.client.HTTPConnection(address, port, timeout=timeout_s)
+    try:
+        connection.request("GET", "/netftapi2.xml")
+        with connection.getresponse() as response:
+            if response.status != 200:
+                raise DeviceError(
+                    f"{device}: http://{address}:{port}/netftapi2.xml answers {response.status} "
+                    f"{response.reason}; a Net F/T answers 200 OK"
+                )
+            text = b""
+            # A server that drips keeps each wait short and the whole endless.
+            while piece := response.read1(4096):
+                text += piece
+                if len(text) > LARGEST_PAGE_BYTES or now() > give_up_s:
+                    raise DeviceError(
+                        f"{device}: http://{address}:{port}/netftapi2.xml does not end within "
+                        f"{timeout_s:g} s and {LARGEST_PAGE_BYTES} bytes; check the address"
+                    )
+    except (OSError, http.client.HTTPException) as error:
+        raise DeviceError(
+            f"{device}: http://{address}:{port}/netftapi2.xml gives no answer within "
+            f"{timeout_s:g} s ({error or type(error).__name__}); "
+            "check the sensor's power, cable and address"
+        ) from error
+    finally:
+        connection.close()
+    return parse_page(text, device)

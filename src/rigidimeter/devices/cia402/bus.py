@@ -1,0 +1,257 @@
+"""The wire to one CANopen node: frames out, frames in, nothing decided.
+
+Nothing here waits but where it says so, and nothing runs by itself: what is not sent by a call is
+not sent. Times are those of the caller's clock, never those that python-can stamps, which are wall
+time. Frames that cannot leave or make no sense are counted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rigidimeter.devices.base import DeviceError, Now
+from rigidimeter.devices.cia402.sdo import library
+from rigidimeter.devices.cia402.setup import Cia402Settings
+from rigidimeter.devices.cia402.state_words import (
+    BOOTED,
+    OPERATIONAL,
+    SYNC_ID,
+    Control,
+    Emergency,
+    Nmt,
+    State,
+    command_bytes,
+    emergency,
+    frames,
+    position_of,
+    sdo_write_bytes,
+    state_of,
+    velocity_of,
+)
+
+__all__ = ["NodeBus"]
+
+QUIET_S = 0.01
+LONGEST_DRAIN_S = 0.5
+REMEMBERED = 64
+
+
+class NodeBus:
+    """Send to one node, and keep what it said last.
+
+    Parameters
+    ----------
+    settings : Cia402Settings
+    now : callable
+        Seconds on the loop's clock.
+    who : str
+        The drive, for messages.
+    """
+
+    def __init__(self, settings: Cia402Settings, now: Now, who: str) -> None:
+        self._settings, self._now, self._who = settings, now, who
+        self._ids = frames(settings.node_id)
+        self._can: Any = None
+        self._bus: Any = None
+        self._position: int | None = None
+        self._velocity: int | None = None
+        self._beaten_s = -math.inf
+        self.statusword = 0
+        self.mode = 0
+        self.raw = (0, 0)
+        """Position and velocity of the last whole measurement, in the drive's units."""
+        self.sequence = 0
+        """How many whole measurements came."""
+        self.sync_s = -math.inf
+        """When the last SYNC was sent."""
+        self.asked_s = math.inf
+        """When the oldest SYNC was sent that is not answered yet; infinite if all are."""
+        self.heard_s = -math.inf
+        """When the last heartbeat was read."""
+        self.network_state = BOOTED
+        """What it said."""
+        self.booted = False
+        """The node restarted; whoever configures it takes this back."""
+        self.alarmed = False
+        """An emergency came; whoever takes note takes this back."""
+        self.emergency = 0
+        self.emergencies: deque[tuple[float, Emergency]] = deque(maxlen=REMEMBERED)
+        self.counts = dict.fromkeys(
+            ("received", "lost", "damaged", "unsent", "backlog", "emergencies"), 0
+        )
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is a bus."""
+        return self._bus is not None
+
+    @property
+    def state(self) -> State:
+        """The state that the drive last reported."""
+        return state_of(self.statusword)
+
+    def open(self) -> None:
+        """Open the bus.
+
+        Raises
+        ------
+        DeviceError
+            If python-can cannot.
+        """
+        if self._bus is not None:
+            return
+        library("canopen")
+        self._can = can = library("can")
+        settings = self._settings
+        more = {"port": settings.port} if settings.interface == "udp_multicast" else {}
+        try:
+            self._bus = can.Bus(
+                interface=settings.interface,
+                channel=settings.channel,
+                bitrate=settings.bitrate,
+                ignore_config=True,
+                **more,
+            )
+        except (can.CanError, OSError, ValueError) as error:
+            raise DeviceError(
+                f"{self._who}: the bus does not open ({error}); check interface, channel and that "
+                "the operating system has brought the bus up"
+            ) from None
+        self._command = self._message(self._ids.command, command_bytes(0, 0))
+        self._sync = self._message(SYNC_ID)
+        self._heartbeat = self._message(0x700 + settings.master_id, bytes([OPERATIONAL]))
+
+    def close(self) -> None:
+        """Close the bus."""
+        bus, self._bus = self._bus, None
+        if bus is not None:
+            bus.shutdown()
+
+    def network(self, command: Nmt) -> None:
+        """Send a network management command to the node."""
+        self._send(self._message(0, bytes([command, self._settings.node_id])))
+
+    def ask(self, control: Control, target: int) -> bool:
+        """Send a command, a SYNC and, when due, our heartbeat; return whether the command left."""
+        now_s = self._now()
+        self._command.data[:] = command_bytes(control, target)
+        sent = self._send(self._command)
+        self._send(self._sync)
+        self.sync_s = now_s
+        self.asked_s = min(self.asked_s, now_s)
+        if now_s - self._beaten_s >= self._settings.heartbeat_s:
+            self._send(self._heartbeat)
+            self._beaten_s = now_s
+        return sent
+
+    def insist(self, control: Control) -> None:
+        """Send a controlword both ways: as a command, and past the mapping to the object itself."""
+        self.ask(control, 0)
+        self._send(self._message(self._ids.sdo_request, sdo_write_bytes(0x6040, 0, control, 2)))
+
+    def receive(self, wait_s: float = 0.0) -> bool:
+        """Take one frame, waiting for it so long; return whether there was one."""
+        if self._bus is None:
+            return False
+        try:
+            message = self._bus.recv(wait_s)
+        except (self._can.CanError, OSError):
+            self.counts["damaged"] += 1
+            return True
+        if message is None:
+            return False
+        if message.is_error_frame or message.is_remote_frame or message.is_extended_id:
+            self.counts["damaged"] += message.is_error_frame
+        elif not self._take(message.arbitration_id, message.data):
+            self.counts["damaged"] += 1
+        return True
+
+    def drain(self, wait_s: float = 0.0) -> None:
+        """Take all that came while nobody read, until nothing comes for so long."""
+        until_s = self._now() + LONGEST_DRAIN_S
+        while self.receive(wait_s) and self._now() < until_s:
+            pass
+        self._position = self._velocity = None
+        self.asked_s = math.inf
+
+    @contextmanager
+    def talk(self) -> Iterator[Any]:
+        """Give questions and answers (SDO); the thread that carries them ends with them."""
+        canopen = library("canopen")
+        # Late answers to what was sent without waiting must not be taken for new ones.
+        self.drain(QUIET_S)
+        network = canopen.Network(self._bus)
+        node = network.add_node(
+            canopen.RemoteNode(self._settings.node_id, canopen.ObjectDictionary())
+        )
+        node.sdo.RESPONSE_TIMEOUT = self._settings.sdo_timeout_s
+        network.subscribe(self._ids.heartbeat, lambda _id, data, _at: self._take_heartbeat(data))
+        notifier = self._can.Notifier(self._bus, network.listeners, QUIET_S)
+        try:
+            yield node.sdo
+        finally:
+            notifier.stop()
+
+    def _message(self, identifier: int, data: bytes = b"") -> Any:
+        return self._can.Message(
+            arbitration_id=identifier, data=bytearray(data), is_extended_id=False
+        )
+
+    def _send(self, message: Any) -> bool:
+        try:
+            self._bus.send(message, timeout=0)
+        except (self._can.CanError, OSError):
+            # Not raised: the drive does not answer what it did not get, and counts as lost.
+            self.counts["unsent"] += 1
+            return False
+        return True
+
+    def _take(self, identifier: int, data: bytearray) -> bool:
+        """Take one frame; return False if it is damaged."""
+        ids = self._ids
+        if identifier == ids.position:
+            report = position_of(data)
+            if report is None:
+                return False
+            self.counts["lost"] += self._position is not None
+            self.statusword, self.mode, self._position = report
+        elif identifier == ids.velocity:
+            self._velocity = velocity_of(data)
+            if self._velocity is None:
+                return False
+        elif identifier == ids.heartbeat:
+            return self._take_heartbeat(data)
+        elif identifier == ids.emergency:
+            return self._take_emergency(data)
+        else:
+            return True
+        if self._position is not None and self._velocity is not None:
+            self.raw = (self._position, self._velocity)
+            self._position = self._velocity = None
+            self.asked_s = math.inf
+            self.sequence += 1
+            self.counts["received"] += 1
+        return True
+
+    def _take_heartbeat(self, data: bytearray) -> bool:
+        if len(data) != 1:
+            return False
+        self.network_state = data[0] & 0x7F
+        self.heard_s = self._now()
+        self.booted = self.booted or self.network_state == BOOTED
+        return True
+
+    def _take_emergency(self, data: bytearray) -> bool:
+        report = emergency(data)
+        if report is None:
+            return False
+        self.emergencies.append((self._now(), report))
+        if report.code:  # 0 takes the ones before back; what was wrong is remembered all the same
+            self.emergency = report.code
+            self.alarmed = True
+            self.counts["emergencies"] += 1
+        return True

@@ -1,0 +1,300 @@
+"""A CiA 402 servo over CANopen in profile-velocity mode.
+
+Before the loop, questions and answers (SDO) set the drive up and prove it. In the loop there are no
+questions and no threads: each `write` sends the command and a SYNC, the drive answers every SYNC
+with its state, position and velocity, and the next `read` finds them. The heartbeat that keeps the
+drive alive is sent by `write` too. A loop that hangs falls silent with it, and the drive stops
+itself: by its heartbeat watchdog (0x1016), and sooner by its command deadline (0x1400:05) where it
+has one.
+
+A measurement is taken at the SYNC, so it carries the time at which the last SYNC before it was
+sent; that is right as long as the drive answers within a tick.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, Now
+from rigidimeter.devices.cia402.bus import NodeBus
+from rigidimeter.devices.cia402.power_up_sequence import FAULTS, reset_fault, walk_up
+from rigidimeter.devices.cia402.sdo import get, put, read_back, text
+from rigidimeter.devices.cia402.setup import (
+    DISPLAYED_MODE,
+    IDENTITY,
+    Cia402Settings,
+    objects,
+    scale,
+)
+from rigidimeter.devices.cia402.state_words import (
+    OPERATIONAL,
+    PROFILE_VELOCITY,
+    Control,
+    Emergency,
+    Nmt,
+    State,
+    fastest_tick_rate_hz,
+)
+from rigidimeter.guard import Cause
+
+__all__ = ["Cia402Drive", "Cia402Settings"]
+
+MOST_FRAMES_A_READ = 64
+BRAKING = (0x6084, 0x6085)
+"""Profile and quick-stop deceleration."""
+
+
+class Cia402Drive:
+    """A `VelocityDrive`; see the module for the protocol.
+
+    What goes wrong in the loop is kept as the first `Cause` until the next `enable`. A drive that
+    has left operation by itself is told to stay where it is: nothing here brings it back.
+
+    Parameters
+    ----------
+    settings : Cia402Settings
+    now : callable
+        Seconds on the loop's clock.
+    """
+
+    Settings = Cia402Settings
+
+    def __init__(self, settings: Cia402Settings, now: Now) -> None:
+        self._settings, self._now = settings, now
+        self._who = (
+            f"CiA 402 drive, node {settings.node_id} on {settings.interface} {settings.channel}"
+        )
+        self._wire = NodeBus(settings, now, self._who)
+        self._scale = scale(settings)
+        self._objects = objects(settings)
+        self._stops_itself_s = settings.drive_watchdog_s - settings.heartbeat_s
+        if settings.command_deadline_s > 0:
+            self._stops_itself_s = min(self._stops_itself_s, settings.command_deadline_s)
+        self._configured = False
+        self._control = Control.DISABLE_VOLTAGE
+        self._sent = 0
+        self._settled_s = -math.inf
+        self._cause = Cause.NONE
+        self._sample = MotionSample(math.nan, math.nan, -math.inf, cause=int(Cause.DRIVE_LOST))
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Measurements received whole or lost in part, frames damaged or unsent, full reads."""
+        return self._wire.counts
+
+    @property
+    def state(self) -> State:
+        """The state that the drive last reported."""
+        return self._wire.state
+
+    @property
+    def emergency(self) -> int:
+        """The code of the last emergency message, 0 if none came since the drive was enabled."""
+        return self._wire.emergency
+
+    @property
+    def emergencies(self) -> Sequence[tuple[float, Emergency]]:
+        """The latest emergency messages, with the times they were read."""
+        return tuple(self._wire.emergencies)
+
+    def connect(self) -> None:
+        """Open the bus and let the drive wait for its settings; nothing is energised."""
+        self._wire.open()
+        self._wire.network(Nmt.PRE_OPERATIONAL)
+
+    def configure(self) -> DeviceFacts:
+        """Write every setting, read each back, and let the drive's frames flow.
+
+        Raises
+        ------
+        DeviceError
+            If the drive does not answer, or keeps a value that was not written.
+        """
+        if not self._wire.is_open:
+            raise DeviceError(f"{self._who}: not connected; connect it before it is configured")
+        self._configured = False
+        self._control = Control.DISABLE_VOLTAGE
+        settings, who = self._settings, self._who
+        self._wire.network(Nmt.PRE_OPERATIONAL)
+        with self._wire.talk() as sdo:
+            self._wire.booted = False
+            identity = {entry.name: get(sdo, entry, who) for entry in IDENTITY}
+            firmware, name = text(sdo, 0x100A, who), text(sdo, 0x1008, who)
+            absent = [entry for entry in self._objects if not put(sdo, entry, who)]
+            found = read_back(sdo, (*self._objects, DISPLAYED_MODE), who)
+        self._wire.network(Nmt.START)
+        self._configured = True
+        watchdogs = [settings.drive_watchdog_s]
+        if settings.command_deadline_s > 0 and not any(entry.index == 0x1400 for entry in absent):
+            watchdogs.append(settings.command_deadline_s)
+        values: dict[str, str | float | int] = {"firmware (0x100A)": firmware, **found}
+        values.update({entry.label: "absent" for entry in absent})
+        values.update({k: value for k, value in identity.items() if value is not None})
+        ramps = [found[entry.label] for entry in self._objects if entry.index in BRAKING]
+        values["braking_rad_s2"] = min(ramps) / self._scale.units_per_rad_s2
+        return DeviceFacts(
+            model=name or f"vendor {identity['vendor']}, product {identity['product']}",
+            serial="" if identity["serial"] is None else str(identity["serial"]),
+            fastest_tick_rate_hz=fastest_tick_rate_hz(settings.bitrate),
+            watchdog_s=min(watchdogs),
+            values=values,
+        )
+
+    def reset_fault(self) -> None:
+        """Take back a fault, as the operator asks; the drive stays without power.
+
+        Raises
+        ------
+        DeviceError
+            If the fault is still there afterwards.
+        """
+        self._must_be_configured()
+        self._control = Control.DISABLE_VOLTAGE
+        reset_fault(self._wire, self._now, self._settings.enable_timeout_s, self._who)
+        self._cause = Cause.NONE
+
+    def enable(self) -> None:
+        """Write zero velocity, read it and every setting back, then energise.
+
+        The loop must begin to write within the drive's watchdog.
+
+        Raises
+        ------
+        DeviceError
+            If a setting or the target is not as written, or the drive does not come up in time.
+        """
+        self._must_be_configured()
+        self._control = Control.DISABLE_VOLTAGE
+        wire = self._wire
+        try:
+            with wire.talk() as sdo:
+                for entry in self._objects:
+                    if entry.index in (0x6040, 0x60FF):
+                        put(sdo, entry, self._who)
+                read_back(sdo, (*self._objects, DISPLAYED_MODE), self._who)
+            wire.network(Nmt.START)
+            wire.drain()
+            self._must_be_configured()
+            wire.alarmed = False
+            self._cause = Cause.NONE
+            walk_up(wire, self._now, self._settings.enable_timeout_s, self._who)
+        except BaseException:
+            self.disable()
+            raise
+        self._control = Control.ENABLE_OPERATION
+        self._sent = 0
+        wire.emergency = 0
+        wire.heard_s, wire.network_state = self._now(), OPERATIONAL
+
+    def read(self) -> MotionSample:
+        """Return the newest sample without waiting; the one before again if there is none."""
+        wire = self._wire
+        for _ in range(MOST_FRAMES_A_READ):
+            if not wire.receive():
+                break
+        else:
+            wire.counts["backlog"] += 1
+        now_s = self._now()
+        found = self._wrong(now_s)
+        if found in (Cause.DRIVE_FAULT, Cause.DRIVE_STATE) and not self._in_operation():
+            # To repeat "enable operation" would bring back a drive that stopped by itself.
+            self._halt(Control.QUICK_STOP)
+        self._cause = self._cause or found
+        self._mind_its_watchdog(now_s)
+        if wire.sequence and wire.sequence != self._sample.sequence:
+            position, velocity = wire.raw
+            self._sample = MotionSample(
+                (position - self._settings.zero_counts) / self._scale.counts_per_rad,
+                velocity / self._scale.units_per_rad_s,
+                wire.sync_s,
+                wire.sequence,
+                wire.raw,
+            )
+        status = wire.emergency << 16 | wire.statusword
+        cause = self._cause if wire.sequence else Cause.DRIVE_LOST
+        return self._sample._replace(status=status, cause=int(cause))
+
+    def _in_operation(self) -> bool:
+        wire = self._wire
+        return wire.state is State.OPERATION_ENABLED and wire.mode == PROFILE_VELOCITY
+
+    def _mind_its_watchdog(self, now_s: float) -> None:
+        """Do not call back a drive that may be braking by itself: "enable operation" would."""
+        if self._control is not Control.ENABLE_OPERATION:
+            return
+        wire = self._wire
+        if now_s - min(wire.sync_s, wire.asked_s) > self._stops_itself_s:
+            answered = wire.asked_s == math.inf
+            self._cause = self._cause or (Cause.DRIVE_STATE if answered else Cause.DRIVE_LOST)
+            self._halt(Control.QUICK_STOP)
+
+    def _wrong(self, now_s: float) -> Cause:
+        """Return what the drive did that it was not told to."""
+        wire, settings = self._wire, self._settings
+        if wire.booted:
+            self._configured = False
+            self._halt(Control.DISABLE_VOLTAGE)
+        if wire.booted or wire.alarmed or wire.state in FAULTS:
+            return Cause.DRIVE_FAULT
+        if self._control is Control.ENABLE_OPERATION:
+            if not self._in_operation() or wire.network_state != OPERATIONAL:
+                return Cause.DRIVE_STATE
+            if now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s:
+                return Cause.DRIVE_LOST
+        elif wire.state is State.OPERATION_ENABLED and now_s > self._settled_s:
+            return Cause.DRIVE_STATE
+        lost = not wire.is_open or now_s - wire.asked_s > settings.lost_s
+        return Cause.DRIVE_LOST if lost else Cause.NONE
+
+    def write(self, velocity_rad_s: float) -> float:
+        """Send velocity, SYNC and, when due, our heartbeat; return what was really sent.
+
+        A drive that is not in operation by our will is sent zero; a number that is not finite is
+        zero too. After a pause in which the drive's watchdog may have acted it is told to stop.
+        """
+        self._mind_its_watchdog(self._now())
+        target = 0
+        if self._control is Control.ENABLE_OPERATION and math.isfinite(velocity_rad_s):
+            most = self._settings.max_velocity_rad_s
+            wanted = max(-most, min(most, velocity_rad_s)) * self._scale.units_per_rad_s
+            target = max(-(2**31), min(2**31 - 1, round(wanted)))
+        if self._wire.is_open and self._wire.ask(self._control, target):
+            self._sent = target
+        return self._sent / self._scale.units_per_rad_s
+
+    def stop(self) -> None:
+        """Brake by the drive's own quick-stop ramp; only `enable` brings it back."""
+        if self._wire.is_open and self._control is not Control.DISABLE_VOLTAGE:
+            self._halt(Control.QUICK_STOP)
+            self._wire.insist(Control.QUICK_STOP)
+
+    def disable(self) -> None:
+        """Take the power away at once."""
+        if self._wire.is_open:
+            self._halt(Control.DISABLE_VOLTAGE)
+            self._wire.insist(Control.DISABLE_VOLTAGE)
+
+    def close(self) -> None:
+        """Take the power away, let the drive wait, close the bus."""
+        self._configured = False
+        try:
+            if self._wire.is_open:
+                self.disable()
+                self._wire.network(Nmt.PRE_OPERATIONAL)
+        finally:
+            self._wire.close()
+
+    def _halt(self, control: Control) -> None:
+        # Power that was taken away is not given back for a gentler stop.
+        if self._control not in (control, Control.DISABLE_VOLTAGE):
+            self._control = control
+            self._settled_s = self._now() + self._settings.lost_s
+        self._sent = 0
+
+    def _must_be_configured(self) -> None:
+        self._configured = self._configured and not self._wire.booted
+        if not (self._wire.is_open and self._configured):
+            raise DeviceError(
+                f"{self._who}: not configured, or restarted since; configure it, then enable it"
+            )

@@ -1,0 +1,225 @@
+"""What a CiA 402 drive is told before it may run, and the proof that it took it.
+
+Angle, velocity and acceleration are those of the joint; the drive counts at its motor:
+
+    position units      counts_per_rev · gear_ratio / 2π              per rad
+    velocity units      velocity_units_per_rev_s · gear_ratio / 2π    per rad/s
+    acceleration units  acceleration_units_per_rev_s2 · gear_ratio / 2π per rad/s²
+
+`sign` −1 turns all three round. Every object is written and read back; enabling reads all of them
+once more, because a drive that restarted in between has lost them, its watchdog among them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple, Self
+
+from pydantic import model_validator
+
+from rigidimeter.devices.cia402.state_words import PROFILE_VELOCITY, Frames, frames
+from rigidimeter.settings.section import Section, quantity
+
+__all__ = [
+    "DISPLAYED_MODE",
+    "IDENTITY",
+    "Cia402Settings",
+    "Object",
+    "Scale",
+    "objects",
+    "scale",
+]
+
+INVALID = 1 << 31
+NO_REMOTE_REQUEST = 1 << 30
+
+
+class Cia402Settings(Section):
+    """A servo on a CAN bus that speaks CANopen, profile CiA 402, in profile-velocity mode.
+
+    `interface` and `channel` are those of python-can. `bitrate` is what the bus runs at; with
+    socketcan it is set by the operating system, and here only says how fast a loop may be. `port`
+    is used by udp_multicast alone. `command_deadline_s` 0 asks for no such deadline; a drive that
+    has none keeps its heartbeat watchdog.
+
+    The decelerations are above what `guard.acceleration_limit_deg_s2` is by default, for the guard
+    counts on a drive that brakes no slower; commissioning compares the two.
+    """
+
+    interface: str = "socketcan"
+    channel: str = "can0"
+    bitrate: int = quantity(1_000_000, "bit/s", 10_000, 1_000_000)
+    port: int = quantity(43113, "1", 1, 65535)
+    node_id: int = quantity(1, "1", 1, 127)
+    master_id: int = quantity(127, "1", 1, 127)
+    counts_per_rev: float = quantity(8192.0, "counts/rev", 1.0, 2.0**31)
+    velocity_units_per_rev_s: float = quantity(8192.0, "unit/(rev/s)", 1e-3, 2.0**31)
+    acceleration_units_per_rev_s2: float = quantity(8192.0, "unit/(rev/s²)", 1e-3, 2.0**31)
+    gear_ratio: float = quantity(100.0, "1", 1e-3, 1e5)
+    sign: Literal[1, -1] = 1
+    zero_counts: int = quantity(0, "counts", -(2**31), 2**31 - 1)
+    max_velocity_rad_s: float = quantity(4.0, "rad/s", 0.0, 100.0, above=True)
+    acceleration_rad_s2: float = quantity(60.0, "rad/s²", 0.0, 1e4, above=True)
+    deceleration_rad_s2: float = quantity(120.0, "rad/s²", 0.0, 1e4, above=True)
+    quick_stop_rad_s2: float = quantity(120.0, "rad/s²", 0.0, 1e4, above=True)
+    quick_stop_option: Literal[2, 6] = 2
+    abort_option: Literal[1, 2, 3] = 3
+    heartbeat_s: float = quantity(0.02, "s", 0.001, 1.0)
+    drive_watchdog_s: float = quantity(0.1, "s", 0.002, 5.0)
+    command_deadline_s: float = quantity(0.05, "s", 0.0, 5.0)
+    lost_s: float = quantity(0.02, "s", 0.001, 1.0)
+    sdo_timeout_s: float = quantity(0.3, "s", 0.01, 5.0)
+    enable_timeout_s: float = quantity(2.0, "s", 0.05, 30.0)
+
+    @property
+    def emulated(self) -> bool:
+        """Whether the bus is one that no drive hangs on."""
+        return self.interface in ("virtual", "udp_multicast") or (
+            self.interface == "socketcan" and self.channel.startswith("vcan")
+        )
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.drive_watchdog_s < 2 * self.heartbeat_s:
+            raise ValueError(
+                f"drive_watchdog_s = {self.drive_watchdog_s:g} s must be at least twice heartbeat_s"
+                f" = {self.heartbeat_s:g} s: one late heartbeat must not stop the drive"
+            )
+        if self.node_id == self.master_id:
+            raise ValueError(
+                f"node_id and master_id are both {self.node_id}: drive and computer must differ"
+            )
+        return self
+
+
+class Scale(NamedTuple):
+    """Units of the drive in one of the joint, with the sign."""
+
+    counts_per_rad: float
+    units_per_rad_s: float
+    units_per_rad_s2: float
+
+
+def scale(settings: Cia402Settings) -> Scale:
+    """Return the drive's units in the joint's; the sign is in those of angle and velocity."""
+    turns_per_rad = settings.gear_ratio / (2 * math.pi)
+    return Scale(
+        settings.sign * settings.counts_per_rev * turns_per_rad,
+        settings.sign * settings.velocity_units_per_rev_s * turns_per_rad,
+        settings.acceleration_units_per_rev_s2 * turns_per_rad,
+    )
+
+
+@dataclass(frozen=True)
+class Object:
+    """One entry of the drive's object dictionary, and the value it must have.
+
+    `optional` entries are left out where the drive does not know them; bits outside `mask` belong
+    to the drive.
+    """
+
+    name: str
+    index: int
+    subindex: int
+    size: int
+    value: int
+    signed: bool = False
+    optional: bool = False
+    mask: int = -1
+
+    @property
+    def label(self) -> str:
+        """The name, with the address as the drive's manual writes it."""
+        return f"{self.name} (0x{self.index:04X}:{self.subindex:02X})"
+
+
+DISPLAYED_MODE = Object("mode of operation display", 0x6061, 0, 1, PROFILE_VELOCITY, signed=True)
+
+IDENTITY = tuple(
+    Object(name, 0x1018, k, 4, 0, optional=k > 1)
+    for k, name in enumerate(("vendor", "product", "revision", "serial"), 1)
+)
+"""Read, never written."""
+
+
+def objects(settings: Cia402Settings) -> tuple[Object, ...]:
+    """Return all that is written, in order; of an entry written twice the last value stays."""
+    units = scale(settings)
+    ids = frames(settings.node_id)
+    watchdog_ms = round(settings.drive_watchdog_s * 1e3)
+
+    def acceleration(rad_s2: float) -> int:
+        return max(1, round(rad_s2 * units.units_per_rad_s2))
+
+    return (
+        Object("controlword", 0x6040, 0, 2, 0),
+        Object("mode of operation", 0x6060, 0, 1, PROFILE_VELOCITY, signed=True),
+        Object("target velocity", 0x60FF, 0, 4, 0, signed=True),
+        Object(
+            "max profile velocity",
+            0x607F,
+            0,
+            4,
+            math.ceil(settings.max_velocity_rad_s * abs(units.units_per_rad_s)),
+        ),
+        Object("profile acceleration", 0x6083, 0, 4, acceleration(settings.acceleration_rad_s2)),
+        Object("profile deceleration", 0x6084, 0, 4, acceleration(settings.deceleration_rad_s2)),
+        Object("quick-stop deceleration", 0x6085, 0, 4, acceleration(settings.quick_stop_rad_s2)),
+        Object("quick-stop option", 0x605A, 0, 2, settings.quick_stop_option, signed=True),
+        Object("abort-connection option", 0x6007, 0, 2, settings.abort_option, signed=True),
+        Object("drive's heartbeat in ms", 0x1017, 0, 2, round(settings.heartbeat_s * 1e3)),
+        Object("heartbeat watchdog", 0x1016, 1, 4, settings.master_id << 16 | watchdog_ms),
+        *_messages(ids, round(settings.command_deadline_s * 1e3)),
+    )
+
+
+def _messages(ids: Frames, deadline_ms: int) -> tuple[Object, ...]:
+    """Return the mapping: one command frame, two frames that answer every SYNC, and no others."""
+    command = ((0x6040, 16), (0x60FF, 32))
+    position = ((0x6041, 16), (0x6061, 8), (0x6064, 32))
+    velocity = ((0x606C, 32),)
+    deadline = Object("command deadline in ms", 0x1400, 5, 2, deadline_ms, optional=True)
+    return (
+        # A command takes effect when it arrives (255), a measurement is taken at every SYNC (1).
+        *_message("command frame", 0x1400, ids.command, 255, command, (deadline,)),
+        *_message("position frame", 0x1800, ids.position, 1, position),
+        *_message("velocity frame", 0x1801, ids.velocity, 1, velocity),
+        *(
+            Object(
+                "unused frame", index, 1, 4, INVALID | id_, optional=True, mask=~NO_REMOTE_REQUEST
+            )
+            for index, id_ in (
+                (0x1401, ids.command + 0x100),
+                (0x1402, ids.command + 0x200),
+                (0x1403, ids.command + 0x300),
+                (0x1802, ids.position + 0x200),
+                (0x1803, ids.position + 0x300),
+            )
+        ),
+    )
+
+
+def _message(
+    name: str,
+    index: int,
+    id_: int,
+    transmission: int,
+    entries: tuple[tuple[int, int], ...],
+    more: tuple[Object, ...] = (),
+) -> tuple[Object, ...]:
+    """Return the order in which CiA 301 lets a mapping be changed: off, emptied, filled, on."""
+    identifier = Object(f"{name}'s identifier", index, 1, 4, id_, mask=~NO_REMOTE_REQUEST)
+    count = Object(f"{name}'s number of entries", index + 0x200, 0, 1, len(entries))
+    return (
+        replace(identifier, value=INVALID | id_),
+        Object(f"{name}'s transmission type", index, 2, 1, transmission),
+        *more,
+        replace(count, value=0),
+        *(
+            Object(f"{name}'s entry {k}", index + 0x200, k, 4, what << 16 | bits)
+            for k, (what, bits) in enumerate(entries, 1)
+        ),
+        count,
+        identifier,
+    )

@@ -1,0 +1,280 @@
+"""What every velocity drive must do; see `conformance`."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Callable
+
+from rigidimeter.devices.base import MotionSample, VelocityDrive
+from rigidimeter.devices.conformance.fixture import (
+    DriveBench,
+    await_,
+    check_counts,
+    check_facts,
+    check_quick,
+    check_stamp,
+    refuses,
+    require,
+)
+from rigidimeter.guard import Cause
+
+__all__ = ["DRIVE_CHECKS"]
+
+DRIVE_COUNTS = ("received", "lost", "damaged")
+POWER_OFF_S = 0.1
+AT_REST = 0.02
+"""Of the bench's speed."""
+
+
+def drive_refuses_disorder(bench: DriveBench) -> None:
+    """Each step asks for the one before; a drive not enabled sends nothing but zero."""
+    drive = bench.make()
+    try:
+        require(isinstance(drive.read(), MotionSample), "read returns a MotionSample always")
+        require(drive.write(bench.speed_rad_s) == 0.0, "write before connect returns 0")
+        refuses(drive.enable, "enable before connect raises DeviceError")
+        refuses(drive.configure, "configure before connect raises DeviceError")
+        drive.connect()
+        refuses(drive.enable, "enable before configure raises DeviceError")
+        _unpowered(bench, "after a refused enable")
+    finally:
+        drive.close()
+
+
+def drive_energises_by_enable_only(bench: DriveBench) -> None:
+    """Neither connect nor configure nor a command gives power."""
+    drive = bench.make()
+    try:
+        drive.connect()
+        _unpowered(bench, "after connect")
+        check_facts(drive.configure())
+        _unpowered(bench, "after configure")
+        for _ in range(10):
+            require(drive.write(bench.speed_rad_s) == 0.0, "write before enable returns 0")
+            drive.read()
+            time.sleep(bench.tick_s)
+        _unpowered(bench, "after write without enable")
+    finally:
+        drive.close()
+
+
+def drive_enables_at_rest(bench: DriveBench) -> None:
+    """Enable gives power and no motion."""
+    drive = _enabled(bench)
+    try:
+        end = bench.other_end
+        require(end is None or end.powered(), "the motor has power after enable")
+        for _ in range(20):
+            _run(drive, bench, 0.0, 1)
+            _at_rest(bench, "after enable")
+    finally:
+        drive.close()
+    _loses_power(bench, "after close")
+
+
+def drive_samples_flow(bench: DriveBench) -> None:
+    """Finite samples without a cause arrive, with new stamps, while commands go out."""
+    drive = _enabled(bench)
+    try:
+        first = drive.read()
+
+        def newer() -> bool:
+            drive.write(0.0)
+            return drive.read().time_s > first.time_s
+
+        await_(newer, bench, "a new sample arrives")
+        sample = drive.read()
+        require(
+            sample.cause == Cause.NONE, f"a good sample has no cause; {Cause(sample.cause).name}"
+        )
+        require(math.isfinite(sample.angle_rad + sample.velocity_rad_s), "a good sample is finite")
+        check_stamp(sample, bench.now)
+    finally:
+        drive.close()
+
+
+def drive_returns_what_was_sent(bench: DriveBench) -> None:
+    """`write` returns the velocity the drive was really given, after limit and rounding."""
+    drive = _enabled(bench)
+    try:
+        speed = bench.speed_rad_s
+        for wanted in (speed, -speed):
+            sent = _run(drive, bench, wanted, math.ceil(bench.settle_s / bench.tick_s))
+            require(
+                abs(sent - wanted) <= bench.tolerance * speed,
+                f"write({wanted:g}) returns about that; it returned {sent:g}",
+            )
+            if bench.other_end is not None:
+                turning = bench.other_end.velocity_rad_s()
+                require(
+                    abs(turning - sent) <= 0.2 * speed,
+                    f"the joint turns as sent ({sent:g} rad/s); it turns at {turning:g}",
+                )
+        _run(drive, bench, 0.0, math.ceil(bench.settle_s / bench.tick_s))
+        _at_rest(bench, "after write(0)")
+    finally:
+        drive.close()
+
+
+def drive_bounds_commands(bench: DriveBench) -> None:
+    """Send what is not finite, which must become zero, and what is far too large."""
+    drive = _enabled(bench)
+    try:
+        for wanted in (1e9, -1e9):
+            sent = drive.write(wanted)
+            require(math.isfinite(sent) and abs(sent) < 1e6, "write limits a velocity")
+        for wanted in (math.nan, math.inf, -math.inf):
+            sent = _run(drive, bench, wanted, 5)
+            require(sent == 0.0, f"write({wanted}) sends 0; it returned {sent}")
+    finally:
+        drive.close()
+
+
+def drive_read_never_waits(bench: DriveBench) -> None:
+    """`read` and `write` are quick whether the drive answers or not; a lost drive is named."""
+    drive = _enabled(bench)
+
+    def tick() -> None:
+        drive.read()
+        drive.write(0.0)
+
+    try:
+        check_quick(tick, 2 * bench.longest_read_s, bench.tick_s, "while the drive answers")
+        if bench.silence is not None:
+            bench.silence()
+            check_quick(tick, 2 * bench.longest_read_s, bench.tick_s, "when it does not")
+            await_(
+                lambda: drive.read().cause != Cause.NONE, bench, "a drive that is silent is named"
+            )
+    finally:
+        drive.close()
+
+
+def drive_counts(bench: DriveBench) -> None:
+    """See that the counts have their names and go up only."""
+    drive = _enabled(bench)
+    try:
+        check_counts(lambda: drive.counts, DRIVE_COUNTS, lambda: _run(drive, bench, 0.0, 20))
+    finally:
+        drive.close()
+
+
+def drive_stops(bench: DriveBench) -> None:
+    """`stop` brings a turning joint to rest, and no command moves it after that."""
+    drive = _enabled(bench)
+    try:
+        _run(drive, bench, bench.speed_rad_s, math.ceil(bench.settle_s / bench.tick_s))
+        drive.stop()
+        drive.stop()
+        await_(lambda: _rests(bench), bench, "the joint is at rest after stop")
+        sent = _run(drive, bench, bench.speed_rad_s, 10)
+        require(sent == 0.0, f"write after stop sends 0; it returned {sent:g}")
+        _at_rest(bench, "after stop, whatever is written")
+    finally:
+        drive.close()
+
+
+def drive_ends_in_any_order(bench: DriveBench) -> None:
+    """`stop`, `disable` and `close` in every order, each twice, and from every state."""
+    orders = [(3, order) for order in itertools.permutations(range(3))]
+    for stage, order in (*((stage, (2, 1, 0)) for stage in range(3)), *orders):
+        drive = bench.make()
+        for step in (drive.connect, drive.configure, drive.enable)[:stage]:
+            step()
+        for number in order:
+            for _ in range(2):
+                (drive.stop, drive.disable, drive.close)[number]()
+                require(drive.write(bench.speed_rad_s) == 0.0, "write returns 0 after the end")
+                drive.read()
+        _loses_power(bench, "after stop, disable and close")
+        drive.close()
+
+
+def drive_stops_by_itself(bench: DriveBench) -> None:
+    """See that a drive whose facts name a watchdog comes to rest when nobody writes."""
+    drive = bench.make()
+    try:
+        drive.connect()
+        watchdog_s = drive.configure().watchdog_s
+        if watchdog_s is None or bench.other_end is None:
+            return
+        drive.enable()
+        _run(drive, bench, bench.speed_rad_s, math.ceil(bench.settle_s / bench.tick_s))
+        time.sleep(watchdog_s)
+        await_(lambda: _rests(bench), bench, f"at rest {watchdog_s:g} s after the last command")
+    finally:
+        drive.close()
+
+
+def drive_restarts_at_rest(bench: DriveBench) -> None:
+    """See that a driver closed at speed leaves nothing that moves the joint at the next enable."""
+    drive = _enabled(bench)
+    try:
+        _run(drive, bench, bench.speed_rad_s, 20)
+    finally:
+        drive.close()
+    await_(lambda: _rests(bench), bench, "the joint is at rest after close")
+    drive_enables_at_rest(bench)
+
+
+def _enabled(bench: DriveBench) -> VelocityDrive:
+    drive = bench.make()
+    try:
+        drive.connect()
+        drive.configure()
+        drive.enable()
+    except BaseException:
+        drive.close()
+        raise
+    return drive
+
+
+def _run(drive: VelocityDrive, bench: DriveBench, velocity_rad_s: float, ticks: int) -> float:
+    """Read and write for so many ticks; return what was sent last."""
+    sent = 0.0
+    for _ in range(ticks):
+        drive.read()
+        sent = drive.write(velocity_rad_s)
+        time.sleep(bench.tick_s)
+    return sent
+
+
+def _rests(bench: DriveBench) -> bool:
+    end = bench.other_end
+    return end is None or abs(end.velocity_rad_s()) <= AT_REST * bench.speed_rad_s
+
+
+def _at_rest(bench: DriveBench, when: str) -> None:
+    require(_rests(bench), f"the joint is at rest {when}")
+
+
+def _unpowered(bench: DriveBench, when: str) -> None:
+    end = bench.other_end
+    require(end is None or not end.powered(), f"the motor has no power {when}")
+
+
+def _loses_power(bench: DriveBench, when: str) -> None:
+    # The order may still be on the wire when the driver has sent it.
+    until_s = time.monotonic() + POWER_OFF_S
+    end = bench.other_end
+    while end is not None and end.powered() and time.monotonic() < until_s:
+        time.sleep(0.001)
+    _unpowered(bench, f"{when}, within {POWER_OFF_S:g} s")
+
+
+DRIVE_CHECKS: tuple[Callable[[DriveBench], None], ...] = (
+    drive_refuses_disorder,
+    drive_energises_by_enable_only,
+    drive_enables_at_rest,
+    drive_samples_flow,
+    drive_returns_what_was_sent,
+    drive_bounds_commands,
+    drive_read_never_waits,
+    drive_counts,
+    drive_stops,
+    drive_ends_in_any_order,
+    drive_stops_by_itself,
+    drive_restarts_at_rest,
+)

@@ -1,0 +1,137 @@
+"""What every torque sensor must do; see `conformance`."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+from rigidimeter.devices.base import TorqueSample, TorqueSensor
+from rigidimeter.devices.conformance.fixture import (
+    SensorBench,
+    await_,
+    check_counts,
+    check_facts,
+    check_quick,
+    check_stamp,
+    refuses,
+    require,
+)
+from rigidimeter.guard import Cause
+
+__all__ = ["SENSOR_CHECKS"]
+
+SENSOR_COUNTS = ("received", "lost", "repeated", "reordered", "damaged")
+
+
+def sensor_refuses_disorder(bench: SensorBench) -> None:
+    """Read, configure and close a sensor that is not connected."""
+    sensor = bench.make()
+    sample = sensor.read()
+    require(isinstance(sample, TorqueSample), "read returns a TorqueSample from the beginning")
+    refuses(sensor.configure, "configure before connect raises DeviceError")
+    sensor.close()
+
+
+def sensor_facts_are_complete(bench: SensorBench) -> None:
+    """See that what `configure` returns can be stored."""
+    sensor = bench.make()
+    try:
+        sensor.connect()
+        check_facts(sensor.configure())
+    finally:
+        sensor.close()
+
+
+def sensor_samples_flow(bench: SensorBench) -> None:
+    """Finite samples without a cause arrive, with new stamps."""
+    sensor = _sampling(bench)
+    try:
+        first = sensor.read()
+        await_(lambda: sensor.read().time_s > first.time_s, bench, "a new sample arrives")
+        sample = sensor.read()
+        require(
+            sample.cause == Cause.NONE, f"a good sample has no cause; {Cause(sample.cause).name}"
+        )
+        require(math.isfinite(sample.torque_nm), "a good sample is finite")
+        check_stamp(sample, bench.now)
+    finally:
+        sensor.close()
+
+
+def sensor_read_never_waits(bench: SensorBench) -> None:
+    """`read` is quick whether samples arrive or not."""
+    sensor = _sampling(bench)
+    try:
+        check_quick(sensor.read, bench.longest_read_s, bench.tick_s, "while samples arrive")
+        if bench.silence is not None:
+            bench.silence()
+            check_quick(sensor.read, bench.longest_read_s, bench.tick_s, "when none arrive")
+            last = sensor.read()
+            time.sleep(2 * bench.tick_s)
+            again = sensor.read()
+            require(
+                again.time_s == last.time_s or again.cause != Cause.NONE,
+                "a sensor that is silent repeats its last sample, or names a cause",
+            )
+    finally:
+        sensor.close()
+
+
+def sensor_counts(bench: SensorBench) -> None:
+    """See that the counts have their names and go up only."""
+    sensor = _sampling(bench)
+
+    def use() -> None:
+        for _ in range(20):
+            sensor.read()
+            time.sleep(bench.tick_s)
+
+    try:
+        check_counts(lambda: sensor.counts, SENSOR_COUNTS, use)
+    finally:
+        sensor.close()
+
+
+def sensor_closes_twice(bench: SensorBench) -> None:
+    """`close` may come at any time, and again; `read` does not raise after it."""
+    bench.make().close()
+    sensor = bench.make()
+    sensor.connect()
+    sensor.close()
+    sensor.close()
+    sensor = _sampling(bench)
+    for _ in range(2):
+        sensor.close()
+        sensor.read()
+        _ = sensor.counts
+
+
+def sensor_connects_again(bench: SensorBench) -> None:
+    """See that a second driver takes over where the first has closed."""
+    for _ in range(2):
+        sensor = _sampling(bench)
+        sensor.close()
+
+
+def _sampling(bench: SensorBench) -> TorqueSensor:
+    sensor = bench.make()
+    try:
+        sensor.connect()
+        sensor.configure()
+        await_(lambda: math.isfinite(sensor.read().torque_nm), bench, "a first sample arrives")
+    except BaseException:
+        sensor.close()
+        raise
+    return sensor
+
+
+SENSOR_CHECKS: tuple[Callable[[SensorBench], None], ...] = (
+    sensor_refuses_disorder,
+    sensor_facts_are_complete,
+    sensor_samples_flow,
+    sensor_read_never_waits,
+    sensor_counts,
+    sensor_closes_twice,
+    sensor_connects_again,
+)

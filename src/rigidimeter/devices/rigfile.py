@@ -1,0 +1,239 @@
+"""RIG.toml: which devices make up a rig, each with the settings of its driver.
+
+    name = "elbow rig, room 12"
+    home_deg = 0.0             # where the joint must stand to be enabled, on the drive's scale
+    home_tolerance_deg = 3.0
+
+    [torque_sensor]
+    driver = "ati-rdt"
+    address = "192.168.1.1"
+
+    [drive]
+    driver = "cia402"
+    channel = "can0"
+
+A driver is one of the names below, or ``package.module:Class``. A driver class carries its settings
+as `Settings` and is made with ``Class(settings, now)``.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import importlib
+import inspect
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from pydantic import BaseModel, ValidationError
+
+from rigidimeter.devices.base import Now
+from rigidimeter.devices.composed import ComposedRig, Home
+from rigidimeter.errors import UserError
+from rigidimeter.settings.messages import sentence
+
+__all__ = ["DRIVERS", "RigFile", "load_rig"]
+
+DRIVERS: Mapping[str, Mapping[str, str]] = {
+    "torque_sensor": {
+        "ati-rdt": "rigidimeter.devices.ati.rdt:AtiRdt",
+        "ati-analogue": "rigidimeter.devices.ati.analogue:AtiAnalogue",
+    },
+    "drive": {
+        "cia402": "rigidimeter.devices.cia402.drive:Cia402Drive",
+        "ascii": "rigidimeter.devices.ascii.drive:AsciiDrive",
+    },
+    "enable_line": {"serial-line": "rigidimeter.devices.enable_line:SerialEnableLine"},
+}
+"""The drivers that come along, by role and name."""
+
+METHODS: Mapping[str, tuple[str, ...]] = {
+    "torque_sensor": ("connect", "configure", "read", "counts", "close"),
+    "drive": (
+        *("connect", "configure", "enable", "read", "write"),
+        *("counts", "stop", "disable", "close"),
+    ),
+    "enable_line": ("close_contact", "open_contact", "close"),
+}
+"""What a class must have to be a device of this role; see `device.base`."""
+
+REQUIRED = ("torque_sensor", "drive")
+HOME: Mapping[str, float | None] = {"home_deg": None, "home_tolerance_deg": 3.0}
+"""Keys of the initial position, and what they are when absent."""
+
+
+@dataclass(frozen=True)
+class RigFile:
+    """A rig as its file describes it, checked, nothing connected.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+    devices : mapping
+        Class and settings by role.
+    digest : str
+        Of what the file says: a commissioning record holds for one of these.
+    home : Home or None
+        Where the joint must stand to be enabled.
+    """
+
+    path: Path
+    name: str
+    devices: Mapping[str, tuple[type[Any], Any]]
+    digest: str
+    home: Home | None = None
+
+    @property
+    def emulated(self) -> bool:
+        """Whether every device says of its settings that they reach no hardware.
+
+        It follows from the wires, not from a word in the file: loopback, a pseudo-terminal, a CAN
+        bus without wires. A driver that says nothing is taken for one of hardware.
+        """
+        return bool(self.devices) and all(
+            getattr(settings, "emulated", False) for _, settings in self.devices.values()
+        )
+
+    def claim(self) -> BinaryIO:
+        """Keep this rig for this process until the file that is returned is closed.
+
+        Raises
+        ------
+        UserError
+            If another process has it.
+        """
+        file = self.path.open("rb")
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            file.close()
+            raise UserError(
+                f"{self.path}: another program uses this rig; end that one first"
+            ) from None
+        return file
+
+    def build(self, now: Now, tick_rate_hz: float, home: Home | None = None) -> ComposedRig:
+        """Make the devices; nothing is connected yet. `home` goes before that of the file."""
+        made = {role: driver(settings, now) for role, (driver, settings) in self.devices.items()}
+        return ComposedRig(
+            made["torque_sensor"],
+            made["drive"],
+            tick_rate_hz,
+            made.get("enable_line"),
+            home or self.home,
+        )
+
+
+def load_rig(path: Path) -> RigFile:
+    """Read RIG.toml.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, or names a device, a driver or a value that does not exist.
+    """
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except UnicodeDecodeError:
+        raise UserError(f"{path}: is not a text file in UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise UserError(f"{path}: is not valid TOML: {error}") from None
+    unknown = sorted(set(values) - set(DRIVERS) - {"name", *HOME})
+    if unknown:
+        raise UserError(
+            f"{path}: unknown key {unknown[0]}; known are name, {', '.join((*HOME, *DRIVERS))}"
+        )
+    missing = [role for role in REQUIRED if role not in values]
+    if missing:
+        raise UserError(f"{path}: has no [{missing[0]}] table, which names a driver")
+    devices = {role: _device(path, role, values[role]) for role in DRIVERS if role in values}
+    name = values.get("name", path.stem)
+    if not isinstance(name, str):
+        raise UserError(f"{path}: name must be text, got {name!r}")
+    digest = hashlib.sha256(repr(sorted_values(values)).encode()).hexdigest()
+    return RigFile(path, name, devices, digest, _home(path, values))
+
+
+def _home(path: Path, values: Mapping[str, Any]) -> Home | None:
+    angle, tolerance = (values.get(key, default) for key, default in HOME.items())
+    for key, value in zip(HOME, (angle, tolerance), strict=True):
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
+            raise UserError(f"{path}: {key} must be a number of degrees, got {value!r}")
+        if value is not None and not math.isfinite(value):
+            raise UserError(f"{path}: {key} must be a finite number of degrees, got {value!r}")
+    if tolerance is None or not 0 < tolerance <= 180:
+        raise UserError(
+            f"{path}: home_tolerance_deg must be above 0 and at most 180 degrees, got {tolerance!r}"
+        )
+    if angle is None:
+        return None
+    return Home(math.radians(angle), math.radians(tolerance))
+
+
+def sorted_values(values: Any) -> Any:
+    """Return nested mappings as sorted pairs: the same for the same meaning, however written."""
+    if isinstance(values, Mapping):
+        return sorted((key, sorted_values(value)) for key, value in values.items())
+    return values
+
+
+def _device(path: Path, role: str, table: Any) -> tuple[type[Any], Any]:
+    if not isinstance(table, dict) or not isinstance(table.get("driver"), str):
+        known = ", ".join(DRIVERS[role])
+        raise UserError(f"{path}: [{role}] must name its driver: {known}, or package.module:Class")
+    driver = _driver(path, role, table["driver"])
+    values = {key: value for key, value in table.items() if key != "driver"}
+    try:
+        return driver, driver.Settings.model_validate(values)
+    except ValidationError as error:
+        lines = [sentence(driver.Settings, values, detail) for detail in error.errors()]
+        raise UserError(f"{path}, [{role}]: " + "; ".join(lines)) from None
+
+
+def _driver(path: Path, role: str, name: str) -> Any:
+    place = DRIVERS[role].get(name, name)
+    module, _, attribute = place.partition(":")
+    if not attribute or not module or module.startswith("."):
+        known = ", ".join(DRIVERS[role])
+        raise UserError(
+            f"{path}, [{role}]: there is no driver {name!r}; known are {known}, and others are "
+            "written package.module:Class"
+        )
+    try:
+        driver = getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise UserError(f"{path}, [{role}]: driver {name!r} cannot be loaded ({error})") from None
+    except (Exception, SystemExit) as error:  # a module of anybody's, which may raise anything
+        what = f"{type(error).__name__}: {error}"
+        raise UserError(
+            f"{path}, [{role}]: driver {name!r} cannot be loaded, its module fails with {what}"
+        ) from error
+    settings = getattr(driver, "Settings", None)
+    if settings is None:
+        raise UserError(f"{path}, [{role}]: {name!r} is no driver: it has no Settings")
+    if not (isinstance(settings, type) and issubclass(settings, BaseModel)):
+        raise UserError(
+            f"{path}, [{role}]: {name!r} is no driver: its Settings must be a class derived from "
+            "rigidimeter.settings.section.Section"
+        )
+    lacking = [method for method in METHODS[role] if not hasattr(driver, method)]
+    if lacking:
+        raise UserError(
+            f"{path}, [{role}]: {name!r} is no driver for a {role.replace('_', ' ')}: it has no "
+            f"{', '.join(lacking)}"
+        )
+    try:
+        inspect.signature(driver).bind(None, None)
+    except TypeError as error:
+        raise UserError(
+            f"{path}, [{role}]: {name!r} is no driver: it must be made with (settings, now), but "
+            f"{error}"
+        ) from None
+    return driver

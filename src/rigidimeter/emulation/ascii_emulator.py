@@ -1,0 +1,346 @@
+"""A serial servo drive on a pseudo-terminal: ASCII registers, trapezoid moves, and every bad habit.
+
+The peer takes as long as a true line would: ten bits a character at its baud rate, each way, and a
+little to think. It starts at 9600 baud, changes by ``s r0x90``, and hears only noise while the
+host's port is set to another rate. A pseudo-terminal carries no break, so it keeps its rate between
+hosts. Its trajectory generator runs an absolute or relative trapezoid with its own deceleration,
+whoever is there to see; a position loop makes the arm follow.
+
+A relative move that starts during another adds to the target before, which is the more dangerous of
+the two readings of such a drive.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import select
+import termios
+import threading
+import time
+import tty
+from collections import deque
+from typing import Any
+
+from rigidimeter.emulation.emulated_arm import EmulatedArm
+from rigidimeter.emulation.trapezoid import Ramps, Trapezoid
+
+__all__ = ["MISBEHAVIOURS", "AsciiPeer"]
+
+MISBEHAVIOURS = {
+    "silent": "answers nothing",
+    "error_replies": "refuses every request with this code",
+    "garbage": "answers with characters that mean nothing",
+    "half_replies": "stops in the middle of each answer",
+    "slow_replies": "answers this many seconds late",
+    "wrong_baud": "changes to this rate by itself",
+    "fault": "latches the fault with this bit and takes the power away",
+    "power_lost": "the hardware enable opens",
+    "does_not_follow": "takes commands and stands still",
+    "runs_away": "moves at this velocity in rad/s whatever it is told",
+    "encoder_frozen": "reports the position and velocity of this moment for ever",
+    "encoder_jump": "adds this many counts to the position",
+    "encoder_sign_flip": "reports position and velocity with the other sign",
+    "stale_target": "keeps this target velocity in 0.1 counts/s, whatever is written",
+    "changes_state": "goes to this desired state by itself",
+}
+"""What `AsciiPeer.misbehave` can do."""
+
+OFF, VELOCITY, MOVES = 0, 11, 21
+POWER_UP_BAUD = 9600
+STEP_S = 0.001
+GENERATOR_STEP_S = 0.0005
+LOOP_GAIN_S = 60.0
+SPEEDS = {getattr(termios, f"B{rate}"): rate for rate in (9600, 19200, 38400, 57600, 115200)}
+FAULT, ENABLE_OPEN, DISABLED, NO_PWM, MOVING = 1 << 22, 1 << 11, 1 << 12, 1 << 15, 1 << 27
+TEXTS = {0x92: "EMU-055-18", 0x81: "4711"}
+READ_ONLY = (0x18, 0x32, 0xA0)
+
+
+class AsciiPeer:
+    """The drive's end of the wire; a thread answers until `close`.
+
+    Parameters
+    ----------
+    arm : EmulatedArm
+    baud : int
+        The highest rate it can be set to.
+    counts_per_turn : float
+        Encoder counts for one turn of the joint.
+    thinking_s : float
+        From the end of a request to the start of its answer.
+    """
+
+    def __init__(
+        self,
+        arm: EmulatedArm,
+        *,
+        baud: int = 115200,
+        counts_per_turn: float = 360_000.0,
+        thinking_s: float = 0.0002,
+    ) -> None:
+        self._arm = arm
+        self._highest_baud = baud
+        self._per_rad = counts_per_turn / (2.0 * math.pi)
+        self._thinking_s = thinking_s
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.port = os.ttyname(self._slave)
+        self.log: deque[tuple[float, str, str]] = deque(maxlen=100_000)
+        self._habits: dict[str, Any] = {}
+        self._registers = {0x24: OFF, 0x2F: 0, 0x36: 1000, 0x37: 1000, 0x90: POWER_UP_BAUD}
+        self._registers |= dict.fromkeys((0xA4, 0xC8, 0xCA, 0xCB), 0)
+        self._registers |= dict.fromkeys((0xCC, 0xCD, 0xCF), 10_000)
+        place = self._counts()[0]
+        self._generator = Trapezoid(place, place)
+        self._generated_s = time.monotonic()
+        self._frozen: tuple[int, int] | None = None
+        self._running = True
+        self._lock = threading.RLock()
+        self._thread = threading.Thread(target=self._run, name="ascii-peer", daemon=True)
+        self._thread.start()
+
+    # -- for tests ----------------------------------------------------------------------------
+
+    def misbehave(self, name: str, value: float = 1) -> None:
+        """Begin a bad habit of `MISBEHAVIOURS`."""
+        if name not in MISBEHAVIOURS:
+            raise ValueError(f"misbehaviour is {name!r}; one of {', '.join(MISBEHAVIOURS)}")
+        with self._lock:
+            if name == "fault":
+                self._registers[0xA4] |= 1 << int(value)
+                self._generator.speed = 0.0
+            elif name == "encoder_frozen":
+                self._frozen = self._seen()
+            elif name == "changes_state":
+                self._registers[0x24] = int(value)
+            elif name == "wrong_baud":
+                self._registers[0x90] = int(value)
+            elif name == "stale_target":
+                self._registers[0x2F] = int(value)
+            self._habits[name] = value
+
+    def behave(self) -> None:
+        """Lay every bad habit down; a latched fault stays until it is cleared."""
+        with self._lock:
+            self._habits.clear()
+            self._frozen = None
+
+    def state(self) -> dict[str, float | int | bool]:
+        """Return what the drive is doing, as seen from outside the wire."""
+        with self._lock:
+            angle_rad, velocity_rad_s = self._arm.motion()
+            return {
+                "angle_rad": angle_rad,
+                "velocity_rad_s": velocity_rad_s,
+                "power": self._powered(),
+                "desired_state": self._registers[0x24],
+                "target_rad_s": self._wanted() / self._per_rad,
+                "status": self._status(),
+                "baud": self._registers[0x90],
+                "requests": len(self.log),
+            }
+
+    def close(self) -> None:
+        """End the thread and close both ends of the pseudo-terminal."""
+        if not self._running:
+            return
+        self._running = False
+        self._thread.join()
+        self._arm.release()
+        os.close(self._master)
+        os.close(self._slave)
+
+    # -- the wire -----------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        heard = bytearray()
+        arrived_s = 0.0
+        while self._running:
+            ready, _, _ = select.select([self._master], [], [], STEP_S)
+            with self._lock:
+                self._generate()
+            if not ready:
+                continue
+            chunk = os.read(self._master, 4096)
+            if not heard:
+                arrived_s = time.monotonic()
+            rate = SPEEDS.get(termios.tcgetattr(self._slave)[4])
+            if rate != self._registers[0x90]:
+                self.log.append((time.monotonic(), "(noise)", ""))
+                heard.clear()
+                continue
+            heard += chunk
+            while b"\r" in heard:
+                line, _, rest = bytes(heard).partition(b"\r")
+                heard = bytearray(rest)
+                arrived_s += (len(line) + 1) * self._character_s()
+                self._until(arrived_s + self._thinking_s)
+                self._answer(line.decode("ascii", "replace").strip(), arrived_s + self._thinking_s)
+                arrived_s = time.monotonic()
+
+    def _answer(self, request: str, begun_s: float) -> None:
+        character_s = self._character_s()
+        with self._lock:
+            habits = dict(self._habits)
+            reply = self._reply(request)
+            self.log.append((time.monotonic(), request, reply))
+        if "silent" in habits:
+            return
+        if "garbage" in habits:
+            reply = "\x7f#?"
+        data = reply.encode("ascii") + b"\r"
+        if "half_replies" in habits:
+            data = data[: len(data) // 2]
+        self._until(begun_s + len(data) * character_s + float(habits.get("slow_replies", 0.0)))
+        # A host that is gone leaves the line full; a true drive sends into the void as well.
+        with contextlib.suppress(BlockingIOError):
+            os.write(self._master, data)
+
+    def _character_s(self) -> float:
+        return 10.0 / self._registers[0x90]
+
+    def _until(self, at_s: float) -> None:
+        while self._running and (left_s := at_s - time.monotonic()) > 0.0:
+            time.sleep(min(left_s, STEP_S))
+            with self._lock:
+                self._generate()
+
+    def _reply(self, request: str) -> str:
+        if "error_replies" in self._habits:
+            return f"e {int(self._habits['error_replies'])}"
+        match request.split():
+            case ["g", name] if (register := _register(name)) is not None:
+                return self._read(register)
+            case ["s", name, number] if (register := _register(name)) is not None:
+                return self._write(register, number)
+            case ["t", "0"]:
+                self._generator.aborting = True
+                return "ok"
+            case ["t", "1"]:
+                return self._start_move()
+        return "e 1"
+
+    def _read(self, register: int) -> str:
+        if register in TEXTS:
+            return f"v {TEXTS[register]}"
+        position, velocity = self._seen()
+        live = {0x32: position, 0x18: velocity, 0xA0: self._status()}
+        value = live.get(register, self._registers.get(register))
+        return "e 15" if value is None else f"v {value}"
+
+    def _write(self, register: int, number: str) -> str:
+        try:
+            value = int(number, 0)
+        except ValueError:
+            return "e 33"
+        if register not in self._registers or register in READ_ONLY:
+            return "e 15"
+        if register == 0x90 and (value not in SPEEDS.values() or value > self._highest_baud):
+            return "e 33"
+        if register == 0x2F and "stale_target" in self._habits:
+            return "ok"
+        if register == 0xA4:
+            value = self._registers[0xA4] & ~value
+        if register == 0x24 and value != self._registers[0x24]:
+            # Power comes and goes at rest, where the arm is.
+            self._generator.rest(self._counts()[0])
+        self._registers[register] = value
+        return "ok"
+
+    # -- the drive ----------------------------------------------------------------------------
+
+    def _counts(self) -> tuple[float, float]:
+        angle_rad, velocity_rad_s = self._arm.motion()
+        return angle_rad * self._per_rad, velocity_rad_s * self._per_rad
+
+    def _seen(self) -> tuple[int, int]:
+        if self._frozen is not None:
+            return self._frozen
+        position, velocity = self._counts()
+        if "encoder_sign_flip" in self._habits:
+            position, velocity = -position, -velocity
+        position += float(self._habits.get("encoder_jump", 0.0))
+        return round(position), round(10.0 * velocity)
+
+    def _powered(self) -> bool:
+        state = self._registers[0x24]
+        return (
+            state in (VELOCITY, MOVES)
+            and not self._registers[0xA4]
+            and "power_lost" not in self._habits
+        )
+
+    def _status(self) -> int:
+        status = self._registers[0xA4]
+        if status:
+            status |= FAULT
+        if self._registers[0x24] == OFF:
+            status |= DISABLED
+        if "power_lost" in self._habits:
+            status |= ENABLE_OPEN
+        if not self._powered():
+            status |= NO_PWM
+        elif self._generator.speed != 0.0:
+            status |= MOVING
+        return status
+
+    def _start_move(self) -> str:
+        if not self._powered() or self._registers[0x24] != MOVES:
+            return "e 22"
+        generator, target = self._generator, float(self._registers[0xCA])
+        if self._registers[0xC8] == 256:
+            target += generator.place if generator.aborting else generator.target
+        elif self._registers[0xC8] != 0:
+            return "e 22"
+        generator.move(target, 0.1 * self._registers[0xCB])
+        return "ok"
+
+    def _wanted(self) -> float:
+        """Return the velocity in counts/s that the drive heads for."""
+        if not self._powered():
+            return 0.0
+        if self._registers[0x24] == VELOCITY:
+            return 0.1 * self._registers[0x2F]
+        return self._generator.wanted(self._ramps())
+
+    def _ramps(self) -> Ramps:
+        if self._registers[0x24] == VELOCITY:
+            return Ramps(1000.0 * self._registers[0x36], 1000.0 * self._registers[0x37])
+        down = self._registers[0xCF if self._generator.aborting else 0xCD]
+        return Ramps(10.0 * self._registers[0xCC], 10.0 * down)
+
+    def _generate(self) -> None:
+        """Bring the generator to now, and let the arm follow it."""
+        now_s = time.monotonic()
+        while self._generated_s < now_s:
+            step_s = min(GENERATOR_STEP_S, now_s - self._generated_s)
+            self._generated_s += step_s
+            self._step(step_s)
+        if "runs_away" in self._habits and self._powered():
+            self._arm.command(float(self._habits["runs_away"]))
+        elif not self._powered() or "does_not_follow" in self._habits:
+            self._arm.command(0.0)
+        else:
+            generator, moves = self._generator, self._registers[0x24] == MOVES
+            error = generator.place - self._counts()[0] if moves else 0.0
+            self._arm.command((generator.speed + LOOP_GAIN_S * error) / self._per_rad)
+
+    def _step(self, step_s: float) -> None:
+        generator = self._generator
+        if not self._powered():
+            # The target of a move before stays, as it would in such a drive.
+            generator.place, generator.speed = self._counts()[0], 0.0
+        elif self._registers[0x24] == VELOCITY:
+            generator.run(0.1 * self._registers[0x2F], self._ramps(), step_s)
+        else:
+            generator.step(self._ramps(), step_s)
+
+
+def _register(name: str) -> int | None:
+    try:
+        return int(name[1:], 16) if name.startswith("r0x") else None
+    except ValueError:
+        return None

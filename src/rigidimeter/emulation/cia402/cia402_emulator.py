@@ -1,0 +1,332 @@
+"""A servo on a CAN bus that speaks CANopen, profile CiA 402, and misbehaves when told to.
+
+It answers to any master: questions (SDO), commands and SYNC by whatever mapping the master made,
+network management, heartbeats both ways. Left alone while it moves, it stops itself: when the
+master's heartbeat (0x1016) or the command message's deadline (0x1400:05) runs out it sends an
+emergency, 0x8130 or 0x8250, and does what 0x6007 says, as a rule a quick stop along 0x6085.
+
+Two threads act on it: python-can's, which receives, and one that looks at the deadlines about every
+millisecond. A lock makes them take turns.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from rigidimeter.emulation.cia402.objects import (
+    COMMAND_MESSAGES,
+    INVALID,
+    MEASUREMENT_MESSAGES,
+    PROFILE_VELOCITY,
+    dictionary,
+)
+from rigidimeter.emulation.cia402.servo import DEFAULTS, GENERIC_ERROR, MISBEHAVIOURS, Servo
+from rigidimeter.emulation.cia402.state_machine import POWERED, Phase, statusword
+from rigidimeter.emulation.emulated_arm import EmulatedArm
+from rigidimeter.errors import UserError
+
+__all__ = ["MISBEHAVIOURS", "Cia402Peer"]
+
+WATCH_S = 0.001
+HEARTBEAT_LOST, COMMAND_LOST = 0x8130, 0x8250
+WRONG_VALUE = 0x06090030
+
+
+class Cia402Peer:
+    """One node on a bus of its own; `close` it.
+
+    Parameters
+    ----------
+    arm : EmulatedArm
+        What it moves.
+    interface, channel : str
+        Of python-can.
+    node_id : int
+    counts_per_rev : float
+        Position, velocity and acceleration units per turn of the joint, per s and per s².
+    now : callable
+        Monotonic time in s.
+    options : Any
+        More for python-can, as `port`.
+    """
+
+    def __init__(
+        self,
+        arm: EmulatedArm,
+        *,
+        interface: str,
+        channel: str,
+        node_id: int = 1,
+        counts_per_rev: float = 819_200.0,
+        now: Callable[[], float] = time.monotonic,
+        **options: Any,
+    ) -> None:
+        try:
+            can, canopen = importlib.import_module("can"), importlib.import_module("canopen")
+        except ModuleNotFoundError as error:
+            raise UserError(
+                f"the emulated servo needs the package {error.name}, which is not installed: "
+                "pip install 'rigidimeter[canopen]'"
+            ) from None
+        self._can, self._abort = can, canopen.SdoAbortedError
+        self._arm, self._now, self._node_id = arm, now, node_id
+        self._units_per_rad = counts_per_rev / (2 * math.pi)
+        self._lock = threading.RLock()
+        self._servo = Servo(arm, self, self._units_per_rad, now)
+        self._later: list[tuple[float, bytes]] = []
+        self.log: list[tuple[float, str]] = []
+        """What happened, with its time."""
+        self._forget()
+        self._bus = can.Bus(interface=interface, channel=channel, ignore_config=True, **options)
+        self._network = network = canopen.Network(self._bus)
+        network.send_message = self._transmit
+        objects = dictionary(canopen.objectdictionary, node_id)
+        self._node = node = network.create_node(canopen.LocalNode(node_id, objects))
+        network.unsubscribe(0x600 + node_id, node.sdo.on_request)
+        network.subscribe(0x600 + node_id, self._on_question)
+        node.add_read_callback(self._on_read)
+        node.add_write_callback(self._on_write)
+        node.nmt.send_command(0x81)
+        node.nmt.send_command(0x80)
+        network.listeners.append(self._on_frame)
+        self._notifier = can.Notifier(self._bus, network.listeners, 0.02)
+        self._ended = threading.Event()
+        self._watch = threading.Thread(target=self._watching, name=f"node {node_id}")
+        self._watch.start()
+
+    def misbehave(self, name: str, value: Any = None) -> None:
+        """Do wrong what `MISBEHAVIOURS` says of this name, from now on."""
+        if name not in MISBEHAVIOURS:
+            raise ValueError(f"{name!r} is none of {', '.join(MISBEHAVIOURS)}")
+        with self._lock:
+            self.note(f"misbehaves: {name}")
+            self._servo.wrong[name] = DEFAULTS.get(name) if value is None else value
+            if name == "fault":
+                self._servo.fault(self._servo.wrong[name], name)
+            elif name == "emergency":
+                self.emergency(self._servo.wrong[name], GENERIC_ERROR)
+            elif name == "leave operation":
+                self._servo.go(Phase.SWITCH_ON_DISABLED, name)
+            elif name == "encoder frozen":
+                self._servo.wrong[name] = self._servo.measured()
+            elif name in ("stop heartbeat", "die"):
+                self._node.nmt.stop_heartbeat()
+            elif name == "reboot":
+                del self._servo.wrong[name]
+                self._reboot()
+            self._servo.move()
+
+    def behave(self) -> None:
+        """Do everything right again, as a repaired drive; its state stays as it is."""
+        with self._lock:
+            self.note("behaves")
+            self._servo.wrong.clear()
+            self._node.nmt.start_heartbeat(self.value(0x1017))
+            self._servo.move()
+
+    def state(self) -> dict[str, Any]:
+        """Return where the arm is and how the drive is."""
+        with self._lock:
+            angle_rad, velocity_rad_s = self._arm.motion()
+            return {
+                "angle_rad": angle_rad,
+                "velocity_rad_s": velocity_rad_s,
+                "power": self._servo.phase in POWERED,
+                "state": self._servo.phase.name,
+                "network": self._node.nmt.state,
+                "target_rad_s": self._servo.target() / self._units_per_rad,
+                "stop_reason": self._servo.last_stop.reason,
+                "stop_began_s": self._servo.last_stop.began_s,
+                "stop_rest_s": self._servo.last_stop.rest_s,
+            }
+
+    def close(self) -> None:
+        """Leave the bus."""
+        if self._ended.is_set():
+            return
+        self._ended.set()
+        self._watch.join()
+        self._node.nmt.stop_heartbeat()
+        self._notifier.stop()
+        self._bus.shutdown()
+
+    # What the node remembers
+
+    def _forget(self) -> None:
+        self._heartbeat_s: float | None = None  # None: not watched yet, or not any more
+        self._command_s: float | None = None
+        self._syncs = 0
+
+    def _reboot(self) -> None:
+        self._servo.restart()
+        self._node.nmt.stop_heartbeat()
+        self._node.data_store.clear()
+        self._forget()
+        self._node.nmt.send_command(0x81)
+        self._node.nmt.send_command(0x80)
+
+    # What the servo sees of the node
+
+    def value(self, index: int, subindex: int = 0) -> int:
+        """Return an object's value."""
+        kind = self._node.object_dictionary[index]
+        entry = kind if not hasattr(kind, "subindices") else kind[subindex]
+        return int(entry.decode_raw(self._node.get_data(index, subindex)))
+
+    def emergency(self, code: int, register: int) -> None:
+        """Send an emergency message."""
+        self.note(f"emergency 0x{code:04X}")
+        self._node.data_store.setdefault(0x603F, {})[0] = code.to_bytes(2, "little")
+        self._node.data_store.setdefault(0x1001, {})[0] = bytes([register])
+        self._node.emcy.send(code, register)
+
+    def changed(self) -> None:
+        """Send the messages that tell of a change, not of a SYNC."""
+        if self._operational():
+            for index in MEASUREMENT_MESSAGES:
+                if self.value(index, 2) >= 254:
+                    self._send_measurements(index)
+
+    def note(self, event: str) -> None:
+        """Write down what happened."""
+        self.log.append((self._now(), event))
+
+    # What the master asks and sets
+
+    def _on_question(self, _identifier: int, data: bytearray, _time: float) -> None:
+        with self._lock:
+            if "die" in self._servo.wrong:
+                return
+            if "slow answers" in self._servo.wrong:
+                self._later.append((self._now() + self._servo.wrong["slow answers"], bytes(data)))
+                return
+            self._node.sdo.on_request(0, data, 0.0)
+
+    def _on_read(self, index: int, subindex: int, **_: Any) -> int | None:
+        if index == 0x6041:
+            return statusword(self._servo.phase)
+        if index == 0x6061:
+            shown = self._servo.wrong.get("change mode")
+            return self.value(0x6060) if shown is None else int(shown)
+        if index == 0x6064:
+            return self._servo.measured()[0]
+        if index == 0x606C:
+            return self._servo.measured()[1]
+        if index == 0x60FF and "stale target" in self._servo.wrong:
+            return round(self._servo.target())
+        if (index, subindex) == (0x1016, 1) and "wrong watchdog" in self._servo.wrong:
+            return int(self._servo.wrong["wrong watchdog"])
+        return None
+
+    def _on_write(self, index: int, data: bytes, **_: Any) -> None:
+        if index == 0x6060 and data[0] not in (0, PROFILE_VELOCITY):
+            raise self._abort(WRONG_VALUE)
+        if index == 0x6040:
+            self._servo.control(int.from_bytes(data, "little"))
+        if index in (0x6040, 0x60FF):
+            # The value itself is stored after this, so what follows from it is done then.
+            self._node.data_store.setdefault(index, {})[0] = bytes(data)
+            self._servo.move()
+
+    # What comes and goes without a question
+
+    def _operational(self) -> bool:
+        return bool(self._node.nmt.state == "OPERATIONAL")
+
+    def _on_frame(self, message: Any) -> None:
+        identifier, data = message.arbitration_id, message.data
+        with self._lock:
+            if "die" in self._servo.wrong or message.is_error_frame or message.is_remote_frame:
+                return
+            if identifier == 0 and len(data) == 2 and data[1] in (0, self._node_id):
+                if data[0] in (0x81, 0x82):
+                    self._reboot()
+                return
+            if 0x700 < identifier < 0x780:
+                self._on_heartbeat(identifier - 0x700)
+            elif self._operational():
+                if identifier == 0x80:
+                    self._on_sync()
+                for index in COMMAND_MESSAGES:
+                    if identifier == self.value(index, 1):
+                        self._on_command(index, bytes(data))
+
+    def _on_heartbeat(self, node_id: int) -> None:
+        watched = self.value(0x1016, 1)
+        if node_id == watched >> 16 and watched & 0xFFFF:
+            if self._heartbeat_s is None:
+                self.note("watches the master's heartbeat")
+            self._heartbeat_s = self._now()
+
+    def _mapping(self, index: int) -> Iterator[tuple[int, int, int]]:
+        """Yield index, subindex and bytes of what a message carries."""
+        for k in range(1, self.value(index + 0x200) + 1):
+            entry = self.value(index + 0x200, k)
+            yield entry >> 16, entry >> 8 & 0xFF, (entry & 0xFF) // 8
+
+    def _on_command(self, index: int, data: bytes) -> None:
+        at = 0
+        mapped = list(self._mapping(index))
+        if len(data) < sum(size for _, _, size in mapped):
+            return
+        self._command_s = self._now()
+        parts = []
+        for entry, subindex, size in mapped:
+            parts.append((entry, subindex, data[at : at + size]))
+            at += size
+        # The controlword last: a state is entered with the target that came along.
+        for entry, subindex, part in sorted(parts, key=lambda part: part[0] == 0x6040):
+            self._node.set_data(entry, subindex, part)
+
+    def _on_sync(self) -> None:
+        self._syncs += 1
+        for index in MEASUREMENT_MESSAGES:
+            every = self.value(index, 2)
+            if 1 <= every <= 240 and self._syncs % every == 0:
+                self._send_measurements(index)
+
+    def _send_measurements(self, index: int) -> None:
+        identifier = self.value(index, 1)
+        if identifier & INVALID or "stop measurements" in self._servo.wrong:
+            return
+        parts = [
+            self._node.get_data(entry, sub)[:size] for entry, sub, size in self._mapping(index)
+        ]
+        self._transmit(identifier & 0x7FF, b"".join(parts))
+
+    def _transmit(self, identifier: int, data: Any, remote: bool = False) -> None:
+        if "die" in self._servo.wrong or remote:
+            return
+        can = self._can
+        try:
+            self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+        except can.CanError as error:
+            self.note(f"not sent: {error}")
+
+    # What it looks at by itself
+
+    def _watching(self) -> None:
+        while not self._ended.wait(WATCH_S):
+            with self._lock:
+                now_s = self._now()
+                self._watch_connection(now_s)
+                self._servo.watch_rest(now_s)
+                due = [data for at_s, data in self._later if at_s <= now_s]
+                self._later = [item for item in self._later if item[0] > now_s]
+                for data in due:
+                    self._node.sdo.on_request(0, data, 0.0)
+
+    def _watch_connection(self, now_s: float) -> None:
+        limit_s = (self.value(0x1016, 1) & 0xFFFF) * 1e-3
+        if self._heartbeat_s is not None and limit_s and now_s - self._heartbeat_s > limit_s:
+            self._heartbeat_s = None
+            self._servo.connection_lost(HEARTBEAT_LOST, "heartbeat lost")
+        limit_s = self.value(COMMAND_MESSAGES[0], 5) * 1e-3
+        if self._command_s is not None and limit_s and now_s - self._command_s > limit_s:
+            self._command_s = None
+            self._servo.connection_lost(COMMAND_LOST, "command deadline passed")

@@ -1,0 +1,118 @@
+"""The plant behind the wire peers: one drive, one arm, whatever the time.
+
+Peers answer when they are asked, not at fixed ticks, so the state is advanced to the moment of each
+question, exactly, under the command that was in force since the last one. The equations are those
+of `simulation.drive` and `simulation.arm`.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from rigidimeter.dynamics import DriveState, arm_torque_nm, drive, drive_step
+from rigidimeter.dynamics.joint import JointDynamics
+
+__all__ = ["EmulatedArm"]
+
+LONGEST_STEP_S = 0.5
+
+
+class EmulatedArm:
+    """A joint on a velocity drive that several peers share; safe to use from several threads.
+
+    Parameters
+    ----------
+    joint : JointDynamics
+        What an estimate should give back.
+    bandwidth_hz, damping_ratio : float
+        Of the drive.
+    noise_sd_nm : float
+        Of each torque reading.
+    voluntary_nm : callable
+        M_sub in N·m at a time in s since the start.
+    seed : int
+        Of the noise.
+    now : callable
+        Monotonic time in s.
+    """
+
+    def __init__(
+        self,
+        joint: JointDynamics,
+        *,
+        bandwidth_hz: float = 50.0,
+        damping_ratio: float = 0.7071,
+        noise_sd_nm: float = 0.005,
+        voluntary_nm: Callable[[float], float] = lambda _: 0.0,
+        seed: int = 1,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.joint = joint
+        self.voluntary_nm = voluntary_nm
+        self._bandwidth_hz, self._damping_ratio = bandwidth_hz, damping_ratio
+        self._noise_sd_nm = noise_sd_nm
+        self._rng = np.random.default_rng(seed)
+        self._now = now
+        self._start_s = self._at_s = now()
+        self._state = DriveState()
+        self._target_rad_s = 0.0
+        self._command_rad_s = 0.0
+        self._ramp_rad_s2 = np.inf
+        self._lock = threading.RLock()
+
+    def command(self, velocity_rad_s: float, ramp_rad_s2: float = np.inf) -> None:
+        """Follow a velocity from now on, changing toward it by at most `ramp_rad_s2`."""
+        with self._lock:
+            self._advance()
+            self._target_rad_s, self._ramp_rad_s2 = velocity_rad_s, ramp_rad_s2
+
+    def release(self) -> None:
+        """Cut the power: the arm is held by its brake within one bandwidth of the drive."""
+        self.command(0.0)
+
+    def motion(self) -> tuple[float, float]:
+        """Return angle in rad and velocity in rad/s now."""
+        with self._lock:
+            self._advance()
+            return self._state.angle_rad, self._state.velocity_rad_s
+
+    def torque_nm(self) -> float:
+        """Return the torque that the drive applies to the joint now, with the sensor's noise."""
+        with self._lock:
+            self._advance()
+            joint = self.joint
+            torque_nm = arm_torque_nm(
+                joint.inertia_kg_m2,
+                joint.damping_nm_s_rad,
+                joint.stiffness_nm_rad,
+                *self._state,
+                self.voluntary_nm(self._at_s - self._start_s),
+            )
+            return torque_nm + self._noise_sd_nm * float(self._rng.standard_normal())
+
+    def place(self, angle_rad: float) -> None:
+        """Put the arm at an angle, at rest, as by hand."""
+        with self._lock:
+            self._advance()
+            self._state = DriveState(angle_rad)
+            self._command_rad_s = self._target_rad_s = 0.0
+
+    def _advance(self) -> None:
+        now_s = self._now()
+        elapsed_s = min(now_s - self._at_s, LONGEST_STEP_S)
+        self._at_s = now_s
+        # A ramp changes the command within the step; short pieces follow it closely enough.
+        while elapsed_s > 1e-9:
+            ramping = self._command_rad_s != self._target_rad_s
+            step_s = min(elapsed_s, 1e-3) if ramping else elapsed_s
+            if ramping:
+                change = self._ramp_rad_s2 * step_s
+                missing = self._target_rad_s - self._command_rad_s
+                self._command_rad_s += max(-change, min(change, missing))
+            coefficients = drive(self._bandwidth_hz, self._damping_ratio, step_s)
+            self._state = drive_step(coefficients, self._state, self._command_rad_s)
+            elapsed_s -= step_s

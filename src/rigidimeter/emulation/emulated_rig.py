@@ -1,0 +1,343 @@
+"""A whole rig without hardware: one arm, a torque peer and a drive peer, told what to do by lines.
+
+Torque comes over UDP as from an ATI Net F/T; the drive hears CANopen on a UDP multicast group, or
+ASCII registers on a pseudo-terminal. Nothing in the program under test knows the difference.
+
+One command a line in, one JSON object a line out, ``ok`` always among its keys:
+
+    state                           angle, velocity, power, drive state, last stop, times
+    misbehave torque|drive NAME [VALUE]
+    behave                          both peers do everything right again
+    joint J B K                     another arm, in kg·m², N·m·s/rad and N·m/rad
+    place DEG                       turn the joint to an angle, by hand
+    push NM                         a hand pushes the joint toward positive angles
+    press, release                  the emergency stop in the drive's enable circuit
+    log                             what the drive peer noted
+    help                            the misbehaviours
+    quit                            the same as the end of the input
+
+Times are those of CLOCK_MONOTONIC, the same in every process of the machine.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import random
+import socket
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import IO, Any, Literal
+
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.emulation import ascii_emulator as ascii_peer
+from rigidimeter.emulation.cia402 import cia402_emulator as cia402
+from rigidimeter.emulation.emulated_arm import EmulatedArm
+from rigidimeter.emulation.rdt import rdt_emulator as rdt
+from rigidimeter.errors import UserError
+
+__all__ = ["MULTICAST_GROUP", "Bench", "serve"]
+
+MULTICAST_GROUP = "239.74.163.2"
+"""Of the emulated CAN bus; each bench has a port of its own on it."""
+
+PRESSED = {
+    # An emergency stop takes the power away; the drive can come up no more until it is released.
+    "cia402": (("leave operation", None), ("refuse enable", None)),
+    "ascii": (("power_lost", 1.0),),
+}
+"""What the drive peers do while the emergency stop is pressed."""
+
+SINES = 8
+PRIORITY = 20
+"""Of the peers, where the system grants it: a wire does not wait for other programs."""
+
+SWITCH_S = 0.0005
+"""The peers' threads are short; none of them shall wait 5 ms for another."""
+
+
+class Bench:
+    """An emulated rig; `close` it, or use it as a context.
+
+    Parameters
+    ----------
+    drive : {"cia402", "ascii"}
+    joint : JointDynamics
+    voluntary_sd_nm : float
+        The subject pushes by so much, in sines from 0.3 to 4 Hz.
+    torque_rate_hz, noise_sd_nm, bandwidth_hz : float
+        Of the torque sensor and the drive.
+    seed : int
+    """
+
+    def __init__(
+        self,
+        drive: Literal["cia402", "ascii"],
+        joint: JointDynamics,
+        *,
+        voluntary_sd_nm: float = 0.0,
+        torque_rate_hz: float = 1000.0,
+        noise_sd_nm: float = 0.005,
+        bandwidth_hz: float = 50.0,
+        seed: int = 1,
+    ) -> None:
+        self._kind = drive
+        _hurry()
+        self._push_nm = 0.0
+        self._voluntary = _voluntary(voluntary_sd_nm, seed)
+        self.arm = EmulatedArm(
+            joint,
+            bandwidth_hz=bandwidth_hz,
+            noise_sd_nm=noise_sd_nm,
+            voluntary_nm=lambda time_s: self._push_nm + self._voluntary(time_s),
+            seed=seed,
+        )
+        self._wrong: dict[str, float | None] = {}
+        self._pressed = False
+        self._bus: dict[str, Any] = {}
+        self.torque = rdt.RdtPeer(self.arm, rate_hz=torque_rate_hz, seed=seed)
+        self.torque.start()
+        try:
+            self.drive: Any = self._make_drive()
+        except BaseException:
+            self.torque.stop()
+            raise
+        self._commands: Mapping[str, Callable[..., dict[str, Any]]] = {
+            "state": self._state,
+            "misbehave": self._misbehave,
+            "behave": self._behave,
+            "joint": self._joint,
+            "place": self._place,
+            "push": self._hand,
+            "press": self._press,
+            "release": self._release,
+            "log": self._log,
+            "help": self._help,
+        }
+
+    def _make_drive(self) -> Any:
+        if self._kind == "ascii":
+            return ascii_peer.AsciiPeer(self.arm)
+        self._bus = {
+            "interface": "udp_multicast",
+            "channel": MULTICAST_GROUP,
+            "port": _free_udp_port(),
+        }
+        return cia402.Cia402Peer(self.arm, **self._bus)
+
+    def __enter__(self) -> Bench:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End both peers, the one even if the other fails."""
+        try:
+            self.drive.close()
+        finally:
+            self.torque.stop()
+
+    def rig_toml(self) -> str:
+        """Return the rig file that reaches this bench."""
+        if self._kind == "ascii":
+            drive = (
+                f'driver = "ascii"\nport = "{self.drive.port}"\n'
+                "counts_per_turn = 360000.0\nlost_s = 0.2\n"
+            )
+        else:
+            drive = (
+                'driver = "cia402"\n'
+                f'interface = "udp_multicast"\nchannel = "{MULTICAST_GROUP}"\n'
+                f"port = {self._bus['port']}\n"
+                "acceleration_rad_s2 = 150.0\ndeceleration_rad_s2 = 150.0\n"
+                # The peers are threads of one process: slower to answer than a servo.
+                "command_deadline_s = 0.1\nlost_s = 0.15\n"
+            )
+        return (
+            'name = "emulated rig"\n\n[torque_sensor]\ndriver = "ati-rdt"\n'
+            f'address = "{self.torque.address}"\nport = {self.torque.port}\n'
+            f"http_port = {self.torque.http_port}\n\n[drive]\n{drive}"
+        )
+
+    def ready(self) -> dict[str, Any]:
+        """Return what a person or a test must know to reach the bench."""
+        return {
+            "ok": True,
+            "ready": True,
+            "drive": self._kind,
+            "torque": {"address": self.torque.address, "port": self.torque.port},
+            "bus": self._bus or {"port": self.drive.port},
+            "time_s": time.monotonic(),
+        }
+
+    def answer(self, line: str) -> dict[str, Any]:
+        """Do what a line says; a line that means nothing is answered, never raised."""
+        name, *words = line.split() or [""]
+        command = self._commands.get(name)
+        if command is None:
+            known = ", ".join((*self._commands, "quit"))
+            return {"ok": False, "error": f"there is no command {name!r}; known: {known}"}
+        try:
+            return {"ok": True, **command(*words)}
+        except (TypeError, ValueError) as error:
+            return {"ok": False, "error": f"{line.strip()!r}: {error}"}
+
+    # What the commands do
+
+    def _state(self) -> dict[str, Any]:
+        now_s = time.monotonic()
+        found = self.drive.state()
+        power = found.pop("power", found.pop("powered", None))
+        return {"time_s": now_s, "power": power, "pressed": self._pressed, **found}
+
+    def _misbehave(self, role: str, *words: str) -> dict[str, Any]:
+        if role not in ("torque", "drive"):
+            raise ValueError("say misbehave torque NAME or misbehave drive NAME")
+        value = None
+        if len(words) > 1 and (number := _number(words[-1])) is not None:
+            value, words = number, words[:-1]
+        name = self._known(role, " ".join(words))
+        if role == "torque":
+            self.torque.misbehave(name, value)
+        else:
+            self._tell_drive(name, value)
+            self._wrong[name] = value
+        return {"misbehaves": name, "value": value, "time_s": time.monotonic()}
+
+    def _known(self, role: str, name: str) -> str:
+        """Return a misbehaviour by its own spelling; blanks, dashes and underscores are one."""
+        wanted = name.replace("_", " ").replace("-", " ")
+        for known in self._misbehaviours(role):
+            if known.replace("_", " ") == wanted:
+                return known
+        raise ValueError(
+            f"{role} has no misbehaviour {name!r}; known: {', '.join(self._misbehaviours(role))}"
+        )
+
+    def _misbehaviours(self, role: str) -> Mapping[str, str]:
+        if role == "torque":
+            return rdt.MISBEHAVIOURS
+        return cia402.MISBEHAVIOURS if self._kind == "cia402" else ascii_peer.MISBEHAVIOURS
+
+    def _tell_drive(self, name: str, value: float | None) -> None:
+        # Emergency codes, modes and bits are whole numbers.
+        whole = int(value) if value is not None and value.is_integer() else value
+        self.drive.misbehave(name, *(() if whole is None else (whole,)))
+
+    def _behave(self) -> dict[str, Any]:
+        self._wrong.clear()
+        self.torque.behave()
+        self._drive_again()
+        return {"time_s": time.monotonic()}
+
+    def _drive_again(self) -> None:
+        """Let the drive do wrong only what is still asked for, the emergency stop included."""
+        self.drive.behave()
+        for name, value in self._wrong.items():
+            self._tell_drive(name, value)
+        if self._pressed:
+            for name, value in PRESSED[self._kind]:
+                self._tell_drive(name, value)
+
+    def _joint(self, inertia: str, damping: str, stiffness: str) -> dict[str, Any]:
+        self.arm.joint = JointDynamics(float(inertia), float(damping), float(stiffness))
+        return {}
+
+    def _place(self, angle_deg: str) -> dict[str, Any]:
+        self.arm.place(math.radians(float(angle_deg)))
+        return {}
+
+    def _hand(self, torque_nm: str) -> dict[str, Any]:
+        self._push_nm = float(torque_nm)
+        return {}
+
+    def _press(self) -> dict[str, Any]:
+        time_s = time.monotonic()
+        self._pressed = True
+        for name, value in PRESSED[self._kind]:
+            self._tell_drive(name, value)
+        return {"time_s": time_s}
+
+    def _release(self) -> dict[str, Any]:
+        time_s = time.monotonic()
+        self._pressed = False
+        self._drive_again()
+        return {"time_s": time_s}
+
+    def _log(self) -> dict[str, Any]:
+        return {"log": [list(entry) for entry in tuple(self.drive.log)]}
+
+    def _help(self) -> dict[str, Any]:
+        roles = ("torque", "drive")
+        return {
+            "commands": [*self._commands, "quit"],
+            **{role: dict(self._misbehaviours(role)) for role in roles},
+        }
+
+
+def serve(
+    bench: Bench, rig_out: Path | None = None, lines: IO[str] = sys.stdin, out: IO[str] = sys.stdout
+) -> None:
+    """Write the rig file, say that the bench is ready, then answer lines until their end."""
+    if rig_out is not None:
+        rig_out.write_text(bench.rig_toml(), encoding="utf-8")
+    sys.setswitchinterval(SWITCH_S)
+    _say(out, bench.ready() | {"rig": None if rig_out is None else str(rig_out)})
+    while line := lines.readline():
+        if not line.strip():
+            continue
+        if line.strip() == "quit":
+            _say(out, {"ok": True})
+            return
+        _say(out, bench.answer(line))
+
+
+def _say(out: IO[str], answer: dict[str, Any]) -> None:
+    out.write(json.dumps(_plain(answer)) + "\n")
+    out.flush()
+
+
+def _plain(value: Any) -> Any:
+    """Return a value that JSON has: a number that is not finite becomes null."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _number(word: str) -> float | None:
+    try:
+        return float(int(word, 0)) if word.lower().startswith("0x") else float(word)
+    except ValueError:
+        return None
+
+
+def _voluntary(sd_nm: float, seed: int) -> Callable[[float], float]:
+    """Return sines between 0.3 and 4 Hz with random phases."""
+    if sd_nm < 0:
+        raise UserError(f"--voluntary {sd_nm:g} N·m: must not be negative")
+    rng = random.Random(seed)
+    amplitude = sd_nm * math.sqrt(2.0 / SINES)
+    sines = [(2 * math.pi * rng.uniform(0.3, 4.0), rng.uniform(0, 7.0)) for _ in range(SINES)]
+    return lambda time_s: amplitude * sum(math.sin(w * time_s + p) for w, p in sines)
+
+
+def _hurry() -> None:
+    """Ask for a real-time priority for the threads to come; without it they are later."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+
+
+def _free_udp_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        port: int = probe.getsockname()[1]
+        return port

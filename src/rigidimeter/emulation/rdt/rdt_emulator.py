@@ -1,0 +1,299 @@
+"""An ATI Net F/T on a true wire: RDT records over UDP, the XML page over HTTP.
+
+Requests and records are those of the Net F/T manual (9620-05-NET FT). As the real one, the peer
+serves the client that asked last, numbers the records of each stream from 1, and counts its own
+samples at their own rate.
+
+The sensor is thought mounted on the drive with the arm on its tool side, so Tz is what the arm does
+to the drive: minus the torque that the drive applies to the joint, Tz = −M. The other axes carry
+noise alone.
+"""
+
+from __future__ import annotations
+
+import random
+import socket
+import struct
+import threading
+import time
+from collections import deque
+from dataclasses import replace
+from typing import Self
+
+from rigidimeter.emulation.emulated_arm import EmulatedArm
+from rigidimeter.emulation.rdt.rdt_faults import MISBEHAVIOURS, ONCE, Faults, fault_value
+from rigidimeter.emulation.rdt.rdt_records import RECORD, SAMPLE_RATE_HZ, RecordSource
+from rigidimeter.emulation.rdt.rdt_web_page import (
+    PageFacts,
+    PageServer,
+    page_text,
+    page_with_faults,
+)
+
+__all__ = ["MISBEHAVIOURS", "RdtPeer"]
+
+_REQUEST = struct.Struct(">HHI")
+
+
+class RdtPeer:
+    """One sensor on an arm; several threads of its own.
+
+    Parameters
+    ----------
+    arm : EmulatedArm
+    rate_hz : float
+        Records per second, at most 7000.
+    address : str
+    port, http_port : int
+        0 takes free ones; after `start` the attributes of these names say which.
+    counts_per_n, counts_per_nm : float
+        Counts for one newton and one newton metre, whatever the units of the page.
+    force_unit, torque_unit : str
+        As the page spells them: N, lbf; Nm, Nmm, lbf-in, lbf-ft and others.
+    serial : str
+    calibration : int
+    noise_counts : float
+        SD of the noise on the other axes.
+    first_sequence : int
+        The RDT sequence of a stream's first record.
+    seed : int
+        Of the noise.
+
+    Attributes
+    ----------
+    sent : deque
+        The RDT sequence and the torque in N·m of the newest records; with it what arrives can be
+        compared exactly.
+    requests : deque
+        The commands that were heard.
+    """
+
+    def __init__(
+        self,
+        arm: EmulatedArm,
+        *,
+        rate_hz: float = 1000.0,
+        address: str = "127.0.0.1",
+        port: int = 0,
+        http_port: int = 0,
+        counts_per_n: float = 1e6,
+        counts_per_nm: float = 1e6,
+        force_unit: str = "N",
+        torque_unit: str = "Nm",
+        serial: str = "FT00001",
+        calibration: int = 0,
+        noise_counts: float = 500.0,
+        first_sequence: int = 1,
+        seed: int = 1,
+    ) -> None:
+        if not 0.0 < rate_hz <= SAMPLE_RATE_HZ:
+            raise ValueError(f"rate_hz is {rate_hz:g}; it must be above 0 and at most 7000 Hz")
+        self.arm = arm
+        self.address, self.port, self.http_port = address, port, http_port
+        self.rate_hz = rate_hz
+        self.requests: deque[int] = deque(maxlen=100)
+        self._page = PageFacts(
+            counts_per_n=counts_per_n,
+            counts_per_nm=counts_per_nm,
+            force_unit=force_unit,
+            torque_unit=torque_unit,
+            serial=serial,
+            calibration=calibration,
+            rate_hz=rate_hz,
+        )
+        self._first_sequence = first_sequence
+        self._records = RecordSource(arm, rate_hz, counts_per_nm, noise_counts, seed)
+        self.sent = self._records.sent
+        self._random = random.Random(seed)
+        self._faults: Faults = {}
+        self._lock = threading.Lock()
+        self._held: list[bytes] = []
+        self._client: tuple[str, int] | None = None
+        self._streaming = threading.Event()
+        self._ending = threading.Event()
+        self._new_stream = threading.Event()
+        self._threads: list[threading.Thread] = []
+
+    def start(self) -> None:
+        """Open both ports and listen."""
+        if self._threads:
+            return
+        self._ending.clear()
+        self._wire = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._wire.bind((self.address, self.port))
+        self.port = self._wire.getsockname()[1]
+        self._stranger = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._http = PageServer(
+            (self.address, self.http_port), self._page_now, self.fault, self._ending
+        )
+        self.http_port = self._http.server_address[1]
+        self._threads = [
+            threading.Thread(target=target, name=f"rdt-peer-{name}", daemon=True)
+            for name, target in (
+                ("listen", self._listen),
+                ("stream", self._stream),
+                ("http", lambda: self._http.serve_forever(poll_interval=0.02)),
+            )
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def stop(self) -> None:
+        """Fall silent and close both ports; safe to call twice."""
+        if not self._threads:
+            return
+        self._ending.set()
+        self._http.shutdown()
+        self._stranger.sendto(b"", (self.address, self.port))  # wakes the listener
+        self._threads[0].join()
+        self._streaming.set()  # wakes the sender, now that no request can put it to sleep again
+        for thread in self._threads:
+            thread.join()
+        self._threads = []
+        self._streaming.clear()
+        self._http.server_close()
+        self._stranger.close()
+        self._wire.close()
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def misbehave(self, name: str, value: float | None = None) -> None:
+        """Do something wrong from now on, beside what is done wrong already.
+
+        Parameters
+        ----------
+        name : str
+            A key of `MISBEHAVIOURS`.
+        value : float, optional
+            What its sentence calls `value`.
+        """
+        if name not in MISBEHAVIOURS:
+            raise ValueError(f"{name!r} is no misbehaviour; known: {', '.join(MISBEHAVIOURS)}")
+        with self._lock:  # always replaced, never changed: who reads needs no lock
+            self._faults = {**self._faults, name: value}
+
+    def behave(self) -> None:
+        """Do everything right again."""
+        with self._lock:
+            self._faults = {}
+
+    def fault(self, name: str, default: float) -> float | None:
+        """Return the value of a misbehaviour that is on, None if it is off."""
+        return fault_value(self._faults, name, default)
+
+    def _page_now(self) -> bytes:
+        bias = -round(self._records.bias_nm * self._page.counts_per_nm)
+        return page_text(page_with_faults(replace(self._page, bias=bias), self._faults))
+
+    def _listen(self) -> None:
+        while not self._ending.is_set():
+            data, client = self._wire.recvfrom(64)
+            if len(data) != _REQUEST.size:
+                continue
+            header, command, _ = _REQUEST.unpack(data)
+            if header != 0x1234:
+                continue
+            self.requests.append(command)
+            if command == 0:
+                self._streaming.clear()
+            elif command in (2, 3) and "deaf" not in self._faults:
+                self._client = client
+                self._new_stream.set()
+                self._streaming.set()
+            elif command == 0x42:
+                self._records.bias_nm = self.arm.torque_nm()
+
+    def _stream(self) -> None:
+        interval_s = 1.0 / self.rate_hz
+        began_s = time.monotonic()
+        k = 0
+        while True:
+            self._streaming.wait()
+            if self._ending.is_set():
+                return
+            late_s = time.monotonic() - began_s - k * interval_s
+            if late_s > 0.2 or self._new_stream.is_set():
+                began_s, k = time.monotonic(), 0
+            elif late_s < 0.0:
+                time.sleep(-late_s)
+            if self._new_stream.is_set():
+                self._new_stream.clear()
+                self._restart()
+            k += 1
+            self._step()
+
+    def _restart(self) -> None:
+        self._records.restart(self._first_sequence)
+        self._late = b""
+        self._held = []
+        self._held_since_s = time.monotonic()
+
+    def _step(self) -> None:
+        """Take one sample and send it, or do with it what it was told."""
+        faults = self._faults
+        if not faults:
+            self._flush()
+            self._send(self._records.take(faults))
+            return
+        if ONCE & faults.keys():
+            with self._lock:
+                self._faults = {k: v for k, v in self._faults.items() if k not in ONCE}
+        if "restart" in faults:
+            self._records.restart(1)
+        data = self._records.take(faults)
+        if "silent" in faults:
+            return
+        if "lose_once" in faults:
+            self._records.sequence += int(faults["lose_once"] or 1) - 1
+            return
+        if self._due(faults, "lose"):
+            return
+        if self._due(faults, "short"):
+            data = data[:20]
+        if self._due(faults, "long"):
+            data += b"\0\0\0\0"
+        if self._due(faults, "garbage"):
+            data = self._random.randbytes(36)
+        if "foreign" in faults:
+            fields = list(RECORD.unpack(self._records.last))
+            fields[8] += 10_000_000
+            self._stranger.sendto(RECORD.pack(*fields), self._client or (self.address, self.port))
+        if self._due(faults, "reorder") or "reorder_once" in faults:
+            self._late = data
+            return
+        copies = 1
+        if self._due(faults, "duplicate") or "duplicate_once" in faults:
+            copies = 2
+        copies = int(fault_value(faults, "flood", 50) or copies)
+        hold_s = fault_value(faults, "backlog", 0.05)
+        if hold_s is None:
+            self._flush()
+        else:
+            self._held.append(data)
+            if time.monotonic() - self._held_since_s >= hold_s:
+                self._flush()
+            return
+        for _ in range(copies):
+            self._send(data)
+
+    def _flush(self) -> None:
+        for held in self._held:
+            self._send(held)
+        self._held = []
+        self._held_since_s = time.monotonic()
+
+    def _send(self, data: bytes) -> None:
+        if self._client is not None:
+            self._wire.sendto(data, self._client)
+            if self._late:
+                late, self._late = self._late, b""
+                self._wire.sendto(late, self._client)
+
+    def _due(self, faults: Faults, name: str) -> bool:
+        every = fault_value(faults, name, 10)
+        return every is not None and self._records.taken % max(int(every), 1) == 0

@@ -1,0 +1,280 @@
+"""An epoch as spectral lines: Eq. 3 multiplied by smooth functions of time and integrated.
+
+With a window w(t) that begins and ends at zero and the frequencies ω_k = 2π k/T, multiply Eq. 3 by
+w(t) e^(−i ω_k t) and integrate. The derivative of the velocity moves to the known window,
+
+    ∫ w e^(−iωt) θ'' dt = iω ∫ w e^(−iωt) θ' dt − ∫ w' e^(−iωt) θ' dt
+
+so nothing is differentiated. What is left is linear in J, B and K at every line, all signals are
+treated alike, and drift and noise outside the band simply are other lines (the modulating
+functions of Shinbrot 1957; Pearson and Lee 1985).
+
+The integrals are sums over the samples of the torque, at the stamps of the torque: a torque that
+was sampled at a point in time is held against the motion at that point. Where the command is
+recorded and explains the velocity, the motion at those points is the motion that the command
+causes, plus what the sensors saw beyond it; so neither slow sensors nor the ripple between the
+ticks bias the fit (`drive`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from rigidimeter.estimation.closedloop.drive_fit import DriveModel
+from rigidimeter.estimation.signals import Array, kinematics, motion_channels, spline, uniform_grid
+from rigidimeter.records import Channel, Epoch
+
+__all__ = ["Grid", "Lines", "epoch_grid", "epoch_lines", "response_lines"]
+
+Complex = NDArray[np.complex128]
+
+FEWEST_LINES = 8
+SAME_TIME = 0.01
+"""Stamps closer than this share of an interval are the same time: clocks are rounded."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The samples and lines of an epoch.
+
+    Attributes
+    ----------
+    time_s : array, shape (n,)
+        Uniform, the stamps of the torque where those are uniform.
+    rate_hz : float
+    window, window_slope_per_s : array, shape (n,)
+        w and w'.
+    line : array of int, shape (m,)
+        Which lines of the FFT are used.
+    omega_rad_s : array, shape (m,)
+    energy : float
+        Σ w²: white noise of unit variance puts this much power into every line.
+    window_lines : complex array, shape (m,)
+        Σ w e^(−iωt): what a constant would leave at the lines.
+    """
+
+    time_s: Array
+    rate_hz: float
+    window: Array
+    window_slope_per_s: Array
+    line: NDArray[np.intp]
+    omega_rad_s: Array
+    energy: float
+    window_lines: Complex
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """The first and the last line."""
+        return float(self.omega_rad_s[0] / (2 * np.pi)), float(self.omega_rad_s[-1] / (2 * np.pi))
+
+    def transform(self, values: Array) -> Complex:
+        """Return Σ w x e^(−iωt) at the lines, free of the mean of x."""
+        windowed = self.window * values
+        spectrum = fft.rfft(windowed)[self.line]
+        return np.asarray(spectrum - self._mean(windowed) * self.window_lines)
+
+    def transform_slope(self, values: Array) -> Complex:
+        """Return Σ w' x e^(−iωt) at the lines, free of the mean of x."""
+        # ∫ w' e^(−iωt) dt = iω ∫ w e^(−iωt) dt, since w is zero at both ends.
+        mean = self._mean(self.window * values)
+        slope = fft.rfft(self.window_slope_per_s * values)[self.line]
+        return np.asarray(slope - mean * 1j * self.omega_rad_s * self.window_lines)
+
+    def _mean(self, windowed: Array) -> float:
+        """Return Σ w² x / Σ w², without a dot product, which would wake threads for so little."""
+        return float(np.add.reduce(self.window * windowed)) / self.energy
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Torque and motion of one epoch at the lines of its grid.
+
+    Attributes
+    ----------
+    grid : Grid
+    torque_nm : complex array, shape (m,)
+    motion : complex array, shape (m, 3)
+        Acceleration, velocity and angle.
+    """
+
+    grid: Grid
+    torque_nm: Complex
+    motion: Complex
+
+
+def epoch_grid(
+    epoch: Epoch,
+    band_hz: tuple[float, float],
+    taper_s: float,
+    samples: Callable[[int, float], int] | None = None,
+) -> Grid:
+    """Lay out samples, window and lines.
+
+    The window rises and falls as a raised cosine over `taper_s`. The line below the band counts
+    too: a line of a record that is not a whole number of periods spreads to its neighbours.
+
+    Parameters
+    ----------
+    epoch : Epoch
+    band_hz : (float, float)
+    taper_s : float
+    samples : callable, optional
+        Takes how many samples there are and their rate, and returns how many to use, from the end;
+        otherwise as many as make a fast FFT, from the start.
+
+    Raises
+    ------
+    ValueError
+        If the band holds too few lines for three parameters.
+    """
+    torque = epoch.channels["torque_nm"]
+    used = [torque, *motion_channels(epoch)]
+    if "perturbation_nm" in epoch.channels:
+        used.append(epoch.channels["perturbation_nm"])
+    time_s, rate_hz = _times(torque, used)
+    if samples is not None:
+        n = samples(time_s.size, rate_hz)
+        time_s = time_s[time_s.size - n :]
+    else:
+        n = fft.prev_fast_len(time_s.size, real=True) if time_s.size else 0
+        time_s = time_s[:n]
+    return Grid(time_s, rate_hz, *_layout(n, float(f"{rate_hz:.9g}"), band_hz, taper_s))
+
+
+@lru_cache(maxsize=32)
+def _layout(
+    n: int, rate_hz: float, band_hz: tuple[float, float], taper_s: float
+) -> tuple[Array, Array, NDArray[np.intp], Array, float, Complex]:
+    """Return what does not depend on where an epoch begins; epochs of a session share it."""
+    low, high = band_hz
+    duration_s = n / rate_hz
+    first = max(int(np.ceil(low * duration_s - 1e-6)) - 1, 1)
+    line = np.arange(first, int(np.floor(high * duration_s + 1e-6)) + 1, dtype=np.intp)
+    if line.size < FEWEST_LINES:
+        raise ValueError(
+            f"{duration_s:.3g} s hold {line.size} spectral lines from {low:g} to {high:g} Hz; "
+            f"at least {FEWEST_LINES} are needed"
+        )
+    window, slope = _taper(n, rate_hz, taper_s)
+    spectrum = np.asarray(fft.rfft(window)[line], dtype=np.complex128)
+    energy = float(np.sum(window * window))
+    omega = np.asarray(2 * np.pi * line / duration_s, dtype=np.float64)
+    for part in (window, slope, line, omega, spectrum):
+        part.setflags(write=False)
+    return window, slope, line, omega, energy, spectrum
+
+
+def epoch_lines(epoch: Epoch, grid: Grid, drive: DriveModel | None) -> Lines:
+    """Return torque and motion at the lines.
+
+    Parameters
+    ----------
+    epoch : Epoch
+    grid : Grid
+        From `epoch_grid` for this epoch or one with the same stamps.
+    drive : DriveModel or None
+        If given, what the command did between the samples of the motion is taken into account.
+    """
+    torque = grid.transform(_at(epoch.channels["torque_nm"], grid.time_s))
+    command = epoch.channels.get("velocity_command_rad_s")
+    angle, velocity = (
+        _sampled(epoch.channels.get(name), grid.time_s) for name in ("angle_rad", "velocity_rad_s")
+    )
+    if angle is not None and velocity is not None:
+        # Torque and motion were sampled together, at the ticks if there is a command at all.
+        motion = _spectra(grid, angle, velocity)
+        if drive is not None and command is not None:
+            motion[:, 0] *= drive.sampled_derivative(grid.omega_rad_s, _interval_s(command))
+        return Lines(grid, torque, motion)
+    if drive is None or command is None:
+        return Lines(grid, torque, _spectra(grid, *_motion(epoch, grid.time_s)))
+    # What the sensors saw beyond the motion that the command causes, at their own stamps.
+    beyond = dict(epoch.channels)
+    for channel in motion_channels(epoch):
+        driven = drive.driven(command, channel.time_s)
+        caused = driven.angle_rad if channel.name == "angle_rad" else driven.velocity_rad_s
+        beyond[channel.name] = Channel(channel.name, channel.time_s, channel.values - caused)
+    motion = _spectra(grid, *_motion(replace(epoch, channels=beyond), grid.time_s))
+    exact = drive.driven(command, grid.time_s)
+    for column, part in enumerate(
+        (exact.acceleration_rad_s2, exact.velocity_rad_s, exact.angle_rad)
+    ):
+        motion[:, column] += grid.transform(part)
+    return Lines(grid, torque, motion)
+
+
+def response_lines(grid: Grid, parts: Sequence[Array]) -> Complex:
+    """Return simulated signals at the lines, shape (m, len(parts)); `parts` are on the grid."""
+    return np.stack([grid.transform(part) for part in parts], axis=1)
+
+
+def _spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array) -> Complex:
+    """Return acceleration, velocity and angle at the lines; nothing is differentiated."""
+    velocity = grid.transform(velocity_rad_s)
+    acceleration = 1j * grid.omega_rad_s * velocity - grid.transform_slope(velocity_rad_s)
+    return np.stack([acceleration, velocity, grid.transform(angle_rad)], axis=1)
+
+
+def _motion(epoch: Epoch, time_s: Array) -> tuple[Array, Array]:
+    """Return angle and velocity at the times."""
+    angle, velocity = epoch.channels.get("angle_rad"), epoch.channels.get("velocity_rad_s")
+    if angle is not None and velocity is not None:
+        return _at(angle, time_s), _at(velocity, time_s)
+    found = kinematics(epoch, time_s)
+    return found[0], found[1]
+
+
+def _at(channel: Channel, time_s: Array) -> Array:
+    """Return a channel at the times; without interpolation where it was sampled at them."""
+    values = _sampled(channel, time_s)
+    return values if values is not None else np.asarray(spline(channel)(time_s), dtype=np.float64)
+
+
+def _sampled(channel: Channel | None, time_s: Array) -> Array | None:
+    """Return a channel at the times if it was sampled at just these, else None."""
+    if channel is None:
+        return None
+    close_s = SAME_TIME / channel.mean_rate_hz
+    first = int(np.searchsorted(channel.time_s, time_s[0] - close_s))
+    stamps = channel.time_s[first : first + time_s.size]
+    if stamps.size < time_s.size or np.max(np.abs(stamps - time_s)) > close_s:
+        return None
+    return channel.values[first : first + time_s.size]
+
+
+def _interval_s(command: Channel) -> float:
+    return 1.0 / command.mean_rate_hz
+
+
+def _times(torque: Channel, used: list[Channel]) -> tuple[Array, float]:
+    """Return the torque's own stamps where every channel overlaps, or a uniform grid near them."""
+    rate_hz = torque.rate_hz
+    start = max(float(channel.time_s[0]) for channel in used)
+    stop = min(float(channel.time_s[-1]) for channel in used)
+    inside = slice(
+        int(np.searchsorted(torque.time_s, start - SAME_TIME / rate_hz)),
+        int(np.searchsorted(torque.time_s, stop + SAME_TIME / rate_hz)),
+    )
+    own = torque.time_s[inside]
+    if own.size > 1:
+        even = own[0] + np.arange(own.size) * ((own[-1] - own[0]) / (own.size - 1))
+        if np.max(np.abs(own - even)) < SAME_TIME / rate_hz:
+            return own, (own.size - 1) / float(own[-1] - own[0])
+    return uniform_grid(used, rate_hz), rate_hz
+
+
+def _taper(n: int, rate_hz: float, taper_s: float) -> tuple[Array, Array]:
+    """Return a window with raised-cosine ends, and its slope."""
+    centre_s = (np.arange(n) + 0.5) / rate_hz
+    edge_s = np.minimum(centre_s, n / rate_hz - centre_s)
+    phase = np.pi * np.minimum(edge_s / taper_s, 1.0) if taper_s > 0 else np.full(n, np.pi)
+    window = 0.5 - 0.5 * np.cos(phase)
+    steep = 0.5 * np.pi / taper_s * np.sin(phase) if taper_s > 0 else np.zeros(n)
+    rising = np.arange(n) < n / 2
+    return window, np.where(rising, steep, -steep)

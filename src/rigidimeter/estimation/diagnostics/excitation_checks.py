@@ -1,0 +1,170 @@
+"""Whether the joint moved in a way that can tell J, B and K apart.
+
+Acceleration and angle of a motion at a single frequency ω are in proportion, θ'' = −ω² θ, so J and
+K trade against each other; of a drift, or of a push in one direction, velocity and angle
+are alike too. What the regressors have in common shows in the singular values of the columns scaled
+to unit length: their ratio is 1 where nothing, and infinite where everything is shared.
+
+Coherence is the share of a signal's power, line by line, that follows the perturbation linearly.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy import signal
+
+from rigidimeter.estimation.diagnostics.finding_text import judged
+from rigidimeter.estimation.diagnostics.power_lines import inside, lines
+from rigidimeter.estimation.signals import Array, Signals, kinematics, spline
+from rigidimeter.estimation.sinusoid_detection import single_frequency_share
+from rigidimeter.records import Channel, Epoch, Finding
+from rigidimeter.settings import DiagnosticsSettings
+
+__all__ = ["band_share", "coherence", "conditioning", "imposed_sinusoid", "perturbation_nm"]
+
+PARAMETERS = ("J", "B", "K")
+MIDDLE_PERCENT = 90.0
+SEGMENTS = 8
+"""Stretches, half overlapping, over which a coherence is averaged: 4 s each in an epoch of 18 s.
+
+Signals that have nothing to do with each other then still show about 0.2.
+"""
+
+
+def conditioning(signals: Signals, settings: DiagnosticsSettings) -> Finding:
+    """Return whether the regressors can be told apart, and if not which two and because of what."""
+    regressors = np.column_stack(
+        [signals.acceleration_rad_s2, signals.velocity_rad_s, signals.angle_rad]
+    )
+    lengths = np.linalg.norm(regressors, axis=0)
+    most = settings.condition_number_most
+    remedy = "use a perturbation with more frequencies, or hold J at the median of other epochs"
+    if not np.all(lengths > 0):
+        return judged(
+            "conditioning",
+            math.inf,
+            most,
+            settings,
+            failed=True,
+            fact=f"the condition number of the motion is infinite (at most {most:g})",
+            meaning="the joint did not move",
+            remedy=remedy,
+        )
+    _, singular, right = np.linalg.svd(regressors / lengths, full_matrices=False)
+    value = float(singular[0] / singular[-1]) if singular[-1] > 0 else math.inf
+    # The weakest direction adds and subtracts what cannot be told apart.
+    first, second = sorted(np.argsort(np.abs(right[-1]))[-2:])
+    low_hz, high_hz = _middle_hz(signals)
+    return judged(
+        "conditioning",
+        value,
+        most,
+        settings,
+        failed=not value <= most,
+        fact=f"the condition number of the motion is {value:.3g} (at most {most:g})",
+        meaning=(
+            f"this epoch cannot tell {PARAMETERS[first]} from {PARAMETERS[second]}, because "
+            f"{MIDDLE_PERCENT:g} % of the velocity's power lies between {low_hz:.2g} and "
+            f"{high_hz:.2g} Hz"
+        ),
+        remedy=remedy,
+    )
+
+
+def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Finding:
+    """Return how far torque and velocity follow the perturbation, by Welch's method.
+
+    The value is the median over the lines of the band, for the weaker of the two.
+    """
+    cause = perturbation_nm(epoch.channels["perturbation_nm"], signals.time_s)
+    length = max(2 * signals.time_s.size // (SEGMENTS + 1), 8)
+    values = {}
+    for name, effect in (("torque", signals.torque_nm), ("velocity", signals.velocity_rad_s)):
+        frequency, shared = signal.coherence(cause, effect, signals.rate_hz, nperseg=length)
+        values[name] = float(np.median(shared[inside(frequency, signals.band_hz)]))
+    weaker = min(values, key=lambda name: values[name])
+    value, least = values[weaker], settings.coherence_least
+    return judged(
+        "coherence",
+        value,
+        least,
+        settings,
+        failed=not value >= least,
+        fact=(
+            f"the coherence of perturbation and {weaker} has a median of {value:.2f} in the band "
+            f"(at least {least:g})"
+        ),
+        meaning=(
+            f"only {100 * value:.0f} % of the {weaker}'s power follows the perturbation; the rest "
+            "is the subject, noise, or a joint that is not linear"
+        ),
+        remedy="ask the subject to relax, perturb more strongly, or pool epochs with instruments",
+    )
+
+
+def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Finding:
+    """Return how much of the recorded torque and velocity lies in the band of the fit."""
+    _, velocity, _ = kinematics(epoch, signals.time_s)
+    torque = spline(epoch.channels["torque_nm"])(signals.time_s)
+    shares = {
+        "torque": _share(torque, signals.rate_hz, signals.band_hz),
+        "velocity": _share(velocity, signals.rate_hz, signals.band_hz),
+    }
+    weaker = min(shares, key=lambda name: shares[name])
+    value, least = 100.0 * shares[weaker], settings.band_share_least_percent
+    low, high = signals.band_hz
+    return judged(
+        "band_share",
+        value,
+        least,
+        settings,
+        failed=not value >= least,
+        fact=(
+            f"{value:.0f} % of the {weaker}'s power lies in the band, {low:g} to {high:.3g} Hz (at "
+            f"least {least:g} %)"
+        ),
+        meaning="most of what was measured is drift below or noise above what is fitted",
+        remedy=(
+            "look for drift of the sensor and for slow pushes; check the rate and the unit of the "
+            "time; set estimation.band_low_hz and band_high_hz to what was perturbed"
+        ),
+    )
+
+
+def imposed_sinusoid(epoch: Epoch, settings: DiagnosticsSettings) -> Finding:
+    """Return whether the motion is a single sinusoid, which no fit of three parameters can use."""
+    value, most = 100.0 * single_frequency_share(epoch), settings.single_frequency_most_percent
+    return judged(
+        "imposed_sinusoid",
+        value,
+        most,
+        settings,
+        failed=not value <= most,
+        fact=f"the strongest line holds {value:.0f} % of the angle's variance (at most {most:g} %)",
+        meaning="the motion is a sinusoid, in which J and K are one number, K − J ω²",
+        remedy="score it as an imposed sinusoid (--task sinusoid), or use a PRBS",
+    )
+
+
+def perturbation_nm(channel: Channel, time_s: Array) -> Array:
+    """Return the perturbation at the given times, held from one tick to the next."""
+    # A tick of rounding must not turn a value into the one before.
+    index = np.searchsorted(channel.time_s, time_s + 1e-9, side="right") - 1
+    return channel.values[np.maximum(index, 0)]
+
+
+def _share(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> float:
+    frequency, power = lines(values, rate_hz, tapered=True)
+    total = float(np.sum(power))
+    return float(np.sum(power[inside(frequency, band_hz)])) / total if total > 0 else 0.0
+
+
+def _middle_hz(signals: Signals) -> tuple[float, float]:
+    """Return between which frequencies the middle of the velocity's power lies."""
+    frequency, power = lines(signals.velocity_rad_s, signals.rate_hz, tapered=True)
+    running = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
+    outside = (1.0 - MIDDLE_PERCENT / 100.0) / 2.0
+    low, high = np.searchsorted(running, [outside, 1.0 - outside])
+    return float(frequency[low]), float(frequency[min(high, frequency.size - 1)])

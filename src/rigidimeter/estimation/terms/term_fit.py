@@ -1,0 +1,275 @@
+"""Fit a sum of terms to effort and motion, and predict with it.
+
+    F(effort) = Σ c_k F(term_k(position, velocity, acceleration; q)) + residual
+
+Terms are computed from the wide-band motion and only then pass the band F, the same as the effort:
+F(v³) is not F(v)³. The band ends at `high`, so samples are kept at about 2.5 times that. Where it
+begins above 0 Hz no mean survives, and an offset cannot be fitted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigidimeter.estimation.signals import Array
+from rigidimeter.estimation.terms.catalogue import REFLEXES, TERMS, parse_terms
+from rigidimeter.estimation.terms.reflex import FIR_SPACING_S
+from rigidimeter.estimation.terms.regressors import Design
+from rigidimeter.estimation.terms.residual_tests import ResidualTest, residual_test
+from rigidimeter.estimation.terms.separable import bread, solve
+from rigidimeter.estimation.terms.wideband_motion import Motion
+from rigidimeter.estimation.uncertainty import hac_covariance
+
+__all__ = ["Parameter", "Prediction", "TermsFit", "fit_terms", "predict"]
+
+NEAR_BOUND = 1e-3
+"""A parameter this near to its bound, as a share of its range, was not found inside."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a fit, with one standard error; NaN where the data give none."""
+
+    term: str
+    name: str
+    value: float
+    standard_error: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class TermsFit:
+    """A fitted sum of terms.
+
+    Attributes
+    ----------
+    terms : tuple of str
+        With the direction of a reflex decided.
+    parameters : tuple of Parameter
+        The gain of a `reflex-fir` follows its responses, of which it is the sum.
+    linear, nonlinear : arrays
+        Coefficients c, and q of the reflex paths.
+    residual : array, shape (n,)
+        At `rate_hz`, ends trimmed.
+    vaf_percent : float
+        100 (1 − var(residual)/var(effort)), both in the band.
+    aic, bic : float
+        N ln(RSS/n) + 2 p and N ln(RSS/n) + p ln N, with N = 2 · bandwidth · T independent samples.
+        They compare fits of the same signals in the same band.
+    independent_samples : float
+        N.
+    degrees_of_freedom : float
+        For the t quantiles of the standard errors.
+    test : ResidualTest
+    remarks : tuple of str
+        What to know before believing it, a sentence each.
+    """
+
+    terms: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    linear: Array
+    nonlinear: Array
+    band_hz: tuple[float, float]
+    rate_hz: float
+    trim_s: float
+    residual: Array
+    vaf_percent: float
+    aic: float
+    bic: float
+    independent_samples: float
+    condition_number: float
+    degrees_of_freedom: float
+    test: ResidualTest
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def n_parameters(self) -> int:
+        """Linear and nonlinear parameters."""
+        return int(self.linear.size + self.nonlinear.size)
+
+    def __getitem__(self, name: str) -> Parameter:
+        """Return a parameter by `term`, or by `term name` where a term has several."""
+        for parameter in self.parameters:
+            if name in (parameter.term, f"{parameter.term} {parameter.name}"):
+                return parameter
+        raise KeyError(name)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Effort as predicted and as measured in the band of the fit, shape (n,) each."""
+
+    predicted: Array
+    measured: Array
+    vaf_percent: float
+
+
+def fit_terms(
+    motion: Motion,
+    names: str | Sequence[str],
+    band_hz: tuple[float, float],
+    trim_s: float = 1.0,
+) -> TermsFit:
+    """Fit the named terms in a band.
+
+    Parameters
+    ----------
+    motion : Motion
+        Wide-band: it must reach well above the band.
+    names : str or sequence of str
+        For example ``"inertia,damping,stiffness,reflex-fir+"``; see `catalogue`.
+    band_hz : (float, float)
+        From 0 Hz where a mean is to be explained.
+    trim_s : float
+        Dropped at each end, where the filter had no neighbours and a reflex no past.
+
+    Raises
+    ------
+    UserError
+        If a name is unknown.
+    ValueError
+        If the data cannot tell terms apart, or the band cannot carry a term.
+    """
+    terms = parse_terms(names)
+    if "offset" in terms and band_hz[0] > 0:
+        raise ValueError(
+            f"offset is constant and does not pass a band that begins at {band_hz[0]:g} Hz; begin "
+            "the band at 0 Hz or leave offset out"
+        )
+    undecided = [name for name in terms if name in REFLEXES and name[-1] not in "+-"]
+    if undecided:
+        return _both_directions(motion, terms, undecided[0], band_hz, trim_s)
+    return _fit(Design(motion, terms, band_hz, trim_s), band_hz, trim_s)
+
+
+def predict(fit: TermsFit, motion: Motion) -> Prediction:
+    """Predict the effort of a motion that the fit need not have seen."""
+    design = Design(motion, fit.terms, fit.band_hz, fit.trim_s)
+    predicted = design.columns(fit.nonlinear) @ fit.linear
+    measured = design.effort[design.keep]
+    unexplained = float(np.var(measured - predicted)) / float(np.var(measured))
+    return Prediction(predicted, measured, 100.0 * (1.0 - unexplained))
+
+
+def _both_directions(
+    motion: Motion,
+    terms: tuple[str, ...],
+    undecided: str,
+    band_hz: tuple[float, float],
+    trim_s: float,
+) -> TermsFit:
+    fits = []
+    for sign in "+-":
+        decided = [undecided + sign if name == undecided else name for name in terms]
+        fits.append(_fit(Design(motion, decided, band_hz, trim_s), band_hz, trim_s))
+    # A reflex resists stretch; a direction that needs a negative gain is not one.
+    worse, better = sorted(fits, key=lambda fit: (_gain(fit, undecided) > 0, fit.vaf_percent))
+    side = "positive" if f"{undecided}+" in better.terms else "negative"
+    remark = (
+        f"{undecided}: the data decided for stretch by motion toward {side} angle "
+        f"(VAF {better.vaf_percent:.2f} %, the other direction {worse.vaf_percent:.2f} %)"
+    )
+    return replace(better, remarks=(remark, *better.remarks))
+
+
+def _gain(fit: TermsFit, kind: str) -> float:
+    term = next(name for name in fit.terms if name.rstrip("+-") == kind)
+    return fit[f"{term} gain"].value
+
+
+def _fit(design: Design, band_hz: tuple[float, float], trim_s: float) -> TermsFit:
+    target = design.effort[design.keep]
+    if not float(np.ptp(target)) > 0:
+        raise ValueError("the effort is constant in the band")
+    nonlinear = design.search()
+    columns, names = design.columns(nonlinear), design.names
+    solution = solve(columns, target, names)
+    residual = solution.residual
+    n, p = target.size, columns.shape[1] + nonlinear.size
+    independent = min(float(n), 2.0 * (band_hz[1] - band_hz[0]) * n / design.rate_hz)
+    parameters, remarks, degrees = _parameters(design, solution.values, nonlinear, residual)
+    misfit = independent * math.log(max(float(residual @ residual) / n, np.finfo(float).tiny))
+    return TermsFit(
+        terms=design.terms,
+        parameters=parameters,
+        linear=solution.values,
+        nonlinear=nonlinear,
+        band_hz=band_hz,
+        rate_hz=design.rate_hz,
+        trim_s=trim_s,
+        residual=residual,
+        vaf_percent=100.0 * (1.0 - float(np.var(residual)) / float(np.var(target))),
+        aic=misfit + 2.0 * p,
+        bic=misfit + p * math.log(independent),
+        independent_samples=independent,
+        condition_number=solution.condition_number,
+        degrees_of_freedom=degrees,
+        test=residual_test(residual, design.velocity[design.keep], design.rate_hz, band_hz),
+        remarks=tuple(remarks),
+    )
+
+
+def _parameters(
+    design: Design, linear: Array, nonlinear: Array, residual: Array
+) -> tuple[tuple[Parameter, ...], list[str], float]:
+    """Return the parameters with HAC errors of the whole Jacobian, linear and nonlinear alike."""
+    low = [bound for one in design.kernels.values() for bound in one.low]
+    high = [bound for one in design.kernels.values() for bound in one.high]
+    slopes, remarks = [], []
+    for k, value in enumerate(nonlinear):
+        width = 1e-4 * (high[k] - low[k])
+        up, down = nonlinear.copy(), nonlinear.copy()
+        up[k], down[k] = value + width, value - width
+        slopes.append((design.columns(up) - design.columns(down)) @ linear / (2.0 * width))
+    jacobian = np.column_stack((design.columns(nonlinear), *slopes))
+    inner = [f"q{k}" for k in range(nonlinear.size)]
+    covariance = np.full((jacobian.shape[1],) * 2, math.nan)
+    degrees = math.nan
+    try:
+        scatter = hac_covariance(
+            bread(jacobian, [*design.names, *inner]), jacobian * residual[:, None]
+        )
+        covariance, degrees = scatter.covariance, scatter.degrees_of_freedom
+    except ValueError as obstacle:
+        remarks.append(f"no standard errors: {obstacle}")
+    errors = np.sqrt(np.diag(covariance))
+    found: list[Parameter] = []
+    column, q = 0, 0
+    for term in design.terms:
+        if term in TERMS:
+            value, error = float(linear[column]), float(errors[column])
+            found.append(Parameter(term, "", value, error, TERMS[term].unit))
+            column += 1
+            continue
+        one = design.kernels[term]
+        part = slice(column, column + len(one.columns))
+        unit = "N·m/rad" if one.kind == "reflex-fir" else "N·m·s/rad"
+        for name, value, error in zip(one.columns, linear[part], errors[part], strict=True):
+            found.append(Parameter(term, name, float(value), float(error), unit))
+        if one.kind == "reflex-fir":
+            spread = FIR_SPACING_S * math.sqrt(float(np.sum(covariance[part, part])))
+            area = FIR_SPACING_S * float(np.sum(linear[part]))
+            found.append(Parameter(term, "gain", area, spread, "N·m·s/rad"))
+        gain = found[-1]
+        if gain.value < 0:
+            remarks.append(
+                f"{term}: the gain is negative, {gain.value:.3g} N·m·s/rad; a reflex resists "
+                "stretch, so this stands for something else"
+            )
+        column += len(one.columns)
+        for name, unit, bottom, top in zip(
+            one.nonlinear, one.units, one.low, one.high, strict=True
+        ):
+            value, error = float(nonlinear[q]), float(errors[linear.size + q])
+            q += 1
+            if min(value - bottom, top - value) < NEAR_BOUND * (top - bottom):
+                remarks.append(
+                    f"{term}: the {name} came to its bound, {value:.3g} {unit}; the data do not "
+                    "determine it, and its error means nothing"
+                )
+            found.append(Parameter(term, name, value, error, unit))
+    return tuple(found), remarks, degrees

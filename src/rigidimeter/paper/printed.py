@@ -1,0 +1,109 @@
+"""The numbers the paper prints, each with its place; nothing here is computed.
+
+"Quantifying Viscous Damping and Stiffness in Parkinsonism Using Data-Driven Model Estimation and
+Admittance Control". Where it prints one quantity in several ways, all of them are here.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rigidimeter.dynamics.joint import JointDynamics
+
+__all__ = [
+    "APP_A_BODY_MASS_KG",
+    "APP_A_CONTROLLER_DAMPING",
+    "APP_A_CONTROLLER_INERTIA",
+    "APP_A_DAMPING_TOTAL",
+    "APP_A_ELBOW_DAMPING",
+    "APP_A_FOREARM_INERTIA",
+    "APP_A_FOREARM_SHARE",
+    "APP_A_INERTIA_TOTAL",
+    "APP_A_ROBOT_INERTIA",
+    "BANDWIDTH_HZ",
+    "BAND_HZ",
+    "CONTROLLER_DAMPING",
+    "CONTROLLER_INERTIA",
+    "COUNTS",
+    "EPOCHS_A_CONDITION",
+    "EQUATION_8",
+    "FIG_4",
+    "FIG_6",
+    "FIG_8_INERTIA",
+    "MEASURED",
+    "POSITION_SD_DEG",
+    "SEC_34",
+    "SEC_34_MEAN",
+    "SEC_34_SD",
+    "SESSION_MIN",
+    "Measured",
+]
+
+CONTROLLER_INERTIA, CONTROLLER_DAMPING = 0.0008, 0.028
+"""J_c and B_c: per degree in Sec. 2.4.2, per radian in App. A."""
+
+POSITION_SD_DEG = 4.0
+"""Sec. 2.4.3: "approximately 4 deg for each perturbation epoch"."""
+
+BAND_HZ = (0.15, 10.0)
+"""Sec. 2.4.3 and Fig. 3(b)."""
+
+BANDWIDTH_HZ = 3.5
+"""Sec. 2.4.3: the worst-case cutoff."""
+
+APP_A_BODY_MASS_KG, APP_A_FOREARM_SHARE = 7.7, 0.015
+APP_A_FOREARM_INERTIA = 8.6625e-4
+APP_A_ROBOT_INERTIA = 4e-3
+APP_A_CONTROLLER_INERTIA = 0.0008
+APP_A_INERTIA_TOTAL = 0.0052
+APP_A_ELBOW_DAMPING = 0.06
+APP_A_CONTROLLER_DAMPING = 0.028
+APP_A_DAMPING_TOTAL = 0.0088
+
+EQUATION_8 = JointDynamics(0.0026, 0.044, 0.75)
+
+SEC_34 = JointDynamics(0.0045, 0.1368, 1.751)
+SEC_34_MEAN = (-1.9e-7, -2.6e-7, -1.9e-7)
+SEC_34_SD = (9.6e-7, 1.05e-6, 1.4e-6)
+"""Of 100 simulations: mean and standard deviation of the errors of J, B and K."""
+
+FIG_4 = JointDynamics(0.0044, 0.1300, 1.310)
+"""Sec. 3.5, "median values"."""
+
+FIG_6 = JointDynamics(0.0044, 0.1300, 1.130)
+"""Caption of Fig. 6, "the median estimates"."""
+
+FIG_8_INERTIA = 0.0045
+"""Caption of Fig. 8: the inertia that was held fixed, the median of all epochs (Sec. 2.4.4)."""
+
+EPOCHS_A_CONDITION = 15
+SESSION_MIN = 10.0
+"""Sec. 2.3."""
+
+COUNTS = {
+    "ratings": {"OFF": 27, "DBS": 12},
+    "sinusoid": {"OFF": 92, "DBS": 46},
+    "prbs": {"OFF": 78, "DBS": 23},
+}
+"""Table 1."""
+
+
+class Measured(NamedTuple):
+    """A line of Table 2, with the p-values printed elsewhere and how many values were compared."""
+
+    name: str
+    title: str
+    n: int
+    p_table: float
+    r: float
+    p_text: float
+    place: str
+
+
+MEASURED = (
+    Measured("mupdrs", "Corrected mUPDRS score", 39, 0.04, 0.18, 0.020, "Sec. 3.1"),
+    Measured("impulse", "Angular impulse score", 138, 4.3e-4, 0.30, 4.3e-4, "Sec. 3.3"),
+    Measured("work", "Work score", 138, 2.8e-4, 0.31, 5.6e-4, "Sec. 3.3"),
+    Measured("viscosity", "Viscosity", 101, 4.0e-4, 0.35, 5.0e-4, "Sec. 3.5 and Fig. 8"),
+    Measured("stiffness", "Stiffness", 101, 1.8e-3, 0.37, 1.8e-4, "Sec. 3.5 and Fig. 8"),
+)

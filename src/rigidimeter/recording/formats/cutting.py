@@ -1,0 +1,161 @@
+"""Where epochs begin and end in a table: by its labels, or by a length.
+
+Rows are counted from 0; a stretch ends before its `stop`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.formats.columns import Table, plain
+from rigidimeter.recording.formats.gaps import longest_s
+from rigidimeter.recording.formats.stamps import seconds, typical_step_s
+from rigidimeter.records import Notice
+
+__all__ = ["Stretch", "by_label", "by_length", "constant_label", "lettered"]
+
+_WHOLE = 0.95
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Rows `start` to `stop` (not included) of a table, and the name of the epoch they are."""
+
+    label: str
+    start: int
+    stop: int
+
+
+def by_label(
+    source: str, time_s: NDArray[np.float64], column: NDArray[Any]
+) -> tuple[list[Stretch], list[Notice]]:
+    """Cut where the label changes; rows without a label are rest and belong to no stretch.
+
+    A label that returns after something else is another epoch: the second run of `1` is named
+    `1 (2)`, and a notice says so.
+    """
+    stretches: list[Stretch] = []
+    notices: list[Notice] = []
+    times_seen: dict[str, int] = {}
+    for label, start, stop in _runs(column):
+        if not label:
+            continue
+        times_seen[label] = times_seen.get(label, 0) + 1
+        name = label
+        if times_seen[label] > 1:
+            name = f"{label} ({times_seen[label]})"
+            text = (
+                f"{source}: epoch {label} occurs again at {seconds(float(time_s[start]))} after "
+                f"other rows; this run is read as epoch {name}"
+            )
+            notices.append(Notice("warning", text))
+        stretches.append(Stretch(name, start, stop))
+    if not stretches:
+        raise UserError(
+            f"{source}: the epoch column is empty in every row, which means rest; label the rows "
+            "of each epoch"
+        )
+    return stretches, notices
+
+
+def by_length(
+    source: str, time_s: NDArray[np.float64], length_s: float
+) -> tuple[list[Stretch], list[Notice]]:
+    """Cut into consecutive stretches of one length by the clock, named `1`, `2` and so on.
+
+    The last one may be up to 5 % short; what is shorter is left out, and a notice says how much.
+    """
+    step_s = typical_step_s(time_s)
+    elapsed = time_s - time_s[0]
+    # A quarter of an interval keeps a stamp that rounding put just before its boundary.
+    index = np.floor((elapsed + 0.25 * step_s) / length_s).astype(np.int64)
+    starts = np.flatnonzero(np.diff(index, prepend=-1))
+    stops = np.append(starts[1:], time_s.size)
+    stretches = [
+        Stretch(str(index[start] + 1), int(start), int(stop))
+        for start, stop in zip(starts, stops, strict=True)
+    ]
+    notices = _gaps_between(source, time_s, stretches, step_s)
+    last = stretches[-1]
+    # The file ends one interval after its last stamp.
+    left_s = float(elapsed[-1]) + step_s - int(index[-1]) * length_s
+    if left_s < _WHOLE * length_s:
+        text = (
+            f"{source}: the last {seconds(left_s)}, from {seconds(float(time_s[last.start]))} on, "
+            f"are shorter than an epoch of {length_s:g} s and were left out"
+        )
+        notices.append(Notice("warning", text))
+        stretches = stretches[:-1]
+    if not stretches:
+        raise UserError(
+            f"{source} lasts {seconds(left_s)}, which is shorter than one epoch of "
+            f"--epoch-length-s {length_s:g}"
+        )
+    return stretches, notices
+
+
+def constant_label(table: Table, standard: str, column: NDArray[Any], stretch: Stretch) -> str:
+    """Return the one label that a column has within a stretch, or nothing if it has none.
+
+    Raises
+    ------
+    UserError
+        If the label changes within the stretch.
+    """
+    seen = ""
+    for label, start, _ in _runs(column[stretch.start : stretch.stop]):
+        if seen and label and label != seen:
+            raise UserError(
+                f"{table.where(stretch.start + start)}: {standard} changes from {seen} to {label} "
+                f"within epoch {stretch.label}; it must stay the same throughout an epoch"
+            )
+        seen = seen or label
+    return seen
+
+
+def lettered(label: str, pieces: int) -> list[str]:
+    """Name the pieces of an epoch: `3a`, `3b` and so on, or `3` if there is only one."""
+    return [label] if pieces == 1 else [label + _letters(index) for index in range(pieces)]
+
+
+def _letters(index: int) -> str:
+    rest, last = divmod(index, 26)
+    return (_letters(rest - 1) if rest else "") + chr(ord("a") + last)
+
+
+def _runs(column: NDArray[Any]) -> list[tuple[str, int, int]]:
+    """Return label, start and stop of each run of one label; empty labels are runs too."""
+    changed = np.asarray(column[1:] != column[:-1], dtype=bool)
+    if column.dtype != object:
+        changed &= ~(np.isnan(column[1:]) & np.isnan(column[:-1]))
+    starts = [0, *(np.flatnonzero(changed) + 1).tolist()]
+    runs: list[tuple[str, int, int]] = []
+    for start, stop in zip(starts, [*starts[1:], column.size], strict=True):
+        label = plain(column[start])
+        if runs and runs[-1][0] == label:  # the same label, written in two ways
+            runs[-1] = (label, runs[-1][1], stop)
+        else:
+            runs.append((label, start, stop))
+    return runs
+
+
+def _gaps_between(
+    source: str, time_s: NDArray[np.float64], stretches: list[Stretch], step_s: float
+) -> list[Notice]:
+    """Report gaps that fall on a boundary, where no epoch is cut because of them."""
+    notices = []
+    for before, after in pairwise(stretches):
+        start_s, stop_s = float(time_s[before.stop - 1]), float(time_s[after.start])
+        if stop_s - start_s > longest_s(step_s):
+            text = (
+                f"{source}: a gap of {seconds(stop_s - start_s)} from {seconds(start_s)} on lies "
+                f"between epochs {before.label} and {after.label}"
+            )
+            notices.append(Notice("warning", text))
+    return notices

@@ -1,0 +1,175 @@
+"""From a session folder to epochs, closed or not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.sample_log import read_events, read_samples
+from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES, read_manifest
+from rigidimeter.records import Channel, Epoch, Motion, Notice, Outcome
+from rigidimeter.settings import Settings, parse_settings
+
+__all__ = ["is_session", "read_session", "session_settings"]
+
+MUCH_LIMITED = 0.01
+"""Above this share of limited ticks the reader is told."""
+
+
+def is_session(path: Path) -> bool:
+    """Whether the path is a folder with a manifest."""
+    return (path / MANIFEST).is_file()
+
+
+def session_settings(folder: Path) -> Settings:
+    """Return the settings a session was recorded with."""
+    manifest = read_manifest(folder)
+    return parse_settings(manifest["settings"], source=f"{folder}/manifest.json, settings")
+
+
+def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
+    """Return the epochs of a session folder, in order.
+
+    An interrupted session gives what was written. An epoch that was not closed with success
+    carries the reason in `closed`, and so does not count in summaries.
+
+    Raises
+    ------
+    UserError
+        If a file of the folder is missing or unreadable.
+    """
+    manifest = read_manifest(folder)
+    settings = session_settings(folder)
+    for name in (SAMPLES, EVENTS):
+        if not (folder / name).is_file():
+            raise UserError(f"{folder}: the session has lost its {name}")
+    samples = read_samples(folder / SAMPLES)
+    events, _ = read_events(folder / EVENTS)
+    notices: list[Notice] = []
+    if not any(event.get("event") == "session_ended" for event in events):
+        notices.append(
+            Notice(
+                "warning",
+                f"{folder}: the session was interrupted; what was written is read. "
+                f"`rigidimeter recover {folder}` closes it",
+            )
+        )
+    ended = {event["epoch"]: event for event in events if event.get("event") == "epoch_ended"}
+    first, last = _extents(samples["epoch"])
+    epochs = []
+    seen: set[int] = set()
+    for event in events:
+        if event.get("event") != "epoch_started":
+            continue
+        number = event["epoch"]
+        if number in seen:
+            notices.append(
+                Notice("error", f"{folder}/{EVENTS}: epoch {number} starts twice; the first counts")
+            )
+            continue
+        seen.add(number)
+        closed_well = ended.get(number, {}).get("outcome") == "success"
+        if number not in first:
+            level: Literal["warning", "error"] = "error" if closed_well else "warning"
+            notices.append(
+                Notice(level, f"{folder}, epoch {event['label']}: no sample was written")
+            )
+            continue
+        if closed_well:
+            missing_s = ended[number]["time_s"] - float(samples["time_s"][last[number]])
+            if missing_s > 1.5 / settings.rig.tick_rate_hz:
+                lost = (
+                    f"its last {missing_s:.3g} s are missing; {SAMPLES} breaks off at "
+                    f"{samples['time_s'][-1]:.3f} s"
+                )
+                notices.append(Notice("error", f"{folder}, epoch {event['label']}: {lost}"))
+                ended[number] = {"outcome": "fail", "reason": lost}
+        rows = slice(first[number], last[number] + 1)
+        share = float(np.mean(samples["limited"][rows] > 0))
+        if share > MUCH_LIMITED:
+            notices.append(
+                Notice(
+                    "warning",
+                    f"{folder}, epoch {event['label']}: the guard changed {100 * share:.0f} % of "
+                    "the commands, so the arm did not follow the perturbation as designed; see the "
+                    "column limited of its samples, and the limits in [guard]",
+                )
+            )
+        epochs.append(_epoch(folder, settings, manifest, samples, rows, event, ended.get(number)))
+    notices += [
+        Notice("error", f"{folder}/{EVENTS}: does not say what epoch {number} of the samples was")
+        for number in first
+        if number not in seen
+    ]
+    return epochs, notices
+
+
+def _extents(number: NDArray[Any]) -> tuple[dict[int, int], dict[int, int]]:
+    """Return the first and the last row of every epoch; the rows of one epoch are contiguous."""
+    if number.size == 0:
+        return {}, {}
+    edges = np.flatnonzero(np.diff(number)) + 1
+    starts, stops = np.concatenate(([0], edges)), np.concatenate((edges, [number.size]))
+    first = {int(number[i]): int(i) for i in starts if number[i] >= 0}
+    last = {int(number[i]): int(j) - 1 for i, j in zip(starts, stops, strict=True)}
+    return first, last
+
+
+def _epoch(
+    folder: Path,
+    settings: Settings,
+    manifest: dict[str, Any],
+    samples: dict[str, NDArray[Any]],
+    rows: slice,
+    started: dict[str, Any],
+    ended: dict[str, Any] | None,
+) -> Epoch:
+    time_s = samples["time_s"][rows]
+    if ended is None:
+        duration_s = time_s[-1] - time_s[0]
+        closed = Outcome("excluded", f"the session was interrupted {duration_s:.3g} s into it")
+    elif ended["outcome"] == "success":
+        closed = Outcome()
+    else:
+        closed = Outcome("excluded", str(ended["reason"]))
+    channels = [
+        *_sampled(samples, rows, "torque_time_s", ("torque_nm",)),
+        *_sampled(samples, rows, "motion_time_s", ("angle_rad", "velocity_rad_s")),
+        Channel("velocity_command_rad_s", time_s, samples["velocity_command_rad_s"][rows]),
+    ]
+    task = started["task"]
+    if task not in ("prbs", "sinusoid"):
+        raise UserError(f"{folder}/{EVENTS}: task is {task!r}; it must be 'prbs' or 'sinusoid'")
+    sine = settings.sinusoid
+    if task == "prbs":
+        channels.append(Channel("perturbation_nm", time_s, samples["perturbation_nm"][rows]))
+    return Epoch(
+        source=str(folder),
+        label=str(started["label"]),
+        channels={channel.name: channel for channel in channels},
+        condition=str(started["condition"]),
+        task=task,
+        motion=(
+            Motion(sine.frequency_hz, float(time_s[0]), sine.motion_s)
+            if task == "sinusoid"
+            else None
+        ),
+        excitation_hz=(
+            (settings.prbs.wanted_low_hz, settings.prbs.wanted_high_hz) if task == "prbs" else None
+        ),
+        closed=closed,
+        virtual=bool(manifest["virtual"]),
+    )
+
+
+def _sampled(
+    samples: dict[str, NDArray[Any]], rows: slice, stamp: str, names: tuple[str, ...]
+) -> list[Channel]:
+    """Return channels with one entry for each sample: a held reading repeats its stamp."""
+    stamps = samples[stamp][rows]
+    fresh = np.concatenate(([True], np.diff(stamps) > 0))
+    return [Channel(name, stamps[fresh], samples[name][rows][fresh]) for name in names]

@@ -1,0 +1,105 @@
+"""The torque perturbation: its course (Fig. 4a) and its power spectrum (Fig. 3b)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+from numpy.typing import NDArray
+from scipy import signal
+
+from rigidimeter.records import Channel
+from rigidimeter.reporting.figures.style import GREY, note, styled
+
+__all__ = ["changes", "perturbation", "spectrum"]
+
+_INK = "#222222"
+_BAND = "#009E73"
+
+
+def changes(channel: Channel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the stamps and values at which a held signal changes, and its first and last."""
+    values = channel.values
+    keep = np.ones(values.size, dtype=bool)
+    keep[1:-1] = values[1:-1] != values[:-2]
+    return channel.time_s[keep], values[keep]
+
+
+def perturbation(channel: Channel, origin_s: float, first_s: float = 7.0) -> Figure:
+    """Draw the perturbation, its first seconds above and the whole of it below.
+
+    Parameters
+    ----------
+    channel : Channel
+        `perturbation_nm`, at least two samples.
+    origin_s : float
+        What the time axis counts from, on the channel's clock.
+    first_s : float
+        How much of it the upper panel shows.
+    """
+    time_s, values = changes(channel)
+    time_s = time_s - origin_s
+    with styled():
+        figure = Figure(figsize=(7.4, 3.1))
+        above, below = figure.subplots(2, 1)
+        for axes in (above, below):
+            axes.step(time_s, values, where="post", color=_INK, linewidth=0.9)
+            axes.set_ylabel("Perturbation\n(N·m)")
+        above.set_xlim(time_s[0], min(time_s[0] + first_s, time_s[-1]))
+        below.set_xlim(time_s[0], time_s[-1])
+        below.set_xlabel("Time since the start of the epoch (s)")
+        note(above, f"first {min(first_s, time_s[-1] - time_s[0]):.3g} s")
+        note(below, "whole")
+    return figure
+
+
+def spectrum(channel: Channel, wanted_hz: tuple[float, float]) -> Figure:
+    """Draw the one-sided power spectral density with the wanted band marked.
+
+    A Hann-windowed periodogram of the whole perturbation, held between its stamps.
+
+    Parameters
+    ----------
+    channel : Channel
+        `perturbation_nm`, at least 16 samples, not constant.
+    wanted_hz : (float, float)
+        The band that the perturbation is to excite.
+    """
+    rate_hz = channel.rate_hz
+    count = int((channel.time_s[-1] - channel.time_s[0]) * rate_hz) + 1
+    grid = channel.time_s[0] + np.arange(count) / rate_hz
+    # A hundredth of a sample of rounding must not hold the value before.
+    index = np.searchsorted(channel.time_s, grid + 0.01 / rate_hz, side="right") - 1
+    frequency_hz, density = signal.periodogram(channel.values[index], rate_hz, window="hann")
+    low, high = wanted_hz
+    shown = (frequency_hz > 0) & (frequency_hz <= max(4 * high, 5 * frequency_hz[1]))
+    frequency_hz, density = frequency_hz[shown], density[shown]
+    with styled():
+        figure = Figure(figsize=(7.4, 2.7))
+        axes = figure.add_subplot()
+        axes.axvspan(low, high, color=_BAND, alpha=0.12, linewidth=0)
+        floor = density.max() * 1e-5
+        axes.loglog(frequency_hz, np.maximum(density, floor), color=_INK, linewidth=0.8)
+        axes.set_ylim(floor, density.max() * 6)
+        axes.set_xlim(min(frequency_hz[0], low / 2), max(frequency_hz[-1], 2 * high))
+        axes.set_xlabel("Frequency (Hz)")
+        axes.set_ylabel("Power spectral density\n((N·m)²/Hz)")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.grid(visible=False, which="minor")
+        _label_band(axes, low, high)
+    return figure
+
+
+def _label_band(axes: Axes, low: float, high: float) -> None:
+    axes.text(
+        float(np.sqrt(low * high)),
+        0.97,
+        f"wanted: {low:g} to {high:g} Hz",
+        transform=axes.get_xaxis_transform(),
+        ha="center",
+        va="top",
+        fontsize=8,
+        color=GREY,
+    )

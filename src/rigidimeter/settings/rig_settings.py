@@ -1,0 +1,39 @@
+"""Settings of the virtual rig: loop rate, drive and sensors."""
+
+from __future__ import annotations
+
+from rigidimeter.settings.section import Section, quantity
+
+__all__ = ["MotionSensorSettings", "RigSettings", "TorqueSensorSettings"]
+
+
+class TorqueSensorSettings(Section):
+    """The virtual torque sensor. `stamp_latency_s` is the part of the latency its stamps know."""
+
+    rate_hz: float = quantity(1000.0, "Hz", 1.0, 20000.0)
+    noise_sd_nm: float = quantity(0.005, "N·m", 0.0, 10.0)
+    resolution_nm: float = quantity(0.0005, "N·m", 0.0, 1.0)
+    latency_s: float = quantity(0.001, "s", 0.0, 0.1)
+    stamp_latency_s: float = quantity(0.001, "s", 0.0, 0.1)
+    jitter_s: float = quantity(0.0, "s", 0.0, 0.1)
+
+
+class MotionSensorSettings(Section):
+    """The virtual encoder: angle and velocity sampled together."""
+
+    rate_hz: float = quantity(1000.0, "Hz", 1.0, 20000.0)
+    angle_resolution_deg: float = quantity(2.25e-4, "deg", 0.0, 1.0)
+    velocity_resolution_deg_s: float = quantity(0.01, "deg/s", 0.0, 10.0)
+    latency_s: float = quantity(0.001, "s", 0.0, 0.1)
+    stamp_latency_s: float = quantity(0.001, "s", 0.0, 0.1)
+    jitter_s: float = quantity(0.0, "s", 0.0, 0.1)
+
+
+class RigSettings(Section):
+    """The virtual rig: loop rate, drive and sensors."""
+
+    tick_rate_hz: float = quantity(1000.0, "Hz", 50.0, 5000.0)
+    drive_bandwidth_hz: float = quantity(50.0, "Hz", 1.0, 2000.0)
+    drive_damping_ratio: float = quantity(0.7071, "1", 0.6, 0.99)
+    torque: TorqueSensorSettings = TorqueSensorSettings()
+    motion: MotionSensorSettings = MotionSensorSettings()

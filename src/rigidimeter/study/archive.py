@@ -1,0 +1,277 @@
+"""The kept analysis of a study, and what is new since: inputs by their digests, numbers by name.
+
+    STUDY/analysis/inputs.json      digests of all inputs and results, settings, method, seed
+    STUDY/analysis/estimates.json   the estimates, as `rigidimeter estimate` writes them
+    STUDY/analysis/comparison.json  every conclusion
+    STUDY/analysis/*.csv            the same as tables
+
+A file whose bytes would be the same is not written again. `comparison.json` and then `inputs.json`
+are written last: a run that was cut off leaves those of the run before, and the next one says what
+is new since then.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from rigidimeter import __version__
+from rigidimeter.errors import UserError
+from rigidimeter.recording import estimates_document, write_text
+from rigidimeter.settings import dump_settings
+from rigidimeter.study.results import Cohort, Study
+from rigidimeter.study.sessions import file_digest
+from rigidimeter.study.study_analysis import StudyRead
+from rigidimeter.study.tables import study_document, study_tables
+
+__all__ = ["ANALYSIS", "INPUTS_SCHEMA", "UNCHANGED", "keep"]
+
+INPUTS_SCHEMA = "rigidimeter.study-inputs/1"
+ANALYSIS = "analysis"
+UNCHANGED = "nothing has changed since the last analysis"
+INPUTS, COMPARISON = "inputs.json", "comparison.json"
+
+_SHOWN = 12
+_COMPARED = ("shift", "p", "r")
+_SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
+_BY_DAYS = ("estimate", "p", "p_days", "day_share")
+
+
+def keep(read: StudyRead, study: Study, cohort: Cohort, seed: int, resamples: int) -> list[str]:
+    """Write what is new into ``STUDY/analysis``; return in sentences what that is.
+
+    A result that was edited by hand is kept beside the new one as ``NAME.edited``. Nothing is said
+    of a first analysis.
+
+    Raises
+    ------
+    UserError
+        If a file cannot be written.
+    """
+    folder = read.folder.folder / ANALYSIS
+    place = str(read.folder.folder)
+    document = study_document(study, cohort, place)
+    texts = {
+        "estimates.json": _json(estimates_document(study.analysis)),
+        **study_tables(study, cohort),
+        COMPARISON: _json(document),
+    }
+    inputs = _inputs(read, study, seed, resamples)
+    results = {name: hashlib.sha256(_bytes(text)).hexdigest() for name, text in texts.items()}
+    before = _object(folder / INPUTS)
+    if before is not None and not _is_inputs(before):
+        before = None
+    said: list[str] = []
+    edited = _edited(folder, before, results, said)
+    if before is not None:
+        said += _new_inputs(before, inputs)
+        old = _object(folder / COMPARISON) if COMPARISON not in edited else None
+        if old is not None:
+            said += _moved(old, document)
+    elif (folder / INPUTS).exists():
+        said.append(f"{ANALYSIS}/{INPUTS} is damaged, so what has changed since is unknown")
+    _write(folder, texts, edited)
+    try:
+        for name in sorted({*_results(before)} - {*texts} - {*edited}):
+            (folder / name).unlink(missing_ok=True)  # ours, unedited, and no longer a result
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written ({error.strerror or error})") from None
+    _write_new(folder / INPUTS, _json({**inputs, "results": results}))
+    if before is not None and not said:
+        said.append(UNCHANGED)
+    return said
+
+
+def _inputs(read: StudyRead, study: Study, seed: int, resamples: int) -> dict[str, Any]:
+    files = {name: file_digest(path) for name, path in read.folder.files.items()}
+    return {
+        "schema": INPUTS_SCHEMA,
+        "software": f"rigidimeter {__version__}",
+        "method": study.analysis.method,
+        "reference": read.names.pair[0],
+        "other": read.names.pair[1],
+        "seed": seed,
+        "resamples": resamples,
+        "settings": dump_settings(study.settings),
+        "files": files | read.gathered.digests,
+    }
+
+
+def _edited(
+    folder: Path, before: Mapping[str, Any] | None, results: Mapping[str, str], said: list[str]
+) -> dict[str, str]:
+    """Return the results that are not as they were written, and under what name to keep each.
+
+    One that is as it will be written now is none of them: a run that was cut off left it.
+    """
+    edited = {}
+    try:
+        for name, digest in (_results(before) or dict.fromkeys(results, "")).items():
+            path = folder / name
+            if not path.is_file():
+                if digest and name in results:
+                    said.append(f"{ANALYSIS}/{name} was taken away; it is written again")
+            elif file_digest(path) not in (digest, results.get(name)):
+                edited[name] = _free(folder, f"{name}.edited")
+                how = "was changed by hand after it was written" if digest else "was there already"
+                said.append(
+                    f"{ANALYSIS}/{name} {how}; it is written anew, and the one that was there is "
+                    f"kept as {edited[name]}"
+                )
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be read ({error.strerror or error})") from None
+    return edited
+
+
+def _free(folder: Path, name: str) -> str:
+    """Return the name, or the first of ``name-2``, ``name-3`` and so on that is not taken."""
+    names = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
+    return next(each for each in names if not (folder / each).exists())
+
+
+def _new_inputs(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    for name in ("software", "method", "reference", "other", "seed", "resamples"):
+        if before.get(name) != now[name]:
+            yield f"{name}: {before.get(name)} → {now[name]}"
+    old, new = (dict(_leaves(each.get("settings") or {})) for each in (before, now))
+    for name in dict.fromkeys([*old, *new]):
+        if old.get(name) != new.get(name):
+            yield f"setting {name}: {old.get(name)} → {new.get(name)}"
+    files = before.get("files")
+    old = dict(files) if isinstance(files, dict) else {}
+    new = now["files"]
+    for what, names in (
+        ("new", [name for name in new if name not in old]),
+        ("gone", [name for name in old if name not in new]),
+        ("changed", [name for name in new if name in old and old[name] != new[name]]),
+    ):
+        if names:
+            more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+            yield f"inputs that are {what}: {', '.join(names[:_SHOWN])}{more}"
+
+
+def _moved(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    """Say which numbers moved, one sentence for each measure and test."""
+    before, now = (dict(_numbers(document)) for document in (old, new))
+    for title in dict.fromkeys([*before, *now]):
+        if title not in now:
+            yield f"{title} is no longer there"
+        elif title not in before:
+            yield f"{title} is new"
+        else:
+            one, two = before[title], now[title]
+            moved = [
+                f"{name} {_from_to(one.get(name), two.get(name))}"
+                for name in dict.fromkeys([*one, *two])
+                if one.get(name) != two.get(name)
+            ]
+            if moved:
+                yield f"{title}: {', '.join(moved)}"
+
+
+def _numbers(document: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield what a reader would look at, by the name of the test."""
+    try:
+        for c in document["comparisons"]:
+            row = {f"n {name}": group["n"] for name, group in c["groups"].items()}
+            row |= {f"median {name}": group["median"] for name, group in c["groups"].items()}
+            yield c["measure"], row | {name: c.get(name) for name in _COMPARED}
+        for d in document["day_tests"]:
+            yield f"{d['measure']} by days", {name: d[name] for name in _BY_DAYS}
+        for e in document["effects"]:
+            sizes = {name: e["effects"][name] for name in _SIZES}
+            yield f"{e['measure']}, effect size", sizes | {"p by Holm": e["p_holm"]}
+        for d in document["effect_differences"]:
+            row = {name: d[name] for name in ("estimate", "low", "high", "p")}
+            yield f"{d['first']} − {d['second']}, difference of effect sizes", row
+        if document["ratings"] is not None:
+            contrast = document["ratings"]["contrast"]
+            row = {"n": document["ratings"]["n"], "estimate": contrast["estimate"]}
+            yield "ratings, contrast", row | {"p": contrast["p_residual"]}
+        for s in document["sensitivity"]:
+            title = f"{s['measure']}, {s['method']}, J {s['inertia']}"
+            yield title, {name: s[name] for name in ("shift", "p", "p_day")}
+        yield "epochs left out", {"count": len(document["exclusions"])}
+    except (KeyError, TypeError, AttributeError):
+        return  # of another version
+
+
+def _from_to(old: Any, new: Any) -> str:
+    shown = [_number(value, 4) for value in (old, new)]
+    if shown[0] == shown[1]:
+        shown = [_number(value, 17) for value in (old, new)]
+    return " → ".join(shown)
+
+
+def _number(value: Any, digits: int) -> str:
+    if value is None:
+        return "none"
+    return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
+
+
+def _leaves(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name, value
+
+
+def _write(folder: Path, texts: Mapping[str, str], edited: Mapping[str, str]) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+        for name, aside in edited.items():
+            (folder / name).replace(folder / aside)
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written ({error.strerror or error})") from None
+    for name, text in texts.items():
+        _write_new(folder / name, text)
+
+
+def _write_new(path: Path, text: str) -> None:
+    """Write a file unless it holds these bytes already."""
+    try:
+        if path.is_file() and path.read_bytes() == _bytes(text):
+            return
+    except OSError:
+        pass  # writing says what is wrong
+    write_text(path, text)
+
+
+def _results(before: Mapping[str, Any] | None) -> dict[str, str]:
+    results = (before or {}).get("results")
+    if not isinstance(results, dict):
+        return {}
+    # A name is a file of the folder, nothing else: this one may have been edited too.
+    return {
+        name: str(digest)
+        for name, digest in results.items()
+        if Path(name).name == name and name not in ("", os.curdir, os.pardir)
+    }
+
+
+def _is_inputs(found: Mapping[str, Any]) -> bool:
+    """Whether a document is of the form of `_inputs`."""
+    tables = (found.get(name) for name in ("settings", "files"))
+    return found.get("schema") == INPUTS_SCHEMA and all(isinstance(t, dict) for t in tables)
+
+
+def _object(path: Path) -> dict[str, Any] | None:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _json(document: Mapping[str, Any]) -> str:
+    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _bytes(text: str) -> bytes:
+    return text.encode("utf-8", errors="backslashreplace")

@@ -1,0 +1,294 @@
+"""A study folder from its tables to its conclusions.
+
+Each subject is analysed apart, for J is held at the median of one joint; with one subject that is
+the analysis of all. Methods of the sensitivity analysis run once each.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rigidimeter.errors import UserError
+from rigidimeter.estimation import METHODS, choose_method
+from rigidimeter.recording.study_folder import Row, StudyFolder, read_study_folder
+from rigidimeter.records import Analysis, Delay, Epoch, Notice
+from rigidimeter.settings import Settings
+from rigidimeter.study.analysis import analyse
+from rigidimeter.study.blinding import Naming, naming
+from rigidimeter.study.comparison import FEWEST_FOR_TEST, MEASURES, Comparison, compare
+from rigidimeter.study.day_model import day_medians_of, day_test, valued
+from rigidimeter.study.effects import Measured, effects_of, ratings_measured
+from rigidimeter.study.exclusions import exclusions_of, operators_exclusions
+from rigidimeter.study.ratings_model import rated
+from rigidimeter.study.results import Cohort, SessionEntry, Study
+from rigidimeter.study.sensitivity import SENSITIVITY_METHODS, sensitivity_rows
+from rigidimeter.study.sessions import Gathered, gather
+from rigidimeter.study.warnings import doubts
+
+__all__ = ["StudyRead", "analyse_study", "read_study", "steps"]
+
+
+@dataclass(frozen=True)
+class StudyRead:
+    """A study folder with its recordings, ready to be analysed.
+
+    Attributes
+    ----------
+    folder : StudyFolder
+    names : Naming
+    gathered : Gathered
+    epochs : tuple of Epoch
+        With what the operator excluded.
+    operator : mapping of (str, str) to Row
+        The operator's exclusions that met an epoch, by source and label.
+    settings : Settings
+        Those that the first session was recorded with, or what was given instead.
+    method : str
+        Of `study.toml`, or what was given instead.
+    notices : tuple of Notice
+    """
+
+    folder: StudyFolder
+    names: Naming
+    gathered: Gathered
+    epochs: tuple[Epoch, ...]
+    operator: Mapping[tuple[str, str], Row]
+    settings: Settings
+    method: str
+    notices: tuple[Notice, ...]
+
+
+def read_study(
+    folder: Path,
+    *,
+    key: Path | None = None,
+    settings: Settings | None = None,
+    method: str = "auto",
+    pair: tuple[str | None, str | None] = (None, None),
+    progress: Callable[[str], None] = lambda _: None,
+) -> StudyRead:
+    """Read a study folder and every recording in it.
+
+    Parameters
+    ----------
+    folder : Path
+    key : Path, optional
+        A blinding key kept elsewhere.
+    settings : Settings, optional
+        Instead of those of the first session.
+    method : str
+        Instead of that of `study.toml`; ``auto`` leaves it.
+    pair : (str or None, str or None)
+        Other conditions than `study.toml` compares.
+    progress : callable
+        Called with the path of each recording once it is read.
+
+    Raises
+    ------
+    UserError
+        If there is nothing to analyse, or an option names what does not exist.
+    """
+    read = read_study_folder(folder, key)
+    chosen = method if method != "auto" else read.about.analysis.method
+    if chosen not in METHODS:
+        near = difflib.get_close_matches(chosen, METHODS, n=1, cutoff=0.0)[0]
+        where = "--method" if method != "auto" else f"{folder / 'study.toml'}: analysis.method ="
+        raise UserError(
+            f"{where} {chosen}: there is no such method; the nearest is {near} (known: "
+            f"{', '.join(METHODS)})"
+        )
+    names, said = naming(read)
+    names = replace(names, pair=_pair(names, pair))
+    gathered = gather(read, names, progress=progress)
+    epochs, operator, excluded = operators_exclusions(read, gathered)
+    return StudyRead(
+        read,
+        names,
+        gathered,
+        epochs,
+        operator,
+        settings or gathered.settings or Settings(),
+        chosen,
+        (*read.notices, *said, *gathered.notices, *excluded),
+    )
+
+
+def steps(read: StudyRead) -> int:
+    """Return how often `analyse_study` will report progress."""
+    fitted = sum(epoch.task == "prbs" for epoch in read.epochs)
+    return len(read.epochs) + fitted * (2 * len(SENSITIVITY_METHODS) + 1)
+
+
+def analyse_study(
+    read: StudyRead,
+    *,
+    seed: int = 1,
+    resamples: int = 9999,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Study:
+    """Analyse a study: estimates, comparisons, days, effects, ratings, sensitivity, exclusions.
+
+    Parameters
+    ----------
+    read : StudyRead
+    seed, resamples : int
+        Of the bootstrap.
+    progress : callable
+        Called about `steps` times, with the name of an epoch.
+    """
+    sessions = {s.entry.source: s.entry for s in read.gathered.sessions}
+    pair = read.names.pair
+    one_offset = read.folder.about.analysis.one_offset_a_day
+    main, notices = _analysed(read.epochs, sessions, read.settings, read.method, progress)
+    comparisons = compare(main, *pair)
+    notices += _lacking(comparisons, pair)
+    by_measure = {
+        measure: valued(measure.name, results, sessions)
+        for measure in MEASURES
+        if (results := measure.results(main))
+    }
+    found, said = rated(read.folder, read.names)
+    notices += said
+    measured = [Measured(m.name, m.title, m.unit, values) for m, values in by_measure.items()]
+    if found is not None:
+        measured.append(ratings_measured(found))
+    effects, differences = effects_of(measured, pair, seed, resamples)
+    analyses = {main.method: main}
+    fitted = [epoch for epoch in read.epochs if epoch.task == "prbs"]
+    if fitted and all(pair):
+        for method in SENSITIVITY_METHODS:
+            if method != main.method:
+                analyses[method], _ = _analysed(
+                    fitted, sessions, read.settings, method, progress, main.delays or None
+                )
+    ordered = {name: analyses[name] for name in SENSITIVITY_METHODS if name in analyses}
+    rows, said = sensitivity_rows(
+        {**ordered, **analyses}, main.method, sessions, pair, one_offset=one_offset
+    )
+    notices += said if fitted and all(pair) else []
+    cohort = Cohort(
+        conditions=read.names.conditions,
+        sessions=tuple(sessions.values()),
+        blinded=read.names.blinded,
+        days=tuple(
+            day for measure, values in by_measure.items() for day in day_medians_of(measure, values)
+        ),
+        day_tests=tuple(
+            day_test(c, values, one_offset=one_offset)
+            for c, values in zip(comparisons, by_measure.values(), strict=True)
+            if c.paired
+        ),
+        effects=effects,
+        differences=differences,
+        ratings=found,
+        sensitivity=tuple(rows) if fitted and all(pair) else (),
+        exclusions=tuple(exclusions_of(read.epochs, main, sessions, read.operator)),
+        virtual=all(epoch.virtual for epoch in read.epochs),
+        left_out=read.gathered.left_out,
+        several=len({entry.subject for entry in sessions.values()}) > 1,
+    )
+    return Study(
+        title=read.folder.about.title,
+        settings=read.settings,
+        epochs=read.epochs,
+        analysis=main,
+        comparisons=comparisons,
+        notices=(*read.notices, *notices),
+        provenance={},
+        cohort=cohort,
+    )
+
+
+def _pair(names: Naming, wanted: tuple[str | None, str | None]) -> tuple[str, str]:
+    found = list(names.pair)
+    for place, (option, name) in enumerate(zip(("--reference", "--other"), wanted, strict=True)):
+        if name is None:
+            continue
+        if name not in names.known:
+            raise UserError(
+                f"{option} {name}: there is no such condition in the study; there are: "
+                f"{', '.join(names.known)}"
+            )
+        found[place] = name
+    if found[0] == found[1]:
+        raise UserError(f"--reference and --other are both {found[0]}; name two conditions")
+    return found[0], found[1]
+
+
+def _analysed(
+    epochs: Sequence[Epoch],
+    sessions: Mapping[str, SessionEntry],
+    settings: Settings,
+    method: str,
+    progress: Callable[[str], None],
+    delays: Sequence[Delay] | None = None,
+) -> tuple[Analysis, list[Notice]]:
+    """Analyse each subject apart and put the parts together, in the order of the epochs."""
+    by_subject: dict[str, list[Epoch]] = {}
+    for epoch in epochs:
+        by_subject.setdefault(sessions[epoch.source].subject, []).append(epoch)
+    if len(by_subject) < 2:
+        found = analyse(epochs, settings, method, delays=delays, progress=progress)
+        return found, list(doubts(found))
+    reason = ""
+    if method == "auto":
+        method, reason = choose_method([epoch for epoch in epochs if epoch.task == "prbs"])
+    parts = {
+        subject: analyse(own, settings, method, delays=delays, progress=progress)
+        for subject, own in by_subject.items()
+    }
+    notices = [
+        Notice(doubt.level, f"subject {subject}: {doubt.text}")
+        for subject, part in parts.items()
+        for doubt in doubts(part)
+    ]
+    reasons = dict.fromkeys([reason, *(part.method_reason for part in parts.values())])
+    fits = [fit for part in parts.values() for fit in part.fits]
+    included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
+    merged = Analysis(
+        method=method,
+        fits=tuple(fits),
+        fixed_inertia=tuple(fit for part in parts.values() for fit in part.fixed_inertia),
+        inertia_kg_m2=float(np.median(included)) if included else float("nan"),
+        scores=tuple(score for part in parts.values() for score in part.scores),
+        delays=tuple(delay for part in parts.values() for delay in part.delays),
+        method_reason=". ".join(filter(None, reasons)),
+    )
+    if included:
+        held = ", ".join(f"{subject} {part.inertia_kg_m2:.4g}" for subject, part in parts.items())
+        text = f"J is held at the median of each subject, in kg·m²: {held}"
+        notices.append(Notice("warning", text))
+    return merged, notices
+
+
+def _lacking(comparisons: Sequence[Comparison], pair: tuple[str, str]) -> list[Notice]:
+    """Say once what keeps a comparison from being tested."""
+    if not comparisons:
+        return [Notice("error", "no epoch could be fitted or scored, so nothing is compared")]
+    recorded = {
+        name: sum(
+            c.summaries[name].n + c.excluded[name] for c in comparisons if name in c.summaries
+        )
+        for name in pair
+    }
+    absent = [name or "a second condition" for name, count in recorded.items() if not count]
+    if absent:
+        present = [name for name, count in recorded.items() if count]
+        text = (
+            f"there is no session in {' or '.join(absent)}, only in "
+            f"{present[0] if present else 'other conditions'}, so nothing is compared"
+        )
+        return [Notice("error", text)]
+    why: dict[str, list[str]] = {}
+    for c in comparisons:
+        if c.test is None and min(s.n for s in c.summaries.values()) < FEWEST_FOR_TEST:
+            why.setdefault(c.remark, []).append(c.title)
+    return [
+        Notice("error", f"no test of {', '.join(titles)}: {remark}")
+        for remark, titles in why.items()
+    ]

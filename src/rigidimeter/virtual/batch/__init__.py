@@ -1,0 +1,23 @@
+"""Many virtual epochs at once, compiled from the steps that the loop itself takes."""
+
+from rigidimeter.virtual.batch.batch_draws import EpochInputs, draw_inputs
+from rigidimeter.virtual.batch.batch_result import Batch
+from rigidimeter.virtual.batch.batch_rig import Bench, bench
+from rigidimeter.virtual.batch.batch_run import simulate_inputs
+from rigidimeter.virtual.batch.batch_simulate import (
+    epoch_generator,
+    simulate_chunks,
+    simulate_epochs,
+)
+
+__all__ = [
+    "Batch",
+    "Bench",
+    "EpochInputs",
+    "bench",
+    "draw_inputs",
+    "epoch_generator",
+    "simulate_chunks",
+    "simulate_epochs",
+    "simulate_inputs",
+]

@@ -1,0 +1,164 @@
+"""From drawn inputs to recorded columns: allocate them, and run one epoch into a row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigidimeter.control import BiquadState
+from rigidimeter.dynamics import DriveState
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.guard import guard_state
+from rigidimeter.records import readonly
+from rigidimeter.virtual.batch.batch_draws import EpochInputs
+from rigidimeter.virtual.batch.batch_epoch import Columns, Joint
+from rigidimeter.virtual.batch.batch_result import Batch
+from rigidimeter.virtual.batch.batch_rig import Bench
+from rigidimeter.virtual.batch.compiled_steps import compiled
+
+__all__ = ["Rows", "batch_of", "empty_rows", "perturbation_rows", "run_row", "simulate_inputs"]
+
+Rows = Mapping[str, NDArray[Any]]
+
+_STAMPS = {"torque_time_s": "torque", "motion_time_s": "motion"}  # and the sensor of each
+_ONE_EACH = {"ticks": np.int64, "cause": np.int64, "limited_ticks": np.int64}
+
+
+def simulate_inputs(
+    bench: Bench,
+    perturbation_nm: ArrayLike,
+    inputs: Sequence[EpochInputs],
+    *,
+    conditions: Sequence[str] = (),
+) -> Batch:
+    """Run epochs from inputs that were drawn beforehand.
+
+    Parameters
+    ----------
+    bench : Bench
+    perturbation_nm : array, shape (ticks,) or (epochs, ticks)
+    inputs : sequence of EpochInputs
+        As `draw_inputs` gives them, or changed.
+    conditions : sequence of str
+        One an epoch; unknown if not given.
+    """
+    perturbation = perturbation_rows(perturbation_nm, len(inputs))
+    rows = empty_rows(len(inputs), bench)
+    for row, drawn in enumerate(inputs):
+        run_row(rows, row, bench, perturbation[row], drawn)
+    return batch_of(
+        rows,
+        bench,
+        perturbation,
+        [drawn.joint for drawn in inputs],
+        tuple(conditions) or ("",) * len(inputs),
+        source="batch of given inputs",
+    )
+
+
+def perturbation_rows(perturbation_nm: ArrayLike, n_epochs: int) -> NDArray[np.float64]:
+    """Return the perturbation as one read-only row an epoch, without copying a shared one.
+
+    Raises
+    ------
+    ValueError
+        If its shape is neither (ticks,) nor (n_epochs, ticks).
+    """
+    given = np.asarray(perturbation_nm, dtype=np.float64, order="C")
+    ticks = given.shape[-1] if given.ndim else 0
+    if given.shape not in ((ticks,), (n_epochs, ticks)) or ticks == 0:
+        raise ValueError(
+            f"the perturbation of {n_epochs} epochs must have shape (ticks,) or "
+            f"({n_epochs}, ticks), got {given.shape}"
+        )
+    return np.broadcast_to(readonly(given), (n_epochs, ticks))
+
+
+def empty_rows(n_epochs: int, bench: Bench) -> Rows:
+    """Return columns to be written, one row an epoch.
+
+    The stamps of a sensor that keeps time are the same in every epoch: they have no rows.
+    """
+    columns = {
+        name: np.empty((n_epochs, bench.ticks), np.int8 if name == "limited" else np.float64)
+        for name in (*Columns._fields, *_jittering(bench))
+    }
+    counts = {name: np.empty(n_epochs, dtype) for name, dtype in _ONE_EACH.items()}
+    return {**columns, **counts, "limit_time_s": np.empty(n_epochs)}
+
+
+def run_row(
+    rows: Rows, row: int, bench: Bench, perturbation_nm: NDArray[np.float64], inputs: EpochInputs
+) -> None:
+    """Run one epoch from rest into a row; rows may be run at the same time."""
+    lengths = {perturbation_nm.size, inputs.torque.taken.size, inputs.motion.taken.size}
+    if lengths != {bench.ticks}:  # compiled code does not look where an array ends
+        raise ValueError(
+            f"the bench is for {bench.ticks} ticks, but perturbation and inputs have "
+            f"{', '.join(map(str, sorted(lengths)))}"
+        )
+    joint = inputs.joint
+    ticks, *result = compiled().run_epoch(
+        bench.coefficients,
+        Joint(joint.inertia_kg_m2, joint.damping_nm_s_rad, joint.stiffness_nm_rad),
+        perturbation_nm,
+        inputs.voluntary_nm,
+        inputs.noise_nm,
+        inputs.torque,
+        inputs.motion,
+        BiquadState(),
+        guard_state(bench.coefficients.limits),
+        DriveState(),
+        Columns(*(rows[name][row] for name in Columns._fields)),
+    )
+    jittering = _jittering(bench)
+    for name in jittering:
+        rows[name][row] = getattr(inputs, _STAMPS[name]).seen_s
+    for name, value in zip(("cause", "limit_time_s", "limited_ticks"), result, strict=True):
+        rows[name][row] = value
+    rows["ticks"][row] = ticks
+    if ticks < bench.ticks:
+        for name in (*Columns._fields, *jittering):
+            rows[name][row, ticks:] = 0 if name == "limited" else np.nan
+
+
+def batch_of(
+    rows: Rows,
+    bench: Bench,
+    perturbation_nm: NDArray[np.float64],
+    joints: Sequence[JointDynamics],
+    conditions: Sequence[str],
+    *,
+    source: str,
+    first: int = 0,
+) -> Batch:
+    """Return written rows as a batch."""
+    columns: Rows = {**rows, **dict(_kept_time(bench, rows["ticks"]))}
+    return Batch(
+        settings=bench.settings,
+        source=source,
+        first=first,
+        joints=tuple(joints),
+        conditions=tuple(conditions),
+        time_s=bench.tick_s,
+        perturbation_nm=perturbation_nm,
+        **columns,
+    )
+
+
+def _jittering(bench: Bench) -> list[str]:
+    """Return the stamps that differ from epoch to epoch."""
+    return [name for name, sensor in _STAMPS.items() if getattr(bench, sensor) is None]
+
+
+def _kept_time(bench: Bench, ticks: NDArray[np.int64]) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    """Yield the stamps that every epoch has in common, as rows; copied only if one ended early."""
+    ended = np.arange(bench.ticks) >= ticks[:, None] if ticks.min() < bench.ticks else None
+    for name, sensor in _STAMPS.items():
+        sampling = getattr(bench, sensor)
+        if sampling is not None:
+            rows = np.broadcast_to(sampling.seen_s, (ticks.size, bench.ticks))
+            yield name, rows if ended is None else np.where(ended, np.nan, rows)

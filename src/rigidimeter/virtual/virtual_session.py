@@ -1,0 +1,91 @@
+"""One session: compose the virtual rig, the loop and the recorder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigidimeter.acquisition import RealTimeClock, SessionResult, SimulatedClock, run_session
+from rigidimeter.devices import SimulatedRig
+from rigidimeter.experiment import PlannedEpoch, plan
+from rigidimeter.recording import SessionWriter
+from rigidimeter.settings import Settings
+
+__all__ = ["run_virtual_session", "session_length_s"]
+
+
+def session_length_s(settings: Settings) -> float:
+    """Return how long the session of these settings lasts, in s."""
+    return plan(settings.protocol, settings.prbs, settings.sinusoid, settings.seed).total_s
+
+
+def run_virtual_session(
+    settings: Settings,
+    folder: Path,
+    *,
+    real_time: bool = False,
+    progress: Callable[[float], None] = lambda _: None,
+    created_utc: str = "",
+) -> SessionResult:
+    """Run the protocol of the settings on the virtual rig and record it.
+
+    All random numbers come from `settings.seed`: the same settings give the same samples, byte for
+    byte, unless the clock is real.
+
+    Parameters
+    ----------
+    settings : Settings
+    folder : Path
+        Made if it does not exist; it must be empty.
+    real_time : bool
+        Keep real time instead of as fast as it goes.
+    progress : callable
+        Takes the session time in s, about once a second of it.
+    created_utc : str
+        When the session took place, for its manifest; now if empty. A planned day has a date of
+        its own, and with it the whole folder is the same byte for byte.
+
+    Raises
+    ------
+    UserError
+        If the folder is not empty or cannot be written.
+    """
+    protocol = plan(settings.protocol, settings.prbs, settings.sinusoid, settings.seed)
+    first = settings.subject[protocol.epochs[0].condition]
+    rig = SimulatedRig(settings.rig, first, np.random.default_rng(settings.seed))
+    writer = SessionWriter(
+        folder,
+        settings,
+        [asdict(epoch) for epoch in protocol.epochs],
+        {"session": settings.seed},
+        virtual=True,
+    )
+    if created_utc:
+        _date(folder / "manifest.json", created_utc)
+
+    def new_joint(planned: PlannedEpoch) -> dict[str, Any]:
+        return {"true_joint": asdict(rig.new_epoch(settings.subject[planned.condition]))}
+
+    return run_session(
+        protocol,
+        settings,
+        rig,
+        RealTimeClock() if real_time else SimulatedClock(),
+        writer,
+        before_epoch=new_joint,
+        progress=progress,
+    )
+
+
+def _date(manifest: Path, created_utc: str) -> None:
+    """Put the planned date into a manifest, before the session begins."""
+    values = json.loads(manifest.read_text(encoding="utf-8")) | {"created_utc": created_utc}
+    text = json.dumps(values, indent=1, ensure_ascii=False, allow_nan=False)
+    part = manifest.with_name(f".{manifest.name}.part")
+    part.write_text(text + "\n", encoding="utf-8")
+    part.replace(manifest)  # whole, or as it was

@@ -1,0 +1,206 @@
+"""A virtual study as a study folder: its sessions on the virtual rig, and its tables.
+
+Every session has a seed of its own (`plan`), so it is the same whichever process runs it and
+whenever; the whole folder is the same byte for byte for equal seeds. ``study.toml`` is written
+last: a folder that has one is complete.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import signal
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording import write_text
+from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
+from rigidimeter.virtual.study_plan import DayPlan, plan_study
+from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s
+
+__all__ = ["SCHEMA", "study_length_s", "write_virtual_study"]
+
+SCHEMA = "rigidimeter.study/1"
+
+_POLL_S = 0.1
+
+Progress = Callable[[float], None]
+
+
+def study_length_s(plans: Sequence[DayPlan]) -> float:
+    """Return how long all sessions last together, in s of the virtual clock."""
+    return sum(session_length_s(plan.settings) for plan in plans)
+
+
+def write_virtual_study(
+    folder: Path,
+    design: StudyDesign,
+    seed: int,
+    *,
+    processes: int = 2,
+    progress: Progress = lambda _: None,
+) -> list[DayPlan]:
+    """Run every session of a virtual study and write its folder; return what was planned.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it does not exist; it must be empty.
+    design : StudyDesign
+    seed : int
+        Of everything random.
+    processes : int
+        Sessions that run at a time, each in a process of its own; with 1, in this one.
+    progress : callable
+        Takes how much of `study_length_s` is done, in s.
+
+    Raises
+    ------
+    UserError
+        If the folder is not empty or cannot be written, or a session fails.
+    """
+    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        raise UserError(f"{folder}: is there already; a study is never written over, name another")
+    plans = plan_study(design, seed)
+    if processes > 1:
+        _run_beside(plans, folder, processes, progress)
+    else:
+        _run_in_turn(plans, folder, progress)
+    write_text(folder / "sessions.csv", _sessions(plans, design.subject))
+    write_text(folder / "ratings.csv", _ratings(plans, design.subject))
+    write_text(folder / "study.toml", _study_toml(design, seed))
+    return plans
+
+
+def _run_in_turn(plans: Sequence[DayPlan], folder: Path, progress: Progress) -> None:
+    before_s = 0.0
+    for plan in plans:
+        done_s = before_s
+        _run(plan, folder, lambda time_s, done_s=done_s: progress(done_s + time_s))  # type: ignore[misc]
+        before_s += session_length_s(plan.settings)
+    progress(before_s)
+
+
+def _run_beside(plans: Sequence[DayPlan], folder: Path, processes: int, progress: Progress) -> None:
+    """Run sessions in processes; end them when we are interrupted."""
+    context = get_context("spawn")
+    reached = context.Array("d", len(plans), lock=False)
+    # An interrupt from the keyboard goes to all processes; only this one is to hear it.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    with context.Pool(min(processes, len(plans)), _take, (reached,)) as pool:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        results = [
+            pool.apply_async(_run_apart, (index, plan, str(folder)))
+            for index, plan in enumerate(plans)
+        ]
+        waiting = results
+        while waiting:
+            time.sleep(_POLL_S)
+            progress(sum(reached))
+            for result in waiting:
+                if result.ready():
+                    result.get()  # raises what the session raised
+            waiting = [result for result in waiting if not result.ready()]
+    progress(study_length_s(plans))
+
+
+_reached: Any = None
+"""In a process of the pool: how far each session has come."""
+
+
+def _take(reached: Any) -> None:
+    global _reached
+    _reached = reached
+
+
+def _run_apart(index: int, plan: DayPlan, folder: str) -> None:
+    def reach(time_s: float) -> None:
+        _reached[index] = time_s
+
+    _run(plan, Path(folder), reach)
+
+
+def _run(plan: DayPlan, folder: Path, progress: Progress) -> None:
+    result = run_virtual_session(
+        plan.settings, folder / plan.folder, progress=progress, created_utc=plan.created_utc
+    )
+    if result.outcome != "success":
+        raise UserError(
+            f"{folder / plan.folder}: the session ended with {result.outcome}: {result.reason}"
+        )
+
+
+def _sessions(plans: Sequence[DayPlan], subject: str) -> str:
+    rows = [(plan.folder, subject, plan.day, plan.condition, plan.note) for plan in plans]
+    return _csv(("path", "subject", "day", "condition", "note"), rows)
+
+
+def _ratings(plans: Sequence[DayPlan], subject: str) -> str:
+    rows = [
+        (subject, plan.day, plan.condition, rating.examiner, f"{rating.score:g}")
+        for plan in plans
+        for rating in plan.ratings
+    ]
+    return _csv(("subject", "day", "condition", "examiner", "score"), rows)
+
+
+def _csv(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _study_toml(design: StudyDesign, seed: int) -> str:
+    """Return the study's description; what it assumes stands in comments."""
+    low, high = design.rating_scale
+    reference, other = design.conditions[0].name, design.conditions[-1].name
+    lines = [
+        "# A virtual study: made by rigidimeter, of a subject that does not exist.",
+        f"# Design {design.name}, seed {seed}. Its assumptions:",
+        *(f"#   {name} = {value}" for name, value in _assumed(design)),
+        "",
+        f'schema = "{SCHEMA}"',
+        f'title = "{design.title}"',
+        f'reference = "{reference}"',
+        f'other = "{other}"',
+        'sessions = "sessions.csv"',
+        'ratings = "ratings.csv"',
+    ]
+    for condition in design.conditions:
+        lines += ["", f"[conditions.{condition.name}]", *_stimulation(condition)]
+    lines += ["", "[rating]", f"scale = [{low:.1f}, {high:.1f}]", f"step = {design.rating_step:g}"]
+    lines += ["", "[analysis]", "one_offset_a_day = true  # so it was made: see the assumptions"]
+    return "\n".join(lines) + "\n"
+
+
+def _assumed(design: StudyDesign) -> list[tuple[str, object]]:
+    apart = ("name", "title", "subject", "conditions", "settings", "first_date")
+    found: list[tuple[str, object]] = [
+        (field.name, getattr(design, field.name))
+        for field in fields(design)
+        if field.name not in apart
+    ]
+    for condition in design.conditions:
+        found += [
+            (f"{condition.name}.{name}", getattr(condition, name))
+            for name in ("damping_nm_s_rad", "stiffness_nm_rad", "voluntary_sd_nm")
+        ]
+    return found
+
+
+def _stimulation(condition: ConditionDesign) -> list[str]:
+    lines = [f'title = "{condition.title}"']
+    for name in ("frequency_hz", "amplitude_ma", "pulse_width_us", "wash_in_min"):
+        value = getattr(condition, name)
+        if value is not None:
+            lines.append(f"{name} = {value}")
+    if condition.electrodes:
+        lines.append(f'electrodes = "{condition.electrodes}"')
+    return lines

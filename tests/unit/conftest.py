@@ -1,0 +1,48 @@
+"""The real loop on the virtual rig, for holding predictions against."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from rigidimeter.acquisition.clock import SimulatedClock
+from rigidimeter.acquisition.control_modes import ControlLoop
+from rigidimeter.devices import SimulatedRig
+from rigidimeter.recording.sample_log import Sample
+from rigidimeter.settings import Settings, parse_settings
+
+IDEAL_TORQUE = {"noise_sd_nm": 0.0, "resolution_nm": 0.0}
+IDEAL_MOTION = {
+    "angle_resolution_deg": 0.0,
+    "velocity_resolution_deg_s": 0.0,
+    "latency_s": 0.0,
+    "stamp_latency_s": 0.0,
+}
+
+
+@pytest.fixture
+def noiseless() -> Callable[..., Settings]:
+    """Return settings of a rig whose sensors add nothing, with the given tables changed."""
+
+    def settings(*, torque: dict | None = None, rig: dict | None = None, **tables) -> Settings:
+        sensors = {"torque": {**IDEAL_TORQUE, **(torque or {})}, "motion": IDEAL_MOTION}
+        return parse_settings({"rig": {**sensors, **(rig or {})}, **tables})
+
+    return settings
+
+
+@pytest.fixture
+def run_loop() -> Callable[..., dict[str, np.ndarray]]:
+    """Run a perturbation through the real loop and return the columns of its samples."""
+
+    def run(settings: Settings, perturbation_nm: np.ndarray, seed: int = 0):
+        rig = SimulatedRig(settings.rig, settings.subject["OFF"], np.random.default_rng(seed))
+        rig.enable()
+        samples: list[Sample] = []
+        loop = ControlLoop(settings, rig, SimulatedClock(), samples.append)
+        loop.perturb(1, perturbation_nm.tolist())
+        return {
+            name: np.array([getattr(sample, name) for sample in samples]) for name in Sample._fields
+        }
+
+    return run

@@ -1,0 +1,167 @@
+"""RIG.toml: who may use the rig, and where its joint must stand."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+
+import pytest
+
+from rigidimeter.devices.composed import Home
+from rigidimeter.devices.rigfile import load_rig
+from rigidimeter.errors import UserError
+
+DEVICES = """
+[torque_sensor]
+driver = "ati-rdt"
+address = "127.0.0.1"
+[drive]
+driver = "ascii"
+port = "/dev/no-such"
+counts_per_turn = 1000
+"""
+
+
+@pytest.fixture
+def rig_file(tmp_path):
+    def write(text: str):
+        path = tmp_path / "rig.toml"
+        path.write_text(text + DEVICES)
+        return path
+
+    return write
+
+
+CLAIM = """
+import sys
+from pathlib import Path
+from rigidimeter.devices.rigfile import load_rig
+claim = load_rig(Path(sys.argv[1])).claim()
+print("has it", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_rig_is_for_one_program_at_a_time(rig_file):
+    path = rig_file("")
+    other = subprocess.Popen(
+        [sys.executable, "-c", CLAIM, str(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert other.stdout is not None
+    assert other.stdout.readline() == "has it\n"
+    rig = load_rig(path)  # to read it is no claim
+    with pytest.raises(UserError, match=r"rig\.toml: another program uses this rig; end that one"):
+        rig.claim()
+    other.kill()  # the claim goes with the process, however it ends
+    other.communicate()
+    with rig.claim():
+        pass
+    rig.claim().close()  # and with the file
+
+
+def test_a_claim_within_one_process_counts_too(rig_file):
+    rig = load_rig(rig_file(""))
+    with rig.claim(), pytest.raises(UserError, match="another program uses this rig"):
+        load_rig(rig.path).claim()
+
+
+def test_without_a_home_the_joint_may_stand_anywhere(rig_file):
+    assert load_rig(rig_file("")).home is None
+
+
+def test_the_home_is_in_degrees(rig_file):
+    home = load_rig(rig_file("home_deg = -90\nhome_tolerance_deg = 1.5\n")).home
+    assert home is not None
+    assert home.angle_rad == -math.pi / 2
+    assert home.tolerance_rad == pytest.approx(math.radians(1.5))
+    assert load_rig(rig_file("home_deg = 0.0\n")).home == Home(0.0, math.radians(3.0))
+
+
+@pytest.mark.parametrize("line", ['home_deg = "up"', "home_deg = true", "home_tolerance_deg = []"])
+def test_a_home_that_is_no_number_is_refused(rig_file, line):
+    with pytest.raises(UserError, match=r"home_\w+ must be a number of degrees"):
+        load_rig(rig_file(f"{line}\n"))
+
+
+def test_a_session_that_is_gone_on_with_brings_its_own_home(rig_file):
+    rig = load_rig(rig_file("home_deg = 10.0\n"))
+    begun = Home(0.3, 0.05)
+    assert rig.build(lambda: 0.0, 50.0, begun)._home == begun
+    assert rig.build(lambda: 0.0, 50.0)._home == rig.home
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        "home_deg = nan",
+        "home_deg = inf",
+        "home_deg = 0.0\nhome_tolerance_deg = -3.0",
+        "home_deg = 0.0\nhome_tolerance_deg = 0",
+        "home_deg = 0.0\nhome_tolerance_deg = inf",
+        "home_deg = 0.0\nhome_tolerance_deg = 360",
+    ],
+)
+def test_a_home_that_no_joint_or_every_joint_meets_is_refused(rig_file, lines):
+    with pytest.raises(
+        UserError, match=r"home_\w+ must be (a finite number of|above 0 and at most)"
+    ):
+        load_rig(rig_file(f"{lines}\n"))
+
+
+SENSOR = """
+from rigidimeter.settings.section import Section
+class Sensor:
+    Settings = {settings}
+    def connect(self): ...
+    def configure(self): ...
+    def read(self): ...
+    def close(self): ...
+    counts = {{}}
+"""
+
+
+DRIVE = (
+    SENSOR.format(settings="Section")
+    + "    enable = write = stop = disable = watchdog_s = read\n"
+    + "    def __init__(self): ...\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("raise RuntimeError('no such card')", "its module fails with RuntimeError: no such card"),
+        ("def (", "its module fails with SyntaxError"),
+        ("raise SystemExit(3)", "its module fails with SystemExit: 3"),
+        ("import no_such_thing", r"cannot be loaded \(No module named 'no_such_thing'\)"),
+        (SENSOR.format(settings=3), "its Settings must be a class derived from"),
+        (SENSOR.format(settings="Section"), "is no driver for a drive: it has no enable, write"),
+        (DRIVE, r"must be made with \(settings, now\), but too many positional arguments"),
+    ],
+)
+def test_a_driver_of_another_s_that_is_none_is_refused(tmp_path, monkeypatch, source, words):
+    module = f"driver_{abs(hash(source))}"
+    (tmp_path / f"{module}.py").write_text(source)
+    monkeypatch.syspath_prepend(tmp_path)
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        '[torque_sensor]\ndriver = "ati-rdt"\naddress = "127.0.0.1"\n'
+        f'[drive]\ndriver = "{module}:Sensor"\n'
+    )
+    with pytest.raises(UserError, match=words):
+        load_rig(path)
+
+
+@pytest.mark.parametrize("driver", [":Drive", ".near:Drive", "near:", "near"])
+def test_a_driver_that_names_no_module_is_refused(tmp_path, driver):
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        '[torque_sensor]\ndriver = "ati-rdt"\naddress = "127.0.0.1"\n'
+        f'[drive]\ndriver = "{driver}"\n'
+    )
+    with pytest.raises(UserError, match=r"there is no driver .*; known are cia402, ascii"):
+        load_rig(path)

@@ -1,0 +1,237 @@
+"""`rigidimeter design` from the outside, and the overview it prints."""
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from rigidimeter.cli.design import SCHEMA, design
+from rigidimeter.errors import UserError
+from rigidimeter.experiment import PARAMETERS, multisine_nm, overview, prbs_nm, sinusoid
+from rigidimeter.settings import Settings, load_settings, parse_settings
+
+app = typer.Typer()
+app.command()(design)
+
+
+def run(*arguments: str) -> str:
+    result = CliRunner().invoke(app, list(arguments), catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def test_prints_the_numbers() -> None:
+    words = " ".join(run().split())
+    for expected in (
+        "7 bits (127 chips) at 20 Hz",
+        "The wanted band 0.15–10 Hz is covered.",
+        "peak speed 125.7 deg/s (guard: 200 deg/s)",
+        "0.044 0.75 3.44 Eq. 8",
+        "0.044 2.25 6.84 widest",
+        "J_c 0.04584 kg·m²/rad (0.0008 kg·m²/deg)",
+        "B_c 1.604 N·m·s/rad (0.028 N·m·s/deg)",
+        "J_c/B_c 0.02857 s",
+        "OFF, sinusoid: 4 epochs",
+        "280 s (4.7 min) with the rests",
+        "stays within the guard's limits",
+    ):
+        assert expected in words
+    assert "Warning" not in words
+
+
+def test_writes_what_will_be_commanded(tmp_path: Path) -> None:
+    folder, numbers = tmp_path / "new" / "planned", tmp_path / "numbers.json"
+    run("--out", str(folder), "--json", str(numbers))
+    settings = Settings()
+    columns = {
+        name: np.loadtxt(folder / name, delimiter=",", skiprows=1, unpack=True)
+        for name in ("prbs.csv", "sinusoid.csv")
+    }
+    np.testing.assert_array_equal(columns["prbs.csv"][0], np.arange(20_000) / 1000.0)
+    np.testing.assert_array_equal(columns["prbs.csv"][1], prbs_nm(settings.prbs, 1000.0))
+    np.testing.assert_array_equal(columns["sinusoid.csv"][1:], sinusoid(settings.sinusoid, 1000.0))
+    assert (folder / "sinusoid.csv").read_text().startswith("time_s,angle_rad,velocity_rad_s\n")
+    with (folder / "protocol.csv").open(newline="") as file:
+        epochs = list(csv.DictReader(file))
+    assert [epoch["label"] for epoch in epochs] == [str(n) for n in range(1, 9)]
+    assert set(epochs[0]) == {"number", "label", "task", "condition", "duration_s", "rest_s"}
+
+    document = json.loads(numbers.read_text())
+    assert document == json.loads((folder / "design.json").read_text())
+    assert document["schema"] == SCHEMA == "rigidimeter.experiment/1"
+    assert document["prbs"]["covered"] is True
+    assert len(document["bandwidth"]["corners"]) == 8
+    assert document["protocol"]["total_s"] == 280.0
+    assert document["controller"]["inertia_kg_m2_per_deg"] == pytest.approx(0.0008)
+    assert document["controller"]["damping_nm_s_deg"] == pytest.approx(0.028)
+
+
+def test_settings_change_the_plan_and_bring_warnings(tmp_path: Path) -> None:
+    settings, numbers = tmp_path / "rig.toml", tmp_path / "numbers.json"
+    settings.write_text(
+        "[prbs]\nclock_hz = 8.0\n[controller]\ndamping_nm_s_rad = 0.0\n"
+        "[margins]\ngain_margin_db = 0.0\nphase_margin_deg = 0.0\n"
+        "[guard]\nspeed_limit_deg_s = 100.0\n[sinusoid]\ntaper_s = 0.0\n"
+    )
+    text = " ".join(run("--settings", str(settings), "--json", str(numbers)).split())
+    assert "is not covered" in text
+    assert "prbs.clock_hz ≥ 16.6 Hz" in text
+    assert "the sinusoid reaches a speed of 125.7 deg/s" in text
+    assert "the sinusoid needs an acceleration" in text
+    assert "velocity never settles" in text
+    document = json.loads(numbers.read_text())
+    assert document["controller"]["time_constant_s"] is None
+    assert document["prbs"]["enough"]["clock_hz"] == 16.6
+    assert len(document["warnings"]) == text.count("Warning:")
+
+
+def test_mistakes_are_sentences(tmp_path: Path) -> None:
+    occupied = tmp_path / "file"
+    occupied.write_text("")
+    with pytest.raises(UserError, match="cannot be made a folder"):
+        run("--out", str(occupied))
+    with pytest.raises(UserError, match="cannot be written"):
+        run("--json", str(tmp_path))
+    with pytest.raises(UserError, match="cannot be read"):
+        run("--settings", str(tmp_path / "none.toml"))
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "prbs.csv").mkdir()
+    with pytest.raises(UserError, match=r"prbs\.csv: cannot be written"):
+        run("--out", str(tmp_path / "out"))
+
+
+def test_prints_what_is_foreseen() -> None:
+    words = " ".join(run().split())
+    for expected in (
+        "subject OFF 28.3 dB 92.1 deg 1472 ms 0.95 stable",
+        "worst joint around it 16.2 dB",
+        "each of J, B, K from 0.25 to 4 times its value",
+        "iv, 0.1–30 Hz 2.8e-06 (0.0621 %) 8.71e-05 (0.0637 %) 0.000468 (0.0267 %)",
+        "passive arm, 0.15–10 Hz 3.57e-06 (0.0794 %) 9.21e-05 (0.0673 %) 0.000547 (0.0312 %)",
+        "iv, 4 epochs pooled",
+    ):
+        assert expected in words
+    assert "would put least squares off" not in words
+
+
+def test_the_subjects_own_torque_is_foreseen(tmp_path: Path) -> None:
+    settings = tmp_path / "rig.toml"
+    settings.write_text("[subject.OFF]\nvoluntary_sd_nm = 0.2\n")
+    words = " ".join(run("--settings", str(settings)).split())
+    assert "would put least squares off: J by -43 %, B by -69 %, K by +3 %" in words
+
+
+def test_numbers_of_what_is_foreseen(tmp_path: Path) -> None:
+    numbers = tmp_path / "numbers.json"
+    run("--json", str(numbers), "--detect", "damping=20%", "--detect", "stiffness=0.3")
+    document = json.loads(numbers.read_text())
+    off = document["stability"]["conditions"]["OFF"]
+    assert off["stable"] is True
+    assert off["gain_margin_db"] == pytest.approx(28.3, abs=0.1)
+    assert document["stability"]["worst"]["DBS"]["inertia_kg_m2"] == pytest.approx(0.018)
+    precision = document["precision"]["OFF"]
+    assert precision["iv_band_hz"] == pytest.approx([0.1016, 29.97], rel=1e-3)
+    assert precision["least_squares_band_hz"] == [0.15, 10.0]
+    for which in ("bound", "iv", "least_squares"):
+        assert list(precision[which]["free"]) == list(PARAMETERS)
+        assert list(precision[which]["fixed_inertia"]) == list(PARAMETERS[1:])
+    assert precision["planned_epochs"] == 4
+    for name in PARAMETERS:
+        assert precision["iv_pooled"][name] == precision["iv"]["free"][name] / 2
+    assert document["precision"]["DBS"]["iv_pooled"] is None
+    assert document["optimised"] is document["multisine"] is None
+    damping, stiffness = document["detection"]
+    assert damping["parameter"] == "damping"
+    assert damping["epochs_needed"] == 4
+    assert damping["planned_power"] is None
+    assert stiffness["difference"] == 0.3
+    assert document["remarks"] == []
+
+
+def test_searches_and_compares(tmp_path: Path) -> None:
+    settings, folder = tmp_path / "rig.toml", tmp_path / "planned"
+    settings.write_text("[optimise]\nclocks = 2\nbits_low = 7\nbits_high = 7\n")
+    text = run(
+        "--settings", str(settings), "--out", str(folder), "--optimise", "--criterion", "D",
+        "--multisine",
+    )  # fmt: skip
+    words = " ".join(text.split())
+    assert "Search for a PRBS (2 sequences, criterion D, iv, one epoch)" in words
+    assert "present 7 20 1 " in words
+    assert "Multisine (crest factor 1.49)" in words
+    assert {path.name for path in folder.iterdir()} == {
+        "prbs.csv", "sinusoid.csv", "protocol.csv", "bode.svg", "multisine.csv", "optimised.toml",
+        "design.json",
+    }  # fmt: skip
+    snippet = (folder / "optimised.toml").read_text()
+    assert all(f"    {line}" in text.splitlines() for line in snippet.splitlines())
+    best = load_settings(folder / "optimised.toml")
+    document = json.loads((folder / "design.json").read_text())
+    assert document["optimised"][0]["amplitude_nm"] == best.prbs.amplitude_nm
+    columns = np.loadtxt(folder / "multisine.csv", delimiter=",", skiprows=1, unpack=True)
+    np.testing.assert_array_equal(columns[1], multisine_nm(Settings()))
+    assert set(document["multisine"]["standard_errors"]["OFF"]) == {
+        "prbs", "same_peak_torque", "same_angle_sd", "same_peak_angle",
+    }  # fmt: skip
+    assert (folder / "bode.svg").read_text().startswith("<?xml")
+
+
+def test_an_unstable_loop_is_refused_after_it_is_shown(tmp_path: Path, rigidimeter) -> None:
+    settings, folder = tmp_path / "rig.toml", tmp_path / "planned"
+    settings.write_text("[controller]\ninertia_kg_m2 = 0.0008\ndamping_nm_s_rad = 0.028\n")
+    ran = rigidimeter(
+        "design", "--settings", settings, "--out", folder, "--optimise", "--multisine",
+        "--detect", "damping=20%",
+    )  # fmt: skip
+    assert ran.status == 1
+    assert ran.err.startswith("rigidimeter: the loop is unstable with subject OFF: a dist")
+    assert ran.err.count("\n") == 1
+    assert "UNSTABLE" in ran.out
+    assert "no standard errors, since the loop is unstable" in " ".join(ran.out.split())
+    document = json.loads((folder / "design.json").read_text())
+    assert document["stability"]["conditions"]["OFF"]["stable"] is False
+    assert document["optimised"] is None
+    assert document["detection"] == []
+    assert (folder / "bode.svg").exists()
+
+
+def test_nearly_unstable_is_said_and_refused(tmp_path: Path) -> None:
+    settings, numbers = tmp_path / "rig.toml", tmp_path / "numbers.json"
+    settings.write_text("[controller]\ninertia_kg_m2 = 0.003\ndamping_nm_s_rad = 0.105\n")
+    with pytest.raises(UserError, match=r"less than margins\.gain_margin_db = 6 dB; raise"):
+        run("--settings", str(settings), "--json", str(numbers))
+    # All is shown and written before it is refused.
+    warnings = json.loads(numbers.read_text())["warnings"]
+    assert any("the loop with subject OFF" in warning for warning in warnings)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--detect", "rigidity=20%"), "names no difference"),
+        (("--criterion", "best"), "the criterion 'best' is unknown"),
+        (("--detect", "damping=20%", "--power", "1.5"), "--power 1.5"),
+    ],
+)
+def test_bad_values_of_options_are_sentences(arguments: tuple[str, ...], words: str) -> None:
+    with pytest.raises(UserError, match=words):
+        run(*arguments)
+
+
+def test_help_needs_no_numerics() -> None:
+    code = "import sys, rigidimeter.cli.design; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_overview_names_every_condition_of_the_settings() -> None:
+    settings = parse_settings({"subject": {"OFF": {}, "levodopa": {}}})
+    planned = overview(settings)
+    assert list(planned.prbs_demand) == ["free arm", "subject OFF", "subject levodopa"]
+    assert planned.warnings == ()
+    assert not planned.perturbation_nm.flags.writeable

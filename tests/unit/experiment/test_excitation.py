@@ -1,0 +1,96 @@
+"""Spectrum and envelope against their closed forms."""
+
+import numpy as np
+import pytest
+
+from rigidimeter.experiment import (
+    HALF_POWER_DB,
+    envelope_db,
+    envelope_edge_hz,
+    line_spacing_hz,
+    plateau_n2m2_hz,
+    power_spectrum,
+    prbs_nm,
+)
+from rigidimeter.settings import PrbsSettings
+
+
+def test_a_sine_has_half_its_square_in_one_line() -> None:
+    time_s = np.arange(1000) / 100.0
+    spectrum = power_spectrum(3.0 * np.sin(2 * np.pi * 5.0 * time_s) + 7.0, 100.0)
+    peak = int(np.argmax(spectrum.density_n2m2_hz))
+    assert spectrum.frequency_hz[peak] == pytest.approx(5.0)
+    assert spectrum.density_n2m2_hz[peak] * 0.1 == pytest.approx(4.5)
+    assert spectrum.share(4.95, 5.05) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("count", [2000, 2001])
+def test_parseval(count: int) -> None:
+    torque = np.random.default_rng(1).normal(size=count)
+    spectrum = power_spectrum(torque, 250.0)
+    total = np.sum(spectrum.density_n2m2_hz) * spectrum.frequency_hz[1]
+    assert total == pytest.approx(np.var(torque), rel=1e-12)
+
+
+def test_the_default_sequence_sums_to_its_variance() -> None:
+    torque = prbs_nm(PrbsSettings(), 1000.0)
+    spectrum = power_spectrum(torque, 1000.0)
+    total = np.sum(spectrum.density_n2m2_hz) * spectrum.frequency_hz[1]
+    assert total == pytest.approx(np.var(torque), rel=1e-12)
+
+
+def test_every_line_of_one_period_is_where_the_formula_puts_it() -> None:
+    # One exact period: line k carries the plateau times the envelope of a chip of 50 ticks,
+    # (sin(πx) / (50 sin(πx/50)))² with x = k/127, which for many ticks is sinc²(x).
+    settings = PrbsSettings(duration_s=6.35)
+    spectrum = power_spectrum(prbs_nm(settings, 1000.0), 1000.0)
+    lines = np.arange(1, 127)
+    x = lines / 127.0
+    envelope = (np.sin(np.pi * x) / (50 * np.sin(np.pi * x / 50))) ** 2
+    np.testing.assert_allclose(
+        spectrum.frequency_hz[lines], lines * line_spacing_hz(settings), rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        spectrum.density_n2m2_hz[lines], plateau_n2m2_hz(settings) * envelope, rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        10 * np.log10(envelope[:64]), envelope_db(lines[:64] * 20.0 / 127.0, 20.0), atol=0.01
+    )
+
+
+def test_plateau_grows_with_the_square_of_the_amplitude() -> None:
+    assert plateau_n2m2_hz(PrbsSettings()) == pytest.approx(2 * 128 / (127 * 20))
+    assert plateau_n2m2_hz(PrbsSettings(amplitude_nm=3.0)) == pytest.approx(
+        9 * plateau_n2m2_hz(PrbsSettings())
+    )
+
+
+def test_envelope_at_half_the_clock_is_two_over_pi_squared() -> None:
+    expected = 20 * np.log10(2 / np.pi)
+    np.testing.assert_allclose(envelope_db([0.0, 5.0], 10.0), [0.0, expected], atol=1e-12)
+    assert envelope_db(10.0, 10.0) == -120.0
+
+
+def test_edges_solve_the_envelope() -> None:
+    assert envelope_edge_hz(1.0, -20 * np.log10(2 / np.pi)) == pytest.approx(0.5)
+    assert envelope_edge_hz(1.0) == pytest.approx(0.442946, abs=1e-6)
+    assert envelope_edge_hz(1.0, 6.0) == pytest.approx(0.602480, abs=1e-6)
+    for drop_db in (0.1, HALF_POWER_DB, 6.0, 40.0):
+        assert envelope_db(envelope_edge_hz(8.0, drop_db), 8.0) == pytest.approx(-drop_db)
+
+
+@pytest.mark.parametrize("drop_db", [0.0, -3.0, 101.0, float("nan")])
+def test_a_drop_out_of_range_is_refused(drop_db: float) -> None:
+    with pytest.raises(ValueError, match="drop_db"):
+        envelope_edge_hz(20.0, drop_db)
+
+
+def test_a_constant_torque_has_nothing_to_share() -> None:
+    with pytest.raises(ValueError, match="no power"):
+        power_spectrum(np.ones(10), 10.0).share(0.0, 5.0)
+
+
+def test_spectrum_is_read_only() -> None:
+    spectrum = power_spectrum([1.0, -1.0, 1.0, 1.0], 4.0)
+    with pytest.raises(ValueError, match="read-only"):
+        spectrum.density_n2m2_hz[0] = 1.0

@@ -1,0 +1,67 @@
+"""Lines, peak and crest factor of the multisine."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rigidimeter.errors import UserError
+from rigidimeter.experiment import crest_factor, multisine_nm, multisine_phases_rad
+from rigidimeter.settings import parse_settings
+
+
+def test_crest_factors_of_known_signals() -> None:
+    time = np.arange(1000) / 1000.0
+    assert crest_factor(np.sin(2 * np.pi * 5 * time)) == pytest.approx(math.sqrt(2.0), rel=1e-4)
+    assert crest_factor(np.sign(np.sin(2 * np.pi * 5 * time + 0.1))) == 1.0
+
+
+@pytest.mark.parametrize("phases", ["schroeder", "random"])
+def test_its_lines_are_equal_and_all_in_the_band(phases: str) -> None:
+    settings = parse_settings({"multisine": {"phases": phases, "period_s": 10.0}})
+    torque = multisine_nm(settings)
+    assert torque.size == 20_000
+    assert np.max(np.abs(torque)) == pytest.approx(settings.prbs.amplitude_nm)
+    assert np.mean(torque) == pytest.approx(0.0, abs=1e-12)
+    lines = np.abs(np.fft.rfft(torque))
+    frequency = np.fft.rfftfreq(torque.size, 1e-3)
+    wanted = np.isin(np.round(frequency * 20), np.arange(4, 202, 2))  # 0.2, 0.3 … 10 Hz
+    assert np.ptp(lines[wanted]) < 1e-6 * np.max(lines)
+    assert np.max(lines[~wanted]) < 1e-6 * np.max(lines)
+
+
+def test_clipping_lowers_the_crest_factor() -> None:
+    def crest(steps: int, **tables) -> float:
+        return crest_factor(
+            multisine_nm(parse_settings({"multisine": {"crest_steps": steps, **tables}}))
+        )
+
+    assert crest(200) < 1.55 < crest(0) < 1.9
+    assert crest(200, phases="random") < 1.8 < 2.5 < crest(0, phases="random")
+
+
+def test_random_phases_come_from_the_seed() -> None:
+    one, same, other = (
+        multisine_nm(parse_settings({"seed": seed, "multisine": {"phases": "random"}}))
+        for seed in (1, 1, 2)
+    )
+    np.testing.assert_array_equal(one, same)
+    assert not np.array_equal(one, other)
+
+
+def test_schroeders_phases() -> None:
+    phases = multisine_phases_rad(3, 6, 0)
+    np.testing.assert_allclose(phases, -np.pi * np.array([0, 2, 6, 12]) / 4)
+
+
+def test_a_part_of_a_period_has_no_mean_left() -> None:
+    torque = multisine_nm(parse_settings({"multisine": {"period_s": 13.0}}))
+    assert np.mean(torque) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_periods_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(UserError, match=r"multisine\.period_s = 25 s is longer than prbs\.durat"):
+        multisine_nm(parse_settings({"multisine": {"period_s": 25.0}}))
+    narrow = {"wanted_low_hz": 0.15, "wanted_high_hz": 0.2}
+    with pytest.raises(UserError, match=r"puts no line into the wanted band 0\.15 to 0\.2 Hz"):
+        multisine_nm(parse_settings({"prbs": narrow, "multisine": {"period_s": 3.0}}))

@@ -1,0 +1,316 @@
+"""The report as a whole, from good studies and from poor ones."""
+
+import base64
+import csv
+import dataclasses
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from rigidimeter.records import Epoch, Finding, Notice, Outcome
+from rigidimeter.reporting import write_report
+from rigidimeter.reporting.measures import short_names
+from rigidimeter.reporting.numbers import interval, number
+from rigidimeter.reporting.report_tables import all_tables
+from rigidimeter.study import Study, analyse
+
+NASTY = "<script>alert('x')</script>&amp;\"$_$"
+VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+class Page(HTMLParser):
+    """The tags, attributes and text of a page; complains when tags do not nest."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[str] = []
+        self.attributes: list[tuple[str, str, str]] = []
+        self.text = ""
+        self._open: list[str] = []
+        self.feed(html)
+        self.close()
+        assert self._open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(tag, name, value or "") for name, value in attrs]
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+    def of(self, name: str) -> list[str]:
+        return [value for _, key, value in self.attributes if key == name]
+
+
+def page_of(study: Study, out: Path) -> Page:
+    return Page(write_report(study, out).read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def written(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_report(study, tmp_path_factory.mktemp("report"))
+
+
+@pytest.fixture(scope="module")
+def page(written: Path) -> Page:
+    return Page(written.read_text(encoding="utf-8"))
+
+
+def test_page_needs_nothing_beside_it(written: Path, page: Page) -> None:
+    assert written.name == "report.html"
+    assert not {"script", "link", "iframe", "object", "base"} & set(page.tags)
+    assert all(value.startswith("data:image/svg+xml;base64,") for value in page.of("src"))
+    assert page.of("href") == []
+    assert not re.search(r"url\(|@import|https?:", written.read_text(encoding="utf-8"))
+
+
+def test_every_table_lies_beside_the_page(written: Path, study: Study) -> None:
+    tables = all_tables(study)
+    assert {path.stem for path in (written.parent / "tables").iterdir()} == set(tables)
+    for name, table in tables.items():
+        path = written.parent / "tables" / f"{name}.csv"
+        with path.open(encoding="utf-8", newline="") as file:
+            header, *rows = csv.reader(file)
+        assert header == [column.name for column in table.columns]
+        assert len(rows) == len(table.rows)
+        for row, expected in zip(rows, table.rows, strict=True):
+            for text, cell in zip(row, expected, strict=True):
+                assert text == ("" if cell is None else str(cell))
+                if isinstance(cell, float) and cell == cell:
+                    assert float(text) == cell
+
+
+def test_every_figure_of_the_page_lies_beside_it(written: Path, page: Page) -> None:
+    stored = {path.read_bytes() for path in (written.parent / "figures").glob("*.svg")}
+    shown = {base64.b64decode(value.partition(",")[2]) for value in page.of("src")}
+    assert stored == shown
+    names = {path.stem for path in (written.parent / "figures").iterdir()}
+    assert names == {
+        "distribution_inertia_kg_m2",
+        "distribution_damping_nm_s_rad",
+        "distribution_stiffness_nm_rad",
+        "distribution_impulse_nm_s",
+        "distribution_work_j",
+        "perturbation",
+        "perturbation_spectrum",
+        "voluntary_spectrum",
+        "torque_1_off",
+        "torque_2_dbs",
+        "loop_1_off",
+        "loop_2_dbs",
+    }
+    for svg in stored:
+        ET.fromstring(svg)
+
+
+def test_page_is_accessible(page: Page) -> None:
+    assert ("html", "lang", "en") in page.attributes
+    assert page.tags.count("img") == len([text for text in page.of("alt") if text])
+    assert page.tags.count("caption") == page.tags.count("table") > 5
+    assert page.tags.count("h1") == 1
+
+
+def test_page_says_what_was_done(page: Page, study: Study) -> None:
+    text = " ".join(page.text.split())
+    assert "the arm touched the position limit" in text
+    assert "one column was empty" in text
+    assert "two-sided Wilcoxon rank-sum test, asymptotic" in text
+    assert "tie and continuity correction" in text
+    assert "0.0008" in text
+    assert "0.0458366" in text
+    assert "The settings of this study" in text
+    assert "virtual subject" not in text.lower()
+
+
+def test_the_same_study_gives_the_same_bytes(study: Study, written: Path, tmp_path: Path) -> None:
+    again = write_report(study, tmp_path / "deep" / "er")
+    files = [path for path in written.parent.rglob("*") if path.is_file()]
+    assert len(files) > 20
+    for path in files:
+        other = again.parent / path.relative_to(written.parent)
+        assert other.read_bytes() == path.read_bytes()
+
+
+def test_virtual_epochs_are_declared(study: Study, make_study, tmp_path: Path) -> None:
+    one = dataclasses.replace(study.epochs[1], virtual=True)
+    mixed = make_study([one, study.epochs[2]])
+    text = " ".join(page_of(mixed, tmp_path).text.split())
+    assert "Virtual subject: no measurement of a person or animal." in text
+    assert "1 of 2 epochs were made by a simulation" in text
+
+
+def test_special_characters_are_escaped(study: Study, make_study, tmp_path: Path) -> None:
+    epochs = [
+        dataclasses.replace(epoch, source=f"/{NASTY}/{NASTY}", condition=NASTY, label=NASTY)
+        for epoch in (study.epochs[1], study.epochs[-1])
+    ]
+    epochs.append(dataclasses.replace(epochs[0], label="b", closed=Outcome("excluded", NASTY)))
+    nasty = make_study(
+        epochs,
+        title=NASTY,
+        notices=(Notice("error", NASTY),),
+        provenance={NASTY: NASTY},
+    )
+    page = page_of(nasty, tmp_path)
+    assert "script" not in page.tags
+    assert page.text.count(NASTY) > 8
+    assert any(NASTY in alt for alt in page.of("alt"))
+    for path in (tmp_path / "figures").iterdir():
+        ET.fromstring(path.read_bytes())
+
+
+def test_page_tells_what_the_estimates_know(page: Page, study: Study) -> None:
+    text = " ".join(page.text.split())
+    analysis = study.analysis
+    assert "Method: iv (instrumental variables" in text
+    assert f"Chosen because {analysis.method_reason}." in text
+    for delay in analysis.delays:
+        assert f"{number(1e3 * delay.delay_s)}" in text
+    for fit in (*analysis.fits, *analysis.fixed_inertia, *analysis.pooled):
+        assert interval(fit.stiffness_nm_rad_low, fit.stiffness_nm_rad_high) in text
+    assert "(all)" in text
+    assert "From 10 epochs on they come from the scatter between epochs; with fewer, the" in text
+    assert "Intervals are made from the power of the residual at each frequency" in text
+    assert "has a recorded perturbation that repeats at least twice" in text
+
+
+def test_a_method_asked_for_by_name_says_so(study: Study, make_study, tmp_path: Path) -> None:
+    epochs = [study.epochs[1]]
+    made = make_study(epochs, analysis=analyse(epochs, study.settings, "published"))
+    text = " ".join(page_of(made, tmp_path).text.split())
+    assert (
+        "Method: published (least squares as the paper prints it). It was asked for by name."
+        in text
+    )
+    assert "No delay between torque and motion was looked for." in text
+    assert "Intervals hold for a residual of any colour" in text
+    assert "The joint is taken for one that does not change" in text
+
+
+def test_the_joint_over_frequency_is_on_the_page(periodic_study: Study, tmp_path: Path) -> None:
+    text = " ".join(page_of(periodic_study, tmp_path).text.split())
+    assert "Torque over angle at the lines of the perturbation" in text
+    assert (tmp_path / "figures" / "impedance.svg").exists()
+
+
+def found(level: str, name: str = "voluntary_torque", text: str = "it pushed") -> Finding:
+    return Finding(name, level, 20.0, 15.0, text, "relax")
+
+
+def test_findings_are_told_once_a_kind(make_study, make_analysis, tmp_path: Path) -> None:
+    analysis = make_analysis({"OFF": 30, "DBS": 2}, scores=False)
+    fits = [
+        dataclasses.replace(fit, findings=(found("doubt", text=f"pushed in {fit.epoch}"),))
+        for fit in analysis.fits[:-1]
+    ]
+    last = dataclasses.replace(analysis.fits[-1], findings=(found("exclude", "frozen", "stood"),))
+    made = make_study([], analysis=dataclasses.replace(analysis, fits=(*fits, last)))
+    text = " ".join(page_of(made, tmp_path).text.split())
+    assert text.index("frozen exclude 1 32 1 stood") < text.index("voluntary_torque doubt 31 32")
+    assert "22, 23 and 7 more pushed in 0 relax" in text
+    assert "pushed in 1 " not in text
+    with (tmp_path / "tables" / "findings.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 32
+    assert rows[1]["text"] == "pushed in 1"
+
+
+def test_no_findings_say_so(make_study, make_analysis, tmp_path: Path) -> None:
+    clean = make_study([], analysis=make_analysis({"OFF": 3}))
+    assert "The checks found nothing." in page_of(clean, tmp_path).text
+
+
+def test_one_condition_is_summarised(study: Study, make_study, tmp_path: Path) -> None:
+    page = page_of(make_study([e for e in study.epochs if e.condition == "DBS"]), tmp_path)
+    assert "No two conditions were compared." in page.text
+    assert "Medians and quartiles by condition" in page.text
+    assert (tmp_path / "figures" / "torque_1_dbs.svg").exists()
+
+
+def test_a_foreign_recording_of_torque_and_angle(study, make_study, tmp_path: Path) -> None:
+    epoch = study.epochs[1]
+    channels = {name: epoch.channels[name] for name in ("torque_nm", "angle_rad")}
+    foreign = Epoch("C:\\data\\wrist.csv", "1", channels)
+    page = page_of(make_study([foreign], provenance={}), tmp_path)
+    assert "The recordings hold no perturbation channel." in page.text
+    assert "No scored epoch with an imposed sinusoid." in page.text
+    assert "(no condition)" in page.text
+    assert (tmp_path / "figures" / "torque_1_unnamed.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("counts", "outcome"),
+    [
+        ({}, None),
+        ({"OFF": 4, "DBS": 4}, Outcome("failed", "torque_nm was not recorded")),
+        ({"OFF": 4, "DBS": 4}, Outcome("excluded", "R² is −3, below zero")),
+        ({"OFF": 1}, None),
+        ({"OFF": 1, "DBS": 2}, None),
+        ({"OFF": 3, "DBS": 3}, None),
+        ({"OFF": 200, "DBS": 100}, None),
+        ({"OFF": 5, "DBS": 5, "levodopa": 4}, None),
+    ],
+)
+@pytest.mark.parametrize("scores", [True, False])
+def test_degenerate_studies(
+    counts, outcome, scores: bool, make_study, make_analysis, tmp_path: Path
+) -> None:
+    analysis = make_analysis(counts, outcome, scores and outcome is None)
+    page = page_of(make_study([], analysis=analysis), tmp_path)
+    assert "nan" not in page.text.split()
+    assert "nothing to draw" in page.text
+    for fit in analysis.fits:
+        assert fit.outcome.reason in page.text
+
+
+def test_no_comparison_at_all(make_study, make_analysis, tmp_path: Path) -> None:
+    made = make_study([], analysis=make_analysis({"OFF": 9, "DBS": 9}), comparisons=())
+    assert "Medians and quartiles by condition" in page_of(made, tmp_path).text
+
+
+def test_short_samples_mark_their_interval(make_study, make_analysis, tmp_path: Path) -> None:
+    made = make_study([], analysis=make_analysis({"OFF": 3, "DBS": 3}))
+    assert any(comparison.test is not None for comparison in made.comparisons)
+    assert "†" in page_of(made, tmp_path).text
+
+
+def test_epochs_without_samples(make_study, make_analysis, tmp_path: Path) -> None:
+    empty = Epoch("a.csv", "1", {}, closed=Outcome("failed", "the file ends in its header"))
+    page = page_of(make_study([empty], analysis=make_analysis({})), tmp_path)
+    assert "the file ends in its header" in page.text
+
+
+def test_a_name_that_is_no_text_is_written_all_the_same(study, make_study, tmp_path: Path) -> None:
+    odd = dataclasses.replace(study.epochs[1], source="/caf\udce9.csv", condition="caf\udce9")
+    assert "caf\\udce9" in page_of(make_study([odd]), tmp_path).text
+
+
+def test_short_names_tell_sources_apart() -> None:
+    assert short_names(["/a/b/x.csv", "/a/c/y.csv"]) == {
+        "/a/b/x.csv": "x.csv",
+        "/a/c/y.csv": "y.csv",
+    }
+    assert short_names(["/a/b/x.csv", "/a/c/x.csv", "/a/b/x.csv"]) == {
+        "/a/b/x.csv": "b/x.csv",
+        "/a/c/x.csv": "c/x.csv",
+    }
+    assert short_names(["x", "./x"]) == {"x": "x", "./x": "./x"}
+    assert short_names([]) == {}
+    assert short_names(["", "/"]) == {"": "", "/": "/"}
+
+
+def test_a_recording_without_a_condition_is_not_compared_with_itself(
+    make_study, make_analysis, tmp_path: Path
+) -> None:
+    made = make_study([], analysis=make_analysis({"": 4}))
+    assert not any(comparison.paired for comparison in made.comparisons)
+    page = page_of(made, tmp_path)
+    assert "(no condition) against" not in page.text
