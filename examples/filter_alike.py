@@ -78,7 +78,7 @@ def main(folder: Path) -> None:
     print(f"{'high-pass at 0.2 Hz':26} {'J %':>7} {'B %':>7} {'K %':>7} {'R²':>7}")
     for name, way in ways.items():
         found = [fit_inertia_damping_stiffness(way(signals)) for signals in raw]
-        error = 100 * (np.median([fit.parameters for fit in found], axis=0) / TRUTH - 1)
+        error = 100 * (np.median([fit.value for fit in found], axis=0) / TRUTH - 1)
         r_squared = np.median([fit.r_squared for fit in found])
         print(f"{name:26} {error[0]:7.2f} {error[1]:7.2f} {error[2]:7.2f} {r_squared:7.3f}")
 

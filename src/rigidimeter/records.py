@@ -9,13 +9,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "CHANNEL_UNITS",
+    "PARAMETERS",
+    "PARAMETER_VECTORS",
     "Analysis",
     "Channel",
     "Delay",
@@ -26,6 +28,7 @@ __all__ = [
     "Notice",
     "Outcome",
     "OutcomeKind",
+    "Parameter",
     "Score",
     "Task",
     "readonly",
@@ -216,21 +219,65 @@ class Epoch:
         return f"{self.source}, epoch {self.label}"
 
 
-@dataclass(frozen=True)
+class Parameter(NamedTuple):
+    """A parameter of Eq. 3: its name with the unit in it, its symbol, its unit, and in words."""
+
+    name: str
+    symbol: str
+    unit: str
+    title: str
+
+
+PARAMETERS = (
+    Parameter("inertia_kg_m2", "J", "kg·m²", "inertia"),
+    Parameter("damping_nm_s_rad", "B", "N·m·s/rad", "damping"),
+    Parameter("stiffness_nm_rad", "K", "N·m/rad", "stiffness"),
+)
+"""J, B and K in the order of every vector of a `Fit`."""
+
+PARAMETER_VECTORS = {"value": "", "se": "_se", "low": "_low", "high": "_high", "bound": "_bound"}
+"""The vectors of a `Fit`, and what their entries are called after the parameter's name."""
+
+
+class _Entry:
+    """One entry of a vector of a `Fit`, as an attribute."""
+
+    def __init__(self, vector: str, index: int) -> None:
+        self._vector, self._index = vector, index
+
+    def __get__(self, fit: Fit, owner: type[Fit]) -> float:
+        return float(getattr(fit, self._vector)[self._index])
+
+
+def _unknown() -> NDArray[np.float64]:
+    return np.full(len(PARAMETERS), math.nan)
+
+
+def _unknown_square() -> NDArray[np.float64]:
+    return np.full((len(PARAMETERS), len(PARAMETERS)), math.nan)
+
+
+@dataclass(frozen=True, eq=False)
 class Fit:
     """J, B, K of one epoch with their standard errors and how far to trust them.
 
     Numbers are NaN when the outcome is `failed`. With the inertia held fixed its standard error is
     0, and the statistics are those of the two-parameter fit. A fit to several epochs is called
-    ``pooled``.
+    ``pooled``. Every entry of the vectors is also an attribute: `inertia_kg_m2`,
+    `inertia_kg_m2_se`, `inertia_kg_m2_low`, `inertia_kg_m2_high`, `inertia_kg_m2_bound`, and
+    likewise for `damping_nm_s_rad` and `stiffness_nm_rad`.
 
     Attributes
     ----------
-    inertia_kg_m2_low, inertia_kg_m2_high : float
-        The 95 % interval; likewise for damping and stiffness.
-    inertia_kg_m2_bound : float
-        The standard error that no unbiased estimate from the same excitation can beat for the
-        noise that was found (Cramér–Rao); likewise for damping and stiffness.
+    value, se : arrays, shape (3,)
+        The parameters in the order of `PARAMETERS`, and their standard errors.
+    low, high : arrays, shape (3,)
+        The ends of the 95 % intervals.
+    bound : array, shape (3,)
+        The standard errors that no unbiased estimate from the same excitation can beat for the
+        noise that was found (Cramér–Rao).
+    covariance : array, shape (3, 3)
+        Of the parameters; NaN where it is not known, as in estimates read from a file.
     r_squared : float
         1 − Σ(residual²)/Σ((torque − mean)²) over the fitted samples.
     vaf_percent : float
@@ -251,21 +298,12 @@ class Fit:
     condition: str
     method: str
     outcome: Outcome
-    inertia_kg_m2: float = math.nan
-    inertia_kg_m2_se: float = math.nan
-    inertia_kg_m2_low: float = math.nan
-    inertia_kg_m2_high: float = math.nan
-    inertia_kg_m2_bound: float = math.nan
-    damping_nm_s_rad: float = math.nan
-    damping_nm_s_rad_se: float = math.nan
-    damping_nm_s_rad_low: float = math.nan
-    damping_nm_s_rad_high: float = math.nan
-    damping_nm_s_rad_bound: float = math.nan
-    stiffness_nm_rad: float = math.nan
-    stiffness_nm_rad_se: float = math.nan
-    stiffness_nm_rad_low: float = math.nan
-    stiffness_nm_rad_high: float = math.nan
-    stiffness_nm_rad_bound: float = math.nan
+    value: NDArray[np.float64] = field(default_factory=_unknown)
+    se: NDArray[np.float64] = field(default_factory=_unknown)
+    low: NDArray[np.float64] = field(default_factory=_unknown)
+    high: NDArray[np.float64] = field(default_factory=_unknown)
+    bound: NDArray[np.float64] = field(default_factory=_unknown)
+    covariance: NDArray[np.float64] = field(default_factory=_unknown_square)
     r_squared: float = math.nan
     vaf_percent: float = math.nan
     condition_number: float = math.nan
@@ -273,6 +311,49 @@ class Fit:
     n_samples: int = 0
     band_hz: tuple[float, float] = (math.nan, math.nan)
     findings: tuple[Finding, ...] = ()
+
+    inertia_kg_m2 = _Entry("value", 0)
+    inertia_kg_m2_se = _Entry("se", 0)
+    inertia_kg_m2_low = _Entry("low", 0)
+    inertia_kg_m2_high = _Entry("high", 0)
+    inertia_kg_m2_bound = _Entry("bound", 0)
+    damping_nm_s_rad = _Entry("value", 1)
+    damping_nm_s_rad_se = _Entry("se", 1)
+    damping_nm_s_rad_low = _Entry("low", 1)
+    damping_nm_s_rad_high = _Entry("high", 1)
+    damping_nm_s_rad_bound = _Entry("bound", 1)
+    stiffness_nm_rad = _Entry("value", 2)
+    stiffness_nm_rad_se = _Entry("se", 2)
+    stiffness_nm_rad_low = _Entry("low", 2)
+    stiffness_nm_rad_high = _Entry("high", 2)
+    stiffness_nm_rad_bound = _Entry("bound", 2)
+
+    def __post_init__(self) -> None:
+        p = len(PARAMETERS)
+        for name, shape in (*((name, (p,)) for name in PARAMETER_VECTORS), ("covariance", (p, p))):
+            array = readonly(getattr(self, name))
+            if array.shape != shape:
+                raise ValueError(f"{name} of a fit must have shape {shape}, not {array.shape}")
+            object.__setattr__(self, name, array)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal in every field; numbers that are NaN in both are equal."""
+        if not isinstance(other, Fit):
+            return NotImplemented
+        return all(
+            np.array_equal(mine, theirs, equal_nan=True)
+            if isinstance(mine, float | np.ndarray) or name == "band_hz"
+            else mine == theirs
+            for (name, mine), theirs in zip(vars(self).items(), vars(other).values(), strict=True)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.source, self.epoch, self.condition, self.method, self.outcome))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the parameters, in the order of the vectors."""
+        return tuple(parameter.name for parameter in PARAMETERS)
 
 
 @dataclass(frozen=True)

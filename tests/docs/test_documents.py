@@ -237,9 +237,7 @@ def _analysis() -> Analysis:
                 name,
                 "bandlimited",
                 Outcome(),
-                inertia_kg_m2=1.0 + k,
-                damping_nm_s_rad=2.0 + k,
-                stiffness_nm_rad=3.0 + k,
+                value=(1.0 + k, 2.0 + k, 3.0 + k),
                 findings=(Finding("frozen", "doubt", 1.0, 2.0, "a", "b"),),
             )
             for k, name in enumerate(conditions)

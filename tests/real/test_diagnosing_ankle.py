@@ -29,7 +29,7 @@ def ankle(shared_data):
 
 def diagnosed(epoch):
     signals = epoch_signals(epoch, "bandlimited", SETTINGS.estimation)
-    parameters = fit_inertia_damping_stiffness(signals).parameters
+    parameters = fit_inertia_damping_stiffness(signals).value
     return {f.name: f for f in diagnose(epoch, signals, parameters, SETTINGS.diagnostics)}
 
 
@@ -59,7 +59,7 @@ def test_intervals_for_a_coloured_residual_are_wider_than_those_for_a_white_one(
     signals = epoch_signals(ankle, "bandlimited", SETTINGS.estimation)
     solution = fit_inertia_damping_stiffness(signals)
     A = np.column_stack([signals.acceleration_rad_s2, signals.velocity_rad_s, signals.angle_rad])
-    residual = signals.torque_nm - A @ solution.parameters
+    residual = signals.torque_nm - A @ solution.value
     coloured = hac_covariance(np.linalg.inv(A.T @ A), A * residual[:, None])
     textbook = np.std(residual) * np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
     assert coloured.standard_errors[2] > 2.0 * textbook[2]

@@ -2,7 +2,7 @@
 
 from rigidimeter.estimation.alignment import aligned, estimate_delays
 from rigidimeter.estimation.bandlimited import band_hz
-from rigidimeter.estimation.least_squares import Solution, fit_inertia_damping_stiffness
+from rigidimeter.estimation.least_squares import fit_inertia_damping_stiffness
 from rigidimeter.estimation.methods import (
     METHODS,
     choose_method,
@@ -18,7 +18,6 @@ __all__ = [
     "METHODS",
     "Cycles",
     "Signals",
-    "Solution",
     "aligned",
     "band_hz",
     "choose_method",

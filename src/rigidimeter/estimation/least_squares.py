@@ -12,43 +12,27 @@ second, whatever the sampling rate, so σ² (AᵀA)⁻¹ is scaled by rate / (2�
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal, stats
+from scipy import signal
 
 from rigidimeter.estimation.closedloop.line_noise import Smoother
 from rigidimeter.estimation.signals import Array, Signals
-from rigidimeter.estimation.uncertainty import block_bootstrap, cramer_rao_coloured, hac_covariance
+from rigidimeter.estimation.uncertainty import (
+    Estimate,
+    block_bootstrap,
+    cramer_rao_coloured,
+    hac_covariance,
+    t_interval,
+)
+from rigidimeter.records import Fit, Outcome
 from rigidimeter.settings import EstimationSettings
 
-__all__ = ["Solution", "fit_inertia_damping_stiffness"]
+__all__ = ["fit_inertia_damping_stiffness"]
 
 BOOTSTRAP_SEED = 1
 """The same epoch gives the same interval every time."""
-
-Triple = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Solution:
-    """Parameters (J, B, K), how well they are known, and the statistics of the fit.
-
-    `low` and `high` are the ends of the 95 % intervals, `bound` the Cramér–Rao bound on the
-    standard errors for a residual of the power that was found.
-    """
-
-    parameters: Triple
-    standard_errors: Triple
-    low: Triple
-    high: Triple
-    bound: Triple
-    r_squared: float
-    vaf_percent: float
-    condition_number: float
-    residual_sd_nm: float
-    n_samples: int
 
 
 class _Solved(NamedTuple):
@@ -62,7 +46,7 @@ def fit_inertia_damping_stiffness(
     signals: Signals,
     inertia_kg_m2: float | None = None,
     settings: EstimationSettings | None = None,
-) -> Solution:
+) -> Fit:
     """Fit Eq. 6, or Eq. 7 when the inertia is given.
 
     Parameters
@@ -73,6 +57,11 @@ def fit_inertia_damping_stiffness(
         Hold J at this value and fit B and K alone; its standard error is then 0.
     settings : EstimationSettings, optional
         How intervals are made.
+
+    Returns
+    -------
+    Fit
+        Without the names of source, epoch, condition and method.
 
     Raises
     ------
@@ -89,25 +78,21 @@ def fit_inertia_damping_stiffness(
         target = torque - inertia_kg_m2 * motion[0]
     solved = _solve(regressors, target)
     values, residual = solved.values, solved.residual
-    errors, low, high = _interval(signals, regressors, target, solved, settings)
-    table = np.column_stack([values, errors, low, high, _bound(signals, regressors, residual)])
+    covariance, low, high = _interval(signals, regressors, target, solved, settings)
+    se = np.sqrt(np.diag(covariance))
+    bound = _bound(signals, regressors, residual)
+    estimate = Estimate(values, se, low, high, bound, covariance)
     if inertia_kg_m2 is not None:
-        table = np.vstack([[inertia_kg_m2, 0.0, inertia_kg_m2, inertia_kg_m2, 0.0], table])
-    parameters, standard_errors, low_end, high_end, bound = (
-        (float(J), float(B), float(K)) for J, B, K in table.T
-    )
+        estimate = estimate.with_inertia(inertia_kg_m2)
     total = float(np.sum((torque - torque.mean()) ** 2))
-    return Solution(
-        parameters=parameters,
-        standard_errors=standard_errors,
-        low=low_end,
-        high=high_end,
-        bound=bound,
+    return Fit(
+        *("", "", "", "", Outcome(), *estimate),
         r_squared=1.0 - float(residual @ residual) / total,
         vaf_percent=100.0 * (1.0 - float(np.var(residual)) / float(np.var(torque))),
         condition_number=solved.condition_number,
         residual_sd_nm=float(np.std(residual)),
         n_samples=torque.size,
+        band_hz=signals.band_hz,
     )
 
 
@@ -118,24 +103,22 @@ def _interval(
     solved: _Solved,
     settings: EstimationSettings,
 ) -> tuple[Array, Array, Array]:
-    """Return standard errors and the ends of the 95 % intervals."""
+    """Return the covariance and the ends of the 95 % intervals."""
     values, bread, _, residual = solved
     n, p = regressors.shape
     if settings.intervals == "bootstrap":
         rng = np.random.default_rng(BOOTSTRAP_SEED)
         drawn = block_bootstrap(regressors, regressors, target, rng, draws=settings.bootstrap_draws)
-        return np.sqrt(np.diag(drawn.covariance)), drawn.low, drawn.high
+        return drawn.covariance, drawn.low, drawn.high
     if settings.intervals == "white":
         low, high = signals.band_hz
         independent_per_sample = min(1.0, 2.0 * (high - low) / signals.rate_hz)
         # As many degrees of freedom are left as there are independent values less the parameters.
         degrees = max(n * independent_per_sample - p, 1.0)
-        errors = np.sqrt(float(residual @ residual) / degrees * np.diag(bread))
+        covariance = float(residual @ residual) / degrees * bread
     else:
-        scatter = hac_covariance(bread, regressors * residual[:, None])
-        errors, degrees = scatter.standard_errors, scatter.degrees_of_freedom
-    half = float(stats.t.ppf(0.975, degrees)) * errors
-    return errors, values - half, values + half
+        covariance, degrees = hac_covariance(bread, regressors * residual[:, None])
+    return covariance, *t_interval(values, np.sqrt(np.diag(covariance)), degrees)
 
 
 def _bound(signals: Signals, regressors: Array, residual: Array) -> Array:

@@ -9,11 +9,11 @@ import numpy as np
 
 from rigidimeter.estimation.bandlimited import bandlimited_signals
 from rigidimeter.estimation.closedloop import CLOSED_LOOP, closed_loop_obstacle, fit_closed_loop
-from rigidimeter.estimation.least_squares import Solution, fit_inertia_damping_stiffness
+from rigidimeter.estimation.least_squares import fit_inertia_damping_stiffness
 from rigidimeter.estimation.published_method import published_signals
 from rigidimeter.estimation.screening import after_fit, before_fit, unusable
 from rigidimeter.estimation.signals import Signals
-from rigidimeter.records import Epoch, Fit, Outcome
+from rigidimeter.records import Epoch, Fit
 from rigidimeter.settings import EstimationSettings, Settings
 
 __all__ = ["METHODS", "choose_method", "epoch_signals", "fit_epoch", "fit_epochs"]
@@ -131,18 +131,20 @@ def _fit(
 ) -> tuple[Fit, Signals | None]:
     try:
         signals = epoch_signals(epoch, method, settings)
-        solution = fit_inertia_damping_stiffness(signals, inertia_kg_m2, settings)
+        fit = fit_inertia_damping_stiffness(signals, inertia_kg_m2, settings)
     except ValueError as error:
         outcome = unusable(epoch, str(error))
         return Fit(epoch.source, epoch.label, epoch.condition, method, outcome), None
-    fit = Fit(
+    outcome = after_fit(epoch, fit.r_squared, fit.condition_number)
+    named = replace(
+        fit,
         source=epoch.source,
         epoch=epoch.label,
         condition=epoch.condition,
         method=method,
-        outcome=after_fit(epoch, solution.r_squared, solution.condition_number),
+        outcome=outcome,
     )
-    return _with_numbers(fit, solution, signals.band_hz), signals
+    return named, signals
 
 
 def _pooled(
@@ -162,42 +164,10 @@ def _pooled(
         velocity_rad_s=np.concatenate([part.velocity_rad_s for part in parts]),
         angle_rad=np.concatenate([part.angle_rad for part in parts]),
     )
-    fit = Fit(
+    return replace(
+        fit_inertia_damping_stiffness(together, inertia_kg_m2, settings),
         source=", ".join(dict.fromkeys(member.source for member in fits)),
         epoch="pooled",
         condition=condition,
         method=fits[0].method,
-        outcome=Outcome(),
-    )
-    solution = fit_inertia_damping_stiffness(together, inertia_kg_m2, settings)
-    return _with_numbers(fit, solution, first.band_hz)
-
-
-def _with_numbers(fit: Fit, solution: Solution, band_hz: tuple[float, float]) -> Fit:
-    (J, B, K), (J_se, B_se, K_se) = solution.parameters, solution.standard_errors
-    (J_low, B_low, K_low), (J_high, B_high, K_high) = solution.low, solution.high
-    J_bound, B_bound, K_bound = solution.bound
-    return replace(
-        fit,
-        inertia_kg_m2=J,
-        inertia_kg_m2_se=J_se,
-        inertia_kg_m2_low=J_low,
-        inertia_kg_m2_high=J_high,
-        inertia_kg_m2_bound=J_bound,
-        damping_nm_s_rad=B,
-        damping_nm_s_rad_se=B_se,
-        damping_nm_s_rad_low=B_low,
-        damping_nm_s_rad_high=B_high,
-        damping_nm_s_rad_bound=B_bound,
-        stiffness_nm_rad=K,
-        stiffness_nm_rad_se=K_se,
-        stiffness_nm_rad_low=K_low,
-        stiffness_nm_rad_high=K_high,
-        stiffness_nm_rad_bound=K_bound,
-        r_squared=solution.r_squared,
-        vaf_percent=solution.vaf_percent,
-        condition_number=solution.condition_number,
-        residual_sd_nm=solution.residual_sd_nm,
-        n_samples=solution.n_samples,
-        band_hz=band_hz,
     )

@@ -29,6 +29,7 @@ from scipy import fft, stats
 
 __all__ = [
     "Bootstrap",
+    "Estimate",
     "Scatter",
     "block_bootstrap",
     "correlation_samples",
@@ -53,6 +54,28 @@ BLOCK_CORRELATION_TIMES = 3.0
 FEWEST_BLOCKS = 4
 MOST_BLOCKS = 250
 """Shorter blocks than this many to an epoch gain nothing and cost memory."""
+
+
+class Estimate(NamedTuple):
+    """Parameters and their uncertainty, in the order in which a `Fit` holds them.
+
+    `value`, `se`, `low`, `high` and `bound` have shape (p,), `covariance` (p, p).
+    """
+
+    value: Array
+    se: Array
+    low: Array
+    high: Array
+    bound: Array
+    covariance: Array
+
+    def with_inertia(self, inertia_kg_m2: float) -> Estimate:
+        """Return the estimate of B and K with the J that was held, which has no error, before."""
+        held = (inertia_kg_m2, 0.0, inertia_kg_m2, inertia_kg_m2, 0.0)
+        value, se, low, high, bound = (
+            np.concatenate(([J], rest)) for J, rest in zip(held, self[:5], strict=True)
+        )
+        return Estimate(value, se, low, high, bound, np.pad(self.covariance, ((1, 0), (1, 0))))
 
 
 class Scatter(NamedTuple):

@@ -85,7 +85,8 @@ def _highpassed(reading: str, way: str, alike: bool) -> Triple:
         angle_rad=high_pass(raw.angle_rad)[kept],
     )
     white = settings.estimation.model_copy(update={"intervals": "white"})
-    return fit_inertia_damping_stiffness(cut, settings=white).parameters
+    J, B, K = fit_inertia_damping_stiffness(cut, settings=white).value.tolist()
+    return J, B, K
 
 
 def highpass_errors_percent(reading: str, way: str, *, alike: bool) -> Triple:

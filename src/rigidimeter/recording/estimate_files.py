@@ -7,12 +7,21 @@ import io
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from rigidimeter.errors import UserError
-from rigidimeter.records import Analysis, Delay, Finding, Fit, Outcome, Score
+from rigidimeter.records import (
+    PARAMETER_VECTORS,
+    PARAMETERS,
+    Analysis,
+    Delay,
+    Finding,
+    Fit,
+    Outcome,
+    Score,
+    readonly,
+)
 
 __all__ = [
     "ESTIMATES_SCHEMA",
@@ -26,13 +35,11 @@ __all__ = [
 
 ESTIMATES_SCHEMA = "rigidimeter.estimates/1"
 
-_PARAMETERS = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
+_PARAMETERS = tuple(parameter.name for parameter in PARAMETERS)
+_STATISTICS = ("r_squared", "vaf_percent", "condition_number", "residual_sd_nm")
 _FIT_NUMBERS = (
-    *(name + ending for name in _PARAMETERS for ending in ("", "_se", "_low", "_high", "_bound")),
-    "r_squared",
-    "vaf_percent",
-    "condition_number",
-    "residual_sd_nm",
+    *(name + ending for name in _PARAMETERS for ending in PARAMETER_VECTORS.values()),
+    *_STATISTICS,
 )
 _SCORE_NUMBERS = ("impulse_nm_s", "work_j", "frequency_hz")
 
@@ -224,7 +231,13 @@ def _score_row(score: Score) -> dict[str, Any]:
 
 def _fit(row: Mapping[str, Any], method: str) -> Fit:
     low, high = row["band_hz"] or (math.nan, math.nan)
-    fit = Fit(
+    # A document of an older version lacks the ends of the intervals.
+    numbers: dict[str, Any] = {
+        vector: readonly([_number(row.get(name + ending)) for name in _PARAMETERS])
+        for vector, ending in PARAMETER_VECTORS.items()
+    }
+    numbers |= {name: _number(row.get(name)) for name in _STATISTICS}
+    return Fit(
         source=str(row["source"]),
         epoch=str(row["epoch"]),
         condition=str(row["condition"]),
@@ -232,11 +245,9 @@ def _fit(row: Mapping[str, Any], method: str) -> Fit:
         outcome=_read_outcome(row, _PARAMETERS),
         n_samples=int(row["n_samples"]),
         band_hz=(float(low), float(high)),
+        findings=tuple(_read_finding(found) for found in row.get("findings", ())),
+        **numbers,
     )
-    # A document of an older version lacks the ends of the intervals.
-    numbers: dict[str, Any] = {name: _number(row.get(name)) for name in _FIT_NUMBERS}
-    findings = tuple(_read_finding(found) for found in row.get("findings", ()))
-    return replace(fit, findings=findings, **numbers)
 
 
 def _read_finding(row: Mapping[str, Any]) -> Finding:

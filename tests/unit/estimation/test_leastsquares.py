@@ -18,29 +18,31 @@ def signals(noise_nm=0.0, seed=0, n=2000, band=(0.0, 50.0), rate_hz=100.0):
 
 def test_without_noise_the_parameters_come_back():
     solution = fit_inertia_damping_stiffness(signals())
-    np.testing.assert_allclose(solution.parameters, TRUTH, rtol=1e-12)
+    np.testing.assert_allclose(solution.value, TRUTH, rtol=1e-12)
     assert solution.r_squared == pytest.approx(1.0, abs=1e-12)
     assert solution.vaf_percent == pytest.approx(100.0, abs=1e-10)
 
 
 def test_with_the_inertia_held_the_others_come_back():
     solution = fit_inertia_damping_stiffness(signals(), inertia_kg_m2=TRUTH[0])
-    np.testing.assert_allclose(solution.parameters, TRUTH, rtol=1e-12)
-    assert solution.standard_errors[0] == 0.0
+    np.testing.assert_allclose(solution.value, TRUTH, rtol=1e-12)
+    assert solution.se[0] == 0.0
 
 
 def test_standard_errors_are_the_scatter_over_noise():
     solutions = [fit_inertia_damping_stiffness(signals(0.02, seed)) for seed in range(300)]
-    scatter = np.std([s.parameters for s in solutions], axis=0, ddof=1)
-    claimed = np.mean([s.standard_errors for s in solutions], axis=0)
+    scatter = np.std([s.value for s in solutions], axis=0, ddof=1)
+    claimed = np.mean([s.se for s in solutions], axis=0)
     np.testing.assert_allclose(claimed, scatter, rtol=0.15)
+    covariance = np.mean([s.covariance for s in solutions], axis=0)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), scatter, rtol=0.15)
 
 
 def test_a_band_limited_residual_counts_as_few_as_it_has_values():
     white = EstimationSettings(intervals="white")
     whole = fit_inertia_damping_stiffness(signals(0.02), settings=white)
     tenth = fit_inertia_damping_stiffness(signals(0.02, band=(0.0, 5.0)), settings=white)
-    ratio = np.array(tenth.standard_errors) / np.array(whole.standard_errors)
+    ratio = np.array(tenth.se) / np.array(whole.se)
     np.testing.assert_allclose(ratio, np.sqrt(10.0), rtol=0.01)
 
 
@@ -51,7 +53,7 @@ def test_it_survives_units_that_square_to_nothing():
         s, acceleration_rad_s2=s.acceleration_rad_s2 * 1e6, angle_rad=s.angle_rad * 1e-6
     )
     solution = fit_inertia_damping_stiffness(scaled)
-    np.testing.assert_allclose(solution.parameters, TRUTH * [1e-6, 1.0, 1e6], rtol=1e-9)
+    np.testing.assert_allclose(solution.value, TRUTH * [1e-6, 1.0, 1e6], rtol=1e-9)
     assert solution.condition_number < 2.0
 
 

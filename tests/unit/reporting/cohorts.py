@@ -192,12 +192,7 @@ def _fill(
         for name, value in JOINT.items()
     }
     for i in range(design.epochs[side]):
-        values = {name: v * float(rng.lognormal(0, SCATTER[name])) for name, v in level.items()}
-        ends = {
-            name + end: value * factor
-            for name, value in values.items()
-            for end, factor in (("_se", 0.02), ("_low", 0.96), ("_high", 1.04), ("_bound", 0.015))
-        }
+        joint = np.array([v * rng.lognormal(0, SCATTER[name]) for name, v in level.items()])
         outcome = Outcome()
         if i == 0 and session.day in {"1", "3"}:
             outcome = LEFT_OUT
@@ -210,8 +205,11 @@ def _fill(
                 session.condition,
                 "iv",
                 outcome,
-                **values,
-                **ends,
+                value=joint,
+                se=0.02 * joint,
+                low=0.96 * joint,
+                high=1.04 * joint,
+                bound=0.015 * joint,
                 r_squared=0.97,
                 vaf_percent=97.0,
                 condition_number=4.2,

@@ -183,35 +183,25 @@ def study(epochs: list[Epoch], make_study: MakeStudy) -> Study:
 
 def fit(label: str, condition: str, value: float, outcome: Outcome | None = None) -> Fit:
     """Return a fit whose intervals reach two standard errors either way."""
-    parameters = {
-        "inertia_kg_m2": (0.0045, 1e-4),
-        "damping_nm_s_rad": (value, 1e-3),
-        "stiffness_nm_rad": (10 * value, 1e-2),
-    }
-    numbers = {
-        name + ending: number
-        for name, (estimate, error) in parameters.items()
-        for ending, number in (
-            ("", estimate),
-            ("_se", error),
-            ("_low", estimate - 2 * error),
-            ("_high", estimate + 2 * error),
-            ("_bound", 0.9 * error),
-        )
-    }
+    estimate = np.array([0.0045, value, 10 * value])
+    error = np.array([1e-4, 1e-3, 1e-2])
     return Fit(
         source="x.csv",
         epoch=label,
         condition=condition,
         method="bandlimited",
         outcome=outcome or Outcome(),
+        value=estimate,
+        se=error,
+        low=estimate - 2 * error,
+        high=estimate + 2 * error,
+        bound=0.9 * error,
         r_squared=0.97,
         vaf_percent=97.0,
         condition_number=4.2,
         residual_sd_nm=0.02,
         n_samples=4501,
         band_hz=(0.15, 10.0),
-        **numbers,
     )
 
 

@@ -10,7 +10,7 @@ from rigidimeter.study import analyse, compare, conditions, doubts, task_of
 
 def fit(condition, B=0.1, K=1.0, J=0.004, outcome=None):
     return Fit("s", "1", condition, "bandlimited", outcome or Outcome(),
-               inertia_kg_m2=J, damping_nm_s_rad=B, stiffness_nm_rad=K)  # fmt: skip
+               value=np.array([J, B, K]))  # fmt: skip
 
 
 def analysis(fits, scores=()):

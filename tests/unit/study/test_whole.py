@@ -160,7 +160,7 @@ def test_several_subjects_each_have_their_median_inertia(monkeypatch, fitted_stu
         from rigidimeter.records import Analysis, Outcome
 
         fits = tuple(
-            Fit(e.source, e.label, e.condition, method, Outcome(), 1.0 + len(epochs))
+            Fit(e.source, e.label, e.condition, method, Outcome(), np.full(3, 1.0 + len(epochs)))
             for e in epochs
         )
         return Analysis(method, fits, fits, 1.0 + len(epochs), ())

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.stats import t as student
@@ -39,6 +38,7 @@ from rigidimeter.estimation.screening import (
     unusable,
 )
 from rigidimeter.estimation.signals import Array, motion_channels
+from rigidimeter.estimation.uncertainty import Estimate
 from rigidimeter.records import Channel, Epoch, Finding, Fit
 from rigidimeter.settings import Settings
 
@@ -307,27 +307,20 @@ def least_squares_start(observations: Sequence[Observation]) -> Array:
     return np.asarray(np.maximum(values, 10 * LEAST), dtype=np.float64)
 
 
-def _numbers(fit: LineFit, inertia_kg_m2: float | None) -> dict[str, Any]:
-    """Return the fields of a `Fit` for J, B and K."""
-    errors = fit.standard_errors
+def _estimate(fit: LineFit, inertia_kg_m2: float | None) -> Estimate:
+    """Return J, B and K with their uncertainty, as a `Fit` holds them."""
     bound = np.sqrt(np.diag(fit.bound))
     if fit.drawn is not None:
-        errors = np.std(fit.drawn, axis=0, ddof=1)
+        covariance = np.atleast_2d(np.cov(fit.drawn, rowvar=False))
         low, high = np.quantile(fit.drawn, [0.025, 0.975], axis=0)
+        found = Estimate(
+            fit.values, np.std(fit.drawn, axis=0, ddof=1), low, high, bound, covariance
+        )
     else:
-        half = student.ppf(0.975, fit.degrees) * errors
-        low, high = fit.values - half, fit.values + half
-    table = np.column_stack([fit.values, errors, low, high, bound])
-    if inertia_kg_m2 is not None:
-        held = [inertia_kg_m2, 0.0, inertia_kg_m2, inertia_kg_m2, 0.0]
-        table = np.vstack([held, table])
-    names = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
-    endings = ("", "_se", "_low", "_high", "_bound")
-    return {
-        name + ending: float(table[row, column])
-        for row, name in enumerate(names)
-        for column, ending in enumerate(endings)
-    }
+        half = student.ppf(0.975, fit.degrees) * fit.standard_errors
+        ends = fit.values - half, fit.values + half
+        found = Estimate(fit.values, fit.standard_errors, *ends, bound, fit.covariance)
+    return found if inertia_kg_m2 is None else found.with_inertia(inertia_kg_m2)
 
 
 def _epoch_fit(
@@ -337,10 +330,9 @@ def _epoch_fit(
     observation: Observation,
     inertia_kg_m2: float | None,
 ) -> Fit:
-    numbers = _numbers(fit, inertia_kg_m2)
+    found = _estimate(fit, inertia_kg_m2)
     lines = observation.lines
-    J, B, K = (numbers[n] for n in ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"))
-    left = lines.torque_nm - lines.motion @ np.array([J, B, K])
+    left = lines.torque_nm - lines.motion @ found.value
     share = float(np.sum(np.abs(left) ** 2) / np.sum(np.abs(lines.torque_nm) ** 2))
     grid = lines.grid
     residual_sd = np.sqrt(2 * np.sum(np.abs(left) ** 2) / (grid.time_s.size * grid.energy))
@@ -358,7 +350,7 @@ def _epoch_fit(
         residual_sd_nm=float(residual_sd),
         n_samples=grid.time_s.size,
         band_hz=grid.band_hz,
-        **numbers,
+        **found._asdict(),
     )
 
 

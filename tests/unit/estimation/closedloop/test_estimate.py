@@ -29,6 +29,9 @@ def test_a_quiet_subject_is_found_to_the_noise(simulated, truth, method):
         assert np.all(values(fit, "_se") < [0.001 * p for p in truth])
         assert np.all(values(fit, "_low") < values(fit)), "the interval holds its estimate"
         assert fit.outcome.included
+    for fit in (*fits, pooled):
+        np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), fit.se, rtol=1e-12)
+        np.testing.assert_allclose(fit.covariance, fit.covariance.T, rtol=1e-9)
     assert pooled.epoch == "pooled"
     # Four times the information: half the error.
     ratio = values(pooled, "_se") / np.mean([values(fit, "_se") for fit in fits], axis=0)
@@ -83,6 +86,8 @@ def test_the_inertia_may_be_held(simulated, truth):
     fits, pooled = fit_epochs(epochs, "iv", settings, inertia_kg_m2=0.0045)
     for fit in [*fits, *pooled]:
         assert (fit.inertia_kg_m2, fit.inertia_kg_m2_se) == (0.0045, 0.0)
+        assert not fit.covariance[0].any()
+        np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), fit.se, rtol=1e-12)
         assert np.all(np.abs(values(fit) / truth - 1)[1:] < 0.004)
 
 

@@ -81,7 +81,7 @@ def perturbed(seed=0, noise_nm=0.005, voluntary_nm=0.0):
 
 def fitted(epoch):
     signals = epoch_signals(epoch, "bandlimited", EstimationSettings())
-    return signals, fit_inertia_damping_stiffness(signals).parameters
+    return signals, fit_inertia_damping_stiffness(signals).value
 
 
 @pytest.fixture(scope="module")
