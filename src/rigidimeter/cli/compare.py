@@ -114,7 +114,7 @@ def compare(
     else:
         read = recordings.read()
         say(read.notices)
-        analysis = analyse_inputs(read)
+        analysis = analyse_inputs(read, recordings.method)
         exit_status = status(read, analysis)
     known = conditions(analysis)
     for option, name in (("--reference", reference), ("--other", other)):

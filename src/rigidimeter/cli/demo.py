@@ -79,7 +79,7 @@ def demo(
     _simulate(settings, sessions)
     read = Recordings(sessions).read()
     say(read.notices)
-    analysis = analyse_inputs(read)
+    analysis = analyse_inputs(read, "auto")
     exit_status = status(read, analysis)
     write_estimates_json(out / "estimates.json", analysis)
     page = make_report("A virtual study of elbow rigidity", read, analysis, out / "report")

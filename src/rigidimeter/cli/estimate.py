@@ -50,7 +50,7 @@ def estimate(
     keep_inputs((json_out, csv_out), recordings.paths)
     read = recordings.read()
     say(read.notices)
-    analysis = analyse_inputs(read)
+    analysis = analyse_inputs(read, recordings.method)
     if json_out is not None:
         write_estimates_json(json_out, analysis)
     if csv_out is not None:

@@ -12,11 +12,11 @@ import typer
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score, Task
+    from rigidimeter.recording import Recording
+    from rigidimeter.records import Analysis, Fit, Notice, Score, Task
     from rigidimeter.settings import Settings
 
 __all__ = [
-    "Inputs",
     "Recordings",
     "adjusted",
     "analyse_inputs",
@@ -24,17 +24,6 @@ __all__ = [
     "say",
     "status",
 ]
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Everything that was read: epochs, what to say about them, and the settings to use."""
-
-    epochs: tuple[Epoch, ...]
-    notices: tuple[Notice, ...]
-    settings: Settings
-    paths: tuple[Path, ...]
-    method: str
 
 
 @dataclass(frozen=True)
@@ -57,76 +46,27 @@ class Recordings:
     controller: tuple[float, float] | None = None
     settings: Path | None = None
 
-    def read(self) -> Inputs:
-        """Read every input; one that cannot be read becomes a notice of level `error`.
+    def read(self) -> Recording:
+        """Read every input, with the band and the controller of the options in its settings.
 
         Raises
         ------
         UserError
             If an option is wrong, or not one input can be read.
         """
-        return _read(self)
+        from rigidimeter.recording import read
 
-
-def _read(wanted: Recordings) -> Inputs:
-    from rigidimeter.recording import (
-        ReadOptions,
-        is_session,
-        read_recording,
-        read_session,
-        session_settings,
-    )
-    from rigidimeter.records import Notice
-    from rigidimeter.settings import load_settings
-
-    conditions = _conditions(wanted.condition or [""], len(wanted.paths))
-    options = ReadOptions(
-        columns=_columns(wanted.column or []),
-        rate_hz=_positive("--rate-hz", wanted.rate_hz),
-        reaction=wanted.reaction,
-        epoch_length_s=_positive("--epoch-length-s", wanted.epoch_length_s),
-        task=_task(wanted.task),
-    )
-    epochs: list[Epoch] = []
-    notices: list[Notice] = []
-    first: Settings | None = None
-    chosen = load_settings(wanted.settings) if wanted.settings is not None else None
-    for path, condition in dict(zip(wanted.paths, conditions, strict=True)).items():
-        try:
-            if is_session(path):
-                recorded = session_settings(path)
-                if chosen is None:
-                    chosen = recorded
-                if first is None:
-                    first = recorded
-                differing = [
-                    name
-                    for name in ("controller", "guard", "prbs", "sinusoid", "rig")
-                    + (() if wanted.settings else ("estimation", "scores"))
-                    if getattr(recorded, name) != getattr(first, name)
-                ]
-                if differing:
-                    notices.append(
-                        Notice(
-                            "warning",
-                            f"{path}: was recorded with other settings than the first session in "
-                            f"{', '.join(differing)}; the analysis and the report use those of the "
-                            "first for all",
-                        )
-                    )
-                found, remarks = read_session(path)
-            else:
-                found, remarks = read_recording(path, replace(options, condition=condition))
-        except UserError as error:
-            notices.append(Notice("error", str(error)))
-            continue
-        epochs += found
-        notices += remarks
-    if not epochs:
-        raise UserError(" / ".join(n.text for n in notices) or "no epoch was found")
-    chosen = adjusted(chosen if chosen is not None else load_settings(None), wanted)
-    paths = tuple(dict.fromkeys(wanted.paths))
-    return Inputs(tuple(epochs), tuple(notices), chosen, paths, wanted.method)
+        recording = read(
+            self.paths,
+            column=_columns(self.column or []),
+            rate_hz=self.rate_hz,
+            reaction=self.reaction,
+            epoch_length_s=self.epoch_length_s,
+            condition=self.condition,
+            task=cast("Task | None", self.task),
+            settings=self.settings,
+        )
+        return replace(recording, settings=adjusted(recording.settings, self))
 
 
 def adjusted(settings: Settings, wanted: Recordings) -> Settings:
@@ -144,7 +84,7 @@ def adjusted(settings: Settings, wanted: Recordings) -> Settings:
     return settings
 
 
-def analyse_inputs(inputs: Inputs) -> Analysis:
+def analyse_inputs(recording: Recording, method: str) -> Analysis:
     """Fit and score with progress.
 
     Raises
@@ -156,11 +96,12 @@ def analyse_inputs(inputs: Inputs) -> Analysis:
     from rigidimeter.estimation import METHODS
     from rigidimeter.study import analyse
 
-    method = inputs.method
     if method not in METHODS:
         raise UserError(f"--method {method}: there is no such method; known: {', '.join(METHODS)}")
-    with Meter("estimate", 2 * len(inputs.epochs)) as meter:
-        return analyse(inputs.epochs, inputs.settings, method, progress=lambda _: meter.advance())
+    with Meter("estimate", 2 * len(recording.epochs)) as meter:
+        return analyse(
+            recording.epochs, recording.settings, method, progress=lambda _: meter.advance()
+        )
 
 
 def keep_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:
@@ -193,12 +134,12 @@ def say(notices: tuple[Notice, ...]) -> None:
         typer.echo(f"{notice.level}: {notice.text}", err=True)
 
 
-def status(inputs: Inputs, analysis: Analysis) -> int:
+def status(recording: Recording, analysis: Analysis) -> int:
     """Say what failed or looks wrong; return 1 if an input was bad or an epoch failed, else 0."""
     from rigidimeter.study import doubts
 
     say(doubts(analysis))
-    bad = any(notice.level == "error" for notice in inputs.notices)
+    bad = recording.failed
     results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
     for result in results:
         if result.outcome.kind == "failed":
@@ -244,26 +185,3 @@ def _columns(pairs: list[str]) -> dict[str, str]:
             raise UserError(f"--column {pair}: {name} was already given as {columns[name]}")
         columns[name] = column
     return columns
-
-
-def _conditions(names: list[str], n_inputs: int) -> list[str]:
-    if len(names) == 1:
-        return names * n_inputs
-    if len(names) != n_inputs:
-        raise UserError(
-            f"--condition was given {len(names)} times for {n_inputs} inputs; give it once for all "
-            "of them, or once for each in their order"
-        )
-    return names
-
-
-def _positive(option: str, value: float | None) -> float | None:
-    if value is not None and not 0 < value < float("inf"):
-        raise UserError(f"{option} {value:g}: must be a number greater than 0")
-    return value
-
-
-def _task(task: str | None) -> Task | None:
-    if task not in (None, "prbs", "sinusoid"):
-        raise UserError(f"--task {task}: must be prbs or sinusoid")
-    return cast("Task | None", task)

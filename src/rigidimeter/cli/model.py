@@ -86,7 +86,7 @@ def model(
     keep_inputs((json_out,), recordings.paths)
     read = recordings.read()
     say(read.notices)
-    bad = any(notice.level == "error" for notice in read.notices)
+    bad = read.failed
     rows: list[dict[str, Any]] = []
     lines: list[str] = []
     perturbed = [e for e in read.epochs if task_of(e, read.settings) != "sinusoid"]

@@ -62,7 +62,7 @@ def report(
         raise typer.Exit(found.status)
     read = recordings.read()
     say(read.notices)
-    analysis = analyse_inputs(read)
+    analysis = analyse_inputs(read, recordings.method)
     exit_status = status(read, analysis)
     page = make_report(title or TITLE, read, analysis, out)
     write_estimates_json(out / "estimates.json", analysis)

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.cli.inputs import Inputs
+    from rigidimeter.recording import Recording
     from rigidimeter.records import Analysis
     from rigidimeter.study import Study
 
 __all__ = ["make_report", "write_page"]
 
 
-def make_report(title: str, inputs: Inputs, analysis: Analysis, out: Path) -> Path:
+def make_report(title: str, recording: Recording, analysis: Analysis, out: Path) -> Path:
     """Compare the first two conditions and write the report; return the page's path.
 
     Raises
@@ -28,12 +28,12 @@ def make_report(title: str, inputs: Inputs, analysis: Analysis, out: Path) -> Pa
 
     made = Study(
         title=title,
-        settings=inputs.settings,
-        epochs=inputs.epochs,
+        settings=recording.settings,
+        epochs=recording.epochs,
         analysis=analysis,
         comparisons=compare(analysis),
-        notices=inputs.notices,
-        provenance=provenance(inputs.paths, inputs.settings),
+        notices=recording.notices,
+        provenance=provenance(recording.paths, recording.settings),
     )
     return write_page(made, out)
 

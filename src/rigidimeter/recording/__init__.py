@@ -10,6 +10,7 @@ from rigidimeter.recording.estimate_files import (
     write_text,
 )
 from rigidimeter.recording.formats import ReadOptions, Table, read_recording, read_table
+from rigidimeter.recording.recording import Recording, read
 from rigidimeter.recording.recovery import Recovery, recover
 from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
 from rigidimeter.recording.session_folder import SessionWriter, read_manifest
@@ -17,11 +18,13 @@ from rigidimeter.recording.session_folder import SessionWriter, read_manifest
 __all__ = [
     "ESTIMATES_SCHEMA",
     "ReadOptions",
+    "Recording",
     "Recovery",
     "SessionWriter",
     "Table",
     "estimates_document",
     "is_session",
+    "read",
     "read_estimates",
     "read_manifest",
     "read_recording",

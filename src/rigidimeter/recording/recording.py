@@ -1,0 +1,160 @@
+"""`read`: session folders and files of any known format become one `Recording`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.formats import ReadOptions, read_recording
+from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
+from rigidimeter.records import Epoch, Notice, Task
+from rigidimeter.settings import Settings, load_settings
+
+__all__ = ["Recording", "read"]
+
+_RECORDED_WITH = ("controller", "guard", "prbs", "sinusoid", "rig")
+_ANALYSED_WITH = ("estimation", "scores")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What was read: epochs, what to say of them, and the settings to analyse them with.
+
+    Parameters
+    ----------
+    epochs : tuple of Epoch
+        In the order of the paths and, within each, of the file; at least one.
+    notices : tuple of Notice
+        What was wrong or doubtful. A path that could not be read has one of level `error`.
+    settings : Settings
+        Those given, else those of the first session folder, else the defaults.
+    paths : tuple of Path
+        What was asked for, each once.
+    """
+
+    epochs: tuple[Epoch, ...]
+    notices: tuple[Notice, ...]
+    settings: Settings
+    paths: tuple[Path, ...]
+
+    @property
+    def failed(self) -> bool:
+        """Whether something that was asked for could not be read."""
+        return any(notice.level == "error" for notice in self.notices)
+
+
+def read(
+    paths: str | Path | Sequence[str | Path],
+    *,
+    column: Mapping[str, str] | None = None,
+    rate_hz: float | None = None,
+    reaction: bool = False,
+    epoch_length_s: float | None = None,
+    condition: str | Sequence[str] | None = None,
+    task: Task | None = None,
+    settings: Settings | str | Path | None = None,
+) -> Recording:
+    """Read session folders and files into one recording.
+
+    What cannot be read becomes a notice of level `error`; the rest is read all the same.
+
+    Parameters
+    ----------
+    paths : path or sequence of paths
+        Session folders, or files of any format in `rigidimeter.recording.formats.READERS`.
+    column : mapping of str to str, optional
+        Standard name to the file's own name of a column, as in ``{"torque_nm": "Fz"}``.
+    rate_hz : float, optional
+        Sampling rate in Hz of files without a time column.
+    reaction : bool
+        The torque is what the joint does to the robot, the negative of what drives the joint.
+    epoch_length_s : float, optional
+        Cut files without an epoch column into epochs of this length, in s.
+    condition : str or sequence of str, optional
+        Condition of files without a condition column: one for all, or one for each path.
+    task : {"prbs", "sinusoid"}, optional
+        Task of files without a task column.
+    settings : Settings or path, optional
+        Settings for the analysis, or a TOML file of them. Default: those with which the first
+        session folder was recorded, else the built-in ones.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    UserError
+        If an argument is wrong, or if nothing could be read.
+    """
+    asked = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
+    conditions = _conditions(condition, len(asked))
+    if task not in (None, "prbs", "sinusoid"):
+        raise UserError(f"--task {task}: must be prbs or sinusoid")
+    columns = dict(column or {})
+    rate_hz = _positive("--rate-hz", rate_hz)
+    epoch_length_s = _positive("--epoch-length-s", epoch_length_s)
+    chosen = settings if isinstance(settings, Settings) else None
+    if isinstance(settings, str | Path):
+        chosen = load_settings(Path(settings))
+    compared = _RECORDED_WITH if chosen is not None else (*_RECORDED_WITH, *_ANALYSED_WITH)
+    first: Settings | None = None
+    epochs: list[Epoch] = []
+    notices: list[Notice] = []
+    for path, name in dict(zip(asked, conditions, strict=True)).items():
+        try:
+            if is_session(path):
+                recorded = session_settings(path)
+                first = first or recorded
+                notices += _about_settings(path, recorded, first, compared)
+                found, remarks = read_session(path)
+            else:
+                options = ReadOptions(columns, rate_hz, reaction, epoch_length_s, name, task)
+                found, remarks = read_recording(path, options)
+        except UserError as error:
+            notices.append(Notice("error", str(error)))
+            continue
+        epochs += found
+        notices += remarks
+    if not epochs:
+        raise UserError(" / ".join(n.text for n in notices) or "no epoch was found")
+    return Recording(
+        tuple(epochs),
+        tuple(notices),
+        chosen or first or load_settings(None),
+        tuple(dict.fromkeys(asked)),
+    )
+
+
+def _about_settings(
+    path: Path, recorded: Settings, first: Settings, compared: Sequence[str]
+) -> list[Notice]:
+    differing = [name for name in compared if getattr(recorded, name) != getattr(first, name)]
+    if not differing:
+        return []
+    text = (
+        f"{path}: was recorded with other settings than the first session in "
+        f"{', '.join(differing)}; the analysis and the report use those of the first for all"
+    )
+    return [Notice("warning", text)]
+
+
+def _conditions(condition: str | Sequence[str] | None, n_paths: int) -> list[str]:
+    names = [condition or ""] if condition is None or isinstance(condition, str) else [*condition]
+    if len(names) == 1:
+        return names * n_paths
+    if len(names) != n_paths:
+        raise UserError(
+            f"--condition was given {len(names)} times for {n_paths} inputs; give it once for all "
+            "of them, or once for each in their order"
+        )
+    return names
+
+
+def _positive(option: str, value: float | None) -> float | None:
+    if value is not None and not 0 < value < math.inf:
+        raise UserError(f"{option} {value:g}: must be a number greater than 0")
+    return value
