@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from benchmarks.paired import Row, in_ms, paired
-from rigidimeter.acquisition import ControlLoop, SimulatedClock
+from rigidimeter.acquisition import ControlLoop, SimulatedClock, perturb
 from rigidimeter.control import BiquadState, admittance_step, biquad_step
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.dynamics import DriveState, arm_torque_nm, drive_step
@@ -171,7 +171,7 @@ def against_loop() -> Row:
     def interpreted() -> None:
         rig = SimulatedRig(SETTINGS.rig, SETTINGS.subject["OFF"], epoch_generator(1, 0))
         rig.enable()
-        ControlLoop(SETTINGS, rig, SimulatedClock(), [].append).perturb(1, wanted)
+        perturb(ControlLoop(SETTINGS, rig, SimulatedClock(), [].append), 1, wanted)
 
     name = "batch epoch of 20 s at 1 kHz with its random numbers / the loop in the interpreter"
     return in_ms(name, paired(lambda: list(simulate_chunks(SETTINGS, 1)), interpreted))

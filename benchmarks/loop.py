@@ -25,9 +25,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigidimeter.acquisition.processes.deadline import DeadlineClock
+from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Recording
-from rigidimeter.acquisition.processes.shared_status import Board
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.acquisition.processes.supervise import (
     Ended,
     LoopSide,
@@ -53,21 +53,21 @@ Workload = Callable[[Settings, float], LoopTarget]
 
 
 class Timed:
-    """What is outside a session, and an order to end it after some time."""
+    """What is supervision a session, and an order to end it after some time."""
 
     def __init__(self, side: LoopSide, duration_s: float) -> None:
         self.attended = False
-        self._outside, self._end_s, self._now_s = side.outside, duration_s, 0.0
+        self._supervision, self._end_s, self._now_s = side.supervision, duration_s, 0.0
 
     def cause(self, now_s: float) -> int:
         self._now_s = now_s
-        return self._outside.cause(now_s)
+        return self._supervision.cause(now_s)
 
     def order(self) -> Order:
         if self._now_s >= self._end_s:
             self._end_s = math.inf
             return Order(Command.ABORT)
-        return self._outside.order()
+        return self._supervision.order()
 
 
 def virtual_session(settings: Settings, duration_s: float, side: LoopSide) -> None:
@@ -76,7 +76,7 @@ def virtual_session(settings: Settings, duration_s: float, side: LoopSide) -> No
     first = settings.subject[protocol.epochs[0].condition]
     rig = SimulatedRig(settings.rig, first, np.random.default_rng(settings.seed))
     clock = DeadlineClock()
-    outside = Timed(side, duration_s)
+    supervision = Timed(side, duration_s)
     side.ready()
     run_session(
         protocol,
@@ -84,7 +84,7 @@ def virtual_session(settings: Settings, duration_s: float, side: LoopSide) -> No
         rig,
         clock,
         side.sink,
-        outside=outside,
+        supervision=supervision,
         state_changed=side.sink.state_changed,
     )
 
@@ -142,8 +142,8 @@ def measure(
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     beside: list[subprocess.Popen[str]] = []
 
-    def console(board: Board) -> None:
-        status = board.status()
+    def console(shared_status: SharedStatus) -> None:
+        status = shared_status.loop()
         if not beside and status is not None and status.time_s >= SKIPPED_S:
             beside.append(cyclictest(rate_hz, seconds - SKIPPED_S, cpu))
 

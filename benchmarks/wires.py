@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks import loop
 from rigidimeter.acquisition import run_session
-from rigidimeter.acquisition.processes.deadline import DeadlineClock
+from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Recording
 from rigidimeter.acquisition.processes.supervise import LoopSide, LoopTarget, Realtime, supervise
 from rigidimeter.devices.rigfile import load_rig
@@ -67,7 +67,7 @@ def session_on(
     try:
         rig.connect()
         side.sink.event("rig_configured", **rig.configure())
-        outside = loop.Timed(side, duration_s)
+        supervision = loop.Timed(side, duration_s)
         side.ready()
         run_session(
             protocol,
@@ -75,7 +75,7 @@ def session_on(
             rig,
             clock,
             side.sink,
-            outside=outside,
+            supervision=supervision,
             zero_first=True,
             state_changed=side.sink.state_changed,
         )

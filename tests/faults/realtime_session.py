@@ -10,7 +10,7 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from rigidimeter.acquisition.processes.deadline import DeadlineClock
+from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.shared_status import Condition, Role
 from rigidimeter.acquisition.processes.supervise import Realtime, supervise
@@ -36,7 +36,7 @@ def ticks(duration_s, side):
         due_s = tick / RATE_HZ
         now_s = clock.wait_until(due_s)
         sink.sample(Sample(tick, now_s, now_s - due_s, 1, 0.0, *[float(tick)] * 8, 0))
-        cause = side.outside.cause(now_s)
+        cause = side.supervision.cause(now_s)
         tick += 1
     outcome, reason = ("fail", Cause(cause).sentence) if cause else ("success", "")
     sink.epoch_ended(1, tick / RATE_HZ, outcome, reason)
@@ -47,16 +47,16 @@ def main() -> None:
     folder, duration_s = Path(sys.argv[1]), float(sys.argv[2])
     seen: dict[str, object] = {}
 
-    def console(board) -> None:
-        pids = {role.name: board.pid(role) for role in Role}
+    def console(shared_status) -> None:
+        pids = {role.name: shared_status.pid(role) for role in Role}
         if seen.get("pids") != pids:
             seen["pids"] = pids
             part = folder.with_name("pids.part")
             part.write_text(json.dumps(pids))
             part.replace(folder.with_name("pids.json"))
-        if board.condition(Role.RECORDER) is Condition.TROUBLE:
-            seen["trouble"] = board.note(Role.RECORDER)
-        status, live = board.status(), board.live()
+        if shared_status.condition(Role.RECORDER) is Condition.TROUBLE:
+            seen["trouble"] = shared_status.note(Role.RECORDER)
+        status, live = shared_status.loop(), shared_status.live()
         if status is not None:
             seen["tick"] = status.tick
         if live is not None:

@@ -26,8 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigidimeter.acquisition.clock import SimulatedClock
-from rigidimeter.acquisition.processes.deadline import DeadlineClock
+from rigidimeter.acquisition.clock import DeadlineClock, SimulatedClock
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.devices.ascii.drive import AsciiDrive
 from rigidimeter.devices.ati.rdt import AtiRdt

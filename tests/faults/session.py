@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.acquisition import run_session
-from rigidimeter.acquisition.processes.deadline import DeadlineClock
+from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
-from rigidimeter.acquisition.processes.shared_status import Board, Condition, Role
+from rigidimeter.acquisition.processes.shared_status import Condition, Role, SharedStatus
 from rigidimeter.acquisition.processes.supervise import LoopSide, Realtime, supervise
 from rigidimeter.devices.rigfile import load_rig
 from rigidimeter.experiment import plan
@@ -77,7 +77,7 @@ def run_loop(settings: Settings, rig_path: Path, side: LoopSide) -> None:
         rig.connect()
         rig.configure()
         side.ready()
-        run_session(protocol, settings, rig, clock, side.sink, outside=side.outside)
+        run_session(protocol, settings, rig, clock, side.sink, supervision=side.supervision)
     finally:
         rig.close()
 
@@ -87,10 +87,10 @@ class Console:
 
     said = False
 
-    def __call__(self, board: Board) -> None:
-        if not self.said and board.condition(Role.LOOP) is Condition.RUNNING:
+    def __call__(self, shared_status: SharedStatus) -> None:
+        if not self.said and shared_status.condition(Role.LOOP) is Condition.RUNNING:
             self.said = True
-            print(json.dumps({role.name: board.pid(role) for role in Role}), flush=True)
+            print(json.dumps({role.name: shared_status.pid(role) for role in Role}), flush=True)
 
 
 def main(rig: str, folder: str) -> None:

@@ -19,8 +19,8 @@ from tests.faults.trials import (
 )
 
 from rigidimeter.acquisition.processes.ring import SampleRing
-from rigidimeter.acquisition.processes.shared_status import Board, Role
-from rigidimeter.acquisition.processes.sink import BoardOutside
+from rigidimeter.acquisition.processes.shared_status import Role, SharedStatus
+from rigidimeter.acquisition.processes.sink import SharedSupervision
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order
 from rigidimeter.devices.base import DeviceError
 from rigidimeter.devices.composed import ComposedRig
@@ -139,15 +139,15 @@ def test_fault_18_emergency_stop(rig, tmp_path, measured):
 
 
 class SharedDesk:
-    """The board and the ring as the loop sees them, on the clock of the trial."""
+    """The shared_status and the ring as the loop sees them, on the clock of the trial."""
 
     def __init__(self, made, **options):
-        self.board, self.ring = Board.create(), SampleRing.create(100_000)
+        self.shared_status, self.ring = SharedStatus.create(), SampleRing.create(100_000)
         now_ns = lambda: 10**9 + round(1e9 * made.clock.now_s())  # noqa: E731
-        self.board._now_ns = now_ns
+        self.shared_status._now_ns = now_ns
         self.suspended_s = 0.0
-        self.outside = BoardOutside(
-            self.board,
+        self.supervision = SharedSupervision(
+            self.shared_status,
             self.ring,
             now_ns=now_ns,
             boot_ns=lambda: now_ns() + round(1e9 * self.suspended_s),
@@ -159,10 +159,10 @@ class SharedDesk:
 
     def cause(self, now_s):
         for role in self.alive:
-            self.board.beat(role)
+            self.shared_status.beat(role)
         if self.records:
             self.ring.recorded = self.ring.written
-        return self.outside.cause(now_s)
+        return self.supervision.cause(now_s)
 
     def order(self):
         return NOTHING
@@ -179,7 +179,7 @@ class SharedDesk:
         return writer
 
     def close(self):
-        for memory in (self.board.memory, self.ring.memory):
+        for memory in (self.shared_status.memory, self.ring.memory):
             memory.unlink()
             memory.close()
 
@@ -341,7 +341,7 @@ def test_fault_20_interrupt(rig, tmp_path, measured):
 
 @pytest.mark.parametrize("rig", RIGS)
 def test_fault_20_told_to_end(rig, tmp_path, measured):
-    """What SIGTERM comes to in the loop: a flag on the board, a cause for the guard."""
+    """What SIGTERM comes to in the loop: a flag on the shared_status, a cause for the guard."""
     with bench(rig) as made:
         desk = Desk(causes={round(AT_S * made.rate_hz): Cause.SIGNAL})
         trial = run(made, tmp_path / "s", desk=desk)

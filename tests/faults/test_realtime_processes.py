@@ -113,7 +113,7 @@ def test_nothing_happens(session):
     ended = run.ended()
     assert (ended["outcome"], ended["loop_exit"], ended["remarks"]) == ("success", 0, [])
     assert run.ticks().size == 500
-    assert (ended["salvaged"], ended["samples"]) == (None, 500)
+    assert (ended["recovered"], ended["samples"]) == (None, 500)
     assert "did not answer" not in run.said
     assert 400 < ended["seen"]["tick"] < 500
     assert [ending[1] for ending in run.endings()] == ["success", "success"]
@@ -134,8 +134,8 @@ def test_the_recorder(session, number):
     assert ended["reason"] == "the recorder no longer answered"
     assert ended["loop_exit"] == 0
     # The loop went on for a second, and all of that was brought in from the ring.
-    assert ended["salvaged"]["samples"] >= 400
-    assert ended["salvaged"]["missing_samples"] == 0
+    assert ended["recovered"]["samples"] >= 400
+    assert ended["recovered"]["missing_samples"] == 0
     run.ticks()
     assert {ending[2] for ending in run.endings()} == {"the recorder no longer answered"}
 
@@ -152,7 +152,7 @@ def test_the_loop(session, number):
     }[number]
     assert run.endings() == [("epoch_ended", "fail", why), ("session_ended", "fail", why)]
     assert (ended["outcome"], ended["reason"]) == ("fail", why)
-    assert ended["salvaged"] is None
+    assert ended["recovered"] is None
     assert not alive(pid)
     run.ticks()
 

@@ -181,7 +181,7 @@ def run(
     result, error = None, None
     try:
         result = run_session(
-            protocol, settings, tap, bench.clock, sink(writer), outside=desk, **options
+            protocol, settings, tap, bench.clock, sink(writer), supervision=desk, **options
         )
     except Exception as caught:
         error = caught

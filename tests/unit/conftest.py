@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition.clock import SimulatedClock
-from rigidimeter.acquisition.control_modes import ControlLoop
+from rigidimeter.acquisition import ControlLoop, SimulatedClock, perturb
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import Settings, parse_settings
@@ -40,7 +39,7 @@ def run_loop() -> Callable[..., dict[str, np.ndarray]]:
         rig.enable()
         samples: list[Sample] = []
         loop = ControlLoop(settings, rig, SimulatedClock(), samples.append)
-        loop.perturb(1, perturbation_nm.tolist())
+        perturb(loop, 1, perturbation_nm.tolist())
         return {
             name: np.array([getattr(sample, name) for sample in samples]) for name in Sample._fields
         }

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from rigidimeter.acquisition.processes.deadline import DeadlineClock
+from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.commissioning import (
     CommissioningRecord,
     Operator,

@@ -1,107 +1,124 @@
-"""What is asked of the joint, tick for tick: to give way, to follow, to return, to stand still.
+"""What is asked of the joint at each tick: to give way, to follow, to return, to stand still.
 
-After missed ticks the controller steps over the time that did pass (at most `LONGEST_STEP` ticks of
-it), and perturbation and position go on where the time is.
+The parameters that may change meanwhile are few and bounded, and a change never makes the loop less
+stable. A heavier or more damped admittance is more stable, a lighter one less. The margin was
+checked for the protocol's own values, so they are the lower bound. The perturbation may only become
+smaller. A change makes no bump: the velocity, the controller's only memory, stays as it is, and
+what follows is limited by the guard like anything else.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
-from rigidimeter.acquisition.clock import Clock
 from rigidimeter.acquisition.run_states import Order
-from rigidimeter.acquisition.supervision import Outside
-from rigidimeter.acquisition.tick import REST, Passage, Recorder, Ticks
-from rigidimeter.control import Admittance, admittance, admittance_step, minimum_jerk, tracking_step
-from rigidimeter.devices.base import Reading, Rig
-from rigidimeter.settings import Settings
+from rigidimeter.acquisition.tick import (
+    LONGEST_STEP,
+    REST,
+    ControlLoop,
+    TickResult,
+    run_ticks,
+    set_admittance,
+)
+from rigidimeter.control import admittance_step, minimum_jerk, tracking_step
+from rigidimeter.devices.base import Reading
+from rigidimeter.settings import ControllerSettings
 
-__all__ = ["REST", "ControlLoop", "Passage"]
+__all__ = ["change_parameter", "follow", "hold", "perturb", "rest"]
 
-LONGEST_STEP = 5
-"""The controller steps over at most so many ticks at once, however many were missed."""
+LARGEST_FACTOR = 10.0
+"""A parameter may grow to so many times the protocol's value."""
 
 
-class ControlLoop(Ticks):
-    """Run stretches of ticks on a rig: the perturbed admittance, or following a position.
+def perturb(loop: ControlLoop, epoch: int, perturbation_nm: Sequence[float]) -> TickResult:
+    """Let the subject move freely while the torque perturbation runs, one value a tick."""
 
-    The arguments are those of `Ticks`.
+    def command(_: Reading, torque_nm: float, k: int) -> tuple[float, float, float]:
+        value = loop.perturbation_scale * perturbation_nm[k]
+        step = loop.admittances[min(loop.elapsed_ticks, LONGEST_STEP) - 1]
+        velocity = loop.guard.velocity_rad_s
+        return admittance_step(step, velocity, value, torque_nm), value, math.nan
+
+    return run_ticks(loop, epoch, len(perturbation_nm), command)
+
+
+def follow(
+    loop: ControlLoop, epoch: int, angle_rad: Sequence[float], velocity_rad_s: Sequence[float]
+) -> TickResult:
+    """Impose a position, one value a tick."""
+
+    def command(reading: Reading, _: float, k: int) -> tuple[float, float, float]:
+        target = angle_rad[k]
+        # The reading is compared with where the target was when it was taken.
+        then = angle_rad[max(k - _age_ticks(loop, reading), 0)]
+        gain = loop.tracking_gain_per_s
+        return tracking_step(gain, then, velocity_rad_s[k], reading.angle_rad), 0.0, target
+
+    return run_ticks(loop, epoch, len(angle_rad), command)
+
+
+def rest(loop: ControlLoop, duration_s: float, return_s: float) -> TickResult:
+    """Return to the initial position by a minimum-jerk motion, then hold it."""
+    start_rad, interval_s = loop.angle_rad, loop.interval_s
+
+    def command(reading: Reading, _: float, k: int) -> tuple[float, float, float]:
+        target, velocity = minimum_jerk(start_rad, return_s, k * interval_s)
+        before_s = max(k - _age_ticks(loop, reading), 0) * interval_s
+        then, _ = minimum_jerk(start_rad, return_s, before_s)
+        gain = loop.tracking_gain_per_s
+        return tracking_step(gain, then, velocity, reading.angle_rad), 0.0, target
+
+    return run_ticks(loop, REST, round(duration_s * loop.rate_hz), command)
+
+
+def hold(
+    loop: ControlLoop, duration_s: float, heard: Callable[[Reading], None] = lambda _: None
+) -> TickResult:
+    """Stand still; `heard` takes every reading."""
+
+    def command(reading: Reading, _: float, __: int) -> tuple[float, float, float]:
+        heard(reading)
+        return 0.0, 0.0, math.nan
+
+    return run_ticks(loop, REST, round(duration_s * loop.rate_hz), command, latched=True)
+
+
+def _age_ticks(loop: ControlLoop, reading: Reading) -> int:
+    return round(loop.tick - reading.motion_time_s * loop.rate_hz)
+
+
+def change_parameter(
+    loop: ControlLoop, protocol: ControllerSettings, order: Order
+) -> dict[str, Any]:
+    """Change a parameter within its bounds; return what happened, for the record.
+
+    Parameters
+    ----------
+    loop : ControlLoop
+    protocol : ControllerSettings
+        The values that the protocol began with.
+    order : Order
     """
-
-    def __init__(
-        self,
-        settings: Settings,
-        rig: Rig,
-        clock: Clock,
-        record: Recorder,
-        progress: Callable[[float], None] = lambda _: None,
-        outside: Outside | None = None,
-        ordered: Callable[[Order], bool] = lambda _: False,
-    ) -> None:
-        super().__init__(settings, rig, clock, record, progress, outside, ordered)
-        controller = settings.controller
-        self._steps = self._admittances(controller.inertia_kg_m2, controller.damping_nm_s_rad)
-        self._tracking_gain = controller.tracking_gain_per_s
-        self.scale = 1.0
-
-    def _admittances(self, inertia_kg_m2: float, damping_nm_s_rad: float) -> list[Admittance]:
-        """Return the steps over one tick, two, and so on."""
-        return [
-            admittance(inertia_kg_m2, damping_nm_s_rad, ticks * self._interval_s)
-            for ticks in range(1, LONGEST_STEP + 1)
-        ]
-
-    def change_controller(self, inertia_kg_m2: float, damping_nm_s_rad: float) -> None:
-        """Go on with another admittance; the velocity, its only memory, stays as it is."""
-        self._steps = self._admittances(inertia_kg_m2, damping_nm_s_rad)
-
-    def perturb(self, epoch: int, perturbation_nm: Sequence[float]) -> Passage:
-        """Let the subject move freely while the torque perturbation runs, one value a tick."""
-
-        def command(_: Reading, torque_nm: float, k: int) -> tuple[float, float, float]:
-            value = self.scale * perturbation_nm[k]
-            step = self._steps[min(self._elapsed, LONGEST_STEP) - 1]
-            velocity = self._guard.velocity_rad_s
-            return admittance_step(step, velocity, value, torque_nm), value, math.nan
-
-        return self._run(epoch, len(perturbation_nm), command)
-
-    def follow(
-        self, epoch: int, angle_rad: Sequence[float], velocity_rad_s: Sequence[float]
-    ) -> Passage:
-        """Impose a position, one value a tick."""
-
-        def command(reading: Reading, _: float, k: int) -> tuple[float, float, float]:
-            target = angle_rad[k]
-            # The reading is compared with where the target was when it was taken.
-            then = angle_rad[max(k - self._age_ticks(reading), 0)]
-            request = tracking_step(self._tracking_gain, then, velocity_rad_s[k], reading.angle_rad)
-            return request, 0.0, target
-
-        return self._run(epoch, len(angle_rad), command)
-
-    def rest(self, duration_s: float, return_s: float) -> Passage:
-        """Return to the initial position along the smoothest way, then hold it."""
-        start_rad = self._angle_rad
-
-        def command(reading: Reading, _: float, k: int) -> tuple[float, float, float]:
-            target, velocity = minimum_jerk(start_rad, return_s, k * self._interval_s)
-            before_s = max(k - self._age_ticks(reading), 0) * self._interval_s
-            then, _ = minimum_jerk(start_rad, return_s, before_s)
-            request = tracking_step(self._tracking_gain, then, velocity, reading.angle_rad)
-            return request, 0.0, target
-
-        return self._run(REST, round(duration_s * self._rate_hz), command)
-
-    def hold(self, duration_s: float, heard: Callable[[Reading], None] = lambda _: None) -> Passage:
-        """Stand still; `heard` takes every reading."""
-
-        def command(reading: Reading, _: float, __: int) -> tuple[float, float, float]:
-            heard(reading)
-            return 0.0, 0.0, math.nan
-
-        return self._run(REST, round(duration_s * self._rate_hz), command, latched=True)
-
-    def _age_ticks(self, reading: Reading) -> int:
-        return round(self._tick - reading.motion_time_s * self._rate_hz)
+    name, value = order.name, order.value
+    facts: dict[str, Any] = {"name": name, "value": value if math.isfinite(value) else None}
+    before = {
+        "inertia_kg_m2": loop.inertia_kg_m2,
+        "damping_nm_s_rad": loop.damping_nm_s_rad,
+        "perturbation_scale": loop.perturbation_scale,
+    }
+    low, high = math.nan, math.nan  # no value lies between them: other parameters may not change
+    if name == "perturbation_scale":
+        low, high = 0.0, 1.0
+    elif name in before:
+        low = getattr(protocol, name)
+        high = LARGEST_FACTOR * low
+    if not low <= value <= high:
+        return {**facts, "refused": f"must be between {low:g} and {high:g}"}
+    if name == "perturbation_scale":
+        loop.perturbation_scale = value
+    else:
+        now = {**before, name: value}
+        set_admittance(loop, now["inertia_kg_m2"], now["damping_nm_s_rad"])
+    return {**facts, "before": before[name]}

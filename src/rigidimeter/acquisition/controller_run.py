@@ -1,7 +1,7 @@
 """How a run is led: its state, what the operator orders, and why it ends.
 
-The operator's orders change the state, the guard's causes end the run or hold it. What comes of it,
-an outcome with a reason, is kept here; what is run is the session's.
+The operator's orders change the state; the guard's causes end the run or hold it. The outcome and
+its reason are kept here. What is run, and in which order, is the session's.
 """
 
 from __future__ import annotations
@@ -9,35 +9,44 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rigidimeter.acquisition.changes import Parameters
 from rigidimeter.acquisition.clock import Clock
-from rigidimeter.acquisition.control_modes import ControlLoop
+from rigidimeter.acquisition.control_modes import change_parameter
 from rigidimeter.acquisition.run_states import Command, Order, Run, State, after
-from rigidimeter.acquisition.supervision import Alone, Outside, Sink
+from rigidimeter.acquisition.supervision import NoSupervision, Sink, Supervision
+from rigidimeter.acquisition.tick import ControlLoop
 from rigidimeter.devices.base import Rig
-from rigidimeter.experiment import PlannedEpoch
 from rigidimeter.guard import Cause, Reaction
 from rigidimeter.recording.session_folder import Ending
 from rigidimeter.settings import Settings
 
-__all__ = ["Conduct"]
+__all__ = ["ControllerRun"]
 
 
-class Conduct:
-    """The loop of a run, and who leads it.
+class ControllerRun:
+    """The loop of a run, its state, and how it ended.
 
     Parameters
     ----------
     settings : Settings
     rig : Rig
     clock : Clock
-    writer : Sink
+    sink : Sink
     progress : callable
         Called with the session time, about once a second of it.
-    outside : Outside
+    supervision : Supervision or None
         Where orders and causes from other processes come from; nobody if not given.
     state_changed : callable
         Called whenever the run changes its state.
+
+    Attributes
+    ----------
+    loop : ControlLoop
+    run : Run
+        The present state, and what is to come.
+    open_epoch : int or None
+        The number of the epoch that runs.
+    outcome, reason, cause : Ending, str, Cause
+        How the run ended; the reason is empty as long as nothing ended it.
     """
 
     def __init__(
@@ -45,91 +54,92 @@ class Conduct:
         settings: Settings,
         rig: Rig,
         clock: Clock,
-        writer: Sink,
+        sink: Sink,
         progress: Callable[[float], None],
-        outside: Outside | None,
+        supervision: Supervision | None,
         state_changed: Callable[[Run], None],
     ) -> None:
-        self._settings = settings
-        self._rig = rig
-        self._writer = writer
-        self._outside = outside or Alone()
+        self._controller = settings.controller
+        self._rig, self._sink = rig, sink
+        self._supervision = supervision or NoSupervision()
         self._state_changed = state_changed
-        self._loop = ControlLoop(
-            settings, rig, clock, writer.sample, progress, self._outside, self._obey
+        self.loop = ControlLoop(
+            settings, rig, clock, sink.sample, progress, self._supervision, self._take_order
         )
-        self._parameters = Parameters(settings.controller)
-        self._state = Run()
-        self._current: PlannedEpoch | None = None
-        self._outcome: Ending = "success"
-        self._reason = ""
-        self._cause = Cause.NONE
+        self.run = Run()
+        self.open_epoch: int | None = None
+        self.outcome: Ending = "success"
+        self.reason = ""
+        self.cause = Cause.NONE
 
-    def _in(self, state: State) -> bool:
-        return self._state.state is state
+    def is_in(self, state: State) -> bool:
+        """Whether the run is in a state."""
+        return self.run.state is state
 
-    def _become(self, run: Run) -> None:
-        if run != self._state:
-            self._state = run
+    def change_state(self, run: Run) -> None:
+        """Take a new state, and say so if it differs from the old one."""
+        if run != self.run:
+            self.run = run
             self._state_changed(run)
 
-    def _obey(self, order: Order) -> bool:
+    def _take_order(self, order: Order) -> bool:
         """Take an order; return whether the stretch that runs ends now."""
         facts: dict[str, Any] = {}
         if order.command is Command.CHANGE:
-            facts = self._parameters.change(order, self._loop)
-        before = self._state
-        self._become(after(before, order.command))
-        self._writer.event(
+            facts = change_parameter(self.loop, self._controller, order)
+        self.change_state(after(self.run, order.command))
+        self._sink.event(
             "order",
-            time_s=self._loop.time_s,
+            time_s=self.loop.time_s,
             command=order.command.name.lower(),
-            state=self._state.state.name.lower(),
+            state=self.run.state.name.lower(),
             **facts,
         )
         if order.command is Command.HALT:
             self._rig.disable()
-            self._cause, self._outcome = Cause.OPERATOR_HALT, "fail"
-            self._reason = Cause.OPERATOR_HALT.sentence
-        ends_rest = order.command is Command.STOP and self._current is None
-        return self._state.at_once or ends_rest
+            self.fail(Cause.OPERATOR_HALT, Cause.OPERATOR_HALT.sentence)
+        ends_rest = order.command is Command.STOP and self.open_epoch is None
+        return self.run.at_once or ends_rest
 
-    def _failed(self) -> bool:
+    def fail(self, cause: Cause, reason: str) -> None:
+        """End with fail, a cause and a reason."""
+        self.cause, self.outcome, self.reason = cause, "fail", reason
+
+    def stopped_by_guard(self) -> bool:
         """Whether the guard stopped the rig; the reason is kept."""
-        if self._loop.reaction <= Reaction.HOLD:
+        if self.loop.reaction <= Reaction.HOLD:
             return False
-        self._cause = self._loop.cause
-        self._outcome = "fail"
-        self._reason = f"the guard stopped the rig: {self._cause.sentence}"
-        self._become(Run(State.FAULTED))
+        cause = self.loop.cause
+        self.fail(cause, f"the guard stopped the rig: {cause.sentence}")
+        self.change_state(Run(State.FAULTED))
         return True
 
-    def _held(self) -> bool:
-        """If the guard holds the rig, pause; without an operator that is the end."""
-        if self._loop.reaction is Reaction.NONE:
+    def may_go_on(self) -> bool:
+        """Whether the run may go on. Where the guard stopped it or holds it unattended, it ends.
+
+        Where the guard holds the rig and an operator is there, the run pauses.
+        """
+        if self.stopped_by_guard():
+            return False
+        if self.loop.reaction is Reaction.NONE or self.is_in(State.STOPPING):
             return True
-        if self._state.state is State.STOPPING:
+        if self._supervision.attended:
+            self.change_state(Run(State.PAUSED, stop_next=self.run.stop_next))
             return True
-        if self._outside.attended:
-            self._become(Run(State.PAUSED, stop_next=self._state.stop_next))
-            return True
-        self._cause = self._loop.cause
-        self._outcome = "fail"
-        self._reason = (
-            f"the guard held the rig and nobody was there to go on: {self._cause.sentence}"
-        )
+        cause = self.loop.cause
+        self.fail(cause, f"the guard held the rig and nobody was there to go on: {cause.sentence}")
         return False
 
-    def _conclude(self, left: int) -> None:
+    def conclude(self, left: int) -> None:
         """Say how the session ended where nothing has said so yet, with so many epochs left."""
-        if self._reason:
+        if self.reason:
             return
-        if self._state.state is State.STOPPING:
-            what = "aborted" if self._state.aborted else "stopped"
-            self._reason = f"{what} by the operator with {left} epochs left"
-            self._outcome = "abort" if self._state.aborted else "success"
+        if self.is_in(State.STOPPING):
+            what = "aborted" if self.run.aborted else "stopped"
+            self.reason = f"{what} by the operator with {left} epochs left"
+            self.outcome = "abort" if self.run.aborted else "success"
         elif left:
-            self._outcome, self._reason = "fail", f"ended with {left} epochs left"
-        elif self._loop.reaction is Reaction.HOLD:
-            self._cause = self._loop.cause
-            self._reason = f"the guard held the rig in the last epoch: {self._cause.sentence}"
+            self.outcome, self.reason = "fail", f"ended with {left} epochs left"
+        elif self.loop.reaction is Reaction.HOLD:
+            self.cause = self.loop.cause
+            self.reason = f"the guard held the rig in the last epoch: {self.cause.sentence}"

@@ -3,34 +3,37 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from rigidimeter.acquisition.clock import Clock
-from rigidimeter.acquisition.control_modes import Passage
-from rigidimeter.acquisition.controller_run import Conduct
+from rigidimeter.acquisition.control_modes import follow, hold, perturb, rest
+from rigidimeter.acquisition.controller_run import ControllerRun
 from rigidimeter.acquisition.run_states import Command, Run, State, after, epoch_over
-from rigidimeter.acquisition.supervision import Outside, Sink
-from rigidimeter.acquisition.zeroing import Zeroing
-from rigidimeter.devices.base import Rig
+from rigidimeter.acquisition.supervision import Sink, Supervision
+from rigidimeter.acquisition.tick import ramp_to_rest, skip_passed_ticks
+from rigidimeter.devices.base import Reading, Rig
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import PlannedEpoch, Protocol, prbs_nm, sinusoid
-from rigidimeter.guard import Cause, Reaction, why_ended
+from rigidimeter.guard import Cause, Reaction, released, why_ended
 from rigidimeter.recording.session_folder import Ending
-from rigidimeter.settings import Settings
+from rigidimeter.settings import Settings, ZeroingSettings
 
 __all__ = ["SessionResult", "run_session"]
 
 BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
-Progress = Callable[[float], None]
 
 LOOK_S = 0.1
 """A paused run looks so often whether it may go on."""
 
 BRAKE_S = 0.1
 """For so long a drive that left its state brakes by its own ramp before its power goes."""
+
+FEWEST_ZEROING_SAMPLES = 10
+"""The standard deviation of fewer samples is not the sensor's noise."""
 
 
 @dataclass(frozen=True)
@@ -44,16 +47,37 @@ class SessionResult:
     cause: Cause = Cause.NONE
 
 
+@dataclass
+class _Session:
+    """What is left to run, on what, and how it goes.
+
+    What an epoch imposes is computed before the first tick: it would make a tick late.
+    """
+
+    settings: Settings
+    rig: Rig
+    sink: Sink
+    run: ControllerRun
+    queue: deque[PlannedEpoch]
+    next_number: int
+    before_epoch: BeforeEpoch
+    perturbation_nm: list[float]
+    angle_rad: list[float]
+    velocity_rad_s: list[float]
+    epochs_run: int = 0
+    epochs_good: int = 0
+
+
 def run_session(
     protocol: Protocol,
     settings: Settings,
     rig: Rig,
     clock: Clock,
-    writer: Sink,
+    sink: Sink,
     *,
     before_epoch: BeforeEpoch = lambda _: {},
-    progress: Progress = lambda _: None,
-    outside: Outside | None = None,
+    progress: Callable[[float], None] = lambda _: None,
+    supervision: Supervision | None = None,
     zero_first: bool = False,
     state_changed: Callable[[Run], None] = lambda _: None,
 ) -> SessionResult:
@@ -69,210 +93,227 @@ def run_session(
     rig : Rig
         Connected and configured.
     clock : Clock
-    writer : Sink
+    sink : Sink
         Closed on return.
     before_epoch : callable
         Called while the arm rests, before each epoch; what it returns is stored with the epoch.
     progress : callable
         Called with the session time, about once a second of it.
-    outside : Outside
+    supervision : Supervision
         Where orders and causes from other processes come from; nobody if not given.
     zero_first : bool
         Whether to zero the torque sensor, and check its noise, before the first epoch.
     state_changed : callable
         Called whenever the run changes its state.
     """
+    run = ControllerRun(settings, rig, clock, sink, progress, supervision, state_changed)
+    queue, rate_hz = deque(protocol.epochs), settings.rig.tick_rate_hz
+    angle_rad, velocity_rad_s = sinusoid(settings.sinusoid, rate_hz)
     session = _Session(
-        protocol, settings, rig, clock, writer, before_epoch, progress, outside, state_changed
+        settings,
+        rig,
+        sink,
+        run,
+        queue,
+        max((epoch.number for epoch in protocol.epochs), default=0) + 1,
+        before_epoch,
+        prbs_nm(settings.prbs, rate_hz).tolist(),
+        angle_rad.tolist(),
+        velocity_rad_s.tolist(),
     )
-    return session.run(zero_first)
+    sink.session_started()
+    try:
+        run.change_state(after(run.run, Command.START))
+        rig.enable()
+        # A device may take long to come up. The clock is not set back for that: it is the drivers'
+        # clock too, and their heartbeats would cease meanwhile.
+        skip_passed_ticks(run.loop)
+        if zero_first:
+            sink.event("rig_enabled", time_s=run.loop.time_s, origin_rad=rig.origin_rad)
+        if not zero_first or _zero_sensor(session):
+            _run_epochs(session)
+        run.conclude(len(queue))
+    except KeyboardInterrupt:
+        run.outcome, run.reason = "abort", "interrupted by the operator"
+    except Exception as error:
+        plain = isinstance(error, UserError)
+        reason = str(error) if plain else f"{type(error).__name__}: {error}"
+        run.fail(run.cause or Cause.SOFTWARE, reason)
+        raise
+    finally:
+        _close(session)
+    return SessionResult(
+        run.outcome, run.reason, session.epochs_run, session.epochs_good, run.cause
+    )
 
 
-class _Session(Conduct):
-    """One run; see `run_session`."""
-
-    def __init__(
-        self,
-        protocol: Protocol,
-        settings: Settings,
-        rig: Rig,
-        clock: Clock,
-        writer: Sink,
-        before_epoch: BeforeEpoch,
-        progress: Progress,
-        outside: Outside | None,
-        state_changed: Callable[[Run], None],
-    ) -> None:
-        super().__init__(settings, rig, clock, writer, progress, outside, state_changed)
-        self._before_epoch = before_epoch
-        self._perturbation = prbs_nm(settings.prbs, settings.rig.tick_rate_hz).tolist()
-        self._angle, self._velocity = (
-            values.tolist() for values in sinusoid(settings.sinusoid, settings.rig.tick_rate_hz)
-        )
-        self._queue = deque(protocol.epochs)
-        self._next_number = max((epoch.number for epoch in protocol.epochs), default=0) + 1
-        self._epochs_run = self._epochs_good = 0
-
-    def run(self, zero_first: bool) -> SessionResult:
-        """Run all epochs, whatever comes."""
-        self._writer.session_started()
-        try:
-            self._become(after(self._state, Command.START))
-            self._rig.enable()
-            # A device may take long to come up. The clock is not set back for that: it is the
-            # drivers' clock too, and their heartbeats would cease meanwhile.
-            self._loop.begin()
-            if zero_first:
-                origin_rad = self._rig.origin_rad
-                self._writer.event("rig_enabled", time_s=self._loop.time_s, origin_rad=origin_rad)
-            if not zero_first or self._zero():
-                self._epochs()
-            self._conclude(len(self._queue))
-        except KeyboardInterrupt:
-            self._outcome, self._reason = "abort", "interrupted by the operator"
-        except Exception as error:
-            self._cause = self._cause or Cause.SOFTWARE
-            plain = isinstance(error, UserError)
-            self._reason = str(error) if plain else f"{type(error).__name__}: {error}"
-            self._outcome = "fail"
-            raise
-        finally:
-            self._close()
-        return SessionResult(
-            self._outcome, self._reason, self._epochs_run, self._epochs_good, self._cause
-        )
-
-    def _epochs(self) -> None:
-        """Run what is in the queue, pausing where asked."""
-        while self._queue and self._ready():
-            planned = self._queue.popleft()
-            self._epoch(planned)
-            self._become(epoch_over(self._state))
-            if self._failed() or not self._held():
-                return
-            if self._state.state is State.RUNNING:
-                self._loop.rest(planned.rest_s, self._settings.protocol.return_s)
-                if self._failed() or not self._held():
-                    return
-
-    def _ready(self) -> bool:
-        """Wait out a pause and return to where epochs begin; return whether the session goes on."""
-        return_s = self._settings.protocol.return_s
-        self._become(epoch_over(self._state))
-        while self._in(State.PAUSED):
-            if self._loop.reaction is Reaction.NONE:
-                self._loop.rest(return_s, return_s)
-            while self._in(State.PAUSED) and not self._failed():
-                self._loop.hold(LOOK_S)
-            if self._in(State.RUNNING):
-                while not self._loop.at_rest and not self._failed():
-                    self._loop.hold(LOOK_S)
-                self._loop.release()
-                # A whole way back, whatever was ordered before it: an epoch begins at its place.
-                self._loop.rest(return_s, return_s)
-            if self._failed() or not self._held():
-                return False
-            self._become(epoch_over(self._state))
-        return self._in(State.RUNNING)
-
-    def _epoch(self, planned: PlannedEpoch) -> Passage:
-        """Run one epoch and close it."""
-        loop, facts = self._loop, self._before_epoch(planned)
-        self._writer.epoch_started(
-            planned.number,
-            planned.label,
-            planned.task,
-            planned.condition,
-            loop.time_s,
-            planned_s=planned.duration_s,
-            **facts,
-        )
-        self._current = planned
-        if planned.task == "prbs":
-            passage = loop.perturb(planned.number, self._perturbation)
-        else:
-            passage = loop.follow(planned.number, self._angle, self._velocity)
-        why = why_ended(self._settings, passage.cause, passage.limit_time_s)
-        ending: Ending = "fail" if why else "success"
-        if passage.interrupted and not why:
-            ending, why = "abort", "ended by the operator"
-        self._writer.epoch_ended(
-            planned.number,
-            loop.time_s,
-            ending,
-            why,
-            limited_ticks=passage.limited_ticks,
-            missed_ticks=passage.missed_ticks,
-            counts=dict(self._rig.counts),
-        )
-        self._current = None
-        self._epochs_run += 1
-        self._epochs_good += ending == "success"
-        if ending == "abort":
-            self._again(planned, self._queue.appendleft)
-        elif ending == "fail" and self._settings.protocol.repeat_limited:
-            self._again(planned, self._queue.append)
-        return passage
-
-    def _again(self, planned: PlannedEpoch, put: Callable[[PlannedEpoch], None]) -> None:
-        """Plan an epoch once more under a number of its own; a repetition is not repeated."""
-        if planned.label.endswith("r"):
+def _run_epochs(session: _Session) -> None:
+    """Run what is in the queue, pausing where asked."""
+    run = session.run
+    while session.queue and _ready_for_epoch(session):
+        planned = session.queue.popleft()
+        _run_epoch(session, planned)
+        run.change_state(epoch_over(run.run))
+        if not run.may_go_on():
             return
-        put(replace(planned, number=self._next_number, label=f"{planned.label}r"))
-        self._next_number += 1
+        if run.is_in(State.RUNNING):
+            rest(run.loop, planned.rest_s, session.settings.protocol.return_s)
+            if not run.may_go_on():
+                return
 
-    def _zero(self) -> bool:
-        """Zero the torque sensor while the joint stands still; return whether all is well.
 
-        What was heard before a hold or an order is thrown away: a zero is made from the whole time
-        or not at all.
-        """
-        limits = self._settings.zeroing
-        while True:
-            zeroing = Zeroing(limits)
-            passage = self._loop.hold(limits.duration_s, zeroing.hear)
-            if self._failed() or not self._held():
-                return False
-            if passage.cause is Cause.NONE and not passage.interrupted:
-                break
-            if not self._ready():
-                return False
-        bias_nm, noise_sd_nm, why = zeroing.result()
-        self._writer.event(
-            "sensor_zeroed",
-            time_s=self._loop.time_s,
-            bias_nm=bias_nm if math.isfinite(bias_nm) else None,
-            noise_sd_nm=noise_sd_nm if math.isfinite(noise_sd_nm) else None,
-            refused=why,
-        )
-        if why:
-            self._outcome, self._reason = "fail", why
+def _ready_for_epoch(session: _Session) -> bool:
+    """Wait out a pause and return to where epochs begin; return whether the session goes on."""
+    run, loop = session.run, session.run.loop
+    return_s = session.settings.protocol.return_s
+    run.change_state(epoch_over(run.run))
+    while run.is_in(State.PAUSED):
+        if loop.reaction is Reaction.NONE:
+            rest(loop, return_s, return_s)
+        while run.is_in(State.PAUSED) and not run.stopped_by_guard():
+            hold(loop, LOOK_S)
+        if run.is_in(State.RUNNING):
+            while not loop.at_rest and not run.stopped_by_guard():
+                hold(loop, LOOK_S)
+            loop.guard = released(loop.guard)
+            # The full way back, whatever was ordered before it: an epoch begins at its place.
+            rest(loop, return_s, return_s)
+        if not run.may_go_on():
             return False
-        self._rig.zero(bias_nm)
-        return True
+        run.change_state(epoch_over(run.run))
+    return run.is_in(State.RUNNING)
 
-    def _close(self) -> None:
-        """Stop, disable, close: every step is tried even when one before it fails."""
-        try:
-            self._loop.stop()
-        finally:
-            if self._state.state is not State.FAULTED:
-                self._become(Run(State.STOPPING))
-            try:
-                self._stop_and_disable()
-            finally:
-                time_s = self._loop.time_s
-                if self._current is not None:
-                    number = self._current.number
-                    self._writer.epoch_ended(number, time_s, self._outcome, self._reason)
-                self._writer.close(time_s, self._outcome, self._reason)
 
-    def _stop_and_disable(self) -> None:
-        """Take the power away; a drive that no longer obeys brakes by its own ramp first."""
+def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
+    """Run one epoch and close it."""
+    settings, sink, run = session.settings, session.sink, session.run
+    facts = session.before_epoch(planned)
+    sink.epoch_started(
+        planned.number,
+        planned.label,
+        planned.task,
+        planned.condition,
+        run.loop.time_s,
+        planned_s=planned.duration_s,
+        **facts,
+    )
+    run.open_epoch = planned.number
+    if planned.task == "prbs":
+        ticks = perturb(run.loop, planned.number, session.perturbation_nm)
+    else:
+        ticks = follow(run.loop, planned.number, session.angle_rad, session.velocity_rad_s)
+    why = why_ended(settings, ticks.cause, ticks.limit_time_s)
+    ending: Ending = "fail" if why else "success"
+    if ticks.interrupted and not why:
+        ending, why = "abort", "ended by the operator"
+    sink.epoch_ended(
+        planned.number,
+        run.loop.time_s,
+        ending,
+        why,
+        limited_ticks=ticks.limited_ticks,
+        missed_ticks=ticks.missed_ticks,
+        counts=dict(session.rig.counts),
+    )
+    run.open_epoch = None
+    session.epochs_run += 1
+    session.epochs_good += ending == "success"
+    if planned.label.endswith("r"):  # a repetition is not repeated
+        return
+    again = replace(planned, number=session.next_number, label=f"{planned.label}r")
+    if ending == "abort":
+        session.queue.appendleft(again)
+    elif ending == "fail" and settings.protocol.repeat_limited:
+        session.queue.append(again)
+    else:
+        return
+    session.next_number += 1
+
+
+def _zero_sensor(session: _Session) -> bool:
+    """Zero the torque sensor while the joint stands still; return whether all is well.
+
+    What was heard before a hold or an order is thrown away: a zero is made from the full time or
+    not at all.
+    """
+    limits, run = session.settings.zeroing, session.run
+    while True:
+        readings: list[Reading] = []
+        ticks = hold(run.loop, limits.duration_s, readings.append)
+        if not run.may_go_on():
+            return False
+        if ticks.cause is Cause.NONE and not ticks.interrupted:
+            break
+        if not _ready_for_epoch(session):
+            return False
+    bias_nm, noise_sd_nm, why = _bias_and_noise(readings, limits)
+    session.sink.event(
+        "sensor_zeroed",
+        time_s=run.loop.time_s,
+        bias_nm=bias_nm if math.isfinite(bias_nm) else None,
+        noise_sd_nm=noise_sd_nm if math.isfinite(noise_sd_nm) else None,
+        refused=why,
+    )
+    if why:
+        run.outcome, run.reason = "fail", why
+        return False
+    session.rig.zero(bias_nm)
+    return True
+
+
+def _bias_and_noise(
+    readings: Sequence[Reading], limits: ZeroingSettings
+) -> tuple[float, float, str]:
+    """Return mean and SD of the torque at rest in N·m, and why the run must not begin, if so."""
+    torques_nm, stamp_s = [], -math.inf
+    for reading in readings:
+        if reading.torque_time_s > stamp_s:  # one that repeats the sample before counts once
+            stamp_s = reading.torque_time_s
+            torques_nm.append(reading.torque_nm)
+    n = len(torques_nm)
+    if n < FEWEST_ZEROING_SAMPLES:
+        return math.nan, math.nan, f"only {n} torque samples came in {limits.duration_s:g} s"
+    bias_nm, noise_sd_nm = statistics.fmean(torques_nm), statistics.stdev(torques_nm)
+    why = ""
+    if abs(bias_nm) > limits.bias_limit_nm:
+        why = (
+            f"at rest the torque sensor reads {bias_nm:.3g} N·m, more than "
+            f"zeroing.bias_limit_nm = {limits.bias_limit_nm:g} N·m: it was zeroed under load, "
+            "or its calibration is another"
+        )
+    elif noise_sd_nm > limits.noise_limit_nm:
+        why = (
+            f"at rest the torque varies by {noise_sd_nm:.3g} N·m (SD), more than "
+            f"zeroing.noise_limit_nm = {limits.noise_limit_nm:g} N·m: the subject moves, or "
+            "the sensor is noisy"
+        )
+    return bias_nm, noise_sd_nm, why
+
+
+def _close(session: _Session) -> None:
+    """Stop, disable, close: every step is tried even when one before it fails."""
+    run, sink = session.run, session.sink
+    try:
+        ramp_to_rest(run.loop)
+    finally:
+        if not run.is_in(State.FAULTED):
+            run.change_state(Run(State.STOPPING))
         try:
-            if self._loop.cause in (Cause.DRIVE_LOST, Cause.DRIVE_STATE):
-                self._rig.stop()
-            if self._loop.cause is Cause.DRIVE_STATE:  # it answers: let it come to rest
-                self._loop.hold(BRAKE_S)
+            _brake_and_disable(session)
         finally:
-            self._rig.disable()
+            time_s = run.loop.time_s
+            if run.open_epoch is not None:
+                sink.epoch_ended(run.open_epoch, time_s, run.outcome, run.reason)
+            sink.close(time_s, run.outcome, run.reason)
+
+
+def _brake_and_disable(session: _Session) -> None:
+    """Take the power away; a drive that no longer obeys brakes by its own ramp first."""
+    loop, rig = session.run.loop, session.rig
+    try:
+        if loop.cause in (Cause.DRIVE_LOST, Cause.DRIVE_STATE):
+            rig.stop()
+        if loop.cause is Cause.DRIVE_STATE:  # it answers: let it come to rest
+            hold(loop, BRAKE_S)
+    finally:
+        rig.disable()

@@ -8,10 +8,10 @@ from rigidimeter.acquisition.run_states import NOTHING, Order
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample
 
-__all__ = ["Alone", "Outside", "Sink"]
+__all__ = ["NoSupervision", "Sink", "Supervision"]
 
 
-class Outside(Protocol):
+class Supervision(Protocol):
     """Asked at every tick, so it answers within a microsecond or two and never waits."""
 
     attended: bool
@@ -28,8 +28,8 @@ class Outside(Protocol):
         """Return the next order that was not taken yet, `NOTHING` if there is none."""
 
 
-class Alone:
-    """Nobody is outside: a session in one process."""
+class NoSupervision:
+    """A session in one process, without an operator."""
 
     attended = False
 

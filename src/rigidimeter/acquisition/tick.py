@@ -1,10 +1,12 @@
 """One tick: wait, read, filter, control, guard, write, record; and the ramp to rest at the end.
 
-The loop sees the rig only through `device.base` and takes its clock as an argument. What is
-recorded is what was sent after the guard.
+All that is remembered from one tick to the next is in a `ControlLoop`; the functions here take it
+as their first argument. The loop sees the rig only through `devices.base` and takes its clock as an
+argument. What is recorded is what was sent after the guard.
 
-A tick that comes late is not made up for: the ticks whose time has passed are left out, and what
-is asked for in the next one goes on where the time is.
+A late tick is not made up for. The ticks whose time has passed are left out, and the next one asks
+for what is due at its own time. The controller then steps over the time that passed, but over at
+most `LONGEST_STEP` ticks.
 """
 
 from __future__ import annotations
@@ -15,8 +17,15 @@ from typing import NamedTuple
 
 from rigidimeter.acquisition.clock import Clock
 from rigidimeter.acquisition.run_states import Command, Order
-from rigidimeter.acquisition.supervision import Alone, Outside
-from rigidimeter.control import Biquad, BiquadState, biquad_step, butterworth_lowpass
+from rigidimeter.acquisition.supervision import NoSupervision, Supervision
+from rigidimeter.control import (
+    Admittance,
+    Biquad,
+    BiquadState,
+    admittance,
+    biquad_step,
+    butterworth_lowpass,
+)
 from rigidimeter.devices.base import Reading, Rig
 from rigidimeter.guard import (
     REACTIONS,
@@ -26,34 +35,45 @@ from rigidimeter.guard import (
     guard_limits,
     guard_state,
     guard_step,
-    released,
 )
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import Settings
 
-__all__ = ["REST", "Controller", "Passage", "Recorder", "Ticks"]
+__all__ = [
+    "LONGEST_STEP",
+    "REST",
+    "ControlLoop",
+    "Controller",
+    "TickResult",
+    "ramp_to_rest",
+    "run_ticks",
+    "set_admittance",
+    "skip_passed_ticks",
+]
 
 REST = -1
 """The epoch number of samples between epochs."""
 
+LONGEST_STEP = 5
+"""In ticks, however many were missed."""
+
 SPARE_TICKS = 10
 """A ramp to rest may take so many ticks more than the speed and the acceleration limit say."""
 
-POSITION_LIMITED, CUT = int(Limited.POSITION), int(Reaction.CUT)
-STALLED = int(Cause.STALLED)
+POSITION_LIMITED, CUT, STALLED = int(Limited.POSITION), int(Reaction.CUT), int(Cause.STALLED)
 
-Recorder = Callable[[Sample], None]
 Controller = Callable[[Reading, float, int], tuple[float, float, float]]
-"""Takes reading, filtered torque and place; gives velocity, perturbation and target."""
+"""Takes reading, filtered torque and number of the tick in its stretch; returns velocity,
+perturbation and target angle."""
 
 
-class Passage(NamedTuple):
+class TickResult(NamedTuple):
     """How a stretch of ticks went.
 
-    `limit_time_s` is when the position limit first held the command back, NaN if it never did;
-    `cause` is why the guard latched, `Cause.NONE` if it did not; `limited_ticks` is how many
-    commands the guard changed, for whatever limit; `missed_ticks` how many were left out;
-    `interrupted` whether an operator ended it.
+    `limit_time_s` is when the position limit first held the command back, NaN if it never did.
+    `cause` is why the guard latched, `Cause.NONE` if it did not. `limited_ticks` counts the
+    commands that the guard changed, for whatever limit; `missed_ticks` the ticks that were left
+    out. `interrupted` says whether an operator ended the stretch.
     """
 
     limit_time_s: float
@@ -63,8 +83,8 @@ class Passage(NamedTuple):
     interrupted: bool = False
 
 
-class Ticks:
-    """Run ticks on a rig, with whatever controller, under one guard.
+class ControlLoop:
+    """The state of a loop: the rig, the controller, the guard, and where the time is.
 
     Parameters
     ----------
@@ -76,238 +96,255 @@ class Ticks:
         Takes one `Sample` a tick.
     progress : callable
         Takes the session time, about once a second of it.
-    outside : Outside
-        Asked at every tick.
-    ordered : callable
+    supervision : Supervision
+        Asked at every tick; by default nobody supervises.
+    take_order : callable
         Takes an order of the operator; returns whether the stretch that runs ends now.
     """
+
+    inertia_kg_m2: float
+    damping_nm_s_rad: float
+    admittances: list[Admittance]
 
     def __init__(
         self,
         settings: Settings,
         rig: Rig,
         clock: Clock,
-        record: Recorder,
+        record: Callable[[Sample], None],
         progress: Callable[[float], None] = lambda _: None,
-        outside: Outside | None = None,
-        ordered: Callable[[Order], bool] = lambda _: False,
+        supervision: Supervision | None = None,
+        take_order: Callable[[Order], bool] = lambda _: False,
     ) -> None:
-        self._progress = progress
-        self._rate_hz = settings.rig.tick_rate_hz
-        self._interval_s = 1.0 / self._rate_hz
-        self._second = round(self._rate_hz)
-        self._rig = rig
-        self._clock = clock
-        self._record = record
-        self._outside = outside or Alone()
-        self._ordered = ordered
-        cutoff_hz = settings.controller.torque_cutoff_hz
-        self._lowpass: Biquad = butterworth_lowpass(cutoff_hz, self._rate_hz)
-        self._filter = BiquadState()
-        self._limits = guard_limits(settings)
-        self._guard = guard_state(self._limits)
-        self._missed_limit = settings.loop.missed_in_a_row
-        self._stall_ticks = settings.loop.stall_s * self._rate_hz
-        self._tick = 0
-        self._elapsed = 1
-        self._late_in_a_row = 0
-        self._missed_ticks = 0
-        self._limit_time_s = math.nan
-        self._limited_ticks = 0
-        self._angle_rad = 0.0
+        controller = settings.controller
+        self.rig, self.clock, self.record = rig, clock, record
+        self.progress, self.take_order = progress, take_order
+        self.supervision = supervision or NoSupervision()
+        self.rate_hz = settings.rig.tick_rate_hz
+        self.interval_s = 1.0 / self.rate_hz
+        self.ticks_per_second = round(self.rate_hz)
+        self.missed_limit = settings.loop.missed_in_a_row
+        self.stall_ticks = settings.loop.stall_s * self.rate_hz
+        self.tracking_gain_per_s = controller.tracking_gain_per_s
+        self.lowpass: Biquad = butterworth_lowpass(controller.torque_cutoff_hz, self.rate_hz)
+        self.limits = guard_limits(settings)
+        self.perturbation_scale = 1.0
+        set_admittance(self, controller.inertia_kg_m2, controller.damping_nm_s_rad)
+        # What a tick changes.
+        self.filtered = BiquadState()
+        self.guard = guard_state(self.limits)
+        self.tick = 0
+        self.elapsed_ticks = 1
+        self.late_in_a_row = 0
+        self.missed_ticks = 0
+        self.limited_ticks = 0
+        self.limit_time_s = math.nan
+        self.angle_rad = 0.0
 
     @property
     def time_s(self) -> float:
         """When the next tick is due."""
-        return self._tick / self._rate_hz
+        return self.tick / self.rate_hz
 
     @property
     def cause(self) -> Cause:
         """Why the guard latched."""
-        return Cause(self._guard.cause)
+        return Cause(self.guard.cause)
 
     @property
     def reaction(self) -> Reaction:
         """What the guard's cause asks for."""
-        return Reaction(self._guard.reaction)
+        return Reaction(self.guard.reaction)
 
     @property
     def at_rest(self) -> bool:
         """Whether the last command was zero."""
-        return self._guard.velocity_rad_s == 0.0
+        return self.guard.velocity_rad_s == 0.0
 
-    def release(self) -> None:
-        """Forget the cause of a hold, from rest: the operator goes on.
 
-        Raises
-        ------
-        ValueError
-            If the guard has stopped the rig rather than held it, or is not at rest.
-        """
-        self._guard = released(self._guard)
+def set_admittance(loop: ControlLoop, inertia_kg_m2: float, damping_nm_s_rad: float) -> None:
+    """Use this admittance from the next tick on; the velocity, its only memory, stays as it is."""
+    loop.inertia_kg_m2, loop.damping_nm_s_rad = inertia_kg_m2, damping_nm_s_rad
+    # The steps over one tick, two, and so on.
+    loop.admittances = [
+        admittance(inertia_kg_m2, damping_nm_s_rad, ticks * loop.interval_s)
+        for ticks in range(1, LONGEST_STEP + 1)
+    ]
 
-    def begin(self) -> None:
-        """Leave out the ticks that went by while the rig was enabled, which takes its time."""
-        while (late := self._ticks_late()) > 0:
-            self._rig.read(late)
-            self._tick += late
 
-    def _ticks_late(self) -> int:
-        """Wait for the tick that is due, and return how many whole ticks late that is."""
-        return math.floor(self._clock.wait_until(self.time_s) * self._rate_hz) - self._tick
+def skip_passed_ticks(loop: ControlLoop) -> None:
+    """Leave out the ticks that went by while the rig was enabled, which takes its time."""
+    while (late := _ticks_late(loop)) > 0:
+        loop.rig.read(late)
+        loop.tick += late
 
-    def stop(self) -> None:
-        """Ramp the velocity to zero within the acceleration limit, however long that takes.
 
-        A tick that fails, say because its sample cannot be recorded, does not end the ramp. It goes
-        on without reading and recording, and the failure is raised after it.
-        """
+def _ticks_late(loop: ControlLoop) -> int:
+    """Wait for the tick that is due, and return how many whole ticks late that is."""
+    return math.floor(loop.clock.wait_until(loop.time_s) * loop.rate_hz) - loop.tick
 
-        def command(_: Reading, __: float, ___: int) -> tuple[float, float, float]:
-            return 0.0, 0.0, math.nan
 
-        try:
-            # The guard takes as much off at every tick; some more for how floats are rounded.
-            ticks = math.ceil(abs(self._guard.velocity_rad_s) / self._brake_rad_s)
-            for _ in range(ticks + SPARE_TICKS):
-                if self._guard.velocity_rad_s == 0.0:
-                    return
-                self._run_tick(REST, 0, command)
-        except BaseException:
-            self._ramp_unrecorded()
-            raise
+def ramp_to_rest(loop: ControlLoop) -> None:
+    """Ramp the velocity to zero within the acceleration limit, however long that takes.
 
-    @property
-    def _brake_rad_s(self) -> float:
-        return self._limits.acceleration_rad_s2 * self._interval_s
+    A tick that fails, say because its sample cannot be recorded, does not end the ramp. It goes
+    on without reading and recording, and the failure is raised after it.
+    """
+    try:
+        # The guard takes as much off at every tick; some more for how floats are rounded.
+        ticks = math.ceil(abs(loop.guard.velocity_rad_s) / _brake_rad_s(loop))
+        for _ in range(ticks + SPARE_TICKS):
+            if loop.guard.velocity_rad_s == 0.0:
+                return
+            _run_tick(loop, REST, 0, _no_motion)
+    except BaseException:
+        _ramp_unrecorded(loop)
+        raise
 
-    def _ramp_unrecorded(self) -> None:
-        """Only write: what else a tick does has failed."""
-        # The ramp takes its time, however late the failure made it.
-        self._tick += max(self._ticks_late(), 0)
-        while (velocity := self._guard.velocity_rad_s) != 0.0:
-            velocity = math.copysign(max(abs(velocity) - self._brake_rad_s, 0.0), velocity)
-            self._guard = self._guard._replace(velocity_rad_s=velocity)
-            self._clock.wait_until(self.time_s)
-            self._rig.write(velocity)
-            self._tick += 1
 
-    def _run(self, epoch: int, n: int, command: Controller, latched: bool = False) -> Passage:
-        """Run `n` ticks' time; a guard that latches ends it, unless it was latched from the start.
+def _no_motion(_: Reading, __: float, ___: int) -> tuple[float, float, float]:
+    return 0.0, 0.0, math.nan
 
-        `latched` allows that: the rig stands still, held.
-        """
-        self._limit_time_s = math.nan
-        self._limited_ticks = self._missed_ticks = 0
-        known = self._guard.reaction if latched else 0
-        interrupted = False
-        k = 0
-        while k < n:
-            k = self._run_tick(epoch, k, command, n - 1) + 1
-            if self._guard.reaction > known:
-                break
-            order = self._outside.order()
-            if order.command is not Command.NONE and self._ordered(order):
-                interrupted = True
-                break
-            if self._tick % self._second == 0:
-                self._progress(self.time_s)
-        return Passage(
-            self._limit_time_s,
-            Cause(self._guard.cause),
-            self._limited_ticks,
-            self._missed_ticks,
-            interrupted,
-        )
 
-    def _run_tick(self, epoch: int, k: int, command: Controller, last: int = 0) -> int:
-        """Run one tick, and return the place it had: later than `k` if ticks were missed."""
-        due_s = self._tick / self._rate_hz
-        now_s = self._clock.wait_until(due_s)
-        lateness_s = now_s - due_s
-        late = 0
-        if lateness_s >= self._interval_s:
-            late = self._miss(int(lateness_s * self._rate_hz))
-            k = min(k + self._elapsed - 1, last)
-            due_s = self._tick / self._rate_hz
-        else:
-            self._elapsed, self._late_in_a_row = 1, 0
-        reading = self._rig.read(self._elapsed)
-        torque_nm, torque_s, angle, velocity, motion_s = reading[:5]
-        if math.isfinite(torque_nm):  # a bad number must not enter the filter's memory
-            self._filter, smooth_nm = biquad_step(self._lowpass, self._filter, torque_nm)
-        else:
-            smooth_nm = torque_nm
-        request, perturbation_nm, target = command(reading, smooth_nm, k)
-        outside = self._outside.cause(now_s)
-        if outside == STALLED:  # the computer was suspended: its clock knows nothing of it
-            late = STALLED
-        if late == STALLED:
-            # A drive with a watchdog has stopped by now, and a ramp down from the velocity before
-            # would set the arm going again; one without brakes by its own ramp.
-            self._guard = self._guard._replace(velocity_rad_s=0.0)
-        was_cut = self._guard.reaction
-        self._guard, allowed, limited = guard_step(
-            self._limits,
-            self._guard,
-            request,
+def _brake_rad_s(loop: ControlLoop) -> float:
+    return loop.limits.acceleration_rad_s2 * loop.interval_s
+
+
+def _ramp_unrecorded(loop: ControlLoop) -> None:
+    """Only write: what else a tick does has failed."""
+    # The ramp takes its time, however late the failure made it.
+    loop.tick += max(_ticks_late(loop), 0)
+    while (velocity := loop.guard.velocity_rad_s) != 0.0:
+        velocity = math.copysign(max(abs(velocity) - _brake_rad_s(loop), 0.0), velocity)
+        loop.guard = loop.guard._replace(velocity_rad_s=velocity)
+        loop.clock.wait_until(loop.time_s)
+        loop.rig.write(velocity)
+        loop.tick += 1
+
+
+def run_ticks(
+    loop: ControlLoop, epoch: int, n: int, command: Controller, latched: bool = False
+) -> TickResult:
+    """Run for the time of `n` ticks, or until the guard latches or an operator ends it.
+
+    Parameters
+    ----------
+    loop : ControlLoop
+    epoch : int
+        Its number, or `REST`.
+    n : int
+    command : callable
+    latched : bool
+        Also run where the guard has latched already: the rig stands still, held.
+    """
+    loop.limit_time_s = math.nan
+    loop.limited_ticks = loop.missed_ticks = 0
+    known = loop.guard.reaction if latched else 0
+    interrupted = False
+    k = 0
+    while k < n:
+        k = _run_tick(loop, epoch, k, command, n - 1) + 1
+        if loop.guard.reaction > known:
+            break
+        order = loop.supervision.order()
+        if order.command is not Command.NONE and loop.take_order(order):
+            interrupted = True
+            break
+        if loop.tick % loop.ticks_per_second == 0:
+            loop.progress(loop.time_s)
+    counts = loop.limited_ticks, loop.missed_ticks
+    return TickResult(loop.limit_time_s, loop.cause, *counts, interrupted)
+
+
+def _run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: int = 0) -> int:
+    """Run tick `k` of a stretch; return which it was, a later one if ticks were missed."""
+    due_s = loop.tick / loop.rate_hz
+    now_s = loop.clock.wait_until(due_s)
+    lateness_s = now_s - due_s
+    late = 0  # a cause, if so many ticks were late
+    if lateness_s >= loop.interval_s:
+        late = _miss(loop, int(lateness_s * loop.rate_hz))
+        k = min(k + loop.elapsed_ticks - 1, last)
+        due_s = loop.tick / loop.rate_hz
+    else:
+        loop.elapsed_ticks, loop.late_in_a_row = 1, 0
+    reading = loop.rig.read(loop.elapsed_ticks)
+    torque_nm, torque_s, angle, velocity, motion_s = reading[:5]
+    if math.isfinite(torque_nm):  # a bad number must not enter the filter's memory
+        loop.filtered, smooth_nm = biquad_step(loop.lowpass, loop.filtered, torque_nm)
+    else:
+        smooth_nm = torque_nm
+    request, perturbation_nm, target = command(reading, smooth_nm, k)
+    from_outside = loop.supervision.cause(now_s)
+    if from_outside == STALLED:  # the computer was suspended: its clock knows nothing of it
+        late = STALLED
+    if late == STALLED:
+        # A drive with a watchdog has stopped by now, and a ramp down from the velocity before
+        # would set the arm going again; one without brakes by its own ramp.
+        loop.guard = loop.guard._replace(velocity_rad_s=0.0)
+    was_cut = loop.guard.reaction
+    loop.guard, allowed, limited = guard_step(
+        loop.limits,
+        loop.guard,
+        request,
+        torque_nm,
+        angle,
+        velocity,
+        due_s - motion_s,
+        due_s - torque_s,
+        # A loop that stood still comes first: the drive's own watchdog follows from it.
+        _stronger(_stronger(late, reading.cause), from_outside),
+        loop.elapsed_ticks,
+    )
+    if loop.guard.reaction == CUT and was_cut != CUT:
+        loop.rig.disable()
+    sent = loop.rig.write(allowed)
+    if limited:
+        loop.limited_ticks += 1
+        if limited == POSITION_LIMITED and not loop.limit_time_s <= due_s:
+            loop.limit_time_s = due_s
+    if math.isfinite(angle):
+        loop.angle_rad = angle
+    loop.record(
+        Sample(
+            loop.tick,
+            now_s,
+            lateness_s,
+            epoch,
+            perturbation_nm,
             torque_nm,
+            torque_s,
             angle,
             velocity,
-            due_s - motion_s,
-            due_s - torque_s,
-            # A loop that stood still comes first: the drive's own watchdog follows from it.
-            _graver(_graver(late, reading.cause), outside),
-            self._elapsed,
+            motion_s,
+            target,
+            request,
+            sent,
+            limited,
+            reading.torque_sequence,
+            reading.torque_status,
+            reading.motion_sequence,
+            reading.motion_status,
+            loop.guard.cause,
         )
-        if self._guard.reaction == CUT and was_cut != CUT:
-            self._rig.disable()
-        sent = self._rig.write(allowed)
-        if limited:
-            self._limited_ticks += 1
-            if limited == POSITION_LIMITED and not self._limit_time_s <= due_s:
-                self._limit_time_s = due_s
-        if math.isfinite(angle):
-            self._angle_rad = angle
-        self._record(
-            Sample(
-                self._tick,
-                now_s,
-                lateness_s,
-                epoch,
-                perturbation_nm,
-                torque_nm,
-                torque_s,
-                angle,
-                velocity,
-                motion_s,
-                target,
-                request,
-                sent,
-                limited,
-                reading.torque_sequence,
-                reading.torque_status,
-                reading.motion_sequence,
-                reading.motion_status,
-                self._guard.cause,
-            )
-        )
-        self._tick += 1
-        return k
-
-    def _miss(self, ticks: int) -> int:
-        """Leave out the ticks whose time has passed; return a cause if they were too many."""
-        self._tick += ticks
-        self._elapsed = ticks + 1
-        self._missed_ticks += ticks
-        self._late_in_a_row += 1
-        if ticks >= self._stall_ticks:
-            return int(Cause.STALLED)
-        if self._late_in_a_row >= self._missed_limit:
-            return int(Cause.DEADLINES_MISSED)
-        return int(Cause.NONE)
+    )
+    loop.tick += 1
+    return k
 
 
-def _graver(cause: int, other: int) -> int:
+def _miss(loop: ControlLoop, ticks: int) -> int:
+    """Leave out the ticks whose time has passed; return a cause if they were too many."""
+    loop.tick += ticks
+    loop.elapsed_ticks = ticks + 1
+    loop.missed_ticks += ticks
+    loop.late_in_a_row += 1
+    if ticks >= loop.stall_ticks:
+        return int(Cause.STALLED)
+    if loop.late_in_a_row >= loop.missed_limit:
+        return int(Cause.DEADLINES_MISSED)
+    return int(Cause.NONE)
+
+
+def _stronger(cause: int, other: int) -> int:
     """Return the cause with the stronger reaction: an emergency stop is not masked by a fault."""
     return other if REACTIONS[other] > REACTIONS[cause] else cause

@@ -76,7 +76,7 @@ def commission(
     from datetime import UTC, datetime
 
     from rigidimeter import __version__
-    from rigidimeter.acquisition.processes.deadline import DeadlineClock
+    from rigidimeter.acquisition.clock import DeadlineClock
     from rigidimeter.acquisition.processes.realtime_scheduling import prepare_loop_process
     from rigidimeter.commissioning import Operator, Timebase, record_path, write_record
     from rigidimeter.commissioning import commission as try_rig

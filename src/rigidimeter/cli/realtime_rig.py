@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rigidimeter.acquisition.processes.deadline import DeadlineClock
+    from rigidimeter.acquisition.clock import DeadlineClock
     from rigidimeter.acquisition.processes.loop_process import LoopSide
     from rigidimeter.devices.base import Rig
     from rigidimeter.experiment import PlannedEpoch, Protocol
@@ -39,9 +39,9 @@ def run_loop(
     home_rad : float or None
         Where the joint stood, on the drive's scale, when the session began that this goes on with.
     side : LoopSide
-        Rings, board and what prepares the process.
+        Rings, shared status and what prepares the process.
     """
-    from rigidimeter.acquisition.processes.deadline import DeadlineClock
+    from rigidimeter.acquisition.clock import DeadlineClock
 
     clock = DeadlineClock()
     if rig_path is None:
@@ -93,7 +93,7 @@ def _run(
             clock,
             side.sink,
             before_epoch=new_joint,
-            outside=side.outside,
+            supervision=side.supervision,
             zero_first=True,
             state_changed=side.sink.state_changed,
         )

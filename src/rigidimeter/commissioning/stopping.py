@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigidimeter.acquisition import ControlLoop
+from rigidimeter.acquisition import ControlLoop, control_modes
 from rigidimeter.commissioning.checks import Check, below, impossible, untried, yes
 from rigidimeter.commissioning.manual_checks import Operator, told
 from rigidimeter.commissioning.motion_tests import way
@@ -124,7 +124,7 @@ def emergency_stop_checks(
     def wait(loop: ControlLoop) -> None:
         nonlocal before, after
         before = rig.read().motion_status
-        loop.hold(wait_s)
+        control_modes.hold(loop, wait_s)
         after = rig.read().motion_status
 
     tried = trial(rig, settings, time, [wait])

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.acquisition import ControlLoop
+from rigidimeter.acquisition import ControlLoop, control_modes, ramp_to_rest
 from rigidimeter.devices.base import Now, Reading, Rig
 from rigidimeter.guard import Cause, Reaction
 from rigidimeter.recording.sample_log import Sample
@@ -135,7 +135,7 @@ def trial(rig: Rig, settings: Settings, time: Timebase, stretches: Sequence[Stre
                     break
             cause = loop.cause
         finally:
-            loop.stop()
+            ramp_to_rest(loop)
             if loop.cause in (Cause.DRIVE_LOST, Cause.DRIVE_STATE):
                 rig.stop()
     finally:
@@ -145,12 +145,13 @@ def trial(rig: Rig, settings: Settings, time: Timebase, stretches: Sequence[Stre
 
 def follow(angle_rad: Array, velocity_rad_s: Array) -> Stretch:
     """Return the stretch that commands velocities, one a tick; the angle is for the record."""
-    return lambda loop: loop.follow(DURING_TRIAL, angle_rad.tolist(), velocity_rad_s.tolist())
+    angle, velocity = angle_rad.tolist(), velocity_rad_s.tolist()
+    return lambda loop: control_modes.follow(loop, DURING_TRIAL, angle, velocity)
 
 
 def hold(duration_s: float) -> Stretch:
     """Return the stretch that stands still."""
-    return lambda loop: loop.hold(duration_s)
+    return lambda loop: control_modes.hold(loop, duration_s)
 
 
 def listen(

@@ -14,12 +14,12 @@ from collections.abc import Callable
 from typing import IO
 
 from rigidimeter.acquisition.processes.shared_status import (
-    Board,
     Condition,
     Flag,
     LiveEstimate,
     LoopStatus,
     Role,
+    SharedStatus,
 )
 from rigidimeter.acquisition.run_states import Command, Order, State
 from rigidimeter.guard import Cause
@@ -64,29 +64,29 @@ def order_of(text: str) -> Order | None:
     return Order(command) if command is not None else None
 
 
-def status_line(status: LoopStatus, live: LiveEstimate | None) -> str:
+def status_line(loop: LoopStatus, live: LiveEstimate | None) -> str:
     """Return what the operator reads, in one line."""
-    where = f"epoch {status.epoch}" if status.epoch >= 0 else "rest"
+    where = f"epoch {loop.epoch}" if loop.epoch >= 0 else "rest"
     parts = [
-        f"{status.time_s:8.1f} s",
-        f"{State(status.state).name.lower()}, {where}",
-        f"{math.degrees(status.angle_rad):+6.1f} deg",
-        f"{status.torque_nm:+6.2f} N·m",
+        f"{loop.time_s:8.1f} s",
+        f"{State(loop.state).name.lower()}, {where}",
+        f"{math.degrees(loop.angle_rad):+6.1f} deg",
+        f"{loop.torque_nm:+6.2f} N·m",
     ]
-    if status.missed_deadlines:
-        parts.append(f"{status.missed_deadlines} deadlines missed")
+    if loop.missed_deadlines:
+        parts.append(f"{loop.missed_deadlines} deadlines missed")
     if live is not None and math.isfinite(live.stiffness_nm_rad):
         parts.append(
             f"J {live.inertia_kg_m2:.4f} B {live.damping_nm_s_rad:.3f} "
             f"K {live.stiffness_nm_rad:.2f} (live)"
         )
-    if status.cause:
-        parts.append(Cause(status.cause).sentence)
+    if loop.cause:
+        parts.append(Cause(loop.cause).sentence)
     return " | ".join(parts)
 
 
 class Terminal:
-    """Shows the board and posts orders.
+    """Shows the status and posts orders.
 
     Parameters
     ----------
@@ -110,22 +110,22 @@ class Terminal:
         if keyboard is not None:
             self._say(HELP)
 
-    def __call__(self, board: Board) -> None:
-        """Look at keyboard and board once."""
-        self._listen(board)
+    def __call__(self, status: SharedStatus) -> None:
+        """Look at keyboard and status once."""
+        self._listen(status)
         for role in (Role.RECORDER, Role.ESTIMATOR):
-            note = board.note(role) if board.condition(role) is Condition.TROUBLE else ""
+            note = status.note(role) if status.condition(role) is Condition.TROUBLE else ""
             if note and self._troubles.get(role) != note:
                 self._say(note)
             self._troubles[role] = note
         if self._now() - self._shown_s < EVERY_S:
             return
-        status = board.status()
-        if status is not None and status.tick >= 0:
+        loop = status.loop()
+        if loop is not None and loop.tick >= 0:
             self._shown_s = self._now()
-            self._say(status_line(status, board.live()))
+            self._say(status_line(loop, status.live()))
 
-    def _listen(self, board: Board) -> None:
+    def _listen(self, status: SharedStatus) -> None:
         if self._keyboard is None:
             return
         descriptor = self._keyboard.fileno()
@@ -133,17 +133,17 @@ class Terminal:
             read = os.read(descriptor, 1024)
             if not read:  # nobody can type any more, so nobody can stop the rig from here
                 self._keyboard = None
-                board.raise_flag(Flag.END_ASKED)
+                status.raise_flag(Flag.END_ASKED)
                 self._say("the keyboard is gone: the rig stops")
                 break  # but what was typed before it went still counts
             self._typed += read
         *lines, self._typed = self._typed.split(b"\n")
         for line in lines:
-            self._obey(line.decode(errors="replace").strip(), board)
+            self._obey(line.decode(errors="replace").strip(), status)
 
-    def _obey(self, text: str, board: Board) -> None:
+    def _obey(self, text: str, status: SharedStatus) -> None:
         if text[:1].lower() == "e":
-            board.raise_flag(Flag.EMERGENCY_STOP)
+            status.raise_flag(Flag.EMERGENCY_STOP)
             self._say("emergency stop")
             return
         order = order_of(text)
@@ -155,7 +155,7 @@ class Terminal:
             self._say(HELP)
             return
         try:
-            board.post(order)
+            status.post(order)
         except ValueError as error:
             self._say(str(error))
             return

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidimeter.acquisition import RealTimeClock, SessionResult, SimulatedClock, run_session
+from rigidimeter.acquisition import DeadlineClock, SessionResult, SimulatedClock, run_session
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.experiment import PlannedEpoch, plan
 from rigidimeter.recording import SessionWriter
@@ -75,7 +75,7 @@ def run_virtual_session(
         protocol,
         settings,
         rig,
-        RealTimeClock() if real_time else SimulatedClock(),
+        DeadlineClock() if real_time else SimulatedClock(),
         writer,
         before_epoch=new_joint,
         progress=progress,

@@ -7,7 +7,14 @@ import time
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition import ControlLoop, RealTimeClock, SimulatedClock, run_session
+from rigidimeter.acquisition import (
+    ControlLoop,
+    DeadlineClock,
+    SimulatedClock,
+    follow,
+    ramp_to_rest,
+    run_session,
+)
 from rigidimeter.devices import Reading, SimulatedRig
 from rigidimeter.experiment import plan
 from rigidimeter.recording import SessionWriter
@@ -123,11 +130,11 @@ def test_a_ramp_to_rest_takes_as_long_as_it_needs():
     rate_hz = settings.rig.tick_rate_hz
     n = round(2.5 * rate_hz)
     speed_rad_s = math.radians(40.0)
-    loop.follow(1, [speed_rad_s * k / rate_hz for k in range(n)], [speed_rad_s] * n)
+    follow(loop, 1, [speed_rad_s * k / rate_hz for k in range(n)], [speed_rad_s] * n)
     at = len(samples)
     fastest = samples[-1].velocity_command_rad_s
     assert fastest == pytest.approx(speed_rad_s)
-    loop.stop()
+    ramp_to_rest(loop)
     sent = np.array([sample.velocity_command_rad_s for sample in samples[at - 1 :]])
     assert sent[-1] == 0.0
     assert len(sent) - 1 == pytest.approx(2.0 * rate_hz, abs=1)
@@ -147,7 +154,7 @@ def test_progress_reaches_the_end(tmp_path):
 
 
 def test_the_real_clock_waits_for_absolute_deadlines():
-    clock = RealTimeClock()
+    clock = DeadlineClock()
     start = time.monotonic()
     times = [clock.wait_until(0.01 * k) for k in range(1, 11)]
     assert time.monotonic() - start >= 0.1 - 1e-3

@@ -57,7 +57,9 @@ def run(folder, desk=None, clock=None, rig=None, values=None, **options):
     protocol = plan(settings.protocol, settings.prbs, settings.sinusoid, 1)
     rig = rig or SimulatedRig(settings.rig, settings.subject["OFF"], np.random.default_rng(1))
     writer = SessionWriter(folder, settings, [], {"session": 1}, virtual=True)
-    result = run_session(protocol, settings, rig, clock or Clock(), writer, outside=desk, **options)
+    result = run_session(
+        protocol, settings, rig, clock or Clock(), writer, supervision=desk, **options
+    )
     events = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
     return result, events, read_samples(folder / "samples.arrows")
 

@@ -6,10 +6,10 @@ import time
 
 import pytest
 
+from rigidimeter.acquisition.clock import DeadlineClock, _relative_sleep
 from rigidimeter.acquisition.processes import realtime_scheduling as realtime
-from rigidimeter.acquisition.processes.deadline import DeadlineClock, _relative_sleep
 from rigidimeter.acquisition.processes.realtime_scheduling import Prepared, prepare_loop_process
-from rigidimeter.acquisition.processes.watchdog import Watched
+from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 
 
 def test_the_clock_wakes_at_its_deadlines():
@@ -137,7 +137,7 @@ def test_a_process_that_ended_is_gone_before_it_is_waited_for():
     if pid == 0:
         time.sleep(60)
         os._exit(0)
-    watched = Watched(pid)
+    watched = WatchedProcess(pid)
     assert watched.alive()
     watched.kill()
     until_s = time.monotonic() + 5.0
@@ -147,12 +147,12 @@ def test_a_process_that_ended_is_gone_before_it_is_waited_for():
     os.waitpid(pid, 0)
     watched.kill()
     watched.close()
-    assert not Watched(pid).alive()
+    assert not WatchedProcess(pid).alive()
 
 
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="needs Linux")
 def test_a_watched_process_is_not_taken_for_another():
-    watched = Watched(os.getpid())
+    watched = WatchedProcess(os.getpid())
     assert watched.alive()
     watched.close()
     assert not watched.alive()

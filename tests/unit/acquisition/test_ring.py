@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.acquisition.processes.ring import ROW, EventRing, Reader, SampleReader, SampleRing
-from rigidimeter.acquisition.processes.shared import Memory
+from rigidimeter.acquisition.processes.shared_memory import Memory
 from rigidimeter.recording.sample_log import Sample, sample_dtypes
 
 

@@ -8,12 +8,12 @@ import os
 import pytest
 
 from rigidimeter.acquisition.processes.shared_status import (
-    Board,
     Condition,
     Flag,
     LiveEstimate,
     LoopStatus,
     Role,
+    SharedStatus,
 )
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order, State
 from rigidimeter.console.terminal import KEYS, Terminal, order_of, status_line
@@ -71,8 +71,8 @@ def test_the_status_says_where_the_run_is_and_why_it_stands():
 class Desk:
     """A terminal on a pipe for its keyboard and one for its screen."""
 
-    def __init__(self, board: Board) -> None:
-        self.board = board
+    def __init__(self, shared_status: SharedStatus) -> None:
+        self.shared_status = shared_status
         keys, self.keys = os.pipe()
         self.screen, screen = os.pipe()
         os.set_blocking(self.screen, False)
@@ -84,7 +84,7 @@ class Desk:
 
     def type(self, text: str) -> None:
         os.write(self.keys, text.encode())
-        self.terminal(self.board)
+        self.terminal(self.shared_status)
 
     def hang_up(self) -> None:
         os.close(self.keys)
@@ -100,7 +100,7 @@ class Desk:
     def orders(self) -> list[Command | Order]:
         """Return the commands that were posted; a change whole."""
         found: list[Command | Order] = []
-        while (order := self.board.take()) is not NOTHING:
+        while (order := self.shared_status.take()) is not NOTHING:
             found.append(order if order.name else order.command)
         return found
 
@@ -114,17 +114,17 @@ class Desk:
 
 @pytest.fixture
 def desk():
-    board = Board.create()
-    desk = Desk(board)
+    shared_status = SharedStatus.create()
+    desk = Desk(shared_status)
     yield desk
     desk.close()
-    board.memory.unlink()
-    board.close()
+    shared_status.memory.unlink()
+    shared_status.close()
 
 
 def test_an_order_goes_once_and_is_confirmed(desk):
     desk.type("p\n")
-    desk.terminal(desk.board)
+    desk.terminal(desk.shared_status)
     assert desk.orders() == [Command.PAUSE]
     assert desk.said() == ["ordered: pause"]
 
@@ -144,7 +144,7 @@ def test_lines_are_taken_when_they_are_whole(desk):
 @pytest.mark.parametrize("typed", ["e", "E", "emergency", "eeeh", "estop now"])
 def test_whatever_begins_with_an_e_is_an_emergency(desk, typed):
     desk.type(f"{typed}\n")
-    assert desk.board.flag(Flag.EMERGENCY_STOP)
+    assert desk.shared_status.flag(Flag.EMERGENCY_STOP)
     assert desk.orders() == []
 
 
@@ -164,33 +164,33 @@ def test_a_parameter_mistyped_and_an_empty_line_only_ask_for_help(desk, typed):
 
 def test_bytes_that_are_no_text_pause_too(desk):
     os.write(desk.keys, b"\xff\xfe\n")
-    desk.terminal(desk.board)
+    desk.terminal(desk.shared_status)
     assert desk.orders() == [Command.PAUSE_NOW]
 
 
 def test_a_keyboard_that_is_gone_ends_the_run(desk):
     desk.hang_up()
-    desk.terminal(desk.board)
-    assert desk.board.flag(Flag.END_ASKED)
+    desk.terminal(desk.shared_status)
+    assert desk.shared_status.flag(Flag.END_ASKED)
     assert desk.said() == ["the keyboard is gone: the rig stops"]
-    desk.terminal(desk.board)  # and is not asked again
+    desk.terminal(desk.shared_status)  # and is not asked again
     assert desk.said() == []
 
 
 def test_what_was_typed_before_the_keyboard_went_still_counts(desk):
     os.write(desk.keys, b"e\n")
     desk.hang_up()
-    desk.terminal(desk.board)
-    assert desk.board.flag(Flag.END_ASKED)
-    assert desk.board.flag(Flag.EMERGENCY_STOP)
+    desk.terminal(desk.shared_status)
+    assert desk.shared_status.flag(Flag.END_ASKED)
+    assert desk.shared_status.flag(Flag.EMERGENCY_STOP)
 
 
 def test_without_an_operator_nothing_is_asked(desk):
     terminal = Terminal(None, desk.out)
     desk.said()
     os.write(desk.keys, b"e\n")
-    terminal(desk.board)
-    assert not desk.board.flag(Flag.EMERGENCY_STOP)
+    terminal(desk.shared_status)
+    assert not desk.shared_status.flag(Flag.EMERGENCY_STOP)
 
 
 def test_orders_that_the_loop_does_not_take_are_said(desk):
@@ -214,23 +214,25 @@ def test_a_screen_that_takes_nothing_does_not_hold_the_operator_up(desk):
 
 
 def test_the_loop_is_shown_once_a_second_and_trouble_once(desk):
-    desk.board.show(LoopStatus(State.RUNNING, 1, 1, 0, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    desk.board.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
+    desk.shared_status.show_loop(
+        LoopStatus(State.RUNNING, 1, 1, 0, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    )
+    desk.shared_status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
     for _ in range(5):
-        desk.terminal(desk.board)
+        desk.terminal(desk.shared_status)
     assert [line.split(" | ")[0].strip() for line in desk.said()] == ["the disk is full", "1.0 s"]
     desk.now_s += 1.0
-    desk.terminal(desk.board)
+    desk.terminal(desk.shared_status)
     assert len(desk.said()) == 1
-    desk.board.set_condition(Role.RECORDER, Condition.RUNNING)
-    desk.terminal(desk.board)
-    desk.board.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
-    desk.terminal(desk.board)
+    desk.shared_status.set_condition(Role.RECORDER, Condition.RUNNING)
+    desk.terminal(desk.shared_status)
+    desk.shared_status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
+    desk.terminal(desk.shared_status)
     assert desk.said() == ["the disk is full"]
 
 
 def test_before_the_first_tick_nothing_is_shown(desk):
-    assert desk.board.status() is not None
-    assert math.isnan(desk.board.status().angle_rad)
-    desk.terminal(desk.board)
+    assert desk.shared_status.loop() is not None
+    assert math.isnan(desk.shared_status.loop().angle_rad)
+    desk.terminal(desk.shared_status)
     assert desk.said() == []

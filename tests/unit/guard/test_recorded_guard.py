@@ -5,7 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition import ControlLoop, SimulatedClock
+from rigidimeter.acquisition import (
+    ControlLoop,
+    SimulatedClock,
+    follow,
+    perturb,
+    ramp_to_rest,
+    rest,
+)
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.experiment import prbs_nm, sinusoid
 from rigidimeter.guard import (
@@ -57,10 +64,10 @@ def recorded(settings, spoil=None, clock=None):
     samples = []
     loop = ControlLoop(settings, rig, clock or SimulatedClock(), samples.append)
     rig.enable()
-    loop.perturb(1, prbs_nm(settings.prbs, settings.rig.tick_rate_hz).tolist())
-    loop.rest(0.5, 0.4)
-    loop.follow(2, *(c.tolist() for c in sinusoid(settings.sinusoid, settings.rig.tick_rate_hz)))
-    loop.stop()
+    perturb(loop, 1, prbs_nm(settings.prbs, settings.rig.tick_rate_hz).tolist())
+    rest(loop, 0.5, 0.4)
+    follow(loop, 2, *(c.tolist() for c in sinusoid(settings.sinusoid, settings.rig.tick_rate_hz)))
+    ramp_to_rest(loop)
     return {
         name: np.array([getattr(sample, name) for sample in samples]) for name in samples[0]._fields
     }

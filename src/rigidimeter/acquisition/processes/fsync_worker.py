@@ -9,12 +9,12 @@ from __future__ import annotations
 import os
 import threading
 
-from rigidimeter.acquisition.processes.shared_status import Board
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
 
-__all__ = ["Syncing"]
+__all__ = ["FsyncWorker"]
 
 
-class Syncing:
+class FsyncWorker:
     """Has files put on the disk when asked; it may hang, the asker does not.
 
     `busy` says that it is at work, `error` what came of the last time, empty if all went well.
@@ -22,14 +22,14 @@ class Syncing:
     Parameters
     ----------
     descriptors : tuple of int
-    board : Board
+    status : SharedStatus
         Shows how many samples are on the disk.
     """
 
-    def __init__(self, descriptors: tuple[int, ...], board: Board) -> None:
+    def __init__(self, descriptors: tuple[int, ...], status: SharedStatus) -> None:
         # Copies, so that a file that is closed meanwhile is not mistaken for another.
         self._descriptors = tuple(os.dup(descriptor) for descriptor in descriptors)
-        self._board = board
+        self._status = status
         self._asked = threading.Semaphore(0)
         self._ending = False
         self.busy = False
@@ -53,7 +53,7 @@ class Syncing:
             try:
                 for descriptor in self._descriptors:
                     os.fsync(descriptor)
-                self._board.synced_samples = self._samples
+                self._status.synced_samples = self._samples
                 self.error = ""
             except OSError as error:
                 self.error = error.strerror or str(error)

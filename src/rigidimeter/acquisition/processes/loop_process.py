@@ -19,9 +19,9 @@ from rigidimeter.acquisition.processes.realtime_scheduling import Prepared, prep
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.ring_recovery import complete
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import Board, Condition, Flag, Role
-from rigidimeter.acquisition.processes.sink import BoardOutside, RingSink
-from rigidimeter.acquisition.processes.watchdog import Watched, leave_signals_to_the_console
+from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Role, SharedStatus
+from rigidimeter.acquisition.processes.sink import RingSink, SharedSupervision
+from rigidimeter.acquisition.processes.watchdog import WatchedProcess, leave_signals_to_the_console
 from rigidimeter.errors import UserError
 
 __all__ = ["LoopSide", "LoopTarget", "Realtime", "loop_main"]
@@ -59,8 +59,8 @@ class LoopSide:
     """
 
     sink: RingSink
-    outside: BoardOutside
-    board: Board
+    supervision: SharedSupervision
+    status: SharedStatus
     ready: Callable[[], Prepared]
 
 
@@ -84,7 +84,7 @@ def loop_main(
     target : callable
     recording : Recording
     names : tuple of str
-        Of the sample ring, the event ring and the board.
+        Of the sample ring, the event ring and the shared status.
     realtime : Realtime
     patience : Patience
     console_pid : int
@@ -92,17 +92,17 @@ def loop_main(
     """
     leave_signals_to_the_console()
     shared = SessionMemory.attach(names)
-    board = shared.board
-    signal.signal(signal.SIGTERM, lambda *_: board.raise_flag(Flag.END_ASKED))
-    board.join(Role.LOOP)
-    if not _recorder_is_there(board, console_pid):
+    status = shared.status
+    signal.signal(signal.SIGTERM, lambda *_: status.raise_flag(Flag.END_ASKED))
+    status.join(Role.LOOP)
+    if not _recorder_is_there(status, console_pid):
         shared.close()
         sys.exit(1)
-    recorder = Watched(board.pid(Role.RECORDER))
+    recorder = WatchedProcess(status.pid(Role.RECORDER))
     rate_hz = recording.settings.rig.tick_rate_hz
-    sink = RingSink(shared.samples, shared.events, board, rate_hz)
-    outside = BoardOutside(
-        board,
+    sink = RingSink(shared.samples, shared.events, status, rate_hz)
+    supervision = SharedSupervision(
+        status,
         shared.samples,
         console_lost_s=patience.console_lost_s,
         recorder_lost_s=patience.recorder_lost_s,
@@ -121,7 +121,7 @@ def loop_main(
 
     code = 0
     try:
-        target(LoopSide(sink, outside, board, ready))
+        target(LoopSide(sink, supervision, status, ready))
         sink.close(sink.last_time_s, "fail", "the loop ended without closing the session")
     except UserError as error:  # a sentence, which stands in the record and is shown at the end
         code = 1
@@ -132,7 +132,7 @@ def loop_main(
         with suppress(ValueError):
             sink.close(sink.last_time_s, "fail", f"{type(error).__name__}: {error}")
     finally:
-        board.set_condition(Role.LOOP, Condition.FAILED if code else Condition.DONE)
+        status.set_condition(Role.LOOP, Condition.FAILED if code else Condition.DONE)
         _leave_real_time()
         remarks: list[str] = []
         complete(Role.LOOP, shared, recording, recorder, patience, remarks)
@@ -144,11 +144,11 @@ def loop_main(
     sys.exit(code)
 
 
-def _recorder_is_there(board: Board, console_pid: int) -> bool:
+def _recorder_is_there(status: SharedStatus, console_pid: int) -> bool:
     """Wait for the recorder; return False if it will not come."""
-    while board.condition(Role.RECORDER) not in (Condition.READY, Condition.RUNNING):
-        failed = board.condition(Role.RECORDER) is Condition.FAILED
-        if failed or board.flag(Flag.END_ASKED) or os.getppid() != console_pid:
+    while status.condition(Role.RECORDER) not in (Condition.READY, Condition.RUNNING):
+        failed = status.condition(Role.RECORDER) is Condition.FAILED
+        if failed or status.flag(Flag.END_ASKED) or os.getppid() != console_pid:
             return False
         time.sleep(0.005)
     return True

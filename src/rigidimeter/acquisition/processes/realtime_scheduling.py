@@ -24,7 +24,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.acquisition.processes.shared import ORDERED
+from rigidimeter.acquisition.processes.shared_memory import ORDERED
 
 __all__ = ["Prepared", "prepare_loop_process"]
 

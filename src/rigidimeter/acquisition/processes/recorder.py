@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.acquisition.processes.ring import ROW, Event, EventRing, SampleRing
-from rigidimeter.acquisition.processes.shared_status import Board, Role
+from rigidimeter.acquisition.processes.shared_status import Role, SharedStatus
 from rigidimeter.recording.sample_log import BATCH_S
 from rigidimeter.recording.session_folder import SessionWriter
 from rigidimeter.settings import Settings
@@ -92,7 +92,7 @@ class Recorder:
     writer : SessionWriter
     samples : SampleRing
     events : EventRing
-    board : Board
+    status : SharedStatus
     tick_rate_hz : float
         Sets how many samples make a batch.
     """
@@ -102,10 +102,10 @@ class Recorder:
         writer: SessionWriter,
         samples: SampleRing,
         events: EventRing,
-        board: Board,
+        status: SharedStatus,
         tick_rate_hz: float,
     ) -> None:
-        self._writer, self._samples, self._events, self._board = writer, samples, events, board
+        self._writer, self._samples, self._events, self._status = writer, samples, events, status
         self._batch = max(1, int(BATCH_S * tick_rate_hz))
         self._open_epoch: int | None = None
         self._last_time_s = 0.0
@@ -174,7 +174,7 @@ class Recorder:
             self._writer.columns({name: rows[name] for name in ROW.names or ()})
             ring.recorded = first = until
             self._last_time_s = float(rows["time_s"][-1])
-            self._board.beat(Role.RECORDER)
+            self._status.beat(Role.RECORDER)
 
     def _write(self, event: Event) -> None:
         facts = event.facts

@@ -14,12 +14,12 @@ import sys
 import time
 import traceback
 
-from rigidimeter.acquisition.processes.fsync_worker import Syncing
+from rigidimeter.acquisition.processes.fsync_worker import FsyncWorker
 from rigidimeter.acquisition.processes.recorder import Patience, Recorder, Recording
 from rigidimeter.acquisition.processes.ring import SampleRing
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import Board, Condition, Flag, Role
-from rigidimeter.acquisition.processes.watchdog import Watched, leave_signals_to_the_console
+from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Role, SharedStatus
+from rigidimeter.acquisition.processes.watchdog import WatchedProcess, leave_signals_to_the_console
 from rigidimeter.errors import UserError
 from rigidimeter.recording.session_folder import SessionWriter
 
@@ -35,7 +35,7 @@ def recorder_main(
     ----------
     recording : Recording
     names : tuple of str
-        Of the sample ring, the event ring and the board.
+        Of the sample ring, the event ring and the shared status.
     patience : Patience
     console_pid : int
         The process that started this one.
@@ -43,56 +43,56 @@ def recorder_main(
     leave_signals_to_the_console()
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends with the session, not before
     shared = SessionMemory.attach(names)
-    samples, board = shared.samples, shared.board
-    board.join(Role.RECORDER)
+    samples, status = shared.samples, shared.status
+    status.join(Role.RECORDER)
     try:
         writer = recording.writer()
-        board.set_condition(Role.RECORDER, Condition.READY, "")
+        status.set_condition(Role.RECORDER, Condition.READY, "")
         rate_hz = recording.settings.rig.tick_rate_hz
-        recorder = Recorder(writer, samples, shared.events, board, rate_hz)
-        ended_well = _record(recorder, writer, board, samples, patience, recording, console_pid)
-        board.set_condition(Role.RECORDER, Condition.DONE if ended_well else Condition.FAILED)
+        recorder = Recorder(writer, samples, shared.events, status, rate_hz)
+        ended_well = _record(recorder, writer, status, samples, patience, recording, console_pid)
+        status.set_condition(Role.RECORDER, Condition.DONE if ended_well else Condition.FAILED)
     except UserError as error:
-        board.set_condition(Role.RECORDER, Condition.FAILED, str(error))
+        status.set_condition(Role.RECORDER, Condition.FAILED, str(error))
         sys.exit(1)
     except BaseException as error:
-        board.set_condition(
+        status.set_condition(
             Role.RECORDER, Condition.FAILED, f"the recorder failed: {type(error).__name__}: {error}"
         )
         traceback.print_exc()
         sys.exit(1)
     finally:
-        if os.getppid() != console_pid and not _loop_lives(board):
+        if os.getppid() != console_pid and not _loop_lives(status):
             shared.unlink()
         shared.close()
 
 
-def _loop_lives(board: Board) -> bool:
-    pid = board.pid(Role.LOOP)
-    return bool(pid) and Watched(pid).alive()
+def _loop_lives(status: SharedStatus) -> bool:
+    pid = status.pid(Role.LOOP)
+    return bool(pid) and WatchedProcess(pid).alive()
 
 
 def _record(
     recorder: Recorder,
     writer: SessionWriter,
-    board: Board,
+    status: SharedStatus,
     samples: SampleRing,
     patience: Patience,
     recording: Recording,
     console_pid: int,
 ) -> bool:
     """Record until the session is closed; return whether it is in the files."""
-    syncing = Syncing(writer.descriptors(), board)
-    loop: Watched | None = None
+    fsync_worker = FsyncWorker(writer.descriptors(), status)
+    loop: WatchedProcess | None = None
     since_s: float | None = None  # the disk has taken nothing since then
     over_s: float | None = None  # the loop has ended since then
     synced_s = time.monotonic()
     try:
         while True:
-            board.beat(Role.RECORDER)
-            if loop is None and board.pid(Role.LOOP):
-                loop = Watched(board.pid(Role.LOOP))
-            why = _loop_lost(board, loop, patience, console_pid)
+            status.beat(Role.RECORDER)
+            if loop is None and status.pid(Role.LOOP):
+                loop = WatchedProcess(status.pid(Role.LOOP))
+            why = _loop_lost(status, loop, patience, console_pid)
             now_s = time.monotonic()
             try:
                 recorder.drain()
@@ -102,43 +102,47 @@ def _record(
                 if since_s is not None:
                     recorder.note("recording_resumed", after_s=round(now_s - since_s, 3))
                     since_s = None
-                board.set_condition(Role.RECORDER, Condition.RUNNING, syncing.error)
+                status.set_condition(Role.RECORDER, Condition.RUNNING, fsync_worker.error)
             except OSError as error:
                 since_s = since_s or now_s
-                board.set_condition(
+                status.set_condition(
                     Role.RECORDER,
                     Condition.TROUBLE,
                     f"{recording.folder}: nothing can be written there "
                     f"({error.strerror or error}); {samples.lag()} samples wait: make room",
                 )
             if recorder.ended:
-                return _synced(syncing, board, samples, patience, recording)
+                return _synced(fsync_worker, status, samples, patience, recording)
             over_s = over_s or (now_s if why or recorder.closing else None)
             if since_s is not None and over_s is not None and now_s - over_s > patience.disk_s:
                 return False
             if recorder.epoch_ended or now_s - synced_s >= patience.sync_s:
                 recorder.epoch_ended, synced_s = False, now_s
-                syncing.ask(samples.recorded)
+                fsync_worker.ask(samples.recorded)
             time.sleep(patience.look_s)
     finally:
-        syncing.close()
+        fsync_worker.close()
 
 
 def _synced(
-    syncing: Syncing, board: Board, samples: SampleRing, patience: Patience, recording: Recording
+    fsync_worker: FsyncWorker,
+    status: SharedStatus,
+    samples: SampleRing,
+    patience: Patience,
+    recording: Recording,
 ) -> bool:
     """Wait until the closed files are on the disk, as long as that is reasonable."""
     until_s = time.monotonic() + patience.disk_s
     asked = False
     while time.monotonic() < until_s:
-        board.beat(Role.RECORDER)
-        if not syncing.busy:
-            if asked and not syncing.error:
+        status.beat(Role.RECORDER)
+        if not fsync_worker.busy:
+            if asked and not fsync_worker.error:
                 return True
             asked = True
-            syncing.ask(samples.recorded)
+            fsync_worker.ask(samples.recorded)
         time.sleep(0.005)
-    board.set_condition(
+    status.set_condition(
         Role.RECORDER,
         Condition.TROUBLE,
         f"{recording.folder}: is written, but the disk has not confirmed it",
@@ -146,10 +150,12 @@ def _synced(
     return True
 
 
-def _loop_lost(board: Board, loop: Watched | None, patience: Patience, console_pid: int) -> str:
+def _loop_lost(
+    status: SharedStatus, loop: WatchedProcess | None, patience: Patience, console_pid: int
+) -> str:
     """Return why no more samples will come; nothing while they may."""
     if loop is None:
-        if os.getppid() != console_pid or board.flag(Flag.END_ASKED):
+        if os.getppid() != console_pid or status.flag(Flag.END_ASKED):
             return "the loop was never started"
         return ""
     if not loop.alive():
@@ -159,7 +165,7 @@ def _loop_lost(board: Board, loop: Watched | None, patience: Patience, console_p
         Condition.RUNNING: patience.loop_lost_s,
         Condition.STOPPING: patience.stopping_s,
     }
-    limit_s = limits_s.get(board.condition(Role.LOOP), math.inf)
-    if board.age_s(Role.LOOP) > limit_s:
+    limit_s = limits_s.get(status.condition(Role.LOOP), math.inf)
+    if status.age_s(Role.LOOP) > limit_s:
         return f"the loop's process did not answer for {limit_s:g} s"
     return ""

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.acquisition.processes.shared import Memory
+from rigidimeter.acquisition.processes.shared_memory import Memory
 from rigidimeter.recording.sample_log import Sample, sample_dtypes
 
 __all__ = ["ROW", "Event", "EventRing", "Reader", "SampleReader", "SampleRing"]

@@ -20,7 +20,7 @@ from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.ring import ROW, EventRing, SampleRing
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import Condition, Role
-from rigidimeter.acquisition.processes.watchdog import Watched
+from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 from rigidimeter.errors import UserError
 from rigidimeter.recording.recovery import recover
 from rigidimeter.recording.sample_log import (
@@ -33,11 +33,11 @@ from rigidimeter.recording.sample_log import (
 )
 from rigidimeter.recording.session_folder import EVENTS, SAMPLES, lock, read_manifest
 
-__all__ = ["Salvage", "complete", "salvage"]
+__all__ = ["Recovered", "complete", "recover_from_rings"]
 
 
 @dataclass(frozen=True)
-class Salvage:
+class Recovered:
     """What was brought from the rings into the folder; `missing_samples` found no room before."""
 
     samples: int
@@ -45,9 +45,9 @@ class Salvage:
     missing_samples: int
 
 
-def salvage(
+def recover_from_rings(
     folder: Path, samples: SampleRing, events: EventRing, reason: str, tick_rate_hz: float
-) -> Salvage:
+) -> Recovered:
     """Complete a session folder from the rings, and close it.
 
     Call it when neither loop nor recorder writes any more. Doing it twice changes nothing.
@@ -96,14 +96,14 @@ def salvage(
             events.recorded += 1
         os.fsync(file.fileno())
     recover(folder, reason)
-    return Salvage(added, len(lines), samples.refused)
+    return Recovered(added, len(lines), samples.refused)
 
 
 def complete(
     me: Role,
     shared: SessionMemory,
     recording: Recording,
-    recorder: Watched,
+    recorder: WatchedProcess,
     patience: Patience,
     remarks: list[str],
 ) -> None:
@@ -115,19 +115,19 @@ def complete(
         Whose heart beats meanwhile.
     shared : SessionMemory
     recording : Recording
-    recorder : Watched
+    recorder : WatchedProcess
     patience : Patience
     remarks : list of str
         What the operator should know is added to them.
     """
-    board = shared.board
+    status = shared.status
     since_s = time.monotonic()
     hung = False
     # One that has done its work no longer beats, and may take a while to leave.
-    while recorder.alive() and not hung and board.condition(Role.RECORDER) is not Condition.DONE:
-        board.beat(me)
+    while recorder.alive() and not hung and status.condition(Role.RECORDER) is not Condition.DONE:
+        status.beat(me)
         # A heart that beat before the wait began may have been silent for a good reason.
-        silent_s = min(board.age_s(Role.RECORDER), time.monotonic() - since_s)
+        silent_s = min(status.age_s(Role.RECORDER), time.monotonic() - since_s)
         hung = silent_s > patience.hung_s
         time.sleep(0.02)
     if hung:
@@ -136,15 +136,15 @@ def complete(
         until_s = time.monotonic() + 2.0
         while recorder.alive() and time.monotonic() < until_s:
             time.sleep(0.01)
-    if board.condition(Role.RECORDER) is Condition.DONE:
+    if status.condition(Role.RECORDER) is Condition.DONE:
         late = shared.samples.lag()
         if late:
             remarks.append(f"{late} samples came after the session was closed")
         return
-    note = board.note(Role.RECORDER)
+    note = status.note(Role.RECORDER)
     reason = note or ("the recorder hung" if hung else "the recorder was killed")
     try:
-        salvage(
+        recover_from_rings(
             recording.folder,
             shared.samples,
             shared.events,

@@ -1,35 +1,35 @@
-"""The memory that the processes of one session share: the rings and the board."""
+"""The memory that the processes of one session share: the rings and the shared status."""
 
 from __future__ import annotations
 
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
-from rigidimeter.acquisition.processes.shared import Memory
-from rigidimeter.acquisition.processes.shared_status import Board
+from rigidimeter.acquisition.processes.shared_memory import Memory
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
 
 __all__ = ["SessionMemory"]
 
 
 class SessionMemory:
-    """Rings and board, made by the console or attached to by the others.
+    """Rings and shared status, made by the console or attached to by the others.
 
     Parameters
     ----------
     samples : SampleRing
     events : EventRing
-    board : Board
+    status : SharedStatus
     """
 
-    def __init__(self, samples: SampleRing, events: EventRing, board: Board) -> None:
-        self.samples, self.events, self.board = samples, events, board
+    def __init__(self, samples: SampleRing, events: EventRing, status: SharedStatus) -> None:
+        self.samples, self.events, self.status = samples, events, status
 
     @classmethod
     def create(cls, tick_rate_hz: float, ring_s: float) -> SessionMemory:
-        """Make all three, or none: rings for `ring_s` of samples, and a board."""
+        """Make all three, or none: rings for `ring_s` of samples, and a shared status."""
         samples = SampleRing.create(max(16, round(ring_s * tick_rate_hz)))
         try:
             events = EventRing.create()
             try:
-                return cls(samples, events, Board.create())
+                return cls(samples, events, SharedStatus.create())
             except BaseException:
                 _drop(events.memory)
                 raise
@@ -40,26 +40,28 @@ class SessionMemory:
     @classmethod
     def attach(cls, names: tuple[str, str, str]) -> SessionMemory:
         """Attach to what another process made, by its names."""
-        return cls(SampleRing.attach(names[0]), EventRing.attach(names[1]), Board.attach(names[2]))
+        return cls(
+            SampleRing.attach(names[0]), EventRing.attach(names[1]), SharedStatus.attach(names[2])
+        )
 
     @property
     def names(self) -> tuple[str, str, str]:
         """What the others attach by."""
-        return self.samples.name, self.events.name, self.board.name
+        return self.samples.name, self.events.name, self.status.name
 
     def touch(self) -> None:
         """Have every page in this process's page table."""
-        for part in (self.samples, self.events, self.board):
+        for part in (self.samples, self.events, self.status):
             part.memory.touch()
 
     def unlink(self) -> None:
         """Remove the names: the memory goes with the last process that has it."""
-        for part in (self.samples, self.events, self.board):
+        for part in (self.samples, self.events, self.status):
             part.memory.unlink()
 
     def close(self) -> None:
         """Let go of the memory."""
-        for part in (self.samples, self.events, self.board):
+        for part in (self.samples, self.events, self.status):
             part.close()
 
 

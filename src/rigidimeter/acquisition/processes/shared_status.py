@@ -1,4 +1,4 @@
-"""The board: a page of shared memory on which each process pins what the others may read.
+"""The shared status: a page of memory on which each process writes what the others may read.
 
 Every value has one writer. Heartbeats are single numbers, nanoseconds of CLOCK_MONOTONIC, which
 all processes of a machine share and which no change of the wall clock moves. Values that belong
@@ -20,11 +20,11 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple
 
-from rigidimeter.acquisition.processes.shared import Memory
+from rigidimeter.acquisition.processes.shared_memory import Memory
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order
 from rigidimeter.guard import Cause
 
-__all__ = ["Board", "Condition", "Flag", "LiveEstimate", "LoopStatus", "Nanoseconds", "Role"]
+__all__ = ["Condition", "Flag", "LiveEstimate", "LoopStatus", "Nanoseconds", "Role", "SharedStatus"]
 
 Nanoseconds = Callable[[], int]
 
@@ -137,8 +137,8 @@ class _Block:
         return None
 
 
-class Board:
-    """The board as one process sees it.
+class SharedStatus:
+    """The shared status as one process sees it.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ class Board:
         self._words = memory.words
         self._bytes = memory.bytes
         self._now_ns = now_ns
-        self._status = _Block(memory, _STATUS, "@5q6d")
+        self._loop = _Block(memory, _STATUS, "@5q6d")
         self._live = _Block(memory, _LIVE, "@3q8d")
         note = f"@q{_NOTE_BYTES - 16}s"
         self._notes = [
@@ -160,22 +160,22 @@ class Board:
         ]
 
     @classmethod
-    def create(cls) -> Board:
-        """Make a board."""
+    def create(cls) -> SharedStatus:
+        """Make a page for one session."""
         memory = Memory.create(_BYTES)
         memory.words[0] = _KIND
-        board = cls(memory)
-        board.show(LoopStatus())
-        board.show_live(LiveEstimate())
-        return board
+        status = cls(memory)
+        status.show_loop(LoopStatus())
+        status.show_live(LiveEstimate())
+        return status
 
     @classmethod
-    def attach(cls, name: str) -> Board:
-        """Attach to a board by its name."""
+    def attach(cls, name: str) -> SharedStatus:
+        """Attach to a page by its name."""
         memory = Memory.attach(name)
         if memory.words[0] != _KIND:
             memory.close()
-            raise ValueError(f"shared memory {name} is no board")
+            raise ValueError(f"shared memory {name} holds something else than a SharedStatus")
         return cls(memory)
 
     @property
@@ -295,13 +295,13 @@ class Board:
 
     # What is shown
 
-    def show(self, status: LoopStatus) -> None:
+    def show_loop(self, status: LoopStatus) -> None:
         """Show the loop; only the loop may."""
-        self._status.write(*status)
+        self._loop.write(*status)
 
-    def status(self) -> LoopStatus | None:
+    def loop(self) -> LoopStatus | None:
         """Return what the loop shows; None if it was killed while it wrote."""
-        values = self._status.read()
+        values = self._loop.read()
         return None if values is None else LoopStatus(*values)  # type: ignore[arg-type]
 
     def show_live(self, estimate: LiveEstimate) -> None:

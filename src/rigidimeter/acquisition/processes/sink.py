@@ -1,4 +1,4 @@
-"""The loop's side of the rings and the board: where it writes, and what it looks at every tick."""
+"""The loop's side of the shared memory: where it writes, and what it looks at every tick."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.shared_status import (
-    Board,
     Condition,
     LoopStatus,
     Nanoseconds,
     Role,
+    SharedStatus,
 )
 from rigidimeter.acquisition.run_states import Order, Run, State
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.recording.session_folder import Ending
 
-__all__ = ["BoardOutside", "RingSink"]
+__all__ = ["RingSink", "SharedSupervision"]
 
 CLOCK_BOOTTIME = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
 """Goes on while the computer is suspended, where the system has such a clock."""
@@ -43,19 +43,19 @@ class RingSink:
     ----------
     samples : SampleRing
     events : EventRing
-    board : Board
+    status : SharedStatus
         The loop's heart beats there with every sample, and its status is shown now and then.
     tick_rate_hz : float
         A tick that is later than a whole one has missed its deadline.
     """
 
     def __init__(
-        self, samples: SampleRing, events: EventRing, board: Board, tick_rate_hz: float
+        self, samples: SampleRing, events: EventRing, status: SharedStatus, tick_rate_hz: float
     ) -> None:
-        self._samples, self._events, self._board = samples, events, board
+        self._samples, self._events, self._status = samples, events, status
         self._push = samples.push
-        self._words = board.memory.words
-        self._heart = board.places()[-1]
+        self._words = status.memory.words
+        self._heart = status.places()[-1]
         self._interval_s = 1.0 / tick_rate_hz
         self._missed = 0
         self._state = State.IDLE
@@ -78,8 +78,8 @@ class RingSink:
     def _show(self, sample: Sample) -> None:
         if not self._begun:
             self._begun = True
-            self._board.set_condition(Role.LOOP, Condition.RUNNING)
-        self._board.show(
+            self._status.set_condition(Role.LOOP, Condition.RUNNING)
+        self._status.show_loop(
             LoopStatus(
                 state=self._state,
                 tick=sample.tick,
@@ -140,8 +140,8 @@ class RingSink:
 
     def stopping(self) -> None:
         """Say that no more ticks are due: what follows may take longer than a tick may."""
-        self._board.beat(Role.LOOP)
-        self._board.set_condition(Role.LOOP, Condition.STOPPING)
+        self._status.beat(Role.LOOP)
+        self._status.set_condition(Role.LOOP, Condition.STOPPING)
 
     def close(self, time_s: float, outcome: Ending, reason: str) -> None:
         """Close the session with its outcome; only the first time counts."""
@@ -159,7 +159,7 @@ class RingSink:
 _boot_ns: Nanoseconds = partial(time.clock_gettime_ns, CLOCK_BOOTTIME)
 
 
-class BoardOutside:
+class SharedSupervision:
     """Answers the loop every tick: is there a cause to stop, is there an order.
 
     CLOCK_MONOTONIC stands still while the computer is suspended, so no heartbeat ages and no tick
@@ -168,7 +168,7 @@ class BoardOutside:
 
     Parameters
     ----------
-    board : Board
+    status : SharedStatus
     samples : SampleRing
     console_lost_s : float
         An older heartbeat of the console is a cause to stop: a dead-man's switch.
@@ -186,7 +186,7 @@ class BoardOutside:
 
     def __init__(
         self,
-        board: Board,
+        status: SharedStatus,
         samples: SampleRing,
         *,
         console_lost_s: float = 1.0,
@@ -198,7 +198,7 @@ class BoardOutside:
         boot_ns: Nanoseconds = _boot_ns,
     ) -> None:
         self.attended = attended
-        self._board, self._samples = board, samples
+        self._status, self._samples = status, samples
         self._console_ns = round(1e9 * console_lost_s)
         self._recorder_ns = round(1e9 * recorder_lost_s)
         self._most_lag = samples.capacity // 2 if most_lag is None else most_lag
@@ -207,8 +207,8 @@ class BoardOutside:
         # difference smaller, and so never looks like a suspension.
         awake_ns = max(boot_ns() - now_ns() for _ in range(3))
         self._suspended_ns = awake_ns + round(1e9 * stall_s)
-        self._words = board.memory.words
-        self._places = board.places()
+        self._words = status.memory.words
+        self._places = status.places()
 
     def cause(self, now_s: float) -> int:
         """Return a `guard.Cause` to stop for, 0 if there is none."""
@@ -232,4 +232,4 @@ class BoardOutside:
 
     def order(self) -> Order:
         """Return the next order that was not taken yet, `NOTHING` if there is none."""
-        return self._board.take()
+        return self._status.take()

@@ -3,11 +3,11 @@
     console    this process: the operator's. It starts the others and may be killed.
     loop       the rig, the control loop, nothing else. It stops the rig when the console is silent.
     recorder   from the rings into the session folder. It ends when the session is closed.
-    estimator  J, B and K for the operator's eyes. It may fail without anybody minding.
+    estimator  J, B and K for the operator's eyes. The session goes on without it.
 
-They share two rings and a board, and nothing that one could make another wait for. Whoever is left
-completes the session: the recorder if the loop dies, the loop if the recorder dies, the console
-after both, the loop after the console and the recorder.
+They share two rings and a page of status, and nothing that could make one wait for another. A
+process that is left completes the session: the recorder if the loop dies, the loop if the recorder
+dies, the console after both, the loop after the console and the recorder.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from typing import Any
 from rigidimeter.acquisition.processes.loop_process import LoopSide, LoopTarget, Realtime, loop_main
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.recorder_process import recorder_main
-from rigidimeter.acquisition.processes.ring_recovery import Salvage, complete
+from rigidimeter.acquisition.processes.ring_recovery import Recovered, complete
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import Board, Condition, Flag, Role
-from rigidimeter.acquisition.processes.watchdog import Watched
+from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Role, SharedStatus
+from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.errors import UserError
 from rigidimeter.recording.sample_log import read_events
@@ -58,7 +58,7 @@ class Ended:
         Exit status of the loop's process, negative for a signal.
     samples : int
         How many the loop made; those that found no room in the ring are not among them.
-    salvaged : Salvage or None
+    recovered : Recovered or None
         What had to be brought from the rings by another process than the recorder.
     remarks : tuple of str
         What else the operator should know.
@@ -68,7 +68,7 @@ class Ended:
     reason: str
     loop_exit: int | None
     samples: int
-    salvaged: Salvage | None
+    recovered: Recovered | None
     remarks: tuple[str, ...]
 
 
@@ -78,7 +78,7 @@ def supervise(
     *,
     realtime: Realtime | None = None,
     patience: Patience | None = None,
-    console: Callable[[Board], object] = lambda _: None,
+    console: Callable[[SharedStatus], object] = lambda _: None,
     ring_s: float = RING_S,
 ) -> Ended:
     """Run a session in processes of its own and return how it ended.
@@ -94,8 +94,8 @@ def supervise(
     realtime : Realtime
     patience : Patience
     console : callable
-        Called in this process about 20 times a second with the board; it must return soon, for the
-        loop stops when this process is silent.
+        Called in this process about 20 times a second with the shared status. It must return soon:
+        the loop stops when this process is silent.
     ring_s : float
         How much the rings hold.
 
@@ -107,8 +107,8 @@ def supervise(
     realtime, patience = realtime or Realtime(), patience or Patience()
     context = multiprocessing.get_context("spawn")
     shared = SessionMemory.create(recording.settings.rig.tick_rate_hz, ring_s)
-    board = shared.board
-    board.join(Role.CONSOLE)
+    status = shared.status
+    status.join(Role.CONSOLE)
     processes: list[BaseProcess] = []
 
     def start(name: str, main: Callable[..., None], *arguments: object) -> BaseProcess:
@@ -119,11 +119,11 @@ def supervise(
         return process
 
     try:
-        with _Interrupts(board):
+        with _Interrupts(status):
             me = os.getpid()
             recorder = start("recorder", recorder_main, recording, shared.names, patience, me)
             loop = start("loop", loop_main, target, recording, shared.names, realtime, patience, me)
-            _await_recorder(recorder, board)
+            _await_recorder(recorder, status)
             rig = recording.settings.rig
             estimator = None
             if realtime.live_estimate:
@@ -135,22 +135,22 @@ def supervise(
                     shared.names,
                     patience.stopping_s,
                 )
-            remarks = _see_through(loop, recorder, board, patience, console)
-            watched = Watched(recorder.pid or 0)
+            remarks = _see_through(loop, recorder, status, patience, console)
+            recorder_watch = WatchedProcess(recorder.pid or 0)
             try:
-                complete(Role.CONSOLE, shared, recording, watched, patience, remarks)
+                complete(Role.CONSOLE, shared, recording, recorder_watch, patience, remarks)
             finally:
-                watched.close()
+                recorder_watch.close()
             if estimator is not None:
                 _end(estimator, 2.0)
-        outcome, reason, salvaged = _outcome(recording)
+        outcome, reason, recovered = _outcome(recording)
         if shared.samples.refused:
             remarks.append(f"{shared.samples.refused} samples found no room and are not recorded")
         samples = shared.samples.written
-        return Ended(outcome, reason, loop.exitcode, samples, salvaged, tuple(remarks))
+        return Ended(outcome, reason, loop.exitcode, samples, recovered, tuple(remarks))
     finally:
         # Whatever happened here, the loop is given the time to stop the rig in order.
-        board.raise_flag(Flag.END_ASKED)
+        status.raise_flag(Flag.END_ASKED)
         for process in reversed(processes):
             _end(process, patience.stopping_s)
         shared.unlink()
@@ -174,8 +174,8 @@ def _undisturbed() -> Iterator[None]:
 class _Interrupts:
     """Turns the signals of the terminal and SIGTERM into orders to the loop."""
 
-    def __init__(self, board: Board) -> None:
-        self._board = board
+    def __init__(self, status: SharedStatus) -> None:
+        self._status = status
         self._count = 0
         self._before: dict[int, Any] = {}
 
@@ -192,59 +192,59 @@ class _Interrupts:
         self._count += 1
         if number == signal.SIGINT and self._count == 1:
             try:
-                self._board.post(Order(Command.ABORT))
+                self._status.post(Order(Command.ABORT))
             except ValueError:  # so many orders wait that nobody takes them
-                self._board.raise_flag(Flag.END_ASKED)
+                self._status.raise_flag(Flag.END_ASKED)
         else:
-            self._board.raise_flag(Flag.END_ASKED)
+            self._status.raise_flag(Flag.END_ASKED)
 
     def __exit__(self, *_: object) -> None:
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
 
-def _await_recorder(recorder: BaseProcess, board: Board) -> None:
+def _await_recorder(recorder: BaseProcess, status: SharedStatus) -> None:
     """Wait until the session folder is made."""
     until_s = time.monotonic() + 60.0
-    while board.condition(Role.RECORDER) in (Condition.ABSENT, Condition.STARTING):
-        board.beat(Role.CONSOLE)
+    while status.condition(Role.RECORDER) in (Condition.ABSENT, Condition.STARTING):
+        status.beat(Role.CONSOLE)
         if not recorder.is_alive() or time.monotonic() > until_s:
             break
         time.sleep(0.01)
-    if board.condition(Role.RECORDER) not in (Condition.READY, Condition.RUNNING):
-        raise UserError(board.note(Role.RECORDER) or "the recorder's process did not start")
+    if status.condition(Role.RECORDER) not in (Condition.READY, Condition.RUNNING):
+        raise UserError(status.note(Role.RECORDER) or "the recorder's process did not start")
 
 
 def _see_through(
     loop: BaseProcess,
     recorder: BaseProcess,
-    board: Board,
+    status: SharedStatus,
     patience: Patience,
-    console: Callable[[Board], object],
+    console: Callable[[SharedStatus], object],
 ) -> list[str]:
     """Keep the operator's heart beating until the loop has ended; return remarks."""
     remarks: list[str] = []
     recorder_told = console_failed = False
     while loop.is_alive():
-        board.beat(Role.CONSOLE)
+        status.beat(Role.CONSOLE)
         try:
             if not console_failed:
-                console(board)
+                console(status)
         except Exception as error:
             console_failed = True
             with contextlib.suppress(OSError):  # of a terminal that is gone
                 traceback.print_exc()
             remarks.append(f"the console failed ({type(error).__name__}: {error})")
-            board.raise_flag(Flag.END_ASKED)
+            status.raise_flag(Flag.END_ASKED)
         if (
             not recorder_told
             and not recorder.is_alive()
-            and board.condition(Role.RECORDER) is not Condition.DONE
+            and status.condition(Role.RECORDER) is not Condition.DONE
         ):
             recorder_told = True
             remarks.append(f"the recorder ended while the loop ran ({_how(recorder)})")
-        silent = board.age_s(Role.LOOP) > patience.hung_s
-        if silent and board.condition(Role.LOOP) in (Condition.RUNNING, Condition.STOPPING):
+        silent = status.age_s(Role.LOOP) > patience.hung_s
+        if silent and status.condition(Role.LOOP) in (Condition.RUNNING, Condition.STOPPING):
             remarks.append(f"the loop did not answer for {patience.hung_s:g} s and was ended")
             loop.kill()
             loop.join(1.0)
@@ -262,20 +262,20 @@ def _how(process: BaseProcess) -> str:
     return f"signal {signal.Signals(-code).name}" if code < 0 else f"exit status {code}"
 
 
-def _outcome(recording: Recording) -> tuple[str, str, Salvage | None]:
-    """Return how the folder says the session ended, and what was salvaged."""
+def _outcome(recording: Recording) -> tuple[str, str, Recovered | None]:
+    """Return how the folder says the session ended, and what was recovered."""
     try:
         events, _ = read_events(recording.folder / EVENTS)
     except (UserError, OSError) as error:
         return "", str(error), None
-    salvaged = None
+    recovered = None
     for event in events:
         if event.get("event") == "record_salvaged":
-            salvaged = Salvage(event["samples"], event["events"], event["missing_samples"])
+            recovered = Recovered(event["samples"], event["events"], event["missing_samples"])
     for event in reversed(events):
         if event.get("event") == "session_ended":
-            return event["outcome"], event["reason"], salvaged
-    return "", "the session was not closed", salvaged
+            return event["outcome"], event["reason"], recovered
+    return "", "the session was not closed", recovered
 
 
 def _end(process: BaseProcess, wait_s: float) -> None:
@@ -288,6 +288,6 @@ def _end(process: BaseProcess, wait_s: float) -> None:
 
 def _estimator_main(*arguments: Any) -> None:
     """Run the live estimate; what it needs is loaded in its own process alone."""
-    from rigidimeter.acquisition.processes.live import estimator_main
+    from rigidimeter.acquisition.processes.live_estimate import estimator_main
 
     estimator_main(*arguments)

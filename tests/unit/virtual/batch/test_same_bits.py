@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition import ControlLoop, SimulatedClock
+from rigidimeter.acquisition import ControlLoop, SimulatedClock, perturb
 from rigidimeter.control import BiquadState
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.dynamics import DriveState
@@ -39,7 +39,7 @@ COLUMNS = (
 
 
 def by_the_loop(settings, rng, subject=None, perturbation_nm=None, spoil=lambda rig, loop: None):
-    """Run one epoch on a new rig in the interpreter: samples, passage and the joint."""
+    """Run one epoch on a new rig in the interpreter: samples, result and the joint."""
     rig = SimulatedRig(settings.rig, subject or next(iter(settings.subject.values())), rng)
     samples = []
     loop = ControlLoop(settings, rig, SimulatedClock(), samples.append)
@@ -47,8 +47,8 @@ def by_the_loop(settings, rng, subject=None, perturbation_nm=None, spoil=lambda 
     rig.enable()
     if perturbation_nm is None:
         perturbation_nm = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
-    passage = loop.perturb(1, perturbation_nm.tolist())
-    return samples, passage, rig.joint
+    result = perturb(loop, 1, perturbation_nm.tolist())
+    return samples, result, rig.joint
 
 
 def bits(values):
@@ -56,7 +56,7 @@ def bits(values):
     return values.view(np.uint64) if values.dtype == np.float64 else values
 
 
-def assert_same_bits(batch, i, samples, passage):
+def assert_same_bits(batch, i, samples, result):
     n = int(batch.ticks[i])
     assert n == len(samples)
     for name in COLUMNS:
@@ -65,9 +65,9 @@ def assert_same_bits(batch, i, samples, passage):
             bits(getattr(batch, name)[i, :n].astype(expected.dtype)), bits(expected), err_msg=name
         )
     np.testing.assert_array_equal(bits(batch.time_s[:n]), bits([s.time_s for s in samples]))
-    assert batch.cause[i] == passage.cause
-    assert batch.limited_ticks[i] == passage.limited_ticks
-    np.testing.assert_array_equal(batch.limit_time_s[i], passage.limit_time_s)
+    assert batch.cause[i] == result.cause
+    assert batch.limited_ticks[i] == result.limited_ticks
+    np.testing.assert_array_equal(batch.limit_time_s[i], result.limit_time_s)
     for name in COLUMNS[1:]:
         rest = getattr(batch, name)[i, n:]
         assert (rest == 0).all() if name == "limited" else np.isnan(rest).all()
@@ -136,8 +136,8 @@ def test_every_column_is_the_loops(tables):
     settings = parse_settings({"prbs": SHORT, **tables})
     batch = simulate_epochs(settings, 2, seed=3)
     for i in range(2):
-        samples, passage, joint = by_the_loop(settings, epoch_generator(3, i))
-        assert_same_bits(batch, i, samples, passage)
+        samples, result, joint = by_the_loop(settings, epoch_generator(3, i))
+        assert_same_bits(batch, i, samples, result)
         assert batch.joints[i] == joint
 
 
@@ -192,8 +192,8 @@ def test_settings_drawn_at_random(number):
         }
     )
     batch = simulate_epochs(settings, 1, first=number)
-    samples, passage, _ = by_the_loop(settings, epoch_generator(1, number))
-    assert_same_bits(batch, 0, samples, passage)
+    samples, result, _ = by_the_loop(settings, epoch_generator(1, number))
+    assert_same_bits(batch, 0, samples, result)
 
 
 @pytest.mark.parametrize(("value", "resolution_nm"), [(math.nan, 0.0005), (math.inf, 0.0)])
@@ -212,8 +212,8 @@ def test_noise_that_is_no_number_latches_both(value, resolution_nm):
     def spoil(rig, _):
         rig._noise = iter(noise.tolist())
 
-    samples, passage, _ = by_the_loop(settings, epoch_generator(1, 0), spoil=spoil)
-    assert_same_bits(batch, 0, samples, passage)
+    samples, result, _ = by_the_loop(settings, epoch_generator(1, 0), spoil=spoil)
+    assert_same_bits(batch, 0, samples, result)
     assert batch.cause[0] == Cause.TORQUE_NOT_FINITE
     assert batch.ticks[0] == 701
 
@@ -223,8 +223,8 @@ def test_a_perturbation_that_is_no_number_latches_both():
     wanted = prbs_nm(settings.prbs, 1000.0)
     wanted[300] = math.nan
     batch = simulate_epochs(settings, 1, perturbation_nm=wanted)
-    samples, passage, _ = by_the_loop(settings, epoch_generator(1, 0), perturbation_nm=wanted)
-    assert_same_bits(batch, 0, samples, passage)
+    samples, result, _ = by_the_loop(settings, epoch_generator(1, 0), perturbation_nm=wanted)
+    assert_same_bits(batch, 0, samples, result)
     assert batch.cause[0] == Cause.COMMAND_NOT_FINITE
 
 
@@ -238,10 +238,10 @@ def test_an_angle_beyond_the_limit_latches_both():
     batch = simulate_inputs(table, prbs_nm(settings.prbs, 1000.0), [inputs])
 
     def spoil(_, loop):
-        loop._limits = limits
+        loop.limits = limits
 
-    samples, passage, _ = by_the_loop(settings, epoch_generator(1, 0), spoil=spoil)
-    assert_same_bits(batch, 0, samples, passage)
+    samples, result, _ = by_the_loop(settings, epoch_generator(1, 0), spoil=spoil)
+    assert_same_bits(batch, 0, samples, result)
     assert batch.cause[0] == Cause.POSITION_LIMIT_EXCEEDED
 
 
@@ -249,8 +249,8 @@ def test_a_whole_epoch_of_20_s_is_the_loops():
     settings = Settings()
     subject = SubjectSettings(voluntary_sd_nm=0.2, stiffness_cv_percent=20.0)
     batch = simulate_epochs(settings, 1, subjects=[subject])
-    samples, passage, joint = by_the_loop(settings, epoch_generator(1, 0), subject)
-    assert_same_bits(batch, 0, samples, passage)
+    samples, result, joint = by_the_loop(settings, epoch_generator(1, 0), subject)
+    assert_same_bits(batch, 0, samples, result)
     assert batch.joints == (joint,)
 
 

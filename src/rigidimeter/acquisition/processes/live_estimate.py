@@ -1,4 +1,4 @@
-"""The live estimator's process: J, B and K from the ring to the board while the arm moves.
+"""The live estimator's process: J, B and K from the ring to the shared status, while the arm moves.
 
 It reads the samples as the console does: where it falls behind it misses some, begins anew, and
 says how many. Nothing waits for it.
@@ -14,7 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.acquisition.processes.ring import Reader, SampleReader, SampleRing
-from rigidimeter.acquisition.processes.shared_status import Board, Condition, LiveEstimate, Role
+from rigidimeter.acquisition.processes.shared_status import (
+    Condition,
+    LiveEstimate,
+    Role,
+    SharedStatus,
+)
 from rigidimeter.acquisition.processes.watchdog import leave_signals_to_the_console
 from rigidimeter.estimation.online import (
     STATE_SIZE,
@@ -82,31 +87,31 @@ def estimator_main(
     settings : OnlineSettings
     rate_hz : float
     names : tuple of str
-        Of the sample ring, the event ring and the board.
+        Of the sample ring, the event ring and the shared status.
     lost_s : float
         Recorder and loop both silent for so long have ended.
     """
     leave_signals_to_the_console()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    ring, board = SampleRing.attach(names[0]), Board.attach(names[2])
+    ring, status = SampleRing.attach(names[0]), SharedStatus.attach(names[2])
     try:
-        board.join(Role.ESTIMATOR)
+        status.join(Role.ESTIMATOR)
         estimator = Estimator(settings, rate_hz)
         reader = SampleReader(ring, Reader.ESTIMATOR)
-        board.set_condition(Role.ESTIMATOR, Condition.RUNNING)
-        while _worth_it(board, lost_s):
-            board.beat(Role.ESTIMATOR)
+        status.set_condition(Role.ESTIMATOR, Condition.RUNNING)
+        while _session_runs(status, lost_s):
+            status.beat(Role.ESTIMATOR)
             rows, missed = reader.read()
             if rows.size:
-                board.show_live(estimator.take(rows, missed))
+                status.show_live(estimator.take(rows, missed))
             time.sleep(LOOK_S)
-        board.set_condition(Role.ESTIMATOR, Condition.DONE)
+        status.set_condition(Role.ESTIMATOR, Condition.DONE)
     finally:
         ring.close()
-        board.close()
+        status.close()
 
 
-def _worth_it(board: Board, lost_s: float) -> bool:
-    if board.condition(Role.LOOP) in (Condition.DONE, Condition.FAILED):
+def _session_runs(status: SharedStatus, lost_s: float) -> bool:
+    if status.condition(Role.LOOP) in (Condition.DONE, Condition.FAILED):
         return False
-    return min(board.age_s(Role.LOOP), board.age_s(Role.RECORDER)) < lost_s
+    return min(status.age_s(Role.LOOP), status.age_s(Role.RECORDER)) < lost_s

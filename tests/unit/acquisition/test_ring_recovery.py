@@ -5,8 +5,8 @@ import pytest
 
 from rigidimeter.acquisition.processes.recorder import Recorder, Recording
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
-from rigidimeter.acquisition.processes.ring_recovery import salvage
-from rigidimeter.acquisition.processes.shared_status import Board
+from rigidimeter.acquisition.processes.ring_recovery import recover_from_rings
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.acquisition.processes.sink import RingSink
 from rigidimeter.errors import UserError
 from rigidimeter.recording import session_folder as folder_module
@@ -24,10 +24,12 @@ class Rig:
     def __init__(self, folder, capacity=1000):
         self.folder = folder
         self.samples, self.events = SampleRing.create(capacity), EventRing.create(32, 512)
-        self.board = Board.create()
-        self.sink = RingSink(self.samples, self.events, self.board, RATE_HZ)
+        self.shared_status = SharedStatus.create()
+        self.sink = RingSink(self.samples, self.events, self.shared_status, RATE_HZ)
         self.writer = Recording(folder, Settings(), virtual=True).writer()
-        self.recorder = Recorder(self.writer, self.samples, self.events, self.board, RATE_HZ)
+        self.recorder = Recorder(
+            self.writer, self.samples, self.events, self.shared_status, RATE_HZ
+        )
         self.tick = 0
 
     def run(self, ticks):
@@ -48,8 +50,10 @@ class Rig:
         for file in (self.writer._log._file, self.writer._events):
             file.close()
 
-    def salvage(self):
-        return salvage(self.folder, self.samples, self.events, "the recorder was killed", RATE_HZ)
+    def recover_from_rings(self):
+        return recover_from_rings(
+            self.folder, self.samples, self.events, "the recorder was killed", RATE_HZ
+        )
 
     def ticks(self):
         columns = read_samples(self.folder / "samples.arrows")
@@ -65,7 +69,7 @@ class Rig:
     def close(self):
         if not self.writer._events.closed:
             self.kill()
-        for part in (self.samples, self.events, self.board):
+        for part in (self.samples, self.events, self.shared_status):
             part.memory.unlink()
             part.close()
 
@@ -156,7 +160,7 @@ def test_samples_that_found_no_room_are_told(rig):
 
 @pytest.mark.parametrize("cursor_behind", [False, True])
 @pytest.mark.parametrize("torn", [0, 700])
-def test_salvage_completes_the_folder_once(rig, cursor_behind, torn):
+def test_recovery_completes_the_folder_once(rig, cursor_behind, torn):
     rig.begin()
     rig.run(900)
     rig.recorder.drain()
@@ -173,7 +177,7 @@ def test_salvage_completes_the_folder_once(rig, cursor_behind, torn):
     rig.run(123)
     rig.end()
     rig.kill()
-    found = rig.salvage()
+    found = rig.recover_from_rings()
     assert (found.samples, found.events, found.missing_samples) == (123, 2, 0)
     assert rig.ticks() == 1373
     assert [kind for kind in rig.kinds() if kind != "record_salvaged"] == [
@@ -183,24 +187,24 @@ def test_salvage_completes_the_folder_once(rig, cursor_behind, torn):
         "session_ended",
     ]
     before = (rig.folder / "samples.arrows").read_bytes(), rig.kinds()
-    assert rig.salvage().samples == 0
+    assert rig.recover_from_rings().samples == 0
     assert before == ((rig.folder / "samples.arrows").read_bytes(), rig.kinds())
 
 
-def test_salvage_closes_what_the_loop_did_not(rig):
+def test_recovery_closes_what_the_loop_did_not(rig):
     rig.begin()
     rig.run(123)
     rig.kill()
-    assert rig.salvage().samples == 123
+    assert rig.recover_from_rings().samples == 123
     events, _ = read_events(rig.folder / "events.jsonl")
     assert events[-1]["outcome"] == "fail"
     assert events[-1]["reason"] == "the recorder was killed"
     assert rig.ticks() == 123
 
 
-def test_salvage_leaves_a_living_recorder_alone(rig):
+def test_recovery_leaves_a_living_recorder_alone(rig):
     rig.begin()
     rig.run(10)
     with pytest.raises(UserError, match="still being recorded"):
-        rig.salvage()
+        rig.recover_from_rings()
     assert folder_module.EVENTS == "events.jsonl"

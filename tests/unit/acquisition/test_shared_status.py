@@ -1,0 +1,220 @@
+import math
+import time
+
+import pytest
+
+from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
+from rigidimeter.acquisition.processes.shared_status import (
+    Condition,
+    Flag,
+    LiveEstimate,
+    LoopStatus,
+    Role,
+    SharedStatus,
+)
+from rigidimeter.acquisition.processes.sink import RingSink, SharedSupervision
+from rigidimeter.acquisition.run_states import NOTHING, Command, Order, Run, State
+from rigidimeter.guard import Cause
+from rigidimeter.recording.sample_log import Sample
+
+
+class Time:
+    def __init__(self) -> None:
+        self.ns = 1_000_000_000_000
+
+    def __call__(self) -> int:
+        return self.ns
+
+
+@pytest.fixture
+def now():
+    return Time()
+
+
+@pytest.fixture
+def shared_status(now):
+    made = SharedStatus.create()
+    shared_status = SharedStatus(made.memory, now)
+    yield shared_status
+    made.memory.unlink()
+    made.close()
+
+
+@pytest.fixture
+def rings():
+    rings = SampleRing.create(10), EventRing.create(16, 512)
+    yield rings
+    for ring in rings:
+        ring.memory.unlink()
+        ring.close()
+
+
+def test_what_one_process_shows_another_sees(shared_status):
+    other = SharedStatus.attach(shared_status.name)
+    assert other.loop() == LoopStatus(
+        **{k: pytest.approx(v, nan_ok=True) for k, v in LoopStatus()._asdict().items()}
+    )
+    status = LoopStatus(1, 12, 3, 5, 0, 1.5, 0.1, 0.2, 0.3, 0.4, 0.5)
+    live = LiveEstimate(12, 1, 7, 1.5, 0.08, 0.001, 0.4, 0.1, 1.7, 0.2, 4.0)
+    shared_status.show_loop(status)
+    shared_status.show_live(live)
+    shared_status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full: µ")
+    assert (other.loop(), other.live()) == (status, live)
+    assert other.condition(Role.RECORDER) is Condition.TROUBLE
+    assert other.note(Role.RECORDER) == "the disk is full: µ"
+    assert other.pid(Role.LOOP) == 0
+    other.close()
+
+
+def test_what_is_half_written_is_not_read(shared_status):
+    shared_status.show_loop(LoopStatus(tick=1))
+    words = shared_status.memory.words
+    words[96] += 1  # as a writer that was killed between the two counts leaves it
+    assert shared_status.loop() is None
+    shared_status.show_loop(LoopStatus(tick=2))
+    assert shared_status.loop().tick == 2
+
+
+def test_heartbeats_age(shared_status, now):
+    assert shared_status.age_s(Role.LOOP) == math.inf
+    shared_status.beat(Role.LOOP)
+    now.ns += 250_000_000
+    assert shared_status.age_s(Role.LOOP) == pytest.approx(0.25)
+
+
+def test_orders_come_in_order_and_once(shared_status):
+    assert shared_status.take() == NOTHING
+    orders = [Order(Command.CHANGE, "damping_nm_s_rad", 0.5), Order(Command.PAUSE)]
+    assert [shared_status.post(order) for order in orders] == [1, 2]
+    assert shared_status.take() == orders[0]
+    assert shared_status.taken == 1
+    assert shared_status.take().command is Command.PAUSE
+    assert shared_status.take() is NOTHING
+
+
+def test_orders_that_nobody_takes_are_refused(shared_status):
+    for _ in range(16):
+        shared_status.post(Order(Command.PAUSE))
+    with pytest.raises(ValueError, match="the loop does not take them"):
+        shared_status.post(Order(Command.PAUSE))
+    with pytest.raises(ValueError, match="at most 48 bytes"):
+        shared_status.post(Order(Command.CHANGE, "x" * 49, 1.0))
+
+
+def sample(k: int) -> Sample:
+    return Sample(k, k / 10, 0.2 if k == 3 else 0.0, 1, *[1.0] * 9, 0)
+
+
+def test_causes_to_stop(shared_status, rings, now):
+    samples, _ = rings
+    supervision = SharedSupervision(
+        shared_status,
+        samples,
+        console_lost_s=0.5,
+        recorder_lost_s=2.0,
+        most_lag=6,
+        now_ns=now,
+        boot_ns=now,
+    )
+    shared_status.beat(Role.CONSOLE)
+    shared_status.beat(Role.RECORDER)
+    assert supervision.cause(0.0) == Cause.NONE
+    for k in range(7):
+        samples.push(sample(k))
+    assert supervision.cause(0.0) == Cause.RECORD_OVERFLOW
+    samples.recorded = 7
+    assert supervision.cause(0.0) == Cause.NONE
+    now.ns += 600_000_000
+    assert supervision.cause(0.0) == Cause.CONSOLE_LOST
+    shared_status.beat(Role.CONSOLE)
+    now.ns += 1_500_000_000
+    shared_status.beat(Role.CONSOLE)
+    assert supervision.cause(0.0) == Cause.RECORDER_LOST
+    shared_status.raise_flag(Flag.END_ASKED)
+    assert supervision.cause(0.0) == Cause.SIGNAL
+    shared_status.raise_flag(Flag.EMERGENCY_STOP)
+    assert supervision.cause(0.0) == Cause.EMERGENCY_STOP
+
+
+@pytest.fixture
+def supervision(shared_status, rings, now):
+    shared_status.beat(Role.CONSOLE)
+    shared_status.beat(Role.RECORDER)
+    before = Time()
+    before.ns = now.ns + 7_000_000_000  # suspended for 7 s since it was started, but not by us
+    return SharedSupervision(
+        shared_status, rings[0], stall_s=0.1, now_ns=now, boot_ns=before
+    ), before
+
+
+def test_a_suspended_computer_has_stood_still(shared_status, supervision, now):
+    supervision, boot = supervision
+    assert supervision.cause(0.0) == Cause.NONE
+    for clock in (now, boot):  # time goes by: no difference
+        clock.ns += 400_000_000
+    assert supervision.cause(0.0) == Cause.NONE
+    boot.ns += 99_000_000  # less than a stall
+    assert supervision.cause(0.0) == Cause.NONE
+    boot.ns += 2_000_000
+    assert supervision.cause(0.0) == Cause.STALLED
+    shared_status.raise_flag(
+        Flag.END_ASKED
+    )  # the ramp that a signal asks for would set the arm going
+    for clock in (now, boot):
+        clock.ns += 500_000_000
+    assert supervision.cause(0.0) == Cause.STALLED
+    shared_status.raise_flag(Flag.EMERGENCY_STOP)
+    assert supervision.cause(0.0) == Cause.EMERGENCY_STOP
+
+
+def test_a_loop_held_up_between_two_clocks_was_not_suspended(shared_status, rings, now):
+    shared_status.beat(Role.CONSOLE)
+    shared_status.beat(Role.RECORDER)
+    held_up_ns = 0
+
+    def held_up():
+        at = now.ns
+        now.ns += held_up_ns
+        return at
+
+    supervision = SharedSupervision(
+        shared_status, rings[0], stall_s=0.1, now_ns=held_up, boot_ns=held_up
+    )
+    held_up_ns = 500_000_000
+    assert supervision.cause(0.0) == Cause.NONE
+
+
+def test_the_two_clocks_are_those_of_the_machine(shared_status, rings):
+    real = SharedStatus(shared_status.memory)
+    real.beat(Role.CONSOLE)
+    real.beat(Role.RECORDER)
+    supervision = SharedSupervision(real, rings[0], stall_s=0.1)
+    time.sleep(0.15)
+    assert supervision.cause(0.0) == Cause.NONE
+
+
+def test_the_sink_keeps_events_in_their_place(shared_status, rings):
+    samples, events = rings
+    sink = RingSink(samples, events, shared_status, tick_rate_hz=10.0)
+    sink.session_started()
+    sink.state_changed(Run(State.RUNNING))
+    sink.epoch_started(1, "one", "prbs", "rest", 0.0, planned_s=0.4)
+    for k in range(4):
+        sink.sample(sample(k))
+    assert shared_status.condition(Role.LOOP) is Condition.RUNNING
+    sink.epoch_ended(1, 0.4, "success", "")
+    sink.sample(sample(4))
+    sink.close(0.5, "success", "")
+    sink.close(9.9, "fail", "again")
+    found = [events.get(k) for k in range(events.written)]
+    assert [(event.facts["event"], event.samples_before) for event in found] == [
+        ("session_started", 0),
+        ("epoch_started", 0),
+        ("epoch_ended", 4),
+        ("session_ended", 5),
+    ]
+    assert found[-1].facts["outcome"] == "success"
+    assert sink.lag() == 5
+    status = shared_status.loop()
+    assert (status.state, status.tick, status.missed_deadlines) == (State.RUNNING, 4, 1)
+    assert shared_status.condition(Role.LOOP) is Condition.STOPPING
