@@ -100,7 +100,8 @@ def compare(
         typer.echo("\n".join([*_lines(found.study.comparisons), *study_lines(found.cohort)]))
         _say_changes(found, folder)
         raise typer.Exit(found.status)
-    from rigidimeter.recording import read_estimates, write_json, write_text
+    from rigidimeter.documents import write_json, write_text
+    from rigidimeter.recording import read_estimates
     from rigidimeter.reporting import csv_text, results_table
     from rigidimeter.study import compare as compare_analysis
     from rigidimeter.study import comparison_row, conditions
@@ -161,7 +162,7 @@ def _compare_columns(
     json_out: Path | None,
     csv_out: Path | None,
 ) -> None:
-    from rigidimeter.recording import write_json
+    from rigidimeter.documents import write_json
     from rigidimeter.records import Notice
 
     if len(recordings.paths) != 1:
@@ -179,7 +180,7 @@ def _compare_columns(
 def _write_study(
     found: Analysed, folder: Path, json_out: Path | None, csv_out: Path | None
 ) -> None:
-    from rigidimeter.recording import write_json, write_text
+    from rigidimeter.documents import write_json, write_text
     from rigidimeter.reporting import csv_text, results_table
     from rigidimeter.study import study_document
 

@@ -64,9 +64,9 @@ def model(
           --reaction --terms inertia,damping,stiffness,reflex --compare
       rigidimeter model elbow.csv --terms inertia,damping,stiffness,offset,coulomb --band-hz 0 20
     """
+    from rigidimeter.documents import write_json
     from rigidimeter.estimation import aligned, estimate_delays
     from rigidimeter.estimation.terms import candidates, parse_terms
-    from rigidimeter.recording import write_json
     from rigidimeter.study import task_of
 
     if recordings.method not in ("auto", "bandlimited"):

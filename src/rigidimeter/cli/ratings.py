@@ -75,7 +75,7 @@ def ratings(
       rigidimeter ratings ratings.csv --random subject/day --contrast OFF DBS
     """
     from rigidimeter.cli.ratings_show import model_notices, ratings_document, ratings_lines
-    from rigidimeter.recording import write_json
+    from rigidimeter.documents import write_json
     from rigidimeter.recording.text_table import read_labelled
     from rigidimeter.records import Notice
     from rigidimeter.statistics import fit_mixed

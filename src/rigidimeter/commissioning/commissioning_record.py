@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
@@ -20,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.commissioning.checks import Check
+from rigidimeter.documents import plain_values, write_json
 from rigidimeter.errors import UserError
 
 __all__ = [
@@ -27,7 +26,6 @@ __all__ = [
     "MUST_PASS",
     "SCHEMA",
     "CommissioningRecord",
-    "plain",
     "read_record",
     "record_path",
     "write_record",
@@ -151,11 +149,9 @@ def record_path(rig: Path) -> Path:
 
 def write_record(path: Path, record: CommissioningRecord) -> None:
     """Write the record with its digest, whole or not at all."""
-    values = plain({**asdict(record), "passed": record.passed})
+    values = plain_values({**asdict(record), "passed": record.passed})
     values["digest"] = _digest(values)
-    part = path.with_name(path.name + ".part")
-    part.write_text(json.dumps(values, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    os.replace(part, path)
+    write_json(path, values)
 
 
 def read_record(path: Path) -> CommissioningRecord:
@@ -200,14 +196,3 @@ def read_record(path: Path) -> CommissioningRecord:
 def _digest(values: Mapping[str, Any]) -> str:
     text = json.dumps(values, sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def plain(value: Any) -> Any:
-    """Return what JSON keeps of a value: a number that is not finite becomes null."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return value

@@ -13,11 +13,11 @@ from typing import Any
 
 from rigidimeter.commissioning.commissioning_record import (
     CommissioningRecord,
-    plain,
     read_record,
     record_path,
 )
 from rigidimeter.devices.rigfile import RigFile
+from rigidimeter.documents import plain_values
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings
 from rigidimeter.settings.commissioning_settings import CommissioningSettings
@@ -124,12 +124,12 @@ def check_record(
         raise UserError(
             f"{path}: is of {record.made_utc[:10]}, and a record holds for {days:g} days; {again}"
         )
-    _same_controller(path, record.covered, plain(covered(settings)))
+    _same_controller(path, record.covered, plain_values(covered(settings)))
     return record
 
 
 def _same_devices(path: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    now = plain(now)
+    now = plain_values(now)
     for role in sorted({*before, *now}):
         old, new = before.get(role, {}), now.get(role, {})
         for key in ("model", "serial", "watchdog_s"):

@@ -23,7 +23,6 @@ import hashlib
 import importlib
 import inspect
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +32,7 @@ from pydantic import BaseModel, ValidationError
 
 from rigidimeter.devices.base import Now
 from rigidimeter.devices.composed import ComposedRig, Home
+from rigidimeter.documents import read_toml
 from rigidimeter.errors import UserError
 from rigidimeter.settings.messages import sentence
 
@@ -137,14 +137,7 @@ def load_rig(path: Path) -> RigFile:
     UserError
         If the file cannot be read, or names a device, a driver or a value that does not exist.
     """
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except UnicodeDecodeError:
-        raise UserError(f"{path}: is not a text file in UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
-        raise UserError(f"{path}: is not valid TOML: {error}") from None
+    values = read_toml(path)
     unknown = sorted(set(values) - set(DRIVERS) - {"name", *HOME})
     if unknown:
         raise UserError(

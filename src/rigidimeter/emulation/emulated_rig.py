@@ -33,6 +33,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, Any, Literal
 
+from rigidimeter.documents import plain_values
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.emulation import ascii_emulator as ascii_peer
 from rigidimeter.emulation.cia402 import cia402_emulator as cia402
@@ -298,19 +299,8 @@ def serve(
 
 
 def _say(out: IO[str], answer: dict[str, Any]) -> None:
-    out.write(json.dumps(_plain(answer)) + "\n")
+    out.write(json.dumps(plain_values(answer)) + "\n")
     out.flush()
-
-
-def _plain(value: Any) -> Any:
-    """Return a value that JSON has: a number that is not finite becomes null."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value
 
 
 def _number(word: str) -> float | None:

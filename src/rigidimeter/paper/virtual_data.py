@@ -7,15 +7,15 @@ what it assumes. They prove nothing about the animal.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from rigidimeter import __version__
+from rigidimeter.documents import read_json, write_json
 from rigidimeter.errors import UserError
-from rigidimeter.recording import read_session, write_text
+from rigidimeter.recording import read_session
 from rigidimeter.records import Epoch
 from rigidimeter.settings import Settings
 from rigidimeter.virtual.study_design import StudyDesign
@@ -88,7 +88,7 @@ def virtual_study(
     wanted = {"design": design.name, "seed": seed, "rigidimeter": __version__}
     made = folder / MADE
     if made.is_file():
-        found = json.loads(made.read_text(encoding="utf-8"))
+        found = read_json(made)
         if found != wanted:
             raise UserError(
                 f"{folder}: is the virtual study {_named(found)}, not {_named(wanted)}; name "
@@ -97,7 +97,7 @@ def virtual_study(
         plans = plan_study(design, seed)
     else:
         plans = write_virtual_study(folder, design, seed, processes=processes, progress=progress)
-        write_text(made, json.dumps(wanted, indent=1) + "\n")
+        write_json(made, wanted)
     epochs: list[Epoch] = []
     days: dict[str, str] = {}
     for plan in plans:

@@ -6,8 +6,6 @@ from rigidimeter.recording.estimate_files import (
     read_estimates,
     write_estimates_csv,
     write_estimates_json,
-    write_json,
-    write_text,
 )
 from rigidimeter.recording.formats import ReadOptions, Table, read_recording, read_table
 from rigidimeter.recording.recording import Recording, read
@@ -34,6 +32,4 @@ __all__ = [
     "session_settings",
     "write_estimates_csv",
     "write_estimates_json",
-    "write_json",
-    "write_text",
 ]

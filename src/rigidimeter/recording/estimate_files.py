@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rigidimeter.documents import csv_text, read_json, write_json, write_text
 from rigidimeter.errors import UserError
 from rigidimeter.records import (
     PARAMETER_VECTORS,
@@ -29,8 +27,6 @@ __all__ = [
     "read_estimates",
     "write_estimates_csv",
     "write_estimates_json",
-    "write_json",
-    "write_text",
 ]
 
 ESTIMATES_SCHEMA = "rigidimeter.estimates/1"
@@ -87,46 +83,7 @@ def write_estimates_csv(path: Path, analysis: Analysis) -> None:
         )
     if not rows:
         rows = [_score_row(score) for score in analysis.scores]
-    file = io.StringIO()
-    writer = csv.DictWriter(file, list(rows[0]) if rows else ["epoch"], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    write_text(path, file.getvalue())
-
-
-def write_json(path: Path, document: Mapping[str, Any]) -> None:
-    """Write a document as JSON; numbers must be finite.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be written.
-    """
-    write_text(path, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be written.
-    """
-    # Whole or not at all: an older file of that name survives a full disk.
-    content = text.encode("utf-8", errors="backslashreplace")
-    beside = path.with_name(f".{path.name}.part")
-    try:
-        if path.is_dir():
-            raise IsADirectoryError(21, "Is a directory", str(path))
-        if path.exists() and not path.is_file():  # such as /dev/stdout
-            path.write_bytes(content)
-            return
-        beside.write_bytes(content)
-        beside.replace(path)
-    except OSError as error:
-        beside.unlink(missing_ok=True)
-        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
+    write_text(path, csv_text(list(rows[0]) if rows else ["epoch"], rows))
 
 
 def read_estimates(path: Path) -> Analysis:
@@ -137,12 +94,7 @@ def read_estimates(path: Path) -> Analysis:
     UserError
         If the file is not such a document.
     """
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"{path}: is not valid JSON ({error})") from None
+    document = read_json(path)
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != ESTIMATES_SCHEMA:
         raise UserError(f"{path}: schema is {schema!r}; expected {ESTIMATES_SCHEMA!r}")

@@ -17,6 +17,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from rigidimeter.documents import json_line
 from rigidimeter.errors import UserError
 
 __all__ = [
@@ -266,7 +267,7 @@ def stream_extent(path: Path) -> tuple[int, bool]:
 
 def append_event(file: BinaryIO, event: Mapping[str, Any]) -> None:
     """Write one event as one line, at once."""
-    append_line(file, json.dumps(event, ensure_ascii=False, allow_nan=False).encode() + b"\n")
+    append_line(file, json_line(event))
 
 
 def append_line(file: BinaryIO, line: bytes) -> None:

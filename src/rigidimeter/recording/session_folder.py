@@ -9,7 +9,6 @@ with success, abort or fail and a reason; so does the session. A folder without 
 from __future__ import annotations
 
 import fcntl
-import json
 import platform
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
@@ -22,6 +21,7 @@ import scipy
 from numpy.typing import NDArray
 
 from rigidimeter import __version__
+from rigidimeter.documents import json_text, read_json, replace_file, text_bytes
 from rigidimeter.errors import UserError
 from rigidimeter.recording.sample_log import (
     SAMPLE_UNITS,
@@ -118,10 +118,7 @@ class SessionWriter:
             }
             if continues:
                 manifest["continues"] = dict(continues)
-            text = json.dumps(manifest, indent=1, ensure_ascii=False, allow_nan=False)
-            part = folder / f".{MANIFEST}.part"
-            part.write_text(text + "\n", encoding="utf-8")
-            part.replace(folder / MANIFEST)  # whole, or not there
+            replace_file(folder / MANIFEST, text_bytes(json_text(manifest)))
             self._log = SampleLog(folder / SAMPLES, settings.rig.tick_rate_hz)
             # Unbuffered: a line that the disk refused must not turn up later.
             self._events: BinaryIO = (folder / EVENTS).open("xb", buffering=0)
@@ -226,14 +223,9 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         If the folder is no session folder, or one that this version cannot read.
     """
     path = folder / MANIFEST
-    try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise UserError(f"{folder}: is not a session folder, it has no {MANIFEST}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read ({error})") from None
-    except json.JSONDecodeError as error:
-        raise UserError(f"{path}: is not valid JSON ({error})") from None
+    if not path.exists():
+        raise UserError(f"{folder}: is not a session folder, it has no {MANIFEST}")
+    manifest = read_json(path)
     schema = manifest.get("schema") if isinstance(manifest, dict) else None
     if schema != SCHEMA:
         raise UserError(f"{path}: schema is {schema!r}; this version reads {SCHEMA!r}")

@@ -7,7 +7,6 @@ its range with the range and the unit.
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -15,6 +14,7 @@ from typing import Any, Self
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
+from rigidimeter.documents import read_toml
 from rigidimeter.errors import UserError
 from rigidimeter.settings.messages import sentence
 from rigidimeter.settings.section import Section
@@ -148,14 +148,7 @@ def read_study_toml(path: Path) -> StudyToml:
     UserError
         Naming each offending key, its value, and what would be right.
     """
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except UnicodeDecodeError:
-        raise UserError(f"{path}: is not a text file in UTF-8") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise UserError(f"{path}: is not valid TOML: {error}") from None
+    values = read_toml(path)
     schema = values.pop("schema", None)
     if schema is None:
         raise UserError(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from dataclasses import dataclass
 from typing import Literal
+
+from rigidimeter import documents
 
 __all__ = ["Cell", "Column", "Kind", "Table", "csv_text"]
 
@@ -54,8 +54,4 @@ class Table:
 
 def csv_text(table: Table) -> str:
     """Return the table as CSV: stored names as header, floats so that they read back equal."""
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([column.name for column in table.columns])
-    writer.writerows(table.rows)
-    return file.getvalue()
+    return documents.csv_text([column.name for column in table.columns], table.rows)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from rigidimeter.documents import read_toml
 from rigidimeter.errors import UserError
 from rigidimeter.settings.messages import sentence
 from rigidimeter.settings.models import Settings
@@ -42,15 +42,7 @@ def load_settings(path: Path | None) -> Settings:
     """
     if path is None:
         return Settings()
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except UnicodeDecodeError:
-        raise UserError(f"{path}: is not a text file in UTF-8") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise UserError(f"{path}: is not valid TOML: {error}") from None
-    return parse_settings(values, source=str(path))
+    return parse_settings(read_toml(path), source=str(path))
 
 
 def dump_settings(settings: Settings) -> dict[str, Any]:

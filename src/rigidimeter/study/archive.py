@@ -21,8 +21,9 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter import __version__
+from rigidimeter.documents import json_text, text_bytes, write_text
 from rigidimeter.errors import UserError
-from rigidimeter.recording import estimates_document, write_text
+from rigidimeter.recording import estimates_document
 from rigidimeter.settings import dump_settings
 from rigidimeter.study.results import Cohort, Study
 from rigidimeter.study.sessions import file_digest
@@ -57,12 +58,12 @@ def keep(read: StudyRead, study: Study, cohort: Cohort, seed: int, resamples: in
     place = str(read.folder.folder)
     document = study_document(study, cohort, place)
     texts = {
-        "estimates.json": _json(estimates_document(study.analysis)),
+        "estimates.json": json_text(estimates_document(study.analysis)),
         **study_tables(study, cohort),
-        COMPARISON: _json(document),
+        COMPARISON: json_text(document),
     }
     inputs = _inputs(read, study, seed, resamples)
-    results = {name: hashlib.sha256(_bytes(text)).hexdigest() for name, text in texts.items()}
+    results = {name: hashlib.sha256(text_bytes(text)).hexdigest() for name, text in texts.items()}
     before = _object(folder / INPUTS)
     if before is not None and not _is_inputs(before):
         before = None
@@ -81,7 +82,7 @@ def keep(read: StudyRead, study: Study, cohort: Cohort, seed: int, resamples: in
             (folder / name).unlink(missing_ok=True)  # ours, unedited, and no longer a result
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror or error})") from None
-    _write_new(folder / INPUTS, _json({**inputs, "results": results}))
+    _write_new(folder / INPUTS, json_text({**inputs, "results": results}))
     if before is not None and not said:
         said.append(UNCHANGED)
     return said
@@ -236,7 +237,7 @@ def _write(folder: Path, texts: Mapping[str, str], edited: Mapping[str, str]) ->
 def _write_new(path: Path, text: str) -> None:
     """Write a file unless it holds these bytes already."""
     try:
-        if path.is_file() and path.read_bytes() == _bytes(text):
+        if path.is_file() and path.read_bytes() == text_bytes(text):
             return
     except OSError:
         pass  # writing says what is wrong
@@ -267,11 +268,3 @@ def _object(path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) else None
-
-
-def _json(document: Mapping[str, Any]) -> str:
-    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _bytes(text: str) -> bytes:
-    return text.encode("utf-8", errors="backslashreplace")

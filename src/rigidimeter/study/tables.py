@@ -5,15 +5,12 @@ Two analyses of the same inputs give the same bytes: no time, and no place, is w
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
+from rigidimeter.documents import csv_text, plain_values
 from rigidimeter.recording import estimates_document
 from rigidimeter.study.comparison import Comparison
 from rigidimeter.study.results import Cohort, RatingsFound, Study
@@ -58,7 +55,7 @@ def study_document(study: Study, cohort: Cohort, place: str) -> dict[str, Any]:
             for notice in study.notices
         ],
     }
-    plain = _plain(document)
+    plain = plain_values(document)
     assert isinstance(plain, dict)
     return plain
 
@@ -79,7 +76,7 @@ def comparison_row(comparison: Comparison) -> dict[str, Any]:
         **(asdict(comparison.test) if comparison.test is not None else {}),
         "remark": comparison.remark,
     }
-    plain = _plain(row)
+    plain = plain_values(row)
     assert isinstance(plain, dict)
     return plain
 
@@ -136,7 +133,11 @@ def study_tables(study: Study, cohort: Cohort) -> dict[str, str]:
         "epochs": [whose[row["source"]] | _flat(row) for row in epochs],
         "scores": [whose[row["source"]] | _flat(row) for row in estimates["scores"]],
     }
-    return {f"{name}.csv": _csv(rows) for name, rows in tables.items() if rows}
+    return {
+        f"{name}.csv": csv_text(list(dict.fromkeys(key for row in rows for key in row)), rows)
+        for name, rows in tables.items()
+        if rows
+    }
 
 
 def _flat(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -148,28 +149,3 @@ def _flat(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         elif not isinstance(value, (list, tuple)):
             flat[prefix + name] = value
     return flat
-
-
-def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    columns = dict.fromkeys(name for row in rows for name in row)
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(columns), restval="", lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        plain = _plain(dict(row))
-        assert isinstance(plain, dict)
-        writer.writerow({name: "" if value is None else value for name, value in plain.items()})
-    return text.getvalue()
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as JSON knows it: no NaN, no tuples, no numbers of numpy."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(each) for name, each in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(each) for each in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

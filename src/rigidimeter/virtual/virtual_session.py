@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from rigidimeter.acquisition import DeadlineClock, SessionResult, SimulatedClock, run_session
 from rigidimeter.devices import SimulatedRig
+from rigidimeter.documents import read_json, write_json
 from rigidimeter.experiment import PlannedEpoch, plan
 from rigidimeter.recording import SessionWriter
 from rigidimeter.settings import Settings
@@ -84,8 +84,5 @@ def run_virtual_session(
 
 def _date(manifest: Path, created_utc: str) -> None:
     """Put the planned date into a manifest, before the session begins."""
-    values = json.loads(manifest.read_text(encoding="utf-8")) | {"created_utc": created_utc}
-    text = json.dumps(values, indent=1, ensure_ascii=False, allow_nan=False)
-    part = manifest.with_name(f".{manifest.name}.part")
-    part.write_text(text + "\n", encoding="utf-8")
-    part.replace(manifest)  # whole, or as it was
+    values = read_json(manifest) | {"created_utc": created_utc}
+    write_json(manifest, values)

@@ -7,8 +7,6 @@ last: a folder that has one is complete.
 
 from __future__ import annotations
 
-import csv
-import io
 import signal
 import time
 from collections.abc import Callable, Sequence
@@ -17,8 +15,8 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from rigidimeter.documents import csv_text, write_text
 from rigidimeter.errors import UserError
-from rigidimeter.recording import write_text
 from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
 from rigidimeter.virtual.study_plan import DayPlan, plan_study
 from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s
@@ -137,7 +135,7 @@ def _run(plan: DayPlan, folder: Path, progress: Progress) -> None:
 
 def _sessions(plans: Sequence[DayPlan], subject: str) -> str:
     rows = [(plan.folder, subject, plan.day, plan.condition, plan.note) for plan in plans]
-    return _csv(("path", "subject", "day", "condition", "note"), rows)
+    return csv_text(("path", "subject", "day", "condition", "note"), rows)
 
 
 def _ratings(plans: Sequence[DayPlan], subject: str) -> str:
@@ -146,15 +144,7 @@ def _ratings(plans: Sequence[DayPlan], subject: str) -> str:
         for plan in plans
         for rating in plan.ratings
     ]
-    return _csv(("subject", "day", "condition", "examiner", "score"), rows)
-
-
-def _csv(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return text.getvalue()
+    return csv_text(("subject", "day", "condition", "examiner", "score"), rows)
 
 
 def _study_toml(design: StudyDesign, seed: int) -> str:

@@ -18,11 +18,9 @@ def read_back(text: str, table: Table) -> list[list[Cell]]:
     header, *rows = csv.reader(io.StringIO(text))
     assert header == [column.name for column in table.columns]
     types = [[type(cell) for cell in row] for row in table.rows]
+    read = {type(None): lambda _: None, bool: "True".__eq__, float: lambda c: float(c or "nan")}
     return [
-        [
-            None if kind is type(None) else (cell == "True" if kind is bool else kind(cell))
-            for cell, kind in zip(row, kinds, strict=True)
-        ]
+        [read.get(kind, kind)(cell) for cell, kind in zip(row, kinds, strict=True)]
         for row, kinds in zip(rows, types, strict=True)
     ]
 

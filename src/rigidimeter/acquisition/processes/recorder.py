@@ -7,7 +7,6 @@ system has been given is put on the disk about once a second and at the end of e
 
 from __future__ import annotations
 
-import json
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from typing import Any
 
 from rigidimeter.acquisition.processes.ring import ROW, Event, EventRing, SampleRing
 from rigidimeter.acquisition.processes.shared_status import Role, SharedStatus
+from rigidimeter.documents import json_line
 from rigidimeter.recording.sample_log import BATCH_S
 from rigidimeter.recording.session_folder import SessionWriter
 from rigidimeter.settings import Settings
@@ -156,7 +156,7 @@ class Recorder:
 
     def _tell(self, kind: str, **facts: Any) -> None:
         event = {"event": kind, "time_s": self._last_time_s, **facts}
-        self._own.append(json.dumps(event, ensure_ascii=False, allow_nan=False).encode() + b"\n")
+        self._own.append(json_line(event))
 
     def _tell_loss(self) -> None:
         lost = {"samples": self._samples.refused, "events": self._events.refused}

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.acquisition.processes.shared_memory import Memory
+from rigidimeter.documents import json_line
 from rigidimeter.recording.sample_log import Sample, sample_dtypes
 
 __all__ = ["ROW", "Event", "EventRing", "Reader", "SampleReader", "SampleRing"]
@@ -241,7 +242,7 @@ class EventRing(_Ring):
         ValueError
             If the event is too long for a slot, or not what JSON can say.
         """
-        line = json.dumps(event, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+        line = json_line(event)
         most = self._slot_bytes - self._head.size
         if len(line) > most:
             raise ValueError(

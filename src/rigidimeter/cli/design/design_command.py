@@ -76,13 +76,14 @@ def design(
       rigidimeter design --settings rig.toml --detect damping=20% --power 0.8
       rigidimeter design --settings rig.toml --optimise --multisine
     """
-    from rigidimeter.cli.design.design_files import write_folder, write_json
+    from rigidimeter.cli.design.design_files import write_folder
     from rigidimeter.cli.design.design_json import document
     from rigidimeter.cli.design.prediction_text import (
         alternative_lines,
         detection_lines,
         ranking_lines,
     )
+    from rigidimeter.documents import write_json
     from rigidimeter.dynamics import refuse_unstable
     from rigidimeter.experiment import (
         Wanted,

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import json
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rigidimeter.documents import csv_text, write_json, write_text
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.experiment import Alternative, Candidate, Foresight, Overview
 
-__all__ = ["snippet", "write_folder", "write_json"]
+__all__ = ["snippet", "write_folder"]
 
 
 def snippet(best: Candidate) -> str:
@@ -52,58 +50,26 @@ def write_folder(
     epochs = document["protocol"]["epochs"]
     names = ["prbs.csv", "sinusoid.csv", "protocol.csv", "bode.svg"]
     _write_torque(folder / "prbs.csv", planned.perturbation_nm.tolist(), rate_hz)
-    _write_csv(
+    write_text(
         folder / "sinusoid.csv",
-        ("time_s", "angle_rad", "velocity_rad_s"),
-        ((tick / rate_hz, *values) for tick, values in enumerate(motion)),
+        csv_text(
+            ("time_s", "angle_rad", "velocity_rad_s"),
+            ((tick / rate_hz, *values) for tick, values in enumerate(motion)),
+        ),
     )
-    _write_csv(folder / "protocol.csv", list(epochs[0]), (epoch.values() for epoch in epochs))
+    write_text(folder / "protocol.csv", csv_text(list(epochs[0]), epochs))
     found = seen.stability
-    _write_text(
-        folder / "bode.svg", svg_text(bode(planned.settings, found.conditions, found.worst))
-    )
+    write_text(folder / "bode.svg", svg_text(bode(planned.settings, found.conditions, found.worst)))
     if alternative is not None:
         names.append("multisine.csv")
         _write_torque(folder / names[-1], alternative.torque_nm.tolist(), rate_hz)
     if ranked is not None:
         names.append("optimised.toml")
-        _write_text(folder / names[-1], snippet(ranked[0]))
+        write_text(folder / names[-1], snippet(ranked[0]))
     write_json(folder / "design.json", document)
     return [*names, "design.json"]
 
 
 def _write_torque(path: Path, torque_nm: list[float], rate_hz: float) -> None:
-    _write_csv(
-        path,
-        ("time_s", "perturbation_nm"),
-        ((tick / rate_hz, value) for tick, value in enumerate(torque_nm)),
-    )
-
-
-def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
-    try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(header)
-            writer.writerows(rows)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
-
-
-def write_json(path: Path, document: dict[str, Any]) -> None:
-    """Write the numbers as JSON.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be written.
-    """
-    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    _write_text(path, text)
-
-
-def _write_text(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
+    rows = ((tick / rate_hz, value) for tick, value in enumerate(torque_nm))
+    write_text(path, csv_text(("time_s", "perturbation_nm"), rows))

@@ -69,7 +69,7 @@ def new(
       rigidimeter compare study
       rigidimeter report study --out study/report
     """
-    from rigidimeter.recording import write_text
+    from rigidimeter.documents import write_text
     from rigidimeter.recording.study_folder import TABLE_COLUMNS
     from rigidimeter.recording.study_toml import STUDY_FILE
 

@@ -1,0 +1,85 @@
+"""Text, JSON, CSV and TOML: full precision, nothing half written, and refusals in a sentence."""
+
+import csv
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigidimeter.documents import (
+    csv_text,
+    json_line,
+    json_text,
+    read_json,
+    read_toml,
+    replace_file,
+    write_json,
+    write_text,
+)
+from rigidimeter.errors import UserError
+
+
+@settings(deadline=None)
+@given(values=st.lists(st.floats(allow_nan=False, allow_infinity=False)))
+def test_floats_survive_json_and_csv_to_the_bit(values):
+    assert json.loads(json_text(values)) == values
+    text = csv_text(["a", "b"], [(value, np.float64(value)) for value in values])
+    rows = list(csv.reader(io.StringIO(text)))
+    assert rows[0] == ["a", "b"]
+    assert [tuple(map(float, row)) for row in rows[1:]] == [(v, v) for v in values]
+
+
+def test_json_has_null_for_what_is_not_finite():
+    document = {"a": math.nan, "b": (np.float64(np.inf), np.int64(3)), 4: "ä"}
+    assert json.loads(json_text(document)) == {"a": None, "b": [None, 3], "4": "ä"}
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        json_line({"torque_nm": math.nan})
+
+
+def test_csv_leaves_cells_empty_and_quotes_what_needs_it():
+    rows = [{"a": 1, "b": 'say "x", y'}, {"a": None, "c": True}, {"a": math.nan, "b": "z\nz"}]
+    assert csv_text(["a", "b", "c"], rows) == (
+        'a,b,c\n1,"say ""x"", y",\n,,True\n,"z\nz",\n'
+    )  # fmt: skip
+    assert csv_text(["a", "b"], []) == "a,b\n"
+
+
+def test_an_older_file_survives_a_failed_write(tmp_path, monkeypatch):
+    path = tmp_path / "a.json"
+    write_json(path, {"old": 1})
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pathlib.Path.write_bytes", full)
+    with pytest.raises(UserError, match=r"a\.json: cannot be written \(No space left on device\)"):
+        write_json(path, {"new": 2})
+    with pytest.raises(OSError, match="No space"):
+        replace_file(path, b"")
+    assert read_json(path) == {"old": 1}
+    assert [file.name for file in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_a_folder_is_not_written_over(tmp_path):
+    with pytest.raises(UserError, match="cannot be written"):
+        write_text(tmp_path, "x")
+
+
+def test_what_cannot_be_read_is_a_sentence(tmp_path):
+    bad = tmp_path / "bad"
+    for data, json_told, toml_told in [
+        (b"{", "is not valid JSON", "is not valid TOML"),
+        (b"\xff", "is not valid JSON", "is not a text file in UTF-8"),
+    ]:
+        bad.write_bytes(data)
+        with pytest.raises(UserError, match=json_told):
+            read_json(bad)
+        with pytest.raises(UserError, match=toml_told):
+            read_toml(bad)
+    for read in (read_json, read_toml):
+        with pytest.raises(UserError, match="cannot be read"):
+            read(tmp_path / "none")
