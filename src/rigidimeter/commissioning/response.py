@@ -5,7 +5,7 @@ A drive of bandwidth f after a delay τ turns it into
 
     θ(t) = θ₀ + s · h_f(t − τ) * ∫ c dt,        s = 1 where all units are right,
 
-with h_f the second-order response of `simulation.drive`. The torque of an arm is
+with h_f the second-order response of `rigidimeter.dynamics.velocity_drive`. The torque of an arm is
 
     M(t) = J θ''(t − δ) + B θ'(t − δ) + K θ(t − δ) + M₀.
 
@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize, nnls
-from scipy.signal import bilinear, lfilter
 
 from rigidimeter.commissioning.trial import Array, Heard, new_samples
+from rigidimeter.dynamics import DriveModel
 
 __all__ = [
     "ArmSeen",
@@ -198,10 +198,10 @@ def _drive_angle(
     if not math.isfinite(bandwidth_hz):
         return lambda at_s: sent_angle_rad(heard, at_s)
     grid = np.arange(heard.time_s[0], heard.time_s[-1] + 1.0 / GRID_HZ, 1.0 / GRID_HZ)
-    omega = 2.0 * math.pi * bandwidth_hz
-    b, a = bilinear([omega**2], [1.0, 2.0 * damping_ratio * omega, omega**2], GRID_HZ)
-    followed = lfilter(b, a, sent_angle_rad(heard, grid))
-    return lambda at_s: np.interp(at_s, grid, followed)
+    mean_rad_s = np.diff(sent_angle_rad(heard, grid)) * GRID_HZ
+    drive = DriveModel(bandwidth_hz, damping_ratio)
+    followed = drive.held(mean_rad_s, 1.0 / GRID_HZ).angle_rad
+    return lambda at_s: np.interp(at_s, grid[:-1], followed)
 
 
 def _line(x: Array, y: Array) -> tuple[float, float, float]:

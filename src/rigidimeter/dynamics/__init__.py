@@ -1,16 +1,21 @@
 """The plant and its loop: joint, drive, sensors, subject as steps, and the linear loop of them."""
 
-from rigidimeter.dynamics.arm import Arm, arm, arm_step, arm_torque_nm
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.dynamics.loop_motion import (
+from rigidimeter.dynamics.joint import (
+    Arm,
+    JointDynamics,
+    arm,
+    arm_step,
+    arm_torque_nm,
+    median_joint,
+)
+from rigidimeter.dynamics.linear_loop import (
     ClosedLoopMotion,
+    Loop,
+    OpenLoop,
     closed_loop_motion,
     voluntary_motion_sd,
 )
 from rigidimeter.dynamics.loop_poles import spectral_radius
-from rigidimeter.dynamics.loop_response import LoopModel, command_response, loop_model, open_loop
-from rigidimeter.dynamics.noise_density import sensor_density, subject_density
-from rigidimeter.dynamics.random_streams import BLOCK_TICKS, RigStreams, rig_streams
 from rigidimeter.dynamics.sensors import (
     SAME_TIME_S,
     between,
@@ -18,6 +23,7 @@ from rigidimeter.dynamics.sensors import (
     quantised,
     sample_time_blocks_s,
     sample_times_s,
+    sensor_density,
 )
 from rigidimeter.dynamics.stability import (
     Margins,
@@ -26,21 +32,37 @@ from rigidimeter.dynamics.stability import (
     loop_stability,
     near_instability,
     refuse_unstable,
-    subject_joint,
 )
-from rigidimeter.dynamics.subject_torque import SubjectTorque, draw_joint
-from rigidimeter.dynamics.velocity_drive import Drive, DriveState, drive, drive_step
+from rigidimeter.dynamics.subject_torque import (
+    BLOCK_TICKS,
+    RigStreams,
+    SubjectTorque,
+    draw_joint,
+    rig_streams,
+    subject_density,
+)
+from rigidimeter.dynamics.velocity_drive import (
+    ArmMotion,
+    Drive,
+    DriveModel,
+    DriveState,
+    drive,
+    drive_step,
+)
 
 __all__ = [
     "BLOCK_TICKS",
     "SAME_TIME_S",
     "Arm",
+    "ArmMotion",
     "ClosedLoopMotion",
     "Drive",
+    "DriveModel",
     "DriveState",
     "JointDynamics",
-    "LoopModel",
+    "Loop",
     "Margins",
+    "OpenLoop",
     "RigStreams",
     "Stability",
     "SubjectTorque",
@@ -49,16 +71,14 @@ __all__ = [
     "arm_torque_nm",
     "between",
     "closed_loop_motion",
-    "command_response",
     "draw_joint",
     "drive",
     "drive_step",
     "loop_margins",
-    "loop_model",
     "loop_stability",
+    "median_joint",
     "moment",
     "near_instability",
-    "open_loop",
     "quantised",
     "refuse_unstable",
     "rig_streams",
@@ -67,6 +87,5 @@ __all__ = [
     "sensor_density",
     "spectral_radius",
     "subject_density",
-    "subject_joint",
     "voluntary_motion_sd",
 ]

@@ -1,21 +1,28 @@
-"""A joint as inertia, viscous damping and stiffness (Eq. 3).
+"""A joint as inertia, viscous damping and stiffness (Eq. 3), and its steps both ways round.
 
     J θ'' + B θ' + K θ = M
 
 with θ the angle in rad, M the torque in N·m that drives the joint, J in kg·m², B in N·m·s/rad and
 K in N·m/rad. M and θ are positive in the same direction: the torque is the one applied *to* the
 joint, the negative of its reaction.
+
+On the rig the drive imposes the motion and the arm answers with a torque: `arm_torque_nm`. Left to
+a torque, the arm moves: `arm_step`, exact for a torque held between two ticks.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["JointDynamics"]
+from rigidimeter.settings import SubjectSettings
+
+__all__ = ["Arm", "JointDynamics", "arm", "arm_step", "arm_torque_nm", "median_joint"]
 
 
 @dataclass(frozen=True)
@@ -48,6 +55,11 @@ class JointDynamics:
         if self.inertia_kg_m2 <= 0:
             raise ValueError(f"inertia must be greater than 0 kg·m², got {self.inertia_kg_m2}")
 
+    @property
+    def parameters(self) -> tuple[float, float, float]:
+        """J, B and K."""
+        return self.inertia_kg_m2, self.damping_nm_s_rad, self.stiffness_nm_rad
+
     def torque_nm(
         self, angle_rad: ArrayLike, velocity_rad_s: ArrayLike, acceleration_rad_s2: ArrayLike
     ) -> NDArray[np.float64]:
@@ -61,7 +73,7 @@ class JointDynamics:
     def compliance_rad_nm(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         """Return θ/M at the given frequencies, in rad/N·m (the transfer function of Eq. 3)."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)
-        J, B, K = self.inertia_kg_m2, self.damping_nm_s_rad, self.stiffness_nm_rad
+        J, B, K = self.parameters
         return np.asarray(1.0 / (J * s**2 + B * s + K))
 
     def bandwidth_hz(self) -> float:
@@ -75,7 +87,7 @@ class JointDynamics:
         ValueError
             If the stiffness is not greater than zero: the static value is then unbounded.
         """
-        J, B, K = self.inertia_kg_m2, self.damping_nm_s_rad, self.stiffness_nm_rad
+        J, B, K = self.parameters
         if K <= 0:
             raise ValueError(f"bandwidth needs a stiffness greater than 0 N·m/rad, got {K}")
         middle = B**2 - 2 * J * K
@@ -83,3 +95,55 @@ class JointDynamics:
         # Of the two equal forms of the root, the one that does not subtract like numbers.
         omega_squared = 2 * K**2 / (middle + root) if middle > 0 else (root - middle) / (2 * J**2)
         return math.sqrt(omega_squared) / (2 * math.pi)
+
+
+def median_joint(subject: SubjectSettings) -> JointDynamics:
+    """Return the median joint of a virtual subject in one condition."""
+    return JointDynamics(subject.inertia_kg_m2, subject.damping_nm_s_rad, subject.stiffness_nm_rad)
+
+
+def arm_torque_nm(
+    inertia_kg_m2: float,
+    damping_nm_s_rad: float,
+    stiffness_nm_rad: float,
+    angle_rad: float,
+    velocity_rad_s: float,
+    acceleration_rad_s2: float,
+    voluntary_nm: float,
+) -> float:
+    """Return the torque the drive must apply, M_meas = J θ'' + B θ' + K θ − M_sub (Eq. 5)."""
+    return (
+        inertia_kg_m2 * acceleration_rad_s2
+        + damping_nm_s_rad * velocity_rad_s
+        + stiffness_nm_rad * angle_rad
+        - voluntary_nm
+    )
+
+
+class Arm(NamedTuple):
+    """One exact step of Eq. 3 under a held torque: x⁺ = A x + b M with x = (θ, θ')."""
+
+    a11: float
+    a12: float
+    a21: float
+    a22: float
+    b1: float
+    b2: float
+
+
+def arm(joint: JointDynamics, interval_s: float) -> Arm:
+    """Discretise Eq. 3 exactly, by the matrix exponential of state and input together."""
+    J, B, K = joint.parameters
+    augmented = np.array([[0.0, 1.0, 0.0], [-K / J, -B / J, 1.0 / J], [0.0, 0.0, 0.0]])
+    e = scipy.linalg.expm(augmented * interval_s)
+    return Arm(*(float(e[i, j]) for i, j in ((0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2))))
+
+
+def arm_step(
+    step: Arm, angle_rad: float, velocity_rad_s: float, torque_nm: float
+) -> tuple[float, float]:
+    """Return angle and velocity after one interval of the given torque."""
+    return (
+        step.a11 * angle_rad + step.a12 * velocity_rad_s + step.b1 * torque_nm,
+        step.a21 * angle_rad + step.a22 * velocity_rad_s + step.b2 * torque_nm,
+    )

@@ -1,6 +1,6 @@
 """The closed loop as one matrix over the ticks after which the sensor's pattern repeats.
 
-The state is the motion (θ, v, v'), the last command, the two memories of the torque filter, and the
+The state is the motion (v', v, θ), the last command, the two memories of the torque filter, and the
 samples of the torque sensor that were taken but have not been replaced yet. One tick is: the drive
 carries out the last command; a sample may be taken on the way; the newest sample that has arrived
 is read, filtered, and gives the next command. Nothing is rounded to whole ticks.
@@ -16,14 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimeter.control import admittance, butterworth_lowpass
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.dynamics.loop_response import (
-    Array,
-    admittance_coefficients,
-    drive_advance,
-    lowpass_coefficients,
-    reading_pattern,
-)
+from rigidimeter.dynamics.linear_loop import reading_pattern
+from rigidimeter.dynamics.velocity_drive import Array, drive_matrices
 from rigidimeter.settings import RigSettings, Settings
 
 __all__ = ["spectral_radius"]
@@ -44,7 +40,7 @@ def spectral_radius(settings: Settings, joint: JointDynamics) -> float:
     if over_pattern is None:
         raise ValueError("a pattern of readings has at least one tick")
     if joint.stiffness_nm_rad == 0.0:
-        over_pattern = over_pattern[1:, 1:]
+        over_pattern = np.delete(np.delete(over_pattern, _ANGLE, 0), _ANGLE, 1)
     largest = float(np.max(np.abs(np.linalg.eigvals(over_pattern))))
     return float(largest ** (1.0 / pattern_ticks))
 
@@ -88,7 +84,7 @@ def _tick_matrices(settings: Settings, joint: JointDynamics) -> Iterator[tuple[A
         yield control @ _motion(settings, joint, line, after_ticks), times
 
 
-_COMMAND, _FIRST, _SECOND, _SAMPLES = 3, 4, 5, 6
+_ANGLE, _COMMAND, _FIRST, _SECOND, _SAMPLES = 2, 3, 4, 5, 6
 
 
 def _motion(
@@ -97,12 +93,13 @@ def _motion(
     """Return how the arm moves in a tick, with a sample so long after its start, or none."""
     rig = settings.rig
     interval_s = 1.0 / rig.tick_rate_hz
+    drive = rig.drive_bandwidth_hz, rig.drive_damping_ratio
     size = _SAMPLES + line
     matrix = np.eye(size)
-    matrix[:3, :3], matrix[:3, _COMMAND] = drive_advance(rig, interval_s)
+    matrix[:3, :3], matrix[:3, _COMMAND] = drive_matrices(*drive, interval_s)
     if after_ticks is not None:
-        arm = np.array([joint.stiffness_nm_rad, joint.damping_nm_s_rad, joint.inertia_kg_m2])
-        part, push = drive_advance(rig, after_ticks * interval_s)
+        arm = np.array(joint.parameters)
+        part, push = drive_matrices(*drive, after_ticks * interval_s)
         matrix[_SAMPLES + 1 :] = np.eye(size)[_SAMPLES : size - 1]
         matrix[_SAMPLES] = 0.0
         matrix[_SAMPLES, :3], matrix[_SAMPLES, _COMMAND] = arm @ part, float(arm @ push)
@@ -111,15 +108,15 @@ def _motion(
 
 def _control(settings: Settings, line: int, place: int) -> Array:
     """Return how the sample at a place in the line becomes the next command."""
-    rate_hz = settings.rig.tick_rate_hz
-    decay, gain = admittance_coefficients(settings.controller, rate_hz)
-    b, a = lowpass_coefficients(settings.controller, rate_hz)
+    controller, rate_hz = settings.controller, settings.rig.tick_rate_hz
+    decay, gain = admittance(controller.inertia_kg_m2, controller.damping_nm_s_rad, 1.0 / rate_hz)
+    b0, b1, b2, a1, a2 = butterworth_lowpass(controller.torque_cutoff_hz, rate_hz)
     size = _SAMPLES + line
     read, first, second = (np.eye(size)[k] for k in (_SAMPLES + place, _FIRST, _SECOND))
-    smooth = b[0] * read + first
+    smooth = b0 * read + first
     matrix = np.eye(size)
-    matrix[_FIRST] = b[1] * read - a[1] * smooth + second
-    matrix[_SECOND] = b[2] * read - a[2] * smooth
+    matrix[_FIRST] = b1 * read - a1 * smooth + second
+    matrix[_SECOND] = b2 * read - a2 * smooth
     matrix[_COMMAND] *= decay
     matrix[_COMMAND] -= gain * smooth
     return matrix

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.settings import TorqueSensorSettings
+
 __all__ = [
     "SAME_TIME_S",
     "between",
@@ -14,6 +16,7 @@ __all__ = [
     "quantised",
     "sample_time_blocks_s",
     "sample_times_s",
+    "sensor_density",
 ]
 
 SAME_TIME_S = 1e-9
@@ -95,3 +98,12 @@ def sample_times_s(
     """Yield the times of `sample_time_blocks_s` one by one."""
     for times_s in sample_time_blocks_s(rate_hz, latency_s, jitter_s, rng):
         yield from times_s.tolist()
+
+
+def sensor_density(sensor: TorqueSensorSettings) -> float:
+    """Return the two-sided density of the torque sensor's noise, in N²m²/Hz.
+
+    White: (σ² + q²/12) / f_s with σ its noise, q its resolution and f_s its rate.
+    """
+    variance = sensor.noise_sd_nm**2 + sensor.resolution_nm**2 / 12.0
+    return variance / sensor.rate_hz

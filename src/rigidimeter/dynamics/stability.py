@@ -23,9 +23,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.dynamics.joint import JointDynamics, median_joint
+from rigidimeter.dynamics.linear_loop import Loop
 from rigidimeter.dynamics.loop_poles import spectral_radius
-from rigidimeter.dynamics.loop_response import Array, Complex, loop_model, open_loop
+from rigidimeter.dynamics.velocity_drive import Array, Complex
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings
 
@@ -34,10 +35,8 @@ __all__ = [
     "Stability",
     "loop_margins",
     "loop_stability",
-    "margin_frequencies_hz",
     "near_instability",
     "refuse_unstable",
-    "subject_joint",
 ]
 
 _POINTS = 4000
@@ -98,26 +97,20 @@ class Stability:
     warnings: tuple[str, ...]
 
 
-def subject_joint(settings: Settings, condition: str) -> JointDynamics:
-    """Return the median joint of a condition."""
-    subject = settings.subject[condition]
-    return JointDynamics(subject.inertia_kg_m2, subject.damping_nm_s_rad, subject.stiffness_nm_rad)
-
-
-def margin_frequencies_hz(settings: Settings) -> Array:
+def _frequencies_hz(settings: Settings) -> Array:
     """Return the frequencies along which the margins are looked for."""
-    half = settings.rig.tick_rate_hz / 2.0
-    return np.geomspace(_LOWEST_HZ, half, _POINTS)
+    return np.geomspace(_LOWEST_HZ, settings.rig.tick_rate_hz / 2.0, _POINTS)
 
 
 def loop_margins(settings: Settings, joint: JointDynamics) -> Margins:
     """Return stability and margins of the loop with a joint in it."""
-    frequency = margin_frequencies_hz(settings)
-    curve = open_loop(loop_model(settings.controller, settings.rig, frequency), joint)
+    loop = Loop(settings.controller, settings.rig)
 
     def curve_at(frequency_hz: Array) -> Complex:
-        return open_loop(loop_model(settings.controller, settings.rig, frequency_hz), joint)
+        return loop.at_frequency(frequency_hz).gain(joint.parameters)
 
+    frequency = _frequencies_hz(settings)
+    curve = curve_at(frequency)
     gain_db, gain_hz = math.inf, math.nan
     # The negative real axis is crossed where the imaginary part changes sign.
     for crossing, value in _crossings(lambda values: values.imag, curve_at, frequency, curve):
@@ -155,15 +148,15 @@ def loop_margins(settings: Settings, joint: JointDynamics) -> Margins:
 def loop_stability(settings: Settings) -> Stability:
     """Return the margins for each condition and for the worst joint around each."""
     conditions, worst = {}, {}
-    model = loop_model(settings.controller, settings.rig, margin_frequencies_hz(settings))
-    for name in settings.subject:
-        joint = subject_joint(settings, name)
+    loop = Loop(settings.controller, settings.rig).at_frequency(_frequencies_hz(settings))
+    for name, subject in settings.subject.items():
+        joint = median_joint(subject)
         conditions[name] = loop_margins(settings, joint)
 
         def badness(candidate: JointDynamics) -> tuple[float, float]:
             radius = spectral_radius(settings, candidate)
             unstable = radius if radius >= 1.0 - _STEADY else 0.0
-            return unstable, -float(np.min(np.abs(1.0 + open_loop(model, candidate))))
+            return unstable, -float(np.min(np.abs(1.0 + loop.gain(candidate.parameters))))
 
         worst[name] = loop_margins(settings, max(_around(settings, joint), key=badness))
     warnings = [
@@ -196,24 +189,19 @@ def near_instability(what: str, margins: Margins, settings: Settings) -> tuple[s
     )
     if not margins.stable:
         return (f"{what} ({values}) is unstable",)
+    found = (
+        ("gain margin", margins.gain_margin_db, "dB", "gain_margin_db", wanted.gain_margin_db),
+        (
+            "phase margin",
+            margins.phase_margin_deg,
+            "deg",
+            "phase_margin_deg",
+            wanted.phase_margin_deg,
+        ),
+    )
     low = [
-        f"{name} of {value:.3g} {unit}, less than margins.{key} = {threshold:g} {unit}"
-        for name, key, value, threshold, unit in (
-            (
-                "a gain margin",
-                "gain_margin_db",
-                margins.gain_margin_db,
-                wanted.gain_margin_db,
-                "dB",
-            ),
-            (
-                "a phase margin",
-                "phase_margin_deg",
-                margins.phase_margin_deg,
-                wanted.phase_margin_deg,
-                "deg",
-            ),
-        )
+        f"a {name} of {value:.3g} {unit}, less than margins.{key} = {threshold:g} {unit}"
+        for name, value, unit, key, threshold in found
         if value < threshold
     ]
     return (f"{what} ({values}) has {' and '.join(low)}",) if low else ()
@@ -230,8 +218,8 @@ def refuse_unstable(settings: Settings, stability: Stability | None = None) -> N
         Naming the condition and what would help.
     """
     found = stability.conditions if stability else None
-    for name in settings.subject:
-        margins = found[name] if found else loop_margins(settings, subject_joint(settings, name))
+    for name, subject in settings.subject.items():
+        margins = found[name] if found else loop_margins(settings, median_joint(subject))
         if not margins.stable:
             grows = math.log(margins.spectral_radius) * settings.rig.tick_rate_hz
             how = (

@@ -2,18 +2,36 @@
 
     v'' + 2 ζ ω_n v' + ω_n² v = ω_n² c
 
-with c the velocity command (held between ticks), v the velocity and ω_n/2π the bandwidth (its
--3 dB frequency at the damping ratio of 0.7071). Second
-order, so that the acceleration, and with it the torque, is continuous. The drive is stiff: the arm
-does not change its motion.
+with c the velocity command in rad/s (held between ticks), v the velocity and ω_n/2π the bandwidth
+(its −3 dB frequency at the damping ratio of 0.7071). Second order, so that the acceleration, and
+with it the torque, is continuous. The drive is stiff: the arm does not change its motion.
+
+With σ = ζ ω_n, ω_d = ω_n √(1 − ζ²), C = e^(−σt) cos ω_d t and S = e^(−σt) sin(ω_d t) / ω_d, the
+state after a time t of constant command is
+
+    v − c → (C + σS)(v − c) + S a        a → −ω_n² S (v − c) + (C − σS) a
+
+and the angle follows from integrating the equation of v − c once. `drive_coefficients` is the only
+place where this is computed; the steps of the virtual rig, the linear loop and the estimation use
+it. A step of the command from rest gives v = c (1 − C − σS).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
+from types import ModuleType
+from typing import NamedTuple, TypeVar
 
-__all__ = ["Drive", "DriveState", "drive", "drive_step"]
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+__all__ = ["ArmMotion", "Drive", "DriveModel", "DriveState", "drive", "drive_step"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Time = TypeVar("Time", float, Array)
 
 
 class Drive(NamedTuple):
@@ -36,8 +54,18 @@ class DriveState(NamedTuple):
     acceleration_rad_s2: float = 0.0
 
 
-def drive(bandwidth_hz: float, damping_ratio: float, interval_s: float) -> Drive:
-    """Discretise the drive exactly.
+class ArmMotion(NamedTuple):
+    """Acceleration, velocity and angle, in the order of J, B and K; each of shape (n,)."""
+
+    acceleration_rad_s2: Array
+    velocity_rad_s: Array
+    angle_rad: Array
+
+
+def drive_coefficients(
+    bandwidth_hz: float, damping_ratio: float, interval_s: Time
+) -> tuple[Time, Time, Time, Time, Time, Time]:
+    """Return m11, m12, m21, m22, n1 and n2 of a step, or of steps of many lengths.
 
     Raises
     ------
@@ -46,18 +74,30 @@ def drive(bandwidth_hz: float, damping_ratio: float, interval_s: float) -> Drive
     """
     if not 0 < damping_ratio < 1:
         raise ValueError(f"damping ratio must be between 0 and 1, got {damping_ratio}")
+    # `math` for one interval: its bits are those of the recorded sessions.
+    functions: ModuleType = np if isinstance(interval_s, np.ndarray) else math
     omega = 2 * math.pi * bandwidth_hz
     sigma = damping_ratio * omega
     omega_d = omega * math.sqrt(1 - damping_ratio**2)
-    decay = math.exp(-sigma * interval_s)
-    cosine = decay * math.cos(omega_d * interval_s)
-    sine = decay * math.sin(omega_d * interval_s) / omega_d
+    decay = functions.exp(-sigma * interval_s)
+    cosine = decay * functions.cos(omega_d * interval_s)
+    sine = decay * functions.sin(omega_d * interval_s) / omega_d
     m11, m12 = cosine + sigma * sine, sine
     m21, m22 = -omega * omega * sine, cosine - sigma * sine
-    # The angle follows from integrating the equation of v − c once.
     n1 = (2 * sigma * (1 - m11) - m21) / omega**2
     n2 = (1 - m22 - 2 * sigma * m12) / omega**2
-    return Drive(interval_s, m11, m12, m21, m22, n1, n2)
+    return m11, m12, m21, m22, n1, n2
+
+
+def drive(bandwidth_hz: float, damping_ratio: float, interval_s: float) -> Drive:
+    """Discretise the drive exactly.
+
+    Raises
+    ------
+    ValueError
+        If the damping ratio is not below 1.
+    """
+    return Drive(interval_s, *drive_coefficients(bandwidth_hz, damping_ratio, interval_s))
 
 
 def drive_step(step: Drive, state: DriveState, command_rad_s: float) -> DriveState:
@@ -70,3 +110,81 @@ def drive_step(step: Drive, state: DriveState, command_rad_s: float) -> DriveSta
         command_rad_s + m11 * lag + m12 * acceleration,
         m21 * lag + m22 * acceleration,
     )
+
+
+def drive_matrices(
+    bandwidth_hz: float, damping_ratio: float, interval_s: float
+) -> tuple[Array, Array]:
+    """Return Φ and Γ with x⁺ = Φ x + Γ c, for x = (acceleration, velocity, angle)."""
+    interval_s, m11, m12, m21, m22, n1, n2 = drive(bandwidth_hz, damping_ratio, interval_s)
+    step = np.array([[m22, m21, 0.0], [m12, m11, 0.0], [n2, n1, 1.0]])
+    return step, np.array([-m21, 1.0 - m11, interval_s - n1])
+
+
+@dataclass(frozen=True)
+class DriveModel:
+    """A drive as it is known or identified, with a pure delay before it answers."""
+
+    bandwidth_hz: float
+    damping_ratio: float
+    delay_s: float = 0.0
+
+    def transfer(self, z: Complex, interval_s: float) -> Complex:
+        """Return acceleration, velocity and angle per held command at z, at the ticks.
+
+        Parameters
+        ----------
+        z : array, shape (m,)
+            Not 1, where the angle has no end.
+        interval_s : float
+
+        Returns
+        -------
+        array, shape (3, m)
+        """
+        # (zI − Φ)⁻¹ Γ. The angle is in no other row.
+        step, push = drive_matrices(self.bandwidth_hz, self.damping_ratio, interval_s)
+        (a11, a12), (a21, a22) = step[:2, :2]
+        determinant = (z - a11) * (z - a22) - a12 * a21
+        acceleration = ((z - a22) * push[0] + a12 * push[1]) / determinant
+        velocity = (a21 * push[0] + (z - a11) * push[1]) / determinant
+        angle = (push[2] + step[2, 1] * velocity + step[2, 0] * acceleration) / (z - 1)
+        motion = np.stack([acceleration, velocity, angle])
+        return motion * z ** (-self.delay_s / interval_s) if self.delay_s else motion
+
+    def sampled_derivative(self, omega_rad_s: Array, interval_s: float) -> Complex:
+        """Return the acceleration at the ticks over the derivative of the velocity's samples.
+
+        1 − (ω_n Δt)²/12 at low frequency: the command's stairs hold the acceleration at the ticks
+        below its mean.
+        """
+        acceleration, velocity, _ = self.transfer(np.exp(1j * omega_rad_s * interval_s), interval_s)
+        return np.asarray(acceleration / (1j * omega_rad_s * velocity))
+
+    def held(self, command_rad_s: Array, interval_s: float) -> ArmMotion:
+        """Return the motion at the ticks under commands held from tick to tick, from rest."""
+        step, push = drive_matrices(self.bandwidth_hz, self.damping_ratio, interval_s)
+        (a11, a12), (a21, a22) = step[:2, :2]
+        denominator = [1.0, -(a11 + a22), a11 * a22 - a12 * a21]
+        acceleration, velocity = (
+            np.asarray(lfilter([0.0, first, second], denominator, command_rad_s))
+            for first, second in (
+                (push[0], a12 * push[1] - a22 * push[0]),
+                (push[1], a21 * push[0] - a11 * push[1]),
+            )
+        )
+        moved = push[2] * command_rad_s + step[2, 1] * velocity + step[2, 0] * acceleration
+        return ArmMotion(acceleration, velocity, np.concatenate(([0.0], np.cumsum(moved[:-1]))))
+
+    def after(self, elapsed_s: Array, motion: ArmMotion, command_rad_s: Array) -> ArmMotion:
+        """Return the motion a time after each tick, from that at the tick and its command."""
+        m11, m12, m21, m22, n1, n2 = drive_coefficients(
+            self.bandwidth_hz, self.damping_ratio, elapsed_s
+        )
+        acceleration, velocity, angle = motion
+        lag = velocity - command_rad_s
+        return ArmMotion(
+            m21 * lag + m22 * acceleration,
+            command_rad_s + m11 * lag + m12 * acceleration,
+            angle + command_rad_s * elapsed_s + n1 * lag + n2 * acceleration,
+        )

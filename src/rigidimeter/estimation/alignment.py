@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.bandlimited import band_hz
 from rigidimeter.estimation.closedloop.closed_loop_fit import (
     closed_loop_obstacle,
@@ -20,9 +21,8 @@ from rigidimeter.estimation.closedloop.closed_loop_fit import (
     observe,
 )
 from rigidimeter.estimation.closedloop.delay import SCAN_STEP_S, direct, estimate_delay
-from rigidimeter.estimation.closedloop.drive_fit import DriveModel
+from rigidimeter.estimation.closedloop.drive_fit import loop_of
 from rigidimeter.estimation.closedloop.instruments import instrumental
-from rigidimeter.estimation.closedloop.noise_free_loop import loop_model
 from rigidimeter.estimation.closedloop.refine import Linearise, Observation
 from rigidimeter.estimation.closedloop.spectral_lines import epoch_grid, epoch_lines
 from rigidimeter.estimation.screening import before_fit
@@ -175,7 +175,7 @@ def _observe(
     torque = epoch.channels["torque_nm"]
     rig = settings.rig
     grid = epoch_grid(epoch, band_hz(epoch, settings.estimation), settings.estimation.trim_s)
-    loop = loop_model(
+    loop = loop_of(
         settings, torque.rate_hz, DriveModel(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
     )
     everywhere = np.ones(grid.line.size, dtype=np.bool_)

@@ -22,13 +22,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimeter.dynamics.loop_motion import (
+from rigidimeter.dynamics import (
     ClosedLoopMotion,
     closed_loop_motion,
+    median_joint,
     voluntary_motion_sd,
 )
-from rigidimeter.dynamics.loop_response import Array
-from rigidimeter.dynamics.stability import subject_joint
+from rigidimeter.dynamics.velocity_drive import Array
 from rigidimeter.errors import UserError
 from rigidimeter.experiment.band import check_band
 from rigidimeter.experiment.demand import demand
@@ -132,7 +132,10 @@ def optimise(settings: Settings, criterion: str = "minimax") -> tuple[Candidate,
 
     def strongest(unit_torque_nm: Array) -> float:
         motions = [
-            (closed_loop_motion(unit_torque_nm, settings, subject_joint(settings, name)), *sds)
+            (
+                closed_loop_motion(unit_torque_nm, settings, median_joint(settings.subject[name])),
+                *sds,
+            )
             for name, sds in moved.items()
         ]
         # Rounded down to the digits that are printed and written.

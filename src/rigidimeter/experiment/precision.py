@@ -37,10 +37,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy.fft import next_fast_len, rfft, rfftfreq
 
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.dynamics.loop_motion import ClosedLoopMotion, closed_loop_motion, motion_per_torque
-from rigidimeter.dynamics.loop_response import Array, Complex, loop_model
-from rigidimeter.dynamics.noise_density import sensor_density, subject_density
+from rigidimeter.dynamics import (
+    ClosedLoopMotion,
+    JointDynamics,
+    Loop,
+    closed_loop_motion,
+    median_joint,
+    sensor_density,
+    subject_density,
+)
+from rigidimeter.dynamics.velocity_drive import Array, Complex
 from rigidimeter.errors import UserError
 from rigidimeter.experiment.predicted_record import Record, expected_record, noise_spectrum
 from rigidimeter.experiment.weighted_lines import USABLE_FRACTION_OF_RATE, layout, weighted_products
@@ -112,8 +118,7 @@ class Precision:
     @property
     def values(self) -> tuple[float, float, float]:
         """J, B and K of the joint."""
-        joint = self.joint
-        return joint.inertia_kg_m2, joint.damping_nm_s_rad, joint.stiffness_nm_rad
+        return self.joint.parameters
 
 
 def predicted_precision(
@@ -142,7 +147,7 @@ def predicted_precision(
         If trimming leaves nothing, or a band holds too few lines.
     """
     estimation, rig = settings.estimation, settings.rig
-    joint = JointDynamics(subject.inertia_kg_m2, subject.damping_nm_s_rad, subject.stiffness_nm_rad)
+    joint = median_joint(subject)
     motion = closed_loop_motion(perturbation_nm, settings, joint)
     if motion.angle_rad.size <= 2.0 * estimation.trim_s * rig.tick_rate_hz + 1.0:
         raise UserError(
@@ -266,8 +271,8 @@ def _bias(
     if not np.any(density):
         return 0.0, 0.0, 0.0
     some = density > 0.0
-    model = loop_model(settings.controller, settings.rig, frequency_hz[some])
-    N = motion_per_torque(model, joint)
+    loop = Loop(settings.controller, settings.rig).at_frequency(frequency_hz[some])
+    N = loop.motion_per_torque(joint.parameters)
     power = 2.0 * density[some]
     moved = np.real((N * power) @ N.conj().T)
     # The reading holds ν at its own time; N is the motion at the same time.

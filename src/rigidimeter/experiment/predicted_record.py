@@ -20,9 +20,8 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfftfreq
 from scipy.interpolate import CubicSpline
 
-from rigidimeter.dynamics.loop_motion import ClosedLoopMotion
-from rigidimeter.dynamics.loop_response import Array
-from rigidimeter.dynamics.noise_density import sensor_density, subject_density
+from rigidimeter.dynamics import ClosedLoopMotion, sensor_density, subject_density
+from rigidimeter.dynamics.velocity_drive import Array
 from rigidimeter.records import readonly
 from rigidimeter.settings import RigSettings, SubjectSettings
 

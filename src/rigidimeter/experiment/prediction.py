@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimeter.dynamics.loop_response import Array
-from rigidimeter.dynamics.stability import Stability, loop_stability
+from rigidimeter.dynamics import Stability, loop_stability
+from rigidimeter.dynamics.velocity_drive import Array
 from rigidimeter.errors import UserError
 from rigidimeter.experiment.epochs_needed import (
     Effect,

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, prev_fast_len, rfft
 
-from rigidimeter.dynamics.loop_response import Array
+from rigidimeter.dynamics.velocity_drive import Array
 from rigidimeter.errors import UserError
 from rigidimeter.experiment.predicted_record import Record, noise_covariance
 from rigidimeter.settings import EstimationSettings, RigSettings, SubjectSettings

@@ -15,8 +15,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from rigidimeter.dynamics import closed_loop_motion, loop_margins, loop_model
-from rigidimeter.dynamics.loop_motion import motion_per_torque
+from rigidimeter.dynamics import Loop, closed_loop_motion, loop_margins
 from rigidimeter.experiment import ideal_response, prbs_nm
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import AGREES, DIFFERS, Check, Row, bounded, within_percent
@@ -146,8 +145,9 @@ def equation_4(workshop: Workshop) -> Row:
     """Make the row: voluntary torque moves arm and controller as one."""
     controller, joint = workshop.settings.controller, printed.SEC_34
     frequency_hz = np.array([0.3, 1.0, 4.0])
-    model = loop_model(controller, workshop.settings.rig, frequency_hz)
-    found = -motion_per_torque(model, joint)[2]  # M_sub is subtracted from the measured torque
+    loop = Loop(controller, workshop.settings.rig).at_frequency(frequency_hz)
+    # M_sub is subtracted from the measured torque.
+    found = -loop.motion_per_torque(joint.parameters)[2]
     s = 2j * np.pi * frequency_hz
     J = joint.inertia_kg_m2 + controller.inertia_kg_m2
     B = joint.damping_nm_s_rad + controller.damping_nm_s_rad

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.dynamics import JointDynamics, arm, arm_step, arm_torque_nm
 
 
 def test_torque_of_a_sinusoid_has_its_closed_form():
@@ -39,3 +39,37 @@ def test_an_impossible_joint_is_refused(values):
 def test_bandwidth_needs_a_stiffness():
     with pytest.raises(ValueError, match="stiffness greater than 0"):
         JointDynamics(0.01, 0.1, 0.0).bandwidth_hz()
+
+
+def step_response(joint, t):
+    """Angle after a unit step of torque, underdamped or overdamped, from rest."""
+    J, B, K = joint.inertia_kg_m2, joint.damping_nm_s_rad, joint.stiffness_nm_rad
+    s1, s2 = np.roots([J, B, K]).astype(complex)
+    return ((1 + (s2 * np.exp(s1 * t) - s1 * np.exp(s2 * t)) / (s1 - s2)) / K).real
+
+
+@pytest.mark.parametrize("damping", [0.02, 0.1368, 0.6])
+def test_the_arm_under_a_step_of_torque_is_exact(damping):
+    joint = JointDynamics(0.0045, damping, 1.751)
+    one_tick = arm(joint, 0.001)
+    angle = velocity = 0.0
+    for k in range(1, 3001):
+        angle, velocity = arm_step(one_tick, angle, velocity, 1.0)
+        if k in (1, 10, 100, 3000):
+            assert angle == pytest.approx(float(step_response(joint, k / 1000)), rel=1e-9)
+
+
+def test_an_arm_without_stiffness_coasts_down():
+    # v = v0 e^(−B t / J)
+    one_tick = arm(JointDynamics(0.01, 0.05, 0.0), 0.001)
+    angle, velocity = 0.0, 1.0
+    for _ in range(200):
+        angle, velocity = arm_step(one_tick, angle, velocity, 0.0)
+    assert velocity == pytest.approx(math.exp(-0.05 * 0.2 / 0.01), rel=1e-9)
+    assert angle == pytest.approx((1 - velocity) * 0.01 / 0.05, rel=1e-9)
+
+
+def test_the_torque_is_that_of_equation_5():
+    assert arm_torque_nm(0.01, 0.2, 3.0, 0.5, 2.0, 10.0, 0.7) == pytest.approx(
+        0.1 + 0.4 + 1.5 - 0.7
+    )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigidimeter.dynamics import closed_loop_motion, subject_joint, voluntary_motion_sd
+from rigidimeter.dynamics import closed_loop_motion, median_joint, voluntary_motion_sd
 from rigidimeter.experiment import ideal_response, prbs_nm
 from rigidimeter.settings import Settings, parse_settings
 
@@ -27,7 +27,7 @@ def test_the_motion_is_that_of_the_real_loop(noiseless, run_loop, torque, subjec
     )
     perturbation = prbs_nm(settings.prbs, RATE_HZ)
     real = run_loop(settings, perturbation)
-    found = closed_loop_motion(perturbation, settings, subject_joint(settings, "OFF"))
+    found = closed_loop_motion(perturbation, settings, median_joint(settings.subject["OFF"]))
     for name, values in (
         ("angle_rad", found.angle_rad),
         ("velocity_rad_s", found.velocity_rad_s),
@@ -40,7 +40,7 @@ def test_the_motion_is_that_of_the_real_loop(noiseless, run_loop, torque, subjec
 def test_acceleration_is_the_derivative_of_the_velocity() -> None:
     settings = Settings()
     perturbation = prbs_nm(settings.prbs, RATE_HZ)
-    found = closed_loop_motion(perturbation, settings, subject_joint(settings, "OFF"))
+    found = closed_loop_motion(perturbation, settings, median_joint(settings.subject["OFF"]))
     between = np.diff(found.velocity_rad_s) * RATE_HZ
     middle = (found.acceleration_rad_s2[1:] + found.acceleration_rad_s2[:-1]) / 2
     np.testing.assert_allclose(middle, between, atol=0.03 * np.max(np.abs(between)))
@@ -49,7 +49,7 @@ def test_acceleration_is_the_derivative_of_the_velocity() -> None:
 def test_the_ideal_loop_is_near() -> None:
     settings = Settings()
     perturbation = prbs_nm(settings.prbs, RATE_HZ)
-    joint = subject_joint(settings, "OFF")
+    joint = median_joint(settings.subject["OFF"])
     found = closed_loop_motion(perturbation, settings, joint).angle_rad
     ideal, _ = ideal_response(perturbation, settings.controller, joint, RATE_HZ)
     assert np.std(found) == pytest.approx(np.std(ideal), rel=0.02)

@@ -8,9 +8,9 @@ import pytest
 from rigidimeter.dynamics import (
     loop_margins,
     loop_stability,
+    median_joint,
     refuse_unstable,
     spectral_radius,
-    subject_joint,
 )
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.errors import UserError
@@ -162,4 +162,4 @@ def test_a_range_of_one_joint_has_no_other_worst() -> None:
 
 
 def test_the_joint_is_that_of_the_condition() -> None:
-    assert subject_joint(Settings(), "DBS") == JointDynamics(0.0045, 0.115, 1.42)
+    assert median_joint(Settings().subject["DBS"]) == JointDynamics(0.0045, 0.115, 1.42)

@@ -64,7 +64,7 @@ def test_writes_what_will_be_commanded(tmp_path: Path) -> None:
 
     document = json.loads(numbers.read_text())
     assert document == json.loads((folder / "design.json").read_text())
-    assert document["schema"] == SCHEMA == "rigidimeter.experiment/1"
+    assert document["schema"] == SCHEMA == "rigidimeter.design/1"
     assert document["prbs"]["covered"] is True
     assert len(document["bandwidth"]["corners"]) == 8
     assert document["protocol"]["total_s"] == 280.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigidimeter.dynamics import closed_loop_motion, subject_joint
+from rigidimeter.dynamics import closed_loop_motion, median_joint
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import CRITERIA, assess, demand, optimise, prbs_nm, predicted_precision
 from rigidimeter.experiment.optimise import strongest_amplitude_nm
@@ -57,7 +57,7 @@ def test_its_errors_are_those_of_the_sequence_it_names() -> None:
 def test_the_amplitude_is_at_the_limit_less_the_margin(guard, quantity, limit) -> None:
     settings = parse_settings({"guard": guard, "optimise": {"limit_margin_percent": 10.0}})
     motion = closed_loop_motion(
-        prbs_nm(settings.prbs, 1000.0), settings, subject_joint(settings, "OFF")
+        prbs_nm(settings.prbs, 1000.0), settings, median_joint(settings.subject["OFF"])
     )
     amplitude = strongest_amplitude_nm([(motion, 0.0, 0.0)], settings)
     needs = demand(
@@ -70,7 +70,7 @@ def test_the_amplitude_is_at_the_limit_less_the_margin(guard, quantity, limit) -
 def test_room_is_left_for_what_the_subject_does() -> None:
     settings = parse_settings({"guard": {"position_limit_deg": 21.0}})
     motion = closed_loop_motion(
-        prbs_nm(settings.prbs, 1000.0), settings, subject_joint(settings, "OFF")
+        prbs_nm(settings.prbs, 1000.0), settings, median_joint(settings.subject["OFF"])
     )
     alone = strongest_amplitude_nm([(motion, 0.0, 0.0)], settings)
     moving = strongest_amplitude_nm([(motion, 0.02, 0.0)], settings)

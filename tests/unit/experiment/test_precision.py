@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import butter, freqs
 
 from rigidimeter.cli.simulate import PAPER_RATES
-from rigidimeter.dynamics import closed_loop_motion, sensor_density, subject_joint
+from rigidimeter.dynamics import closed_loop_motion, median_joint, sensor_density
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import prbs_nm, predicted_precision
 from rigidimeter.experiment.predicted_record import expected_record
@@ -22,7 +22,7 @@ def predict(settings: Settings, band: tuple[float, float] | None = None):
 def samples(settings: Settings) -> np.ndarray:
     """Return θ'', v and θ at the stamps of the torque, one row a sample."""
     perturbation = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
-    motion = closed_loop_motion(perturbation, settings, subject_joint(settings, "OFF"))
+    motion = closed_loop_motion(perturbation, settings, median_joint(settings.subject["OFF"]))
     return expected_record(motion, settings.rig).motion.T
 
 
@@ -44,7 +44,7 @@ def test_in_white_noise_the_bound_is_that_of_least_squares_in_time(rig: dict) ->
 def test_least_squares_of_a_passive_arm_is_least_squares_in_the_band() -> None:
     settings = Settings()
     perturbation = prbs_nm(settings.prbs, RATE_HZ)
-    motion = closed_loop_motion(perturbation, settings, subject_joint(settings, "OFF"))
+    motion = closed_loop_motion(perturbation, settings, median_joint(settings.subject["OFF"]))
     columns = (motion.acceleration_rad_s2, motion.velocity_rad_s, motion.angle_rad)
     lines = np.fft.rfft(np.column_stack(columns)[1000:-1000], axis=0)
     omega = 2 * np.pi * np.fft.rfftfreq(perturbation.size - 2000, 1 / RATE_HZ)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.cli.simulate import PAPER_RATES
-from rigidimeter.dynamics import SubjectTorque, closed_loop_motion, subject_density, subject_joint
+from rigidimeter.dynamics import SubjectTorque, closed_loop_motion, median_joint, subject_density
 from rigidimeter.experiment import prbs_nm
 from rigidimeter.experiment.predicted_record import (
     expected_record,
@@ -19,7 +19,7 @@ PUSHING = SubjectSettings(voluntary_sd_nm=0.2, tremor_amplitude_nm=0.1)
 
 def expected(settings: Settings):
     torque_nm = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
-    joint = subject_joint(settings, "OFF")
+    joint = median_joint(settings.subject["OFF"])
     return expected_record(closed_loop_motion(torque_nm, settings, joint), settings.rig)
 
 
@@ -49,7 +49,7 @@ def test_it_is_the_motion_at_the_stamps() -> None:
     epoch = simulate_epochs(settings, 1, seed=3).epoch(0)
     torque = epoch.channels["torque_nm"]
     inside = torque.time_s >= 0.0
-    joint = subject_joint(settings, "OFF")
+    joint = median_joint(settings.subject["OFF"])
     parameters = [joint.inertia_kg_m2, joint.damping_nm_s_rad, joint.stiffness_nm_rad]
     found = parameters @ expected(settings).motion
     measured = torque.values[inside][: found.size]

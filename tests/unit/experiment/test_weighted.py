@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 
-from rigidimeter.dynamics import closed_loop_motion, subject_joint
+from rigidimeter.dynamics import closed_loop_motion, median_joint
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import prbs_nm
 from rigidimeter.experiment.predicted_record import Record, expected_record, noise_covariance
@@ -16,7 +16,7 @@ COARSE = {"tick_rate_hz": 250.0, "torque": {"rate_hz": 125.0}, "motion": {"rate_
 
 def recorded(settings: Settings) -> Record:
     torque_nm = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
-    joint = subject_joint(settings, "OFF")
+    joint = median_joint(settings.subject["OFF"])
     return expected_record(closed_loop_motion(torque_nm, settings, joint), settings.rig)
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SCHEMA", "document"]
 
-SCHEMA = "rigidimeter.experiment/1"
+SCHEMA = "rigidimeter.design/1"
 
 
 def document(

@@ -14,12 +14,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import t as student
 
+from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.closedloop.delay import direct
-from rigidimeter.estimation.closedloop.drive_fit import DriveModel, fit_drive
+from rigidimeter.estimation.closedloop.drive_fit import fit_drive, loop_of
 from rigidimeter.estimation.closedloop.instruments import LEAST, instrumental
 from rigidimeter.estimation.closedloop.lack_of_fit import misfits, worst_misfit
 from rigidimeter.estimation.closedloop.maximum_likelihood import output_error
-from rigidimeter.estimation.closedloop.noise_free_loop import loop_model
 from rigidimeter.estimation.closedloop.periodic_response import periodic, whole_periods
 from rigidimeter.estimation.closedloop.refine import (
     SHARED_FROM,
@@ -140,7 +140,7 @@ def observe(epoch: Epoch, settings: Settings, method: str, drive: DriveModel | N
         min(rig.drive_bandwidth_hz, 0.45 * perturbation.mean_rate_hz), rig.drive_damping_ratio
     )
     excited = grid.line % periods == 0 if periods else np.ones(grid.line.size, dtype=np.bool_)
-    loop = loop_model(settings, torque.rate_hz, assumed)
+    loop = loop_of(settings, torque.rate_hz, assumed)
     late_ns = round((grid.time_s[0] - perturbation.time_s[0]) * 1e9)
     sequence = hashlib.sha256(perturbation.values.tobytes()).digest()
     return Observation(

@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.closedloop.closed_loop_fit import (
     CLOSED_LOOP,
     drives,
     least_squares_start,
     observe,
 )
-from rigidimeter.estimation.closedloop.drive_fit import DriveModel
 from rigidimeter.estimation.closedloop.refine import Observation, fit_pooled
 from rigidimeter.estimation.closedloop.spectral_lines import SAME_TIME, Grid
 from rigidimeter.estimation.signals import Array

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.dynamics import Loop
 from rigidimeter.estimation.closedloop.line_noise import Smoother, drawn_lines, line_covariance
-from rigidimeter.estimation.closedloop.noise_free_loop import LoopModel
 from rigidimeter.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel
@@ -66,7 +66,7 @@ class Observation(NamedTuple):
 
     lines: Lines
     perturbation: Channel
-    loop: LoopModel
+    loop: Loop
     excited: NDArray[np.bool_]
     response_key: Hashable
 

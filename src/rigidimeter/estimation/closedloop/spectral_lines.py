@@ -26,7 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from rigidimeter.estimation.closedloop.drive_fit import DriveModel
+from rigidimeter.dynamics import DriveModel
+from rigidimeter.estimation.closedloop.drive_fit import driven
 from rigidimeter.estimation.signals import Array, kinematics, motion_channels, spline, uniform_grid
 from rigidimeter.records import Channel, Epoch
 
@@ -197,14 +198,11 @@ def epoch_lines(epoch: Epoch, grid: Grid, drive: DriveModel | None) -> Lines:
     # What the sensors saw beyond the motion that the command causes, at their own stamps.
     beyond = dict(epoch.channels)
     for channel in motion_channels(epoch):
-        driven = drive.driven(command, channel.time_s)
-        caused = driven.angle_rad if channel.name == "angle_rad" else driven.velocity_rad_s
-        beyond[channel.name] = Channel(channel.name, channel.time_s, channel.values - caused)
+        caused = driven(drive, command, channel.time_s)
+        seen = caused.angle_rad if channel.name == "angle_rad" else caused.velocity_rad_s
+        beyond[channel.name] = Channel(channel.name, channel.time_s, channel.values - seen)
     motion = _spectra(grid, *_motion(replace(epoch, channels=beyond), grid.time_s))
-    exact = drive.driven(command, grid.time_s)
-    for column, part in enumerate(
-        (exact.acceleration_rad_s2, exact.velocity_rad_s, exact.angle_rad)
-    ):
+    for column, part in enumerate(driven(drive, command, grid.time_s)):
         motion[:, column] += grid.transform(part)
     return Lines(grid, torque, motion)
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MultipleLocator
 from numpy.typing import NDArray
 
-from rigidimeter.dynamics import Margins, loop_model, open_loop
+from rigidimeter.dynamics import Loop, Margins
 from rigidimeter.reporting.figures.style import GREY, condition_colours, drawable, note, styled
 from rigidimeter.settings import Settings
 
@@ -30,7 +30,7 @@ def bode(settings: Settings, margins: dict[str, Margins], worst: dict[str, Margi
     """
     colours = condition_colours(margins)
     frequency_hz = np.geomspace(_LOWEST_HZ, settings.rig.tick_rate_hz / 2.0, 1200)
-    model = loop_model(settings.controller, settings.rig, frequency_hz)
+    loop = Loop(settings.controller, settings.rig).at_frequency(frequency_hz)
     with styled():
         figure = Figure(figsize=(7.4, 5.4))
         above, below = figure.subplots(2, 1, sharex=True)
@@ -41,7 +41,7 @@ def bode(settings: Settings, margins: dict[str, Margins], worst: dict[str, Margi
                 (worst[name], "--", f"{drawable(name)}, worst joint"),
             ):
                 label = f"{label}: {_in_numbers(found)}"
-                curve = open_loop(model, found.joint)
+                curve = loop.gain(found.joint.parameters)
                 decibel = 20.0 * np.log10(np.maximum(np.abs(curve), 1e-12))
                 phase_deg = np.degrees(np.unwrap(np.angle(curve)))
                 above.semilogx(frequency_hz, decibel, line, color=colour, label=label)

@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
 
-from rigidimeter.estimation.closedloop.drive_fit import DriveModel
-from rigidimeter.estimation.closedloop.noise_free_loop import loop_model
+from rigidimeter.dynamics import DriveModel
+from rigidimeter.estimation.closedloop.drive_fit import loop_of
 
 
 def model(settings, epoch):
     rig = settings.rig
     assumed = DriveModel(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
-    return loop_model(settings, epoch.channels["torque_nm"].rate_hz, assumed)
+    return loop_of(settings, epoch.channels["torque_nm"].rate_hz, assumed)
 
 
 def test_without_noise_the_response_is_what_the_loop_recorded(simulated, quiet, truth):

@@ -5,22 +5,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from rigidimeter.control import admittance, butterworth_lowpass
-from rigidimeter.dynamics import (
-    DriveState,
-    command_response,
-    drive,
-    drive_step,
-    loop_model,
-    open_loop,
-)
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.dynamics.loop_response import (
-    admittance_coefficients,
-    drive_advance,
-    lowpass_coefficients,
-    reading_pattern,
-)
+from rigidimeter.dynamics import JointDynamics, Loop
+from rigidimeter.dynamics.linear_loop import reading_pattern
 from rigidimeter.settings import ControllerSettings, RigSettings, TorqueSensorSettings
 
 JOINT = JointDynamics(0.0045, 0.1368, 1.751)
@@ -32,19 +18,6 @@ def pattern(**sensor: float) -> list[float]:
 
 def rig(**sensor: float) -> RigSettings:
     return RigSettings(torque=TorqueSensorSettings(**sensor))
-
-
-@pytest.mark.parametrize("damping", [0.0, 1.6])
-def test_the_parts_are_those_of_the_loop(damping: float) -> None:
-    controller = ControllerSettings(damping_nm_s_rad=damping)
-    real = admittance(controller.inertia_kg_m2, damping, 1e-3)
-    assert admittance_coefficients(controller, 1000.0) == pytest.approx(tuple(real))
-    b, a = lowpass_coefficients(controller, 1000.0)
-    assert [*b, *a[1:]] == pytest.approx(list(butterworth_lowpass(20.0, 1000.0)))
-    step, push = drive_advance(RigSettings(), 1e-3)
-    state, command = np.array([0.1, -0.7, 20.0]), 0.4
-    expected = drive_step(drive(50.0, 0.7071, 1e-3), DriveState(*state), command)
-    np.testing.assert_allclose(step @ state + push * command, expected, rtol=1e-12)
 
 
 def test_how_old_the_reading_is() -> None:
@@ -70,25 +43,41 @@ def test_a_fast_loop_is_the_ratio_of_impedances() -> None:
     s = 2j * np.pi * frequency
     J, B, K = JOINT.inertia_kg_m2, JOINT.damping_nm_s_rad, JOINT.stiffness_nm_rad
     expected = (J * s + B + K / s) / (controller.inertia_kg_m2 * s + controller.damping_nm_s_rad)
-    found = open_loop(loop_model(controller, fast, frequency), JOINT)
+    found = Loop(controller, fast).at_frequency(frequency).gain(JOINT.parameters)
     np.testing.assert_allclose(found, expected, rtol=0.05)
 
 
 def test_a_constant_torque_ends_in_a_constant_speed_without_stiffness() -> None:
-    model = loop_model(ControllerSettings(), RigSettings(), [0.0, 1.0])
-    free = command_response(model, JointDynamics(0.0045, 0.2, 0.0))
-    assert free[0] == pytest.approx(1.0 / (ControllerSettings().damping_nm_s_rad + 0.2))
-    assert command_response(model, JOINT)[0] == 0.0
-    undamped = loop_model(ControllerSettings(damping_nm_s_rad=0.0), RigSettings(), [0.0, 1.0])
-    resisted = command_response(undamped, JointDynamics(0.0045, 0.2, 0.0))
-    assert resisted[0] == pytest.approx(1.0 / 0.2)
-    assert np.all(np.isfinite(resisted))
+    free = JointDynamics(0.0045, 0.2, 0.0).parameters
+    slowest = [1e-7]
+    loop = Loop(ControllerSettings(), RigSettings()).at_frequency(slowest)
+    resistance = ControllerSettings().damping_nm_s_rad + 0.2
+    assert loop.command(free)[0] == pytest.approx(1.0 / resistance, rel=1e-6)
+    assert abs(loop.command(JOINT.parameters)[0]) < 1e-6
+    undamped = Loop(ControllerSettings(damping_nm_s_rad=0.0), RigSettings()).at_frequency(slowest)
+    assert undamped.command(free)[0] == pytest.approx(1.0 / 0.2, rel=1e-6)
 
 
 def test_a_pattern_of_readings_is_summed_exactly() -> None:
-    frequency = np.array([0.0, 3.0, 40.0])
+    frequency = np.array([0.001, 3.0, 40.0])
     slow = rig(rate_hz=400.0, latency_s=0.0037)
     ages = pattern(rate_hz=400.0, latency_s=0.0037)
     expected = np.mean([np.exp(-2j * np.pi * frequency * age * 1e-3) for age in ages], axis=0)
-    found = loop_model(ControllerSettings(), slow, frequency).read_torque
+    found = Loop(ControllerSettings(), slow).at_frequency(frequency).read_torque
     np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_a_slow_sensor_is_a_delay_and_a_loss_of_gain() -> None:
+    """A hold of n ticks: sin(nωT/2) / (n sin(ωT/2)), later by latency + (n − 1) T/2."""
+    frequency = np.array([1.0, 10.0, 30.0])
+    turned = 2 * np.pi * frequency * 1e-3
+    found = Loop(ControllerSettings(), rig(rate_hz=100.0, latency_s=0.002)).at_frequency(frequency)
+    gain = np.sin(5 * turned) / (10 * np.sin(turned / 2))
+    np.testing.assert_allclose(np.abs(found.read_torque), gain, rtol=1e-12)
+    np.testing.assert_allclose(np.angle(found.read_torque), -6.5 * turned, rtol=1e-9)
+
+
+def test_ages_are_times_whatever_the_rate_of_the_recording() -> None:
+    z = np.exp(2j * np.pi * np.array([2.0, 20.0]) / 400.0)
+    found = Loop(ControllerSettings(), rig(latency_s=0.003)).at(z, 400.0)
+    np.testing.assert_allclose(found.read_torque, z**-1.2, rtol=1e-12)

@@ -1,11 +1,11 @@
-import itertools
-
 import numpy as np
 import pytest
 from scipy import signal
 
-from rigidimeter.dynamics import SubjectTorque, draw_joint, quantised, sample_times_s
+from rigidimeter.dynamics import SubjectTorque, draw_joint, subject_density
 from rigidimeter.settings import SubjectSettings
+
+RATE_HZ = 1000.0
 
 
 def test_voluntary_torque_has_the_wanted_size_and_band():
@@ -50,23 +50,29 @@ def test_joints_scatter_about_the_median():
     assert draw_joint(subject, rng).inertia_kg_m2 == 0.0045
 
 
-def test_a_reading_is_rounded_to_its_resolution():
-    assert quantised(0.12345, 0.001) == pytest.approx(0.123)
-    assert quantised(-0.1236, 0.001) == pytest.approx(-0.124)
-    assert quantised(0.12345, 0.0) == 0.12345
+@pytest.mark.parametrize(
+    ("settings", "variance"),
+    [
+        ({"voluntary_sd_nm": 0.2}, 0.04),
+        ({"tremor_amplitude_nm": 0.4}, 0.08),
+        ({"voluntary_sd_nm": 0.2, "tremor_amplitude_nm": 0.4}, 0.12),
+        ({}, 0.0),
+    ],
+)
+def test_a_density_integrates_to_the_variance(settings: dict, variance: float) -> None:
+    spacing = 0.005
+    frequency = np.arange(0, 500.0, spacing)
+    density = subject_density(SubjectSettings(**settings), frequency, RATE_HZ)
+    assert 2 * np.sum(density) * spacing == pytest.approx(variance, rel=0.01)
 
 
-def test_samples_keep_their_rate_and_their_jitter():
-    times = sample_times_s(50.0, 0.002, 0.005, np.random.default_rng(1))
-    taken = np.array(list(itertools.islice(times, 9000)))
-    late = taken - (np.arange(9000) / 50.0 - 0.002)
-    assert late.min() >= -1e-12
-    assert late.max() <= 0.005 + 1e-12
-    assert late.max() > 0.0049
-
-
-@pytest.mark.parametrize("jitter_s", [0.0, 0.005])
-def test_the_first_sample_arrives_at_time_zero(jitter_s):
-    times = sample_times_s(100.0, 0.002, jitter_s, np.random.default_rng(1))
-    assert next(times) == -0.002
-    assert 0.008 <= next(times) <= 0.008 + jitter_s + 1e-12
+@pytest.mark.parametrize("settings", [{"voluntary_sd_nm": 0.2}, {"tremor_amplitude_nm": 0.4}])
+def test_the_density_is_that_of_the_virtual_subject(settings: dict) -> None:
+    own = SubjectSettings(**settings)
+    torque = SubjectTorque(own, RATE_HZ, np.random.default_rng(4)).block(1_000_000)
+    frequency, measured = signal.welch(torque, RATE_HZ, nperseg=20_000)
+    found = 2 * subject_density(own, frequency, RATE_HZ)
+    for low, high in ((0.3, 1.0), (1.0, 4.0), (4.0, 8.0)):
+        band = (frequency >= low) & (frequency < high)
+        if np.sum(found[band]) > 0.01 * np.sum(found):
+            assert np.sum(measured[band]) == pytest.approx(np.sum(found[band]), rel=0.1)

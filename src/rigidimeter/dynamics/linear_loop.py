@@ -1,0 +1,341 @@
+"""The perturbed admittance loop as a linear system (Fig. 2): its response and the motion in it.
+
+At each tick the loop reads a torque M that was sampled some time ago, filters it (F), sends the
+velocity command c (A), and the drive carries it out until the next tick:
+
+    c = A (p − F M'),    A(z) = g / (1 − d z⁻¹),    d = e^(−B_c T/J_c),  g = (1 − d)/B_c
+    v'' + 2 ζ ω_n v' + ω_n² v = ω_n² c (held),      M = J v' + B v + K θ − M_sub
+
+with p the perturbation in N·m, T the tick and M' the newest reading of M that has arrived. With
+L = A F M'/c the open loop, a perturbation is answered by c = A/(1 + L) p, and torque ν that is
+added to the measured one by c = −F A/(1 + L) ν, later by the delays of the sensor.
+
+The coefficients are those of the steps in `rigidimeter.control` and `velocity_drive`, and the
+motion between two ticks is solved exactly, so any latency is exact, whole ticks or not. A sensor
+slower than the loop is read again until it has news: the age of the reading goes through a
+pattern, and its mean response is taken; `loop_poles` takes the pattern itself. For a sensor of
+interval n T that is e^(−jω latency) Σ e^(−jωkT)/n, k = 0 … n − 1: a delay of latency + (n − 1) T/2
+and a gain of sin(nωT/2) / (n sin(ωT/2)). Jitter is taken at its bound. The guard is not in it: what
+it does is no longer linear.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.fft import irfft, next_fast_len, rfft
+
+from rigidimeter.control import admittance, butterworth_lowpass
+from rigidimeter.dynamics.joint import JointDynamics, median_joint
+from rigidimeter.dynamics.subject_torque import subject_density
+from rigidimeter.dynamics.velocity_drive import (
+    ArmMotion,
+    Array,
+    Complex,
+    DriveModel,
+    drive_matrices,
+)
+from rigidimeter.settings import ControllerSettings, RigSettings, Settings, SubjectSettings
+
+__all__ = [
+    "ClosedLoopMotion",
+    "Loop",
+    "OpenLoop",
+    "Parameters",
+    "Reading",
+    "closed_loop_motion",
+    "reading_pattern",
+    "voluntary_motion_sd",
+]
+
+Parameters = tuple[float, float, float]
+"""J, B and K of the joint."""
+
+_PARTS_OF_A_TICK = 1_000_000
+
+_MOST_SAMPLES_A_PATTERN = 64
+"""Rates are compared as a fraction of at most this denominator."""
+
+_LINES_A_HZ = 50
+"""How finely the band of voluntary torque is summed."""
+
+_DIGITS = 36.0
+"""−ln of the rounding of a float."""
+
+
+class Reading(NamedTuple):
+    """Which sample is read at one tick of the pattern.
+
+    Attributes
+    ----------
+    sample : int
+        Its number; it was sampled at sample / rate − latency.
+    age_ticks : Fraction
+        How long before this tick it was sampled.
+    """
+
+    sample: int
+    age_ticks: Fraction
+
+
+class ClosedLoopMotion(NamedTuple):
+    """Command, and motion of the arm, at the ticks; each of shape (n,)."""
+
+    command_rad_s: Array
+    acceleration_rad_s2: Array
+    velocity_rad_s: Array
+    angle_rad: Array
+
+
+class OpenLoop(NamedTuple):
+    """What of the loop does not change with the joint, at m points z.
+
+    Attributes
+    ----------
+    admittance, forward : array, shape (m,)
+        A, and A F, in rad/s per N·m.
+    motion, read : array, shape (3, m)
+        Acceleration, velocity and angle of the arm per velocity command: at the ticks, and as the
+        reading of the torque sensor sees them, delays included.
+    read_torque : array, shape (m,)
+        Reading per torque: what the delays alone do.
+    """
+
+    admittance: Complex
+    forward: Complex
+    motion: Complex
+    read: Complex
+    read_torque: Complex
+
+    def gain(self, parameters: Parameters) -> Complex:
+        """Return L: what comes back of a velocity command, with the minus sign left out."""
+        J, B, K = parameters
+        torque = J * self.read[0] + B * self.read[1] + K * self.read[2]
+        return np.asarray(self.forward * torque)
+
+    def command(self, parameters: Parameters) -> Complex:
+        """Return the velocity command per perturbation, A / (1 + L), in rad/s per N·m."""
+        return np.asarray(self.admittance / (1.0 + self.gain(parameters)))
+
+    def motion_per_torque(self, parameters: Parameters) -> Complex:
+        """Return acceleration, velocity and angle per N·m that is added to the measured torque."""
+        command = -self.forward * self.read_torque / (1.0 + self.gain(parameters))
+        return np.asarray(command * self.motion)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Controller, torque path and drive.
+
+    Parameters
+    ----------
+    controller : ControllerSettings
+        J_c and B_c of the admittance, and the cutoff of the low-pass in front of it.
+    rig : RigSettings
+        Tick rate, drive and torque sensor.
+    drive_delay_s : float
+        A pure delay before the drive answers.
+    """
+
+    controller: ControllerSettings
+    rig: RigSettings
+    drive_delay_s: float = 0.0
+
+    def at_frequency(self, frequency_hz: ArrayLike) -> OpenLoop:
+        """Return the loop at frequencies above 0 and up to half the tick rate, shape (m,)."""
+        rate_hz = self.rig.tick_rate_hz
+        omega = 2.0 * np.pi * np.asarray(frequency_hz, dtype=np.float64)
+        return self.at(np.exp(1j * omega / rate_hz), rate_hz)
+
+    def at(self, z: Complex, rate_hz: float) -> OpenLoop:
+        """Return the loop at points z, not 1, with commands held for 1 / rate_hz.
+
+        `rate_hz` is that of the rig, or that at which a recording holds the perturbation.
+        """
+        interval_s = 1.0 / rate_hz
+        controller, rig = self.controller, self.rig
+        decay, gain = admittance(controller.inertia_kg_m2, controller.damping_nm_s_rad, interval_s)
+        steady = gain / (1.0 - decay / z)
+        drive = DriveModel(rig.drive_bandwidth_hz, rig.drive_damping_ratio, self.drive_delay_s)
+        motion = drive.transfer(z, interval_s)
+        late = z ** (-self.drive_delay_s * rate_hz)
+        read, read_torque = np.zeros_like(motion), np.zeros_like(z)
+        ages = _ages_by_sample(rig, rate_hz)
+        ticks = sum(age.ticks for age in ages)
+        for whole, rest, count in ages:
+            held = _delays(z, whole, count) / ticks
+            step, push = drive_matrices(
+                drive.bandwidth_hz, drive.damping_ratio, (1.0 - rest) * interval_s
+            )
+            read += (step @ motion + push[:, None] * late) * held / z
+            read_torque += held * z**-rest
+        forward = steady * _lowpass(controller.torque_cutoff_hz, z, rate_hz)
+        return OpenLoop(steady, forward, motion, read, read_torque)
+
+    def response(self, perturbation_nm: Array, rate_hz: float, parameters: Parameters) -> ArmMotion:
+        """Return the motion that a perturbation causes, from rest, without noise.
+
+        Parameters
+        ----------
+        perturbation_nm : array, shape (n,)
+            One value a tick.
+        rate_hz : float
+            Ticks a second.
+        parameters : (float, float, float)
+            J, B and K of the joint; the loop with it must be stable.
+        """
+        circle = _on_circle(self, perturbation_nm.size, rate_hz, 1)
+        command = circle.to(perturbation_nm) * circle.loop.command(parameters)
+        return ArmMotion(*(circle.back(command * part) for part in circle.loop.motion))
+
+    def sensed(
+        self, motion: Sequence[Array], rate_hz: float, parameters: Parameters
+    ) -> list[Array]:
+        """Return how the measured torque changes with J, B and K, along a given motion.
+
+        ∂M/∂J = S a and so on, with the sensitivity S = 1 / (1 + L): in the loop a stiffer joint
+        also moves less.
+        """
+        circle = _on_circle(self, motion[0].size, rate_hz, 1)
+        around = 1.0 + circle.loop.gain(parameters)
+        return [circle.back(circle.to(part) / around) for part in motion]
+
+
+def closed_loop_motion(
+    perturbation_nm: ArrayLike, settings: Settings, joint: JointDynamics
+) -> ClosedLoopMotion:
+    """Return command and motion that a perturbation causes, without noise and from rest.
+
+    For a sensor slower than the loop it is the mean over the phases of the sensor.
+
+    Parameters
+    ----------
+    perturbation_nm : array, shape (n,)
+        One value a tick.
+    settings : Settings
+        Of which `controller` and `rig` are used.
+    joint : JointDynamics
+        The loop with it must be stable.
+    """
+    torque = np.asarray(perturbation_nm, dtype=np.float64)
+    loop = Loop(settings.controller, settings.rig)
+    circle = _on_circle(loop, torque.size, settings.rig.tick_rate_hz, 2)
+    command = circle.to(torque) * circle.loop.command(joint.parameters)
+    parts = (command, *(command * part for part in circle.loop.motion))
+    return ClosedLoopMotion(*(circle.back(part) for part in parts))
+
+
+def voluntary_motion_sd(settings: Settings, subject: SubjectSettings) -> tuple[float, float]:
+    """Return the SD of angle (rad) and velocity (rad/s) that the subject's own torque causes."""
+    rate_hz = settings.rig.tick_rate_hz
+    # Fine enough for the slowest pole of the loop; the last tick of the band holds no power.
+    frequency = np.arange(1, round(rate_hz / 2.0 * _LINES_A_HZ)) / _LINES_A_HZ
+    density = subject_density(subject, frequency, rate_hz)
+    loop = Loop(settings.controller, settings.rig).at_frequency(frequency)
+    _, velocity, angle = loop.motion_per_torque(median_joint(subject).parameters)
+    return (
+        math.sqrt(2.0 * float(np.sum(np.abs(angle) ** 2 * density)) / _LINES_A_HZ),
+        math.sqrt(2.0 * float(np.sum(np.abs(velocity) ** 2 * density)) / _LINES_A_HZ),
+    )
+
+
+class _Circle(NamedTuple):
+    """The loop at the frequencies of an FFT, on a circle just outside the unit circle.
+
+    A record is damped before its FFT and raised again after it, so that neither the integrator of
+    the angle nor the end of the record, which the FFT joins to its start, needs special care.
+    """
+
+    length: int
+    damping: Array
+    loop: OpenLoop
+
+    def to(self, record: Array) -> Complex:
+        return np.asarray(rfft(record * self.damping, self.length))
+
+    def back(self, spectrum: Complex) -> Array:
+        return np.asarray(irfft(spectrum, self.length)[: self.damping.size] / self.damping)
+
+
+@lru_cache(maxsize=8)
+def _on_circle(loop: Loop, n: int, rate_hz: float, times: int) -> _Circle:
+    """Return the loop for records of `n` ticks in an FFT so many times as long.
+
+    What comes round is damped by e^(−D), and raising the end of the record again raises its
+    rounding by e^(D/times). Both are the same at D = 36 times/(times + 1): 2e-8 of the largest
+    value for a record on its own, 4e-11 for twice the length. An estimate asks for the same loop
+    many times.
+    """
+    length = int(next_fast_len(times * n, real=True))
+    radius = _DIGITS * times / (times + 1) / length
+    angle = 2.0 * np.pi * np.arange(length // 2 + 1) / length
+    damping = np.exp(-radius * np.arange(n))
+    return _Circle(length, damping, loop.at(np.exp(radius + 1j * angle), rate_hz))
+
+
+def _lowpass(cutoff_hz: float, z: Complex, rate_hz: float) -> Complex:
+    """Return the second-order low-pass of the loop at z; none where the ticks are too slow."""
+    if cutoff_hz >= rate_hz / 2:
+        return np.ones_like(z)
+    b0, b1, b2, a1, a2 = butterworth_lowpass(cutoff_hz, rate_hz)
+    return np.asarray(((b0 * z + b1) * z + b2) / ((z + a1) * z + a2))
+
+
+class _Ages(NamedTuple):
+    """The ages of one sample, which is read on end: from whole + rest up, for so many ticks."""
+
+    whole: int
+    rest: float
+    ticks: int
+
+
+@lru_cache(maxsize=16)
+def _ages_by_sample(rig: RigSettings, rate_hz: float) -> tuple[_Ages, ...]:
+    """Return the ages of the readings in ticks of the given rate."""
+    # A rate that was found from stamps carries their rounding.
+    scale = Fraction(rate_hz / rig.tick_rate_hz).limit_denominator(_PARTS_OF_A_TICK)
+    ages = sorted((scale * age % 1, scale * age) for _, age in reading_pattern(rig)[0])
+    if scale != 1:  # the ages are not a tick apart
+        return tuple(_Ages(math.floor(age), float(rest), 1) for rest, age in ages)
+    groups = [list(group) for _, group in itertools.groupby(ages, key=lambda pair: pair[0])]
+    return tuple(_Ages(math.floor(group[0][1]), float(group[0][0]), len(group)) for group in groups)
+
+
+def _delays(z: Complex, first: int, count: int) -> Complex:
+    """Return Σ z⁻ᵏ over `count` whole ticks from `first`, by doubling: exact near z = 1 too."""
+    total, summed = np.ones_like(z), 1
+    for bit in f"{count:b}"[1:]:
+        total = total * (1.0 + z ** -float(summed))
+        summed *= 2
+        if bit == "1":
+            total = 1.0 + total / z
+            summed += 1
+    return np.asarray(z ** -float(first) * total)
+
+
+@lru_cache(maxsize=16)
+def reading_pattern(rig: RigSettings) -> tuple[tuple[Reading, ...], Fraction]:
+    """Return what is read at each tick until the pattern repeats, and the ticks per sample.
+
+    Sample k arrives at k / rate (later by the jitter's bound) and is read at the first tick that is
+    not before; it was sampled one latency earlier.
+    """
+    tick_rate, sensor_rate = Fraction(repr(rig.tick_rate_hz)), Fraction(repr(rig.torque.rate_hz))
+    ticks_per_sample = (tick_rate / sensor_rate).limit_denominator(_MOST_SAMPLES_A_PATTERN)
+    late, latency = (
+        (Fraction(repr(value)) * tick_rate).limit_denominator(_PARTS_OF_A_TICK)
+        for value in (rig.torque.jitter_s, rig.torque.latency_s)
+    )
+    pattern = []
+    for tick in range(ticks_per_sample.numerator):
+        sample = math.floor((tick - late) / ticks_per_sample)
+        pattern.append(Reading(sample, tick - sample * ticks_per_sample - late + latency))
+    return tuple(pattern), ticks_per_sample
