@@ -43,11 +43,11 @@ def _one_epoch() -> list[Row]:
             12.0,
         ),
         "bandlimited with intervals": (
-            lambda: fit_epoch(epochs[0], "bandlimited", settings.estimation),
+            lambda: fit_epoch(epochs[0], "bandlimited", settings),
             1.0,
         ),
         "published with intervals": (
-            lambda: fit_epoch(epochs[0], "published", settings.estimation),
+            lambda: fit_epoch(epochs[0], "published", settings),
             1.0,
         ),
     }

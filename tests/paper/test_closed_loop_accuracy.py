@@ -6,7 +6,7 @@ import pytest
 from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.estimation import fit_epoch
 from rigidimeter.recording import read_session
-from rigidimeter.settings import EstimationSettings
+from rigidimeter.settings import Settings
 
 TRUTH = np.array([0.0045, 0.1368, 1.751])
 SEEDS = range(12)
@@ -16,7 +16,7 @@ def run(simulate, rig, method="bandlimited"):
     fits, spread = [], []
     for seed in SEEDS:
         (epoch,), _ = read_session(simulate(seed=seed, name=f"s{seed}", rig=rig))
-        fit = fit_epoch(epoch, method, EstimationSettings())
+        fit = fit_epoch(epoch, method, Settings())
         fits.append([fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad])
         spread.append(np.rad2deg(epoch.channels["angle_rad"].values.std()))
     return 100 * (np.mean(fits, axis=0) / TRUTH - 1), np.array(spread)

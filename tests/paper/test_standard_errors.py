@@ -6,7 +6,7 @@ import pytest
 from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.estimation import fit_epoch
 from rigidimeter.recording import read_session
-from rigidimeter.settings import EstimationSettings
+from rigidimeter.settings import Settings
 
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 
@@ -17,7 +17,7 @@ def test_claimed_errors_are_within_a_third_of_the_scatter(simulate, rig):
     values, errors = [], []
     for seed in range(100):
         (epoch,), _ = read_session(simulate(seed=seed, name=f"s{seed}", rig=rig))
-        fit = fit_epoch(epoch, "bandlimited", EstimationSettings())
+        fit = fit_epoch(epoch, "bandlimited", Settings())
         values.append([getattr(fit, name) for name in NAMES])
         errors.append([getattr(fit, f"{name}_se") for name in NAMES])
     scatter, claimed = np.std(values, axis=0, ddof=1), np.mean(errors, axis=0)

@@ -93,11 +93,12 @@ def analyse_inputs(recording: Recording, method: str) -> Analysis:
         If there is no such method.
     """
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.estimation import METHODS
+    from rigidimeter.estimation import method_names
     from rigidimeter.study import analyse
 
-    if method not in METHODS:
-        raise UserError(f"--method {method}: there is no such method; known: {', '.join(METHODS)}")
+    if method not in method_names():
+        known = ", ".join(method_names())
+        raise UserError(f"--method {method}: there is no such method; known: {known}")
     with Meter("estimate", 2 * len(recording.epochs)) as meter:
         return analyse(
             recording.epochs, recording.settings, method, progress=lambda _: meter.advance()

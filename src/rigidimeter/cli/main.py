@@ -6,9 +6,11 @@ Modules of the command line import heavy libraries inside their functions, so th
 
 from __future__ import annotations
 
+import importlib.util
 import io
 import signal
 import sys
+from pathlib import Path
 from types import FrameType
 from typing import Annotated
 
@@ -22,6 +24,7 @@ from rigidimeter.cli.design import design
 from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
 from rigidimeter.cli.model import model
+from rigidimeter.cli.options import MethodsCommand
 from rigidimeter.cli.ratings import ratings
 from rigidimeter.cli.recover import recover
 from rigidimeter.cli.report import report
@@ -49,8 +52,35 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _load(paths: list[Path] | None) -> None:
+    """Run files of Python that add to the package, such as an estimator, in their order."""
+    for path in paths or ():
+        if not path.is_file():
+            raise UserError(f"--load {path}: there is no such file")
+        spec = importlib.util.spec_from_file_location(path.stem, path)
+        if spec is None or spec.loader is None:
+            raise UserError(f"--load {path}: is not a file of Python; its name must end in .py")
+        module = importlib.util.module_from_spec(spec)
+        sys.modules.setdefault(path.stem, module)
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:
+            raise UserError(f"--load {path}: {type(error).__name__}: {error}") from error
+
+
 @app.callback()
 def _root(
+    load: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--load",
+            metavar="FILE",
+            callback=_load,
+            is_eager=True,
+            help="First run a file of Python that adds an estimator, a term or a check; repeat as "
+            "needed.",
+        ),
+    ] = None,
     version: Annotated[
         bool,
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
@@ -81,7 +111,7 @@ for command in (
     recover,
     demo,
 ):
-    app.command()(command)
+    app.command(cls=MethodsCommand)(command)
 app.add_typer(study)
 
 

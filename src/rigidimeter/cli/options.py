@@ -9,13 +9,32 @@ import functools
 import inspect
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
 import typer
+from typer.core import TyperCommand, TyperOption
 
 from rigidimeter.cli.inputs import Recordings
 
-__all__ = ["SettingsOption", "reads_recordings"]
+__all__ = ["MethodsCommand", "SettingsOption", "reads_recordings"]
+
+
+class MethodsCommand(TyperCommand):
+    """A command whose help lists the estimators, those of `--load` among them."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Fill in what `--method` takes; only here, because it imports every estimator."""
+        for option in self.params:
+            if isinstance(option, TyperOption) and "--method" in option.opts:
+                from rigidimeter.estimation import METHODS
+
+                known = ", ".join(f"{method.name} ({method.title})" for method in METHODS)
+                option.help = (
+                    "auto (iv where the perturbation was recorded, else bandlimited), or one of: "
+                    f"{known}."
+                )
+        super().format_help(ctx, formatter)
+
 
 InputsArgument = Annotated[
     list[Path],
@@ -30,9 +49,7 @@ MethodOption = Annotated[
     typer.Option(
         "--method",
         metavar="NAME",
-        help="auto (iv where the perturbation was recorded, else bandlimited), iv (instrumental "
-        "variables), spectral (lines of the perturbation), ml (simulated loop), bandlimited "
-        "(least squares in one zero-phase band) or published (the paper to the letter).",
+        help="The estimator, by its name.",
     ),
 ]
 SettingsOption = Annotated[

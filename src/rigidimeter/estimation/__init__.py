@@ -2,13 +2,17 @@
 
 from rigidimeter.estimation.alignment import aligned, estimate_delays
 from rigidimeter.estimation.bandlimited import band_hz
+from rigidimeter.estimation.from_arrays import identify
 from rigidimeter.estimation.least_squares import fit_inertia_damping_stiffness
+from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.methods import (
     METHODS,
     choose_method,
     epoch_signals,
     fit_epoch,
     fit_epochs,
+    method_named,
+    method_names,
 )
 from rigidimeter.estimation.scores import Cycles, score_epoch, scoring_cycles
 from rigidimeter.estimation.signals import Signals
@@ -17,6 +21,7 @@ from rigidimeter.estimation.sinusoid_detection import find_motion, single_freque
 __all__ = [
     "METHODS",
     "Cycles",
+    "Method",
     "Signals",
     "aligned",
     "band_hz",
@@ -27,6 +32,9 @@ __all__ = [
     "fit_epoch",
     "fit_epochs",
     "fit_inertia_damping_stiffness",
+    "identify",
+    "method_named",
+    "method_names",
     "score_epoch",
     "scoring_cycles",
     "single_frequency_share",

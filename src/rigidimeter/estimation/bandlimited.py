@@ -12,10 +12,13 @@ second are dropped after filtering: there the filter saw no neighbours.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from scipy import signal
 
+from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares, intervals_text
+from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE
 from rigidimeter.estimation.signals import (
     Array,
@@ -29,7 +32,7 @@ from rigidimeter.estimation.signals import (
 from rigidimeter.records import Epoch
 from rigidimeter.settings import EstimationSettings
 
-__all__ = ["band_hz", "bandlimited_signals", "zero_phase_band"]
+__all__ = ["BANDLIMITED", "band_hz", "bandlimited_signals", "zero_phase_band"]
 
 EDGE_SAMPLES = 10
 """Samples of the slowest channel dropped at each end before filtering.
@@ -102,3 +105,16 @@ def bandlimited_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
         rate_hz=rate_hz,
         band_hz=band,
     )
+
+
+BANDLIMITED = Method(
+    name="bandlimited",
+    title="least squares, all signals through one zero-phase band",
+    needs=(),
+    methods_text="by least squares of signals that passed one zero-phase filter",
+    fit=partial(fit_least_squares, "bandlimited", bandlimited_signals),
+    signals=bandlimited_signals,
+    intervals_text=intervals_text,
+    pooled_text=POOLED_TEXT,
+    in_sensitivity=True,
+)

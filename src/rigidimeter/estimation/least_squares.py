@@ -12,12 +12,16 @@ second, whatever the sampling rate, so σ² (AᵀA)⁻¹ is scaled by rate / (2�
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy import signal
 
 from rigidimeter.estimation.closedloop.line_noise import Smoother
+from rigidimeter.estimation.method_record import Progress
+from rigidimeter.estimation.screening import after_fit, before_fit, unusable
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.estimation.uncertainty import (
     Estimate,
@@ -26,13 +30,36 @@ from rigidimeter.estimation.uncertainty import (
     hac_covariance,
     t_interval,
 )
-from rigidimeter.records import Fit, Outcome
-from rigidimeter.settings import EstimationSettings
+from rigidimeter.records import Epoch, Fit, Outcome
+from rigidimeter.settings import EstimationSettings, Settings
 
-__all__ = ["fit_inertia_damping_stiffness"]
+__all__ = ["POOLED_TEXT", "fit_inertia_damping_stiffness", "fit_least_squares", "intervals_text"]
+
+SignalsOf = Callable[[Epoch, EstimationSettings], Signals]
 
 BOOTSTRAP_SEED = 1
 """The same epoch gives the same interval every time."""
+
+
+_RESIDUALS = {
+    "hac": "a residual of any colour (lowest cosines of the scores, quantiles of Student’s t)",
+    "bootstrap": "a residual of any colour (blocks of the epoch drawn again)",
+    "white": "a residual that is white within the band, as sensor noise is and voluntary torque "
+    "is not",
+}
+
+POOLED_TEXT = (
+    "The joint is taken for one that does not change, and where epochs differ by more than "
+    "their own intervals these are too narrow"
+)
+
+
+def intervals_text(settings: EstimationSettings) -> str:
+    """Return what the intervals of least squares hold for."""
+    return (
+        f"Intervals hold for {_RESIDUALS[settings.intervals]}, and know nothing of bias: a "
+        "subject who pushes in a closed loop pulls least squares away from the joint"
+    )
 
 
 class _Solved(NamedTuple):
@@ -93,6 +120,76 @@ def fit_inertia_damping_stiffness(
         residual_sd_nm=float(np.std(residual)),
         n_samples=torque.size,
         band_hz=signals.band_hz,
+    )
+
+
+def fit_least_squares(
+    method: str,
+    signals_of: SignalsOf,
+    epochs: Sequence[Epoch],
+    settings: Settings,
+    inertia_kg_m2: float | None,
+    progress: Progress,
+) -> tuple[list[Fit], list[Fit]]:
+    """Fit every epoch, and all epochs of a condition put one after the other.
+
+    `signals_of` prepares the signals of an epoch; for the rest see `method_record.FitEpochs`.
+    """
+    estimation = settings.estimation
+    fits = []
+    kept: dict[str, list[tuple[Fit, Signals]]] = {}
+    for epoch in epochs:
+        try:
+            obstacle = before_fit(epoch, estimation)
+            if obstacle:
+                raise ValueError(obstacle)
+            signals = signals_of(epoch, estimation)
+            found = fit_inertia_damping_stiffness(signals, inertia_kg_m2, estimation)
+        except ValueError as error:
+            outcome = unusable(epoch, str(error))
+            fits.append(Fit(epoch.source, epoch.label, epoch.condition, method, outcome))
+        else:
+            fit = replace(
+                found,
+                source=epoch.source,
+                epoch=epoch.label,
+                condition=epoch.condition,
+                method=method,
+                outcome=after_fit(epoch, found.r_squared, found.condition_number),
+            )
+            fits.append(fit)
+            if fit.outcome.included:
+                kept.setdefault(epoch.condition, []).append((fit, signals))
+        progress(epoch.name)
+    groups = list(kept.items())
+    if len(groups) > 1:
+        groups.append(("", [member for _, members in groups for member in members]))
+    return fits, [_pooled(name, members, estimation, inertia_kg_m2) for name, members in groups]
+
+
+def _pooled(
+    condition: str,
+    members: Sequence[tuple[Fit, Signals]],
+    settings: EstimationSettings,
+    inertia_kg_m2: float | None,
+) -> Fit:
+    """Return the fit to all epochs of a condition, put one after the other."""
+    fits, parts = zip(*members, strict=True)
+    first = parts[0]
+    together = replace(
+        first,
+        time_s=np.concatenate([part.time_s for part in parts]),
+        torque_nm=np.concatenate([part.torque_nm for part in parts]),
+        acceleration_rad_s2=np.concatenate([part.acceleration_rad_s2 for part in parts]),
+        velocity_rad_s=np.concatenate([part.velocity_rad_s for part in parts]),
+        angle_rad=np.concatenate([part.angle_rad for part in parts]),
+    )
+    return replace(
+        fit_inertia_damping_stiffness(together, inertia_kg_m2, settings),
+        source=", ".join(dict.fromkeys(member.source for member in fits)),
+        epoch="pooled",
+        condition=condition,
+        method=fits[0].method,
     )
 
 

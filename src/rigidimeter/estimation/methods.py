@@ -1,31 +1,49 @@
-"""Epochs in, fits out: the methods by name."""
+"""The estimators by name. A new one is a module with its `Method` record and a line here."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
-import numpy as np
-
-from rigidimeter.estimation.bandlimited import bandlimited_signals
-from rigidimeter.estimation.closedloop import CLOSED_LOOP, closed_loop_obstacle, fit_closed_loop
-from rigidimeter.estimation.least_squares import fit_inertia_damping_stiffness
-from rigidimeter.estimation.published_method import published_signals
-from rigidimeter.estimation.screening import after_fit, before_fit, unusable
+from rigidimeter.estimation.bandlimited import BANDLIMITED, bandlimited_signals
+from rigidimeter.estimation.closedloop import IV, ML, SPECTRAL, closed_loop_obstacle
+from rigidimeter.estimation.method_record import Method, Progress
+from rigidimeter.estimation.published_method import PUBLISHED
+from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.signals import Signals
 from rigidimeter.records import Epoch, Fit
 from rigidimeter.settings import EstimationSettings, Settings
 
-__all__ = ["METHODS", "choose_method", "epoch_signals", "fit_epoch", "fit_epochs"]
+__all__ = [
+    "METHODS",
+    "choose_method",
+    "epoch_signals",
+    "fit_epoch",
+    "fit_epochs",
+    "method_named",
+    "method_names",
+]
 
-_LEAST_SQUARES: Mapping[str, Callable[[Epoch, EstimationSettings], Signals]] = {
-    "bandlimited": bandlimited_signals,
-    "published": published_signals,
-}
-"""How each method of least squares prepares the signals of an epoch."""
+METHODS: list[Method] = [PUBLISHED, BANDLIMITED, IV, SPECTRAL, ML]
+"""Every estimator. Code from outside the package may append its own."""
 
-METHODS: tuple[str, ...] = ("auto", *_LEAST_SQUARES, *CLOSED_LOOP)
-"""The methods by name; the default comes first."""
+
+def method_names() -> tuple[str, ...]:
+    """Return what `--method` takes: ``auto``, the default, and the name of each estimator."""
+    return ("auto", *(method.name for method in METHODS))
+
+
+def method_named(name: str) -> Method:
+    """Return the estimator of that name.
+
+    Raises
+    ------
+    ValueError
+        If there is none; the text names those there are.
+    """
+    for method in METHODS:
+        if method.name == name:
+            return method
+    raise ValueError(f"there is no such method; known: {', '.join(method_names())}")
 
 
 def choose_method(epochs: Sequence[Epoch]) -> tuple[str, str]:
@@ -53,7 +71,7 @@ def choose_method(epochs: Sequence[Epoch]) -> tuple[str, str]:
 
 
 def epoch_signals(epoch: Epoch, method: str, settings: EstimationSettings) -> Signals:
-    """Return the signals that `method` fits; those of ``bandlimited`` for methods of lines.
+    """Return the signals that a method fits; those of ``bandlimited`` where it fits none.
 
     Raises
     ------
@@ -63,7 +81,7 @@ def epoch_signals(epoch: Epoch, method: str, settings: EstimationSettings) -> Si
     obstacle = before_fit(epoch, settings)
     if obstacle:
         raise ValueError(obstacle)
-    return _LEAST_SQUARES.get(method, bandlimited_signals)(epoch, settings)
+    return (method_named(method).signals or bandlimited_signals)(epoch, settings)
 
 
 def fit_epochs(
@@ -71,103 +89,21 @@ def fit_epochs(
     method: str,
     settings: Settings,
     inertia_kg_m2: float | None = None,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = lambda _: None,
 ) -> tuple[list[Fit], list[Fit]]:
-    """Fit every epoch, and all epochs of a condition together.
+    """Fit every epoch, and all epochs of a condition together, by the method of that name.
 
-    Parameters
-    ----------
-    epochs : sequence of Epoch
-    method : str
-        A name of `METHODS` other than ``auto``.
-    settings : Settings
-    inertia_kg_m2 : float, optional
-        Hold J at this value (Eq. 7).
-    progress : callable
-        Called with the name of each epoch once it is done.
-
-    Returns
-    -------
-    fits : list of Fit
-        One for each epoch, in order.
-    pooled : list of Fit
-        One for each condition, and with several one for all, whose condition is empty.
+    Parameters and values are those of `method_record.FitEpochs`.
     """
-    if method in CLOSED_LOOP:
-        return fit_closed_loop(epochs, method, settings, inertia_kg_m2, progress)
-    fits = []
-    kept: dict[str, list[tuple[Fit, Signals]]] = {}
-    for epoch in epochs:
-        fit, signals = _fit(epoch, method, settings.estimation, inertia_kg_m2)
-        fits.append(fit)
-        if signals is not None and fit.outcome.included:
-            kept.setdefault(epoch.condition, []).append((fit, signals))
-        progress(epoch.name)
-    groups = list(kept.items())
-    if len(groups) > 1:
-        groups.append(("", [member for _, members in groups for member in members]))
-    pooled = [
-        _pooled(condition, members, settings.estimation, inertia_kg_m2)
-        for condition, members in groups
-    ]
-    return fits, pooled
+    return method_named(method).fit(epochs, settings, inertia_kg_m2, progress)
 
 
 def fit_epoch(
-    epoch: Epoch,
-    method: str,
-    settings: EstimationSettings,
-    inertia_kg_m2: float | None = None,
+    epoch: Epoch, method: str, settings: Settings, inertia_kg_m2: float | None = None
 ) -> Fit:
-    """Fit J, B and K to an epoch by least squares, or B and K when the inertia is given.
+    """Fit J, B and K to one epoch, or B and K when the inertia is given.
 
     An epoch that cannot be fitted gives a `Fit` whose outcome is `failed`, with the reason.
     """
-    return _fit(epoch, method, settings, inertia_kg_m2)[0]
-
-
-def _fit(
-    epoch: Epoch, method: str, settings: EstimationSettings, inertia_kg_m2: float | None
-) -> tuple[Fit, Signals | None]:
-    try:
-        signals = epoch_signals(epoch, method, settings)
-        fit = fit_inertia_damping_stiffness(signals, inertia_kg_m2, settings)
-    except ValueError as error:
-        outcome = unusable(epoch, str(error))
-        return Fit(epoch.source, epoch.label, epoch.condition, method, outcome), None
-    outcome = after_fit(epoch, fit.r_squared, fit.condition_number)
-    named = replace(
-        fit,
-        source=epoch.source,
-        epoch=epoch.label,
-        condition=epoch.condition,
-        method=method,
-        outcome=outcome,
-    )
-    return named, signals
-
-
-def _pooled(
-    condition: str,
-    members: Sequence[tuple[Fit, Signals]],
-    settings: EstimationSettings,
-    inertia_kg_m2: float | None,
-) -> Fit:
-    """Return the least squares over all epochs of a condition, put one after the other."""
-    fits, parts = zip(*members, strict=True)
-    first = parts[0]
-    together = replace(
-        first,
-        time_s=np.concatenate([part.time_s for part in parts]),
-        torque_nm=np.concatenate([part.torque_nm for part in parts]),
-        acceleration_rad_s2=np.concatenate([part.acceleration_rad_s2 for part in parts]),
-        velocity_rad_s=np.concatenate([part.velocity_rad_s for part in parts]),
-        angle_rad=np.concatenate([part.angle_rad for part in parts]),
-    )
-    return replace(
-        fit_inertia_damping_stiffness(together, inertia_kg_m2, settings),
-        source=", ".join(dict.fromkeys(member.source for member in fits)),
-        epoch="pooled",
-        condition=condition,
-        method=fits[0].method,
-    )
+    (fit,), _ = fit_epochs([epoch], method, settings, inertia_kg_m2)
+    return fit

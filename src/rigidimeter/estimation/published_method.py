@@ -13,14 +13,18 @@ The paper gives neither order nor direction of the filter: here second order and
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from scipy import signal
 
+from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares, intervals_text
+from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.signals import Array, Signals, kinematics, motion_channels, uniform_grid
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import EstimationSettings
 
-__all__ = ["published_signals"]
+__all__ = ["PUBLISHED", "published_signals"]
 
 
 def published_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
@@ -73,3 +77,18 @@ def _held(command: Channel, time_s: Array) -> Array:
     # A tick of rounding must not turn a command into the one before.
     index = np.searchsorted(command.time_s, time_s + 1e-9, side="right") - 1
     return command.values[np.maximum(index, 0)]
+
+
+PUBLISHED = Method(
+    name="published",
+    title="least squares as the paper prints it",
+    needs=(),
+    methods_text="by ordinary least squares in the time domain, as published",
+    fit=partial(fit_least_squares, "published", published_signals),
+    references=("paper",),
+    signals=published_signals,
+    intervals_text=intervals_text,
+    pooled_text=POOLED_TEXT,
+    as_recorded=True,
+    in_sensitivity=True,
+)

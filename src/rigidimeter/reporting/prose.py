@@ -18,6 +18,7 @@ import numpy as np
 from rigidimeter import __version__
 from rigidimeter.records import Epoch, Fit
 from rigidimeter.reporting.measures import condition_name
+from rigidimeter.reporting.methods import method_of
 from rigidimeter.reporting.numbers import number
 from rigidimeter.reporting.prose_statistics import rating_sentences, test_sentences
 from rigidimeter.reporting.references import Cited, Prose
@@ -195,18 +196,12 @@ def _estimation(facts: _Facts, cite: Cited) -> list[str]:
     if not analysis.fits:
         return []
     band = _band(analysis.fits)
-    how = {
-        "iv": "by refined instrumental variables made from the known perturbation "
-        f"{cite('riv', 'riv_loop')}"
-        if analysis.method == "iv"
-        else "",
-        "spectral": "by instrumental variables at the lines of the periodic perturbation",
-        "ml": "by maximum likelihood of the torque that the perturbation causes in the whole loop",
-        "bandlimited": "by least squares of signals that passed one zero-phase filter",
-        "published": f"by ordinary least squares in the time domain, as by {cite.by_name('paper')}"
-        if analysis.method == "published"
-        else "",
-    }.get(analysis.method, f"by the method “{analysis.method}”")
+    method = method_of(analysis.method)
+    how = f"by the method “{analysis.method}”"
+    if method is not None:
+        how = " ".join(
+            [method.methods_text, *([cite(*method.references)] * bool(method.references))]
+        )
     sentences = [
         f"Inertia J, viscous damping B and stiffness K of J θ″ + B θ′ + K θ = M were estimated "
         f"epoch by epoch {how}{band}."

@@ -4,7 +4,7 @@ Acquisition and study meet only in recorded files, so a laboratory can analyse w
 installed.
 """
 
-from rigidimeter.study.analysis import analyse, checked, task_of
+from rigidimeter.study.analysis import analyse, task_of
 from rigidimeter.study.archive import UNCHANGED, keep
 from rigidimeter.study.comparison import MEASURES, Comparison, Measure, compare, conditions
 from rigidimeter.study.results import (
@@ -43,7 +43,6 @@ __all__ = [
     "StudyRead",
     "analyse",
     "analyse_study",
-    "checked",
     "compare",
     "comparison_row",
     "conditions",

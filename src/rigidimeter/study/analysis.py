@@ -10,20 +10,19 @@ import numpy as np
 from rigidimeter.estimation import (
     aligned,
     choose_method,
-    epoch_signals,
     estimate_delays,
     fit_epochs,
+    method_named,
     score_epoch,
     single_frequency_share,
 )
-from rigidimeter.estimation.closedloop import CLOSED_LOOP, drives
-from rigidimeter.estimation.diagnostics import diagnose
+from rigidimeter.estimation.closedloop import drives
+from rigidimeter.estimation.diagnostics import checked
 from rigidimeter.estimation.screening import before_fit
-from rigidimeter.records import Analysis, Delay, Epoch, Fit, Outcome, Task
+from rigidimeter.records import Analysis, Delay, Epoch, Fit, Task
 from rigidimeter.settings import Settings
-from rigidimeter.units import rad_from_deg
 
-__all__ = ["analyse", "checked", "task_of"]
+__all__ = ["analyse", "task_of"]
 
 SINGLE_FREQUENCY_SHARE = 0.85
 """Above this share of the angle's variance in one line, the epoch is an imposed sinusoid.
@@ -61,7 +60,7 @@ def analyse(
     epochs : iterable of Epoch
     settings : Settings
     method : str
-        A name of `estimation.METHODS`; ``auto`` chooses by what was recorded.
+        The name of one of `estimation.METHODS`; ``auto`` chooses by what was recorded.
     delays : sequence of Delay, optional
         Of every source, as another analysis of the same epochs found them: they do not depend on
         the method, and cost the most.
@@ -75,7 +74,8 @@ def analyse(
     if method == "auto":
         method, reason = choose_method(fitted)
     used: Sequence[Delay] = ()
-    if method != "published":  # which is kept as it was printed
+    estimator = method_named(method)
+    if not estimator.as_recorded:
         by_source: dict[str, list[Epoch]] = {epoch.source: [] for epoch in everything}
         for epoch in fitted:
             by_source[epoch.source].append(epoch)
@@ -87,7 +87,7 @@ def analyse(
         if task == "sinusoid":
             scores.append(score_epoch(epoch, settings.scores, settings.estimation))
             progress(epoch.name)
-    if method in CLOSED_LOOP:
+    if "perturbation_nm" in estimator.needs:
         reason += _without_drive(fitted, settings, bool(reason))
     fits, pooled = fit_epochs(fitted, method, settings, progress=progress)
     fits = [checked(epoch, fit, settings) for epoch, fit in zip(fitted, fits, strict=True)]
@@ -134,28 +134,3 @@ def _without_drive(epochs: Sequence[Epoch], settings: Settings, after: bool) -> 
         "drive, so the motion between samples is interpolated: J may come out about 1 % low and, "
         "where the subject pushes, B some percent high"
     )
-
-
-def checked(epoch: Epoch, fit: Fit, settings: Settings) -> Fit:
-    """Return the fit with what the checks found, excluded if one of them says so."""
-    if fit.n_samples == 0:
-        return fit
-    try:
-        signals = epoch_signals(epoch, "bandlimited", settings.estimation)
-    except ValueError:
-        return fit  # the fit has said why
-    from_session = epoch.excitation_hz is not None
-    limit_rad = rad_from_deg(settings.guard.position_limit_deg) if from_session else None
-    findings = diagnose(
-        epoch,
-        signals,
-        (fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad),
-        settings.diagnostics,
-        position_limit_rad=limit_rad,
-    )
-    failed = [finding for finding in findings if finding.remedy]
-    grave = [finding for finding in failed if finding.level == "exclude"]
-    outcome = fit.outcome
-    if grave and outcome.included:
-        outcome = Outcome("excluded", f"{grave[0].text}; {grave[0].remedy}")
-    return replace(fit, outcome=outcome, findings=tuple(failed))

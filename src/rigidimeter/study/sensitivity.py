@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
+from rigidimeter.estimation import METHODS
 from rigidimeter.records import Analysis, Fit, Notice
 from rigidimeter.study.comparison import (
     FEWEST_FOR_TEST,
@@ -17,12 +18,14 @@ from rigidimeter.study.comparison import (
 from rigidimeter.study.day_model import day_test, valued
 from rigidimeter.study.results import SensitivityRow, SessionEntry
 
-__all__ = ["SENSITIVITY_METHODS", "sensitivity_rows"]
-
-SENSITIVITY_METHODS = ("published", "bandlimited", "iv")
-"""The estimators that a study is analysed with besides the chosen one."""
+__all__ = ["sensitivity_methods", "sensitivity_rows"]
 
 _INERTIA, _DAMPING, _STIFFNESS = MEASURES[:3]
+
+
+def sensitivity_methods() -> tuple[str, ...]:
+    """Return the estimators that a study is analysed with besides the chosen one."""
+    return tuple(method.name for method in METHODS if method.in_sensitivity)
 
 
 def sensitivity_rows(

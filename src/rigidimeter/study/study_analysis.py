@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rigidimeter.errors import UserError
-from rigidimeter.estimation import METHODS, choose_method
+from rigidimeter.estimation import choose_method, method_names
 from rigidimeter.recording.study_folder import Row, StudyFolder, read_study_folder
 from rigidimeter.records import Analysis, Delay, Epoch, Notice
 from rigidimeter.settings import Settings
@@ -26,7 +26,7 @@ from rigidimeter.study.effects import Measured, effects_of, ratings_measured
 from rigidimeter.study.exclusions import exclusions_of, operators_exclusions
 from rigidimeter.study.ratings_model import rated
 from rigidimeter.study.results import Cohort, SessionEntry, Study
-from rigidimeter.study.sensitivity import SENSITIVITY_METHODS, sensitivity_rows
+from rigidimeter.study.sensitivity import sensitivity_methods, sensitivity_rows
 from rigidimeter.study.sessions import Gathered, gather
 from rigidimeter.study.warnings import doubts
 
@@ -95,12 +95,13 @@ def read_study(
     """
     read = read_study_folder(folder, key)
     chosen = method if method != "auto" else read.about.analysis.method
-    if chosen not in METHODS:
-        near = difflib.get_close_matches(chosen, METHODS, n=1, cutoff=0.0)[0]
+    known = method_names()
+    if chosen not in known:
+        near = difflib.get_close_matches(chosen, known, n=1, cutoff=0.0)[0]
         where = "--method" if method != "auto" else f"{folder / 'study.toml'}: analysis.method ="
         raise UserError(
             f"{where} {chosen}: there is no such method; the nearest is {near} (known: "
-            f"{', '.join(METHODS)})"
+            f"{', '.join(known)})"
         )
     names, said = naming(read)
     names = replace(names, pair=_pair(names, pair))
@@ -121,7 +122,7 @@ def read_study(
 def steps(read: StudyRead) -> int:
     """Return how often `analyse_study` will report progress."""
     fitted = sum(epoch.task == "prbs" for epoch in read.epochs)
-    return len(read.epochs) + fitted * (2 * len(SENSITIVITY_METHODS) + 1)
+    return len(read.epochs) + fitted * (2 * len(sensitivity_methods()) + 1)
 
 
 def analyse_study(
@@ -161,12 +162,12 @@ def analyse_study(
     analyses = {main.method: main}
     fitted = [epoch for epoch in read.epochs if epoch.task == "prbs"]
     if fitted and all(pair):
-        for method in SENSITIVITY_METHODS:
+        for method in sensitivity_methods():
             if method != main.method:
                 analyses[method], _ = _analysed(
                     fitted, sessions, read.settings, method, progress, main.delays or None
                 )
-    ordered = {name: analyses[name] for name in SENSITIVITY_METHODS if name in analyses}
+    ordered = {name: analyses[name] for name in sensitivity_methods() if name in analyses}
     rows, said = sensitivity_rows(
         {**ordered, **analyses}, main.method, sessions, pair, one_offset=one_offset
     )

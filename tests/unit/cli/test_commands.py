@@ -131,7 +131,7 @@ def test_a_report_of_a_foreign_recording(rigidimeter, tmp_path):
     ("arguments", "words"),
     [
         (["estimate", "none.csv"], "none.csv: there is no such file"),
-        (["estimate", "{session}", "--method", "magic"], "known: auto, bandlimited, published, iv"),
+        (["estimate", "{session}", "--method", "magic"], "known: auto, published, bandlimited, iv"),
         (["estimate", "{session}", "--rate-hz", "-5"], "--rate-hz -5: must be a number greater"),
         (["estimate", "{session}", "--column", "torque_nm"], "write NAME=COLUMN"),
         (["estimate", "{session}", "--column", "a=b", "--column", "a=c"], "already given"),

@@ -7,9 +7,9 @@ from scipy import signal
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import band_hz, epoch_signals, fit_epoch
 from rigidimeter.records import Channel, Epoch, Outcome
-from rigidimeter.settings import EstimationSettings
+from rigidimeter.settings import Settings
 
-SETTINGS = EstimationSettings()
+SETTINGS = Settings()
 JOINT = JointDynamics(0.0175, 1.25, 103.0)
 
 
@@ -54,16 +54,16 @@ def test_the_second_stage_holds_the_inertia():
 
 def test_the_band_follows_what_is_known_of_the_perturbation():
     epoch = moving_epoch()
-    assert band_hz(epoch, SETTINGS) == (0.15, 50.0)
+    assert band_hz(epoch, SETTINGS.estimation) == (0.15, 50.0)
     slow = moving_epoch(rate_hz=100.0)
-    assert band_hz(slow, SETTINGS)[1] == pytest.approx(40.0)
+    assert band_hz(slow, SETTINGS.estimation)[1] == pytest.approx(40.0)
     t = epoch.channels["torque_nm"].time_s
     known = moving_epoch(perturbation_nm=Channel("perturbation_nm", t, np.sign(np.sin(9 * t))))
-    assert band_hz(known, SETTINGS) == (0.15, 10.0)
+    assert band_hz(known, SETTINGS.estimation) == (0.15, 10.0)
 
 
 def test_edges_are_trimmed_after_filtering():
-    signals = epoch_signals(moving_epoch(), "bandlimited", SETTINGS)
+    signals = epoch_signals(moving_epoch(), "bandlimited", SETTINGS.estimation)
     assert signals.time_s[0] == pytest.approx(1.0)
     assert signals.time_s[-1] == pytest.approx(18.998, abs=0.01)
 

@@ -2,10 +2,22 @@
 
 from rigidimeter.estimation.closedloop.closed_loop_fit import (
     CLOSED_LOOP,
+    IV,
+    ML,
+    SPECTRAL,
     closed_loop_obstacle,
     drives,
     fit_closed_loop,
 )
 from rigidimeter.estimation.closedloop.epoch_stream import EpochStream
 
-__all__ = ["CLOSED_LOOP", "EpochStream", "closed_loop_obstacle", "drives", "fit_closed_loop"]
+__all__ = [
+    "CLOSED_LOOP",
+    "IV",
+    "ML",
+    "SPECTRAL",
+    "EpochStream",
+    "closed_loop_obstacle",
+    "drives",
+    "fit_closed_loop",
+]

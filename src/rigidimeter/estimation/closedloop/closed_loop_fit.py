@@ -8,8 +8,9 @@ epoch says of J, B and K is its own.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.stats import t as student
@@ -22,6 +23,7 @@ from rigidimeter.estimation.closedloop.lack_of_fit import misfits, worst_misfit
 from rigidimeter.estimation.closedloop.maximum_likelihood import output_error
 from rigidimeter.estimation.closedloop.periodic_response import periodic, whole_periods
 from rigidimeter.estimation.closedloop.refine import (
+    ENOUGH_EPOCHS,
     SHARED_FROM,
     Linearise,
     LineFit,
@@ -31,6 +33,7 @@ from rigidimeter.estimation.closedloop.refine import (
     fit_single,
 )
 from rigidimeter.estimation.closedloop.spectral_lines import epoch_grid, epoch_lines
+from rigidimeter.estimation.method_record import Method, Progress
 from rigidimeter.estimation.screening import (
     USABLE_FRACTION_OF_RATE,
     after_fit,
@@ -40,10 +43,13 @@ from rigidimeter.estimation.screening import (
 from rigidimeter.estimation.signals import Array, motion_channels
 from rigidimeter.estimation.uncertainty import Estimate
 from rigidimeter.records import Channel, Epoch, Finding, Fit
-from rigidimeter.settings import Settings
+from rigidimeter.settings import EstimationSettings, Settings
 
 __all__ = [
     "CLOSED_LOOP",
+    "IV",
+    "ML",
+    "SPECTRAL",
     "closed_loop_obstacle",
     "drives",
     "fit_closed_loop",
@@ -161,19 +167,19 @@ def observe(epoch: Epoch, settings: Settings, method: str, drive: DriveModel | N
 
 
 def fit_closed_loop(
-    epochs: Sequence[Epoch],
     method: str,
+    epochs: Sequence[Epoch],
     settings: Settings,
     inertia_kg_m2: float | None = None,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = lambda _: None,
 ) -> tuple[list[Fit], list[Fit]]:
     """Fit J, B and K (or B and K at a given inertia) to every epoch and to each condition.
 
     Parameters
     ----------
-    epochs : sequence of Epoch
     method : str
         A key of `CLOSED_LOOP`.
+    epochs : sequence of Epoch
     settings : Settings
         Controller, rig and estimation.
     inertia_kg_m2 : float, optional
@@ -392,3 +398,53 @@ def _without_numbers(epoch: Epoch, method: str, reason: str) -> Fit:
         method=method,
         outcome=unusable(epoch, reason),
     )
+
+
+def _intervals_text(settings: EstimationSettings) -> str:
+    if settings.intervals == "bootstrap":
+        return (
+            "Intervals are made by giving each spectral line of the residual a new phase, the "
+            "subject’s own torque included"
+        )
+    return (
+        "Intervals are made from the power of the residual at each frequency, the subject’s own "
+        "torque included"
+    )
+
+
+_POOLED_TEXT = (
+    f"From {ENOUGH_EPOCHS} epochs on they come from the scatter between epochs; with fewer, the "
+    "joint is taken for one that does not change, and where epochs differ by more than their own "
+    "intervals these are too narrow"
+)
+
+IV = Method(
+    name="iv",
+    title="instrumental variables, made from the perturbation",
+    needs=("perturbation_nm",),
+    methods_text="by refined instrumental variables made from the known perturbation",
+    fit=partial(fit_closed_loop, "iv"),
+    references=("riv", "riv_loop"),
+    intervals_text=_intervals_text,
+    pooled_text=_POOLED_TEXT,
+    in_sensitivity=True,
+)
+SPECTRAL = Method(
+    name="spectral",
+    title="instrumental variables at the lines of a periodic perturbation",
+    needs=("perturbation_nm",),
+    methods_text="by instrumental variables at the lines of the periodic perturbation",
+    fit=partial(fit_closed_loop, "spectral"),
+    intervals_text=_intervals_text,
+    pooled_text=_POOLED_TEXT,
+)
+ML = Method(
+    name="ml",
+    title="maximum likelihood of the torque that the perturbation causes in the whole loop",
+    needs=("perturbation_nm",),
+    methods_text="by maximum likelihood of the torque that the perturbation causes in the whole "
+    "loop",
+    fit=partial(fit_closed_loop, "ml"),
+    intervals_text=_intervals_text,
+    pooled_text=_POOLED_TEXT,
+)

@@ -6,7 +6,7 @@ from rigidimeter.estimation.diagnostics.channels import (
     position_limit,
     saturation,
 )
-from rigidimeter.estimation.diagnostics.diagnose import diagnose, summary
+from rigidimeter.estimation.diagnostics.diagnose import checked, diagnose, summary
 from rigidimeter.estimation.diagnostics.excitation_checks import (
     band_share,
     coherence,
@@ -40,6 +40,7 @@ __all__ = [
     "active_movement",
     "active_seconds",
     "band_share",
+    "checked",
     "coherence",
     "conditioning",
     "diagnose",

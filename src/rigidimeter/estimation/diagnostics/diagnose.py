@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigidimeter.estimation.bandlimited import bandlimited_signals
 from rigidimeter.estimation.diagnostics.channels import (
     frozen,
     guard_limited,
@@ -39,11 +41,13 @@ from rigidimeter.estimation.diagnostics.residuals import (
     residual_perturbation,
     residual_whiteness,
 )
+from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.signals import Array, Signals
-from rigidimeter.records import Epoch, Finding
-from rigidimeter.settings import DiagnosticsSettings
+from rigidimeter.records import Epoch, Finding, Fit, Outcome
+from rigidimeter.settings import DiagnosticsSettings, Settings
+from rigidimeter.units import rad_from_deg
 
-__all__ = ["diagnose", "summary"]
+__all__ = ["checked", "diagnose", "summary"]
 
 
 def diagnose(
@@ -134,3 +138,27 @@ def summary(findings: Sequence[Finding]) -> str:
         for finding in sorted(failed, key=lambda finding: order.index(finding.level))
     ]
     return "\n".join([*lines, f"{passed} of {len(findings)} checks passed"])
+
+
+def checked(epoch: Epoch, fit: Fit, settings: Settings) -> Fit:
+    """Return the fit with what the checks found, excluded if one of them says so."""
+    if fit.n_samples == 0:
+        return fit
+    if before_fit(epoch, settings.estimation):
+        return fit  # the fit has said why
+    signals = bandlimited_signals(epoch, settings.estimation)
+    from_session = epoch.excitation_hz is not None
+    limit_rad = rad_from_deg(settings.guard.position_limit_deg) if from_session else None
+    findings = diagnose(
+        epoch,
+        signals,
+        (fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad),
+        settings.diagnostics,
+        position_limit_rad=limit_rad,
+    )
+    failed = [finding for finding in findings if finding.remedy]
+    grave = [finding for finding in failed if finding.level == "exclude"]
+    outcome = fit.outcome
+    if grave and outcome.included:
+        outcome = Outcome("excluded", f"{grave[0].text}; {grave[0].remedy}")
+    return replace(fit, outcome=outcome, findings=tuple(failed))

@@ -115,7 +115,7 @@ def test_an_epoch_gives_its_joint_back():
     settings = Settings()
     joint = JointDynamics(0.0045, 0.1368, 1.751)
     epoch = simulate_epochs(settings, 1, joints=[joint]).epoch(0)
-    fit = fit_epoch(epoch, "bandlimited", settings.estimation)
+    fit = fit_epoch(epoch, "bandlimited", settings)
     assert fit.outcome.included
     assert fit.stiffness_nm_rad == pytest.approx(1.751, rel=0.005)
     assert fit.damping_nm_s_rad == pytest.approx(0.1368, rel=0.01)

@@ -1,0 +1,92 @@
+"""What an estimator is: one `Method` record, made in the estimator's own module."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from rigidimeter.estimation.signals import Signals
+from rigidimeter.records import Epoch, Fit
+from rigidimeter.settings import EstimationSettings, Settings
+
+__all__ = ["FitEpochs", "Method", "Progress"]
+
+Progress = Callable[[str], None]
+
+
+class FitEpochs(Protocol):
+    """The function of an estimator."""
+
+    def __call__(
+        self,
+        epochs: Sequence[Epoch],
+        settings: Settings,
+        inertia_kg_m2: float | None,
+        progress: Progress,
+    ) -> tuple[list[Fit], list[Fit]]:
+        """Fit every epoch, and all epochs of each condition together.
+
+        Parameters
+        ----------
+        epochs : sequence of Epoch
+        settings : Settings
+        inertia_kg_m2 : float or None
+            Hold J at this value (Eq. 7).
+        progress : callable
+            Called with the name of each epoch once it is done.
+
+        Returns
+        -------
+        fits : list of Fit
+            One for each epoch, in order; one that could not be fitted has failed, with the reason.
+        pooled : list of Fit
+            One for each condition with an epoch that counts, and with several one for all of them
+            together, whose condition is empty; their `epoch` is ``pooled``.
+        """
+
+
+@dataclass(frozen=True)
+class Method:
+    """An estimator of J, B and K.
+
+    Parameters
+    ----------
+    name : str
+        As `--method` takes it.
+    title : str
+        What it does, in a few words.
+    needs : tuple of str
+        The channels it needs besides torque and a measured motion. A method that needs
+        `perturbation_nm` is taken for one that voluntary torque does not bias.
+    methods_text : str
+        How the estimates were made, for a methods section: completes "J, B and K were estimated".
+    fit : FitEpochs
+        The function.
+    references : tuple of str
+        Keys of `reporting.references` that the methods text cites.
+    signals : callable, optional
+        The signals that it fits, where these are not those of ``bandlimited``.
+    intervals_text : callable
+        What the intervals hold for, under given settings.
+    pooled_text : str
+        What the intervals of the pooled estimates hold for.
+    as_recorded : bool
+        Fit the channels as they are, without correcting the delay of the torque.
+    in_sensitivity : bool
+        Whether every study is analysed by it, beside the method chosen.
+    """
+
+    name: str
+    title: str
+    needs: tuple[str, ...]
+    methods_text: str
+    fit: FitEpochs
+    references: tuple[str, ...] = ()
+    signals: Callable[[Epoch, EstimationSettings], Signals] | None = None
+    intervals_text: Callable[[EstimationSettings], str] = lambda _: (
+        "Intervals are those that the method gives"
+    )
+    pooled_text: str = "Those of all epochs together are its own too"
+    as_recorded: bool = False
+    in_sensitivity: bool = False
