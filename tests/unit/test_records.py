@@ -3,7 +3,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.records import PARAMETER_VECTORS, PARAMETERS, Fit, Outcome
+from rigidimeter.recording import write_estimates_csv
+from rigidimeter.records import (
+    PARAMETER_VECTORS,
+    PARAMETERS,
+    Analysis,
+    Finding,
+    Fit,
+    Outcome,
+    Score,
+)
 
 FIT = Fit(
     "a.csv", "1", "OFF", "iv", Outcome(),
@@ -36,3 +45,50 @@ def test_fits_are_equal_when_every_number_is():
     assert hash(replace(FIT)) == hash(FIT)
     assert replace(FIT, high=np.array([1.2, 2.4, 3.7])) != FIT
     assert replace(FIT, epoch="2") != FIT
+
+
+def analysis(**changes):
+    left_out = replace(FIT, epoch="2", outcome=Outcome("excluded", "R² < 0 & worse"))
+    found = Finding("frozen", "exclude", 2.0, 1.0, "angle <hung>", "check the cable")
+    fits = (replace(FIT, findings=(found,)), replace(left_out, findings=(found,)))
+    return Analysis(
+        **{
+            "method": "iv",
+            "fits": fits,
+            "fixed_inertia": fits,
+            "inertia_kg_m2": 1.0,
+            "scores": (Score("a.csv", "3", "OFF", Outcome(), 0.4, 0.2, 8, 1.0),),
+            "pooled": (replace(FIT, epoch="pooled"),),
+            **changes,
+        }
+    )
+
+
+def test_the_table_has_the_columns_of_the_csv(tmp_path):
+    write_estimates_csv(tmp_path / "e.csv", analysis())
+    table = analysis().table()
+    assert list(table.columns) == (tmp_path / "e.csv").read_text().splitlines()[0].split(",")
+    assert table["stiffness_nm_rad"].tolist() == [3.0, 3.0]
+    assert table["outcome"].tolist() == ["included", "excluded"]
+    only_scores = analysis(fits=(), fixed_inertia=(), pooled=())
+    assert only_scores.table()["work_j"].tolist() == [0.2]
+
+
+def test_findings_of_one_check_are_told_once():
+    ((first, fits),) = analysis().findings
+    assert first.name == "frozen"
+    assert [fit.epoch for fit in fits] == ["1", "2"]
+
+
+def test_a_notebook_shows_estimates_with_intervals_and_what_was_found():
+    page = analysis()._repr_html_()
+    assert "K (N·m/rad)" in page
+    assert "3 [2.4, 3.6]" in page
+    assert "all epochs" in page
+    assert "check the cable" in page
+    assert "angle &lt;hung&gt;" in page
+    assert "R² &lt; 0 &amp; worse" in page
+    assert "<hung>" not in page
+    assert "work (J)" in page
+    many = analysis(fits=(FIT,) * 50, fixed_inertia=(FIT,) * 50)
+    assert "The first 20 of 50 epochs." in many._repr_html_()

@@ -112,49 +112,30 @@ def _delay_lines(analysis: Analysis) -> list[str]:
 
 
 def _pooled_lines(fit: Fit) -> list[str]:
-    name = fit.condition or "all"
-    rows = (
-        ("J", fit.inertia_kg_m2, fit.inertia_kg_m2_low, fit.inertia_kg_m2_high, "kg·m²"),
-        (
-            "B",
-            fit.damping_nm_s_rad,
-            fit.damping_nm_s_rad_low,
-            fit.damping_nm_s_rad_high,
-            "N·m·s/rad",
-        ),
-        (
-            "K",
-            fit.stiffness_nm_rad,
-            fit.stiffness_nm_rad_low,
-            fit.stiffness_nm_rad_high,
-            "N·m/rad",
-        ),
-    )
+    from rigidimeter.records import PARAMETERS
+
+    name = (fit.condition or "all")[:10]
     return [
-        f"{name[:10] if symbol == 'J' else '':>10} {symbol} {value:11.5g}  "
-        f"[{low:.5g}, {high:.5g}] {unit}"
-        for symbol, value, low, high, unit in rows
+        f"{'' if i else name:>10} {parameter.symbol} {fit.value[i]:11.5g}  "
+        f"[{fit.low[i]:.5g}, {fit.high[i]:.5g}] {parameter.unit}"
+        for i, parameter in enumerate(PARAMETERS)
     ]
 
 
 def _finding_lines(analysis: Analysis) -> list[str]:
     """Return each kind of finding once: in which epochs, the first in full, and what to do."""
-    seen: dict[tuple[str, str], list[Fit]] = {}
-    for fit in analysis.fits:
-        for finding in fit.findings:
-            seen.setdefault((finding.name, finding.level), []).append(fit)
-    if not seen:
-        return []
-    lines = ["", "What the checks found (all of it is in the JSON)"]
-    for (name, level), fits in seen.items():
-        first = next(found for found in fits[0].findings if found.name == name)
+    lines = []
+    for first, found_in in analysis.findings:
+        fits = [fit for fit in found_in if fit.epoch != "pooled"]
+        if not fits:
+            continue
         where = "1 epoch" if len(fits) == 1 else f"{len(fits)} epochs"
         lines += _wrapped(
-            f"{level}: {where} of {len(analysis.fits)}, first epoch {fits[0].epoch}: {first.text}. "
-            f"Remedy: {first.remedy}.",
+            f"{first.level}: {where} of {len(analysis.fits)}, first epoch {fits[0].epoch}: "
+            f"{first.text}. Remedy: {first.remedy}.",
             indent=" ",
         )
-    return lines
+    return ["", "What the checks found (all of it is in the JSON)", *lines] if lines else []
 
 
 def _band(analysis: Analysis) -> str:

@@ -94,15 +94,13 @@ def analyse_inputs(recording: Recording, method: str) -> Analysis:
     """
     from rigidimeter.cli.progress import Meter
     from rigidimeter.estimation import method_names
-    from rigidimeter.study import analyse
+    from rigidimeter.study import estimate
 
     if method not in method_names():
         known = ", ".join(method_names())
         raise UserError(f"--method {method}: there is no such method; known: {known}")
     with Meter("estimate", 2 * len(recording.epochs)) as meter:
-        return analyse(
-            recording.epochs, recording.settings, method, progress=lambda _: meter.advance()
-        )
+        return estimate(recording, method, progress=lambda _: meter.advance())
 
 
 def keep_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:

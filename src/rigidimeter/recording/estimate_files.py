@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.documents import csv_text, read_json, write_json, write_text
+from rigidimeter.documents import csv_text, plain_values, read_json, write_json, write_text
 from rigidimeter.errors import UserError
 from rigidimeter.records import (
     PARAMETER_VECTORS,
     PARAMETERS,
+    STATISTICS,
     Analysis,
     Delay,
     Finding,
@@ -32,29 +33,24 @@ __all__ = [
 ESTIMATES_SCHEMA = "rigidimeter.estimates/1"
 
 _PARAMETERS = tuple(parameter.name for parameter in PARAMETERS)
-_STATISTICS = ("r_squared", "vaf_percent", "condition_number", "residual_sd_nm")
-_FIT_NUMBERS = (
-    *(name + ending for name in _PARAMETERS for ending in PARAMETER_VECTORS.values()),
-    *_STATISTICS,
-)
-_SCORE_NUMBERS = ("impulse_nm_s", "work_j", "frequency_hz")
 
 
 def estimates_document(analysis: Analysis) -> dict[str, Any]:
     """Return an analysis as plain values; numbers that do not exist are null."""
-    return {
+    document = {
         "schema": ESTIMATES_SCHEMA,
         "method": analysis.method,
         "method_reason": analysis.method_reason,
-        "delays": [_delay_row(delay) for delay in analysis.delays],
+        "delays": [vars(delay) for delay in analysis.delays],
         "pooled": _pooled(analysis.pooled),
         "epochs": [_fit_row(fit) for fit in analysis.fits],
         "fixed_inertia": {
-            "inertia_kg_m2": _finite(analysis.inertia_kg_m2),
+            "inertia_kg_m2": analysis.inertia_kg_m2,
             "epochs": [_fit_row(fit) for fit in analysis.fixed_inertia],
         },
-        "scores": [_score_row(score) for score in analysis.scores],
+        "scores": [score.row() for score in analysis.scores],
     }
+    return dict(plain_values(document))
 
 
 def write_estimates_json(path: Path, analysis: Analysis) -> None:
@@ -67,22 +63,7 @@ def write_estimates_csv(path: Path, analysis: Analysis) -> None:
 
     An analysis of sinusoids alone gives the table of scores.
     """
-    rows: list[dict[str, Any]] = []
-    for fit, fixed in zip(analysis.fits, analysis.fixed_inertia, strict=True):
-        row = _fit_row(fit)
-        low, high = row.pop("band_hz") or (None, None)
-        row["findings"] = " / ".join(finding.text for finding in fit.findings)
-        rows.append(
-            row
-            | {"band_low_hz": low, "band_high_hz": high}
-            | {
-                f"fixed_inertia_{name}": _finite(getattr(fixed, name))
-                for name in _FIT_NUMBERS
-                if name == "inertia_kg_m2" or not name.startswith("inertia_kg_m2")
-            }
-        )
-    if not rows:
-        rows = [_score_row(score) for score in analysis.scores]
+    rows = analysis.rows()
     write_text(path, csv_text(list(rows[0]) if rows else ["epoch"], rows))
 
 
@@ -117,10 +98,6 @@ def read_estimates(path: Path) -> Analysis:
         ) from None
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
 def _number(value: Any) -> float:
     return math.nan if value is None else float(value)
 
@@ -134,39 +111,10 @@ def _read_outcome(row: Mapping[str, Any], numbers: Sequence[str]) -> Outcome:
     return Outcome(kind, str(row["reason"]))
 
 
-def _outcome(result: Fit | Score) -> dict[str, Any]:
-    return {
-        "source": result.source,
-        "epoch": result.epoch,
-        "condition": result.condition,
-        "outcome": result.outcome.kind,
-        "reason": result.outcome.reason,
-    }
-
-
-def _numbers(result: Fit | Score, names: Sequence[str]) -> dict[str, Any]:
-    return {name: _finite(getattr(result, name)) for name in names}
-
-
 def _fit_row(fit: Fit) -> dict[str, Any]:
-    band = [fit.band_hz[0], fit.band_hz[1]] if all(map(math.isfinite, fit.band_hz)) else None
-    return {
-        **_outcome(fit),
-        **_numbers(fit, _FIT_NUMBERS),
-        "n_samples": fit.n_samples,
-        "band_hz": band,
-        "findings": [_finding_row(finding) for finding in fit.findings],
-    }
-
-
-def _finding_row(finding: Finding) -> dict[str, Any]:
-    row = dict(vars(finding))
-    return row | {"value": _finite(finding.value), "threshold": _finite(finding.threshold)}
-
-
-def _delay_row(delay: Delay) -> dict[str, Any]:
-    row = dict(vars(delay))
-    return row | {name: _finite(row[name]) for name in ("delay_s", "delay_s_se")}
+    band = list(fit.band_hz) if all(map(math.isfinite, fit.band_hz)) else None
+    findings = [vars(finding) for finding in fit.findings]
+    return fit.row() | {"band_hz": band, "findings": findings}
 
 
 def _pooled(fits: Sequence[Fit]) -> dict[str, Any] | None:
@@ -177,10 +125,6 @@ def _pooled(fits: Sequence[Fit]) -> dict[str, Any] | None:
     return {**_fit_row(fits[-1]), "conditions": conditions}
 
 
-def _score_row(score: Score) -> dict[str, Any]:
-    return {**_outcome(score), **_numbers(score, _SCORE_NUMBERS), "n_cycles": score.n_cycles}
-
-
 def _fit(row: Mapping[str, Any], method: str) -> Fit:
     low, high = row["band_hz"] or (math.nan, math.nan)
     # A document of an older version lacks the ends of the intervals.
@@ -188,7 +132,7 @@ def _fit(row: Mapping[str, Any], method: str) -> Fit:
         vector: readonly([_number(row.get(name + ending)) for name in _PARAMETERS])
         for vector, ending in PARAMETER_VECTORS.items()
     }
-    numbers |= {name: _number(row.get(name)) for name in _STATISTICS}
+    numbers |= {name: _number(row.get(name)) for name in STATISTICS}
     return Fit(
         source=str(row["source"]),
         epoch=str(row["epoch"]),
@@ -239,7 +183,7 @@ def _score(row: Mapping[str, Any]) -> Score:
         source=str(row["source"]),
         epoch=str(row["epoch"]),
         condition=str(row["condition"]),
-        outcome=_read_outcome(row, _SCORE_NUMBERS[:2]),
+        outcome=_read_outcome(row, ("impulse_nm_s", "work_j")),
         impulse_nm_s=_number(row["impulse_nm_s"]),
         work_j=_number(row["work_j"]),
         n_cycles=int(row["n_cycles"]),

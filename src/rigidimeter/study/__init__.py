@@ -4,7 +4,7 @@ Acquisition and study meet only in recorded files, so a laboratory can analyse w
 installed.
 """
 
-from rigidimeter.study.analysis import analyse, task_of
+from rigidimeter.study.analysis import analyse, estimate, task_of
 from rigidimeter.study.archive import UNCHANGED, keep
 from rigidimeter.study.comparison import MEASURES, Comparison, Measure, compare, conditions
 from rigidimeter.study.results import (
@@ -47,6 +47,7 @@ __all__ = [
     "comparison_row",
     "conditions",
     "doubts",
+    "estimate",
     "keep",
     "read_study",
     "steps",

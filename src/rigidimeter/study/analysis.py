@@ -19,10 +19,11 @@ from rigidimeter.estimation import (
 from rigidimeter.estimation.closedloop import drives
 from rigidimeter.estimation.diagnostics import checked
 from rigidimeter.estimation.screening import before_fit
+from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Delay, Epoch, Fit, Task
 from rigidimeter.settings import Settings
 
-__all__ = ["analyse", "task_of"]
+__all__ = ["analyse", "estimate", "task_of"]
 
 SINGLE_FREQUENCY_SHARE = 0.85
 """Above this share of the angle's variance in one line, the epoch is an imposed sinusoid.
@@ -134,3 +135,41 @@ def _without_drive(epochs: Sequence[Epoch], settings: Settings, after: bool) -> 
         "drive, so the motion between samples is interpolated: J may come out about 1 % low and, "
         "where the subject pushes, B some percent high"
     )
+
+
+def estimate(
+    recording: Recording | Iterable[Epoch],
+    method: str = "auto",
+    *,
+    settings: Settings | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Analysis:
+    """Estimate J, B and K of every epoch, and score the imposed sinusoids.
+
+    Parameters
+    ----------
+    recording : Recording or iterable of Epoch
+    method : str
+        The name of an estimator; ``auto`` chooses by what was recorded.
+    settings : Settings, optional
+        Instead of those of the recording.
+    progress : callable
+        Called with the name of each epoch once it is done.
+
+    Returns
+    -------
+    Analysis
+        `table()` gives its epochs as a pandas table, `pooled` the estimates of all epochs together,
+        `findings` what the checks found; in a notebook it shows itself as a table.
+
+    Raises
+    ------
+    ValueError
+        If there is no such method.
+    """
+    if isinstance(recording, Recording):
+        epochs: Iterable[Epoch] = recording.epochs
+        settings = settings or recording.settings
+    else:
+        epochs = recording
+    return analyse(epochs, settings or Settings(), method, progress=progress)

@@ -3,9 +3,10 @@ import math
 import numpy as np
 import pytest
 
+from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Channel, Epoch, Fit, Outcome, Score
-from rigidimeter.settings import Settings
-from rigidimeter.study import analyse, compare, conditions, doubts, task_of
+from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.study import analyse, compare, conditions, doubts, estimate, task_of
 
 
 def fit(condition, B=0.1, K=1.0, J=0.004, outcome=None):
@@ -35,6 +36,17 @@ def epochs_with_inertia(inertias, closed=None):
         outcome = (closed or {}).get(k, Outcome())
         made.append(Epoch("s", str(k), channels, task="prbs", closed=outcome))
     return made
+
+
+def test_a_recording_is_estimated_with_its_settings():
+    epochs = tuple(epochs_with_inertia([0.004, 0.005]))
+    settings = parse_settings({"estimation": {"band_high_unknown_hz": 12.0}})
+    found = estimate(Recording(epochs, (), settings, ()), "bandlimited")
+    assert found == analyse(epochs, settings, "bandlimited")
+    assert found.fits[0].band_hz == (0.15, 12.0)
+    assert estimate(epochs, "bandlimited") == analyse(epochs, Settings(), "bandlimited")
+    with pytest.raises(ValueError, match="no such method"):
+        estimate(epochs, "magic")
 
 
 def test_the_second_stage_holds_the_median_inertia_of_the_included():

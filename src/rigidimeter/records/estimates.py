@@ -1,152 +1,34 @@
-"""The frozen types that travel between the rooms.
-
-Units stand in every name. Arrays are float64 and read-only once inside a record.
-"""
+"""What was estimated: parameters and their uncertainty, scores, findings, and all together."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-__all__ = [
-    "CHANNEL_UNITS",
-    "PARAMETERS",
-    "PARAMETER_VECTORS",
-    "Analysis",
-    "Channel",
-    "Delay",
-    "Epoch",
-    "Finding",
-    "Fit",
-    "Motion",
-    "Notice",
-    "Outcome",
-    "OutcomeKind",
-    "Parameter",
-    "Score",
-    "Task",
-    "readonly",
-]
+from rigidimeter.records.epochs import Outcome, readonly
+from rigidimeter.records.notebook_view import analysis_html
+from rigidimeter.records.parameters import PARAMETER_VECTORS, PARAMETERS
 
-Task = Literal["prbs", "sinusoid"]
-OutcomeKind = Literal["included", "excluded", "failed"]
+if TYPE_CHECKING:
+    import pandas as pd
 
-CHANNEL_UNITS: Mapping[str, str] = {
-    "torque_nm": "N·m",
-    "angle_rad": "rad",
-    "velocity_rad_s": "rad/s",
-    "velocity_command_rad_s": "rad/s",
-    "perturbation_nm": "N·m",
-    "emg_v": "V",
-}
-"""The channels an epoch may hold, and their units."""
+__all__ = ["FIT_NUMBERS", "STATISTICS", "Analysis", "Delay", "Finding", "Findings", "Fit", "Score"]
 
+STATISTICS = ("r_squared", "vaf_percent", "condition_number", "residual_sd_nm")
+"""How well a fit explains the torque, beside its parameters."""
 
-def readonly(values: ArrayLike) -> NDArray[np.float64]:
-    """Return a read-only float64 view (or copy, where the type differs) of an array."""
-    array = np.asarray(values, dtype=np.float64).view()
-    array.setflags(write=False)
-    return array
+FIT_NUMBERS = (
+    *(p.name + ending for p in PARAMETERS for ending in PARAMETER_VECTORS.values()),
+    *STATISTICS,
+)
+"""The numbers of a fit, as files and tables name them."""
 
-
-@dataclass(frozen=True)
-class Channel:
-    """One measured quantity with its own time stamps.
-
-    Parameters
-    ----------
-    name : str
-        One of `CHANNEL_UNITS`; the unit is part of the name.
-    time_s : array, shape (n,)
-        When each sample was taken, strictly increasing. Channels of one epoch share the clock but
-        neither rate nor phase: stamps may jitter.
-    values : array, shape (n,)
-        In the unit that the name states.
-    """
-
-    name: str
-    time_s: NDArray[np.float64]
-    values: NDArray[np.float64]
-
-    def __post_init__(self) -> None:
-        if self.name not in CHANNEL_UNITS:
-            raise ValueError(f"unknown channel {self.name!r}; known are {', '.join(CHANNEL_UNITS)}")
-        time_s, values = readonly(self.time_s), readonly(self.values)
-        if time_s.ndim != 1 or time_s.shape != values.shape:
-            raise ValueError(
-                f"channel {self.name}: {time_s.shape} stamps and {values.shape} values"
-            )
-        object.__setattr__(self, "time_s", time_s)
-        object.__setattr__(self, "values", values)
-
-    def __len__(self) -> int:
-        return int(self.values.size)
-
-    @property
-    def unit(self) -> str:
-        """The unit of the values."""
-        return CHANNEL_UNITS[self.name]
-
-    @cached_property
-    def rate_hz(self) -> float:
-        """The typical sampling rate: one over the median interval; NaN below two samples."""
-        if len(self) < 2:
-            return math.nan
-        return 1.0 / float(np.median(np.diff(self.time_s)))
-
-    @cached_property
-    def mean_rate_hz(self) -> float:
-        """Samples over time: for an even clock, free of the rounding of single stamps."""
-        if len(self) < 2:
-            return math.nan
-        return (len(self) - 1) / float(self.time_s[-1] - self.time_s[0])
-
-
-@dataclass(frozen=True)
-class Motion:
-    """What an imposed sinusoid was meant to be: needed to cut its cycles.
-
-    `start_s` is when the motion starts, on the clock of the epoch's channels.
-    """
-
-    frequency_hz: float
-    start_s: float
-    duration_s: float
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How something went: a bad epoch is a value, not an exception.
-
-    `included` counts in every summary; `excluded` does not count, for the reason given, though it
-    may have numbers; `failed` could not be computed, for the reason given, and is worth a look.
-    """
-
-    kind: OutcomeKind = "included"
-    reason: str = ""
-
-    @property
-    def included(self) -> bool:
-        """Whether the result counts in summaries."""
-        return self.kind == "included"
-
-
-@dataclass(frozen=True)
-class Notice:
-    """A sentence for the user about an input that was read all the same.
-
-    A `warning` leaves the exit status alone; an `error` makes it non-zero although whatever could
-    be analysed was.
-    """
-
-    level: Literal["warning", "error"]
-    text: str
+SCORE_NUMBERS = ("impulse_nm_s", "work_j", "frequency_hz", "n_cycles")
+"""The numbers of a score, as files and tables name them."""
 
 
 @dataclass(frozen=True)
@@ -174,69 +56,6 @@ class Finding:
     threshold: float
     text: str
     remedy: str
-
-
-@dataclass(frozen=True)
-class Epoch:
-    """A stretch of recording in which one perturbation ran.
-
-    Parameters
-    ----------
-    source : str
-        The file or folder it came from.
-    label : str
-        The epoch's name within the source.
-    channels : mapping of str to Channel
-        By channel name. Torque is positive when it drives the joint in the direction of
-        positive angle, the sign of Eq. 3.
-    condition : str
-        For example ``OFF`` or ``DBS``; empty where unknown.
-    task : {"prbs", "sinusoid"} or None
-        None where the recording does not say.
-    motion : Motion or None
-        The imposed sinusoid, where the recording says so.
-    excitation_hz : (float, float) or None
-        The band the perturbation was designed for, where the recording says so.
-    closed : Outcome
-        How the epoch ended when it was recorded: `included` for success.
-    virtual : bool
-        Whether a simulation made it.
-    """
-
-    source: str
-    label: str
-    channels: Mapping[str, Channel]
-    condition: str = ""
-    task: Task | None = None
-    motion: Motion | None = None
-    excitation_hz: tuple[float, float] | None = None
-    closed: Outcome = field(default_factory=Outcome)
-    virtual: bool = False
-
-    @property
-    def name(self) -> str:
-        """Source and label, as sentences name the epoch."""
-        return f"{self.source}, epoch {self.label}"
-
-
-class Parameter(NamedTuple):
-    """A parameter of Eq. 3: its name with the unit in it, its symbol, its unit, and in words."""
-
-    name: str
-    symbol: str
-    unit: str
-    title: str
-
-
-PARAMETERS = (
-    Parameter("inertia_kg_m2", "J", "kg·m²", "inertia"),
-    Parameter("damping_nm_s_rad", "B", "N·m·s/rad", "damping"),
-    Parameter("stiffness_nm_rad", "K", "N·m/rad", "stiffness"),
-)
-"""J, B and K in the order of every vector of a `Fit`."""
-
-PARAMETER_VECTORS = {"value": "", "se": "_se", "low": "_low", "high": "_high", "bound": "_bound"}
-"""The vectors of a `Fit`, and what their entries are called after the parameter's name."""
 
 
 class _Entry:
@@ -355,6 +174,11 @@ class Fit:
         """The names of the parameters, in the order of the vectors."""
         return tuple(parameter.name for parameter in PARAMETERS)
 
+    def row(self) -> dict[str, Any]:
+        """Return the names and numbers of the fit, as files and tables have them."""
+        numbers = {name: getattr(self, name) for name in FIT_NUMBERS}
+        return _named(self) | numbers | {"n_samples": self.n_samples}
+
 
 @dataclass(frozen=True)
 class Delay:
@@ -384,6 +208,27 @@ class Score:
     n_cycles: int = 0
     frequency_hz: float = math.nan
 
+    def row(self) -> dict[str, Any]:
+        """Return the names and numbers of the score, as files and tables have them."""
+        return _named(self) | {name: getattr(self, name) for name in SCORE_NUMBERS}
+
+
+def _named(result: Fit | Score) -> dict[str, Any]:
+    return {
+        "source": result.source,
+        "epoch": result.epoch,
+        "condition": result.condition,
+        "outcome": result.outcome.kind,
+        "reason": result.outcome.reason,
+    }
+
+
+class Findings(NamedTuple):
+    """What one check found, in one or more epochs: the first finding, and the fits of all."""
+
+    first: Finding
+    fits: tuple[Fit, ...]
+
 
 @dataclass(frozen=True)
 class Analysis:
@@ -404,3 +249,43 @@ class Analysis:
     pooled: tuple[Fit, ...] = ()
     delays: tuple[Delay, ...] = ()
     method_reason: str = ""
+
+    @property
+    def findings(self) -> tuple[Findings, ...]:
+        """What the checks found: for each check and level the epochs, in the order of reading."""
+        groups: dict[tuple[str, str], tuple[Finding, list[Fit]]] = {}
+        for fit in (*self.fits, *self.pooled):
+            for finding in fit.findings:
+                _, fits = groups.setdefault((finding.name, finding.level), (finding, []))
+                fits.append(fit)
+        return tuple(Findings(first, tuple(fits)) for first, fits in groups.values())
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return one row for each fitted epoch: the fit, and B and K at fixed inertia beside it.
+
+        An analysis of sinusoids alone gives a row for each score.
+        """
+        rows = []
+        for fit, fixed in zip(self.fits, self.fixed_inertia, strict=True):
+            held = {f"fixed_inertia_{name}": getattr(fixed, name) for name in FIT_NUMBERS}
+            for ending in ("_se", "_low", "_high", "_bound"):  # of a J that was held
+                del held[f"fixed_inertia_{PARAMETERS[0].name}{ending}"]
+            rows.append(
+                fit.row()
+                | {
+                    "findings": " / ".join(finding.text for finding in fit.findings),
+                    "band_low_hz": fit.band_hz[0],
+                    "band_high_hz": fit.band_hz[1],
+                }
+                | held
+            )
+        return rows or [score.row() for score in self.scores]
+
+    def table(self) -> pd.DataFrame:
+        """Return `rows` as a table, with the columns of ``rigidimeter estimate --csv``."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows())
+
+    def _repr_html_(self) -> str:
+        return analysis_html(self)

@@ -1,0 +1,50 @@
+"""The frozen types that travel between the rooms.
+
+Units stand in every name. Arrays are float64 and read-only once inside a record.
+"""
+
+from rigidimeter.records.epochs import (
+    CHANNEL_UNITS,
+    Channel,
+    Epoch,
+    Motion,
+    Notice,
+    Outcome,
+    OutcomeKind,
+    Task,
+    readonly,
+)
+from rigidimeter.records.estimates import (
+    FIT_NUMBERS,
+    STATISTICS,
+    Analysis,
+    Delay,
+    Finding,
+    Findings,
+    Fit,
+    Score,
+)
+from rigidimeter.records.parameters import PARAMETER_VECTORS, PARAMETERS, Parameter
+
+__all__ = [
+    "CHANNEL_UNITS",
+    "FIT_NUMBERS",
+    "PARAMETERS",
+    "PARAMETER_VECTORS",
+    "STATISTICS",
+    "Analysis",
+    "Channel",
+    "Delay",
+    "Epoch",
+    "Finding",
+    "Findings",
+    "Fit",
+    "Motion",
+    "Notice",
+    "Outcome",
+    "OutcomeKind",
+    "Parameter",
+    "Score",
+    "Task",
+    "readonly",
+]
