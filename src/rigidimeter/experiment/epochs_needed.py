@@ -1,4 +1,4 @@
-"""How many epochs it takes to see a difference with the two-sided rank-sum test.
+"""How many epochs it takes to detect a difference with the two-sided rank-sum test.
 
 The test counts U = #{x > y} and rejects when |U − mn/2| − ½ ≥ z σ₀, σ₀² = mn(m + n + 1)/12 (what
 `rigidimeter.statistics.ranksum` does without ties). For normal epochs x ~ N(δ, s_x²) and
@@ -30,13 +30,29 @@ from dataclasses import dataclass
 
 from scipy.stats import beta, betabinom, multivariate_normal, norm
 
+from rigidimeter.dynamics.velocity_drive import Array
 from rigidimeter.errors import UserError
+from rigidimeter.experiment.precision import PARAMETERS, predicted_precision
+from rigidimeter.settings import Settings
 
-__all__ = ["MOST_EPOCHS", "Effect", "SampleSize", "epoch_sd", "ranksum_power", "sample_size"]
+__all__ = [
+    "Detection",
+    "Effect",
+    "Wanted",
+    "detect",
+    "epoch_sd",
+    "planned_epochs",
+    "ranksum_power",
+    "sample_size",
+]
 
-MOST_EPOCHS = 5000
+_MOST_EPOCHS = 5000
 """Where the search for a sample size ends."""
 
+_NAMES = {"inertia": 0, "damping": 1, "stiffness": 2}
+
+_SIZES = (5, 10, 20, 40, 80)
+"""Epochs in each condition for which the power is shown."""
 
 _MANY_PAIRS = 10_000
 """Above this many pairs the beta-binomial is taken as the beta that it tends to."""
@@ -63,11 +79,143 @@ class Effect:
 
 
 @dataclass(frozen=True)
-class SampleSize:
-    """Epochs in each condition, and the power they give."""
+class Wanted:
+    """A difference that is to be detected: of which parameter, and in what unit."""
 
-    epochs: int
+    parameter: str
+    amount: float
+    percent: bool
+
+    @classmethod
+    def parse(cls, text: str) -> Wanted:
+        """Read ``damping=20%`` or ``stiffness=0.3``.
+
+        Raises
+        ------
+        UserError
+            If it cannot be read.
+        """
+        name, equals, amount = text.partition("=")
+        number = amount.strip().removesuffix("%")
+        if name.strip() not in _NAMES or not equals:
+            raise UserError(
+                f"--detect {text} names no difference; write inertia, damping or stiffness, an "
+                "equals sign and a number, such as damping=20% or stiffness=0.3"
+            )
+        try:
+            value = float(number)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and value != 0.0):
+            raise UserError(
+                f"--detect {text}: {amount.strip() or 'nothing'} is not a number other than 0, "
+                "with % for a share of the first condition's value"
+            )
+        return cls(name.strip(), value, amount.strip().endswith("%"))
+
+
+@dataclass(frozen=True)
+class Detection:
+    """How many epochs a wanted difference needs.
+
+    Attributes
+    ----------
+    wanted : Wanted
+    condition : str
+        From whose joint the difference is counted.
+    effect : Effect
+        In the parameter's unit, with the SD of an epoch's value in both conditions.
+    cv_percent : float
+        The joint's own variation from epoch to epoch that is in it.
+    needed : int
+        Epochs in each condition.
+    power : float
+        With that many.
+    powers : dict of int to float
+        For other numbers of epochs in each condition.
+    planned : (int, int) or None
+        PRBS epochs of the first two conditions in the protocol, where it has them.
+    planned_power : float
+        With those; NaN without them.
+    """
+
+    wanted: Wanted
+    condition: str
+    effect: Effect
+    cv_percent: float
+    needed: int
     power: float
+    powers: dict[int, float]
+    planned: tuple[int, int] | None
+    planned_power: float
+
+
+def planned_epochs(settings: Settings) -> dict[str, int]:
+    """Return how many PRBS epochs the protocol holds for each condition of the settings."""
+    counts = dict.fromkeys(settings.subject, 0)
+    for block in settings.protocol.blocks:
+        if block.task == "prbs":
+            counts[block.condition] += block.epochs
+    return counts
+
+
+def detect(
+    settings: Settings,
+    perturbation_nm: Array,
+    wanted: Wanted,
+    *,
+    power: float = 0.8,
+    alpha: float = 0.05,
+) -> Detection:
+    """Return how many epochs a condition a difference needs.
+
+    The first condition of the settings is the baseline; the other one is its joint with the
+    parameter lowered by the amount (or raised, for a negative amount). Standard errors are those of
+    `iv`: of B and K with the inertia held, as they are compared; of J in the fit of all three.
+
+    Raises
+    ------
+    UserError
+        If the power or level is out of range, the other joint would not exist, or no number of
+        epochs is enough.
+    """
+    if not (0.0 < power < 1.0 and 0.0 < alpha < 1.0):
+        raise UserError(
+            f"--power {power:g} and --alpha {alpha:g} must both be between 0 and 1, for example "
+            "0.8 and 0.05"
+        )
+    condition, subject = next(iter(settings.subject.items()))
+    place = _NAMES[wanted.parameter]
+    key = PARAMETERS[place]
+    value = float(getattr(subject, key))
+    difference = value * wanted.amount / 100.0 if wanted.percent else wanted.amount
+    if value - difference <= 0.0:
+        raise UserError(
+            f"a {wanted.parameter} lower by {difference:.4g} leaves nothing of subject.{condition}."
+            f"{key} = {value:.4g}; name a smaller difference"
+        )
+    cv_percent = float(getattr(subject, key.split("_", maxsplit=1)[0] + "_cv_percent"))
+    spreads = []
+    for level in (value, value - difference):
+        joint = subject.model_copy(update={key: level})
+        errors = predicted_precision(perturbation_nm, settings, joint).iv
+        error = errors.free[0] if place == 0 else errors.fixed_inertia[place - 1]
+        spreads.append(epoch_sd(error, level, cv_percent))
+    effect = Effect(difference, *spreads)
+    needed = sample_size(effect, power, alpha=alpha)
+    counts = list(planned_epochs(settings).values())
+    planned = (counts[0], counts[1]) if len(counts) > 1 and min(counts[:2]) > 0 else None
+    return Detection(
+        wanted=wanted,
+        condition=condition,
+        effect=effect,
+        cv_percent=cv_percent,
+        needed=needed,
+        power=ranksum_power(effect, needed, needed, alpha=alpha),
+        powers={n: ranksum_power(effect, n, n, alpha=alpha) for n in _SIZES},
+        planned=planned,
+        planned_power=ranksum_power(effect, *planned, alpha=alpha) if planned else math.nan,
+    )
 
 
 def epoch_sd(standard_error: float, value: float, cv_percent: float) -> float:
@@ -132,13 +280,13 @@ def ranksum_power(effect: Effect, n_x: int, n_y: int, *, alpha: float = 0.05) ->
     return min(1.0, float(count.sf(upper - 1) + count.cdf(pairs - upper)))
 
 
-def sample_size(effect: Effect, power: float = 0.8, *, alpha: float = 0.05) -> SampleSize:
+def sample_size(effect: Effect, power: float = 0.8, *, alpha: float = 0.05) -> int:
     """Return the fewest epochs a condition, the same in both, that reach the power.
 
     Raises
     ------
     UserError
-        If `MOST_EPOCHS` in each condition are not enough, or the difference is 0.
+        If `_MOST_EPOCHS` in each condition are not enough, or the difference is 0.
     """
     if effect.difference == 0.0:
         raise UserError("a difference of 0 cannot be detected; name one that is not 0")
@@ -147,9 +295,9 @@ def sample_size(effect: Effect, power: float = 0.8, *, alpha: float = 0.05) -> S
     low, high = 1, 2
     while ranksum_power(effect, high, high, alpha=alpha) < power:
         low, high = high, 2 * high
-        if low > MOST_EPOCHS:
+        if low > _MOST_EPOCHS:
             raise UserError(
-                f"a difference of {effect.difference:.4g} needs more than {MOST_EPOCHS} epochs in "
+                f"a difference of {effect.difference:.4g} needs more than {_MOST_EPOCHS} epochs in "
                 f"each condition at a spread of {effect.sd_x:.4g} from epoch to epoch"
             )
     while high - low > 1:
@@ -158,7 +306,7 @@ def sample_size(effect: Effect, power: float = 0.8, *, alpha: float = 0.05) -> S
             low = middle
         else:
             high = middle
-    return SampleSize(high, ranksum_power(effect, high, high, alpha=alpha))
+    return high
 
 
 def _moments(effect: Effect, n_x: int, n_y: int) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from rigidimeter.dynamics.joint import JointDynamics
 
-__all__ = ["APPENDIX_A", "EQUATION_8_SIGNS", "Corner", "Corners", "corners"]
+__all__ = ["APPENDIX_A", "Corner", "Corners", "corners"]
 
 APPENDIX_A = JointDynamics(inertia_kg_m2=0.0052, damping_nm_s_rad=0.088, stiffness_nm_rad=1.5)
 """The nominal arm with robot and controller of App. A, of which Eq. 8 is half in each value.
@@ -29,7 +29,7 @@ its printed parts (forearm 8.6625e-4, robot 4e-3, controller 8e-4) sum to 0.0056
 the controller per radian where Sec. 2.4.2 gives it per degree.
 """
 
-EQUATION_8_SIGNS = (-1, -1, -1)
+_EQUATION_8_SIGNS = (-1, -1, -1)
 """The corner (of J, B, K) that the paper calls the one with the largest bandwidth."""
 
 
@@ -63,17 +63,12 @@ class Corners:
     @property
     def equation_8(self) -> Corner:
         """The corner of Eq. 8, all three at the lower value: the paper's worst case."""
-        return next(corner for corner in self.corners if corner.signs == EQUATION_8_SIGNS)
+        return next(corner for corner in self.corners if corner.signs == _EQUATION_8_SIGNS)
 
     @property
     def widest(self) -> Corner:
         """The corner with the largest bandwidth."""
         return max(self.corners, key=lambda corner: corner.bandwidth_hz)
-
-    @property
-    def narrowest(self) -> Corner:
-        """The corner with the smallest bandwidth."""
-        return min(self.corners, key=lambda corner: corner.bandwidth_hz)
 
 
 def corners(nominal: JointDynamics = APPENDIX_A, uncertainty_percent: float = 50.0) -> Corners:
@@ -94,10 +89,8 @@ def corners(nominal: JointDynamics = APPENDIX_A, uncertainty_percent: float = 50
     if not 0.0 <= uncertainty_percent < 100.0:
         raise ValueError(f"uncertainty must be 0 to below 100 %, got {uncertainty_percent}")
     share = uncertainty_percent / 100.0
-    ends = (-1, 1)
-    at_corners = tuple(
-        _corner(nominal, share, signs) for signs in itertools.product(ends, ends, ends)
-    )
+    signs = [(J, B, K) for J, B, K in itertools.product((-1, 1), repeat=3)]
+    at_corners = tuple(_corner(nominal, share, one) for one in signs)
     return Corners(uncertainty_percent, _corner(nominal, share, (0, 0, 0)), at_corners)
 
 

@@ -17,16 +17,25 @@ domain swapping algorithm", IEEE Trans. Instrum. Meas. 37, 1988.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.experiment.tick_count import tick_count, tick_times_s
+from rigidimeter.experiment.perturbations import tick_count, tick_times_s
+from rigidimeter.experiment.precision import predicted_precision
+from rigidimeter.records import readonly
 from rigidimeter.settings import Settings
 
-__all__ = ["crest_factor", "multisine_nm", "multisine_phases_rad"]
+__all__ = [
+    "MultisineComparison",
+    "compare_multisine",
+    "crest_factor",
+    "multisine_nm",
+    "multisine_phases_rad",
+]
 
 _POINTS_PER_CYCLE = 16
 _CLIP_AT = 0.9
@@ -126,3 +135,44 @@ def multisine_nm(settings: Settings) -> NDArray[np.float64]:
         torque += np.cos(2.0 * np.pi * k / own.period_s * time_s + phase)
     torque -= np.mean(torque)
     return np.asarray(torque * (prbs.amplitude_nm / np.max(np.abs(torque))))
+
+
+@dataclass(frozen=True)
+class MultisineComparison:
+    """A multisine beside the PRBS.
+
+    `errors` holds, by condition and by what is held equal, the standard errors of J, B and K by
+    `iv`: of the PRBS itself (``prbs``), and of the multisine as it is, with the PRBS's peak torque,
+    and scaled so that the angle has the PRBS's standard deviation, or its peak.
+    """
+
+    torque_nm: NDArray[np.float64]
+    crest_factor: float
+    errors: dict[str, dict[str, tuple[float, float, float]]]
+
+
+def compare_multisine(
+    settings: Settings, perturbation_nm: NDArray[np.float64]
+) -> MultisineComparison:
+    """Return the multisine and its standard errors beside those of the PRBS.
+
+    Raises
+    ------
+    UserError
+        As `multisine_nm` and `predicted_precision`.
+    """
+    torque = multisine_nm(settings)
+    errors: dict[str, dict[str, tuple[float, float, float]]] = {}
+    for name, subject in settings.subject.items():
+        ours = predicted_precision(perturbation_nm, settings, subject)
+        its = predicted_precision(torque, settings, subject)
+        scales = {
+            "same_peak_torque": float(np.max(np.abs(perturbation_nm)) / np.max(np.abs(torque))),
+            "same_angle_sd": ours.angle_sd_rad / its.angle_sd_rad,
+            "same_peak_angle": ours.peak_angle_rad / its.peak_angle_rad,
+        }
+        errors[name] = {"prbs": ours.iv.free}
+        for what, scale in scales.items():
+            J, B, K = (error / scale for error in its.iv.free)
+            errors[name][what] = (J, B, K)
+    return MultisineComparison(readonly(torque), crest_factor(torque), errors)

@@ -11,7 +11,8 @@ closed loop, S the density of ν, and T the length of the epoch.
 - bound: (∫ ZZᴴ / S df)⁻¹ over all frequencies that the torque's samples hold. No estimator that
   leans on the perturbation alone can do better. (One that knew S could also use the motion that the
   subject's own torque causes. `bound` leaves that out.)
-- `iv`: that motion as the instrument, the lines of a window weighed by their noise; see `weighted`.
+- `iv`: that motion as the instrument, the lines of a window weighed by their noise; see
+  `predicted_record`.
 - least squares, of signals that all went through a band of gain g (`bandlimited`): A⁻¹ Q A⁻¹ with
   A = ∫ g² ZZᴴ df and Q = ∫ g⁴ ZZᴴ S df, S that of the sensor: the standard error of a passive arm.
 
@@ -32,7 +33,6 @@ T. Söderström and P. Stoica, "Instrumental Variable Methods for System Identif
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import next_fast_len, rfft, rfftfreq
@@ -48,16 +48,18 @@ from rigidimeter.dynamics import (
 )
 from rigidimeter.dynamics.velocity_drive import Array, Complex
 from rigidimeter.errors import UserError
-from rigidimeter.experiment.predicted_record import Record, expected_record, noise_spectrum
-from rigidimeter.experiment.weighted_lines import USABLE_FRACTION_OF_RATE, layout, weighted_products
+from rigidimeter.experiment.predicted_record import (
+    USABLE_FRACTION_OF_RATE,
+    Record,
+    expected_record,
+    layout,
+    noise_spectrum,
+    weighted_products,
+)
+from rigidimeter.records import readonly
 from rigidimeter.settings import RigSettings, Settings, SubjectSettings
 
-__all__ = [
-    "PARAMETERS",
-    "Errors",
-    "Precision",
-    "predicted_precision",
-]
+__all__ = ["PARAMETERS", "Errors", "Precision", "predicted_precision"]
 
 _MOST_CONDITION = 1e12
 """Above this condition number of scaled regressors the errors are not worth printing."""
@@ -80,9 +82,6 @@ class Errors:
 
     free: tuple[float, float, float]
     fixed_inertia: tuple[float, float]
-
-
-_NOTHING = Errors((0.0, 0.0, 0.0), (0.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -122,11 +121,7 @@ class Precision:
 
 
 def predicted_precision(
-    perturbation_nm: Array,
-    settings: Settings,
-    subject: SubjectSettings,
-    *,
-    band_hz: tuple[float, float] | None = None,
+    perturbation_nm: Array, settings: Settings, subject: SubjectSettings
 ) -> Precision:
     """Return the standard errors of one epoch for the median joint of a subject.
 
@@ -138,8 +133,6 @@ def predicted_precision(
         For loop, sensors and estimation.
     subject : SubjectSettings
         Its median joint, voluntary torque and tremor.
-    band_hz : (float, float), optional
-        Of `iv`; by default that of `estimation` for methods of the closed loop.
 
     Raises
     ------
@@ -155,37 +148,26 @@ def predicted_precision(
             f"of {motion.angle_rad.size / rig.tick_rate_hz:g} s"
         )
     record = expected_record(motion, rig)
-    lines = layout(record, estimation, band_hz)
-    least_squares = _least_squares(motion, settings, subject, joint)
-    noisy = _noisy(rig, subject)
-    if noisy:
+    lines = layout(record, estimation)
+    band_hz, least_squares, bias = _least_squares(motion, settings, subject, joint)
+    bound = iv = Errors((0.0, 0.0, 0.0), (0.0, 0.0))
+    covariance = np.zeros((3, 3))
+    own = subject.voluntary_sd_nm > 0.0 or subject.tremor_amplitude_nm > 0.0
+    if own or sensor_density(rig.torque) > 0.0:  # otherwise nothing hides the joint
         A, Q = weighted_products(record, rig, subject, lines)
+        bound, iv, covariance = _bound(record, rig, subject), _errors(A, Q), _sandwich(A, Q)
     return Precision(
         joint=joint,
         iv_band_hz=lines.band_hz,
-        least_squares_band_hz=least_squares.band_hz,
-        bound=_bound(record, rig, subject) if noisy else _NOTHING,
-        iv=_errors(A, Q) if noisy else _NOTHING,
-        least_squares=least_squares.errors,
-        covariance=_sandwich(A, Q) if noisy else np.zeros((3, 3)),
-        least_squares_bias=least_squares.bias,
+        least_squares_band_hz=band_hz,
+        bound=bound,
+        iv=iv,
+        least_squares=least_squares,
+        covariance=readonly(covariance),
+        least_squares_bias=bias,
         angle_sd_rad=float(np.std(motion.angle_rad)),
         peak_angle_rad=float(np.max(np.abs(motion.angle_rad))),
     )
-
-
-class _LeastSquares(NamedTuple):
-    """What `bandlimited` will make of an epoch."""
-
-    band_hz: tuple[float, float]
-    errors: Errors
-    bias: tuple[float, float, float]
-
-
-def _noisy(rig: RigSettings, subject: SubjectSettings) -> bool:
-    """Whether anything hides the joint at all."""
-    own = subject.voluntary_sd_nm > 0.0 or subject.tremor_amplitude_nm > 0.0
-    return own or sensor_density(rig.torque) > 0.0
 
 
 def _products(Z: Complex, weight: Array, n: int) -> Array:
@@ -215,7 +197,7 @@ def _bound(record: Record, rig: RigSettings, subject: SubjectSettings) -> Errors
     padded = 2 * next_fast_len(record.motion.shape[1], real=True)
     density = noise_spectrum(rig, subject, rfftfreq(padded, 1.0 / record.rate_hz))
     if np.any(density == 0.0):  # at a frequency without noise nothing hides the joint
-        return _NOTHING
+        return Errors((0.0, 0.0, 0.0), (0.0, 0.0))
     information = _products(rfft(record.motion, padded), 1.0 / density, padded)
     return _errors(information, information)
 
@@ -228,7 +210,7 @@ def _errors(A: Array, Q: Array) -> Errors:
 
 def _least_squares(
     motion: ClosedLoopMotion, settings: Settings, subject: SubjectSettings, joint: JointDynamics
-) -> _LeastSquares:
+) -> tuple[tuple[float, float], Errors, tuple[float, float, float]]:
     """Return band, errors of a passive arm, and bias of `bandlimited`."""
     estimation, rig = settings.estimation, settings.rig
     slowest_hz = min(rig.torque.rate_hz, rig.motion.rate_hz)
@@ -244,13 +226,12 @@ def _least_squares(
             f"epoch of {kept / rig.tick_rate_hz:g} s; the fit needs at least {len(PARAMETERS)}"
         )
     gain = _zero_phase_gain(frequency, low_hz, high_hz)
-    columns = (motion.acceleration_rad_s2, motion.velocity_rad_s, motion.angle_rad)
-    Z = np.stack([rfft(column[trim : trim + kept]) for column in columns])
+    Z = np.asarray(rfft(np.stack(motion[1:])[:, trim : trim + kept]))
     A = _products(Z, gain**2, kept) / rig.tick_rate_hz
     Q = _products(Z, gain**4, kept) / rig.tick_rate_hz * sensor_density(rig.torque)
     voluntary = subject_density(subject, frequency, rig.tick_rate_hz) * gain**2
     bias = _bias(A, settings, joint, frequency, voluntary)
-    return _LeastSquares((low_hz, high_hz), _errors(A, Q), bias)
+    return (low_hz, high_hz), _errors(A, Q), bias
 
 
 def _zero_phase_gain(frequency_hz: Array, low_hz: float, high_hz: float) -> Array:
