@@ -1,6 +1,5 @@
 """The experiment before it runs: perturbations, session order, predicted precision, power."""
 
-from rigidimeter.experiment.band import DROP_DB, BandCheck, check_band
 from rigidimeter.experiment.demand import (
     Demand,
     beyond_limits,
@@ -8,39 +7,46 @@ from rigidimeter.experiment.demand import (
     ideal_response,
     time_constant_s,
 )
+from rigidimeter.experiment.design_document import SCHEMA, design_document
 from rigidimeter.experiment.epochs_needed import (
+    Detection,
     Effect,
-    SampleSize,
+    Wanted,
+    detect,
     epoch_sd,
+    planned_epochs,
     ranksum_power,
     sample_size,
 )
-from rigidimeter.experiment.joint_bandwidth import APPENDIX_A, Corner, Corners, corners
-from rigidimeter.experiment.multisine import crest_factor, multisine_nm, multisine_phases_rad
-from rigidimeter.experiment.optimise import CRITERIA, Candidate, assess, check_criterion, optimise
-from rigidimeter.experiment.overview import FREE_ARM, Overview, overview
-from rigidimeter.experiment.perturbation_spectrum import (
+from rigidimeter.experiment.excitation import (
     HALF_POWER_DB,
+    BandCheck,
     Spectrum,
+    check_band,
     envelope_db,
     envelope_edge_hz,
     line_spacing_hz,
     plateau_n2m2_hz,
     power_spectrum,
 )
-from rigidimeter.experiment.position_sinusoid import sinusoid
-from rigidimeter.experiment.prbs import chip_count, period_s, prbs_levels, prbs_nm
-from rigidimeter.experiment.precision import PARAMETERS, Errors, Precision, predicted_precision
-from rigidimeter.experiment.prediction import (
-    Alternative,
-    Detection,
-    Foresight,
-    Wanted,
+from rigidimeter.experiment.joint_bandwidth import APPENDIX_A, Corner, Corners, corners
+from rigidimeter.experiment.multisine import (
+    MultisineComparison,
     compare_multisine,
-    detect,
-    foresee,
-    planned_epochs,
+    crest_factor,
+    multisine_nm,
+    multisine_phases_rad,
 )
+from rigidimeter.experiment.optimise import CRITERIA, Candidate, assess, check_criterion, optimise
+from rigidimeter.experiment.overview import Design, design
+from rigidimeter.experiment.perturbations import (
+    chip_count,
+    period_s,
+    prbs_levels,
+    prbs_nm,
+    sinusoid,
+)
+from rigidimeter.experiment.precision import PARAMETERS, Errors, Precision, predicted_precision
 from rigidimeter.experiment.session_order import (
     PlannedEpoch,
     Protocol,
@@ -52,25 +58,22 @@ from rigidimeter.experiment.session_order import (
 __all__ = [
     "APPENDIX_A",
     "CRITERIA",
-    "DROP_DB",
-    "FREE_ARM",
     "HALF_POWER_DB",
     "PARAMETERS",
-    "Alternative",
+    "SCHEMA",
     "BandCheck",
     "Candidate",
     "Corner",
     "Corners",
     "Demand",
+    "Design",
     "Detection",
     "Effect",
     "Errors",
-    "Foresight",
-    "Overview",
+    "MultisineComparison",
     "PlannedEpoch",
     "Precision",
     "Protocol",
-    "SampleSize",
     "Spectrum",
     "Wanted",
     "assess",
@@ -82,18 +85,18 @@ __all__ = [
     "corners",
     "crest_factor",
     "demand",
+    "design",
+    "design_document",
     "detect",
     "draw_rests_s",
     "envelope_db",
     "envelope_edge_hz",
     "epoch_sd",
-    "foresee",
     "ideal_response",
     "line_spacing_hz",
     "multisine_nm",
     "multisine_phases_rad",
     "optimise",
-    "overview",
     "period_s",
     "plan",
     "planned_epochs",

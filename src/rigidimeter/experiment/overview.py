@@ -7,6 +7,7 @@ better PRBS and a multisine. `rigidimeter design` prints what it returns.
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,8 +68,8 @@ class Design:
     remarks : tuple of str
         For each condition without an entry in `precision`, why it has none.
     warnings : tuple of str
-        A sentence for each limit of the guard that a perturbation would pass, and for each loop
-        that is nearly unstable.
+        A sentence for each limit of the guard that a perturbation would pass; those on stability
+        are in `stability`.
     detections : tuple of Detection
         Epochs needed for each difference that was asked for.
     criterion : str or None
@@ -114,14 +115,15 @@ class Design:
         return pd.DataFrame(list(rows.values()), index=index, columns=columns)
 
     def _repr_html_(self) -> str:
-        sentences = [*self.warnings, *self.remarks, self.band.verdict]
-        return self.table().to_html() + "".join(f"<p>{sentence}</p>" for sentence in sentences)
+        sentences = [*self.warnings, *self.stability.warnings, *self.remarks]
+        table = str(self.table().to_html())
+        return table + "".join(f"<p>{html.escape(sentence)}</p>" for sentence in sentences)
 
 
 def design(
     settings: Settings | Path | str | Mapping[str, Any] | None = None,
     *,
-    detect_differences: Sequence[str] = (),
+    differences: Sequence[str] = (),
     power: float = 0.8,
     alpha: float = 0.05,
     search: str | None = None,
@@ -137,7 +139,7 @@ def design(
     ----------
     settings : Settings, path, mapping or None
         None stands for the defaults.
-    detect_differences : sequence of str
+    differences : sequence of str
         Differences for which to find the epochs needed, such as ``"damping=20%"``.
     power, alpha : float
         Power and level of the rank-sum test for them.
@@ -154,7 +156,7 @@ def design(
         If a value is out of range, or the PRBS never changes level within its duration.
     """
     chosen = settings_from(settings, **changes)
-    wanted = [Wanted.parse(text) for text in detect_differences]
+    wanted = [Wanted.parse(text) for text in differences]
     if search is not None:
         check_criterion(search)
     rate_hz, guard = chosen.rig.tick_rate_hz, chosen.guard
@@ -190,7 +192,7 @@ def design(
         stability=stability,
         precision=precision,
         remarks=remarks,
-        warnings=(*warnings, *stability.warnings),
+        warnings=tuple(warnings),
         detections=tuple(
             detect(chosen, perturbation_nm, difference, power=power, alpha=alpha)
             for difference in wanted

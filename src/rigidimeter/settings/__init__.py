@@ -2,7 +2,12 @@
 
 from rigidimeter.settings.diagnostics_settings import DiagnosticLevels, DiagnosticsSettings
 from rigidimeter.settings.estimation_settings import EstimationSettings, ScoreSettings
-from rigidimeter.settings.load import dump_settings, load_settings, parse_settings
+from rigidimeter.settings.load import (
+    dump_settings,
+    load_settings,
+    parse_settings,
+    settings_from,
+)
 from rigidimeter.settings.loop_settings import (
     GAP_S,
     ControllerSettings,
@@ -56,4 +61,5 @@ __all__ = [
     "dump_settings",
     "load_settings",
     "parse_settings",
+    "settings_from",
 ]

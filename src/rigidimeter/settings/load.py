@@ -13,7 +13,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.settings.messages import sentence
 from rigidimeter.settings.models import Settings
 
-__all__ = ["dump_settings", "load_settings", "parse_settings"]
+__all__ = ["dump_settings", "load_settings", "parse_settings", "settings_from"]
 
 
 def parse_settings(values: Mapping[str, Any], *, source: str = "settings") -> Settings:
@@ -48,3 +48,40 @@ def load_settings(path: Path | None) -> Settings:
 def dump_settings(settings: Settings) -> dict[str, Any]:
     """Return the settings as plain nested values, as the manifest stores them."""
     return settings.model_dump(mode="json")
+
+
+def settings_from(
+    source: Settings | Path | str | Mapping[str, Any] | None = None, **changes: Any
+) -> Settings:
+    """Return settings from whatever holds them, with some values changed.
+
+    Parameters
+    ----------
+    source : Settings, path of a TOML file, mapping or None
+        None stands for the defaults.
+    **changes
+        Tables with the values that differ, such as ``prbs={"clock_hz": 10.0}``.
+
+    Raises
+    ------
+    UserError
+        As `load_settings` and `parse_settings`.
+    """
+    if isinstance(source, Mapping):
+        settings = parse_settings(source)
+    elif isinstance(source, Settings):
+        settings = source
+    else:
+        settings = load_settings(None if source is None else Path(source))
+    return parse_settings(_merged(dump_settings(settings), changes)) if changes else settings
+
+
+def _merged(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return nested values with those of `changes` in their place."""
+    both = {
+        key: _merged(values[key], value)
+        if isinstance(value, Mapping) and isinstance(values.get(key), Mapping)
+        else value
+        for key, value in changes.items()
+    }
+    return {**values, **both}

@@ -1,4 +1,4 @@
-"""Lines, peak and crest factor of the multisine."""
+"""Lines, peak and crest factor of the multisine, and its precision beside the PRBS."""
 
 import math
 
@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 
 from rigidimeter.errors import UserError
-from rigidimeter.experiment import crest_factor, multisine_nm, multisine_phases_rad
-from rigidimeter.settings import parse_settings
+from rigidimeter.experiment import (
+    compare_multisine,
+    crest_factor,
+    multisine_nm,
+    multisine_phases_rad,
+    prbs_nm,
+    predicted_precision,
+)
+from rigidimeter.settings import Settings, parse_settings
 
 
 def test_crest_factors_of_known_signals() -> None:
@@ -65,3 +72,24 @@ def test_periods_that_do_not_fit_are_refused() -> None:
     narrow = {"wanted_low_hz": 0.15, "wanted_high_hz": 0.2}
     with pytest.raises(UserError, match=r"puts no line into the wanted band 0\.15 to 0\.2 Hz"):
         multisine_nm(parse_settings({"prbs": narrow, "multisine": {"period_s": 3.0}}))
+
+
+def test_the_multisine_beside_the_prbs() -> None:
+    settings = Settings()
+    torque = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
+    found = compare_multisine(settings, torque)
+    assert 1.4 < found.crest_factor < 1.6
+    ours = predicted_precision(torque, settings, settings.subject["OFF"])
+    its = predicted_precision(found.torque_nm, settings, settings.subject["OFF"])
+    errors = found.errors["OFF"]
+    assert errors["prbs"] == ours.iv.free
+    # Its peak is the amplitude; the PRBS's is that less its mean.
+    np.testing.assert_allclose(errors["same_peak_torque"], its.iv.free, rtol=0.02)
+    np.testing.assert_allclose(
+        errors["same_angle_sd"],
+        np.array(its.iv.free) * its.angle_sd_rad / ours.angle_sd_rad,
+    )
+    np.testing.assert_allclose(
+        errors["same_peak_angle"],
+        np.array(its.iv.free) * its.peak_angle_rad / ours.peak_angle_rad,
+    )

@@ -14,9 +14,9 @@ from rigidimeter.settings import Settings, parse_settings
 RATE_HZ = 1000.0
 
 
-def predict(settings: Settings, band: tuple[float, float] | None = None):
+def predict(settings: Settings):
     perturbation = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
-    return predicted_precision(perturbation, settings, settings.subject["OFF"], band_hz=band)
+    return predicted_precision(perturbation, settings, settings.subject["OFF"])
 
 
 def samples(settings: Settings) -> np.ndarray:
@@ -71,7 +71,7 @@ def test_a_band_has_the_lines_of_the_estimation() -> None:
     paper = parse_settings({"rig": PAPER_RATES, "estimation": wide})
     assert predict(paper).iv_band_hz[1] == pytest.approx(40, abs=0.1)
     assert predict(parse_settings({"rig": PAPER_RATES})).least_squares_band_hz == (0.15, 10.0)
-    narrow = predict(Settings(), (0.15, 10.0))
+    narrow = predict(parse_settings({"estimation": {"band_high_closed_loop_hz": 10.0}}))
     assert narrow.iv_band_hz[1] == pytest.approx(10.0, abs=0.05)
     assert np.all(np.array(narrow.iv.free) > predict(Settings()).iv.free)
 
@@ -141,5 +141,6 @@ def test_no_noise_no_error(noiseless) -> None:
 def test_what_cannot_be_predicted_is_said() -> None:
     with pytest.raises(UserError, match=r"estimation\.trim_s = 1 s at either end leaves nothing"):
         predict(parse_settings({"prbs": {"duration_s": 2.0}}))
+    narrow = {"band_high_closed_loop_hz": 0.2}
     with pytest.raises(UserError, match=r"the band 0\.15 to 0\.2 Hz holds 2 lines"):
-        predict(Settings(), (0.15, 0.2))
+        predict(parse_settings({"estimation": narrow}))

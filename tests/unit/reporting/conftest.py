@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.experiment.prbs import prbs_levels
+from rigidimeter.experiment import prbs_levels
 from rigidimeter.records import Analysis, Channel, Epoch, Fit, Motion, Notice, Outcome, Score
 from rigidimeter.settings import Settings
 from rigidimeter.study import Study, analyse, compare

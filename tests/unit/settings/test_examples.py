@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.dynamics import loop_stability, near_instability
-from rigidimeter.experiment import overview, sinusoid
+from rigidimeter.experiment import design, sinusoid
 from rigidimeter.guard.watch import energy_after
 from rigidimeter.settings import GuardSettings, Settings, SubjectSettings, load_settings
 
@@ -22,7 +22,7 @@ def human() -> Settings:
 
 
 def test_the_design_of_a_human_elbow_is_accepted(human: Settings) -> None:
-    assert overview(human).warnings == ()
+    assert design(human).warnings == ()
     stability = loop_stability(human)
     for name, margins in stability.conditions.items():
         assert not near_instability(name, margins, human)

@@ -1,4 +1,4 @@
-"""`rigidimeter design` from the outside, and the overview it prints."""
+"""`rigidimeter design` from the outside."""
 
 import csv
 import json
@@ -11,10 +11,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from rigidimeter.cli.design import SCHEMA, design
+from rigidimeter.cli.design import design
 from rigidimeter.errors import UserError
-from rigidimeter.experiment import PARAMETERS, multisine_nm, overview, prbs_nm, sinusoid
-from rigidimeter.settings import Settings, load_settings, parse_settings
+from rigidimeter.experiment import PARAMETERS, SCHEMA, multisine_nm, prbs_nm, sinusoid
+from rigidimeter.settings import Settings, load_settings
 
 app = typer.Typer()
 app.command()(design)
@@ -227,11 +227,3 @@ def test_bad_values_of_options_are_sentences(arguments: tuple[str, ...], words: 
 def test_help_needs_no_numerics() -> None:
     code = "import sys, rigidimeter.cli.design; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-def test_overview_names_every_condition_of_the_settings() -> None:
-    settings = parse_settings({"subject": {"OFF": {}, "levodopa": {}}})
-    planned = overview(settings)
-    assert list(planned.prbs_demand) == ["free arm", "subject OFF", "subject levodopa"]
-    assert planned.warnings == ()
-    assert not planned.perturbation_nm.flags.writeable

@@ -1,0 +1,96 @@
+"""`rigidimeter design`: what will be commanded, and what will come of it, before any hardware."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigidimeter.cli.inputs import keep_inputs
+
+__all__ = ["design"]
+
+
+def design(
+    settings: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Settings in TOML; what is left out has its default."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Folder for prbs.csv, sinusoid.csv, protocol.csv, bode.svg and design.json.",
+        ),
+    ] = None,
+    json_out: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="File for the numbers, as JSON."),
+    ] = None,
+    detect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=AMOUNT",
+            help="Epochs needed to detect a difference of inertia, damping or stiffness, for "
+            "example damping=20% or stiffness=0.3; repeat as needed.",
+        ),
+    ] = None,
+    power: Annotated[float, typer.Option(help="Wanted power of --detect.")] = 0.8,
+    alpha: Annotated[float, typer.Option(help="Level of the test of --detect.")] = 0.05,
+    optimise: Annotated[
+        bool,
+        typer.Option(
+            "--optimise", help="Search clock, bits and amplitude of the PRBS within the guard."
+        ),
+    ] = False,
+    criterion: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Of --optimise: minimax (the largest relative error), A (their root mean square) "
+            "or D (their volume).",
+        ),
+    ] = "minimax",
+    multisine: Annotated[
+        bool,
+        typer.Option(
+            "--multisine", help="Compare with a multisine; with --out also writes multisine.csv."
+        ),
+    ] = False,
+) -> None:
+    """Show what will be commanded and what will come of it, before anyone is perturbed.
+
+    Nothing moves. Shown are perturbations and their band, the session, the stability of the loop,
+    and the standard errors to expect. A loop that is unstable, or nearly so, with the joint of a
+    condition is refused.
+
+    \b
+    For example:
+      rigidimeter design
+      rigidimeter design --settings rig.toml --out planned --json numbers.json
+      rigidimeter design --settings rig.toml --detect damping=20% --power 0.8
+      rigidimeter design --settings rig.toml --optimise --multisine
+    """
+    from rigidimeter.cli.design_text import design_lines, write_folder
+    from rigidimeter.documents import write_json
+    from rigidimeter.dynamics import refuse_unstable
+    from rigidimeter.experiment import check_criterion, design_document
+    from rigidimeter.experiment import design as compute
+
+    keep_inputs((json_out,), [settings] if settings is not None else [])
+    check_criterion(criterion)
+    designed = compute(
+        settings,
+        differences=detect or (),
+        power=power,
+        alpha=alpha,
+        search=criterion if optimise else None,
+        with_multisine=multisine,
+    )
+    typer.echo("\n".join(design_lines(designed, power, alpha)))
+    if out is not None:
+        typer.echo(f"\nWritten to {out}: {', '.join(write_folder(out, designed))}")
+    if json_out is not None:
+        write_json(json_out, design_document(designed))
+    refuse_unstable(designed.settings, designed.stability)

@@ -1,0 +1,332 @@
+"""The text and the files of `rigidimeter design`."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rigidimeter.documents import csv_text, write_json, write_text
+from rigidimeter.dynamics import Margins
+from rigidimeter.errors import UserError
+from rigidimeter.experiment import (
+    Candidate,
+    Design,
+    Detection,
+    MultisineComparison,
+    chip_count,
+    design_document,
+    period_s,
+    time_constant_s,
+)
+from rigidimeter.units import deg_from_rad, rad_from_deg
+
+__all__ = ["design_lines", "write_folder"]
+
+_SHOWN = 8
+_HEADS = ("J kg·m²", "B N·m·s/rad", "K N·m/rad")
+_UNITS = {"inertia": "kg·m²", "damping": "N·m·s/rad", "stiffness": "N·m/rad"}
+_EQUAL = {
+    "prbs": "PRBS",
+    "same_peak_torque": "same peak torque",
+    "same_angle_sd": "same angle SD",
+    "same_peak_angle": "same peak angle",
+}
+
+
+def design_lines(design: Design, power: float, alpha: float) -> Iterator[str]:
+    """Yield the text, section by section; `power` and `alpha` are those that were asked for."""
+    sections = [
+        part(design)
+        for part in (_prbs, _sinusoid, _controller, _bandwidth, _protocol, _stability, _precision)
+    ]
+    sections += [_detection(found, power, alpha) for found in design.detections]
+    if design.ranked is not None:
+        sections.append(_ranking(design, design.ranked))
+    if design.multisine is not None:
+        sections.append(_multisine(design.multisine))
+    for section in sections:
+        yield from section
+        yield ""
+    if not design.warnings:
+        yield "All of it stays within the guard's limits."
+    for warning in (*design.warnings, *design.stability.warnings):
+        yield from _wrapped(f"Warning: {warning}.", indent="")
+
+
+def write_folder(folder: Path, design: Design) -> list[str]:
+    """Write what will be commanded and what is predicted; return the names of the files.
+
+    Raises
+    ------
+    UserError
+        If the folder cannot be made or a file cannot be written.
+    """
+    from rigidimeter.reporting.figures import svg_text
+    from rigidimeter.reporting.figures.open_loop import bode
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be made a folder ({error.strerror or error})") from None
+    motion = (design.angle_rad.tolist(), design.velocity_rad_s.tolist())
+    epochs = [vars(epoch) for epoch in design.protocol.epochs]
+    texts = {
+        "prbs.csv": _columns(design, ["perturbation_nm"], [design.perturbation_nm.tolist()]),
+        "sinusoid.csv": _columns(design, ["angle_rad", "velocity_rad_s"], motion),
+        "protocol.csv": csv_text(list(epochs[0]), epochs),
+        "bode.svg": svg_text(
+            bode(design.settings, design.stability.conditions, design.stability.worst)
+        ),
+    }
+    if design.multisine is not None:
+        torque = [design.multisine.torque_nm.tolist()]
+        texts["multisine.csv"] = _columns(design, ["perturbation_nm"], torque)
+    if design.ranked is not None:
+        texts["optimised.toml"] = _snippet(design.ranked[0])
+    for name, text in texts.items():
+        write_text(folder / name, text)
+    write_json(folder / "design.json", design_document(design))
+    return [*texts, "design.json"]
+
+
+def _columns(design: Design, names: list[str], columns: Sequence[list[float]]) -> str:
+    rate_hz = design.settings.rig.tick_rate_hz
+    times_s = [tick / rate_hz for tick in range(len(columns[0]))]
+    return csv_text(["time_s", *names], zip(times_s, *columns, strict=True))
+
+
+def _snippet(best: Candidate) -> str:
+    """Return a sequence as settings."""
+    prbs = best.prbs
+    return (
+        f"[prbs]\nregister_bits = {prbs.register_bits}\nclock_hz = {prbs.clock_hz!r}\n"
+        f"amplitude_nm = {prbs.amplitude_nm!r}\n"
+    )
+
+
+def _wrapped(text: str, indent: str = "  ") -> list[str]:
+    """Return the text on lines of at most 96 letters."""
+    return textwrap.wrap(text, 96, initial_indent=indent, subsequent_indent="  ")
+
+
+def _prbs(design: Design) -> Iterator[str]:
+    prbs, band = design.settings.prbs, design.band
+    low_nm, high_nm = design.perturbation_nm.min(), design.perturbation_nm.max()
+    yield "Torque perturbation (PRBS)"
+    yield (
+        f"  {prbs.register_bits} bits ({chip_count(prbs)} chips) at {prbs.clock_hz:g} Hz, period "
+        f"{period_s(prbs):.4g} s; {prbs.duration_s:g} s at {design.settings.rig.tick_rate_hz:g} "
+        "ticks/s"
+    )
+    yield f"  ±{prbs.amplitude_nm:g} N·m; without its mean {low_nm:+.4g} and {high_nm:+.4g} N·m"
+    yield (
+        f"  lines every {band.line_spacing_hz:.4g} Hz; plateau {band.plateau_n2m2_hz:.4g} N²m²/Hz; "
+        f"−3 dB at {band.half_power_hz:.2f} Hz"
+    )
+    yield (
+        f"  in the wanted band: {band.lines_in_band} lines, {band.in_band_percent:.0f} % of the "
+        "power"
+    )
+    yield from _wrapped(band.verdict)
+    yield "  predicted in the ideal loop   angle SD    peak angle    peak speed"
+    for name, needs in design.prbs_demand.items():
+        yield (
+            f"    {name:<22} {deg_from_rad(needs.angle_sd_rad):9.2f} deg"
+            f" {deg_from_rad(needs.peak_angle_rad):9.2f} deg"
+            f" {deg_from_rad(needs.peak_speed_rad_s):7.1f} deg/s"
+        )
+
+
+def _sinusoid(design: Design) -> Iterator[str]:
+    sinusoid, guard = design.settings.sinusoid, design.settings.guard
+    needs = design.sinusoid_demand
+    yield "Position perturbation (sinusoid)"
+    yield (
+        f"  ±{sinusoid.amplitude_deg:g} deg at {sinusoid.frequency_hz:g} Hz for "
+        f"{sinusoid.motion_s:g} s of {sinusoid.duration_s:g} s, tapers of {sinusoid.taper_s:g} s"
+    )
+    for name, value, limit, unit in (
+        ("peak speed", needs.peak_speed_rad_s, guard.speed_limit_deg_s, "deg/s"),
+        (
+            "peak acceleration",
+            needs.peak_acceleration_rad_s2,
+            guard.acceleration_limit_deg_s2,
+            "deg/s²",
+        ),
+        ("angle with the room to stop", needs.reach_rad, guard.position_limit_deg, "deg"),
+    ):
+        yield f"  {name} {deg_from_rad(value):.4g} {unit} (guard: {limit:g} {unit})"
+
+
+def _controller(design: Design) -> Iterator[str]:
+    controller = design.settings.controller
+    J, B = controller.inertia_kg_m2, controller.damping_nm_s_rad
+    tau_s = time_constant_s(controller)
+    yield "Controller (admittance)"
+    yield f"  J_c {J:.4g} kg·m²/rad ({rad_from_deg(J):.4g} kg·m²/deg)"
+    yield f"  B_c {B:.4g} N·m·s/rad ({rad_from_deg(B):.4g} N·m·s/deg)"
+    if math.isfinite(tau_s):
+        yield f"  time constant of the free arm J_c/B_c {tau_s:.4g} s"
+    else:
+        yield "  no damping: the free arm's velocity never settles"
+
+
+def _bandwidth(design: Design) -> Iterator[str]:
+    table = design.bandwidth
+    yield f"Bandwidth (−3 dB) of the arm of App. A, J, B, K ±{table.uncertainty_percent:g} %"
+    yield "  corner     J kg·m²  B N·m·s/rad  K N·m/rad      Hz"
+    for corner in (table.nominal, *table.corners):
+        name = "nominal" if not any(corner.signs) else "".join("−0+"[s + 1] for s in corner.signs)
+        notes = {table.equation_8.signs: "  Eq. 8", table.widest.signs: "  widest"}
+        yield (
+            f"  {name:<9} {corner.joint.inertia_kg_m2:8.4f} {corner.joint.damping_nm_s_rad:12.3f}"
+            f" {corner.joint.stiffness_nm_rad:10.2f} {corner.bandwidth_hz:7.2f}"
+            f"{notes.get(corner.signs, '')}"
+        )
+
+
+def _protocol(design: Design) -> Iterator[str]:
+    protocol = design.protocol
+    yield f"Protocol (seed {protocol.seed})"
+    for (task, condition), epochs in protocol.counts.items():
+        yield f"  {condition}, {task}: {epochs} {'epoch' if epochs == 1 else 'epochs'}"
+    yield f"  {protocol.total_s:g} s ({protocol.total_s / 60:.1f} min) with the rests"
+
+
+def _stability(design: Design) -> Iterator[str]:
+    """Yield the margins of the loop."""
+    ours = design.settings.margins
+    yield "Stability of the admittance on the arm"
+    yield "                           gain margin   phase margin   delay margin   modulus   verdict"
+    for name, margins in design.stability.conditions.items():
+        yield _margins(f"subject {name}", margins)
+        yield _margins("  worst joint around it", design.stability.worst[name])
+    yield (
+        f"  worst: each of J, B, K from {ours.joint_factor_low:g} to {ours.joint_factor_high:g} "
+        "times its value"
+    )
+
+
+def _margins(name: str, found: Margins) -> str:
+    columns = (
+        ("never", 9) if math.isinf(found.gain_margin_db) else (f"{found.gain_margin_db:.1f} dB", 9),
+        (
+            ("never", 12)
+            if math.isinf(found.phase_margin_deg)
+            else (f"{found.phase_margin_deg:.1f} deg", 12)
+        ),
+        (
+            ("never", 12)
+            if math.isinf(found.delay_margin_s)
+            else (f"{1000.0 * found.delay_margin_s:.4g} ms", 12)
+        ),
+        (f"{found.modulus_margin:.2f}", 7),
+    )
+    text = "   ".join(value.rjust(width) for value, width in columns)
+    return f"  {name:<24}  {text}   {'stable' if found.stable else 'UNSTABLE'}"
+
+
+def _precision(design: Design) -> Iterator[str]:
+    """Yield the standard errors of one epoch, and of all planned ones."""
+    counts = design.planned_epochs
+    yield "Predicted standard errors of one epoch"
+    for name, found in design.precision.items():
+        yield f"  subject {name}".ljust(44) + "".join(head.rjust(21) for head in _HEADS)
+        rows = [
+            ("bound, every frequency", found.bound.free),
+            (f"iv, {_band(found.iv_band_hz)}", found.iv.free),
+            (
+                f"least squares, passive arm, {_band(found.least_squares_band_hz)}",
+                found.least_squares.free,
+            ),
+        ]
+        if counts[name] > 1:
+            pooled = math.sqrt(counts[name])
+            J, B, K = (error / pooled for error in found.iv.free)
+            rows.insert(2, (f"iv, {counts[name]} epochs pooled", (J, B, K)))
+        for what, errors in rows:
+            yield f"    {what:<40}" + "".join(
+                _error(error, value) for error, value in zip(errors, found.values, strict=True)
+            )
+        if any(found.least_squares_bias):
+            off = ", ".join(
+                f"{symbol} by {100.0 * bias / value:+.0f} %"
+                for symbol, bias, value in zip(
+                    "JBK", found.least_squares_bias, found.values, strict=True
+                )
+                if value
+            )
+            yield from _wrapped(f"  the subject's own torque would put least squares off: {off}")
+    for remark in design.remarks:
+        yield from _wrapped(f"  {remark}")
+
+
+def _band(band_hz: tuple[float, float]) -> str:
+    low, high = band_hz
+    return f"{low:.2g}–{high:.2g} Hz"
+
+
+def _error(error: float, value: float) -> str:
+    percent = f"({100.0 * error / value:.3g} %)" if value else ""
+    return f"{error:.3g} {percent}".rjust(21)
+
+
+def _ranking(design: Design, ranked: tuple[Candidate, ...]) -> Iterator[str]:
+    """Yield the best sequences of the search, beside the present one."""
+    now = design.present
+    yield (
+        f"Search for a PRBS ({len(ranked)} sequences, criterion {design.criterion}, iv, one epoch)"
+    )
+    yield (
+        "           bits  clock Hz  ±N·m      cost %   J %      B %      K %      angle SD   peak "
+        "angle"
+    )
+    rows = [(f"{k}", found) for k, found in enumerate(ranked[:_SHOWN], start=1)]
+    for label, found in [*rows, *([("present", now)] if now else [])]:
+        J, B, K = (max(values) for values in zip(*found.errors_percent.values(), strict=True))
+        yield (
+            f"  {label:<8}{found.prbs.register_bits:5d} {found.prbs.clock_hz:9.4g}"
+            f" {found.prbs.amplitude_nm:6.3g} {found.cost_percent:10.3g}   "
+            f"{J:<8.3g} {B:<8.3g} {K:<8.3g} {deg_from_rad(found.angle_sd_rad):5.1f} deg"
+            f" {deg_from_rad(found.peak_angle_rad):8.1f} deg"
+            f"{'' if found.covered else '  misses the band'}"
+        )
+    yield "  the best one, as settings:"
+    yield from (f"    {line}" for line in _snippet(ranked[0]).splitlines())
+
+
+def _multisine(found: MultisineComparison) -> Iterator[str]:
+    """Yield the standard errors of the multisine beside those of the PRBS."""
+    yield f"Multisine (crest factor {found.crest_factor:.3g}), standard errors of iv, one epoch"
+    for name, errors in found.errors.items():
+        yield f"  subject {name}".ljust(32) + "".join(head.rjust(14) for head in _HEADS)
+        for what, values in errors.items():
+            yield f"    {_EQUAL[what]:<28}" + "".join(f"{value:14.3g}" for value in values)
+
+
+def _detection(found: Detection, power: float, alpha: float) -> Iterator[str]:
+    """Yield how many epochs a difference needs."""
+    wanted, effect = found.wanted, found.effect
+    unit = _UNITS[wanted.parameter]
+    share = f" ({wanted.amount:g} %)" if wanted.percent else ""
+    yield (
+        f"To detect a {wanted.parameter} different by {abs(effect.difference):.4g} {unit}{share} "
+        f"from subject {found.condition}"
+    )
+    yield f"  an epoch's value scatters by {effect.sd_x:.3g} and {effect.sd_y:.3g} {unit}"
+    yield (
+        f"  (standard error of iv, and {found.cv_percent:g} % from epoch to epoch: "
+        f"subject.{found.condition}.{wanted.parameter}_cv_percent)"
+    )
+    yield (
+        f"  {found.needed} epochs in each condition give a power of "
+        f"{found.power:.2f} (wanted {power:g}; rank-sum test at {alpha:g})"
+    )
+    yield "  power with " + ", ".join(f"{n}: {value:.2f}" for n, value in found.powers.items())
+    if found.planned is not None:
+        yield (
+            f"  the protocol's {found.planned[0]} and {found.planned[1]} epochs give "
+            f"{found.planned_power:.2f}"
+        )
