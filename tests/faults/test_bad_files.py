@@ -28,7 +28,7 @@ def refusal(path, **options) -> str:
         (b"\n\n# only a remark\n", "is empty; its first line must name the columns"),
         (HEAD, "names its columns in line 1 but has no samples"),
         (HEAD + b"0,1,2\n", "holds 1 sample"),
-        (ROWS, "first line holds numbers (0.00, 0, 0.1, ...), but it must name the columns"),
+        (ROWS, "first line holds numbers (0.00, 0, 0.1), but it must name the columns"),
         (b"time_s\n1\n2\n", "names fewer than two columns"),
         (HEAD + ROWS + b"0.5,oops,1\n", "line 52: torque_nm holds 'oops', which is not a number"),
         (HEAD + ROWS + b"0.5,1\n", "line 52 has 2 values, but the first line names 3 columns"),
@@ -41,7 +41,10 @@ def refusal(path, **options) -> str:
         (b"\x89PNG\r\n\x1a\n\x00\xff\xfe", "is not a text file in UTF-8"),
         (b"a,b\n1,\x002\n", "is not a text file: it holds zero bytes"),
         (HEAD.decode().encode("utf-16")[:-1], "is not a text file in UTF-8"),
-        (HEAD.replace(b"angle", b"\xb0") + ROWS, "is not a text file in UTF-8"),
+        (HEAD.replace(b"angle", b"\x81") + ROWS, "is not a text file in UTF-8"),
+        (HEAD.replace(b"angle", b"\xb0\x1b") + ROWS, "is not a text file in UTF-8"),
+        (HEAD + ROWS + b'0.5,"1,1\n0.6,1,1\n', "line 52 has 2 values"),
+        (HEAD + ROWS + b'0.5,"1"x,1\n', "line 52: torque_nm holds '1x', which is not a number"),
     ],
 )  # fmt: skip
 def test_text_files(tmp_path, data, told):

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.readers import read_table
-from rigidimeter.recording.formats.table_epochs import ReadOptions, Table, epochs_from_table
+from rigidimeter.recording.formats.table import Table
+from rigidimeter.recording.formats.table_epochs import ReadOptions, epochs_from_table
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 sizes = st.integers(2, 12)

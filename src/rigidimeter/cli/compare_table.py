@@ -14,7 +14,7 @@ from rigidimeter.errors import UserError
 if TYPE_CHECKING:
     import numpy as np
 
-    from rigidimeter.recording.text_table import Labelled
+    from rigidimeter.recording.formats import TextTable
     from rigidimeter.statistics import EffectDifference, Effects, Summary
 
 __all__ = ["Measured", "TableComparison", "compare_table"]
@@ -83,10 +83,10 @@ def compare_table(
     """
     import numpy as np
 
-    from rigidimeter.recording.text_table import read_labelled
+    from rigidimeter.recording.formats import read_text_table
     from rigidimeter.statistics import holm
 
-    table = read_labelled(path)
+    table = read_text_table(path)
     labels = table.column(by, "--by")
     for name in values:
         table.column(name, "--value")
@@ -140,7 +140,7 @@ def _pair(
 
 
 def _kept(
-    table: Labelled, labels: Sequence[str], names: Sequence[str], by: str
+    table: TextTable, labels: Sequence[str], names: Sequence[str], by: str
 ) -> tuple[list[int], list[str]]:
     """Return the rows of both groups, without those that an analysis has excluded."""
     rows = [k for k, label in enumerate(labels) if label in names]
@@ -160,7 +160,7 @@ def _kept(
 
 
 def _measured(
-    table: Labelled,
+    table: TextTable,
     name: str,
     labels: Sequence[str],
     units: Sequence[str] | None,

@@ -76,7 +76,7 @@ def ratings(
     """
     from rigidimeter.cli.ratings_show import model_notices, ratings_document, ratings_lines
     from rigidimeter.documents import write_json
-    from rigidimeter.recording.text_table import read_labelled
+    from rigidimeter.recording.formats import read_text_table
     from rigidimeter.records import Notice
     from rigidimeter.statistics import fit_mixed
     from rigidimeter.study.rating_table import RANDOM, groupings, ratings_of
@@ -98,7 +98,7 @@ def ratings(
         "subject": subject,
         "day": day,
     }
-    read = read_labelled(table)
+    read = read_text_table(table)
     found = ratings_of(read, columns, chosen, scale, step)
     conditions = [row.condition for row in found.rows]
     pair = contrast or _first_two(conditions)

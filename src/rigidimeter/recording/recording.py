@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.formats import ReadOptions, read_recording
-from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
+from rigidimeter.recording.formats import ReadOptions, read_recording, reader_of
 from rigidimeter.records import Epoch, Notice, Task
 from rigidimeter.settings import Settings, load_settings
 
@@ -106,14 +105,13 @@ def read(
     notices: list[Notice] = []
     for path, name in dict(zip(asked, conditions, strict=True)).items():
         try:
-            if is_session(path):
-                recorded = session_settings(path)
+            reader = reader_of(path)
+            if reader.settings is not None:
+                recorded = reader.settings(path)
                 first = first or recorded
                 notices += _about_settings(path, recorded, first, compared)
-                found, remarks = read_session(path)
-            else:
-                options = ReadOptions(columns, rate_hz, reaction, epoch_length_s, name, task)
-                found, remarks = read_recording(path, options)
+            options = ReadOptions(columns, rate_hz, reaction, epoch_length_s, name, task)
+            found, remarks = read_recording(path, options)
         except UserError as error:
             notices.append(Notice("error", str(error)))
             continue

@@ -19,8 +19,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.formats import TextTable, read_text_table
+from rigidimeter.recording.formats.text_table import cell_number
 from rigidimeter.recording.study_toml import STUDY_FILE, StudyToml, read_study_toml
-from rigidimeter.recording.text_table import Labelled, read_labelled
 from rigidimeter.records import Notice
 
 __all__ = ["TABLE_COLUMNS", "Row", "StudyFolder", "is_study", "read_study_folder"]
@@ -62,7 +63,7 @@ class Row:
         UserError
             If it is neither.
         """
-        return Labelled(self.source, {column: (self[column],)}, (self.line,)).number(column, 0)
+        return cell_number(self[column], column, self.where)
 
 
 @dataclass(frozen=True)
@@ -150,9 +151,7 @@ def _namer(name: str, key: Path | None) -> str:
 
 
 def _read_table(path: Path, name: str, notices: list[Notice]) -> tuple[Row, ...]:
-    if _has_no_rows(path):
-        return ()
-    table = read_labelled(path)
+    table = read_text_table(path, may_be_empty=True)
     needed, allowed = TABLE_COLUMNS[name]
     present = tuple(table.columns)
     missing = [column for column in needed if column not in present]
@@ -178,7 +177,7 @@ def _unknown_columns(path: Path, present: Sequence[str], known: Sequence[str]) -
         yield Notice("warning", f"{path}: column {column} is not read; {nearest}")
 
 
-def _rows(table: Labelled, needed: Sequence[str], notices: list[Notice]) -> Iterable[Row]:
+def _rows(table: TextTable, needed: Sequence[str], notices: list[Notice]) -> Iterable[Row]:
     for index, line in enumerate(table.lines):
         where = f"{table.source}, line {line}"
         cells = {name: cells[index] for name, cells in table.columns.items()}
@@ -189,13 +188,3 @@ def _rows(table: Labelled, needed: Sequence[str], notices: list[Notice]) -> Iter
             )
             continue
         yield Row(table.source, line, cells)
-
-
-def _has_no_rows(path: Path) -> bool:
-    """Whether the file has one line of names and nothing below, as a new study has it."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeError):
-        return False  # `read_labelled` says what is wrong
-    lines = [line for line in text.splitlines() if line.strip(" ,;\t") and line[:1] != "#"]
-    return len(lines) == 1

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.text_table import Labelled
+from rigidimeter.recording.formats import TextTable
 from rigidimeter.statistics import nested
 
 __all__ = ["RANDOM", "Rating", "Ratings", "groupings", "oddities", "ratings_of"]
@@ -38,7 +38,7 @@ class Ratings:
 
 
 def ratings_of(
-    table: Labelled,
+    table: TextTable,
     columns: Mapping[str, str],
     random: Sequence[str],
     scale: tuple[float, float],
@@ -48,7 +48,7 @@ def ratings_of(
 
     Parameters
     ----------
-    table : Labelled
+    table : TextTable
     columns : mapping of str to str
         What the file calls condition, score, examiner, subject and day.
     random : sequence of str

@@ -103,9 +103,9 @@ REFUSED = [
     (ROWS[:9], (), "ratings of one condition only (OFF)"),
     (ROWS[:2], (), "holds 2 ratings; at least 3"),
     (changed(2, "score", "")[:3], (), "holds 2 ratings (1 more lack a score or a label)"),
-    ([], (), "names its columns but has no rows"),
-    ([ROWS[0][:3]], (), "line 2 has 3 cells, but the first line names 4 columns"),
-    ([("OFF", "1", "A", "2,0")] * 2, (), "line 2 has 5 cells"),
+    ([], (), "names its columns in line 1 but has no rows"),
+    ([ROWS[0][:3]], (), "line 2 has 3 values, but the first line names 4 columns"),
+    ([("OFF", "1", "A", "2,0")] * 2, (), "line 2 has 5 values"),
     (
         ROWS,
         ("--score", "updrs"),

@@ -1,6 +1,26 @@
-"""Recordings that others made: a file becomes a table, and a table becomes epochs."""
+"""The formats that are read: a file becomes a table, and a table becomes epochs."""
 
-from rigidimeter.recording.formats.readers import read_recording, read_table
-from rigidimeter.recording.formats.table_epochs import ReadOptions, Table
+from rigidimeter.recording.formats.readers import (
+    READERS,
+    Reader,
+    formats_text,
+    read_recording,
+    read_table,
+    reader_of,
+)
+from rigidimeter.recording.formats.table import Table
+from rigidimeter.recording.formats.table_epochs import ReadOptions
+from rigidimeter.recording.formats.text_table import TextTable, read_text_table
 
-__all__ = ["ReadOptions", "Table", "read_recording", "read_table"]
+__all__ = [
+    "READERS",
+    "ReadOptions",
+    "Reader",
+    "Table",
+    "TextTable",
+    "formats_text",
+    "read_recording",
+    "read_table",
+    "read_text_table",
+    "reader_of",
+]

@@ -1,4 +1,4 @@
-"""The columns of somebody else's file, found by name and turned into numbers or labels.
+"""The standard columns of somebody else's file: found by name, turned into numbers, put on a clock.
 
 A file calls its torque whatever it likes. Here a column gets its standard name, by itself or as
 the user says, and every refusal names the option that would put it right.
@@ -6,78 +6,27 @@ the user says, and every refusal names the option that would put it right.
 
 from __future__ import annotations
 
-import difflib
 import math
-import re
 import shlex
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.formats.table import MISSING, Table, alike, nearest
 from rigidimeter.records import CHANNEL_UNITS
 
-__all__ = [
-    "LABELS",
-    "MISSING",
-    "MOTION",
-    "Table",
-    "find_columns",
-    "listed",
-    "nearest",
-    "numbers",
-    "plain",
-    "printable",
-]
+__all__ = ["LABELS", "MOTION", "RATE_NAMES", "find_columns", "numbers", "seconds", "time_stamps"]
 
 LABELS = ("epoch", "condition", "task")
 MOTION = ("velocity_rad_s", "angle_rad")
 STANDARD = ("time_s", *CHANNEL_UNITS, *LABELS)
-MISSING = frozenset({"", "na", "n/a", "#n/a", "#na", "nan", "-nan", "null", "none", "<na>"})
-"""Texts, in lower case, that stand for a sample that is not there."""
-
-_ALIASES: Mapping[str, tuple[str, ...]] = {
-    "time_s": ("time", "t"),
-    "torque_nm": ("torque", "moment"),
-    "angle_rad": ("angle", "position", "theta"),
-    "velocity_rad_s": ("velocity", "speed", "omega"),
-    "emg_v": ("emg",),
-}
-_SHOWN = 20
-
-
-@dataclass(frozen=True)
-class Table:
-    """What a file holds, before anything is known of its meaning.
-
-    Parameters
-    ----------
-    source : str
-        The file, as messages name it.
-    columns : mapping of str to array, shape (n,)
-        By the file's own names: float64, NaN where a number is missing, or objects that are str.
-    scalars : mapping of str to float or str
-        Entries with a single value, such as a sampling rate.
-    others : mapping of str to str
-        Entries that cannot be a column, and what they are instead.
-    lines : array of int, shape (n,), or None
-        The line of the file that each row came from; None for files without lines.
-    """
-
-    source: str
-    columns: Mapping[str, NDArray[Any]]
-    scalars: Mapping[str, float | str] = field(default_factory=dict)
-    others: Mapping[str, str] = field(default_factory=dict)
-    lines: NDArray[np.int64] | None = None
-
-    def where(self, row: int) -> str:
-        """Name a row, counted from 0, as the user would find it in the file."""
-        if self.lines is None:
-            return f"{self.source}, row {row + 1}"
-        return f"{self.source}, line {int(self.lines[row])}"
+RATE_NAMES = ("rate_hz", "fs_hz", "fs", "sampling_rate_hz")
+"""Single values of a file that are taken as its sampling rate."""
+STRAY_SHARE = 0.01
+"""Up to this share of entries may be text in a column of numbers and still be left out singly."""
+_AGREEMENT = 0.01
 
 
 def find_columns(table: Table, wanted: Mapping[str, str]) -> dict[str, str]:
@@ -120,10 +69,6 @@ def find_columns(table: Table, wanted: Mapping[str, str]) -> dict[str, str]:
     return found
 
 
-STRAY_SHARE = 0.01
-"""Up to this share of entries may be text in a column of numbers and still be left out singly."""
-
-
 def numbers(
     table: Table, standard: str, name: str, strays: list[str] | None = None
 ) -> NDArray[np.float64]:
@@ -164,41 +109,43 @@ def numbers(
     return values
 
 
-def plain(value: object) -> str:
-    """Return a label as text: `1` for 1.0, nothing for NaN and other marks of absence."""
-    if isinstance(value, float):
-        if math.isnan(value):
-            return ""
-        return str(int(value)) if value.is_integer() else repr(float(value))
-    text = printable(" ".join(str(value).split()))
-    if text.lower() in MISSING:
-        return ""
-    return re.sub(r"^(-?\d+)\.0+$", r"\1", text)
+def time_stamps(
+    table: Table, time_name: str | None, rate_hz: float | None, n_rows: int
+) -> NDArray[np.float64]:
+    """Return the time of each row in s, shape (n_rows,), strictly increasing.
+
+    Parameters
+    ----------
+    table : Table
+        The file.
+    time_name : str or None
+        The file's name of its time column, if it has one.
+    rate_hz : float or None
+        The sampling rate, if the user gave one.
+    n_rows : int
+        The length of the columns.
+
+    Raises
+    ------
+    UserError
+        If there is neither time nor rate, if they disagree, or if the time does not increase.
+    """
+    if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
+        raise UserError(f"--rate-hz {rate_hz:g}: the sampling rate must be greater than 0 Hz")
+    if time_name is not None:
+        time_s = numbers(table, "time_s", time_name)
+        _increasing(table, time_name, time_s)
+        if rate_hz is not None:
+            _agreeing(table, time_name, time_s, rate_hz)
+        return time_s
+    if rate_hz is None:
+        rate_hz = _own_rate(table)
+    return np.arange(n_rows) / rate_hz
 
 
-def printable(name: str) -> str:
-    """Return a name without line feeds and the like, as it can stand in a sentence."""
-    return "".join(letter if letter.isprintable() else "?" for letter in name)
-
-
-def nearest(name: str, candidates: Iterable[str], *, least: float = 0.0) -> str:
-    """Return the candidate most like a name, or nothing if none is like it by `least` (0 to 1)."""
-    ranked = [(_likeness(name, candidate), candidate) for candidate in candidates]
-    likeness, best = max(ranked, key=lambda pair: pair[0], default=(-1.0, ""))
-    return best if likeness >= least else ""
-
-
-def listed(table: Table) -> str:
-    """Return the names of the columns as sentences show them."""
-    names = list(table.columns)
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return ", ".join(name[:60] for name in names[:_SHOWN]) + more
-
-
-def _likeness(standard: str, candidate: str) -> float:
-    spoken = {candidate.lower(), candidate.lower().rsplit(".", 1)[-1]}
-    known = (standard.lower(), *_ALIASES.get(standard, ()))
-    return max(difflib.SequenceMatcher(None, a, b).ratio() for a in known for b in spoken)
+def seconds(value: float) -> str:
+    """Return a time or duration as sentences show it, with at most four decimals."""
+    return f"{value:.4f}".rstrip("0").rstrip(".") + " s"
 
 
 def _no_such_column(table: Table, standard: str, name: str) -> str:
@@ -214,19 +161,17 @@ def _no_such_column(table: Table, standard: str, name: str) -> str:
     right = f"--column {shlex.quote(f'{standard}={near}')}"
     return (
         f"{table.source}: {option}: there is no column {name}; the nearest is {near}, so perhaps "
-        f"{right} (its columns are {listed(table)})"
+        f"{right} (its columns are {table.listed})"
     )
 
 
 def _missing(table: Table, found: Mapping[str, str], what: str, standards: tuple[str, ...]) -> str:
     taken = set(found.values())
     free = [name for name in table.columns if name not in taken]
-    text = f"{table.source} {what}; its columns are {listed(table)}"
+    text = f"{table.source} {what}; its columns are {table.listed}"
     if not free:
         return f"{text}, and none is left to be it"
-    ranked = [
-        (_likeness(standard, name), standard, name) for standard in standards for name in free
-    ]
+    ranked = [(alike(standard, name), standard, name) for standard in standards for name in free]
     _, standard, name = max(ranked, key=lambda entry: entry[0])
     option = shlex.quote(f"{standard}={name}")
     return f"{text}; the nearest is {name}: if it is the one, say --column {option}"
@@ -245,4 +190,57 @@ def _same_length(table: Table, found: Mapping[str, str]) -> None:
         raise UserError(
             f"{table.source} holds {length} sample{'' if length == 1 else 's'}; a recording needs "
             "at least 2, and an estimate some seconds"
+        )
+
+
+def _own_rate(table: Table) -> float:
+    found = {
+        name: float(value)
+        for name, value in table.scalars.items()
+        if name.rsplit(".", 1)[-1] in RATE_NAMES and not isinstance(value, str)
+    }
+    if not found:
+        near = nearest("time_s", table.columns, least=0.7) or "NAME"
+        option = shlex.quote(f"time_s={near}")
+        raise UserError(
+            f"{table.source} has neither a column time_s nor a sampling rate; say --rate-hz, or "
+            f"name the column of the time in seconds, as in --column {option} (its columns are "
+            f"{table.listed})"
+        )
+    if len(set(found.values())) > 1:
+        shown = ", ".join(f"{name} = {value:g}" for name, value in found.items())
+        raise UserError(f"{table.source} states several sampling rates ({shown}); say --rate-hz")
+    name, rate_hz = next(iter(found.items()))
+    if not (math.isfinite(rate_hz) and rate_hz > 0):
+        raise UserError(
+            f"{table.source}: {name} = {rate_hz:g}, but a sampling rate must be greater than 0 Hz; "
+            "say --rate-hz"
+        )
+    return rate_hz
+
+
+def _increasing(table: Table, name: str, time_s: NDArray[np.float64]) -> None:
+    bad = np.flatnonzero(~np.isfinite(time_s))
+    if bad.size:
+        row = int(bad[0])
+        raise UserError(
+            f"{table.where(row)}: {name} is {'missing' if np.isnan(time_s[row]) else 'infinite'}; "
+            "every row must have a time in seconds"
+        )
+    back = np.flatnonzero(np.diff(time_s) <= 0)
+    if back.size:
+        row = int(back[0]) + 1
+        before, now = float(time_s[row - 1]), float(time_s[row])
+        what = f"repeats {now!r}" if now == before else f"goes back from {before!r} to {now!r}"
+        raise UserError(f"{table.where(row)}: {name} {what}; time must increase from row to row")
+
+
+def _agreeing(table: Table, name: str, time_s: NDArray[np.float64], rate_hz: float) -> None:
+    """Refuse a stated rate that is not the one of the stamps; gaps do not count."""
+    steps = np.diff(time_s)
+    own_hz = 1.0 / float(np.mean(steps[steps <= 3 * np.median(steps)]))
+    if abs(own_hz / rate_hz - 1) > _AGREEMENT:
+        raise UserError(
+            f"{table.source}: --rate-hz {rate_hz:g} disagrees with column {name}, whose stamps are "
+            f"{own_hz:.6g} Hz; leave out --rate-hz to use the column"
         )

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.formats.columns import Table, plain
-from rigidimeter.recording.formats.gaps import longest_s
-from rigidimeter.recording.formats.stamps import seconds, typical_step_s
+from rigidimeter.recording.formats.columns import seconds
+from rigidimeter.recording.formats.gaps import Rows, longest_s
+from rigidimeter.recording.formats.table import Table, label_text
 from rigidimeter.records import Notice
 
 __all__ = ["Stretch", "by_label", "by_length", "constant_label", "lettered"]
@@ -64,14 +64,12 @@ def by_label(
     return stretches, notices
 
 
-def by_length(
-    source: str, time_s: NDArray[np.float64], length_s: float
-) -> tuple[list[Stretch], list[Notice]]:
+def by_length(source: str, clock: Rows, length_s: float) -> tuple[list[Stretch], list[Notice]]:
     """Cut into consecutive stretches of one length by the clock, named `1`, `2` and so on.
 
     The last one may be up to 5 % short; what is shorter is left out, and a notice says how much.
     """
-    step_s = typical_step_s(time_s)
+    time_s, step_s = clock.time_s, clock.step_s
     elapsed = time_s - time_s[0]
     # A quarter of an interval keeps a stamp that rounding put just before its boundary.
     index = np.floor((elapsed + 0.25 * step_s) / length_s).astype(np.int64)
@@ -137,7 +135,7 @@ def _runs(column: NDArray[Any]) -> list[tuple[str, int, int]]:
     starts = [0, *(np.flatnonzero(changed) + 1).tolist()]
     runs: list[tuple[str, int, int]] = []
     for start, stop in zip(starts, [*starts[1:], column.size], strict=True):
-        label = plain(column[start])
+        label = label_text(column[start])
         if runs and runs[-1][0] == label:  # the same label, written in two ways
             runs[-1] = (label, runs[-1][1], stop)
         else:

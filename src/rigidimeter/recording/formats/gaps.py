@@ -7,19 +7,22 @@ lost.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.recording.formats.stamps import typical_step_s
+from rigidimeter.recording.formats.columns import seconds
+from rigidimeter.records import Notice
 
 __all__ = [
     "Break",
     "Loss",
     "Rows",
     "Signal",
+    "about_breaks",
+    "about_losses",
     "find_losses",
     "kept_rows",
     "longest_s",
@@ -29,6 +32,7 @@ __all__ = [
 _LONGEST_STEPS = 3.0
 _LONGEST_S = 0.05
 _REGULAR = 1.5
+_SHOWN = 3
 _ROUNDING_S = 1e-6  # of stamps as large as the seconds since 1970
 
 
@@ -43,7 +47,7 @@ class Rows:
     @classmethod
     def of(cls, time_s: NDArray[np.float64]) -> Rows:
         """Measure a clock of two or more stamps."""
-        step_s = typical_step_s(time_s)
+        step_s = _typical_step_s(time_s)
         steps = np.diff(time_s)
         excess = np.where(steps > longest_s(step_s), steps - step_s, 0.0)
         return cls(time_s, step_s, np.concatenate(([0.0], np.cumsum(excess))))
@@ -106,7 +110,7 @@ def make_signal(name: str, clock: Rows, values: NDArray[np.float64]) -> Signal:
     rows = np.flatnonzero(finite)
     infinite = np.flatnonzero(np.isinf(values))
     time_s = clock.time_s if rows.size == values.size else clock.time_s[rows]
-    step_s = typical_step_s(time_s) if rows.size > 1 else np.inf
+    step_s = _typical_step_s(time_s) if rows.size > 1 else np.inf
     kept = values if rows.size == values.size else values[rows]
     own_rows = 1 < rows.size < values.size and _has_own_rows(clock, rows, step_s)
     return Signal(name, rows, time_s, kept, infinite, step_s, own_rows)
@@ -167,6 +171,61 @@ def kept_rows(start: int, stop: int, breaks: Iterable[Break]) -> list[tuple[int,
     return pieces
 
 
+def about_losses(source: str, column: str, losses: Mapping[str, Sequence[Loss]]) -> list[Notice]:
+    """Report the samples that one column lacks, by epoch, in one sentence."""
+    every = [loss for found in losses.values() for loss in found]
+    if not every:
+        return []
+    count = sum(loss.count for loss in every)
+    start_s, stop_s = every[0].start_s, every[-1].stop_s
+    when = (
+        f"at {seconds(start_s)}" if count == 1 else f"from {seconds(start_s)} to {seconds(stop_s)}"
+    )
+    runs = f" in {len(every)} runs" if len(every) > 1 else ""
+    lacking = [label for label, found in losses.items() if found]
+    shown = ", ".join(lacking[:_SHOWN]) + (" and more" if len(lacking) > _SHOWN else "")
+    one = count == 1
+    text = (
+        f"{source}: {column} has {count} sample{'' if one else 's'} missing or not finite, "
+        f"{when}{runs} (epoch{'' if len(lacking) == 1 else 's'} {shown}); "
+        f"{'it was' if one else 'they were'} left out"
+    )
+    return [Notice("error", text)]
+
+
+def about_breaks(
+    source: str, label: str, breaks: Sequence[Break], pieces: Sequence[str], n_signals: int
+) -> list[Notice]:
+    """Report where an epoch was cut: an error where samples are lost, else a warning."""
+    notices = []
+    spans: dict[tuple[float, float], list[Break]] = {}
+    for gap in breaks:
+        spans.setdefault((gap.start_s, gap.stop_s), []).append(gap)
+    for lost in (True, False):
+        chosen = {
+            span: gaps
+            for span, gaps in sorted(spans.items())
+            if any(gap.lost for gap in gaps) is lost
+        }
+        if not chosen:
+            continue
+        told = [
+            f"{seconds(stop_s - start_s)} from {seconds(start_s)} to {seconds(stop_s)} in "
+            + ("all channels" if len(gaps) == n_signals else " and ".join(g.signal for g in gaps))
+            for (start_s, stop_s), gaps in list(chosen.items())[:_SHOWN]
+        ]
+        more = f"; and {len(chosen) - _SHOWN} more" if len(chosen) > _SHOWN else ""
+        what = "samples are missing for" if lost else "there is a gap of"
+        text = f"{source}, epoch {label}: {what} {'; '.join(told)}{more}; {_cut(label, pieces)}"
+        notices.append(Notice("error" if lost else "warning", text))
+    return notices
+
+
+def _typical_step_s(time_s: NDArray[np.float64]) -> float:
+    """Return the median interval of two or more stamps, in s."""
+    return float(np.median(np.diff(time_s)))
+
+
 def _has_own_rows(clock: Rows, rows: NDArray[np.intp], step_s: float) -> bool:
     if step_s > _REGULAR * clock.step_s:
         return True
@@ -175,3 +234,11 @@ def _has_own_rows(clock: Rows, rows: NDArray[np.intp], step_s: float) -> bool:
     regular = int(np.count_nonzero(skipped & (net_s <= _REGULAR * step_s)))
     irregular = int(np.count_nonzero(skipped)) - regular
     return regular >= 3 and regular > irregular
+
+
+def _cut(label: str, pieces: Sequence[str]) -> str:
+    if not pieces:
+        return "nothing of the epoch was read"
+    if len(pieces) == 1:
+        return f"epoch {label} was shortened to what lies outside"
+    return f"the epoch was cut there into {len(pieces)}, {pieces[0]} to {pieces[-1]}"

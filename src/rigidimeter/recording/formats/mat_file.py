@@ -15,9 +15,8 @@ import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.formats.arrays import first_line, table_of_arrays
-from rigidimeter.recording.formats.columns import Table
 from rigidimeter.recording.formats.mat_check import check_mat5
+from rigidimeter.recording.formats.table import Table, table_of_arrays
 
 __all__ = ["read_mat"]
 
@@ -30,28 +29,17 @@ def read_mat(path: Path) -> Table:
     Raises
     ------
     UserError
-        If it is not one, is damaged, or needs h5py and that is not installed.
+        If it has no column, or needs h5py and that is not installed.
+    Exception
+        Whatever scipy and h5py raise on a damaged file.
     """
-    source = str(path)
-    try:
-        with path.open("rb") as file:
-            start = file.read(520)
-    except OSError as error:
-        raise UserError(f"{source} cannot be read ({error.strerror or error})") from None
-    reads = _entries_hdf5 if _HDF5 in (start[:8], start[512:520]) else _entries
-    try:
-        entries = reads(source, path)
-    except UserError:
-        raise
-    except Exception as error:  # scipy and h5py raise whatever they trip over in a damaged file
-        raise UserError(
-            f"{source} is not a complete MATLAB file ({first_line(error)}); it must be made by "
-            "save in MATLAB"
-        ) from error
-    return table_of_arrays(source, entries)
+    with path.open("rb") as file:
+        start = file.read(520)
+    hdf5 = _HDF5 in (start[:8], start[512:520])
+    return table_of_arrays(str(path), _entries_hdf5(path) if hdf5 else _entries(path))
 
 
-def _entries(source: str, path: Path) -> dict[str, NDArray[Any]]:
+def _entries(path: Path) -> dict[str, NDArray[Any]]:
     check_mat5(path.read_bytes())
     with warnings.catch_warnings():
         # A doubtful file is refused: its warning becomes the reason.
@@ -84,12 +72,12 @@ def _array(value: object) -> NDArray[Any]:
     return array
 
 
-def _entries_hdf5(source: str, path: Path) -> dict[str, NDArray[Any]]:
+def _entries_hdf5(path: Path) -> dict[str, NDArray[Any]]:
     try:
         import h5py
     except ImportError:
         raise UserError(
-            f"{source} is a MATLAB file of version 7.3, which needs one more package: "
+            f"{path} is a MATLAB file of version 7.3, which needs one more package: "
             "pip install 'rigidimeter[matlab73]' (or save it in MATLAB with -v7)"
         ) from None
 

@@ -1,74 +1,177 @@
-"""One door to recordings that others made: the suffix of the file says how to read it."""
+"""The formats that are read: one `Reader` each, in the list `READERS`.
+
+To add a format, write a function that turns a file into a `Table` and put a `Reader` of it into the
+list. Names of columns, the clock, gaps, labels and epochs are the same for all tables then. A
+format that knows its own epochs, with a clock for each channel, returns epochs and notices instead.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.formats.csv_file import read_csv
 from rigidimeter.recording.formats.mat_file import read_mat
 from rigidimeter.recording.formats.npz_file import read_npz
-from rigidimeter.recording.formats.table_epochs import ReadOptions, Table, epochs_from_table
+from rigidimeter.recording.formats.table import Table
+from rigidimeter.recording.formats.table_epochs import ReadOptions, epochs_from_table
+from rigidimeter.recording.formats.text_table import read_text_recording
+from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
 from rigidimeter.records import Epoch, Notice
+from rigidimeter.settings import Settings
 
-__all__ = ["READERS", "read_recording", "read_table"]
+__all__ = ["READERS", "Reader", "formats_text", "read_recording", "read_table", "reader_of"]
 
-READERS: Mapping[str, Callable[[Path], Table]] = {
-    ".csv": read_csv,
-    ".tsv": read_csv,
-    ".txt": read_csv,
-    ".npz": read_npz,
-    ".mat": read_mat,
-}
-"""What reads a file, by its suffix in lower case."""
+Epochs = tuple[list[Epoch], list[Notice]]
 
 
-def read_recording(path: Path, options: ReadOptions) -> tuple[list[Epoch], list[Notice]]:
-    """Read the epochs of a file.
+@dataclass(frozen=True)
+class Reader:
+    """One format.
+
+    Parameters
+    ----------
+    name : str
+        What people call such a file, as in "MATLAB file".
+    suffixes : tuple of str
+        With the dot, in lower case.
+    read : callable
+        Turns a path into a `Table`, or into epochs and notices. It raises `UserError` with a
+        sentence that begins with the path.
+    sniff : callable, optional
+        Whether a path holds this format. It decides between readers of one suffix, and finds the
+        reader of a path whose suffix nobody has. A reader without it takes every file with one of
+        its suffixes.
+    settings : callable, optional
+        Returns the settings with which a path was recorded.
+    made_by : str
+        What makes such files. Where it is given, any exception of `read` means a damaged file.
+    extra : str
+        The extra of this package that `read` needs for some files, as in ``rigidimeter[matlab73]``.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    read: Callable[[Path], Table | Epochs]
+    sniff: Callable[[Path], bool] | None = None
+    settings: Callable[[Path], Settings] | None = None
+    made_by: str = ""
+    extra: str = ""
+
+
+READERS: list[Reader] = [
+    Reader("session folder", (), read_session, sniff=is_session, settings=session_settings),
+    Reader("text table", (".csv", ".tsv", ".txt"), read_text_recording),
+    Reader("NumPy archive", (".npz",), read_npz, made_by="numpy.savez"),
+    Reader("MATLAB file", (".mat",), read_mat, made_by="save in MATLAB", extra="matlab73"),
+]
+"""Every format. Of several readers for one path the first counts."""
+
+
+def reader_of(path: Path) -> Reader:
+    """Return the reader of a path.
+
+    Raises
+    ------
+    UserError
+        If there is no such path, or no reader for it.
+    """
+    if not path.exists():
+        raise UserError(f"{path}: there is no such file")
+    suffix = path.suffix.lower()
+    named = [reader for reader in READERS if suffix in reader.suffixes and path.is_file()]
+    for reader in (*named, *(reader for reader in READERS if reader.sniff is not None)):
+        if reader.sniff is None or reader.sniff(path):
+            return reader
+    known = _any_of([suffix for reader in READERS for suffix in reader.suffixes])
+    if path.is_dir():
+        raise UserError(
+            f"{path} is a folder without manifest.json, so it is not a session folder; give a "
+            f"session folder or a {known} file"
+        )
+    what = f"of type {path.suffix}" if path.suffix else "without a suffix"
+    raise UserError(f"{path} is a file {what}; what can be read is {known}")
+
+
+def read_recording(path: Path, options: ReadOptions) -> Epochs:
+    """Read the epochs of a session folder or a file.
 
     Parameters
     ----------
     path : Path
-        A text, NumPy or MATLAB file.
     options : ReadOptions
-        What the file does not say of itself.
+        What a file does not say of itself; a format that knows its own epochs needs nothing of it.
 
     Returns
     -------
     epochs : list of Epoch
-        In the order of the file, at least one.
+        In the order of the file; at least one of a table.
     notices : list of Notice
         What the user should know of them.
 
     Raises
     ------
     UserError
-        If the file cannot be read as a recording; one sentence says why.
+        If the path cannot be read as a recording; one sentence says why.
     """
-    return epochs_from_table(read_table(path), options)
+    found = _read(path)
+    return epochs_from_table(found, options) if isinstance(found, Table) else found
 
 
 def read_table(path: Path) -> Table:
-    """Read the columns of a file, chosen by its suffix.
+    """Read the columns of a file.
 
     Raises
     ------
     UserError
-        If there is no such file, or none that can be read.
+        If there is no such file, or none that can be read as a table.
     """
-    known = f"{', '.join(list(READERS)[:-1])} or {list(READERS)[-1]}"
-    if path.is_dir():
+    found = _read(path)
+    if not isinstance(found, Table):
+        raise UserError(f"{path} is a {reader_of(path).name}, which holds epochs and no table")
+    return found
+
+
+def formats_text() -> str:
+    """Return what can be read, as sentences say it."""
+    shown = [
+        f"{reader.name}s" + (f" ({', '.join(reader.suffixes)})" if reader.suffixes else "")
+        for reader in READERS
+    ]
+    return _any_of(shown)
+
+
+def _read(path: Path) -> Table | Epochs:
+    reader = reader_of(path)
+    if path.is_file():
+        try:
+            with path.open("rb") as file:
+                empty = not file.read(1)
+        except OSError as error:
+            raise UserError(f"{path} cannot be read ({error.strerror or error})") from None
+        if empty:
+            raise UserError(f"{path} is empty; a recording in a {path.suffix} file was expected")
+    try:
+        return reader.read(path)
+    except UserError:
+        raise
+    except ImportError as error:
+        if not reader.extra:
+            raise
         raise UserError(
-            f"{path} is a folder without manifest.json, so it is not a session folder; give a "
-            f"session folder or a {known} file"
-        )
-    if not path.exists():
-        raise UserError(f"{path}: there is no such file")
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        suffix = f"of type {path.suffix}" if path.suffix else "without a suffix"
-        raise UserError(f"{path} is a file {suffix}; what can be read is {known}")
-    if path.stat().st_size == 0:
-        raise UserError(f"{path} is empty; a recording in a {path.suffix} file was expected")
-    return reader(path)
+            f"{path} is a {reader.name}, which needs one more package: "
+            f"pip install 'rigidimeter[{reader.extra}]'"
+        ) from error
+    except Exception as error:
+        if not reader.made_by:
+            raise
+        reason = (str(error).strip().splitlines() or [""])[0][:120] or type(error).__name__
+        raise UserError(
+            f"{path} is not a complete {reader.name} ({reason}); it must be made by "
+            f"{reader.made_by}"
+        ) from error
+
+
+def _any_of(names: list[str]) -> str:
+    return " or ".join(filter(None, [", ".join(names[:-1]), names[-1]]))

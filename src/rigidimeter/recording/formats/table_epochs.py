@@ -19,10 +19,10 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.columns import (
     LABELS,
     MOTION,
-    Table,
     find_columns,
-    nearest,
     numbers,
+    seconds,
+    time_stamps,
 )
 from rigidimeter.recording.formats.cutting import (
     Stretch,
@@ -36,17 +36,23 @@ from rigidimeter.recording.formats.gaps import (
     Loss,
     Rows,
     Signal,
+    about_breaks,
+    about_losses,
     find_losses,
     kept_rows,
     make_signal,
 )
-from rigidimeter.recording.formats.read_notices import about_breaks, about_losses, about_units
-from rigidimeter.recording.formats.stamps import seconds, stamps
+from rigidimeter.recording.formats.table import Table, nearest
 from rigidimeter.records import CHANNEL_UNITS, Channel, Epoch, Notice, Task
 
-__all__ = ["ReadOptions", "Table", "epochs_from_table"]
+__all__ = ["ReadOptions", "epochs_from_table"]
 
 _FEWEST = 2
+_LARGEST_ANGLE_RAD = 2 * math.pi
+_LARGEST_VELOCITY_RAD_S = 50.0
+_LARGEST_EMG_V = 20.0
+"""Amplifiers give at most ±10 V or so; more is another unit."""
+_LARGEST_STEP_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -90,9 +96,9 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
         raise UserError(f"--epoch-length-s {length_s:g}: the length must be greater than 0 s")
     names = find_columns(table, options.columns)
     n_rows = table.columns[names["torque_nm"]].size
-    clock = Rows.of(stamps(table, names.get("time_s"), options.rate_hz, n_rows))
+    clock = Rows.of(time_stamps(table, names.get("time_s"), options.rate_hz, n_rows))
     signals, notices = _signals(table, names, clock, options.reaction)
-    notices += about_units(table.source, signals, clock.step_s)
+    notices += _about_units(table.source, signals, clock.step_s)
     labels = {name: _label_column(table, names[name], n_rows) for name in LABELS if name in names}
     stretches, more = _stretches(table, clock, labels.get("epoch"), length_s)
     notices += more
@@ -176,7 +182,7 @@ def _stretches(
             notices.insert(0, Notice("warning", text))
         return stretches, notices
     if length_s is not None:
-        return by_length(table.source, clock.time_s, length_s)
+        return by_length(table.source, clock, length_s)
     return [Stretch("1", 0, clock.time_s.size)], []
 
 
@@ -260,3 +266,28 @@ def _pieces(
 
 def _spoken(standard: str, name: str) -> str:
     return standard if standard == name else f"{standard} (column {name})"
+
+
+def _about_units(source: str, signals: Mapping[str, Signal], step_s: float) -> list[Notice]:
+    """Warn of values that only make sense in degrees, in microvolts, or in milliseconds."""
+    notices = []
+    for name, signal in signals.items():
+        if name == "angle_rad":
+            limit, right = _LARGEST_ANGLE_RAD, "degrees: divide by 57.2958 to have rad"
+        elif name.endswith("_rad_s"):
+            limit, right = _LARGEST_VELOCITY_RAD_S, "degrees: divide by 57.2958 to have rad/s"
+        elif name == "emg_v":
+            limit, right = _LARGEST_EMG_V, "microvolts: divide by 1e6 to have V"
+        else:
+            continue
+        largest = float(np.max(np.abs(signal.values)))
+        if largest > limit:
+            text = f"{source}: {name} reaches {largest:.4g}, which looks like {right}"
+            notices.append(Notice("warning", text))
+    if step_s > _LARGEST_STEP_S:
+        text = (
+            f"{source}: the rows are {seconds(step_s)} apart, which looks like milliseconds: "
+            "divide by 1000 to have s"
+        )
+        notices.append(Notice("warning", text))
+    return notices

@@ -6,6 +6,7 @@ import pytest
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.readers import read_recording, read_table
 from rigidimeter.recording.formats.table_epochs import ReadOptions
+from rigidimeter.recording.formats.text_table import read_text_table
 
 PLAIN = "time_s,torque_nm,angle_rad\n0.0,1.5,-0.25\n0.5,-2e-3,0.75\n1.0,3,0\n"
 WANTED = {"time_s": [0, 0.5, 1], "torque_nm": [1.5, -0.002, 3], "angle_rad": [-0.25, 0.75, 0]}
@@ -144,3 +145,65 @@ def test_whole_numbers_as_labels(tmp_path):
     )
     epochs, _ = read_recording(path, ReadOptions())
     assert [epoch.label for epoch in epochs] == ["1", "2"]
+
+
+def test_what_windows_writes_in_western_europe(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_bytes(
+        "t;torque_nm;Winkel (°);condition\n0;1,5;2;früh\n0,1;2,5;3;früh\n".encode("cp1252")
+    )
+    options = ReadOptions(columns={"time_s": "t", "angle_rad": "Winkel (°)"})
+    (epoch,), notices = read_recording(path, options)
+    assert notices == []
+    assert epoch.condition == "früh"
+    np.testing.assert_array_equal(epoch.channels["angle_rad"].values, [2, 3])
+
+
+def test_quoted_cells(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text('"time_s","torque_nm","angle_rad",task\n0,"1.5", "2","prbs"\n0.1,2.5,3,prbs\n')
+    (epoch,), notices = read_recording(path, ReadOptions())
+    assert notices == []
+    assert epoch.task == "prbs"
+    np.testing.assert_array_equal(epoch.channels["torque_nm"].values, [1.5, 2.5])
+
+
+def test_labels_that_look_like_truth_values_stay_as_written(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("time_s,torque_nm,angle_rad,condition\n0,1,2,TRUE\n1,2,3,TRUE\n")
+    assert read_recording(path, ReadOptions())[0][0].condition == "TRUE"
+
+
+@pytest.fixture
+def table(tmp_path):
+    def write(text: str):
+        path = tmp_path / "labels.csv"
+        path.write_text(text)
+        return read_text_table(path)
+
+    return write
+
+
+def test_a_small_table_keeps_its_text_and_its_lines(table):
+    found = table('# made by hand\ncode; score\n\n 001 ; 2,5\n;\n"a\nb";NA\nnone;\n')
+    assert found.columns == {"code": ("001", "a\nb", "none"), "score": ("2,5", "NA", "")}
+    assert found.lines == (4, 6, 8)
+    assert [found.number("score", row) for row in range(3)] == [2.5, None, None]
+
+
+def test_a_cell_that_is_no_number_is_named_with_its_line(table):
+    found = table('code,score\n"a\nb",1\nc,1e999\nd,two\n')
+    with pytest.raises(UserError, match=r"line 5: score is 'two', which is not a number"):
+        found.number("score", 2)
+    with pytest.raises(UserError, match=r"line 4: score is 1e999, which is too large"):
+        found.number("score", 1)
+    with pytest.raises(UserError, match="there is no column day; its columns are code, score"):
+        found.column("day", "--day")
+
+
+def test_a_table_without_rows(tmp_path):
+    path = tmp_path / "labels.csv"
+    path.write_text("# nothing yet\ncode,score\n,\n")
+    assert read_text_table(path, may_be_empty=True).lines == ()
+    with pytest.raises(UserError, match="names its columns in line 2 but has no rows"):
+        read_text_table(path)

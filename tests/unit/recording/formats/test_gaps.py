@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.formats.table_epochs import ReadOptions, Table, epochs_from_table
+from rigidimeter.recording.formats.table import Table
+from rigidimeter.recording.formats.table_epochs import ReadOptions, epochs_from_table
 
 NAN = np.nan
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rigidimeter.recording.formats.columns import Table
 from rigidimeter.recording.formats.readers import read_recording
+from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.table_epochs import ReadOptions, epochs_from_table
 
 N = 400
