@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import typer
 
+from rigidimeter.cli.options import Recordings, adjusted
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.recording import Recording
-    from rigidimeter.records import Analysis, Fit, Notice, Score, Task
-    from rigidimeter.settings import Settings
+    from rigidimeter.records import Analysis, Fit, Notice, Score
 
 __all__ = [
     "Recordings",
@@ -24,64 +23,6 @@ __all__ = [
     "say",
     "status",
 ]
-
-
-@dataclass(frozen=True)
-class Recordings:
-    """What the user named, and how to read it; the fields are the options of the commands.
-
-    The settings are those of the file given, else those that the first session folder was recorded
-    with, else the defaults.
-    """
-
-    paths: list[Path]
-    method: str = "auto"
-    column: list[str] | None = None
-    rate_hz: float | None = None
-    reaction: bool = False
-    epoch_length_s: float | None = None
-    condition: list[str] | None = None
-    task: str | None = None
-    band_hz: tuple[float, float] | None = None
-    controller: tuple[float, float] | None = None
-    settings: Path | None = None
-
-    def read(self) -> Recording:
-        """Read every input, with the band and the controller of the options in its settings.
-
-        Raises
-        ------
-        UserError
-            If an option is wrong, or not one input can be read.
-        """
-        from rigidimeter.recording import read
-
-        recording = read(
-            self.paths,
-            column=_columns(self.column or []),
-            rate_hz=self.rate_hz,
-            reaction=self.reaction,
-            epoch_length_s=self.epoch_length_s,
-            condition=self.condition,
-            task=cast("Task | None", self.task),
-            settings=self.settings,
-        )
-        return replace(recording, settings=adjusted(recording.settings, self))
-
-
-def adjusted(settings: Settings, wanted: Recordings) -> Settings:
-    """Return the settings with the band and the controller that options give.
-
-    Raises
-    ------
-    UserError
-        If one is out of its range.
-    """
-    if wanted.band_hz is not None:
-        settings = _with_band(settings, wanted.band_hz)
-    if wanted.controller is not None:
-        settings = _with_controller(settings, wanted.controller)
-    return settings
 
 
 def analyse_inputs(recording: Recording, method: str) -> Analysis:
@@ -147,40 +88,3 @@ def status(recording: Recording, analysis: Analysis) -> int:
                 f"error: {result.source}, epoch {result.epoch}: {result.outcome.reason}", err=True
             )
     return int(bad)
-
-
-def _with_band(settings: Settings, band_hz: tuple[float, float]) -> Settings:
-    from rigidimeter.settings import dump_settings, parse_settings
-
-    low, high = band_hz
-    values = dump_settings(settings)
-    values["estimation"] |= {
-        "band_low_hz": low,
-        "band_high_hz": high,
-        "band_high_unknown_hz": high,
-        "band_high_closed_loop_hz": high,
-    }
-    return parse_settings(values, source=f"--band-hz {low:g} {high:g}")
-
-
-def _with_controller(settings: Settings, controller: tuple[float, float]) -> Settings:
-    from rigidimeter.settings import dump_settings, parse_settings
-
-    inertia, damping = controller
-    values = dump_settings(settings)
-    values["controller"] |= {"inertia_kg_m2": inertia, "damping_nm_s_rad": damping}
-    return parse_settings(values, source=f"--controller {inertia:g} {damping:g}")
-
-
-def _columns(pairs: list[str]) -> dict[str, str]:
-    columns: dict[str, str] = {}
-    for pair in pairs:
-        name, equals, column = pair.partition("=")
-        if not (name and equals and column):
-            raise UserError(
-                f"--column {pair}: write NAME=COLUMN, for example --column torque_nm=Fz"
-            )
-        if name in columns:
-            raise UserError(f"--column {pair}: {name} was already given as {columns[name]}")
-        columns[name] = column
-    return columns

@@ -24,7 +24,7 @@ from rigidimeter.cli.design import design
 from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
 from rigidimeter.cli.model import model
-from rigidimeter.cli.options import MethodsCommand
+from rigidimeter.cli.options import RegistryCommand
 from rigidimeter.cli.ratings import ratings
 from rigidimeter.cli.recover import recover
 from rigidimeter.cli.report import report
@@ -77,8 +77,8 @@ def _root(
             metavar="FILE",
             callback=_load,
             is_eager=True,
-            help="First run a file of Python that adds an estimator, a term or a check; repeat as "
-            "needed.",
+            help="First run a file of Python that adds an estimator, a file format, a term or a "
+            "check; repeat as needed.",
         ),
     ] = None,
     version: Annotated[
@@ -111,7 +111,7 @@ for command in (
     recover,
     demo,
 ):
-    app.command(cls=MethodsCommand)(command)
+    app.command(cls=RegistryCommand)(command)
 app.add_typer(study)
 
 

@@ -1,4 +1,4 @@
-"""Options that several commands share: how to read a recording and how to fit it.
+"""Options that several commands share: how to read recordings and how to fit them.
 
 `reads_recordings` gives them to a command, which takes a `Recordings` as its first parameter.
 """
@@ -8,173 +8,215 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, cast, get_type_hints
 
 import typer
-from typer.core import TyperCommand, TyperOption
+from typer.core import TyperArgument, TyperCommand, TyperOption
 
-from rigidimeter.cli.inputs import Recordings
+from rigidimeter.errors import UserError
 
-__all__ = ["MethodsCommand", "SettingsOption", "reads_recordings"]
+if TYPE_CHECKING:
+    from rigidimeter.recording import Recording
+    from rigidimeter.records import Task
+    from rigidimeter.settings import Settings
+
+__all__ = ["Recordings", "RegistryCommand", "SettingsOption", "adjusted", "reads_recordings"]
 
 
-class MethodsCommand(TyperCommand):
-    """A command whose help lists the estimators, those of `--load` among them."""
+class RegistryCommand(TyperCommand):
+    """A command whose help lists file formats and estimators, those of `--load` among them."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Fill in what `--method` takes; only here, because it imports every estimator."""
-        for option in self.params:
-            if isinstance(option, TyperOption) and "--method" in option.opts:
+        """Fill in what INPUT and `--method` take; only here, because it imports all of them."""
+        for parameter in self.params:
+            if isinstance(parameter, TyperArgument) and parameter.name == "paths":
+                from rigidimeter.recording.formats import formats_text
+
+                parameter.help = f"What to read: {formats_text()}."
+            if isinstance(parameter, TyperOption) and "--method" in parameter.opts:
                 from rigidimeter.estimation import METHODS
 
                 known = ", ".join(f"{method.name} ({method.title})" for method in METHODS)
-                option.help = (
+                parameter.help = (
                     "auto (iv where the perturbation was recorded, else bandlimited), or one of: "
                     f"{known}."
                 )
         super().format_help(ctx, formatter)
 
 
-InputsArgument = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="INPUT",
-        help="Session folders, or recordings as .csv, .npz or .mat.",
-        show_default=False,
-    ),
-]
-MethodOption = Annotated[
-    str,
-    typer.Option(
-        "--method",
-        metavar="NAME",
-        help="The estimator, by its name.",
-    ),
-]
 SettingsOption = Annotated[
     Path | None,
     typer.Option(
         "--settings", metavar="FILE", help="Settings in TOML, such as examples/settings/study.toml."
     ),
 ]
-ColumnOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--column",
-        metavar="NAME=COLUMN",
-        help="What the file calls a standard column, for example torque_nm=Fz; repeat as needed.",
-    ),
-]
-RateOption = Annotated[
-    float | None,
-    typer.Option(
-        "--rate-hz", metavar="HZ", help="Sampling rate of a file without a time_s column."
-    ),
-]
-ReactionOption = Annotated[
-    bool,
-    typer.Option(
-        "--reaction", help="The torque is the joint's reaction, the negative of what drives it."
-    ),
-]
-EpochLengthOption = Annotated[
-    float | None,
-    typer.Option(
-        "--epoch-length-s",
-        metavar="S",
-        help="Cut a file without an epoch column into epochs of this length.",
-    ),
-]
-ConditionOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--condition",
-        metavar="NAME",
-        help="Condition of files without a condition column: once for all of them, or once for "
-        "each input in their order.",
-    ),
-]
-TaskOption = Annotated[
-    str | None,
-    typer.Option(
-        "--task",
-        metavar="prbs|sinusoid",
-        help="Fit J, B, K (prbs) or score (sinusoid); by default the motion decides.",
-    ),
-]
-BandOption = Annotated[
-    tuple[float, float] | None,
-    typer.Option(
-        "--band-hz",
-        metavar="LOW HIGH",
-        help="Band of the fit. Default: bandlimited 0.15 to 10 where the perturbation is known, "
-        "else to 50; iv, spectral and ml 0.15 to 30; at most 0.4 times the slowest channel's rate.",
-    ),
-]
-ControllerOption = Annotated[
-    tuple[float, float] | None,
-    typer.Option(
-        "--controller",
-        metavar="J_C B_C",
-        help="Inertia in kg·m² and damping in N·m·s/rad of the admittance, for files without a "
-        "manifest. Default: those of the settings, else the paper's. A wrong value makes iv less "
-        "precise, not wrong.",
-    ),
-]
 
 
-def _reading(
-    inputs: InputsArgument,
-    method: MethodOption = "auto",
-    column: ColumnOption = None,
-    rate_hz: RateOption = None,
-    reaction: ReactionOption = False,
-    epoch_length_s: EpochLengthOption = None,
-    condition: ConditionOption = None,
-    task: TaskOption = None,
-    band_hz: BandOption = None,
-    controller: ControllerOption = None,
-    settings: SettingsOption = None,
-) -> Recordings:
-    """Hold the shared parameters and what becomes of them."""
-    return Recordings(
-        inputs,
-        method,
-        column,
-        rate_hz,
-        reaction,
-        epoch_length_s,
-        condition,
-        task,
-        band_hz,
-        controller,
-        settings,
-    )
+@dataclass(frozen=True)
+class Recordings:
+    """What the user named, and how to read and fit it; the fields are options of the commands."""
+
+    paths: Annotated[
+        list[Path], typer.Argument(metavar="INPUT", help="What to read.", show_default=False)
+    ]
+    method: Annotated[
+        str, typer.Option("--method", metavar="NAME", help="The estimator, by its name.")
+    ] = "auto"
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--column",
+            metavar="NAME=COLUMN",
+            help="What the file calls a standard column, for example torque_nm=Fz; repeat as "
+            "needed.",
+        ),
+    ] = None
+    rate_hz: Annotated[
+        float | None,
+        typer.Option(
+            "--rate-hz", metavar="HZ", help="Sampling rate of a file without a time_s column."
+        ),
+    ] = None
+    reaction: Annotated[
+        bool,
+        typer.Option(
+            "--reaction", help="The torque is the joint's reaction, the negative of what drives it."
+        ),
+    ] = False
+    epoch_length_s: Annotated[
+        float | None,
+        typer.Option(
+            "--epoch-length-s",
+            metavar="S",
+            help="Cut a file without an epoch column into epochs of this length.",
+        ),
+    ] = None
+    condition: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--condition",
+            metavar="NAME",
+            help="Condition of files without a condition column: once for all of them, or once "
+            "for each input in their order.",
+        ),
+    ] = None
+    task: Annotated[
+        str | None,
+        typer.Option(
+            "--task",
+            metavar="prbs|sinusoid",
+            help="Fit J, B, K (prbs) or score (sinusoid); by default the motion decides.",
+        ),
+    ] = None
+    band_hz: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            "--band-hz",
+            metavar="LOW HIGH",
+            help="Band of the fit. Default: bandlimited 0.15 to 10 where the perturbation is "
+            "known, else to 50; iv, spectral and ml 0.15 to 30; at most 0.4 times the slowest "
+            "channel's rate.",
+        ),
+    ] = None
+    controller: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            "--controller",
+            metavar="J_C B_C",
+            help="Inertia in kg·m² and damping in N·m·s/rad of the admittance, for files without "
+            "a manifest. Default: those of the settings, else the paper's. A wrong value makes iv "
+            "less precise, not wrong.",
+        ),
+    ] = None
+    settings: SettingsOption = None
+
+    def read(self) -> Recording:
+        """Read every input, with the band and the controller of the options in its settings.
+
+        Raises
+        ------
+        UserError
+            If an option is wrong, or not one input can be read.
+        """
+        from rigidimeter.recording import read
+
+        recording = read(
+            self.paths,
+            column=_columns(self.column or []),
+            rate_hz=self.rate_hz,
+            reaction=self.reaction,
+            epoch_length_s=self.epoch_length_s,
+            condition=self.condition,
+            task=cast("Task | None", self.task),
+            settings=self.settings,
+        )
+        return replace(recording, settings=adjusted(recording.settings, self))
 
 
 def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:
     """Replace a command's first parameter, a `Recordings`, by the options that make one."""
-    shared = inspect.signature(_reading).parameters
+    shared = inspect.signature(Recordings).parameters
     own = list(inspect.signature(command).parameters.values())[1:]
+    hints = {
+        **get_type_hints(command, include_extras=True),
+        **get_type_hints(Recordings, include_extras=True),
+    }
 
     @functools.wraps(command)
     def with_options(**given: object) -> None:
         reading = {name: given.pop(name) for name in shared}
-        command(_reading(**reading), **given)  # type: ignore[arg-type]
+        command(Recordings(**reading), **given)  # type: ignore[arg-type]
 
-    parameters = [*shared.values(), *own]
-    hints = {
-        **get_type_hints(command, include_extras=True),
-        **get_type_hints(_reading, include_extras=True),
-        "return": None,
-    }
     with_options.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [
             parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=hints[parameter.name])
-            for parameter in parameters
+            for parameter in (*shared.values(), *own)
         ]
     )
-    with_options.__annotations__ = {p.name: hints[p.name] for p in parameters}
+    with_options.__annotations__ = {**hints, "return": None}
     del with_options.__wrapped__
     return with_options
+
+
+def adjusted(settings: Settings, wanted: Recordings) -> Settings:
+    """Return the settings with the band and the controller that options give.
+
+    Raises
+    ------
+    UserError
+        If one is out of its range.
+    """
+    from rigidimeter.settings import dump_settings, parse_settings
+
+    if wanted.band_hz is not None:
+        low, high = wanted.band_hz
+        values = dump_settings(settings)
+        values["estimation"] |= {
+            "band_low_hz": low,
+            "band_high_hz": high,
+            "band_high_unknown_hz": high,
+            "band_high_closed_loop_hz": high,
+        }
+        settings = parse_settings(values, source=f"--band-hz {low:g} {high:g}")
+    if wanted.controller is not None:
+        inertia, damping = wanted.controller
+        values = dump_settings(settings)
+        values["controller"] |= {"inertia_kg_m2": inertia, "damping_nm_s_rad": damping}
+        settings = parse_settings(values, source=f"--controller {inertia:g} {damping:g}")
+    return settings
+
+
+def _columns(pairs: list[str]) -> dict[str, str]:
+    columns: dict[str, str] = {}
+    for pair in pairs:
+        name, equals, column = pair.partition("=")
+        if not (name and equals and column):
+            raise UserError(
+                f"--column {pair}: write NAME=COLUMN, for example --column torque_nm=Fz"
+            )
+        if name in columns:
+            raise UserError(f"--column {pair}: {name} was already given as {columns[name]}")
+        columns[name] = column
+    return columns

@@ -5,11 +5,11 @@ import struct
 
 import numpy as np
 import pytest
+from tests.faults.test_bad_inputs import recording as joint_motion
 
 import rigidimeter.recording as recording
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import READERS, Reader, Table, formats_text
-from tests.faults.test_bad_inputs import recording as joint_motion
 
 MAGIC = b"TOY1"
 NAMES = ("time_s", "torque_nm", "angle_rad")
