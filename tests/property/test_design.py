@@ -13,14 +13,13 @@ from rigidimeter.experiment import (
     check_band,
     corners,
     demand,
-    line_spacing_hz,
     plan,
-    plateau_n2m2_hz,
     power_spectrum,
     prbs_levels,
     prbs_nm,
     sinusoid,
 )
+from rigidimeter.experiment.excitation import line_spacing_hz, plateau_n2m2_hz
 from rigidimeter.settings import (
     BlockSettings,
     GuardSettings,

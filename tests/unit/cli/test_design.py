@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 from rigidimeter.cli.design import design
 from rigidimeter.errors import UserError
-from rigidimeter.experiment import PARAMETERS, SCHEMA, multisine_nm, prbs_nm, sinusoid
+from rigidimeter.experiment import PARAMETERS, multisine_nm, prbs_nm, sinusoid
+from rigidimeter.experiment.design_document import SCHEMA
 from rigidimeter.settings import Settings, load_settings
 
 app = typer.Typer()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.experiment import beyond_limits, demand, ideal_response, sinusoid, time_constant_s
+from rigidimeter.experiment import demand, ideal_response, sinusoid, time_constant_s
+from rigidimeter.experiment.demand import beyond_limits
 from rigidimeter.guard import Limited, guard_limits, guard_state, guard_step
 from rigidimeter.settings import ControllerSettings, GuardSettings, SinusoidSettings, parse_settings
 

@@ -11,13 +11,12 @@ from rigidimeter.experiment import (
     Effect,
     Wanted,
     detect,
-    epoch_sd,
-    planned_epochs,
     prbs_nm,
     predicted_precision,
     ranksum_power,
     sample_size,
 )
+from rigidimeter.experiment.epochs_needed import epoch_sd, planned_epochs
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.statistics.ranksum import ranksum
 

@@ -5,15 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.experiment import (
+from rigidimeter.experiment import check_band, power_spectrum, prbs_nm
+from rigidimeter.experiment.excitation import (
     HALF_POWER_DB,
-    check_band,
     envelope_db,
     envelope_edge_hz,
     line_spacing_hz,
     plateau_n2m2_hz,
-    power_spectrum,
-    prbs_nm,
 )
 from rigidimeter.settings import PrbsSettings
 

@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 
 from rigidimeter.errors import UserError
-from rigidimeter.experiment import (
-    compare_multisine,
-    crest_factor,
-    multisine_nm,
-    multisine_phases_rad,
-    prbs_nm,
-    predicted_precision,
-)
+from rigidimeter.experiment import compare_multisine, multisine_nm, prbs_nm, predicted_precision
+from rigidimeter.experiment.multisine import crest_factor, multisine_phases_rad
 from rigidimeter.settings import Settings, parse_settings
 
 

@@ -5,8 +5,8 @@ import pytest
 
 from rigidimeter.dynamics import closed_loop_motion, median_joint
 from rigidimeter.errors import UserError
-from rigidimeter.experiment import CRITERIA, assess, demand, optimise, prbs_nm, predicted_precision
-from rigidimeter.experiment.optimise import strongest_amplitude_nm
+from rigidimeter.experiment import demand, optimise, prbs_nm, predicted_precision
+from rigidimeter.experiment.optimise import CRITERIA, assess, strongest_amplitude_nm
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.units import rad_from_deg
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rigidimeter.experiment import draw_rests_s, plan, rest_generator
+from rigidimeter.experiment import plan
+from rigidimeter.experiment.session_order import draw_rests_s, rest_generator
 from rigidimeter.settings import BlockSettings, PrbsSettings, ProtocolSettings, SinusoidSettings
 
 BLOCKS = ProtocolSettings(
