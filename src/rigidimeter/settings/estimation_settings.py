@@ -1,14 +1,23 @@
-"""Settings of what is computed from an epoch: the estimate, and the scores."""
+"""Settings of what is computed from an epoch: estimate, scores, checks, live estimate."""
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import model_validator
 
 from rigidimeter.settings.section import Section, quantity
 
-__all__ = ["EstimationSettings", "ScoreSettings"]
+__all__ = [
+    "DiagnosticLevels",
+    "DiagnosticsSettings",
+    "EstimationSettings",
+    "Level",
+    "OnlineSettings",
+    "ScoreSettings",
+]
+
+Level = Literal["note", "doubt", "exclude"]
 
 
 class EstimationSettings(Section):
@@ -50,13 +59,95 @@ class EstimationSettings(Section):
 class ScoreSettings(Section):
     """How the impulse and work scores are computed (Sec. 2.3)."""
 
+    ascending: ClassVar = (("band_low_hz", "band_high_hz"),)
+
     band_low_hz: float = quantity(0.2, "Hz", 0.001, 10.0)
     band_high_hz: float = quantity(5.0, "Hz", 0.1, 100.0)
     cycles: int = quantity(8, "1", 1, 1000)
     discard_s: float = quantity(1.0, "s", 0.0, 60.0)
 
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if self.band_low_hz >= self.band_high_hz:
-            raise ValueError("band_low_hz must be below band_high_hz")
-        return self
+
+class DiagnosticLevels(Section):
+    """What each check does when it fails: only say so, cast doubt, or exclude the epoch.
+
+    The names are those of the findings.
+
+    Those exclude by default that say the channels did not measure, or that the numbers mean
+    nothing. A negative or unlikely parameter only casts doubt: leaving out epochs for their result
+    shifts the median of those that stay.
+    """
+
+    conditioning: Level = "doubt"
+    coherence: Level = "doubt"
+    band_share: Level = "doubt"
+    imposed_sinusoid: Level = "exclude"
+    residual_whiteness: Level = "note"
+    residual_perturbation: Level = "doubt"
+    lack_of_fit: Level = "doubt"
+    held_out_vaf: Level = "exclude"
+    voluntary_torque: Level = "doubt"
+    active_movement: Level = "doubt"
+    emg_activity: Level = "doubt"
+    saturation: Level = "exclude"
+    frozen: Level = "exclude"
+    velocity_scale: Level = "exclude"
+    velocity_delay: Level = "doubt"
+    guard_limited: Level = "doubt"
+    position_limit: Level = "doubt"
+    negative_parameters: Level = "doubt"
+    implausible_parameters: Level = "doubt"
+
+
+class DiagnosticsSettings(Section):
+    """Thresholds of the checks. `_least` and `_most` are the ends of what is taken as sound."""
+
+    ascending: ClassVar = (
+        ("voluntary_low_hz", "voluntary_high_hz"),
+        ("inertia_least_kg_m2", "inertia_most_kg_m2"),
+    )
+
+    condition_number_most: float = quantity(10.0, "1", 1.0, 1e6)
+    coherence_least: float = quantity(0.5, "1", 0.0, 1.0)
+    band_share_least_percent: float = quantity(50.0, "%", 0.0, 100.0)
+    single_frequency_most_percent: float = quantity(85.0, "%", 1.0, 100.0)
+    residual_flatness_least: float = quantity(0.7, "1", 0.0, 1.0)
+    residual_perturbation_most_percent: float = quantity(10.0, "%", 0.0, 100.0)
+    lack_of_fit_most_percent: float = quantity(2.0, "%", 0.0, 100.0)
+    held_out_vaf_least_percent: float = quantity(0.0, "%", -1000.0, 100.0)
+    voluntary_low_hz: float = quantity(0.3, "Hz", 0.01, 20.0)
+    voluntary_high_hz: float = quantity(4.0, "Hz", 0.05, 50.0)
+    voluntary_share_most_percent: float = quantity(15.0, "%", 0.0, 100.0)
+    active_torque_nm: float = quantity(0.1, "N·m", 0.0, 100.0, above=True)
+    active_share_percent: float = quantity(50.0, "%", 0.0, 1000.0)
+    active_most_percent: float = quantity(20.0, "%", 0.0, 100.0)
+    emg_window_s: float = quantity(0.25, "s", 0.01, 10.0)
+    emg_baseline_factor: float = quantity(3.0, "1", 1.0, 1000.0, above=True)
+    emg_active_most_percent: float = quantity(20.0, "%", 0.0, 100.0)
+    saturated_most_percent: float = quantity(0.5, "%", 0.0, 100.0)
+    frozen_most_s: float = quantity(0.1, "s", 0.0, 60.0)
+    velocity_scale_most_percent: float = quantity(10.0, "%", 0.1, 1000.0)
+    velocity_delay_most_ms: float = quantity(5.0, "ms", 0.01, 1000.0)
+    limited_most_percent: float = quantity(1.0, "%", 0.0, 100.0)
+    position_most_percent: float = quantity(98.0, "%", 1.0, 100.0)
+    inertia_least_kg_m2: float = quantity(1e-5, "kg·m²", 0.0, 10.0)
+    inertia_most_kg_m2: float = quantity(1.0, "kg·m²", 0.0, 100.0, above=True)
+    damping_most_nm_s_rad: float = quantity(50.0, "N·m·s/rad", 0.0, 1000.0, above=True)
+    stiffness_most_nm_rad: float = quantity(2000.0, "N·m/rad", 0.0, 100000.0, above=True)
+    levels: DiagnosticLevels = DiagnosticLevels()
+
+
+class OnlineSettings(Section):
+    """The band of the causal filters, and how long the live estimate remembers.
+
+    A sample counts 1/e after `forgetting_s`; a step of a parameter is followed from 10 to 90 % in
+    2.2 times that. Motion with less than `rest_share_percent` of its usual power teaches nothing,
+    and then nothing is forgotten either.
+    """
+
+    ascending: ClassVar = (("band_low_hz", "band_high_hz"),)
+
+    band_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
+    band_high_hz: float = quantity(10.0, "Hz", 0.1, 1000.0)
+    forgetting_s: float = quantity(5.0, "s", 0.05, 3600.0)
+    rest_share_percent: float = quantity(1.0, "%", 0.0, 50.0)
+    rest_window_s: float = quantity(0.5, "s", 0.01, 60.0)

@@ -14,28 +14,33 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from rigidimeter.settings.commissioning_settings import CommissioningSettings
-from rigidimeter.settings.diagnostics_settings import DiagnosticsSettings
-from rigidimeter.settings.estimation_settings import EstimationSettings, ScoreSettings
+from rigidimeter.settings.estimation_settings import (
+    DiagnosticsSettings,
+    EstimationSettings,
+    OnlineSettings,
+    ScoreSettings,
+)
+from rigidimeter.settings.experiment_settings import (
+    MarginsSettings,
+    MultisineSettings,
+    OptimiseSettings,
+    PrbsSettings,
+    ProtocolSettings,
+    SinusoidSettings,
+)
 from rigidimeter.settings.loop_settings import (
     ControllerSettings,
     GuardSettings,
     LoopSettings,
     ZeroingSettings,
 )
-from rigidimeter.settings.online_settings import OnlineSettings
-from rigidimeter.settings.prediction_settings import (
-    MarginsSettings,
-    MultisineSettings,
-    OptimiseSettings,
-)
-from rigidimeter.settings.protocol_settings import PrbsSettings, ProtocolSettings, SinusoidSettings
 from rigidimeter.settings.rig_settings import (
     MotionSensorSettings,
     RigSettings,
+    SubjectSettings,
     TorqueSensorSettings,
 )
 from rigidimeter.settings.section import Section
-from rigidimeter.settings.subject_settings import SubjectSettings
 
 __all__ = ["Settings"]
 
