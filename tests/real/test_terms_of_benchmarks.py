@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rigidimeter.estimation.terms import compare_models, fit_terms, motion_from_position
+from rigidimeter.estimation.terms import compare_models, fit_terms, wideband_from_angle
 
 ANKLE_BAND_HZ = (0.0, 40.0)
 JBK = "inertia,damping,stiffness,offset"
@@ -13,14 +13,14 @@ JBK = "inertia,damping,stiffness,offset"
 def ankle(shared_data, name):
     with np.load(shared_data / "ankle" / f"{name}.npz") as archive:
         torque, angle = -archive["torque_Nm"], archive["position_rad"]
-    return motion_from_position(torque, angle, 1000.0, 120.0)
+    return wideband_from_angle(torque, angle, 1000.0, 120.0)
 
 
 @pytest.fixture
 def emps(shared_data):
     data = scipy.io.loadmat(shared_data / "emps" / "DATA_EMPS.mat")
     force = float(data["gtau"].ravel()[0]) * data["vir"].ravel()
-    return motion_from_position(force, data["qm"].ravel(), 1000.0, 120.0)
+    return wideband_from_angle(force, data["qm"].ravel(), 1000.0, 120.0)
 
 
 EMPS_BAND_HZ = (0.0, 40.0)
@@ -103,7 +103,7 @@ class TestSilverbox:
             shared_data / "silverbox" / "SNLS80mV.csv", delimiter=",", skip_header=1
         )[:, :2]
         return {
-            name: motion_from_position(*table[part].T, self.RATE_HZ, np.inf)
+            name: wideband_from_angle(*table[part].T, self.RATE_HZ, np.inf)
             for name, part in (
                 ("noise", slice(0, 40_000)),
                 ("multisine", slice(40_800, None)),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,9 +13,8 @@ from rigidimeter.cli.options import reads_recordings
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.estimation.terms import Comparison, ModelRow, TermsFit
+    from rigidimeter.estimation.terms import Comparison, EpochModels, ModelRow, TermsFit
     from rigidimeter.records import Epoch
-    from rigidimeter.settings import Settings
 
 __all__ = ["model"]
 
@@ -34,10 +31,7 @@ def model(
         typer.Option(
             "--terms",
             metavar="NAME,NAME,...",
-            help="Terms of the torque: inertia, damping, stiffness, offset, coulomb, quadratic, "
-            "cubic, directional-damping, directional-stiffness, directional-coulomb, reflex, "
-            "reflex-fir, reflex-second-order (+ or - after a reflex: the direction that stretches "
-            "the muscle). Repeat to compare your own models.",
+            help="The terms of the torque, by their names. Repeat to compare your own models.",
         ),
     ] = None,
     compare: Annotated[
@@ -66,7 +60,7 @@ def model(
     """
     from rigidimeter.documents import write_json
     from rigidimeter.estimation import aligned, estimate_delays
-    from rigidimeter.estimation.terms import candidates, parse_terms
+    from rigidimeter.estimation.terms import candidates, model_epoch, parse_terms
     from rigidimeter.study import task_of
 
     if recordings.method not in ("auto", "bandlimited"):
@@ -81,8 +75,9 @@ def model(
             raise UserError(f"--band-hz 0 {band_hz[1]:g}: the upper edge must be above 0 Hz")
         # The settings know no band from 0 Hz, since the other methods cannot do without its edge.
         recordings = replace(recordings, band_hz=None)
+        high_hz: float | None = band_hz[1]
     else:
-        band_hz = None
+        high_hz = None
     keep_inputs((json_out,), recordings.paths)
     read = recordings.read()
     say(read.notices)
@@ -95,10 +90,28 @@ def model(
         by_source.setdefault(epoch.source, []).append(epoch)
     delays = estimate_delays(by_source, read.settings)
     for epoch in perturbed:
-        row, text, failed = _epoch(aligned(epoch, delays), read.settings, models, compare, band_hz)
-        rows.append(row)
-        lines += [*text, ""]
-        bad = bad or failed
+        row: dict[str, Any] = {
+            "source": epoch.source,
+            "epoch": epoch.label,
+            "condition": epoch.condition,
+        }
+        try:
+            found = model_epoch(
+                aligned(epoch, delays), models, read.settings, compare=compare, high_hz=high_hz
+            )
+        except ValueError as error:
+            typer.echo(f"error: {epoch.name}: {error}", err=True)
+            rows.append(row | {"outcome": "failed", "reason": str(error), "models": []})
+            lines += [f"{epoch.name}: failed, {error}", ""]
+            bad = True
+            continue
+        rows.append(row | _as_json(epoch, found, compare))
+        lines += [*_lines(epoch, found, compare), ""]
+        problems = [one.problem for one in found.compared.rows if one.fit is None]
+        if not compare:
+            for problem in problems:
+                typer.echo(f"error: {epoch.name}: {problem}", err=True)
+        bad = bad or len(problems) == len(models) or (bool(problems) and not compare)
     if not rows:
         raise UserError("every epoch is an imposed sinusoid; a model needs a perturbed one")
     if json_out is not None:
@@ -107,97 +120,14 @@ def model(
     raise typer.Exit(int(bad))
 
 
-def _epoch(
-    epoch: Epoch,
-    every_setting: Settings,
-    models: Sequence[tuple[str, ...]],
-    compare: bool,
-    wanted_band_hz: tuple[float, float] | None,
-) -> tuple[dict[str, Any], list[str], bool]:
-    """Return what to write of an epoch, what to print, and whether it failed."""
-    from rigidimeter.estimation import band_hz
-    from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE, before_fit
-    from rigidimeter.estimation.signals import motion_channels
-    from rigidimeter.estimation.terms import ModelRow, compare_models, fit_terms, motion_from_epoch
-
-    settings = every_setting.estimation
-    row: dict[str, Any] = {
-        "source": epoch.source,
-        "epoch": epoch.label,
-        "condition": epoch.condition,
-    }
-    obstacle = before_fit(epoch, settings)
-    if obstacle:
-        typer.echo(f"error: {epoch.name}: {obstacle}", err=True)
-        failed = {"outcome": "failed", "reason": obstacle, "models": []}
-        return row | failed, [f"{epoch.name}: failed, {obstacle}"], True
-    low, high = band_hz(epoch, settings)
-    band = (low, high)
-    if wanted_band_hz is not None:
-        used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
-        usable = USABLE_FRACTION_OF_RATE * min(one.rate_hz for one in used)
-        band = (0.0, min(wanted_band_hz[1], usable))
-    motion = motion_from_epoch(epoch, band[1])
-    row |= {"outcome": epoch.closed.kind, "reason": epoch.closed.reason, "band_hz": list(band)}
-    lines = [f"{epoch.name}, {band[0]:.4g} to {band[1]:.4g} Hz"]
-    if compare:
-        compared = compare_models(motion, models, band, settings.trim_s)
-        pushes = _pushes(epoch, every_setting)
-        if pushes:
-            compared = replace(compared, recommended=None, reason=pushes)
-        lines += _table(compared)
-        row["recommended"] = compared.recommended and list(compared.recommended.terms)
-        row["why"] = compared.reason
-        found = compared.rows
-        chosen = [compared.recommended] if compared.recommended else []
-    else:
-        found = tuple(_fitted(fit_terms, motion, one, band, settings.trim_s) for one in models)
-        chosen = [one for one in found if isinstance(one, ModelRow)]
-    row["models"] = [_as_json(one) for one in found]
-    for one in chosen:
-        lines += _fit_lines(one)
-    problems = [one.problem for one in found if one.fit is None]
+def _lines(epoch: Epoch, found: EpochModels, compare: bool) -> list[str]:
+    low, high = found.band_hz
+    heading = f"{epoch.name}, {low:.4g} to {high:.4g} Hz"
     if not compare:
-        for problem in problems:
-            typer.echo(f"error: {epoch.name}: {problem}", err=True)
-    return row, lines, bool(problems) and (not compare or len(problems) == len(found))
-
-
-def _pushes(epoch: Epoch, settings: Settings) -> str:
-    """Return why held-out data cannot choose a model, or an empty text.
-
-    In the closed loop the subject's own torque is in the motion in both halves alike, so a term
-    that fits it predicts it too, and says nothing of the joint.
-    """
-    from rigidimeter.estimation import epoch_signals, fit_epochs
-    from rigidimeter.estimation.diagnostics import reconstructed_torque_nm, voluntary_torque
-
-    if "perturbation_nm" not in epoch.channels:
-        return ""
-    (fit,), _ = fit_epochs([epoch], "iv", settings)
-    if fit.n_samples == 0:
-        return ""
-    signals = epoch_signals(epoch, "bandlimited", settings.estimation)
-    parameters = (fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad)
-    own_nm = reconstructed_torque_nm(signals, parameters)
-    finding = voluntary_torque(own_nm, signals, settings.diagnostics)
-    if not finding.remedy:
-        return ""
-    return (
-        f"{finding.value:.2g} % of the torque's variance is the subject's own, which the loop puts "
-        "into the motion too; a term that fits it predicts it in both halves and says nothing of "
-        "the joint"
-    )
-
-
-def _fitted(fit_terms: Any, motion: Any, terms: Any, band: Any, trim_s: float) -> ModelRow:
-    from rigidimeter.estimation.terms import ModelRow
-
-    try:
-        fit = fit_terms(motion, terms, band, trim_s)
-    except ValueError as error:
-        return ModelRow(terms, None, math.nan, str(error))
-    return ModelRow(fit.terms, fit, math.nan)
+        return [heading, *(line for row in found.compared.rows for line in _fit_lines(row))]
+    recommended = found.compared.recommended
+    shown = _fit_lines(recommended) if recommended is not None else []
+    return [heading, *_table(found.compared), *shown]
 
 
 def _table(compared: Comparison) -> list[str]:
@@ -236,27 +166,29 @@ def _fit_lines(row: ModelRow) -> list[str]:
     return [*lines, *(f"    {remark}" for remark in fit.remarks)]
 
 
-def _as_json(row: ModelRow) -> dict[str, Any]:
+def _as_json(epoch: Epoch, found: EpochModels, compare: bool) -> dict[str, Any]:
+    chosen = found.compared.recommended
     return {
-        "terms": list(row.terms),
-        "problem": row.problem,
-        "held_out_vaf_percent": _finite(row.held_out_vaf_percent),
-        **(_fit_json(row.fit) if row.fit is not None else {}),
+        "outcome": epoch.closed.kind,
+        "reason": epoch.closed.reason,
+        "band_hz": list(found.band_hz),
+        **({"recommended": chosen and list(chosen.terms)} if compare else {}),
+        **({"why": found.compared.reason} if compare else {}),
+        "models": [
+            {
+                "terms": list(row.terms),
+                "problem": row.problem,
+                "held_out_vaf_percent": row.held_out_vaf_percent,
+                **(_fit_json(row.fit) if row.fit is not None else {}),
+            }
+            for row in found.compared.rows
+        ],
     }
 
 
 def _fit_json(fit: TermsFit) -> dict[str, Any]:
     return {
-        "parameters": [
-            {
-                "term": one.term,
-                "name": one.name,
-                "value": one.value,
-                "standard_error": _finite(one.standard_error),
-                "unit": one.unit,
-            }
-            for one in fit.parameters
-        ],
+        "parameters": [vars(one) for one in fit.parameters],
         "n_parameters": fit.n_parameters,
         "vaf_percent": fit.vaf_percent,
         "aic": fit.aic,
@@ -268,7 +200,3 @@ def _fit_json(fit: TermsFit) -> dict[str, Any]:
         "input_p": fit.test.input_p,
         "remarks": list(fit.remarks),
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -26,10 +26,10 @@ __all__ = ["Recordings", "RegistryCommand", "SettingsOption", "adjusted", "reads
 
 
 class RegistryCommand(TyperCommand):
-    """A command whose help lists file formats and estimators, those of `--load` among them."""
+    """A command whose help lists formats, estimators and terms, those of `--load` too."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Fill in what INPUT and `--method` take; only here, because it imports all of them."""
+        """Fill in what there is to choose from; only here, because it imports all of it."""
         for parameter in self.params:
             if isinstance(parameter, TyperArgument) and parameter.name == "paths":
                 from rigidimeter.recording.formats import formats_text
@@ -42,6 +42,13 @@ class RegistryCommand(TyperCommand):
                 parameter.help = (
                     "auto (iv where the perturbation was recorded, else bandlimited), or one of: "
                     f"{known}."
+                )
+            if isinstance(parameter, TyperOption) and "--terms" in parameter.opts:
+                from rigidimeter.estimation.terms import term_names
+
+                parameter.help = (
+                    f"Terms of the torque: {', '.join(term_names())} (+ or - after a reflex: the "
+                    "direction that stretches the muscle). Repeat to compare your own models."
                 )
         super().format_help(ctx, formatter)
 

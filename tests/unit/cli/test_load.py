@@ -1,4 +1,4 @@
-"""An estimator from outside the package: one file, given to the command line by --load."""
+"""An estimator or a term from outside the package: one file, given to --load."""
 
 import json
 from collections.abc import Iterator
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.estimation import METHODS
+from rigidimeter.estimation.terms import TERMS
 
 ESTIMATOR = '''
 import numpy as np
@@ -76,6 +77,19 @@ def test_estimate_and_report_use_it(rigidimeter, estimator, recording, tmp_path)
     ran = rigidimeter("report", *chosen, "--out", tmp_path / "report")
     assert ran.status == 0, ran.err
     assert "a guess" in (tmp_path / "report" / "report.html").read_text("utf-8")
+
+
+def test_a_term_of_the_torque_is_one_entry(rigidimeter, recording, tmp_path, monkeypatch):
+    monkeypatch.setattr("rigidimeter.estimation.terms.catalogue.TERMS", TERMS[:])
+    path = tmp_path / "quintic.py"
+    path.write_text(
+        "from rigidimeter.estimation.terms.catalogue import TERMS, Term\n"
+        "TERMS.append(Term('quintic', 'N·m/rad⁵', 'A spring.', lambda m: m.angle_rad**5))\n"
+    )
+    assert "quintic" in rigidimeter("--load", path, "model", "--help").out
+    ran = rigidimeter("--load", path, "model", recording, "--terms", "stiffness,quintic")
+    assert ran.status == 0, ran.err
+    assert "N·m/rad⁵" in ran.out
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,8 @@ is seen here is the least of it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
@@ -36,7 +38,7 @@ BASELINE_QUANTILE = 0.2
 _SHOWN = 5
 
 
-def reconstructed_torque_nm(signals: Signals, parameters: tuple[float, float, float]) -> Array:
+def reconstructed_torque_nm(signals: Signals, parameters: Array | Sequence[float]) -> Array:
     """Return M_sub of Eq. 5 in N·m, shape (n,), in the band of the signals."""
     J, B, K = parameters
     return (

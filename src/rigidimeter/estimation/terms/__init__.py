@@ -1,50 +1,34 @@
 """Models as sums of terms by name: fit, predict, compare."""
 
-from rigidimeter.estimation.terms.catalogue import GROUPS, REFLEXES, TERMS, Term, parse_terms
+from rigidimeter.estimation.terms.catalogue import TERMS, Term, parse_terms, term_names
 from rigidimeter.estimation.terms.model_comparison import (
-    BASE,
     Comparison,
+    EpochModels,
     ModelRow,
     candidates,
     compare_models,
+    fit_model,
+    model_epoch,
 )
-from rigidimeter.estimation.terms.reflex import REFLEX_KINDS
-from rigidimeter.estimation.terms.residual_tests import ResidualTest, residual_test
-from rigidimeter.estimation.terms.term_fit import (
-    Parameter,
-    Prediction,
-    TermsFit,
-    fit_terms,
-    predict,
-)
-from rigidimeter.estimation.terms.wideband_motion import (
-    Motion,
-    motion_from_epoch,
-    motion_from_position,
-    split,
-)
+from rigidimeter.estimation.terms.term_fit import Prediction, TermsFit, fit_terms, predict
+from rigidimeter.estimation.terms.wideband import wideband_from_angle, wideband_signals
 
 __all__ = [
-    "BASE",
-    "GROUPS",
-    "REFLEXES",
-    "REFLEX_KINDS",
     "TERMS",
     "Comparison",
+    "EpochModels",
     "ModelRow",
-    "Motion",
-    "Parameter",
     "Prediction",
-    "ResidualTest",
     "Term",
     "TermsFit",
     "candidates",
     "compare_models",
+    "fit_model",
     "fit_terms",
-    "motion_from_epoch",
-    "motion_from_position",
+    "model_epoch",
     "parse_terms",
     "predict",
-    "residual_test",
-    "split",
+    "term_names",
+    "wideband_from_angle",
+    "wideband_signals",
 ]

@@ -1,6 +1,6 @@
 """The terms of the equation, by name.
 
-    effort = sum of coefficient × term(position, velocity, acceleration) + residual
+    M = sum of coefficient × term(angle, velocity, acceleration) + residual
 
 A coefficient is positive where the term resists the motion: a friction that opposes, a spring that
 pulls back, a reflex in the muscle that is stretched. `damping-` is therefore min(v, 0), and
@@ -21,11 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimeter.errors import UserError
-from rigidimeter.estimation.signals import Array
+from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.estimation.terms.reflex import REFLEX_KINDS
-from rigidimeter.estimation.terms.wideband_motion import Motion
 
-__all__ = ["GROUPS", "REFLEXES", "TERMS", "Term", "parse_terms"]
+__all__ = ["GROUPS", "REFLEXES", "TERMS", "Term", "parse_terms", "term_named", "term_names"]
 
 
 @dataclass(frozen=True)
@@ -36,83 +35,84 @@ class Term:
     ----------
     name : str
     unit : str
-        Of the coefficient, for a joint: effort in N·m, position in rad.
+        Of the coefficient, in N·m for the torque and rad for the angle.
     meaning : str
         What it is, in one sentence.
     regressor : callable
-        From a wide-band motion to an array of shape (n,).
+        From wide-band signals to an array of shape (n,).
     """
 
     name: str
     unit: str
     meaning: str
-    regressor: Callable[[Motion], Array]
+    regressor: Callable[[Signals], Array]
 
 
-TERMS: Mapping[str, Term] = {
-    term.name: term
-    for term in (
-        Term("inertia", "kg·m²", "Torque for each angular acceleration.", lambda m: m.acceleration),
-        Term("damping", "N·m·s/rad", "Viscous torque, as fast as it moves.", lambda m: m.velocity),
-        Term("stiffness", "N·m/rad", "Elastic torque, as far as it is.", lambda m: m.position),
-        Term("offset", "N·m", "A constant torque.", lambda m: np.ones_like(m.position)),
-        Term(
-            "coulomb",
-            "N·m",
-            "Dry friction: the same at any speed, against it.",
-            lambda m: np.sign(m.velocity),
-        ),
-        Term(
-            "quadratic",
-            "N·m/rad²",
-            "Stiffness that grows with the angle, so that the two sides differ.",
-            lambda m: m.position**2,
-        ),
-        Term(
-            "cubic",
-            "N·m/rad³",
-            "Stiffness that grows with the square of the angle.",
-            lambda m: m.position**3,
-        ),
-        Term(
-            "damping+",
-            "N·m·s/rad",
-            "Viscous torque while it moves toward positive angle.",
-            lambda m: np.maximum(m.velocity, 0.0),
-        ),
-        Term(
-            "damping-",
-            "N·m·s/rad",
-            "Viscous torque while it moves toward negative angle.",
-            lambda m: np.minimum(m.velocity, 0.0),
-        ),
-        Term(
-            "stiffness+",
-            "N·m/rad",
-            "Elastic torque while it moves toward positive angle.",
-            lambda m: np.where(m.velocity > 0, m.position, 0.0),
-        ),
-        Term(
-            "stiffness-",
-            "N·m/rad",
-            "Elastic torque while it moves toward negative angle.",
-            lambda m: np.where(m.velocity < 0, m.position, 0.0),
-        ),
-        Term(
-            "coulomb+",
-            "N·m",
-            "Dry friction while it moves toward positive angle.",
-            lambda m: np.where(m.velocity > 0, 1.0, 0.0),
-        ),
-        Term(
-            "coulomb-",
-            "N·m",
-            "Dry friction while it moves toward negative angle.",
-            lambda m: np.where(m.velocity < 0, -1.0, 0.0),
-        ),
-    )
-}
-"""Terms that are linear in their coefficient."""
+TERMS: list[Term] = [
+    Term(
+        "inertia", "kg·m²", "Torque for each angular acceleration.", lambda m: m.acceleration_rad_s2
+    ),
+    Term(
+        "damping", "N·m·s/rad", "Viscous torque, as fast as it moves.", lambda m: m.velocity_rad_s
+    ),
+    Term("stiffness", "N·m/rad", "Elastic torque, as far as it is.", lambda m: m.angle_rad),
+    Term("offset", "N·m", "A constant torque.", lambda m: np.ones_like(m.angle_rad)),
+    Term(
+        "coulomb",
+        "N·m",
+        "Dry friction: the same at any speed, against it.",
+        lambda m: np.sign(m.velocity_rad_s),
+    ),
+    Term(
+        "quadratic",
+        "N·m/rad²",
+        "Stiffness that grows with the angle, so that the two sides differ.",
+        lambda m: m.angle_rad**2,
+    ),
+    Term(
+        "cubic",
+        "N·m/rad³",
+        "Stiffness that grows with the square of the angle.",
+        lambda m: m.angle_rad**3,
+    ),
+    Term(
+        "damping+",
+        "N·m·s/rad",
+        "Viscous torque while it moves toward positive angle.",
+        lambda m: np.maximum(m.velocity_rad_s, 0.0),
+    ),
+    Term(
+        "damping-",
+        "N·m·s/rad",
+        "Viscous torque while it moves toward negative angle.",
+        lambda m: np.minimum(m.velocity_rad_s, 0.0),
+    ),
+    Term(
+        "stiffness+",
+        "N·m/rad",
+        "Elastic torque while it moves toward positive angle.",
+        lambda m: np.where(m.velocity_rad_s > 0, m.angle_rad, 0.0),
+    ),
+    Term(
+        "stiffness-",
+        "N·m/rad",
+        "Elastic torque while it moves toward negative angle.",
+        lambda m: np.where(m.velocity_rad_s < 0, m.angle_rad, 0.0),
+    ),
+    Term(
+        "coulomb+",
+        "N·m",
+        "Dry friction while it moves toward positive angle.",
+        lambda m: np.where(m.velocity_rad_s > 0, 1.0, 0.0),
+    ),
+    Term(
+        "coulomb-",
+        "N·m",
+        "Dry friction while it moves toward negative angle.",
+        lambda m: np.where(m.velocity_rad_s < 0, -1.0, 0.0),
+    ),
+]
+"""Terms that are linear in their coefficient. Code from outside the package may append its own."""
 
 REFLEXES: tuple[str, ...] = tuple(kind + side for kind in REFLEX_KINDS for side in ("", "+", "-"))
 """Reflex paths. `+` has the muscle stretched by motion toward positive angle, `-` the other;
@@ -124,6 +124,16 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "directional-coulomb": ("coulomb+", "coulomb-"),
 }
 """Names that stand for several terms."""
+
+
+def term_named(name: str) -> Term | None:
+    """Return the linear term of that name; None where there is none."""
+    return next((term for term in TERMS if term.name == name), None)
+
+
+def term_names() -> tuple[str, ...]:
+    """Return what `--terms` takes; a reflex may be followed by a direction."""
+    return (*(term.name for term in TERMS), *GROUPS, *REFLEX_KINDS)
 
 
 def parse_terms(text: str | Iterable[str]) -> tuple[str, ...]:
@@ -139,6 +149,7 @@ def parse_terms(text: str | Iterable[str]) -> tuple[str, ...]:
     shown = ",".join(names)
     if not names:
         raise UserError("no term is named; for example inertia,damping,stiffness")
+    linear = [term.name for term in TERMS]
     found: list[str] = []
     for name in names:
         for single in GROUPS.get(name, (name,)):
@@ -148,8 +159,8 @@ def parse_terms(text: str | Iterable[str]) -> tuple[str, ...]:
                     f"{', '.join(REFLEX_KINDS)}, followed by + or - for the direction of motion "
                     "that stretches the muscle, or by nothing to let the data decide"
                 )
-            if single not in TERMS and single not in REFLEXES:
-                known = ", ".join((*TERMS, *GROUPS, *REFLEX_KINDS))
+            if single not in linear and single not in REFLEXES:
+                known = ", ".join(term_names())
                 raise UserError(f"{shown}: there is no term {single!r}; known: {known}")
             if single in found:
                 raise UserError(f"{shown}: {single} is named twice; name each term once")

@@ -7,15 +7,33 @@ recommended.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
+from rigidimeter.estimation.bandlimited import band_hz, bandlimited_signals
+from rigidimeter.estimation.diagnostics import reconstructed_torque_nm, voluntary_torque
+from rigidimeter.estimation.methods import fit_epoch
+from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE, before_fit
+from rigidimeter.estimation.signals import Signals, motion_channels
 from rigidimeter.estimation.terms.catalogue import REFLEXES, parse_terms
 from rigidimeter.estimation.terms.reflex import REFLEX_KINDS
 from rigidimeter.estimation.terms.term_fit import TermsFit, fit_terms, predict
-from rigidimeter.estimation.terms.wideband_motion import Motion, split
+from rigidimeter.estimation.terms.wideband import wideband_signals
+from rigidimeter.records import Epoch
+from rigidimeter.settings import Settings
 
-__all__ = ["BASE", "Comparison", "ModelRow", "candidates", "compare_models"]
+__all__ = [
+    "BASE",
+    "Comparison",
+    "EpochModels",
+    "ModelRow",
+    "candidates",
+    "compare_models",
+    "fit_model",
+    "model_epoch",
+]
 
 BASE = ("inertia", "damping", "stiffness")
 
@@ -27,14 +45,14 @@ SMALL_P = 0.01
 
 @dataclass(frozen=True)
 class ModelRow:
-    """One model: its fit to the first part, and the VAF of what it predicts of the rest.
+    """One model: its fit, and where models are compared the VAF of what it predicts.
 
     `fit` is None where the model could not be fitted; `problem` then says why.
     """
 
     terms: tuple[str, ...]
     fit: TermsFit | None
-    held_out_vaf_percent: float
+    held_out_vaf_percent: float = math.nan
     problem: str = ""
 
 
@@ -45,6 +63,13 @@ class Comparison:
     rows: tuple[ModelRow, ...]
     recommended: ModelRow | None
     reason: str
+
+
+class EpochModels(NamedTuple):
+    """The models of one epoch, and the band they were fitted in."""
+
+    band_hz: tuple[float, float]
+    compared: Comparison
 
 
 def candidates(terms: Sequence[str]) -> list[tuple[str, ...]]:
@@ -62,33 +87,123 @@ def candidates(terms: Sequence[str]) -> list[tuple[str, ...]]:
 
 
 def compare_models(
-    motion: Motion,
+    motion: Signals,
     models: Sequence[Sequence[str]],
     band_hz: tuple[float, float],
     trim_s: float = 1.0,
-    fraction: float = 0.5,
 ) -> Comparison:
-    """Fit each model on the first `fraction`, predict the rest, and recommend one.
+    """Fit each model on the first half, predict the second, and recommend one.
 
     Parameters
     ----------
-    motion : Motion
+    motion : Signals
+        Wide-band.
     models : sequence of sequences of str
         The terms of each.
     band_hz, trim_s
-        As for `fit_terms`; the cut between the parts is trimmed on both sides.
-    fraction : float
+        As for `fit_terms`; the cut between the halves is trimmed on both sides.
     """
-    first, rest = split(motion, fraction)
+    half = round(0.5 * motion.time_s.size)
+    first, rest = _part(motion, slice(0, half)), _part(motion, slice(half, None))
     rows = []
     for model in models:
-        terms = parse_terms(model)
-        try:
-            fit = fit_terms(first, terms, band_hz, trim_s)
-            rows.append(ModelRow(fit.terms, fit, predict(fit, rest).vaf_percent))
-        except ValueError as error:
-            rows.append(ModelRow(terms, None, float("nan"), str(error)))
+        row = fit_model(first, model, band_hz, trim_s)
+        if row.fit is not None:
+            row = replace(row, held_out_vaf_percent=predict(row.fit, rest).vaf_percent)
+        rows.append(row)
     return Comparison(tuple(rows), *_recommend(rows))
+
+
+def fit_model(
+    motion: Signals, terms: Sequence[str], band_hz: tuple[float, float], trim_s: float = 1.0
+) -> ModelRow:
+    """Fit one model; one that cannot be fitted says why."""
+    try:
+        fit = fit_terms(motion, terms, band_hz, trim_s)
+    except ValueError as error:
+        return ModelRow(parse_terms(terms), None, problem=str(error))
+    return ModelRow(fit.terms, fit)
+
+
+def model_epoch(
+    epoch: Epoch,
+    models: Sequence[Sequence[str]],
+    settings: Settings,
+    *,
+    compare: bool = False,
+    high_hz: float | None = None,
+) -> EpochModels:
+    """Fit models to an epoch, or compare them.
+
+    Parameters
+    ----------
+    epoch : Epoch
+        With torque and motion on one clock.
+    models : sequence of sequences of str
+        The terms of each.
+    settings : Settings
+    compare : bool
+        Fit to the first half, predict the second and recommend a model; else fit to all of it.
+    high_hz : float, optional
+        The upper edge of a band that begins at 0 Hz, instead of the band of the settings.
+
+    Raises
+    ------
+    ValueError
+        If the epoch cannot be used; the text says why.
+    """
+    estimation = settings.estimation
+    obstacle = before_fit(epoch, estimation)
+    if obstacle:
+        raise ValueError(obstacle)
+    band = band_hz(epoch, estimation)
+    if high_hz is not None:
+        used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
+        slowest_hz = min(channel.rate_hz for channel in used)
+        band = (0.0, min(high_hz, USABLE_FRACTION_OF_RATE * slowest_hz))
+    motion = wideband_signals(epoch, band[1])
+    if not compare:
+        rows = (fit_model(motion, model, band, estimation.trim_s) for model in models)
+        return EpochModels(band, Comparison(tuple(rows), None, ""))
+    compared = compare_models(motion, models, band, estimation.trim_s)
+    pushes = _voluntary_torque(epoch, settings)
+    if pushes:
+        compared = replace(compared, recommended=None, reason=pushes)
+    return EpochModels(band, compared)
+
+
+def _voluntary_torque(epoch: Epoch, settings: Settings) -> str:
+    """Return why held-out data cannot choose a model, or an empty text.
+
+    In the closed loop the subject's own torque is in the motion in both halves alike, so a term
+    that fits it predicts it too, and says nothing of the joint.
+    """
+    if "perturbation_nm" not in epoch.channels:
+        return ""
+    fit = fit_epoch(epoch, "iv", settings)
+    if fit.n_samples == 0:
+        return ""
+    signals = bandlimited_signals(epoch, settings.estimation)
+    own_nm = reconstructed_torque_nm(signals, fit.value)
+    finding = voluntary_torque(own_nm, signals, settings.diagnostics)
+    if not finding.remedy:
+        return ""
+    return (
+        f"{finding.value:.2g} % of the torque's variance is the subject's own, which the loop puts "
+        "into the motion too; a term that fits it predicts it in both halves and says nothing of "
+        "the joint"
+    )
+
+
+def _part(motion: Signals, part: slice) -> Signals:
+    return replace(
+        motion,
+        time_s=motion.time_s[part],
+        torque_nm=motion.torque_nm[part],
+        acceleration_rad_s2=motion.acceleration_rad_s2[part],
+        velocity_rad_s=motion.velocity_rad_s[part],
+        angle_rad=motion.angle_rad[part],
+    )
 
 
 def _recommend(rows: Sequence[ModelRow]) -> tuple[ModelRow | None, str]:

@@ -27,8 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from rigidimeter.estimation.signals import Array
-from rigidimeter.estimation.terms.wideband_motion import Motion
+from rigidimeter.estimation.signals import Array, Signals
 
 __all__ = ["REFLEX_KINDS", "Kernel", "kernel", "pass_through", "stretch_velocity"]
 
@@ -100,12 +99,12 @@ def kernel(name: str) -> Kernel:
     )
 
 
-def stretch_velocity(motion: Motion, name: str) -> Array:
+def stretch_velocity(motion: Signals, name: str) -> Array:
     """Return the half-wave rectified velocity, wide-band, in its own sign."""
     if name[-1] not in "+-":
         raise ValueError(f"{name}: the direction that stretches the muscle is not known")
     rectify = np.maximum if name.endswith("+") else np.minimum
-    return np.asarray(rectify(motion.velocity, 0.0), dtype=np.float64)
+    return np.asarray(rectify(motion.velocity_rad_s, 0.0), dtype=np.float64)
 
 
 def pass_through(stretch: Array, rate_hz: float, found: Kernel, nonlinear: Array) -> list[Array]:

@@ -11,11 +11,11 @@ from itertools import product
 
 import numpy as np
 
-from rigidimeter.estimation.signals import Array
-from rigidimeter.estimation.terms.catalogue import REFLEXES, TERMS
+from rigidimeter.estimation.signals import Array, Signals
+from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
 from rigidimeter.estimation.terms.reflex import Kernel, kernel, pass_through, stretch_velocity
 from rigidimeter.estimation.terms.separable import search
-from rigidimeter.estimation.terms.wideband_motion import Motion, banded
+from rigidimeter.estimation.terms.wideband import banded
 
 __all__ = ["Design"]
 
@@ -27,7 +27,7 @@ class Design:
     """Everything linear done once: banded, thinned regressors and stretches."""
 
     def __init__(
-        self, motion: Motion, terms: Sequence[str], band_hz: tuple[float, float], trim_s: float
+        self, motion: Signals, terms: Sequence[str], band_hz: tuple[float, float], trim_s: float
     ) -> None:
         step = max(1, int(motion.rate_hz / (SAMPLES_PER_CYCLE * band_hz[1]) + 1e-6))
 
@@ -36,16 +36,19 @@ class Design:
 
         self.rate_hz = motion.rate_hz / step
         self.terms = tuple(terms)
-        self.effort = thin(motion.effort)
-        self.velocity = thin(motion.velocity)
+        self.torque_nm = thin(motion.torque_nm)
+        self.velocity_rad_s = thin(motion.velocity_rad_s)
         trim = round(trim_s * self.rate_hz)
-        self.keep = slice(trim, self.effort.size - trim)
-        if self.effort[self.keep].size < 2:
+        self.keep = slice(trim, self.torque_nm.size - trim)
+        if self.torque_nm[self.keep].size < 2:
             raise ValueError(
-                f"it lasts {motion.duration_s:.3g} s, of which {trim_s:g} s are trimmed at each end"
+                f"it lasts {motion.time_s.size / motion.rate_hz:.3g} s, of which {trim_s:g} s are "
+                "trimmed at each end"
             )
         self.plain = {
-            name: thin(TERMS[name].regressor(motion))[self.keep] for name in terms if name in TERMS
+            name: thin(term.regressor(motion))[self.keep]
+            for name in terms
+            if (term := term_named(name)) is not None
         }
         self.kernels: dict[str, Kernel] = {name: kernel(name) for name in terms if name in REFLEXES}
         self.stretches = {name: thin(stretch_velocity(motion, name)) for name in self.kernels}
@@ -80,4 +83,4 @@ class Design:
         starts = [sum(parts, ()) for parts in product(*(one.starts for one in kernels))]
         low = [bound for one in kernels for bound in one.low]
         high = [bound for one in kernels for bound in one.high]
-        return search(self.columns, self.effort[self.keep], starts, low, high)
+        return search(self.columns, self.torque_nm[self.keep], starts, low, high)

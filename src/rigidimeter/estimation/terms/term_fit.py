@@ -1,8 +1,8 @@
-"""Fit a sum of terms to effort and motion, and predict with it.
+"""Fit a sum of terms to torque and motion, and predict with it.
 
-    F(effort) = Σ c_k F(term_k(position, velocity, acceleration; q)) + residual
+    F(M) = Σ c_k F(term_k(angle, velocity, acceleration; q)) + residual
 
-Terms are computed from the wide-band motion and only then pass the band F, the same as the effort:
+Terms are computed from the wide-band signals and only then pass the band F, as the torque does:
 F(v³) is not F(v)³. The band ends at `high`, so samples are kept at about 2.5 times that. Where it
 begins above 0 Hz no mean survives, and an offset cannot be fitted.
 """
@@ -15,23 +15,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigidimeter.estimation.signals import Array
-from rigidimeter.estimation.terms.catalogue import REFLEXES, TERMS, parse_terms
+from rigidimeter.estimation.signals import Array, Signals
+from rigidimeter.estimation.terms.catalogue import REFLEXES, parse_terms, term_named
 from rigidimeter.estimation.terms.reflex import FIR_SPACING_S
 from rigidimeter.estimation.terms.regressors import Design
 from rigidimeter.estimation.terms.residual_tests import ResidualTest, residual_test
 from rigidimeter.estimation.terms.separable import bread, solve
-from rigidimeter.estimation.terms.wideband_motion import Motion
 from rigidimeter.estimation.uncertainty import hac_covariance
 
-__all__ = ["Parameter", "Prediction", "TermsFit", "fit_terms", "predict"]
+__all__ = ["Prediction", "TermParameter", "TermsFit", "fit_terms", "predict"]
 
 NEAR_BOUND = 1e-3
 """A parameter this near to its bound, as a share of its range, was not found inside."""
 
 
 @dataclass(frozen=True)
-class Parameter:
+class TermParameter:
     """One number of a fit, with one standard error; NaN where the data give none."""
 
     term: str
@@ -49,14 +48,14 @@ class TermsFit:
     ----------
     terms : tuple of str
         With the direction of a reflex decided.
-    parameters : tuple of Parameter
+    parameters : tuple of TermParameter
         The gain of a `reflex-fir` follows its responses, of which it is the sum.
     linear, nonlinear : arrays
         Coefficients c, and q of the reflex paths.
     residual : array, shape (n,)
         At `rate_hz`, ends trimmed.
     vaf_percent : float
-        100 (1 − var(residual)/var(effort)), both in the band.
+        100 (1 − var(residual)/var(torque)), both in the band.
     aic, bic : float
         N ln(RSS/n) + 2 p and N ln(RSS/n) + p ln N, with N = 2 · bandwidth · T independent samples.
         They compare fits of the same signals in the same band.
@@ -70,7 +69,7 @@ class TermsFit:
     """
 
     terms: tuple[str, ...]
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[TermParameter, ...]
     linear: Array
     nonlinear: Array
     band_hz: tuple[float, float]
@@ -91,7 +90,7 @@ class TermsFit:
         """Linear and nonlinear parameters."""
         return int(self.linear.size + self.nonlinear.size)
 
-    def __getitem__(self, name: str) -> Parameter:
+    def __getitem__(self, name: str) -> TermParameter:
         """Return a parameter by `term`, or by `term name` where a term has several."""
         for parameter in self.parameters:
             if name in (parameter.term, f"{parameter.term} {parameter.name}"):
@@ -109,7 +108,7 @@ class Prediction:
 
 
 def fit_terms(
-    motion: Motion,
+    motion: Signals,
     names: str | Sequence[str],
     band_hz: tuple[float, float],
     trim_s: float = 1.0,
@@ -118,7 +117,7 @@ def fit_terms(
 
     Parameters
     ----------
-    motion : Motion
+    motion : Signals
         Wide-band: it must reach well above the band.
     names : str or sequence of str
         For example ``"inertia,damping,stiffness,reflex-fir+"``; see `catalogue`.
@@ -146,17 +145,17 @@ def fit_terms(
     return _fit(Design(motion, terms, band_hz, trim_s), band_hz, trim_s)
 
 
-def predict(fit: TermsFit, motion: Motion) -> Prediction:
-    """Predict the effort of a motion that the fit need not have seen."""
+def predict(fit: TermsFit, motion: Signals) -> Prediction:
+    """Predict the torque of a motion that the fit need not have seen."""
     design = Design(motion, fit.terms, fit.band_hz, fit.trim_s)
     predicted = design.columns(fit.nonlinear) @ fit.linear
-    measured = design.effort[design.keep]
+    measured = design.torque_nm[design.keep]
     unexplained = float(np.var(measured - predicted)) / float(np.var(measured))
     return Prediction(predicted, measured, 100.0 * (1.0 - unexplained))
 
 
 def _both_directions(
-    motion: Motion,
+    motion: Signals,
     terms: tuple[str, ...],
     undecided: str,
     band_hz: tuple[float, float],
@@ -182,9 +181,9 @@ def _gain(fit: TermsFit, kind: str) -> float:
 
 
 def _fit(design: Design, band_hz: tuple[float, float], trim_s: float) -> TermsFit:
-    target = design.effort[design.keep]
+    target = design.torque_nm[design.keep]
     if not float(np.ptp(target)) > 0:
-        raise ValueError("the effort is constant in the band")
+        raise ValueError("the torque is constant in the band")
     nonlinear = design.search()
     columns, names = design.columns(nonlinear), design.names
     solution = solve(columns, target, names)
@@ -208,14 +207,14 @@ def _fit(design: Design, band_hz: tuple[float, float], trim_s: float) -> TermsFi
         independent_samples=independent,
         condition_number=solution.condition_number,
         degrees_of_freedom=degrees,
-        test=residual_test(residual, design.velocity[design.keep], design.rate_hz, band_hz),
+        test=residual_test(residual, design.velocity_rad_s[design.keep], design.rate_hz, band_hz),
         remarks=tuple(remarks),
     )
 
 
 def _parameters(
     design: Design, linear: Array, nonlinear: Array, residual: Array
-) -> tuple[tuple[Parameter, ...], list[str], float]:
+) -> tuple[tuple[TermParameter, ...], list[str], float]:
     """Return the parameters with HAC errors of the whole Jacobian, linear and nonlinear alike."""
     low = [bound for one in design.kernels.values() for bound in one.low]
     high = [bound for one in design.kernels.values() for bound in one.high]
@@ -237,23 +236,24 @@ def _parameters(
     except ValueError as obstacle:
         remarks.append(f"no standard errors: {obstacle}")
     errors = np.sqrt(np.diag(covariance))
-    found: list[Parameter] = []
+    found: list[TermParameter] = []
     column, q = 0, 0
     for term in design.terms:
-        if term in TERMS:
+        plain = term_named(term)
+        if plain is not None:
             value, error = float(linear[column]), float(errors[column])
-            found.append(Parameter(term, "", value, error, TERMS[term].unit))
+            found.append(TermParameter(term, "", value, error, plain.unit))
             column += 1
             continue
         one = design.kernels[term]
         part = slice(column, column + len(one.columns))
         unit = "N·m/rad" if one.kind == "reflex-fir" else "N·m·s/rad"
         for name, value, error in zip(one.columns, linear[part], errors[part], strict=True):
-            found.append(Parameter(term, name, float(value), float(error), unit))
+            found.append(TermParameter(term, name, float(value), float(error), unit))
         if one.kind == "reflex-fir":
             spread = FIR_SPACING_S * math.sqrt(float(np.sum(covariance[part, part])))
             area = FIR_SPACING_S * float(np.sum(linear[part]))
-            found.append(Parameter(term, "gain", area, spread, "N·m·s/rad"))
+            found.append(TermParameter(term, "gain", area, spread, "N·m·s/rad"))
         gain = found[-1]
         if gain.value < 0:
             remarks.append(
@@ -271,5 +271,5 @@ def _parameters(
                     f"{term}: the {name} came to its bound, {value:.3g} {unit}; the data do not "
                     "determine it, and its error means nothing"
                 )
-            found.append(Parameter(term, name, value, error, unit))
+            found.append(TermParameter(term, name, value, error, unit))
     return tuple(found), remarks, degrees

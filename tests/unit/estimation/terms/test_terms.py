@@ -1,24 +1,32 @@
 """Each term against a motion whose derivatives are known in closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import signal
 
 from rigidimeter.errors import UserError
+from rigidimeter.estimation import Signals
 from rigidimeter.estimation.terms import (
     TERMS,
-    Motion,
     candidates,
     compare_models,
     fit_terms,
-    motion_from_position,
     parse_terms,
     predict,
+    wideband_from_angle,
 )
 from rigidimeter.estimation.terms.reflex import kernel, pass_through, stretch_velocity
 
 RATE_HZ = 500.0
 BAND_HZ = (0.0, 20.0)
+REGRESSORS = {term.name: term.regressor for term in TERMS}
+
+
+def wide(torque, x, v, a):
+    """Return signals of all frequencies."""
+    return Signals(np.arange(x.size) / RATE_HZ, torque, a, v, x, RATE_HZ, (0.0, RATE_HZ / 2))
 
 
 def smooth_motion(rng, duration_s=30.0, rate_hz=RATE_HZ, high_hz=8.0, late_s=0.0):
@@ -39,11 +47,11 @@ def smooth_motion(rng, duration_s=30.0, rate_hz=RATE_HZ, high_hz=8.0, late_s=0.0
 @pytest.fixture
 def exact():
     _, (x, v, a) = smooth_motion(np.random.default_rng(3))
-    return Motion(np.zeros_like(x), x, v, a, RATE_HZ)
+    return wide(np.zeros_like(x), x, v, a)
 
 
-def driven(motion, effort):
-    return Motion(effort, motion.position, motion.velocity, motion.acceleration, motion.rate_hz)
+def driven(motion, torque):
+    return replace(motion, torque_nm=torque)
 
 
 CLOSED_FORM = {
@@ -64,17 +72,17 @@ CLOSED_FORM = {
 
 
 def test_every_term_has_a_closed_form_here():
-    assert set(CLOSED_FORM) == set(TERMS)
+    assert set(CLOSED_FORM) == set(REGRESSORS)
 
 
-@pytest.mark.parametrize("name", list(TERMS))
+@pytest.mark.parametrize("name", list(REGRESSORS))
 def test_a_term_is_its_closed_form_at_one_instant(name):
     for x, v, a in ((0.3, 2.0, -5.0), (-0.4, -1.5, 7.0)):
-        motion = Motion(*(np.array([value]) for value in (0.0, x, v, a)), RATE_HZ)
-        assert TERMS[name].regressor(motion)[0] == pytest.approx(CLOSED_FORM[name](x, v, a))
+        motion = wide(*(np.array([value]) for value in (0.0, x, v, a)))
+        assert REGRESSORS[name](motion)[0] == pytest.approx(CLOSED_FORM[name](x, v, a))
 
 
-@pytest.mark.parametrize("name", list(TERMS))
+@pytest.mark.parametrize("name", list(REGRESSORS))
 def test_a_term_is_found_beside_j_b_k(exact, name):
     base = {"inertia": 0.01, "damping": 0.2, "stiffness": 3.0}
     side = {"damping+": "damping-", "stiffness+": "stiffness-"}
@@ -83,8 +91,8 @@ def test_a_term_is_found_beside_j_b_k(exact, name):
         other = side.get(name, name[:-1] + "+")
         base[other] = 0.7
     truth = base | {name: 1.7}
-    effort = sum(value * TERMS[term].regressor(exact) for term, value in truth.items())
-    fit = fit_terms(driven(exact, effort), list(truth), BAND_HZ)
+    torque = sum(value * REGRESSORS[term](exact) for term, value in truth.items())
+    fit = fit_terms(driven(exact, torque), list(truth), BAND_HZ)
     for term, value in truth.items():
         assert fit[term].value == pytest.approx(value, rel=1e-6)
     assert fit.vaf_percent == pytest.approx(100.0)
@@ -92,24 +100,24 @@ def test_a_term_is_found_beside_j_b_k(exact, name):
 
 def test_derivatives_in_the_frequency_domain_are_exact_inside():
     _, (x, v, a) = smooth_motion(np.random.default_rng(1))
-    motion = motion_from_position(x, x, RATE_HZ, 1e9)
+    motion = wideband_from_angle(x, x, RATE_HZ, 1e9)
     inner = slice(500, -500)
-    np.testing.assert_allclose(motion.velocity[inner], v[inner], atol=2e-3 * np.std(v))
-    np.testing.assert_allclose(motion.acceleration[inner], a[inner], atol=2e-2 * np.std(a))
-    np.testing.assert_allclose(motion.position, x, atol=1e-12)
+    np.testing.assert_allclose(motion.velocity_rad_s[inner], v[inner], atol=2e-3 * np.std(v))
+    np.testing.assert_allclose(motion.acceleration_rad_s2[inner], a[inner], atol=2e-2 * np.std(a))
+    np.testing.assert_allclose(motion.angle_rad, x, atol=1e-12)
 
 
 def test_a_straight_line_has_a_constant_velocity_and_no_acceleration():
     line = 0.3 + 0.5 * np.arange(1000) / RATE_HZ
-    motion = motion_from_position(line, line, RATE_HZ, 50.0)
-    np.testing.assert_allclose(motion.velocity, 0.5, atol=1e-9)
-    np.testing.assert_allclose(motion.acceleration, 0.0, atol=1e-7)
+    motion = wideband_from_angle(line, line, RATE_HZ, 50.0)
+    np.testing.assert_allclose(motion.velocity_rad_s, 0.5, atol=1e-9)
+    np.testing.assert_allclose(motion.acceleration_rad_s2, 0.0, atol=1e-7)
 
 
 def test_a_bent_term_is_bent_before_it_is_filtered(exact):
     """F(x³) is not F(x)³: with the band below the motion only the right order gives the truth."""
-    effort = 2.0 * exact.position + 900.0 * exact.position**3
-    fit = fit_terms(driven(exact, effort), "stiffness,cubic", (0.0, 3.0))
+    torque = 2.0 * exact.angle_rad + 900.0 * exact.angle_rad**3
+    fit = fit_terms(driven(exact, torque), "stiffness,cubic", (0.0, 3.0))
     assert fit["cubic"].value == pytest.approx(900.0, rel=1e-6)
 
 
@@ -117,7 +125,7 @@ def test_a_bent_term_is_bent_before_it_is_filtered(exact):
 def test_a_reflex_passes_late_and_rectified(sign):
     """A velocity step of 2 rad/s: the pure path is the step itself, a delay later."""
     velocity = np.where(np.arange(4000) >= 2000, 2.0, -2.0)
-    motion = Motion(velocity, velocity, velocity, velocity, RATE_HZ)
+    motion = wide(velocity, velocity, velocity, velocity)
     stretch = stretch_velocity(motion, f"reflex{sign}")
     (passed,) = pass_through(stretch, RATE_HZ, kernel("reflex"), np.array([0.3]))
     late = round(0.3 * RATE_HZ)
@@ -139,10 +147,10 @@ def test_a_known_reflex_is_recovered(exact, name):
         plant = ([w**2], [1.0, 2 * truth["damping ratio"] * w, w**2])
         b, a, _ = signal.cont2discrete(plant, 1 / RATE_HZ, "foh")
         reflex = signal.lfilter(b.ravel(), a, reflex)
-    effort = 0.015 * exact.acceleration + 0.6 * exact.velocity + 60.0 * exact.position
-    effort = effort + 8.0 * reflex
-    effort = effort + 0.05 * np.std(effort) * rng.standard_normal(effort.size)
-    fit = fit_terms(driven(exact, effort), f"inertia,damping,stiffness,{name}", BAND_HZ)
+    torque = 0.015 * exact.acceleration_rad_s2 + 0.6 * exact.velocity_rad_s + 60.0 * exact.angle_rad
+    torque = torque + 8.0 * reflex
+    torque = torque + 0.05 * np.std(torque) * rng.standard_normal(torque.size)
+    fit = fit_terms(driven(exact, torque), f"inertia,damping,stiffness,{name}", BAND_HZ)
     delay = fit[f"{name} delay"]
     assert abs(delay.value - 0.045) < 0.002
     assert abs(delay.value - 0.045) < 4 * delay.standard_error
@@ -156,7 +164,7 @@ def test_a_free_response_finds_the_gain_of_a_second_order_path(exact):
     inner = np.array([0.06, 4.0, 0.9])
     (reflex,) = pass_through(stretch, RATE_HZ, kernel("reflex-second-order"), inner)
     fit = fit_terms(
-        driven(exact, 0.5 * exact.velocity + 5.0 * reflex), "damping,reflex-fir+", BAND_HZ
+        driven(exact, 0.5 * exact.velocity_rad_s + 5.0 * reflex), "damping,reflex-fir+", BAND_HZ
     )
     assert fit["reflex-fir+ gain"].value == pytest.approx(5.0, rel=0.03)
     assert fit.vaf_percent > 99.9
@@ -165,18 +173,18 @@ def test_a_free_response_finds_the_gain_of_a_second_order_path(exact):
 def test_without_a_sign_the_data_decide(exact):
     stretch = stretch_velocity(exact, "reflex-")
     (reflex,) = pass_through(stretch, RATE_HZ, kernel("reflex"), np.array([0.045]))
-    fit = fit_terms(driven(exact, exact.position + reflex), "stiffness,reflex", BAND_HZ)
+    fit = fit_terms(driven(exact, exact.angle_rad + reflex), "stiffness,reflex", BAND_HZ)
     assert fit.terms == ("stiffness", "reflex-")
     assert "decided for stretch by motion toward negative angle" in fit.remarks[0]
 
 
 def test_the_rest_is_predicted_and_the_true_model_recommended(exact):
     rng = np.random.default_rng(2)
-    effort = 0.01 * exact.acceleration + 0.2 * exact.velocity + 3 * exact.position
-    effort = effort + 2e3 * exact.position**3
-    effort = effort + 0.05 * np.std(effort) * rng.standard_normal(effort.size)
+    torque = 0.01 * exact.acceleration_rad_s2 + 0.2 * exact.velocity_rad_s + 3 * exact.angle_rad
+    torque = torque + 2e3 * exact.angle_rad**3
+    torque = torque + 0.05 * np.std(torque) * rng.standard_normal(torque.size)
     compared = compare_models(
-        driven(exact, effort), candidates(parse_terms("inertia,damping,stiffness,coulomb,cubic")),
+        driven(exact, torque), candidates(parse_terms("inertia,damping,stiffness,coulomb,cubic")),
         BAND_HZ,
     )  # fmt: skip
     assert compared.recommended is not None
@@ -188,30 +196,30 @@ def test_the_rest_is_predicted_and_the_true_model_recommended(exact):
 
 
 def test_a_prediction_is_of_the_motion_given(exact):
-    fit = fit_terms(driven(exact, 3.0 * exact.position), "stiffness", BAND_HZ)
-    assert predict(fit, driven(exact, 3.0 * exact.position)).vaf_percent == pytest.approx(100.0)
-    # Twice the effort: half is unexplained, a quarter of the variance.
-    assert predict(fit, driven(exact, 6.0 * exact.position)).vaf_percent == pytest.approx(75.0)
+    fit = fit_terms(driven(exact, 3.0 * exact.angle_rad), "stiffness", BAND_HZ)
+    assert predict(fit, driven(exact, 3.0 * exact.angle_rad)).vaf_percent == pytest.approx(100.0)
+    # Twice the torque: half is unexplained, a quarter of the variance.
+    assert predict(fit, driven(exact, 6.0 * exact.angle_rad)).vaf_percent == pytest.approx(75.0)
 
 
 def test_white_noise_passes_for_white_and_a_forgotten_term_does_not(exact):
     rng = np.random.default_rng(8)
     tests = []
     for _ in range(20):
-        effort = exact.position + 0.05 * rng.standard_normal(exact.position.size)
-        tests.append(fit_terms(driven(exact, effort), "stiffness", BAND_HZ).test)
+        torque = exact.angle_rad + 0.05 * rng.standard_normal(exact.angle_rad.size)
+        tests.append(fit_terms(driven(exact, torque), "stiffness", BAND_HZ).test)
     assert sum(test.ljung_box_p < 0.05 for test in tests) <= 4
     assert sum(test.input_p < 0.05 for test in tests) <= 4
-    effort = effort + 0.05 * exact.velocity
-    assert fit_terms(driven(exact, effort), "stiffness", BAND_HZ).test.input_p < 1e-3
+    torque = torque + 0.05 * exact.velocity_rad_s
+    assert fit_terms(driven(exact, torque), "stiffness", BAND_HZ).test.input_p < 1e-3
 
 
 def test_standard_errors_are_those_of_repetition(exact):
     rng = np.random.default_rng(9)
     found = []
     for _ in range(40):
-        effort = 3.0 * exact.position + 0.05 * rng.standard_normal(exact.position.size)
-        found.append(fit_terms(driven(exact, effort), "stiffness,damping", BAND_HZ)["stiffness"])
+        torque = 3.0 * exact.angle_rad + 0.05 * rng.standard_normal(exact.angle_rad.size)
+        found.append(fit_terms(driven(exact, torque), "stiffness,damping", BAND_HZ)["stiffness"])
     scatter = np.std([one.value for one in found], ddof=1)
     assert np.median([one.standard_error for one in found]) == pytest.approx(scatter, rel=0.35)
 
@@ -234,17 +242,19 @@ def test_a_wrong_name_is_one_sentence(names, words):
 
 def test_what_the_data_cannot_tell_apart_is_named(exact):
     with pytest.raises(ValueError, match=r"cannot tell damping, damping\+ and damping- apart"):
-        fit_terms(driven(exact, exact.velocity), "inertia,damping,directional-damping", BAND_HZ)
+        fit_terms(
+            driven(exact, exact.velocity_rad_s), "inertia,damping,directional-damping", BAND_HZ
+        )
 
 
 def test_an_offset_needs_a_band_from_zero(exact):
     with pytest.raises(ValueError, match=r"begins at 0.15 Hz; begin the band at 0 Hz"):
-        fit_terms(driven(exact, exact.velocity), "damping,offset", (0.15, 20.0))
+        fit_terms(driven(exact, exact.velocity_rad_s), "damping,offset", (0.15, 20.0))
 
 
 def test_a_term_that_the_motion_never_shows_is_named():
     n = 5000
     position = np.linspace(0.0, 1.0, n)
-    motion = motion_from_position(position**2, position, RATE_HZ, 60.0)
+    motion = wideband_from_angle(position**2, position, RATE_HZ, 60.0)
     with pytest.raises(ValueError, match="damping- is zero throughout"):
         fit_terms(motion, "stiffness,damping-", BAND_HZ)

@@ -1,4 +1,4 @@
-"""Effort and motion, wide-band, before any term is computed.
+"""Torque and motion, wide-band, before any term is computed.
 
 Terms such as sign(v), θ³ or max(v, 0) bend the signal, so they must see it as it was. Only noise
 far above the band of the fit is taken away first, by one zero-phase low-pass F on every signal
@@ -6,13 +6,9 @@ alike: the equation keeps its coefficients (see `estimation.bandlimited`). Deriv
 the frequency domain, where they are exact up to that low-pass:
 
     F(x^(k)) <-> (j 2 pi f)^k / (1 + (f / wide)^8) X(f)
-
-The arrays carry no unit of their own. A joint has N·m and rad, an axis N and m, a circuit V.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import fft, signal
@@ -21,6 +17,7 @@ from rigidimeter.estimation.bandlimited import zero_phase_band
 from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE
 from rigidimeter.estimation.signals import (
     Array,
+    Signals,
     grid_rate_hz,
     kinematics,
     motion_channels,
@@ -29,57 +26,38 @@ from rigidimeter.estimation.signals import (
 )
 from rigidimeter.records import Epoch
 
-__all__ = ["Motion", "banded", "motion_from_epoch", "motion_from_position", "split"]
+__all__ = ["banded", "wideband_from_angle", "wideband_signals"]
 
 WIDE_OVER_BAND = 3.0
 """How far above the band the noise is cut before a term bends the signal."""
 
 
-@dataclass(frozen=True)
-class Motion:
-    """Effort (torque, force, voltage) and motion on one uniform grid, wide-band.
-
-    Attributes
-    ----------
-    effort, position, velocity, acceleration : arrays, shape (n,)
-        Effort is what drives the motion: positive toward positive position.
-    rate_hz : float
-    """
-
-    effort: Array
-    position: Array
-    velocity: Array
-    acceleration: Array
-    rate_hz: float
-
-    @property
-    def duration_s(self) -> float:
-        """How long it lasts."""
-        return self.effort.size / self.rate_hz
-
-
-def motion_from_position(effort: Array, position: Array, rate_hz: float, wide_hz: float) -> Motion:
-    """Differentiate a sampled position, and cut effort and motion alike at `wide_hz`.
+def wideband_from_angle(
+    torque_nm: Array, angle_rad: Array, rate_hz: float, wide_hz: float
+) -> Signals:
+    """Differentiate a sampled angle, and cut torque and motion alike at `wide_hz`.
 
     Parameters
     ----------
-    effort, position : arrays, shape (n,)
+    torque_nm, angle_rad : arrays, shape (n,)
     rate_hz : float
         Of both.
     wide_hz : float
         Where the low-pass has half its gain, well above the band of the fit; at or above half the
         rate nothing is cut.
     """
-    return Motion(
-        effort=_derivative(effort, 0, rate_hz, wide_hz),
-        position=_derivative(position, 0, rate_hz, wide_hz),
-        velocity=_derivative(position, 1, rate_hz, wide_hz),
-        acceleration=_derivative(position, 2, rate_hz, wide_hz),
+    return Signals(
+        time_s=np.arange(angle_rad.size) / rate_hz,
+        torque_nm=_derivative(torque_nm, 0, rate_hz, wide_hz),
+        acceleration_rad_s2=_derivative(angle_rad, 2, rate_hz, wide_hz),
+        velocity_rad_s=_derivative(angle_rad, 1, rate_hz, wide_hz),
+        angle_rad=_derivative(angle_rad, 0, rate_hz, wide_hz),
         rate_hz=rate_hz,
+        band_hz=(0.0, min(wide_hz, rate_hz / 2)),
     )
 
 
-def motion_from_epoch(epoch: Epoch, high_hz: float) -> Motion:
+def wideband_signals(epoch: Epoch, high_hz: float) -> Signals:
     """Bring the channels of an epoch onto one grid, for a band that ends at `high_hz`.
 
     A measured velocity is used where there is one.
@@ -89,34 +67,20 @@ def motion_from_epoch(epoch: Epoch, high_hz: float) -> Motion:
     slowest = min(channel.rate_hz for channel in used)
     wide_hz = max(high_hz, min(WIDE_OVER_BAND * high_hz, USABLE_FRACTION_OF_RATE * slowest))
     time_s = uniform_grid(used, rate_hz)
-    effort = spline(epoch.channels["torque_nm"])(time_s)
+    torque = spline(epoch.channels["torque_nm"])(time_s)
     if "velocity_rad_s" not in epoch.channels:
-        position = spline(epoch.channels["angle_rad"])(time_s)
-        return motion_from_position(effort, position, rate_hz, wide_hz)
+        angle = spline(epoch.channels["angle_rad"])(time_s)
+        return wideband_from_angle(torque, angle, rate_hz, wide_hz)
     angle, velocity, acceleration = kinematics(epoch, time_s)
-    return Motion(
-        effort=_derivative(effort, 0, rate_hz, wide_hz),
-        position=_derivative(angle, 0, rate_hz, wide_hz),
-        velocity=_derivative(velocity, 0, rate_hz, wide_hz),
-        acceleration=_derivative(acceleration, 0, rate_hz, wide_hz),
+    return Signals(
+        time_s=time_s,
+        torque_nm=_derivative(torque, 0, rate_hz, wide_hz),
+        acceleration_rad_s2=_derivative(acceleration, 0, rate_hz, wide_hz),
+        velocity_rad_s=_derivative(velocity, 0, rate_hz, wide_hz),
+        angle_rad=_derivative(angle, 0, rate_hz, wide_hz),
         rate_hz=rate_hz,
+        band_hz=(0.0, min(wide_hz, rate_hz / 2)),
     )
-
-
-def split(motion: Motion, fraction: float) -> tuple[Motion, Motion]:
-    """Cut a motion into its first part and the rest."""
-    cut = round(fraction * motion.effort.size)
-    first, rest = (
-        Motion(
-            motion.effort[part],
-            motion.position[part],
-            motion.velocity[part],
-            motion.acceleration[part],
-            motion.rate_hz,
-        )
-        for part in (slice(0, cut), slice(cut, None))
-    )
-    return first, rest
 
 
 def banded(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> Array:
