@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import hypothesis
 import pytest
+from tests.lateness import PRESENT, LatenessProbe, run_beside_probe
 
 from rigidimeter.cli.main import main
 from rigidimeter.settings import parse_settings
@@ -64,11 +65,33 @@ def rigidimeter(monkeypatch, capsys) -> Callable[..., Ran]:
     return run
 
 
-REALTIME = ("tests/wire/", "tests/faults/test_faults_", "tests/faults/test_realtime_")
+REALTIME = {
+    "tests/wire/": {"priority": 10},
+    "tests/faults/test_faults_processes": {},  # true processes, as in life
+    "tests/faults/test_faults_": {"priority": 10, "resolves_s": 0.02},
+    "tests/faults/test_realtime_": {"resolves_s": 0.2},
+}
+"""What keeps real time, the first that fits: priority and what can be resolved, see `lateness`."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what keeps real time: other work on the same processors would make it late."""
     for item in items:
-        if any(part in item.path.as_posix() for part in REALTIME):
-            item.add_marker(pytest.mark.realtime)
+        case = getattr(item, "callspec", None)
+        if case is not None and case.params.get("rig") == "virtual":
+            continue  # on a simulated clock
+        for part, options in REALTIME.items():
+            if part in item.path.as_posix():
+                item.add_marker(pytest.mark.realtime(**options))
+                break
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    return run_beside_probe(item, nextitem)
+
+
+@pytest.fixture
+def lateness() -> LatenessProbe:
+    """Give the probe that runs beside this test."""
+    return PRESENT[0]

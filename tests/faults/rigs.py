@@ -6,21 +6,19 @@
     rdt_ascii      `AtiRdt` over UDP at 1 kHz and `AsciiDrive` on a pseudo-terminal, in real time
 
 On the wires the peers' threads share the process with the loop, which makes it later than it would
-be alone. So every bound in real time is that of the settings plus `SLACK_S` plus the largest
-lateness that the trial itself recorded; on the virtual rig nothing is added. The threads ask for a
-real-time priority, as the loop of a true rig does, so that other programs disturb them less; where
-the arm's own trace shows that they stood still all the same, the trial says nothing about the rig
-and is run again (`DISTURBED_S`, and `conftest`).
+be alone. So every bound in real time is that of the settings plus `SLACK_S` plus the worst lateness
+of the probe beside the test (`tests.lateness`); on the virtual rig nothing is added. Tests on wires
+run at a real-time priority, as the loop of a true rig does, so that other programs disturb them
+less.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-import os
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -46,9 +44,6 @@ RIGS = ("virtual", *WIRES)
 
 SLACK_S = 0.03
 """What a busy machine may add on a wire: three peers' threads and a loop in one process."""
-
-DISTURBED_S = 0.02
-"""The sensor's thread looks at the arm every millisecond: a longer gap is the machine's doing."""
 
 JOINT = JointDynamics(0.0045, 0.1368, 1.751)
 
@@ -104,9 +99,6 @@ CANOPEN_DRIVE: dict[str, Any] = {
 ASCII_DRIVE: dict[str, Any] = {"counts_per_turn": 360_000.0}
 
 _channels = itertools.count()
-
-stood_still: list[float] = []
-"""The longest gap in the trace of each arm since this was last cleared."""
 
 
 class Wrong(NamedTuple):
@@ -373,21 +365,7 @@ def bench(name: str, connected: bool = True, **tables: Any) -> Iterator[Bench]:
         inner = SimulatedRig(settings.rig, subject, np.random.default_rng(1))
         yield Bench(name, settings, VirtualClock(rate_hz), SpoiledRig(inner))
         return
-    with _priority():
-        yield from _on_wires(name, settings, connected)
-
-
-@contextmanager
-def _priority() -> Iterator[None]:
-    """Ask for a real-time priority, which threads that are started inherit."""
-    before = os.sched_getscheduler(0), os.sched_getparam(0)
-    with suppress(OSError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
-    try:
-        yield
-    finally:
-        with suppress(OSError):
-            os.sched_setscheduler(0, *before)
+    yield from _on_wires(name, settings, connected)
 
 
 def _on_wires(name: str, settings: Settings, connected: bool) -> Iterator[Bench]:
@@ -421,8 +399,6 @@ def _on_wires(name: str, settings: Settings, connected: bool) -> Iterator[Bench]
                 made.facts = configured(rig)
             yield made
         finally:
-            seen_s = [at_s for at_s, _, _ in arm.trace]
-            stood_still.append(max(np.diff(seen_s), default=0.0))
             try:
                 rig.close()
             finally:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from tests.faults.rigs import ASCII, SLACK_S, Bench, Wrong
+from tests.lateness import PRESENT
 
 from rigidimeter.acquisition import run_session
 from rigidimeter.acquisition.run_states import NOTHING, Order
@@ -102,13 +104,14 @@ class Trial:
     disabled_s: float
     powered: bool
     written: Any
+    began_s: float
 
     @property
     def slack_s(self) -> float:
         """What scheduling may have added: nothing on a simulated clock."""
         if self.bench.virtual:
             return 1e-9
-        return SLACK_S + float(self.samples["lateness_s"].max())
+        return SLACK_S + PRESENT[0].worst_s(self.began_s)
 
     @property
     def tick_s(self) -> float:
@@ -179,6 +182,7 @@ def run(
     tap = Tap(bench, acts)
     writer = SessionWriter(folder, settings, [], {"session": 1}, virtual=bench.virtual)
     result, error = None, None
+    began_s = time.monotonic()
     try:
         result = run_session(
             protocol, settings, tap, bench.clock, sink(writer), supervision=desk, **options
@@ -201,6 +205,7 @@ def run(
         tap.disabled_s,
         bench.powered,
         np.array(tap.written),
+        began_s,
     )
 
 

@@ -18,6 +18,8 @@ import time
 from pathlib import Path
 from typing import Any, Self
 
+from tests.lateness import ordinary_priority, same_priority
+
 __all__ = ["EmulatedBench"]
 
 ANSWER_S = 10.0
@@ -58,9 +60,11 @@ class EmulatedBench:
             stderr=self._errors,
             bufsize=0,
             start_new_session=True,  # Ctrl-C in a test run is for the test run
+            preexec_fn=ordinary_priority,
         )
         try:
             self.ready = self._answer("start", START_S)
+            same_priority(self.pid)
         except BaseException:
             self.close()
             raise

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 import can
 import canopen
 import pytest
+from tests.lateness import ordinary_priority, same_priority
 
 from rigidimeter.devices.base import DeviceError, MotionSample
 from rigidimeter.devices.cia402.drive import Cia402Drive, Cia402Settings
@@ -254,7 +255,7 @@ def test_what_only_a_comparison_shows_is_passed_on_to_the_guard(wire, name):
         assert after.velocity_rad_s == pytest.approx(-0.5, abs=0.01)
 
 
-def test_a_quick_stop_follows_the_ramp_and_stays(wire):
+def test_a_quick_stop_follows_the_ramp_and_stays(wire, lateness):
     drive = wire.ready(quick_stop_rad_s2=5.0)
     _run(drive, 2.0, for_s=0.5)
     began_s = time.monotonic()
@@ -262,7 +263,8 @@ def test_a_quick_stop_follows_the_ramp_and_stays(wire):
     drive.stop()
     assert _wait(lambda: wire.peer.state()["stop_rest_s"] > began_s)
     stop = wire.peer.state()
-    assert stop["stop_rest_s"] - stop["stop_began_s"] == pytest.approx(2.0 / 5.0, abs=0.08)
+    late_s = lateness.worst_s(began_s)
+    assert stop["stop_rest_s"] - stop["stop_began_s"] == pytest.approx(0.4, abs=0.05 + late_s)
     assert drive.write(1.0) == 0.0
     _run(drive, 1.0, for_s=0.2, until=lambda _: False)
     assert abs(wire.peer.state()["velocity_rad_s"]) < 0.01
@@ -402,7 +404,7 @@ def test_a_drive_left_running_by_a_killed_program_does_not_move_on_enable(wire):
 @pytest.mark.parametrize(
     ("deadline_s", "reason"), [(0.15, "command deadline passed"), (0.0, "heartbeat lost")]
 )
-def test_a_loop_that_hangs_leaves_the_drive_to_stop_itself(wire, deadline_s, reason):
+def test_a_loop_that_hangs_leaves_the_drive_to_stop_itself(wire, lateness, deadline_s, reason):
     drive = wire.ready(command_deadline_s=deadline_s)
     _run(drive, 1.0, for_s=0.3)
     hung_s = time.monotonic()
@@ -410,7 +412,7 @@ def test_a_loop_that_hangs_leaves_the_drive_to_stop_itself(wire, deadline_s, rea
     stop = wire.peer.state()
     assert stop["stop_reason"] == reason
     within_s = deadline_s or SLACK["drive_watchdog_s"]
-    assert stop["stop_began_s"] - hung_s < within_s + 0.1
+    assert stop["stop_began_s"] - hung_s < within_s + 0.05 + lateness.worst_s(hung_s)
     print(f"\n{reason}: braking {stop['stop_began_s'] - hung_s:.3f} s after the last command")
     # A loop that comes back learns it, and does not bring the drive back.
     sample = _run(drive, 1.0)
@@ -434,16 +436,17 @@ def test_a_loop_that_wakes_up_does_not_cancel_the_drives_own_stop(wire, hears_it
     assert len(enabled) == 1
 
 
-def test_the_loop_never_waits_for_a_dead_drive(wire):
+def test_the_loop_never_waits_for_a_dead_drive(wire, lateness):
     drive = wire.ready()
     wire.peer.misbehave("die")
-    took = []
+    took, began_s = [], time.monotonic()
     for _ in range(200):
         start = time.perf_counter()
         drive.read()
         drive.write(0.1)
         took.append(time.perf_counter() - start)
     assert sorted(took)[len(took) // 2] < 1e-3
+    assert max(took) < 0.01 + lateness.worst_s(began_s)
     assert drive.write(float("inf")) == 0.0
 
 
@@ -558,10 +561,12 @@ def started() -> Iterator[Callable[..., subprocess.Popen[str]]]:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
+            preexec_fn=ordinary_priority,
         )
         processes.append(process)
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
+        same_priority(process.pid)
         return process
 
     yield start
@@ -570,7 +575,7 @@ def started() -> Iterator[Callable[..., subprocess.Popen[str]]]:
         process.communicate()
 
 
-def test_a_drive_in_another_process_runs_and_is_missed_when_it_is_killed(started):
+def test_a_drive_in_another_process_runs_and_is_missed_when_it_is_killed(started, lateness):
     port = _port()
     peer = started(PEER, GROUP, port)
     settings = Cia402Settings(
@@ -588,13 +593,15 @@ def test_a_drive_in_another_process_runs_and_is_missed_when_it_is_killed(started
         peer.kill()
         killed_s = time.monotonic()
         assert Cause(_run(drive, 0.5).cause) is Cause.DRIVE_LOST
-        assert time.monotonic() - killed_s < 0.2 + 0.3
+        assert time.monotonic() - killed_s < 0.2 + 0.05 + lateness.worst_s(killed_s)
     finally:
         drive.close()
 
 
 @pytest.mark.parametrize(("blow", "deadline_s"), [(signal.SIGKILL, 0.0), (signal.SIGSTOP, 0.15)])
-def test_a_killed_or_stopped_program_leaves_the_drive_to_stop_itself(started, blow, deadline_s):
+def test_a_killed_or_stopped_program_leaves_the_drive_to_stop_itself(
+    started, lateness, blow, deadline_s
+):
     port = _port()
     peer = Cia402Peer(_arm(), interface="udp_multicast", channel=GROUP, port=port)
     try:
@@ -609,7 +616,7 @@ def test_a_killed_or_stopped_program_leaves_the_drive_to_stop_itself(started, bl
             f"\n{blow.name}: braking after {stop['stop_began_s'] - struck_s:.3f} s, at rest after "
             f"{stop['stop_rest_s'] - struck_s:.3f} s; watchdog {within_s:g} s"
         )
-        assert stop["stop_began_s"] - struck_s < within_s + 0.1
+        assert stop["stop_began_s"] - struck_s < within_s + 0.05 + lateness.worst_s(struck_s)
         assert abs(stop["velocity_rad_s"]) < 0.02
     finally:
         peer.close()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import math
-import os
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -60,18 +59,6 @@ def settings(rate_hz: float, **guard: float) -> Settings:
             "loop": {"missed_in_a_row": 50, "stall_s": 0.09},
         }
     )
-
-
-@pytest.fixture(autouse=True)
-def _priority() -> Iterator[None]:
-    """Run in real time where the system grants it."""
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))
-    except PermissionError:
-        yield
-        return
-    yield
-    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 @pytest.fixture(scope="module")

@@ -136,10 +136,12 @@ def test_what_the_sensor_says_of_itself_is_kept(peer, sensor_of):
     assert facts.values["torque_unit"] == "Nm"
 
 
-def test_configuring_waits_for_the_first_sample_and_closing_stops_the_stream(peer, sensor):
+def test_configuring_waits_for_the_first_sample_and_closing_stops_the_stream(
+    peer, sensor, lateness
+):
     sample = sensor.read()
     assert sample.sequence >= 1
-    assert abs(time.monotonic() - sample.time_s) < 0.5
+    assert abs(time.monotonic() - sample.time_s) < 0.05 + lateness.worst_s(sample.time_s)
     sensor.close()
     sensor.close()
     time.sleep(0.05)
@@ -312,7 +314,7 @@ def test_the_sequence_wraps_around_without_loss(arm, sensor_of):
         ("saturated", None, "saturated"),
     ],
 )
-def test_a_sensor_that_cannot_be_used_is_refused(peer, sensor_of, name, value, words):
+def test_a_sensor_that_cannot_be_used_is_refused(peer, sensor_of, lateness, name, value, words):
     peer.misbehave(name, value)
     sensor = sensor_of(peer, timeout_s=0.3)
     if words is None:
@@ -322,7 +324,7 @@ def test_a_sensor_that_cannot_be_used_is_refused(peer, sensor_of, name, value, w
     with pytest.raises(DeviceError, match=words) as refused:
         sensor.configure()
     assert str(refused.value).startswith("torque sensor at 127.0.0.1: ")
-    assert time.monotonic() - began_s < 2.0
+    assert time.monotonic() - began_s < 1.0 + lateness.worst_s(began_s)
     peer.behave()
     sensor.configure()  # and it can be used when it is right again
 

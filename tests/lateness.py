@@ -1,0 +1,175 @@
+"""How late the machine wakes a process, measured beside each test that keeps time.
+
+A test by the machine's clock is as exact as the machine is. Beside every test marked `realtime` a
+small process sleeps to absolute deadlines, one a millisecond, at the priority of the test itself,
+and notes how late it was woken. A test that compares a measured time with a bound allows what the
+probe saw in addition:
+
+    assert took_s < 0.4 + lateness.worst_s(began_s)
+
+A machine that stood still for longer than a test can resolve says nothing about the software, so
+the test is repeated. If that happens every time, the test fails, and says that the machine is too
+busy to judge. That holds for a test that failed while the machine stood still, and for one that
+passed with so wide a bound that it would have passed whatever happened. The probe is a process and
+not a thread: what the software under test does to its own interpreter must not widen a bound.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Self
+
+import pytest
+from _pytest.runner import runtestprotocol
+
+ATTEMPTS = 4
+ROWS = 20_000
+NOTED_S = 0.0005
+"""Less than that is not noted."""
+
+PROBE = """
+import mmap, os, struct, sys, time
+view = mmap.mmap(int(sys.argv[1]), 0)
+rows, noted_s = int(sys.argv[2]), float(sys.argv[3])
+row, next_s = 0, time.monotonic()
+parent = os.getppid()
+while os.getppid() == parent:
+    next_s += 0.001
+    struct.pack_into("qd", view, 0, row, next_s)
+    time.sleep(max(next_s - time.monotonic(), 0.0))
+    now_s = time.monotonic()
+    if now_s - next_s > noted_s:
+        struct.pack_into("dd", view, 16 + 16 * (row % rows), next_s, now_s)
+        row += 1
+        next_s = now_s
+"""
+
+
+class LatenessProbe:
+    """A process that notes when it should have been woken, and when it was.
+
+    Attributes
+    ----------
+    allowed_s : float
+        By how much a test widened its bounds at most.
+    """
+
+    def __enter__(self) -> Self:
+        self.allowed_s = 0.0
+        self._file = tempfile.TemporaryFile()
+        self._file.truncate(16 + 16 * ROWS)
+        self._view = mmap.mmap(self._file.fileno(), 0)
+        descriptor = self._file.fileno()
+        command = [sys.executable, "-S", "-c", PROBE, str(descriptor), str(ROWS), str(NOTED_S)]
+        self._process = subprocess.Popen(command, pass_fds=[descriptor])
+        until_s = time.monotonic() + 30.0
+        while not self._due_s():
+            assert time.monotonic() < until_s, "the lateness probe did not start"
+            time.sleep(0.001)
+        self._began_s = time.monotonic()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.kill()
+        self._process.wait()
+        self._view.close()
+        self._file.close()
+
+    def _due_s(self) -> float:
+        return float(struct.unpack_from("d", self._view, 8)[0])
+
+    def worst_s(self, since_s: float) -> float:
+        """Return the longest lateness since a time of `time.monotonic`, to widen a bound by."""
+        worst_s = self._worst_s(since_s)
+        self.allowed_s = max(self.allowed_s, worst_s)
+        return worst_s
+
+    def _worst_s(self, since_s: float) -> float:
+        (count,) = struct.unpack_from("q", self._view, 0)
+        worst_s = time.monotonic() - self._due_s()  # it may be late just now
+        for row in range(min(count, ROWS)):
+            due_s, woken_s = struct.unpack_from("dd", self._view, 16 + 16 * row)
+            if woken_s > since_s:
+                worst_s = max(worst_s, woken_s - max(due_s, since_s))
+        return max(worst_s, 0.0)
+
+    def stood_still_s(self) -> float:
+        """Return the longest lateness of all, without widening a bound by it."""
+        return self._worst_s(self._began_s)
+
+
+@contextmanager
+def _priority(priority: int) -> Iterator[None]:
+    """Ask for a real-time priority, as a rig's loop does; threads and processes inherit it."""
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    if priority:
+        with suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            os.sched_setscheduler(0, *before)
+
+
+def ordinary_priority() -> None:
+    """Give up a real-time priority; for the `preexec_fn` of a process that a test starts.
+
+    While it loads, it would hold up all that has the same priority.
+    """
+    with suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+def same_priority(pid: int) -> None:
+    """Give all threads of a process that has started the priority of this one."""
+    for thread in Path(f"/proc/{pid}/task").iterdir():
+        with suppress(OSError):
+            os.sched_setscheduler(int(thread.name), os.sched_getscheduler(0), os.sched_getparam(0))
+
+
+PRESENT: list[LatenessProbe] = []
+"""The probe beside the test that runs, for helpers that are no fixtures."""
+
+
+def run_beside_probe(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    """Run a test marked `realtime` beside a probe; repeat it where the machine stood still."""
+    marker = item.get_closest_marker("realtime")
+    if marker is None:
+        return None
+    resolves_s = marker.kwargs.get("resolves_s", 0.05)
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    stood_still_s: list[float] = []
+    reports: list[Any] = []
+    for _ in range(ATTEMPTS):
+        with _priority(marker.kwargs.get("priority", 0)), LatenessProbe() as probe:
+            PRESENT[:] = [probe]
+            item._initrequest()  # type: ignore[attr-defined]
+            reports = runtestprotocol(item, nextitem=nextitem, log=False)
+            failed = any(report.failed for report in reports)
+            stood_still_s.append(probe.stood_still_s() if failed else probe.allowed_s)
+        if stood_still_s[-1] <= resolves_s:
+            break
+    else:
+        late = ", ".join(f"{1e3 * late_s:.0f}" for late_s in stood_still_s)
+        why = (
+            f"the machine is too busy to judge: it woke a sleeping process {late} ms late in "
+            f"{ATTEMPTS} attempts, and this test resolves {1e3 * resolves_s:.0f} ms"
+        )
+        for report in reports:
+            if report.when == "call":
+                report.outcome = "failed"
+                report.longrepr = f"{report.longrepr}\n\n{why}" if report.longrepr else why
+    for report in reports:
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
