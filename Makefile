@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test alone check bench bench-loop hazards mutation clean
+.PHONY: install demo test check bench bench-loop hazards mutation clean
 
 install: $(STAMP)
 
@@ -21,12 +21,7 @@ demo: install
 
 test: install
 	$(BIN)/python -m pytest -n auto -m 'not slow and not realtime'
-	$(BIN)/python -m pytest -n 2 -m 'not slow and realtime' || $(MAKE) --no-print-directory alone
-
-# A test by the clock fails where the machine gives its processors to others. What failed two at a
-# time must hold alone, with the same bounds.
-alone:
-	$(BIN)/python -m pytest --last-failed --last-failed-no-failures none -m 'not slow and realtime'
+	$(BIN)/python -m pytest -n 2 -m 'not slow and realtime'
 
 check: install
 	$(BIN)/ruff format --check .

@@ -22,10 +22,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import loop
-from rigidimeter.acquisition import run_session
 from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Recording
 from rigidimeter.acquisition.processes.supervise import LoopSide, LoopTarget, Realtime, supervise
+from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.devices.rigfile import load_rig
 from rigidimeter.experiment import Protocol, plan
 from rigidimeter.recording import read_session

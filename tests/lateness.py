@@ -57,11 +57,19 @@ while os.getppid() == parent:
 class LatenessProbe:
     """A process that notes when it should have been woken, and when it was.
 
+    Parameters
+    ----------
+    ordinary : bool
+        Whether it has no real-time priority, whatever this process has.
+
     Attributes
     ----------
     allowed_s : float
         By how much a test widened its bounds at most.
     """
+
+    def __init__(self, ordinary: bool = False) -> None:
+        self._ordinary = ordinary
 
     def __enter__(self) -> Self:
         self.allowed_s = 0.0
@@ -70,7 +78,11 @@ class LatenessProbe:
         self._view = mmap.mmap(self._file.fileno(), 0)
         descriptor = self._file.fileno()
         command = [sys.executable, "-S", "-c", PROBE, str(descriptor), str(ROWS), str(NOTED_S)]
-        self._process = subprocess.Popen(command, pass_fds=[descriptor])
+        self._process = subprocess.Popen(
+            command,
+            pass_fds=[descriptor],
+            preexec_fn=ordinary_priority if self._ordinary else None,
+        )
         until_s = time.monotonic() + 30.0
         while not self._due_s():
             assert time.monotonic() < until_s, "the lateness probe did not start"
@@ -147,11 +159,12 @@ def run_beside_probe(item: pytest.Item, nextitem: pytest.Item | None) -> bool | 
     if marker is None:
         return None
     resolves_s = marker.kwargs.get("resolves_s", 0.05)
+    ordinary = marker.kwargs.get("ordinary_probe", False)
     item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
     stood_still_s: list[float] = []
     reports: list[Any] = []
     for _ in range(ATTEMPTS):
-        with _priority(marker.kwargs.get("priority", 0)), LatenessProbe() as probe:
+        with _priority(marker.kwargs.get("priority", 0)), LatenessProbe(ordinary) as probe:
             PRESENT[:] = [probe]
             item._initrequest()  # type: ignore[attr-defined]
             reports = runtestprotocol(item, nextitem=nextitem, log=False)

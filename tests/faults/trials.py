@@ -20,8 +20,8 @@ import numpy as np
 from tests.faults.rigs import ASCII, SLACK_S, Bench, Wrong
 from tests.lateness import PRESENT
 
-from rigidimeter.acquisition import run_session
 from rigidimeter.acquisition.run_states import NOTHING, Order
+from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.experiment import plan
 from rigidimeter.guard import Cause, Reaction
 from rigidimeter.recording import SessionWriter

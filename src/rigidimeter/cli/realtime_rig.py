@@ -74,7 +74,7 @@ def _run(
     approve: Callable[[Mapping[str, Any]], Sequence[str]],
 ) -> None:
     """Set up the rig and run; `approve` refuses it or says which checks were never made."""
-    from rigidimeter.acquisition import run_session
+    from rigidimeter.acquisition.session_run import run_session
 
     try:
         rig.connect()

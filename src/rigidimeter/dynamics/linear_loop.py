@@ -30,8 +30,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.fft import irfft, next_fast_len, rfft
 
 from rigidimeter.control import admittance, butterworth_lowpass
 from rigidimeter.dynamics.joint import JointDynamics, median_joint
@@ -259,10 +259,12 @@ class _Circle(NamedTuple):
     loop: OpenLoop
 
     def to(self, record: Array) -> Complex:
-        return np.asarray(rfft(record * self.damping, self.length))
+        return np.asarray(scipy.fft.rfft(record * self.damping, self.length))
 
     def back(self, spectrum: Complex) -> Array:
-        return np.asarray(irfft(spectrum, self.length)[: self.damping.size] / self.damping)
+        return np.asarray(
+            scipy.fft.irfft(spectrum, self.length)[: self.damping.size] / self.damping
+        )
 
 
 @lru_cache(maxsize=8)
@@ -274,7 +276,7 @@ def _on_circle(loop: Loop, n: int, rate_hz: float, times: int) -> _Circle:
     value for a record on its own, 4e-11 for twice the length. An estimate asks for the same loop
     many times.
     """
-    length = int(next_fast_len(times * n, real=True))
+    length = int(scipy.fft.next_fast_len(times * n, real=True))
     radius = _DIGITS * times / (times + 1) / length
     angle = 2.0 * np.pi * np.arange(length // 2 + 1) / length
     damping = np.exp(-radius * np.arange(n))

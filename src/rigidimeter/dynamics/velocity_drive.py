@@ -24,8 +24,8 @@ from types import ModuleType
 from typing import NamedTuple, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 __all__ = ["ArmMotion", "Drive", "DriveModel", "DriveState", "drive", "drive_step"]
 
@@ -167,7 +167,7 @@ class DriveModel:
         (a11, a12), (a21, a22) = step[:2, :2]
         denominator = [1.0, -(a11 + a22), a11 * a22 - a12 * a21]
         acceleration, velocity = (
-            np.asarray(lfilter([0.0, first, second], denominator, command_rad_s))
+            np.asarray(scipy.signal.lfilter([0.0, first, second], denominator, command_rad_s))
             for first, second in (
                 (push[0], a12 * push[1] - a22 * push[0]),
                 (push[1], a21 * push[0] - a11 * push[1]),

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from rigidimeter.acquisition import DeadlineClock, SessionResult, SimulatedClock, run_session
+from rigidimeter.acquisition import DeadlineClock, SimulatedClock
+from rigidimeter.acquisition.session_run import SessionResult, run_session
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.documents import read_json, write_json
 from rigidimeter.experiment import PlannedEpoch, plan

@@ -2,19 +2,17 @@
 
 import json
 import math
-import time
 
 import numpy as np
 import pytest
 
 from rigidimeter.acquisition import (
     ControlLoop,
-    DeadlineClock,
     SimulatedClock,
     follow,
     ramp_to_rest,
-    run_session,
 )
+from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.devices import Reading, SimulatedRig
 from rigidimeter.experiment import plan
 from rigidimeter.recording import SessionWriter
@@ -151,15 +149,6 @@ def test_progress_reaches_the_end(tmp_path):
     reached = []
     run(SpoiledRig(lambda r: r), tmp_path / "s", progress=reached.append)
     assert reached == [1.0, 2.0, 3.0, 4.0]
-
-
-def test_the_real_clock_waits_for_absolute_deadlines():
-    clock = DeadlineClock()
-    start = time.monotonic()
-    times = [clock.wait_until(0.01 * k) for k in range(1, 11)]
-    assert time.monotonic() - start >= 0.1 - 1e-3
-    assert all(t >= 0.01 * k for k, t in enumerate(times, start=1))
-    assert clock.wait_until(0.0) >= 0.1  # a deadline in the past returns at once
 
 
 def test_a_rig_without_power_does_not_move():

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition import SimulatedClock, run_session
+from rigidimeter.acquisition import SimulatedClock
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order
+from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.experiment import plan, prbs_nm
 from rigidimeter.guard import Cause

@@ -184,6 +184,7 @@ def test_a_loop_held_up_between_two_clocks_was_not_suspended(shared_status, ring
     assert supervision.cause(0.0) == Cause.NONE
 
 
+@pytest.mark.realtime(resolves_s=0.5)
 def test_the_two_clocks_are_those_of_the_machine(shared_status, rings):
     real = SharedStatus(shared_status.memory)
     real.beat(Role.CONSOLE)

@@ -1,0 +1,76 @@
+"""The probe beside the tests by the clock: it sees a machine that stands still, and says so."""
+
+import os
+import signal
+import time
+
+import pytest
+from tests import lateness
+from tests.lateness import ATTEMPTS, LatenessProbe
+
+
+def test_a_probe_that_was_held_up_says_for_how_long():
+    with LatenessProbe() as probe:
+        began_s = time.monotonic()
+        os.kill(probe._process.pid, signal.SIGSTOP)
+        time.sleep(0.2)
+        assert probe.worst_s(began_s) > 0.15  # it is late just now
+        os.kill(probe._process.pid, signal.SIGCONT)
+        while probe.stood_still_s() < 0.15:
+            time.sleep(0.001)
+        assert probe.allowed_s > 0.15
+        assert time.monotonic() - began_s >= probe.stood_still_s()
+
+
+class Still(LatenessProbe):
+    """Beside a machine that stands still for 0.2 s in the first so many attempts."""
+
+    left = 0
+
+    def stood_still_s(self):
+        return 0.2 if self.left >= 0 else 0.0
+
+    def worst_s(self, since_s):
+        self.allowed_s = self.stood_still_s()
+        return self.allowed_s
+
+    def __enter__(self):
+        type(self).left -= 1
+        self.allowed_s, self._began_s = 0.0, 0.0
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("body", "still", "passes", "runs"),
+    [
+        ("assert True", 9, True, 1),  # it did not ask how late the machine was
+        ("assert PRESENT[0].worst_s(0.0) < 9", 2, True, 3),
+        ("assert PRESENT[0].worst_s(0.0) < 9", 9, False, ATTEMPTS),
+        ("assert False", 9, False, ATTEMPTS),
+        ("assert False", 0, False, 1),
+    ],
+)
+def test_a_machine_that_stood_still_is_no_judge(pytester, monkeypatch, body, still, passes, runs):
+    monkeypatch.setattr(lateness, "LatenessProbe", Still)
+    monkeypatch.setattr(Still, "left", still)
+    pytester.makeconftest(
+        "from tests.lateness import run_beside_probe\n"
+        "def pytest_runtest_protocol(item, nextitem):\n"
+        "    return run_beside_probe(item, nextitem)\n"
+    )
+    pytester.makepyfile(
+        "import pytest\n"
+        "from tests.lateness import PRESENT\n"
+        "@pytest.mark.realtime\n"
+        "def test_it():\n"
+        "    with open('ran', 'a') as file:\n"
+        "        file.write('x')\n"
+        f"    {body}\n"
+    )
+    ran = pytester.runpytest_inprocess("-p", "no:cacheprovider", "-W", "ignore")
+    ran.assert_outcomes(passed=int(passes), failed=int(not passes))
+    assert (pytester.path / "ran").read_text() == "x" * runs
+    assert ("too busy to judge" in ran.stdout.str()) == (runs == ATTEMPTS)
