@@ -1,7 +1,9 @@
 """A format from outside the package: one function and one entry in the list of readers."""
 
 import json
+import re
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,3 +89,34 @@ def test_a_format_that_needs_another_package_says_which(monkeypatch, path):
     )
     with pytest.raises(UserError, match=r"pip install 'rigidimeter\[toys\]'"):
         recording.read(path)
+
+
+ROOT = Path(__file__).parents[4]
+HOW_TO = ROOT / "docs" / "how-to" / "add-a-file-format.md"
+
+
+def test_the_example_of_the_document_is_read_by_the_command_line(tmp_path, rigidimeter):
+    (example,) = re.findall(r"```python\n(.*?)```", HOW_TO.read_text("utf-8"), re.S)
+    (tmp_path / "amplifier.py").write_text(example)
+    columns = joint_motion()
+    values = np.column_stack([columns[name] for name in NAMES]).astype("<f8")
+    (tmp_path / "r.amp").write_bytes(",".join(NAMES).encode() + b"\n" + values.tobytes())
+    known = list(READERS)
+    out = tmp_path / "out.json"
+    try:
+        ran = rigidimeter(
+            "--load", tmp_path / "amplifier.py", "estimate", tmp_path / "r.amp", "--json", out
+        )
+    finally:
+        READERS[:] = known
+    assert ran.status == 0, ran.err
+    assert json.loads(out.read_text())["epochs"][0]["outcome"] == "included"
+
+
+def test_the_document_on_reading_lists_every_format():
+    text = " ".join(
+        (ROOT / "docs" / "how-to" / "read-your-recording.md").read_text("utf-8").split()
+    )
+    for reader in READERS:
+        suffixes = ", ".join(f"`{suffix}`" for suffix in reader.suffixes)
+        assert f"{reader.name}s" + (f" ({suffixes})" if suffixes else "") in text
