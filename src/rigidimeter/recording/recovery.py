@@ -74,27 +74,11 @@ def _close(samples_path: Path, events_path: Path, reason: str) -> Recovery:
     if torn_event:
         _drop_torn_line(events_path)
     with events_path.open("ab", buffering=0) as file:
+        ending = {"time_s": last_time_s, "outcome": "fail", "reason": reason}
         for number, _ in open_epochs:
-            append_event(
-                file,
-                {
-                    "event": "epoch_ended",
-                    "epoch": number,
-                    "time_s": last_time_s,
-                    "outcome": "fail",
-                    "reason": reason,
-                },
-            )
+            append_event(file, {"event": "epoch_ended", "epoch": number, **ending})
         if not any(e.get("event") == "session_ended" for e in events):
-            append_event(
-                file,
-                {
-                    "event": "session_ended",
-                    "time_s": last_time_s,
-                    "outcome": "fail",
-                    "reason": reason,
-                },
-            )
+            append_event(file, {"event": "session_ended", **ending})
     return Recovery(False, n, last_time_s, tuple(label for _, label in open_epochs), torn)
 
 

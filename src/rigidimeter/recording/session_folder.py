@@ -154,49 +154,27 @@ class SessionWriter:
 
     def session_started(self) -> None:
         """Say that the loop runs."""
-        append_event(self._events, {"event": "session_started", "time_s": 0.0})
+        self.event("session_started", time_s=0.0)
 
     def epoch_started(
         self, number: int, label: str, task: str, condition: str, time_s: float, **facts: Any
     ) -> None:
         """Say that an epoch begins, with whatever facts belong to it."""
-        append_event(
-            self._events,
-            {
-                "event": "epoch_started",
-                "epoch": number,
-                "label": label,
-                "task": task,
-                "condition": condition,
-                "time_s": time_s,
-                **facts,
-            },
-        )
+        named = {"epoch": number, "label": label, "task": task, "condition": condition}
+        self.event("epoch_started", **named, time_s=time_s, **facts)
 
     def epoch_ended(
         self, number: int, time_s: float, outcome: Ending, reason: str, **facts: Any
     ) -> None:
         """Close an epoch; its samples are in the file before the event is."""
         self._log.flush()
-        append_event(
-            self._events,
-            {
-                "event": "epoch_ended",
-                "epoch": number,
-                "time_s": time_s,
-                "outcome": outcome,
-                "reason": reason,
-                **facts,
-            },
-        )
+        ending = {"time_s": time_s, "outcome": outcome, "reason": reason}
+        self.event("epoch_ended", epoch=number, **ending, **facts)
 
     def close(self, time_s: float, outcome: Ending, reason: str) -> None:
         """Close the session with its outcome."""
         self._log.close()
-        append_event(
-            self._events,
-            {"event": "session_ended", "time_s": time_s, "outcome": outcome, "reason": reason},
-        )
+        self.event("session_ended", time_s=time_s, outcome=outcome, reason=reason)
         self._events.close()
 
 

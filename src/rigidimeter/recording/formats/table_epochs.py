@@ -48,10 +48,15 @@ from rigidimeter.records import CHANNEL_UNITS, Channel, Epoch, Notice, Task
 __all__ = ["ReadOptions", "epochs_from_table"]
 
 _FEWEST = 2
-_LARGEST_ANGLE_RAD = 2 * math.pi
-_LARGEST_VELOCITY_RAD_S = 50.0
-_LARGEST_EMG_V = 20.0
-"""Amplifiers give at most ±10 V or so; more is another unit."""
+_DEGREES = "degrees: divide by 57.2958 to have rad"
+_PLAUSIBLE: Mapping[str, tuple[float, str]] = {
+    "angle_rad": (2 * math.pi, _DEGREES),
+    "velocity_rad_s": (50.0, f"{_DEGREES}/s"),
+    "velocity_command_rad_s": (50.0, f"{_DEGREES}/s"),
+    "emg_v": (20.0, "microvolts: divide by 1e6 to have V"),
+}
+"""The largest plausible value of a channel, and what a larger one looks like. Amplifiers of EMG
+give at most ±10 V or so."""
 _LARGEST_STEP_S = 0.5
 
 
@@ -271,16 +276,9 @@ def _spoken(standard: str, name: str) -> str:
 def _about_units(source: str, signals: Mapping[str, Signal], step_s: float) -> list[Notice]:
     """Warn of values that only make sense in degrees, in microvolts, or in milliseconds."""
     notices = []
-    for name, signal in signals.items():
-        if name == "angle_rad":
-            limit, right = _LARGEST_ANGLE_RAD, "degrees: divide by 57.2958 to have rad"
-        elif name.endswith("_rad_s"):
-            limit, right = _LARGEST_VELOCITY_RAD_S, "degrees: divide by 57.2958 to have rad/s"
-        elif name == "emg_v":
-            limit, right = _LARGEST_EMG_V, "microvolts: divide by 1e6 to have V"
-        else:
-            continue
-        largest = float(np.max(np.abs(signal.values)))
+    for name in (name for name in signals if name in _PLAUSIBLE):
+        limit, right = _PLAUSIBLE[name]
+        largest = float(np.max(np.abs(signals[name].values)))
         if largest > limit:
             text = f"{source}: {name} reaches {largest:.4g}, which looks like {right}"
             notices.append(Notice("warning", text))
