@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from collections import Counter
 from collections.abc import Sequence
 from importlib import resources
@@ -13,6 +12,7 @@ import jinja2
 from markupsafe import Markup
 
 from rigidimeter import __version__
+from rigidimeter.documents import json_text, write_text
 from rigidimeter.paper.comparison_table import AGREES, DIFFERS, UNPUBLISHED, VERDICTS, Row, Verdict
 from rigidimeter.paper.rows import SECTIONS
 from rigidimeter.reporting.numbers import number
@@ -31,9 +31,7 @@ def tally(rows: Sequence[Row]) -> dict[Verdict, int]:
 
 def ledger_text(rows: Sequence[Row]) -> str:
     """Return ``ledger.json``: a list with one object for each row."""
-    return json.dumps(
-        [row.as_dict() for row in rows], ensure_ascii=False, indent=2, allow_nan=False
-    )
+    return json_text([row.as_dict() for row in rows])
 
 
 def render_page(rows: Sequence[Row], seed: int) -> str:
@@ -84,15 +82,11 @@ def write_ledger(rows: Sequence[Row], out: Path, seed: int) -> Path:
     (out / "figures").mkdir(parents=True, exist_ok=True)
     for row in rows:
         for picture in row.pictures:
-            _write(out / "figures" / f"{picture.name}.svg", picture.svg)
-    _write(out / "ledger.json", ledger_text(rows) + "\n")
+            write_text(out / "figures" / f"{picture.name}.svg", picture.svg)
+    write_text(out / "ledger.json", ledger_text(rows))
     page = out / "paper.html"
-    _write(page, render_page(rows, seed))
+    write_text(page, render_page(rows, seed))
     return page
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _data_uri(svg: str) -> str:

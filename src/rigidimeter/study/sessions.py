@@ -13,13 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording import (
-    ReadOptions,
-    is_session,
-    read_recording,
-    read_session,
-    session_settings,
-)
+from rigidimeter.recording import ReadOptions, is_session, read_recording, session_settings
 from rigidimeter.recording.sample_log import read_events
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES
 from rigidimeter.recording.study_folder import Row, StudyFolder
@@ -185,9 +179,7 @@ def _read(
                 f"{path}: the session was interrupted and never closed; close it with "
                 f"`rigidimeter recover {path}`"
             )
-        epochs, said = read_session(path)
-    else:
-        epochs, said = read_recording(path, ReadOptions())
+    epochs, said = read_recording(path, ReadOptions())
     said = [*said, *_agrees(path, row, condition, epochs, names)]
     tasks = [task_of(epoch, settings or Settings()) for epoch in epochs]
     entry = SessionEntry(
