@@ -63,6 +63,6 @@ def test_intervals_for_a_coloured_residual_are_wider_than_those_for_a_white_one(
     coloured = hac_covariance(np.linalg.inv(A.T @ A), A * residual[:, None])
     textbook = np.std(residual) * np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
     assert coloured.standard_errors[2] > 2.0 * textbook[2]
-    drawn = block_bootstrap(A, A, signals.torque_nm, np.random.default_rng(0), draws=400)
+    drawn = block_bootstrap(A, signals.torque_nm, np.random.default_rng(0), draws=400)
     ratio = np.sqrt(np.diag(drawn.covariance)) / coloured.standard_errors
     assert np.all((ratio > 0.5) & (ratio < 2.0)), ratio

@@ -14,9 +14,14 @@ from rigidimeter.estimation.methods import (
     method_named,
     method_names,
 )
-from rigidimeter.estimation.scores import Cycles, score_epoch, scoring_cycles
+from rigidimeter.estimation.scores import (
+    Cycles,
+    find_motion,
+    score_epoch,
+    scoring_cycles,
+    single_frequency_share,
+)
 from rigidimeter.estimation.signals import Signals
-from rigidimeter.estimation.sinusoid_detection import find_motion, single_frequency_share
 
 __all__ = [
     "METHODS",

@@ -205,7 +205,7 @@ def _interval(
     n, p = regressors.shape
     if settings.intervals == "bootstrap":
         rng = np.random.default_rng(BOOTSTRAP_SEED)
-        drawn = block_bootstrap(regressors, regressors, target, rng, draws=settings.bootstrap_draws)
+        drawn = block_bootstrap(regressors, target, rng, draws=settings.bootstrap_draws)
         return drawn.covariance, drawn.low, drawn.high
     if settings.intervals == "white":
         low, high = signals.band_hz

@@ -1,21 +1,20 @@
-"""How far estimates scatter when the residual is coloured: intervals that hold.
+"""Standard errors and intervals of least squares when the residual is coloured.
 
-An estimate that solves Zᵀ(M − A p) = 0 (Z = A for least squares, else instruments) has
+Least squares solves Aᵀ(M − A p) = 0, so that
 
-    cov p = D S Dᵀ,    D = (ZᵀA)⁻¹,    S = cov Σ z e
+    cov p = D S D,    D = (AᵀA)⁻¹,    S = cov Σ a e
 
 The textbook S = σ² AᵀA takes the residual e for white. Voluntary torque, tremor and drift are not,
-and S then also counts how the scores g = z e go together over time: n times their spectral density
-at frequency zero. Three ways to it:
+and S then also counts how the scores g = a e are correlated over time: n times their spectral
+density at frequency zero. Two ways to it:
 
-- `hac_covariance` without a lag: the mean square of K cosine sums of the scores, all below the
-  frequency K / (2 T). It is positive by construction and has K degrees of freedom, so that
-  t quantiles make up for what little a short epoch knows (Lazarus, Lewis, Stock and Watson 2018,
-  J. Bus. Econ. Stat. 36:541).
-- `hac_covariance` with a lag: Bartlett's kernel (Newey and West 1987), as other programs have it.
-- `block_bootstrap`: solve again and again with blocks of the epoch drawn at random.
+- `hac_covariance`: the mean square of K cosine sums of the scores, all below the frequency
+  K / (2 T). It is positive by construction and has K degrees of freedom, so that t quantiles make
+  up for what little a short epoch knows (Lazarus, Lewis, Stock and Watson 2018, J. Bus. Econ.
+  Stat. 36:541).
+- `block_bootstrap`: solve again and again with blocks of the epoch drawn at random (Künsch 1989).
 
-`cramer_rao` is what no unbiased estimate can beat, for planning and for judging the others.
+`cramer_rao_coloured` is what no unbiased estimate can beat.
 """
 
 from __future__ import annotations
@@ -33,7 +32,6 @@ __all__ = [
     "Scatter",
     "block_bootstrap",
     "correlation_samples",
-    "cramer_rao",
     "cramer_rao_coloured",
     "hac_covariance",
     "t_interval",
@@ -91,19 +89,15 @@ class Scatter(NamedTuple):
 
 
 class Bootstrap(NamedTuple):
-    """Scatter of the drawn solutions, shape (p, p), and the percentile interval, shape (p,) each.
-
-    `block` is the length of a block in samples, its mean for the stationary bootstrap.
-    """
+    """Scatter of the drawn solutions, shape (p, p), and the 95 % interval, shape (p,) each."""
 
     covariance: Array
     low: Array
     high: Array
-    block: int
 
 
 def correlation_samples(scores: Array) -> Array:
-    """Return for how many samples each column goes together with itself, shape (p,), at least 1.
+    """Return the correlation time of each column in samples, shape (p,), at least 1.
 
     τ = 1 + 2 Σ ρ(h), from the first lag to the last before the autocorrelation ρ first turns
     negative. Beyond, ρ must sum to −½, because a fit makes its scores sum to zero. n / τ is the
@@ -127,28 +121,24 @@ def correlation_samples(scores: Array) -> Array:
     return np.asarray(times)
 
 
-def hac_covariance(
-    bread: Array, scores: Array, max_lag: int | None = None, *, small_sample: bool = True
-) -> Scatter:
+def hac_covariance(bread: Array, scores: Array) -> Scatter:
     """Return the covariance of an estimate whose residual may be coloured and uneven.
+
+    It is enlarged by n_eff / (n_eff − p), with n_eff the independent scores of the slowest column:
+    p of them went into the fit.
 
     Parameters
     ----------
     bread : array, shape (p, p)
-        (AᵀA)⁻¹ for least squares, (ZᵀA)⁻¹ for instruments.
+        (AᵀA)⁻¹.
     scores : array, shape (n, p)
-        Instruments times residual, z e, one row for each sample.
-    max_lag : int, optional
-        Weigh products up to this lag by Bartlett's kernel, 1 − h / (max_lag + 1). Without it,
-        cosines, as many as the correlation of the scores allows.
-    small_sample : bool
-        Enlarge by n_eff / (n_eff − p), with n_eff the independent scores of the slowest column: p
-        of them went into the fit.
+        Regressors times residual, a e, one row for each sample.
 
     Returns
     -------
     Scatter
-        The degrees of freedom are the number of cosines, or n / (⅔ (max_lag + 1)) for the kernel.
+        The degrees of freedom are the number of cosines, as many as the correlation of the scores
+        allows.
 
     Raises
     ------
@@ -161,104 +151,60 @@ def hac_covariance(
     if n <= p + 1:
         raise ValueError(f"{n} samples are too few for the scatter of {p} parameters")
     independent = max(n / float(np.max(correlation_samples(scores))), p + 1.0)
-    if max_lag is None:
-        wanted = round(COSINES * independent ** (2.0 / 3.0))
-        count = min(max(wanted, FEWEST_COSINES), n - 1)
-        middle = _cosine_sum(scores, count)
-        degrees = float(count)
-    else:
-        if not 0 <= max_lag < n:
-            raise ValueError(f"max_lag must be from 0 to {n - 1}, got {max_lag}")
-        middle = _bartlett_sum(scores, max_lag)
-        degrees = n / (2.0 / 3.0 * (max_lag + 1))
-    if small_sample:
-        middle = middle * independent / (independent - p)
-    return Scatter(bread @ middle @ bread.T, max(degrees, 1.0))
+    count = min(max(round(COSINES * independent ** (2.0 / 3.0)), FEWEST_COSINES), n - 1)
+    middle = _cosine_sum(scores, count) * independent / (independent - p)
+    return Scatter(bread @ middle @ bread.T, float(count))
 
 
 def t_interval(
-    values: Array, standard_errors: Array, degrees_of_freedom: float, level: float = 0.95
+    values: Array, standard_errors: Array, degrees_of_freedom: float
 ) -> tuple[Array, Array]:
-    """Return the ends of the t intervals of a level: values ∓ t · standard errors."""
-    half = float(stats.t.ppf(0.5 + level / 2.0, degrees_of_freedom)) * np.asarray(standard_errors)
+    """Return the ends of the 95 % t intervals: values ∓ t · standard errors."""
+    half = float(stats.t.ppf(0.975, degrees_of_freedom)) * np.asarray(standard_errors)
     return np.asarray(values) - half, np.asarray(values) + half
 
 
 def block_bootstrap(
-    instruments: Array,
-    regressors: Array,
-    target: Array,
-    rng: np.random.Generator,
-    *,
-    draws: int = 999,
-    block: int | None = None,
-    stationary: bool = False,
-    level: float = 0.95,
+    regressors: Array, target: Array, rng: np.random.Generator, *, draws: int = 999
 ) -> Bootstrap:
-    """Solve ZᵀA p = ZᵀM for epochs put together from blocks of this one.
+    """Solve AᵀA p = AᵀM for epochs put together from blocks of this one.
 
-    Blocks may begin anywhere and run on from the end to the beginning. Only ZᵀA and ZᵀM of a block
+    Blocks may begin anywhere and run on from the end to the beginning. Only AᵀA and AᵀM of a block
     are needed; they are differences of running sums, so a draw costs as many additions as it has
     blocks.
 
     Parameters
     ----------
-    instruments, regressors : arrays, shape (n, p)
-        The same array twice for least squares.
+    regressors : array, shape (n, p)
     target : array, shape (n,)
     rng : numpy.random.Generator
     draws : int
-    block : int, optional
-        Length in samples; if not given three correlation times of the slowest score, but at least
-        four blocks to an epoch.
-    stationary : bool
-        Draw lengths too, geometric with mean `block` (Politis and Romano 1994); else all blocks are
-        alike (Künsch 1989).
-    level : float
-        Of the percentile interval.
-
-    Raises
-    ------
-    ValueError
-        If a given block is longer than half the epoch: there is then nothing to draw from.
     """
     n, p = regressors.shape
-    # Unit lengths, as in the fit, so that units do not decide the conditioning of ZᵀA.
+    # Unit lengths, as in the fit, so that units do not decide the conditioning of AᵀA.
     scale = np.linalg.norm(regressors, axis=0)
-    A, Z = regressors / scale, instruments / np.linalg.norm(instruments, axis=0)
-    if block is None:
-        solution = np.linalg.solve(Z.T @ A, Z.T @ target)
-        slowest = np.max(correlation_samples(Z * (target - A @ solution)[:, None]))
-        block = max(math.ceil(BLOCK_CORRELATION_TIMES * slowest), math.ceil(n / MOST_BLOCKS))
-        block = min(block, max(n // FEWEST_BLOCKS, 1))
-    if not 1 <= block <= n // 2:
-        raise ValueError(
-            f"a block of {block} samples does not fit twice into {n}; the epoch is too short for "
-            "a residual that goes together for so long"
-        )
-    products = np.einsum("ni,nj->nij", Z, np.column_stack([A, target])).reshape(n, -1)
+    A = regressors / scale
+    solution = np.linalg.solve(A.T @ A, A.T @ target)
+    block = _block_samples(A * (target - A @ solution)[:, None])
+    products = np.einsum("ni,nj->nij", A, np.column_stack([A, target])).reshape(n, -1)
     running = np.concatenate(
         ([np.zeros(products.shape[1])], np.cumsum(np.tile(products, (2, 1)), 0))
     )
-    lengths = _block_lengths(n, block, draws, stationary, rng)
-    starts = rng.integers(0, n, size=lengths.shape)
+    lengths = np.full(math.ceil(n / block), block, dtype=np.int64)
+    lengths[-1] = n - block * (lengths.size - 1)
+    starts = rng.integers(0, n, size=(draws, lengths.size))
     sums = (running[starts + lengths] - running[starts]).sum(axis=1).reshape(draws, p, p + 1)
     solutions = np.linalg.solve(sums[:, :, :p], sums[:, :, p:])[:, :, 0] / scale
-    low, high = np.quantile(solutions, [(1.0 - level) / 2.0, (1.0 + level) / 2.0], axis=0)
-    return Bootstrap(np.atleast_2d(np.cov(solutions, rowvar=False)), low, high, block)
+    low, high = np.quantile(solutions, [0.025, 0.975], axis=0)
+    return Bootstrap(np.atleast_2d(np.cov(solutions, rowvar=False)), low, high)
 
 
-def cramer_rao(regressors: Array, noise_sd: float) -> Array:
-    """Return the least covariance any unbiased estimate can have under white noise: σ² (AᵀA)⁻¹.
-
-    Parameters
-    ----------
-    regressors : array, shape (n, p)
-        Without noise.
-    noise_sd : float
-        Of the torque, per sample, in N·m.
-    """
-    return noise_sd**2 * _inverse_gram(regressors)
+def _block_samples(scores: Array) -> int:
+    """Return the length of a block: three correlation times, and at least four to an epoch."""
+    n = scores.shape[0]
+    slowest = float(np.max(correlation_samples(scores)))
+    wanted = max(math.ceil(BLOCK_CORRELATION_TIMES * slowest), math.ceil(n / MOST_BLOCKS))
+    return min(wanted, max(n // FEWEST_BLOCKS, 1))
 
 
 def cramer_rao_coloured(regressors: Array, density: Array, rate_hz: float) -> Array:
@@ -285,14 +231,10 @@ def cramer_rao_coloured(regressors: Array, density: Array, rate_hz: float) -> Ar
     weight[0] = 1.0
     if n % 2 == 0:
         weight[-1] = 1.0
-    root = np.sqrt(weight / (n * rate_hz * density))[:, None] * lines
-    return _inverse_gram(np.concatenate([root.real, root.imag]))
-
-
-def _inverse_gram(matrix: Array) -> Array:
-    """Return (AᵀA)⁻¹ by the singular values of A scaled to unit lengths."""
-    scale = np.linalg.norm(matrix, axis=0)
-    _, singular, right = np.linalg.svd(matrix / scale, full_matrices=False)
+    matrix = np.sqrt(weight / (n * rate_hz * density))[:, None] * lines
+    stacked = np.concatenate([matrix.real, matrix.imag])
+    scale = np.linalg.norm(stacked, axis=0)
+    _, singular, right = np.linalg.svd(stacked / scale, full_matrices=False)
     root = (right.T / singular) / scale[:, None]
     return np.asarray(root @ root.T)
 
@@ -302,34 +244,3 @@ def _cosine_sum(scores: Array, count: int) -> Array:
     # The transform gives 2 Σ cos(π j (t + ½)/n) g_t; a sum of unit mean square has √2 before it.
     sums = fft.dct(scores, type=2, axis=0)[1 : count + 1] / np.sqrt(2.0)
     return np.asarray(sums.T @ sums / count)
-
-
-def _bartlett_sum(scores: Array, max_lag: int) -> Array:
-    """Return Σ w(h) g_t g_{t+h}ᵀ over all lags, by way of the sums of max_lag + 1 neighbours.
-
-    Bartlett's weights are the overlaps of two windows of that length, so the sum is that of the
-    outer products of the running sums, and cannot be negative.
-    """
-    window = max_lag + 1
-    padded = np.concatenate(
-        [np.zeros((window, scores.shape[1])), scores, np.zeros((max_lag, scores.shape[1]))]
-    )
-    running = np.cumsum(padded, axis=0)
-    sums = running[window:] - running[:-window]
-    return np.asarray(sums.T @ sums / window)
-
-
-def _block_lengths(
-    n: int, block: int, draws: int, stationary: bool, rng: np.random.Generator
-) -> NDArray[np.int64]:
-    """Return the lengths of the blocks of each draw, shape (draws, m); each row sums to n."""
-    if not stationary:
-        lengths = np.full((draws, math.ceil(n / block)), block, dtype=np.int64)
-        lengths[:, -1] = n - block * (lengths.shape[1] - 1)
-        return lengths
-    # Enough that falling short of n is rarer than one draw in a million; the last then fills up.
-    mean = n / block
-    count = math.ceil(mean + 6.0 * math.sqrt(mean) + 6.0)
-    ends = np.minimum(np.cumsum(rng.geometric(1.0 / block, size=(draws, count)), axis=1), n)
-    ends[:, -1] = n
-    return np.diff(ends, axis=1, prepend=0)

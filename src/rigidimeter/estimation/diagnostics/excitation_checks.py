@@ -17,8 +17,8 @@ from scipy import signal
 
 from rigidimeter.estimation.diagnostics.finding_text import judged
 from rigidimeter.estimation.diagnostics.power_lines import inside, lines
+from rigidimeter.estimation.scores import single_frequency_share
 from rigidimeter.estimation.signals import Array, Signals, kinematics, spline
-from rigidimeter.estimation.sinusoid_detection import single_frequency_share
 from rigidimeter.records import Channel, Epoch, Finding
 from rigidimeter.settings import DiagnosticsSettings
 
