@@ -107,7 +107,7 @@ def correlation_samples(scores: Array) -> Array:
     ----------
     scores : array, shape (n, p)
     """
-    n = scores.shape[0]
+    n = len(scores)
     power = np.abs(np.fft.rfft(scores, 2 * n, axis=0)) ** 2
     autocovariance = np.fft.irfft(power, axis=0)[:n]
     times = []
@@ -201,7 +201,7 @@ def block_bootstrap(
 
 def _block_samples(scores: Array) -> int:
     """Return the length of a block: three correlation times, and at least four to an epoch."""
-    n = scores.shape[0]
+    n = len(scores)
     slowest = float(np.max(correlation_samples(scores)))
     wanted = max(math.ceil(BLOCK_CORRELATION_TIMES * slowest), math.ceil(n / MOST_BLOCKS))
     return min(wanted, max(n // FEWEST_BLOCKS, 1))
