@@ -1,10 +1,8 @@
 """The plant and its loop: joint, drive, sensors, subject as steps, and the linear loop of them."""
 
 from rigidimeter.dynamics.joint import (
-    Arm,
     JointDynamics,
-    arm,
-    arm_step,
+    arm_response,
     arm_torque_nm,
     median_joint,
 )
@@ -53,7 +51,6 @@ from rigidimeter.dynamics.velocity_drive import (
 __all__ = [
     "BLOCK_TICKS",
     "SAME_TIME_S",
-    "Arm",
     "ArmMotion",
     "ClosedLoopMotion",
     "Drive",
@@ -66,8 +63,7 @@ __all__ = [
     "RigStreams",
     "Stability",
     "SubjectTorque",
-    "arm",
-    "arm_step",
+    "arm_response",
     "arm_torque_nm",
     "between",
     "closed_loop_motion",

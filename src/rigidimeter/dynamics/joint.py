@@ -1,4 +1,4 @@
-"""A joint as inertia, viscous damping and stiffness (Eq. 3), and its steps both ways round.
+"""A joint as inertia, viscous damping and stiffness (Eq. 3), both ways round.
 
     J θ'' + B θ' + K θ = M
 
@@ -7,22 +7,27 @@ K in N·m/rad. M and θ are positive in the same direction: the torque is the on
 joint, the negative of its reaction.
 
 On the rig the drive imposes the motion and the arm answers with a torque: `arm_torque_nm`. Left to
-a torque, the arm moves: `arm_step`, exact for a torque held between two ticks.
+a torque, the arm moves: `arm_response`.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from rigidimeter.dynamics.velocity_drive import held_response
 from rigidimeter.settings import SubjectSettings
 
-__all__ = ["Arm", "JointDynamics", "arm", "arm_step", "arm_torque_nm", "median_joint"]
+__all__ = [
+    "JointDynamics",
+    "arm_response",
+    "arm_torque_nm",
+    "median_joint",
+]
 
 
 @dataclass(frozen=True)
@@ -120,30 +125,14 @@ def arm_torque_nm(
     )
 
 
-class Arm(NamedTuple):
-    """One exact step of Eq. 3 under a held torque: x⁺ = A x + b M with x = (θ, θ')."""
+def arm_response(
+    joint: JointDynamics, torque_nm: ArrayLike, interval_s: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return angle and velocity at the ticks under torques held from tick to tick, from rest.
 
-    a11: float
-    a12: float
-    a21: float
-    a22: float
-    b1: float
-    b2: float
-
-
-def arm(joint: JointDynamics, interval_s: float) -> Arm:
-    """Discretise Eq. 3 exactly, by the matrix exponential of state and input together."""
+    Eq. 3 discretised exactly, by the matrix exponential of state and input together.
+    """
     J, B, K = joint.parameters
     augmented = np.array([[0.0, 1.0, 0.0], [-K / J, -B / J, 1.0 / J], [0.0, 0.0, 0.0]])
-    e = scipy.linalg.expm(augmented * interval_s)
-    return Arm(*(float(e[i, j]) for i, j in ((0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2))))
-
-
-def arm_step(
-    step: Arm, angle_rad: float, velocity_rad_s: float, torque_nm: float
-) -> tuple[float, float]:
-    """Return angle and velocity after one interval of the given torque."""
-    return (
-        step.a11 * angle_rad + step.a12 * velocity_rad_s + step.b1 * torque_nm,
-        step.a21 * angle_rad + step.a22 * velocity_rad_s + step.b2 * torque_nm,
-    )
+    step = scipy.linalg.expm(augmented * interval_s)
+    return held_response(step[:2, :2], step[:2, 2], np.asarray(torque_nm, dtype=np.float64))

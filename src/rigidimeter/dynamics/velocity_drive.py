@@ -112,6 +112,24 @@ def drive_step(step: Drive, state: DriveState, command_rad_s: float) -> DriveSta
     )
 
 
+def held_response(step: Array, push: Array, values: Array) -> tuple[Array, Array]:
+    """Return both states of x⁺ = Φ x + Γ u, from rest, at each of the held values u.
+
+    As one filter for each state, (zI − Φ)⁻¹ Γ.
+
+    Parameters
+    ----------
+    step : array, shape (2, 2)
+    push : array, shape (2,)
+    values : array, shape (n,)
+    """
+    (a11, a12), (a21, a22) = step
+    denominator = [1.0, -(a11 + a22), a11 * a22 - a12 * a21]
+    first = scipy.signal.lfilter([0.0, push[0], a12 * push[1] - a22 * push[0]], denominator, values)
+    second = scipy.signal.lfilter([0.0, push[1], a21 * push[0] - a11 * push[1]], denominator, values)
+    return np.asarray(first), np.asarray(second)
+
+
 def drive_matrices(
     bandwidth_hz: float, damping_ratio: float, interval_s: float
 ) -> tuple[Array, Array]:
@@ -164,15 +182,7 @@ class DriveModel:
     def held(self, command_rad_s: Array, interval_s: float) -> ArmMotion:
         """Return the motion at the ticks under commands held from tick to tick, from rest."""
         step, push = drive_matrices(self.bandwidth_hz, self.damping_ratio, interval_s)
-        (a11, a12), (a21, a22) = step[:2, :2]
-        denominator = [1.0, -(a11 + a22), a11 * a22 - a12 * a21]
-        acceleration, velocity = (
-            np.asarray(scipy.signal.lfilter([0.0, first, second], denominator, command_rad_s))
-            for first, second in (
-                (push[0], a12 * push[1] - a22 * push[0]),
-                (push[1], a21 * push[0] - a11 * push[1]),
-            )
-        )
+        acceleration, velocity = held_response(step[:2, :2], push[:2], command_rad_s)
         moved = push[2] * command_rad_s + step[2, 1] * velocity + step[2, 0] * acceleration
         return ArmMotion(acceleration, velocity, np.concatenate(([0.0], np.cumsum(moved[:-1]))))
 

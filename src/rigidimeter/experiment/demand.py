@@ -26,10 +26,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.dynamics import JointDynamics, arm_response
 from rigidimeter.settings import GAP_S, ControllerSettings, GuardSettings
 from rigidimeter.units import deg_from_rad, rad_from_deg
 
@@ -90,18 +89,11 @@ def ideal_response(
     -------
     angle_rad, velocity_rad_s : array, shape (n,)
     """
-    torque_nm = np.asarray(perturbation_nm, dtype=np.float64)
-    J, B, K = controller.inertia_kg_m2, controller.damping_nm_s_rad, 0.0
-    if joint is not None:
-        J, B, K = (
-            J + joint.inertia_kg_m2,
-            B + joint.damping_nm_s_rad,
-            joint.stiffness_nm_rad,
-        )
-    angle_rad, velocity_rad_s = (
-        _filtered(numerator, [J, B, K], torque_nm, rate_hz) for numerator in ([1.0], [1.0, 0.0])
+    J, B, K = joint.parameters if joint is not None else (0.0, 0.0, 0.0)
+    together = JointDynamics(
+        controller.inertia_kg_m2 + J, controller.damping_nm_s_rad + B, stiffness_nm_rad=K
     )
-    return angle_rad, velocity_rad_s
+    return arm_response(together, perturbation_nm, 1.0 / rate_hz)
 
 
 def demand(
@@ -159,38 +151,19 @@ def beyond_limits(what: str, needs: Demand, guard: GuardSettings) -> tuple[str, 
             "position_limit_deg",
             "reaches an angle (with the room to stop) of",
             needs.reach_rad,
-            guard.position_limit_deg,
             "deg",
         ),
-        (
-            "speed_limit_deg_s",
-            "reaches a speed of",
-            needs.peak_speed_rad_s,
-            guard.speed_limit_deg_s,
-            "deg/s",
-        ),
+        ("speed_limit_deg_s", "reaches a speed of", needs.peak_speed_rad_s, "deg/s"),
         (
             "acceleration_limit_deg_s2",
             "needs an acceleration of",
             needs.peak_acceleration_rad_s2,
-            guard.acceleration_limit_deg_s2,
             "deg/s²",
         ),
     )
     return tuple(
-        f"{what} {verb} {deg_from_rad(value):.4g} {unit}, more than guard.{key} = {limit:g} {unit}"
-        for key, verb, value, limit, unit in rows
-        if deg_from_rad(value) > limit
+        f"{what} {verb} {deg_from_rad(value):.4g} {unit}, more than guard.{key} = "
+        f"{getattr(guard, key):g} {unit}"
+        for key, verb, value, unit in rows
+        if deg_from_rad(value) > getattr(guard, key)
     )
-
-
-def _filtered(
-    numerator: list[float],
-    denominator: list[float],
-    torque_nm: NDArray[np.float64],
-    rate_hz: float,
-) -> NDArray[np.float64]:
-    b, a, _ = scipy.signal.cont2discrete(
-        (np.array(numerator), np.array(denominator)), 1.0 / rate_hz, method="zoh"
-    )
-    return np.asarray(scipy.signal.lfilter(np.squeeze(b), a, torque_nm), dtype=np.float64)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from rigidimeter.dynamics import arm, arm_step
+from rigidimeter.dynamics import arm_response
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import AGREES, Row, within_percent
 from rigidimeter.paper.context import Workshop
@@ -23,14 +23,9 @@ _RATE_HZ = 1000.0
 def equation_3(workshop: Workshop) -> Row:
     """Make the row: the arm under a sinusoidal torque settles on the compliance of Eq. 3."""
     joint = printed.SEC_34
-    step = arm(joint, 1.0 / _RATE_HZ)
     count = round(_CYCLES * _RATE_HZ / _FREQUENCY_HZ)
     phase = 2.0 * math.pi * _FREQUENCY_HZ * np.arange(count) / _RATE_HZ
-    angles = np.empty(count)
-    angle = velocity = 0.0
-    for tick, torque in enumerate(np.sin(phase)):
-        angles[tick] = angle
-        angle, velocity = arm_step(step, angle, velocity, float(torque))
+    angles, _ = arm_response(joint, np.sin(phase), 1.0 / _RATE_HZ)
     last = slice(count // 2, None)  # the beginning has died out by then
     found = 2.0 * abs(np.mean(angles[last] * np.exp(-1j * phase[last])))
     wanted = float(abs(joint.compliance_rad_nm(_FREQUENCY_HZ)))

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.dynamics import JointDynamics, arm, arm_step, arm_torque_nm
+from rigidimeter.dynamics import JointDynamics, arm_response, arm_torque_nm
 
 
 def test_torque_of_a_sinusoid_has_its_closed_form():
@@ -51,22 +51,20 @@ def step_response(joint, t):
 @pytest.mark.parametrize("damping", [0.02, 0.1368, 0.6])
 def test_the_arm_under_a_step_of_torque_is_exact(damping):
     joint = JointDynamics(0.0045, damping, 1.751)
-    one_tick = arm(joint, 0.001)
-    angle = velocity = 0.0
-    for k in range(1, 3001):
-        angle, velocity = arm_step(one_tick, angle, velocity, 1.0)
-        if k in (1, 10, 100, 3000):
-            assert angle == pytest.approx(float(step_response(joint, k / 1000)), rel=1e-9)
+    angle, _ = arm_response(joint, np.ones(3001), 0.001)
+    for k in (1, 10, 100, 3000):
+        assert angle[k] == pytest.approx(float(step_response(joint, k / 1000)), rel=1e-9)
 
 
 def test_an_arm_without_stiffness_coasts_down():
     # v = v0 e^(−B t / J)
-    one_tick = arm(JointDynamics(0.01, 0.05, 0.0), 0.001)
-    angle, velocity = 0.0, 1.0
-    for _ in range(200):
-        angle, velocity = arm_step(one_tick, angle, velocity, 0.0)
-    assert velocity == pytest.approx(math.exp(-0.05 * 0.2 / 0.01), rel=1e-9)
-    assert angle == pytest.approx((1 - velocity) * 0.01 / 0.05, rel=1e-9)
+    torque = np.zeros(221)
+    torque[:20] = 1.0
+    angle, velocity = arm_response(JointDynamics(0.01, 0.05, 0.0), torque, 0.001)
+    assert velocity[20] == pytest.approx((1 - math.exp(-0.05 * 0.02 / 0.01)) / 0.05, rel=1e-9)
+    assert velocity[220] == pytest.approx(velocity[20] * math.exp(-0.05 * 0.2 / 0.01), rel=1e-9)
+    coasted = (velocity[20] - velocity[220]) * 0.01 / 0.05
+    assert angle[220] - angle[20] == pytest.approx(coasted, rel=1e-9)
 
 
 def test_the_torque_is_that_of_equation_5():
