@@ -258,7 +258,7 @@ def _precision(design: Design) -> Iterator[str]:
                 )
                 if value
             )
-            yield from _wrapped(f"  the subject's own torque would put least squares off: {off}")
+            yield from _wrapped(f"  the subject's own torque would bias least squares: {off}")
     for remark in design.remarks:
         yield from _wrapped(f"  {remark}")
 

@@ -15,8 +15,8 @@ motion between two ticks is solved exactly, so any latency is exact, whole ticks
 slower than the loop is read again until it has news: the age of the reading goes through a
 pattern, and its mean response is taken; `loop_poles` takes the pattern itself. For a sensor of
 interval n T that is e^(−jω latency) Σ e^(−jωkT)/n, k = 0 … n − 1: a delay of latency + (n − 1) T/2
-and a gain of sin(nωT/2) / (n sin(ωT/2)). Jitter is taken at its bound. The guard is not in it: what
-it does is no longer linear.
+and a gain of sin(nωT/2) / (n sin(ωT/2)). Jitter is taken at its bound. The guard is left out: it is
+not linear.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ _LINES_A_HZ = 50
 """How finely the band of voluntary torque is summed."""
 
 _DIGITS = 36.0
-"""−ln of the rounding of a float."""
+"""−ln of the relative rounding of a float, 2e-16."""
 
 
 class Reading(NamedTuple):
@@ -250,8 +250,8 @@ def voluntary_motion_sd(settings: Settings, subject: SubjectSettings) -> tuple[f
 class _Circle(NamedTuple):
     """The loop at the frequencies of an FFT, on a circle just outside the unit circle.
 
-    A record is damped before its FFT and raised again after it, so that neither the integrator of
-    the angle nor the end of the record, which the FFT joins to its start, needs special care.
+    A record is damped before its FFT, and the damping is undone afterwards. So the integrator of
+    the angle and the wrap-around of the FFT need no special treatment.
     """
 
     length: int
@@ -269,12 +269,12 @@ class _Circle(NamedTuple):
 
 @lru_cache(maxsize=8)
 def _on_circle(loop: Loop, n: int, rate_hz: float, times: int) -> _Circle:
-    """Return the loop for records of `n` ticks in an FFT so many times as long.
+    """Return the loop for records of `n` ticks, in an FFT of `times` that length.
 
-    What comes round is damped by e^(−D), and raising the end of the record again raises its
-    rounding by e^(D/times). Both are the same at D = 36 times/(times + 1): 2e-8 of the largest
-    value for a record on its own, 4e-11 for twice the length. An estimate asks for the same loop
-    many times.
+    The wrap-around is damped by e^(−D), and undoing the damping amplifies rounding at the end of
+    the record by e^(D/times). Both are equal at D = 36 times/(times + 1): 2e-8 of the largest
+    value for an FFT of the record's own length, 4e-11 for twice that. An estimate needs the same
+    loop many times.
     """
     length = int(scipy.fft.next_fast_len(times * n, real=True))
     radius = _DIGITS * times / (times + 1) / length
@@ -292,7 +292,7 @@ def _lowpass(cutoff_hz: float, z: Complex, rate_hz: float) -> Complex:
 
 
 class _Ages(NamedTuple):
-    """The ages of one sample, which is read on end: from whole + rest up, for so many ticks."""
+    """Ages of a sample that is read at `ticks` ticks in a row: whole + rest, then one tick more."""
 
     whole: int
     rest: float

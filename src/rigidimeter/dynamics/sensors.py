@@ -73,7 +73,7 @@ def sample_time_blocks_s(
 
     Sample k is taken at k/rate − latency + jitter_k, with jitter_k uniform between 0 and the given
     bound, and reaches the loop `latency_s` later. The first has no jitter and arrives at time zero:
-    a loop starts when its sensors have spoken.
+    a loop starts once each sensor has delivered a sample.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which PRBS tells most about the joints: clock, register bits and amplitude.
+"""Search for the PRBS with the smallest predicted errors: clock, register bits and amplitude.
 
 Standard errors fall as one over the amplitude, so each sequence is made as strong as the guard
 allows: angle with the room to stop, speed and acceleration of the command, each less the margin
@@ -103,7 +103,7 @@ def check_criterion(criterion: str) -> None:
 
 
 def assess(settings: Settings, criterion: str = "minimax") -> Candidate | None:
-    """Return the settings' own PRBS at its own amplitude; None where it tells nothing."""
+    """Return the settings' own PRBS at its own amplitude; None if no error can be predicted."""
     unit = settings.prbs.model_copy(update={"amplitude_nm": 1.0})
     return _candidate(settings, unit, criterion, lambda _: settings.prbs.amplitude_nm)
 

@@ -62,8 +62,8 @@ _FEWEST_LINES = 8
 """The estimation asks for as many."""
 
 _MEMORY = 10.0
-"""After so many periods of its lowest frequency, or of 2 s for the tremor, the subject's torque has
-forgotten itself."""
+"""The autocovariance of the subject's torque has decayed after so many periods of its lowest
+frequency, or of 2 s for the tremor."""
 
 _ROUNDING = 1e-6
 """Of a sample: a stamp that is a rounding error late still counts."""
@@ -123,7 +123,7 @@ def noise_covariance(rig: RigSettings, subject: SubjectSettings, lags: int) -> A
     lag_s = np.arange(lags) / rig.torque.rate_hz
     covariance = np.zeros(lags)
     if subject.voluntary_sd_nm > 0.0 or subject.tremor_amplitude_nm > 0.0:
-        # So long that what comes round has died out.
+        # Long enough that the wrap-around has decayed.
         memory_s = max(_MEMORY / subject.voluntary_low_hz, 2.0 * _MEMORY)
         half_s = max(lag_s[-1], (lag_s[-1] + memory_s) / 2.0)
         half = next_fast_len(math.ceil(half_s * rig.tick_rate_hz) + 2, real=True)
@@ -226,7 +226,7 @@ def weighted_products(
     lines : Layout
     """
     window, line, n = lines.window, lines.line, lines.window.size
-    # Over twice the length nothing comes round, and line k is bin 2k.
+    # Over twice the length nothing wraps around, and line k is bin 2k.
     covariance = noise_covariance(rig, subject, n + 1)
     covariance = np.concatenate([covariance, covariance[n - 1 : 0 : -1]])
     pairs = irfft(np.abs(rfft(window, 2 * n)) ** 2, 2 * n)

@@ -68,13 +68,13 @@ class ScoreSettings(Section):
 
 
 class DiagnosticLevels(Section):
-    """What each check does when it fails: only say so, cast doubt, or exclude the epoch.
+    """What a check that fails does: leave a note, mark the epoch as doubtful, or exclude it.
 
     The names are those of the findings.
 
-    Those exclude by default that say the channels did not measure, or that the numbers mean
-    nothing. A negative or unlikely parameter only casts doubt: leaving out epochs for their result
-    shifts the median of those that stay.
+    By default a check excludes the epoch if it shows that a channel did not measure or that the
+    numbers are meaningless. A negative or unlikely parameter does not: leaving out epochs because
+    of their result shifts the median of the others.
     """
 
     conditioning: Level = "doubt"
@@ -140,8 +140,8 @@ class OnlineSettings(Section):
     """The band of the causal filters, and how long the live estimate remembers.
 
     A sample counts 1/e after `forgetting_s`; a step of a parameter is followed from 10 to 90 % in
-    2.2 times that. Motion with less than `rest_share_percent` of its usual power teaches nothing,
-    and then nothing is forgotten either.
+    2.2 times that. While the motion has less than `rest_share_percent` of its usual power,
+    the estimate is neither updated nor forgotten.
     """
 
     ascending: ClassVar = (("band_low_hz", "band_high_hz"),)

@@ -15,10 +15,10 @@ from rigidimeter.units import per_rad_from_per_deg
 __all__ = ["GAP_S", "ControllerSettings", "GuardSettings", "LoopSettings", "ZeroingSettings"]
 
 GAP_S = 0.005
-"""The position limit is kept also when a step comes this late, or a tick late if ticks are longer.
+"""The position limit holds even when a step comes this late, or a tick late if ticks are longer.
 
-So long a loop under a real-time schedule is late; a program that stands still for longer is for the
-drive's own watchdog and the mechanical stops.
+A loop under a real-time schedule is late by at most this; against a program that stands still for
+longer there are the drive's own watchdog and the mechanical stops.
 """
 
 

@@ -118,14 +118,14 @@ def test_prints_what_is_foreseen() -> None:
         "iv, 4 epochs pooled",
     ):
         assert expected in words
-    assert "would put least squares off" not in words
+    assert "would bias least squares" not in words
 
 
 def test_the_subjects_own_torque_is_foreseen(tmp_path: Path) -> None:
     settings = tmp_path / "rig.toml"
     settings.write_text("[subject.OFF]\nvoluntary_sd_nm = 0.2\n")
     words = " ".join(run("--settings", str(settings)).split())
-    assert "would put least squares off: J by -43 %, B by -69 %, K by +3 %" in words
+    assert "would bias least squares: J by -43 %, B by -69 %, K by +3 %" in words
 
 
 def test_numbers_of_what_is_foreseen(tmp_path: Path) -> None:
