@@ -126,7 +126,9 @@ def held_response(step: Array, push: Array, values: Array) -> tuple[Array, Array
     (a11, a12), (a21, a22) = step
     denominator = [1.0, -(a11 + a22), a11 * a22 - a12 * a21]
     first = scipy.signal.lfilter([0.0, push[0], a12 * push[1] - a22 * push[0]], denominator, values)
-    second = scipy.signal.lfilter([0.0, push[1], a21 * push[0] - a11 * push[1]], denominator, values)
+    second = scipy.signal.lfilter(
+        [0.0, push[1], a21 * push[0] - a11 * push[1]], denominator, values
+    )
     return np.asarray(first), np.asarray(second)
 
 

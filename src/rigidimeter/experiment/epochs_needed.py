@@ -28,7 +28,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scipy.stats import beta, betabinom, multivariate_normal, norm
+import scipy
 
 from rigidimeter.dynamics.velocity_drive import Array
 from rigidimeter.errors import UserError
@@ -264,7 +264,7 @@ def ranksum_power(effect: Effect, n_x: int, n_y: int, *, alpha: float = 0.05) ->
     pairs = n_x * n_y
     sigma = math.sqrt(pairs * (n_x + n_y + 1) / 12.0)
     # Smallest U that rejects on the upper side; the lower side mirrors it.
-    upper = math.ceil(pairs / 2.0 + 0.5 + float(norm.isf(alpha / 2.0)) * sigma - 1e-9)
+    upper = math.ceil(pairs / 2.0 + 0.5 + float(scipy.stats.norm.isf(alpha / 2.0)) * sigma - 1e-9)
     if upper > pairs:
         return 0.0  # even complete separation is not significant
     share, variance = _moments(effect, n_x, n_y)
@@ -274,9 +274,9 @@ def ranksum_power(effect: Effect, n_x: int, n_y: int, *, alpha: float = 0.05) ->
     together = max((variance / alone - 1.0) / (pairs - 1), _CERTAIN)
     shape = 1.0 / together - 1.0
     if pairs > _MANY_PAIRS:  # the sum over counts is slow, and its steps no longer matter
-        part = beta(share * shape, (1.0 - share) * shape)
+        part = scipy.stats.beta(share * shape, (1.0 - share) * shape)
         return min(1.0, float(part.sf((upper - 0.5) / pairs) + part.cdf(1 - (upper - 0.5) / pairs)))
-    count = betabinom(pairs, share * shape, (1.0 - share) * shape)
+    count = scipy.stats.betabinom(pairs, share * shape, (1.0 - share) * shape)
     return min(1.0, float(count.sf(upper - 1) + count.cdf(pairs - upper)))
 
 
@@ -316,7 +316,7 @@ def _moments(effect: Effect, n_x: int, n_y: int) -> tuple[float, float]:
     if total == 0.0:
         return (0.5 + math.copysign(0.5, effect.difference)) if effect.difference else 0.5, 0.0
     d = effect.difference / total
-    p1 = float(norm.cdf(d))
+    p1 = float(scipy.stats.norm.cdf(d))
     # x − y and x − y' share x, so their correlation is that part of the variance.
     share_x = (effect.sd_x / total) ** 2
     p2, p3 = _both_above(d, share_x), _both_above(d, 1.0 - share_x)
@@ -327,8 +327,8 @@ def _moments(effect: Effect, n_x: int, n_y: int) -> tuple[float, float]:
 def _both_above(d: float, correlation: float) -> float:
     """Return the chance that two standard normals of this correlation are both above −d."""
     if correlation <= 0.0:
-        return float(norm.cdf(d)) ** 2
+        return float(scipy.stats.norm.cdf(d)) ** 2
     if correlation >= 1.0:
-        return float(norm.cdf(d))
+        return float(scipy.stats.norm.cdf(d))
     covariance = [[1.0, correlation], [correlation, 1.0]]
-    return float(multivariate_normal.cdf([d, d], mean=[0.0, 0.0], cov=covariance))
+    return float(scipy.stats.multivariate_normal.cdf([d, d], mean=[0.0, 0.0], cov=covariance))

@@ -35,7 +35,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import next_fast_len, rfft, rfftfreq
+import scipy
 
 from rigidimeter.dynamics import (
     ClosedLoopMotion,
@@ -194,11 +194,11 @@ def _sandwich(A: Array, Q: Array) -> Array:
 
 def _bound(record: Record, rig: RigSettings, subject: SubjectSettings) -> Errors:
     # The noise does not end with the record: the lines are twice as fine as the record's own.
-    padded = 2 * next_fast_len(record.motion.shape[1], real=True)
-    density = noise_spectrum(rig, subject, rfftfreq(padded, 1.0 / record.rate_hz))
+    padded = 2 * scipy.fft.next_fast_len(record.motion.shape[1], real=True)
+    density = noise_spectrum(rig, subject, scipy.fft.rfftfreq(padded, 1.0 / record.rate_hz))
     if np.any(density == 0.0):  # at a frequency without noise nothing hides the joint
         return Errors((0.0, 0.0, 0.0), (0.0, 0.0))
-    information = _products(rfft(record.motion, padded), 1.0 / density, padded)
+    information = _products(scipy.fft.rfft(record.motion, padded), 1.0 / density, padded)
     return _errors(information, information)
 
 
@@ -218,7 +218,7 @@ def _least_squares(
     high_hz = min(estimation.band_high_hz, USABLE_FRACTION_OF_RATE * slowest_hz)
     trim = round(estimation.trim_s * rig.tick_rate_hz)
     kept = motion.angle_rad.size - 2 * trim
-    frequency = rfftfreq(kept, 1.0 / rig.tick_rate_hz)
+    frequency = scipy.fft.rfftfreq(kept, 1.0 / rig.tick_rate_hz)
     inside = (frequency >= low_hz) & (frequency <= high_hz)
     if np.count_nonzero(inside) < len(PARAMETERS):
         raise UserError(
@@ -226,7 +226,7 @@ def _least_squares(
             f"epoch of {kept / rig.tick_rate_hz:g} s; the fit needs at least {len(PARAMETERS)}"
         )
     gain = _zero_phase_gain(frequency, low_hz, high_hz)
-    Z = np.asarray(rfft(np.stack(motion[1:])[:, trim : trim + kept]))
+    Z = np.asarray(scipy.fft.rfft(np.stack(motion[1:])[:, trim : trim + kept]))
     A = _products(Z, gain**2, kept) / rig.tick_rate_hz
     Q = _products(Z, gain**4, kept) / rig.tick_rate_hz * sensor_density(rig.torque)
     voluntary = subject_density(subject, frequency, rig.tick_rate_hz) * gain**2

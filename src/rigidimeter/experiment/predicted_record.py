@@ -34,9 +34,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft, rfftfreq
-from scipy.interpolate import CubicSpline
 
 from rigidimeter.dynamics import ClosedLoopMotion, sensor_density, subject_density
 from rigidimeter.dynamics.velocity_drive import Array
@@ -103,7 +102,9 @@ def expected_record(motion: ClosedLoopMotion, rig: RigSettings) -> Record:
     first = math.ceil(late_s * rate_hz - _ROUNDING)
     last = max(math.floor((until_s + late_s) * rate_hz + _ROUNDING), first)
     stamps_s = np.arange(first, last + 1) / rate_hz - late_s
-    at_stamps = CubicSpline(np.arange(ticks) / rig.tick_rate_hz, np.stack(motion[1:]), axis=1)
+    at_stamps = scipy.interpolate.CubicSpline(
+        np.arange(ticks) / rig.tick_rate_hz, np.stack(motion[1:]), axis=1
+    )
     return Record(rate_hz, np.asarray(at_stamps(stamps_s), dtype=np.float64))
 
 
@@ -126,12 +127,14 @@ def noise_covariance(rig: RigSettings, subject: SubjectSettings, lags: int) -> A
         # Long enough that the wrap-around has decayed.
         memory_s = max(_MEMORY / subject.voluntary_low_hz, 2.0 * _MEMORY)
         half_s = max(lag_s[-1], (lag_s[-1] + memory_s) / 2.0)
-        half = next_fast_len(math.ceil(half_s * rig.tick_rate_hz) + 2, real=True)
+        half = scipy.fft.next_fast_len(math.ceil(half_s * rig.tick_rate_hz) + 2, real=True)
         density = subject_density(
-            subject, rfftfreq(2 * half, 1.0 / rig.tick_rate_hz), rig.tick_rate_hz
+            subject, scipy.fft.rfftfreq(2 * half, 1.0 / rig.tick_rate_hz), rig.tick_rate_hz
         )
-        at_ticks = irfft(density, 2 * half)[: half + 1] * rig.tick_rate_hz
-        covariance += CubicSpline(np.arange(half + 1) / rig.tick_rate_hz, at_ticks)(lag_s)
+        at_ticks = scipy.fft.irfft(density, 2 * half)[: half + 1] * rig.tick_rate_hz
+        covariance += scipy.interpolate.CubicSpline(
+            np.arange(half + 1) / rig.tick_rate_hz, at_ticks
+        )(lag_s)
     covariance[0] += sensor_density(rig.torque) * rig.torque.rate_hz
     return readonly(covariance)
 
@@ -199,7 +202,7 @@ def layout(record: Record, estimation: EstimationSettings) -> Layout:
     """
     low_hz = estimation.band_low_hz
     high_hz = min(estimation.band_high_closed_loop_hz, USABLE_FRACTION_OF_RATE * record.rate_hz)
-    n = prev_fast_len(record.motion.shape[1], real=True)
+    n = scipy.fft.prev_fast_len(record.motion.shape[1], real=True)
     length_s = n / record.rate_hz
     first = max(math.ceil(low_hz * length_s - _ROUNDING) - 1, 1)
     line = np.arange(first, math.floor(high_hz * length_s + _ROUNDING) + 1, dtype=np.intp)
@@ -229,18 +232,23 @@ def weighted_products(
     # Over twice the length nothing wraps around, and line k is bin 2k.
     covariance = noise_covariance(rig, subject, n + 1)
     covariance = np.concatenate([covariance, covariance[n - 1 : 0 : -1]])
-    pairs = irfft(np.abs(rfft(window, 2 * n)) ** 2, 2 * n)
-    power = rfft(pairs * covariance).real[2 * line]
+    pairs = scipy.fft.irfft(np.abs(scipy.fft.rfft(window, 2 * n)) ** 2, 2 * n)
+    power = scipy.fft.rfft(pairs * covariance).real[2 * line]
     motion = record.motion[:, :n]
     # A mean is not fitted: the estimation takes it out under the window.
     mean = np.sum(window**2 * motion, axis=1) / np.sum(window**2)
-    Z = rfft(window * (motion - mean[:, None]))[:, line]
+    Z = scipy.fft.rfft(window * (motion - mean[:, None]))[:, line]
     weighted = np.zeros((3, n // 2 + 1), dtype=np.complex128)
     weighted[:, line] = Z / power
     A = np.real(weighted[:, line] @ Z.conj().T)
     # irfft sums both signs of frequency over n: Re Σ of one sign is n/2 times that.
-    h = window * irfft(weighted, n) * (n / 2.0)
-    Q = h @ irfft(rfft(h, 2 * n) * rfft(covariance).real, 2 * n)[:, :n].T
+    h = window * scipy.fft.irfft(weighted, n) * (n / 2.0)
+    Q = (
+        h
+        @ scipy.fft.irfft(scipy.fft.rfft(h, 2 * n) * scipy.fft.rfft(covariance).real, 2 * n)[
+            :, :n
+        ].T
+    )
     return np.asarray(A), np.asarray(Q)
 
 
