@@ -76,9 +76,9 @@ def say(notices: tuple[Notice, ...]) -> None:
 
 def status(recording: Recording, analysis: Analysis) -> int:
     """Say what failed or looks wrong; return 1 if an input was bad or an epoch failed, else 0."""
-    from rigidimeter.study import doubts
+    from rigidimeter.study import analysis_warnings
 
-    say(doubts(analysis))
+    say(analysis_warnings(analysis))
     bad = recording.failed
     results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
     for result in results:

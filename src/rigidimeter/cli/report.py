@@ -10,7 +10,7 @@ import typer
 
 from rigidimeter.cli.inputs import Recordings, analyse_inputs, say, status
 from rigidimeter.cli.options import reads_recordings
-from rigidimeter.cli.study.study_input import KeyOption, analysed_study, study_of
+from rigidimeter.cli.study_input import KeyOption, analysed_study, study_of
 from rigidimeter.errors import UserError
 
 __all__ = ["report"]
@@ -55,7 +55,7 @@ def report(
                 f"{folder / 'report'}"
             )
         found = analysed_study(folder, recordings, key)
-        study = found.study if title is None else replace(found.study, title=title)
+        study = found.result if title is None else replace(found.result, title=title)
         page = write_page(study, out)
         write_estimates_json(out / "estimates.json", study.analysis)
         typer.echo(str(page))

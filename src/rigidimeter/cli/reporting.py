@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from rigidimeter.errors import UserError
 if TYPE_CHECKING:
     from rigidimeter.recording import Recording
     from rigidimeter.records import Analysis
-    from rigidimeter.study import Study
+    from rigidimeter.study import StudyResult
 
 __all__ = ["make_report", "write_page"]
 
@@ -24,21 +25,19 @@ def make_report(title: str, recording: Recording, analysis: Analysis, out: Path)
         If the folder cannot be written.
     """
     from rigidimeter.cli.provenance import provenance
-    from rigidimeter.study import Study, compare
+    from rigidimeter.study import compare_analysis
 
-    made = Study(
-        title=title,
+    made = replace(
+        compare_analysis(analysis, title=title),
         settings=recording.settings,
         epochs=recording.epochs,
-        analysis=analysis,
-        comparisons=compare(analysis),
         notices=recording.notices,
         provenance=provenance(recording.paths, recording.settings),
     )
     return write_page(made, out)
 
 
-def write_page(study: Study, out: Path) -> Path:
+def write_page(study: StudyResult, out: Path) -> Path:
     """Write the report of a study with progress; return the page's path.
 
     Raises

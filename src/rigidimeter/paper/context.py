@@ -11,7 +11,7 @@ from rigidimeter.paper.virtual_data import VirtualStudy, counts_of, virtual_stud
 from rigidimeter.records import Analysis
 from rigidimeter.settings import Settings
 from rigidimeter.statistics import DayDifference, day_difference
-from rigidimeter.study import MEASURES, Comparison, analyse, compare
+from rigidimeter.study import MEASURES, Comparison, analyse, compare_analysis
 from rigidimeter.virtual.study_design import PAPER, StudyDesign
 from rigidimeter.virtual.study_plan import plan_study
 from rigidimeter.virtual.virtual_study import study_length_s
@@ -97,7 +97,8 @@ class Workshop:
 
     @cached_property
     def _comparisons(self) -> Mapping[str, Comparison]:
-        return {found.measure: found for found in compare(self.analysis, "OFF", "DBS")}
+        found = compare_analysis(self.analysis, "OFF", "DBS", resamples=0)
+        return {each.measure.name: each for each in found.comparisons}
 
     def comparison(self, measure: str) -> Comparison:
         """Return one measure of the virtual study in OFF and DBS."""

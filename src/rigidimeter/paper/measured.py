@@ -92,8 +92,8 @@ def _distribution_row(item: _Comparison, workshop: Workshop) -> Row:
         id=item.row,
         source=item.figure,
         paper=f"median and interquartile range; {item.paper}",
-        ours=f"virtual study: medians {medians} {compared.unit}; p = {p_value(p)}, r = {r}; when "
-        f"days count, not epochs, p = {by_day}",
+        ours=f"virtual study: medians {medians} {compared.measure.unit}; p = {p_value(p)}, "
+        f"r = {r}; when days count, not epochs, p = {by_day}",
         reading="Two-sided rank-sum test with tie and continuity correction; every epoch a point. "
         "Beside it a mixed model with an offset for every day.",
         checks=(),

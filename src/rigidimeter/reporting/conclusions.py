@@ -1,26 +1,22 @@
-"""What a study folder shows, in sentences that go no further than its numbers.
-
-A difference is "shown" where the day-aware p, adjusted by Holm's method for the number of measures,
-is below one less the confidence. An effect leads where the p of its difference from another,
-adjusted for all pairs, is. A conclusion depends on the method where methods do not agree on whether
-there is a difference, or on its sign.
-"""
+"""What a study folder shows, in sentences that go no further than its numbers."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
+from rigidimeter.reporting.measures import lower_first
 from rigidimeter.reporting.numbers import interval, number, p_value
-from rigidimeter.reporting.test_tables import day_holm, pair_holm, sorted_rows, tests_by_days
-from rigidimeter.study import Cohort, MeasureEffect, SensitivityRow
+from rigidimeter.study import (
+    Comparison,
+    Dependence,
+    SensitivityRow,
+    StudyResult,
+    dependences,
+    leader,
+    verdict,
+)
 
-__all__ = ["LEAST_SQUARES", "cohort_verdict", "method_dependence", "series"]
-
-LEVEL = 0.05
-SAME = 1e-12
-LEAST_SQUARES = ("published", "bandlimited")
-"""Voluntary torque in the loop pulls these away from the joint."""
+__all__ = ["method_dependence", "series", "study_verdict"]
 
 
 def series(items: Sequence[str]) -> str:
@@ -28,143 +24,95 @@ def series(items: Sequence[str]) -> str:
     return " and ".join([", ".join(items[:-1]), items[-1]] if len(items) > 1 else items)
 
 
-def lower_first(title: str) -> str:
-    """Return a title as it stands within a sentence."""
-    return title[:1].lower() + title[1:]
-
-
-def cohort_verdict(cohort: Cohort) -> str:
+def study_verdict(study: StudyResult) -> str:
     """Return what days show, and which effect leads; empty where no two conditions were tested."""
-    sentences = [*_shown(cohort), *_leader(cohort)]
+    sentences = [*_shown(study), *_leader(study)]
     if not sentences:
         return ""
-    prefix = "Virtual data. " if cohort.virtual else ""
-    prefix += "Blinded: conditions are codes. " if cohort.blinded else ""
+    prefix = "Virtual data. " if study.virtual else ""
+    prefix += "Blinded: conditions are codes. " if study.blinded else ""
     return prefix + " ".join(sentences)
 
 
-def _shown(cohort: Cohort) -> list[str]:
-    every = tests_by_days(cohort)
-    tests = [test for test in every if not math.isnan(test.p)]
-    adjusted = day_holm(cohort)
-    if not tests:
-        remarks = list(dict.fromkeys(test.remark for test in every if test.remark))
-        return [f"Days could not be compared: {'; '.join(remarks)}."] if remarks else []
-    groups: dict[str, list[str]] = {"lower": [], "higher": [], "nothing": []}
-    for test in tests:
-        p = adjusted[test.measure]
-        shown = p < 1 - test.confidence
-        side = ("lower" if test.estimate > 0 else "higher") if shown else "nothing"
-        groups[side].append(f"{lower_first(test.title)} ({_p(p)})")
-    reference, other = tests[0].reference, tests[0].other
-    parts = [
-        f"{other} is {side} than {reference} in {series(groups[side])}"
-        for side in ("lower", "higher")
-        if groups[side]
-    ]
-    nothing = f"no difference is shown in {series(groups['nothing'])}" if groups["nothing"] else ""
-    text = "; ".join([*parts, *([nothing] if nothing else [])])
-    how = _corrected(len(tests))
-    sentence = f"When days count{how}, {text}."
-    missing = [lower_first(t.title) for t in every if math.isnan(t.p)]
-    return [sentence] + ([f"Not tested by days: {series(missing)}."] if missing else [])
+def _titles(comparisons: Sequence[Comparison]) -> str:
+    return series([lower_first(c.measure.title) for c in comparisons])
 
 
-def _corrected(count: int) -> str:
-    return f" (p by Holm for {count} measures)" if count > 1 else ""
-
-
-def _leader(cohort: Cohort) -> list[str]:
-    effects = list(cohort.effects)
-    if len(effects) < 2:
+def _shown(study: StudyResult) -> list[str]:
+    found = verdict(study)
+    if found is None or found.basis != "days":
         return []
-    largest = max(_size(effect) for effect in effects)
-    first = [effect for effect in effects if _size(effect) > largest - SAME]
-    titles = series([lower_first(effect.title) for effect in first])
-    numbers = f"rank-biserial correlation {number(largest, 2)}"
-    if len(first) == 1:
-        numbers += f", r\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}{number(first[0].effects.r, 2)}"
-    sentence = f"The largest effect is that of {titles} ({numbers})"
-    if len(first) > 1:
+    if not found.tested:
+        remarks = list(dict.fromkeys(c.days.remark for c in found.untested if c.days))
+        told = [remark for remark in remarks if remark]
+        return [f"Days could not be compared: {'; '.join(told)}."] if told else []
+    parts = [
+        f"{study.other} is {side} than {study.reference} in {_with_p(members)}"
+        for side, members in (("lower", found.lower), ("higher", found.higher))
+        if members
+    ]
+    if found.undecided:
+        parts.append(f"no difference is shown in {_with_p(found.undecided)}")
+    how = f" (p by Holm for {found.tested} measures)" if found.tested > 1 else ""
+    sentence = f"When days count{how}, {'; '.join(parts)}."
+    untested = [f"Not tested by days: {_titles(found.untested)}."] if found.untested else []
+    return [sentence, *untested]
+
+
+def _with_p(comparisons: Sequence[Comparison]) -> str:
+    return series([f"{lower_first(c.measure.title)} ({_p(c.days_p_holm)})" for c in comparisons])
+
+
+def _leader(study: StudyResult) -> list[str]:
+    found = leader(study)
+    if found is None:
+        return []
+    effects = found.first[0].effects
+    numbers = f"rank-biserial correlation {number(found.size, 2)}"
+    if len(found.first) == 1 and effects is not None:
+        numbers += f", r\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}{number(effects.r, 2)}"
+    sentence = f"The largest effect is that of {_titles(found.first)} ({numbers})"
+    if len(found.first) > 1:
         return [f"{sentence}: they are equal."]
-    if not cohort.differences:
-        return [f"{sentence}."]
-    ahead, level, untold = _lead(cohort, first[0], effects)
-    parts = [f"its lead is beyond chance over {series(ahead)}"] if ahead else []
-    if level and not ahead:
-        over = "any other" if len(effects) > 2 and not untold else series(level)
-        parts.append(f"its lead over {over} is not beyond chance")
-    elif level:
-        parts[0] += f", not over {series(level)}"
-    if untold:
-        parts.append(f"how sure its lead over {series(untold)} is, is not known")
+    parts = []
+    if found.ahead:
+        parts = [f"its lead is beyond chance over {_titles(found.ahead)}"]
+        if found.level:
+            parts[0] += f", not over {_titles(found.level)}"
+    elif found.level:
+        every = len(found.level) > 1 and not found.unknown
+        over = "any other" if every else _titles(found.level)
+        parts = [f"its lead over {over} is not beyond chance"]
+    if found.unknown:
+        parts.append(f"how sure its lead over {_titles(found.unknown)} is, is not known")
     return [f"{'; '.join([sentence, *parts])}."]
 
 
-def _size(effect: MeasureEffect) -> float:
-    return abs(effect.effects.rank_biserial)
-
-
-def _lead(
-    cohort: Cohort, first: MeasureEffect, effects: Sequence[MeasureEffect]
-) -> tuple[list[str], list[str], list[str]]:
-    """Return over whom the lead is beyond chance, over whom it is not, and where p is unknown."""
-    adjusted = pair_holm(cohort)
-    ahead: list[str] = []
-    level: list[str] = []
-    untold: list[str] = []
-    for effect in effects:
-        if effect is first:
-            continue
-        a, b = (first.measure, effect.measure), (effect.measure, first.measure)
-        p = adjusted.get(a, adjusted.get(b, math.nan))
-        place = untold if math.isnan(p) else ahead if p < LEVEL else level
-        place.append(lower_first(effect.title))
-    return ahead, level, untold
-
-
-def method_dependence(cohort: Cohort) -> tuple[str, ...]:
+def method_dependence(study: StudyResult) -> tuple[str, ...]:
     """Return a sentence or two for each measure: whether its conclusion depends on the method."""
-    by_measure: dict[str, list[SensitivityRow]] = {}
-    for row in sorted_rows(cohort.sensitivity):
-        by_measure.setdefault(row.measure, []).append(row)
-    pairs = [(test.reference, test.other) for test in tests_by_days(cohort)]
-    pair = pairs[0] if pairs else ("the reference", "the other")
-    return tuple(
-        _dependence(rows, *pair)
-        for rows in by_measure.values()
-        if len({(row.method, row.inertia) for row in rows}) > 1
-    )
+    pair = (study.reference or "the reference", study.other or "the other")
+    return tuple(_dependence(found, *pair) for found in dependences(study))
 
 
-def _said(row: SensitivityRow) -> int:
-    """Return 1 or −1 where the row shows a difference of that sign, else 0."""
-    p = row.p if math.isnan(row.p_day) else row.p_day
-    return int(math.copysign(1, row.shift)) if p < LEVEL and row.shift else 0
-
-
-def _dependence(rows: Sequence[SensitivityRow], reference: str, other: str) -> str:
-    title = rows[0].title
-    groups: dict[int, list[SensitivityRow]] = {}
-    for row in rows:
-        groups.setdefault(_said(row), []).append(row)
-    if set(groups) == {0}:
+def _dependence(found: Dependence, reference: str, other: str) -> str:
+    title, rows = found.rows[0].measure.title, found.rows
+    if not found.lower and not found.higher:
         return f"{title}: no method shows a difference."
-    if len(groups) == 1:
-        return f"{title}: every method shows the difference. {_sizes(rows)}".rstrip()
-    if {1, -1} <= set(groups):
+    if found.lower and found.higher:
         text = (
-            f"{title}: the sign depends on the method: {_names(groups[1], rows)} "
-            f"{_verb(groups[1], 'show')} {other} lower than {reference}, "
-            f"{_names(groups[-1], rows)} higher"
+            f"{title}: the sign depends on the method: {_names(found.lower, rows)} "
+            f"{_verb(found.lower, 'show')} {other} lower than {reference}, "
+            f"{_names(found.higher, rows)} higher"
         )
-        return text + (f"; {_names(groups[0], rows)} neither." if 0 in groups else ".")
-    shown, absent = groups[next(sign for sign in groups if sign)], groups[0]
+        return text + (f"; {_names(found.none, rows)} neither." if found.none else ".")
+    if not found.none:
+        return f"{title}: every method shows the difference. {_why(found)}".rstrip()
+    shown = found.lower or found.higher
     text = (
         f"{title}: the difference that {_names(shown, rows)} {_verb(shown, 'show')} is not "
-        f"shown by {_names(absent, rows)}."
+        f"shown by {_names(found.none, rows)}."
     )
-    return f"{text} {_why(shown, absent)}".rstrip()
+    return f"{text} {_why(found)}".rstrip()
 
 
 def _verb(rows: Sequence[SensitivityRow], verb: str) -> str:
@@ -183,67 +131,40 @@ def _names(rows: Sequence[SensitivityRow], among: Sequence[SensitivityRow]) -> s
     return series(told)
 
 
-def _sizes(rows: Sequence[SensitivityRow]) -> str:
-    """Say so where the size of a shift lies outside the interval of the one that is used."""
-    chosen = next((row for row in rows if row.chosen), None)
-    if chosen is None:
+def _why(found: Dependence) -> str:
+    """Return what may explain the disagreement."""
+    if found.reason == "least squares alone":
+        return (
+            "The subject’s own torque biases least squares, and can hide a difference as well as "
+            "make one."
+        )
+    standard = found.standard
+    if standard is None:
         return ""
-    outside = [row for row in rows if not chosen.shift_low <= row.shift <= chosen.shift_high]
-    if not outside:
-        return ""
-    far = max(outside, key=lambda row: abs(row.shift - chosen.shift))
+    ends = interval(standard.shift_low, standard.shift_high, 3)
+    names = _names(found.about, found.rows)
+    if found.reason == "size":
+        far = found.about[0]
+        return (
+            f"Its size depends on it: {number(far.shift, 3)} {far.measure.unit} by {names}, "
+            f"outside the interval of “{standard.method}”, {number(standard.shift, 3)} {ends}."
+        )
+    if found.reason == "alike":
+        return (
+            f"All shifts lie in the interval of “{standard.method}”, {ends}: they differ in p more "
+            "than in size."
+        )
+    if found.reason == "imprecise":
+        return (
+            f"The interval of “{standard.method}” {ends} holds the shift of {names} too: a lack of "
+            "precision could be the reason."
+        )
+    text = f"The interval of “{standard.method}” {ends} does not hold that shift."
+    if found.reason == "not voluntary":
+        return f"{text} Voluntary torque would bias {names} too, so it is not the likely reason."
     return (
-        f"Its size depends on it: {number(far.shift, 3)} {far.unit} by {_names([far], rows)}, "
-        f"outside the interval of “{chosen.method}”, {number(chosen.shift, 3)} "
-        f"{interval(chosen.shift_low, chosen.shift_high, 3)}."
-    )
-
-
-def _why(shown: Sequence[SensitivityRow], absent: Sequence[SensitivityRow]) -> str:
-    """Tell torque of the subject's own from mere lack of precision, where the intervals can.
-
-    Such torque pulls all of least squares, so what one of its methods shows and another does not
-    has another reason.
-    """
-    every = [*shown, *absent]
-    instrumental = [row for row in absent if row.method not in LEAST_SQUARES]
-    least = [row for row in shown if row.method in LEAST_SQUARES]
-    unmoved = [row for row in absent if row.method in LEAST_SQUARES]
-    if not instrumental and not least:
-        return (
-            "Torque of the subject’s own pulls least squares, and can hide a difference as well "
-            "as make one."
-        )
-    if not instrumental or not least:
-        return _alike(every) or _sizes(every)
-    one = next((row for row in instrumental if row.chosen), instrumental[0])
-    inside = [row for row in least if one.shift_low <= row.shift <= one.shift_high]
-    ends = interval(one.shift_low, one.shift_high, 3)
-    if inside:
-        return (
-            f"The interval of “{one.method}” {ends} holds the shift of {_names(inside, every)} "
-            "too: a lack of precision could be the reason."
-        )
-    text = f"The interval of “{one.method}” {ends} leaves that shift out."
-    if {row.method for row in unmoved} - {row.method for row in least}:
-        return (
-            f"{text} Voluntary torque would pull {_names(unmoved, every)} too, so it is not the "
-            "likely reason."
-        )
-    return (
-        f"{text} Voluntary torque would do this: it pulls least squares and not the instrumental "
+        f"{text} Voluntary torque would do this: it biases least squares and not the instrumental "
         "estimate."
-    )
-
-
-def _alike(rows: Sequence[SensitivityRow]) -> str:
-    """Say so where every shift lies in the interval of the one that is used."""
-    one = next((row for row in rows if row.chosen), None)
-    if one is None or not all(one.shift_low <= row.shift <= one.shift_high for row in rows):
-        return ""
-    return (
-        f"All shifts lie in the interval of “{one.method}”, "
-        f"{interval(one.shift_low, one.shift_high, 3)}: they differ in p more than in size."
     )
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 from rigidimeter.records import Delay, Fit
-from rigidimeter.reporting.measures import split_pooled
 from rigidimeter.reporting.numbers import number
 from rigidimeter.reporting.page_table import Cell, Column, Table
-from rigidimeter.study import Study
+from rigidimeter.study import StudyResult, split_pooled
 
 __all__ = ["ALL_CONDITIONS", "HOW", "WHO", "delays_table", "fits_table", "pooled_table"]
 
@@ -83,7 +82,7 @@ def fits_table(name: str, caption: str, fits: tuple[Fit, ...]) -> Table:
     return Table(name, caption + in_which, columns, rows)
 
 
-def pooled_table(study: Study) -> Table:
+def pooled_table(study: StudyResult) -> Table:
     """List the fits to all epochs of each condition together, and to all of them."""
     numbers = (*_ESTIMATES, *_QUALITY)
     by_condition, overall = split_pooled(study.analysis)
@@ -96,7 +95,7 @@ def pooled_table(study: Study) -> Table:
     return Table("pooled", f"All epochs of a condition together{in_which}", columns, rows)
 
 
-def delays_table(study: Study) -> Table:
+def delays_table(study: StudyResult) -> Table:
     """List how late the torque is in each source, and what was done about it."""
     columns = (
         WHO[0],

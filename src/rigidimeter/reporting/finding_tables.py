@@ -6,7 +6,7 @@ from rigidimeter.records import Finding, Fit
 from rigidimeter.reporting.estimate_tables import WHO
 from rigidimeter.reporting.measures import short_names
 from rigidimeter.reporting.page_table import Cell, Column, Table
-from rigidimeter.study import Study
+from rigidimeter.study import StudyResult
 
 __all__ = ["finding_kinds", "findings_table"]
 
@@ -16,11 +16,11 @@ MOST_LABELS = 24
 """So many epochs of a kind are named; every one is in the table of all findings."""
 
 
-def _found(study: Study) -> list[tuple[Fit, Finding]]:
+def _found(study: StudyResult) -> list[tuple[Fit, Finding]]:
     return [(fit, finding) for fit in study.analysis.fits for finding in fit.findings]
 
 
-def findings_table(study: Study) -> Table:
+def findings_table(study: StudyResult) -> Table:
     """List every finding, epoch by epoch."""
     columns = (
         *WHO,
@@ -41,7 +41,7 @@ def findings_table(study: Study) -> Table:
     return Table("findings", "Findings, epoch by epoch", columns, rows)
 
 
-def finding_kinds(study: Study) -> Table:
+def finding_kinds(study: StudyResult) -> Table:
     """List each kind of finding once: the gravest first, then the most frequent."""
     columns = (
         Column("check", "Check", "check"),
@@ -66,7 +66,7 @@ def finding_kinds(study: Study) -> Table:
     return Table("finding_kinds", "What the checks found", columns, tuple(rows))
 
 
-def _where(study: Study, fits: list[Fit]) -> str:
+def _where(study: StudyResult, fits: list[Fit]) -> str:
     """Return the epochs by source, as many as can be read."""
     names = short_names(fit.source for fit in study.analysis.fits)
     by_source: dict[str, list[str]] = {}

@@ -14,8 +14,8 @@ from markupsafe import Markup
 
 from rigidimeter import __version__
 from rigidimeter.records import Fit, Score
-from rigidimeter.reporting.conclusions import cohort_verdict
-from rigidimeter.reporting.measures import condition_name, conditions, short_names, verdict
+from rigidimeter.reporting.conclusions import study_verdict
+from rigidimeter.reporting.measures import condition_name, epoch_verdict, short_names
 from rigidimeter.reporting.methods import interval_basis, method_title, pooled_basis
 from rigidimeter.reporting.numbers import interval, number, p_value
 from rigidimeter.reporting.page_table import Cell, Column, Table, csv_text
@@ -35,7 +35,7 @@ from rigidimeter.reporting.pictures import (
 from rigidimeter.reporting.prose import methods_prose
 from rigidimeter.reporting.report_tables import all_tables
 from rigidimeter.reporting.study_facts import cohort_view
-from rigidimeter.study import Comparison, Study
+from rigidimeter.study import Comparison, StudyResult
 
 __all__ = ["render_page", "short_names", "write_report"]
 
@@ -51,7 +51,7 @@ class Pair:
     unbounded: bool
 
 
-DRAWN: Mapping[str, Callable[[Study], list[Picture]]] = {
+DRAWN: Mapping[str, Callable[[StudyResult], list[Picture]]] = {
     "effects": effect_pictures,
     "days": day_pictures,
     "ratings": rating_pictures,
@@ -67,7 +67,7 @@ DRAWN: Mapping[str, Callable[[Study], list[Picture]]] = {
 
 
 def write_report(
-    study: Study, out: Path, progress: Callable[[float], None] = lambda _: None
+    study: StudyResult, out: Path, progress: Callable[[float], None] = lambda _: None
 ) -> Path:
     """Write ``report.html``, ``tables/*.csv`` and ``figures/*.svg`` into a folder.
 
@@ -76,7 +76,7 @@ def write_report(
 
     Parameters
     ----------
-    study : Study
+    study : StudyResult
         What to show.
     out : Path
         The folder; made if it does not exist. Files of the same names are replaced.
@@ -101,8 +101,8 @@ def write_report(
     for group in pictures.values():
         for picture in group:
             _write(out / "figures" / f"{picture.name}.svg", picture.svg)
-    if study.cohort is not None:
-        _write(out / "methods.txt", methods_prose(study, study.cohort).text)
+    if study.sessions:
+        _write(out / "methods.txt", methods_prose(study).text)
     page = out / "report.html"
     _write(page, render_page(study, tables, pictures))
     return page
@@ -113,7 +113,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def render_page(
-    study: Study, tables: Mapping[str, Table], pictures: Mapping[str, Sequence[Picture]]
+    study: StudyResult, tables: Mapping[str, Table], pictures: Mapping[str, Sequence[Picture]]
 ) -> str:
     """Return the page as text, with its style and its figures inside."""
     folder = resources.files("rigidimeter.reporting")
@@ -137,7 +137,7 @@ def render_page(
         tables=tables,
         pictures=pictures,
         pairs=(pairs := _pairs(study.comparisons)),
-        uncompared=len(conditions(study)) > 2 * len(pairs),
+        uncompared=len(study.condition_names) > 2 * len(pairs),
         verdict=_verdict(study),
         virtual=sum(epoch.virtual for epoch in study.epochs),
         sources=Counter(epoch.source for epoch in study.epochs),
@@ -147,26 +147,20 @@ def render_page(
         interval_basis=interval_basis(study.analysis.method, study.settings.estimation),
         pooled_basis=pooled_basis(study.analysis.method),
         version=__version__,
-        cohort=cohort_view(study, _unlisted(tables)),
+        cohort=cohort_view(study),
     )
 
 
-def _sources(study: Study) -> list[str]:
+def _sources(study: StudyResult) -> list[str]:
     analysis = study.analysis
     results: tuple[Fit | Score, ...] = (*analysis.fits, *analysis.fixed_inertia, *analysis.scores)
     return [result.source for result in results]
 
 
-def _verdict(study: Study) -> str:
+def _verdict(study: StudyResult) -> str:
     """Return what days show where there are days, else what epochs show."""
-    by_days = cohort_verdict(study.cohort) if study.cohort is not None else ""
-    return by_days or verdict(study)
-
-
-def _unlisted(tables: Mapping[str, Table]) -> int:
-    """Return how many recorded epochs of a study folder neither count nor are listed."""
-    account = tables.get("account")
-    return sum(int(row[-1] or 0) for row in account.rows) if account is not None else 0
+    by_days = study_verdict(study) if study.sessions else ""
+    return by_days or epoch_verdict(study)
 
 
 def _data_uri(svg: str) -> str:
@@ -181,6 +175,8 @@ def _shown(cell: Cell, column: Column, names: Mapping[str, str]) -> str:
         return names.get(str(cell), str(cell))
     if column.kind == "p" and isinstance(cell, float):
         return p_value(cell)
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
     if isinstance(cell, float):
         return f"{cell:g}" if column.kind == "setting" else number(cell * column.page_factor)
     return str(cell)
@@ -235,7 +231,11 @@ def _pairs(comparisons: Iterable[Comparison]) -> list[Pair]:
 
 
 def _row(comparison: Comparison) -> dict[str, str]:
-    row = {"title": comparison.title, "unit": comparison.unit, "remark": comparison.remark}
+    row = {
+        "title": comparison.measure.title,
+        "unit": comparison.measure.unit,
+        "remark": comparison.remark,
+    }
     sides = {"reference": comparison.reference, "other": comparison.other}
     for side, condition in sides.items():
         s = comparison.summaries[condition]

@@ -23,7 +23,7 @@ from rigidimeter.reporting.numbers import number
 from rigidimeter.reporting.prose_statistics import rating_sentences, test_sentences
 from rigidimeter.reporting.references import Cited, Prose
 from rigidimeter.settings import Settings
-from rigidimeter.study import Cohort, Condition, Study
+from rigidimeter.study import Condition, StudyResult
 
 __all__ = ["methods_prose"]
 
@@ -35,8 +35,7 @@ By = Literal["protocol", "check", "estimate", "operator"]
 class _Facts:
     """What the sentences draw on."""
 
-    study: Study
-    cohort: Cohort
+    study: StudyResult
     perturbed: tuple[Epoch, ...]
     imposed: tuple[Epoch, ...]
 
@@ -45,12 +44,11 @@ class _Facts:
         return self.study.settings
 
 
-def methods_prose(study: Study, cohort: Cohort) -> Prose:
+def methods_prose(study: StudyResult) -> Prose:
     """Return the paragraph of methods with its references."""
     scored = {(score.source, score.epoch) for score in study.analysis.scores}
     facts = _Facts(
         study,
-        cohort,
         tuple(e for e in study.epochs if (e.source, e.label) not in scored),
         tuple(e for e in study.epochs if (e.source, e.label) in scored),
     )
@@ -60,7 +58,7 @@ def methods_prose(study: Study, cohort: Cohort) -> Prose:
         [*_perturbation(facts, cite), *_rates(facts), *_limits(facts)],
         [*_estimation(facts, cite), *_scores(facts)],
         _exclusions(facts),
-        [*rating_sentences(cohort, cite), *test_sentences(study, cohort, cite)],
+        [*rating_sentences(study, cite), *test_sentences(study, cite)],
         _software(facts),
     ]
     return Prose(
@@ -83,31 +81,31 @@ def _counted(count: int, noun: str) -> str:
 
 
 def _design(facts: _Facts) -> list[str]:
-    cohort = facts.cohort
-    subjects = {s.subject for s in cohort.sessions}
-    days = {(s.subject, s.day) for s in cohort.sessions}
+    study = facts.study
+    subjects = {s.subject for s in study.sessions}
+    days = {(s.subject, s.day) for s in study.sessions}
     each = [
         f"{_plural(len(own), 'day')} in {condition_name(c.name)}"
-        for c in cohort.conditions
-        if (own := {(s.subject, s.day) for s in cohort.sessions if s.condition == c.name})
+        for c in study.conditions
+        if (own := {(s.subject, s.day) for s in study.sessions if s.condition == c.name})
     ]
-    visits = {(s.subject, s.day, s.condition) for s in cohort.sessions}
+    visits = {(s.subject, s.day, s.condition) for s in study.sessions}
     if len(each) > 1 and len(visits) > len(days):
         each.append(f"{len(visits) - len(days)} of them in more than one condition")
     split = f" ({', '.join(each)})" if len(each) > 1 else ""
-    who = _counted(len(subjects), "virtual subject" if cohort.virtual else "subject")
+    who = _counted(len(subjects), "virtual subject" if study.virtual else "subject")
     verb = "was" if len(subjects) == 1 else "were"
     sentences = [
         f"{who} {verb} measured on {_plural(len(days), 'day')}{split}, in "
-        f"{_plural(len(cohort.sessions), 'session')}; "
+        f"{_plural(len(study.sessions), 'session')}; "
         f"{_plural(len(facts.perturbed), 'epoch')} with a torque perturbation and "
         f"{_plural(len(facts.imposed), 'epoch')} with an imposed sinusoid were recorded."
     ]
-    if cohort.virtual:
+    if study.virtual:
         sentences.append(
             "All data were made by a simulation of joint, robot and sensors; nobody was measured."
         )
-    if cohort.blinded:
+    if study.blinded:
         sentences.append(
             "The analysis was made blinded: conditions are codes, and the key was not used."
         )
@@ -115,9 +113,9 @@ def _design(facts: _Facts) -> list[str]:
 
 
 def _conditions(facts: _Facts) -> list[str]:
-    if facts.cohort.blinded:
+    if facts.study.blinded:
         return []  # a code must not be told by its stimulation
-    told = [text for c in facts.cohort.conditions if (text := _stimulation(c))]
+    told = [text for c in facts.study.conditions if (text := _stimulation(c))]
     return [f"Conditions: {'; '.join(told)}."] if told else []
 
 
@@ -212,10 +210,10 @@ def _estimation(facts: _Facts, cite: Cited) -> list[str]:
             f"The torque was first shifted by its estimated delay in {len(corrected)} of "
             f"{_plural(len(analysis.delays), 'session')}."
         )
-    if math.isfinite(analysis.inertia_kg_m2) or facts.cohort.several:
+    if math.isfinite(analysis.inertia_kg_m2) or facts.study.several_subjects:
         of_whom = (
             "of the same subject in all conditions"
-            if facts.cohort.several
+            if facts.study.several_subjects
             else f"of all conditions ({number(analysis.inertia_kg_m2)} kg·m²)"
         )
         sentences.append(
@@ -255,7 +253,7 @@ def _scores(facts: _Facts) -> list[str]:
 
 
 def _exclusions(facts: _Facts) -> list[str]:
-    out = facts.cohort.exclusions
+    out = facts.study.exclusions
     total = len(facts.study.epochs)
     if not total:
         return []

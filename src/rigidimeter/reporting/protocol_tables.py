@@ -8,10 +8,9 @@ import numpy as np
 from pydantic import BaseModel
 
 from rigidimeter.records import Epoch
-from rigidimeter.reporting.measures import conditions
 from rigidimeter.reporting.page_table import Cell, Column, Table
 from rigidimeter.settings import Settings
-from rigidimeter.study import Study
+from rigidimeter.study import StudyResult
 from rigidimeter.units import rad_from_deg
 
 __all__ = ["design_table", "epoch_counts", "epoch_duration_s", "settings_table"]
@@ -25,7 +24,7 @@ def epoch_duration_s(epoch: Epoch) -> float:
     return max(spans, default=math.nan)
 
 
-def epoch_counts(study: Study) -> Table:
+def epoch_counts(study: StudyResult) -> Table:
     """Count the epochs of each task and condition, with their durations."""
     columns = (
         Column("task", "Task", "text"),
@@ -38,7 +37,7 @@ def epoch_counts(study: Study) -> Table:
     )
     rows: list[tuple[Cell, ...]] = []
     for task, title in _TASKS.items():
-        for condition in conditions(study):
+        for condition in study.condition_names:
             group = [e for e in study.epochs if e.task == task and e.condition == condition]
             durations = [d for e in group if math.isfinite(d := epoch_duration_s(e))]
             if not group:
@@ -53,7 +52,7 @@ def epoch_counts(study: Study) -> Table:
     return Table("counts", "Epochs by task and condition", columns, tuple(rows))
 
 
-def design_table(study: Study) -> Table:
+def design_table(study: StudyResult) -> Table:
     """Return the settings that define the measurement and the analysis."""
     s = study.settings
     prbs, guard, sinusoid = s.prbs, s.guard, s.sinusoid

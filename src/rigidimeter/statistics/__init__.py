@@ -5,6 +5,7 @@ from rigidimeter.statistics.contrasts import (
     JointTest,
     contrast,
     difference,
+    interval_of,
     joint_test,
     pairwise,
 )
@@ -60,6 +61,7 @@ __all__ = [
     "exact_ranksum",
     "fit_mixed",
     "holm",
+    "interval_of",
     "joint_test",
     "largest_r",
     "likelihood_ratio",

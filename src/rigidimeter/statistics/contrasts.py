@@ -17,10 +17,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import f as f_distribution
+from scipy.stats import t as t_distribution
 
 from rigidimeter.statistics.mixed import Mixed
 
-__all__ = ["Contrast", "JointTest", "contrast", "difference", "joint_test", "pairwise"]
+__all__ = [
+    "Contrast",
+    "JointTest",
+    "contrast",
+    "difference",
+    "interval_of",
+    "joint_test",
+    "pairwise",
+]
 
 Array = NDArray[np.float64]
 
@@ -95,6 +104,14 @@ def difference(fit: Mixed, first: str, second: str) -> Contrast:
 def pairwise(fit: Mixed) -> dict[tuple[str, str], Contrast]:
     """Return the difference of every pair of conditions, the earlier less the later."""
     return {pair: difference(fit, *pair) for pair in itertools.combinations(fit.conditions, 2)}
+
+
+def interval_of(
+    estimate: float, se: float, df: float, confidence: float = 0.95
+) -> tuple[float, float]:
+    """Return the interval of an estimate whose error follows t with these degrees of freedom."""
+    half = float(t_distribution.isf((1 - confidence) / 2, df)) * se
+    return estimate - half, estimate + half
 
 
 def contrast(fit: Mixed, weights: ArrayLike) -> Contrast:

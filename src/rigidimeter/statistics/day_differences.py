@@ -20,9 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import rankdata
-from scipy.stats import t as t_distribution
 
-from rigidimeter.statistics.contrasts import difference
+from rigidimeter.statistics.contrasts import difference, interval_of
 from rigidimeter.statistics.mixed import fit_mixed, nested
 
 __all__ = ["DayDifference", "day_difference", "day_medians", "exact_ranksum"]
@@ -30,6 +29,7 @@ __all__ = ["DayDifference", "day_difference", "day_medians", "exact_ranksum"]
 Array = NDArray[np.float64]
 
 _X, _Y = "x", "y"
+_IN_WORDS = {"condition in day": "condition within a day"}
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,8 @@ class DayDifference:
     offsets : tuple of str
         What had an offset of its own: ``subject``, ``day``, ``condition in day``.
     confidence : float
+    remark : str
+        Why there is no test, else empty: a test that could not be made has NaN for its numbers.
     """
 
     estimate: float
@@ -69,6 +71,13 @@ class DayDifference:
     day_share: float
     offsets: tuple[str, ...]
     confidence: float = 0.95
+    remark: str = ""
+
+    @property
+    def model(self) -> str:
+        """What the model had offsets for, in words."""
+        named = [f"each {_IN_WORDS.get(name, name)}" for name in self.offsets]
+        return " and ".join([", ".join(named[:-1]), *named[-1:]][len(named) < 2 :])
 
 
 def day_difference(
@@ -154,7 +163,7 @@ def day_difference(
     fit = fit_mixed(values, conditions, groups)
     found = difference(fit, _X, _Y)
     se, df = found.se_kenward_roger, found.df_kenward_roger
-    half = float(t_distribution.isf((1 - confidence) / 2, df)) * se
+    low, high = interval_of(found.estimate, se, df, confidence)
     # A subject with one day: its offset and the day's are one.
     of_day = "subject" if _same(whose, units) and "subject" in groups else "day"
     between = fit.variances[of_day] + fit.variances.get("condition in day", 0.0)
@@ -162,8 +171,8 @@ def day_difference(
     return DayDifference(
         estimate=found.estimate,
         se=se,
-        low=found.estimate - half,
-        high=found.estimate + half,
+        low=low,
+        high=high,
         p=found.p_kenward_roger,
         df=df,
         n_days_x=len({*nested(subjects[0], days[0])}),

@@ -232,7 +232,7 @@ def compare_effects(
 
 
 def holm(p_values: Sequence[float]) -> tuple[float, ...]:
-    """Return Holm's adjusted p-values in the order given; one that is NaN stays, and is no test.
+    """Return Holm's adjusted p-values in the order given; a NaN stays and is not counted.
 
     References
     ----------
@@ -243,13 +243,13 @@ def holm(p_values: Sequence[float]) -> tuple[float, ...]:
     >>> holm([0.01, 0.04, 0.03])
     (0.03, 0.06, 0.06)
     """
-    order = sorted((p, k) for k, p in enumerate(p_values) if not math.isnan(p))
-    adjusted = [float(p) for p in p_values]
-    largest = 0.0
-    for rank, (p, k) in enumerate(order):
-        largest = max(largest, min(1.0, (len(order) - rank) * p))
-        adjusted[k] = largest
-    return tuple(adjusted)
+    from statsmodels.stats.multitest import multipletests
+
+    adjusted = np.array(p_values, dtype=np.float64)
+    known = ~np.isnan(adjusted)
+    if known.any():
+        adjusted[known] = multipletests(adjusted[known], method="holm")[1]
+    return tuple(adjusted.tolist())
 
 
 def _units(groups: TwoGroups) -> tuple[list[str], list[str]]:

@@ -1,4 +1,4 @@
-"""From recorded files to fits, to comparisons, to what a whole study says.
+"""From recorded files to fits, to comparisons, to what a study concludes.
 
 Acquisition and study meet only in recorded files, so a laboratory can analyse with no driver
 installed.
@@ -6,51 +6,83 @@ installed.
 
 from rigidimeter.study.analysis import analyse, estimate, task_of
 from rigidimeter.study.archive import UNCHANGED, keep
-from rigidimeter.study.comparison import MEASURES, Comparison, Measure, compare, conditions
+from rigidimeter.study.columns import compare_columns
+from rigidimeter.study.compare_input import compare
+from rigidimeter.study.comparison import (
+    compare_analysis,
+    compare_measures,
+    conditions,
+    split_pooled,
+)
 from rigidimeter.study.results import (
-    Cohort,
+    MEASURES,
+    RATING,
+    Comparison,
     Condition,
     DayMedian,
-    DayTest,
+    EffectPair,
     Exclusion,
     LeftOut,
-    MeasureEffect,
+    Measure,
+    Observation,
+    RatingMean,
     RatingsFound,
     SensitivityRow,
     SessionEntry,
-    Study,
+    StudyResult,
 )
 from rigidimeter.study.study_analysis import StudyRead, analyse_study, read_study, steps
-from rigidimeter.study.tables import comparison_row, study_document
-from rigidimeter.study.warnings import doubts
+from rigidimeter.study.tables import (
+    COMPARISON_SCHEMA,
+    TEST,
+    comparison_document,
+    result_tables,
+    table_csv,
+)
+from rigidimeter.study.verdict import Dependence, Leader, Verdict, dependences, leader, verdict
+from rigidimeter.study.warnings import analysis_warnings
 
 __all__ = [
+    "COMPARISON_SCHEMA",
     "MEASURES",
+    "RATING",
+    "TEST",
     "UNCHANGED",
-    "Cohort",
     "Comparison",
     "Condition",
     "DayMedian",
-    "DayTest",
+    "Dependence",
+    "EffectPair",
     "Exclusion",
+    "Leader",
     "LeftOut",
     "Measure",
-    "MeasureEffect",
+    "Observation",
+    "RatingMean",
     "RatingsFound",
     "SensitivityRow",
     "SessionEntry",
-    "Study",
     "StudyRead",
+    "StudyResult",
+    "Verdict",
     "analyse",
     "analyse_study",
+    "analysis_warnings",
     "compare",
-    "comparison_row",
+    "compare_analysis",
+    "compare_columns",
+    "compare_measures",
+    "comparison_document",
     "conditions",
-    "doubts",
+    "dependences",
     "estimate",
     "keep",
+    "leader",
     "read_study",
+    "result_tables",
+    "split_pooled",
     "steps",
-    "study_document",
+    "table_csv",
     "task_of",
+    "verdict",
 ]

@@ -25,10 +25,10 @@ from rigidimeter.documents import json_text, text_bytes, write_text
 from rigidimeter.errors import UserError
 from rigidimeter.recording import estimates_document
 from rigidimeter.settings import dump_settings
-from rigidimeter.study.results import Cohort, Study
+from rigidimeter.study.results import RATING, StudyResult
 from rigidimeter.study.sessions import file_digest
 from rigidimeter.study.study_analysis import StudyRead
-from rigidimeter.study.tables import study_document, study_tables
+from rigidimeter.study.tables import comparison_document, result_tables, table_csv
 
 __all__ = ["ANALYSIS", "INPUTS_SCHEMA", "UNCHANGED", "keep"]
 
@@ -37,13 +37,17 @@ ANALYSIS = "analysis"
 UNCHANGED = "nothing has changed since the last analysis"
 INPUTS, COMPARISON = "inputs.json", "comparison.json"
 
+OLD_SCHEMA = "rigidimeter.study-comparison/1"
+
 _SHOWN = 12
+_TABLES = ("comparisons", "days", "effect_differences", "ratings", "sensitivity",
+           "excluded_epochs", "left_out", "estimates", "scores")  # fmt: skip
 _COMPARED = ("shift", "p", "r")
 _SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
 _BY_DAYS = ("estimate", "p", "p_days", "day_share")
 
 
-def keep(read: StudyRead, study: Study, cohort: Cohort, seed: int, resamples: int) -> list[str]:
+def keep(read: StudyRead, study: StudyResult) -> list[str]:
     """Write what is new into ``STUDY/analysis``; return in sentences what that is.
 
     A result that was edited by hand is kept beside the new one as ``NAME.edited``. Nothing is said
@@ -56,13 +60,14 @@ def keep(read: StudyRead, study: Study, cohort: Cohort, seed: int, resamples: in
     """
     folder = read.folder.folder / ANALYSIS
     place = str(read.folder.folder)
-    document = study_document(study, cohort, place)
+    document = comparison_document(study, place)
+    tables = result_tables(study)
     texts = {
         "estimates.json": json_text(estimates_document(study.analysis)),
-        **study_tables(study, cohort),
+        **{f"{name}.csv": table_csv(tables[name]) for name in _TABLES if tables[name]},
         COMPARISON: json_text(document),
     }
-    inputs = _inputs(read, study, seed, resamples)
+    inputs = _inputs(read, study)
     results = {name: hashlib.sha256(text_bytes(text)).hexdigest() for name, text in texts.items()}
     before = _object(folder / INPUTS)
     if before is not None and not _is_inputs(before):
@@ -88,7 +93,7 @@ def keep(read: StudyRead, study: Study, cohort: Cohort, seed: int, resamples: in
     return said
 
 
-def _inputs(read: StudyRead, study: Study, seed: int, resamples: int) -> dict[str, Any]:
+def _inputs(read: StudyRead, study: StudyResult) -> dict[str, Any]:
     files = {name: file_digest(path) for name, path in read.folder.files.items()}
     return {
         "schema": INPUTS_SCHEMA,
@@ -96,8 +101,8 @@ def _inputs(read: StudyRead, study: Study, seed: int, resamples: int) -> dict[st
         "method": study.analysis.method,
         "reference": read.names.pair[0],
         "other": read.names.pair[1],
-        "seed": seed,
-        "resamples": resamples,
+        "seed": study.seed,
+        "resamples": study.resamples,
         "settings": dump_settings(study.settings),
         "files": files | read.gathered.digests,
     }
@@ -178,15 +183,19 @@ def _moved(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
 def _numbers(document: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield what a reader would look at, by the name of the test."""
     try:
+        if document["schema"] == OLD_SCHEMA:
+            document = _upgraded(document)
         for c in document["comparisons"]:
-            row = {f"n {name}": group["n"] for name, group in c["groups"].items()}
-            row |= {f"median {name}": group["median"] for name, group in c["groups"].items()}
-            yield c["measure"], row | {name: c.get(name) for name in _COMPARED}
-        for d in document["day_tests"]:
-            yield f"{d['measure']} by days", {name: d[name] for name in _BY_DAYS}
-        for e in document["effects"]:
-            sizes = {name: e["effects"][name] for name in _SIZES}
-            yield f"{e['measure']}, effect size", sizes | {"p by Holm": e["p_holm"]}
+            if c["measure"] != RATING.name:  # an older document tests the corrected scores apart
+                row = {f"n {name}": group["n"] for name, group in c["groups"].items()}
+                row |= {f"median {name}": group["median"] for name, group in c["groups"].items()}
+                yield c["measure"], row | {name: c.get(name) for name in _COMPARED}
+                if c["days"] is not None:
+                    days = {name: c["days"][name] for name in _BY_DAYS}
+                    yield f"{c['measure']} by days", days
+            if c.get("rank_biserial") is not None:
+                sizes = {name: c[name] for name in _SIZES}
+                yield f"{c['measure']}, effect size", sizes | {"p by Holm": c["p_holm"]}
         for d in document["effect_differences"]:
             row = {name: d[name] for name in ("estimate", "low", "high", "p")}
             yield f"{d['first']} − {d['second']}, difference of effect sizes", row
@@ -200,6 +209,21 @@ def _numbers(document: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]
         yield "epochs left out", {"count": len(document["exclusions"])}
     except (KeyError, TypeError, AttributeError):
         return  # of another version
+
+
+def _upgraded(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a document of the older schema, which listed tests and effects apart, as a new one."""
+    days = {each["measure"]: each for each in document["day_tests"]}
+    effects = {
+        each["measure"]: each["effects"] | {"p_holm": each["p_holm"]}
+        for each in document["effects"]
+    }
+    rows = {each["measure"]: each for each in document["comparisons"]}
+    comparisons = [
+        {"measure": name, "days": days.get(name), **effects.get(name, {}), **rows.get(name, {})}
+        for name in dict.fromkeys([*rows, *effects])
+    ]
+    return {**document, "comparisons": comparisons}
 
 
 def _from_to(old: Any, new: Any) -> str:

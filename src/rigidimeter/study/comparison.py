@@ -1,80 +1,58 @@
-"""Two conditions side by side, in every measure of an analysis."""
+"""Two conditions side by side in every measure: the one comparison that everything goes through.
+
+Columns of a table, conditions of recordings and a study folder differ in where their observations
+come from, not in what is computed from them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-from rigidimeter.records import Analysis, Fit, Score
-from rigidimeter.statistics import RankSum, Summary, ranksum, summarise
+import numpy as np
 
-__all__ = ["MEASURES", "Comparison", "Measure", "compare", "compare_results", "conditions"]
+from rigidimeter.records import Analysis, Fit, Notice, Score
+from rigidimeter.statistics import (
+    DayDifference,
+    TwoGroups,
+    compare_effects,
+    day_difference,
+    effect_sizes,
+    holm,
+    ranksum,
+    summarise,
+    two_groups,
+)
+from rigidimeter.study.results import (
+    MEASURES,
+    Comparison,
+    DayMedian,
+    EffectPair,
+    Measure,
+    Observation,
+    SessionEntry,
+    StudyResult,
+)
+
+__all__ = [
+    "FEWEST_FOR_TEST",
+    "compare_analysis",
+    "compare_measures",
+    "conditions",
+    "day_test",
+    "day_tests",
+    "gathered",
+    "measured",
+    "no_days",
+    "observed",
+    "rank_test",
+    "split_pooled",
+]
 
 FEWEST_FOR_TEST = 3
 """Below this many values in a condition there is no rank-sum test."""
-
-
-class Measure(NamedTuple):
-    """What is compared: stored name, name for people, unit, and where an analysis holds it."""
-
-    name: str
-    title: str
-    unit: str
-    results: Callable[[Analysis], Sequence[Fit | Score]]
-
-
-MEASURES = (
-    Measure("inertia_kg_m2", "Inertia J", "kg·m²", lambda found: found.fits),
-    Measure("damping_nm_s_rad", "Viscous damping B", "N·m·s/rad", lambda f: f.fixed_inertia),
-    Measure("stiffness_nm_rad", "Stiffness K", "N·m/rad", lambda f: f.fixed_inertia),
-    Measure("impulse_nm_s", "Angular impulse", "N·m·s", lambda found: found.scores),
-    Measure("work_j", "Work", "J", lambda found: found.scores),
-)
-"""Inertia is from the first stage; damping and stiffness are from the second, at fixed inertia."""
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One measure in two conditions.
-
-    Attributes
-    ----------
-    measure : str
-        Stored name with unit, for example ``damping_nm_s_rad``.
-    title : str
-        Name for people, for example ``Viscous damping B``.
-    unit : str
-        For axes and tables, for example ``N·m·s/rad``.
-    reference, other : str
-        The two conditions; differences are reference − other.
-    values : mapping of str to tuple of float
-        The included values by condition, in the order of recording.
-    summaries : mapping of str to Summary
-        By condition.
-    excluded : mapping of str to int
-        How many epochs of each condition have no included value.
-    test : RankSum or None
-        None when a condition has too few values, for the reason in `remark`.
-    remark : str
-        Why there is no test, else empty.
-    """
-
-    measure: str
-    title: str
-    unit: str
-    reference: str
-    other: str
-    values: Mapping[str, tuple[float, ...]]
-    summaries: Mapping[str, Summary]
-    excluded: Mapping[str, int]
-    test: RankSum | None
-    remark: str = ""
-
-    @property
-    def paired(self) -> bool:
-        """Whether there are two conditions; with one, `other` means nothing."""
-        return len(self.summaries) == 2
 
 
 def conditions(analysis: Analysis) -> tuple[str, ...]:
@@ -84,63 +62,283 @@ def conditions(analysis: Analysis) -> tuple[str, ...]:
     return tuple(sorted(seen, key=lambda condition: condition != "OFF"))
 
 
-def compare(
-    analysis: Analysis, reference: str | None = None, other: str | None = None
-) -> tuple[Comparison, ...]:
-    """Compare two conditions in J, B, K, impulse and work; B and K with the inertia held.
+def compare_analysis(
+    analysis: Analysis,
+    reference: str | None = None,
+    other: str | None = None,
+    *,
+    seed: int = 1,
+    resamples: int = 9999,
+    title: str = "",
+) -> StudyResult:
+    """Compare two conditions of an analysis in J, B, K, impulse and work.
 
-    Without names, the first two conditions that `conditions` gives. An analysis with one condition
+    B and K are those with the inertia held. Every epoch counts as one observation. Without names
+    the first two conditions that `conditions` gives are compared; an analysis with one condition
     gives its summaries and no test.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    reference, other : str, optional
+    seed, resamples : int
+        Of the bootstrap; with 0 resamples there are no effect sizes with intervals.
+    title : str
     """
     names = conditions(analysis) or ("",)
     first = reference if reference is not None else names[0]
-    rest = [name for name in names if name != first]
-    second = other if other is not None else (rest[0] if rest else "")
-    return tuple(
-        compare_results(measure, results, first, second)
-        for measure in MEASURES
-        if (results := measure.results(analysis))
+    second = other if other is not None else next((n for n in names if n != first), "")
+    comparisons = gathered(analysis, (first, second))
+    comparisons, differences = compare_measures(comparisons, seed=seed, resamples=resamples)
+    return StudyResult(
+        title, first, second, comparisons, differences, (), seed, resamples, analysis=analysis
     )
 
 
-def compare_results(
+def gathered(
+    analysis: Analysis,
+    pair: tuple[str, str],
+    sessions: Mapping[str, SessionEntry] | None = None,
+) -> tuple[Comparison, ...]:
+    """Return every measure of an analysis with its observations, not yet tested.
+
+    `sessions`, by source, tell subject and day; then the day is what the bootstrap resamples.
+    """
+    by_condition, _ = split_pooled(analysis)
+    found = []
+    for measure in MEASURES:
+        results = measure.results(analysis)
+        if not results:
+            continue
+        pooled = by_condition.items() if isinstance(results[0], Fit) else ()
+        one = observed(measure, results, pair, sessions)
+        estimates = {name: _observation(measure, fit, None) for name, fit in pooled}
+        found.append(replace(one, pooled=estimates))
+    return tuple(found)
+
+
+def observed(
     measure: Measure,
     results: Sequence[Fit | Score],
-    reference: str,
-    other: str,
+    pair: tuple[str, str],
+    sessions: Mapping[str, SessionEntry] | None = None,
 ) -> Comparison:
-    """Compare two conditions in one measure; an empty `other` gives summaries alone."""
-    groups = [reference, other] if other else [reference]
-    values = {
-        name: tuple(
-            float(getattr(result, measure.name))
-            for result in results
-            if result.condition == name and result.outcome.included
-        )
-        for name in groups
-    }
-    excluded = {
-        name: sum(r.condition == name and not r.outcome.included for r in results)
-        for name in groups
-    }
-    test, remark = None, ""
-    if not other:
-        remark = "only one condition was recorded"
-    elif min(len(values[name]) for name in groups) < FEWEST_FOR_TEST:
-        counts = " and ".join(f"{len(values[name])} in {name}" for name in groups)
-        remark = f"a test needs {FEWEST_FOR_TEST} epochs in each condition; there are {counts}"
-    else:
-        test = ranksum(values[reference], values[other])
-    summaries = {name: summarise(values[name]) for name in groups}
+    """Return one measure of some fits or scores with its observations, not yet tested."""
+    observations = [
+        _observation(measure, result, sessions) for result in results if result.outcome.included
+    ]
+    excluded = {result.condition: 0 for result in results}
+    for result in results:
+        excluded[result.condition] += not result.outcome.included
+    return measured(measure, observations, pair, excluded)
+
+
+def _observation(
+    measure: Measure, result: Fit | Score, sessions: Mapping[str, SessionEntry] | None
+) -> Observation:
+    value, low, high = (
+        float(getattr(result, measure.name + end, math.nan)) for end in ("", "_low", "_high")
+    )
+    subject, day, unit = "", "", f"{result.source}/{result.epoch}"
+    if sessions is not None:
+        subject, day = sessions[result.source].subject, sessions[result.source].day
+        unit = f"{subject}/{day}"
+    return Observation(
+        value, result.condition, subject, day, result.source, result.epoch, unit, low, high
+    )
+
+
+def measured(
+    measure: Measure,
+    observations: Sequence[Observation],
+    pair: tuple[str, str],
+    excluded: Mapping[str, int] | None = None,
+) -> Comparison:
+    """Return a measure in all conditions that were observed, the compared ones first."""
+    reference, other = pair
+    compared = pair if other else (reference,)
+    names = dict.fromkeys([*compared, *(excluded or ()), *(o.condition for o in observations)])
     return Comparison(
-        measure.name,
-        measure.title,
-        measure.unit,
+        measure,
         reference,
         other,
-        values,
-        summaries,
-        excluded,
-        test,
-        remark,
+        tuple(observations),
+        {name: summarise([o.value for o in observations if o.condition == name]) for name in names},
+        {name: (excluded or {}).get(name, 0) for name in names},
     )
+
+
+def compare_measures(
+    comparisons: Sequence[Comparison], *, seed: int = 1, resamples: int = 9999
+) -> tuple[tuple[Comparison, ...], tuple[EffectPair, ...]]:
+    """Test every measure, and compare the effect sizes of every two.
+
+    Every measure and every pair draws from a random stream of its own, so one more measure changes
+    no other number. Two measures are resampled together where they share units in both conditions.
+    """
+    tested = [rank_test(each) for each in comparisons]
+    adjusted = holm([each.test.p if each.test else math.nan for each in tested])
+    tested = [replace(each, p_holm=p) for each, p in zip(tested, adjusted, strict=True)]
+    if not resamples:
+        return tuple(tested), ()
+    groups = {each.measure.name: _groups(each) for each in tested if each.test is not None}
+    tested = [
+        replace(each, effects=effect_sizes(groups[name], _stream(seed, name), resamples=resamples))
+        if (name := each.measure.name) in groups
+        else each
+        for each in tested
+    ]
+    pairs = list(itertools.combinations(groups, 2))
+    differences = []
+    for first, second in pairs:
+        one, two = groups[first], groups[second]
+        paired = not (
+            set(one.x_units).isdisjoint(two.x_units) or set(one.y_units).isdisjoint(two.y_units)
+        )
+        rng = _stream(seed, first, second)
+        differences.append(compare_effects(one, two, rng, paired=paired, resamples=resamples))
+    return tuple(tested), tuple(
+        EffectPair(*names, difference, p)
+        for names, difference, p in zip(
+            pairs, differences, holm([found.p for found in differences]), strict=True
+        )
+    )
+
+
+def rank_test(comparison: Comparison) -> Comparison:
+    """Return the comparison with its rank-sum test, or why there is none."""
+    if not comparison.other:
+        return replace(comparison, remark="only one condition was recorded")
+    x, y = (comparison.values[name] for name in comparison.pair)
+    if min(len(x), len(y)) < FEWEST_FOR_TEST:
+        counts = f"{len(x)} in {comparison.reference} and {len(y)} in {comparison.other}"
+        remark = (
+            f"a test needs {FEWEST_FOR_TEST} {comparison.measure.counted} in each condition; "
+            f"there are {counts}"
+        )
+        return replace(comparison, remark=remark)
+    return replace(comparison, test=ranksum(x, y))
+
+
+def day_tests(
+    comparisons: Sequence[Comparison],
+    *,
+    one_offset: bool = False,
+    ready: Mapping[str, DayDifference] | None = None,
+) -> tuple[Comparison, ...]:
+    """Return paired comparisons with their tests by days, adjusted for all of them, and medians.
+
+    `ready` holds tests that were made elsewhere, by measure: that of the ratings.
+    """
+    ready = ready or {}
+    found = [
+        ready.get(each.measure.name) or day_test(each, one_offset=one_offset)
+        for each in comparisons
+        if each.paired
+    ]
+    adjusted = iter(zip(found, holm([each.p for each in found]), strict=True))
+    done = []
+    for each in comparisons:
+        days, p = next(adjusted) if each.paired else (None, math.nan)
+        medians = () if each.measure.name in ready else _day_medians(each)
+        done.append(replace(each, days=days, days_p_holm=p, day_medians=medians))
+    return tuple(done)
+
+
+def day_test(
+    comparison: Comparison, *, one_offset: bool = False, confidence: float = 0.95
+) -> DayDifference:
+    """Compare the two conditions by days; where that cannot be done, a remark says why.
+
+    With `one_offset` a day is taken to affect both its conditions alike.
+    """
+    x, y = (comparison.of(name) for name in comparison.pair)
+    days = len({o.unit for o in x}), len({o.unit for o in y})
+    if min(len(x), len(y)) < FEWEST_FOR_TEST:
+        return no_days(*days, comparison.remark, confidence)
+    try:
+        return day_difference(
+            [o.value for o in x],
+            [o.value for o in y],
+            [o.day for o in x],
+            [o.day for o in y],
+            x_subjects=[o.subject for o in x],
+            y_subjects=[o.subject for o in y],
+            one_offset=one_offset,
+            confidence=confidence,
+        )
+    except (ValueError, ArithmeticError) as error:
+        return no_days(*days, str(error), confidence)
+
+
+def no_days(days_x: int, days_y: int, remark: str, confidence: float = 0.95) -> DayDifference:
+    """Return the test by days that could not be made, for the reason given."""
+    nan = math.nan
+    return DayDifference(
+        nan, nan, nan, nan, nan, nan, days_x, days_y, nan, nan, (), confidence, remark
+    )
+
+
+def _day_medians(comparison: Comparison) -> tuple[DayMedian, ...]:
+    """Return median and quartiles of every day of every subject and condition."""
+    days: dict[tuple[str, str, str], list[float]] = {}
+    for o in comparison.observations:
+        days.setdefault((o.subject, o.day, o.condition), []).append(o.value)
+    return tuple(
+        DayMedian(*key, s.n, s.median, s.q1, s.q3)
+        for key, values in days.items()
+        for s in [summarise(values)]
+    )
+
+
+def split_pooled(analysis: Analysis) -> tuple[dict[str, Fit], Fit | None]:
+    """Return the fit to all epochs of each condition, and the one to all epochs if there is one.
+
+    The latter has no condition, as recordings without a name for theirs have none: it comes last.
+    """
+    recorded = {fit.condition for fit in analysis.fits}
+    by_condition: dict[str, Fit] = {}
+    overall = None
+    for fit in analysis.pooled:
+        if fit.condition in by_condition or fit.condition not in recorded:
+            overall = fit
+        else:
+            by_condition[fit.condition] = fit
+    return by_condition, overall
+
+
+def lacking(comparisons: Sequence[Comparison], pair: tuple[str, str]) -> list[Notice]:
+    """Say once what keeps the measures of recordings from being tested."""
+    if not comparisons:
+        return [Notice("error", "no epoch could be fitted or scored, so nothing is compared")]
+    recorded = {
+        name: sum(c.summaries[name].n + c.excluded[name] for c in comparisons if name in c.pair)
+        for name in pair
+    }
+    absent = [name or "a second condition" for name, count in recorded.items() if not count]
+    if absent:
+        present = [name for name, count in recorded.items() if count]
+        text = (
+            f"there is no session in {' or '.join(absent)}, only in "
+            f"{present[0] if present else 'other conditions'}, so nothing is compared"
+        )
+        return [Notice("error", text)]
+    why: dict[str, list[str]] = {}
+    for c in comparisons:
+        if c.paired and c.test is None:
+            why.setdefault(c.remark, []).append(c.measure.title)
+    return [
+        Notice("error", f"no test of {', '.join(titles)}: {remark}")
+        for remark, titles in why.items()
+    ]
+
+
+def _groups(comparison: Comparison) -> TwoGroups:
+    x, y = (comparison.of(name) for name in comparison.pair)
+    return two_groups(
+        [o.value for o in x], [o.value for o in y], [o.unit for o in x], [o.unit for o in y]
+    )
+
+
+def _stream(seed: int, *names: str) -> np.random.Generator:
+    return np.random.default_rng([seed, *" ".join(names).encode()])

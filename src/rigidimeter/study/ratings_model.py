@@ -1,22 +1,38 @@
 """The examiners' ratings of a study: score = mean of condition + offset of examiner + error.
 
 As Sec. 2.2 of the paper; with several subjects each has an offset too. Beside it the same contrast
-with an offset for every day, for the three scores of one day are of one arm on one day.
+with an offset for every day, since all scores of one day are of one arm on that day.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.study_folder import StudyFolder
 from rigidimeter.records import Notice
-from rigidimeter.statistics import Contrast, Mixed, difference, fit_mixed
+from rigidimeter.statistics import (
+    Contrast,
+    DayDifference,
+    Mixed,
+    contrast,
+    difference,
+    fit_mixed,
+    interval_of,
+)
 from rigidimeter.study.blinding import Naming
+from rigidimeter.study.comparison import measured, no_days
 from rigidimeter.study.rating_table import Rating, groupings, oddities
-from rigidimeter.study.results import RatingsFound
+from rigidimeter.study.results import (
+    RATING,
+    Comparison,
+    Observation,
+    RatingMean,
+    RatingsFound,
+)
 
-__all__ = ["rated"]
+__all__ = ["means_of", "rated", "ratings_comparison", "ratings_days"]
 
 FEWEST = 3
 
@@ -57,6 +73,7 @@ def rated(read: StudyFolder, names: Naming) -> tuple[RatingsFound | None, list[N
         source=source,
         rows=tuple((r.condition, r.examiner, r.subject, r.day, r.score) for r in rows),
         fit=fit,
+        means=means_of(fit),
         contrast=difference(fit, first, second),
         reference=first,
         other=second,
@@ -111,7 +128,7 @@ def _lone_examiners(rows: list[Rating]) -> list[str]:
     for row in rows:
         counts[row.examiner] += 1
     if counts and all(count == 1 for count in counts.values()):
-        return ["every examiner gave one rating, so offsets cannot be told from chance"]
+        return ["every examiner gave one rating, so offsets cannot be distinguished from chance"]
     return []
 
 
@@ -141,3 +158,50 @@ def _with_days(
     except (ValueError, ArithmeticError):
         return None
     return difference(fit, *pair)
+
+
+def means_of(fit: Mixed) -> tuple[RatingMean, ...]:
+    """Return the mean of each condition with its interval by Kenward and Roger."""
+    means = []
+    for condition in fit.conditions:
+        one = contrast(fit, [float(name == condition) for name in fit.conditions])
+        low, high = interval_of(one.estimate, one.se_kenward_roger, one.df_kenward_roger)
+        means.append(RatingMean(condition, one.estimate, low, high))
+    return tuple(means)
+
+
+def ratings_comparison(found: RatingsFound) -> Comparison:
+    """Return the corrected scores as a measure; a rating without a day is a day of its own."""
+    observations = [
+        Observation(score, condition, subject, day, unit=f"{subject}/{day or f'row {number}'}")
+        for number, ((condition, _, subject, day, _), score) in enumerate(
+            zip(found.rows, found.fit.corrected.tolist(), strict=True), start=1
+        )
+    ]
+    return measured(RATING, observations, (found.reference, found.other))
+
+
+def ratings_days(found: RatingsFound) -> DayDifference:
+    """Return the contrast with an offset for every day as a test by days."""
+    days_x, days_y = (
+        len({row[2:4] for row in found.rows if row[0] == condition})
+        for condition in (found.reference, found.other)
+    )
+    c = found.contrast_days
+    if c is None:
+        return no_days(days_x, days_y, "the ratings cannot separate days from the residual")
+    se, df = c.se_kenward_roger, c.df_kenward_roger
+    low, high = interval_of(c.estimate, se, df)
+    return DayDifference(
+        c.estimate,
+        se,
+        low,
+        high,
+        c.p_kenward_roger,
+        df,
+        days_x,
+        days_y,
+        math.nan,
+        math.nan,
+        (),
+    )

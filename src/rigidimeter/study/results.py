@@ -1,29 +1,214 @@
-"""What a report shows: an analysis with its comparisons, and what a study folder adds to them."""
+"""What a comparison of two conditions found: every number that a page, a table or a line shows."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from html import escape
+from typing import TYPE_CHECKING, Literal
 
-from rigidimeter.records import Analysis, Epoch, Notice
+from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score
 from rigidimeter.settings import Settings
-from rigidimeter.statistics import Contrast, EffectDifference, Effects, Mixed
-from rigidimeter.study.comparison import Comparison
+from rigidimeter.statistics import (
+    Contrast,
+    DayDifference,
+    EffectDifference,
+    Effects,
+    Mixed,
+    RankSum,
+    Summary,
+)
+from rigidimeter.study.tables import comparison_rows
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = [
-    "Cohort",
+    "MEASURES",
+    "RATING",
+    "Comparison",
     "Condition",
     "DayMedian",
-    "DayTest",
+    "EffectPair",
     "Exclusion",
     "LeftOut",
-    "MeasureEffect",
+    "Measure",
+    "Observation",
+    "RatingMean",
     "RatingsFound",
     "SensitivityRow",
     "SessionEntry",
-    "Study",
+    "StudyResult",
 ]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What is compared.
+
+    Attributes
+    ----------
+    name : str
+        Stored name with unit, for example ``damping_nm_s_rad``.
+    title, unit : str
+        For people, for example ``Viscous damping B`` and ``N·m·s/rad``.
+    origin : str
+        Where its values come from: a field of an analysis, examiners' ratings, or the column of a
+        table.
+    """
+
+    name: str
+    title: str
+    unit: str
+    origin: Literal["fits", "fixed_inertia", "scores", "ratings", "column"]
+
+    def results(self, analysis: Analysis) -> Sequence[Fit | Score]:
+        """Return the fits or scores that hold this measure."""
+        if self.origin in ("ratings", "column"):
+            return ()
+        found: Sequence[Fit | Score] = getattr(analysis, self.origin)
+        return found
+
+    @property
+    def label(self) -> str:
+        """Title and unit, for axes and headings."""
+        return f"{self.title} ({self.unit})" if self.unit else self.title
+
+    @property
+    def counted(self) -> str:
+        """What one value is, in the plural."""
+        return {"ratings": "ratings", "column": "values"}.get(self.origin, "epochs")
+
+
+MEASURES = (
+    Measure("inertia_kg_m2", "Inertia J", "kg·m²", "fits"),
+    Measure("damping_nm_s_rad", "Viscous damping B", "N·m·s/rad", "fixed_inertia"),
+    Measure("stiffness_nm_rad", "Stiffness K", "N·m/rad", "fixed_inertia"),
+    Measure("impulse_nm_s", "Angular impulse", "N·m·s", "scores"),
+    Measure("work_j", "Work", "J", "scores"),
+)
+"""Inertia is from the first stage; damping and stiffness are from the second, at fixed inertia."""
+
+RATING = Measure("rating", "Examiners' rating", "1", "ratings")
+"""Scores less the offsets of their examiners."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One value of a measure that counts.
+
+    Attributes
+    ----------
+    value, low, high : float
+        With the ends of its own 95 % interval, NaN where it has none.
+    condition, subject, day, source, epoch : str
+        Empty where unknown.
+    unit : str
+        What the bootstrap resamples: a day of a subject, a session, or the value itself.
+    """
+
+    value: float
+    condition: str
+    subject: str = ""
+    day: str = ""
+    source: str = ""
+    epoch: str = ""
+    unit: str = ""
+    low: float = math.nan
+    high: float = math.nan
+
+
+@dataclass(frozen=True)
+class DayMedian:
+    """The included values of one measure on one day of one subject, in one condition."""
+
+    subject: str
+    day: str
+    condition: str
+    n: int
+    median: float
+    q1: float
+    q3: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One measure in every condition, and what sets two of them apart.
+
+    Attributes
+    ----------
+    measure : Measure
+    reference, other : str
+        The two conditions that are compared; differences are reference − other. `other` is empty
+        where there is only one.
+    observations : tuple of Observation
+        The included values of all conditions, in the order of recording.
+    summaries : mapping of str to Summary
+        By condition; the compared ones first.
+    excluded : mapping of str to int
+        How many epochs of each condition have no included value.
+    pooled : mapping of str to Observation
+        The estimate from all epochs of a condition together, where there is one.
+    test : RankSum or None
+        None when a condition has too few values, for the reason in `remark`.
+    p_holm : float
+        p of `test`, adjusted by Holm's method for all measures that were tested.
+    effects : Effects or None
+        Effect sizes with bootstrap intervals.
+    days : DayDifference or None
+        The test in which days count, not epochs; None where days are not known.
+    days_p_holm : float
+        p of `days`, adjusted by Holm's method for all measures tested by days.
+    day_medians : tuple of DayMedian
+    """
+
+    measure: Measure
+    reference: str
+    other: str
+    observations: tuple[Observation, ...]
+    summaries: Mapping[str, Summary]
+    excluded: Mapping[str, int]
+    pooled: Mapping[str, Observation] = field(default_factory=dict)
+    test: RankSum | None = None
+    remark: str = ""
+    p_holm: float = math.nan
+    effects: Effects | None = None
+    days: DayDifference | None = None
+    days_p_holm: float = math.nan
+    day_medians: tuple[DayMedian, ...] = ()
+
+    @property
+    def pair(self) -> tuple[str, ...]:
+        """The conditions that are compared: two, or the only one."""
+        return (self.reference, self.other) if self.other else (self.reference,)
+
+    @property
+    def paired(self) -> bool:
+        """Whether there are two conditions to compare."""
+        return bool(self.other)
+
+    @property
+    def values(self) -> dict[str, tuple[float, ...]]:
+        """The included values by condition, in the order of recording."""
+        return {name: tuple(o.value for o in self.of(name)) for name in self.summaries}
+
+    def of(self, condition: str) -> tuple[Observation, ...]:
+        """Return the observations of one condition."""
+        return tuple(each for each in self.observations if each.condition == condition)
+
+
+@dataclass(frozen=True)
+class EffectPair:
+    """How much larger the effect size of one measure is than that of another, by stored names.
+
+    `p_holm` is adjusted by Holm's method for all pairs.
+    """
+
+    first: str
+    second: str
+    difference: EffectDifference
+    p_holm: float
 
 
 @dataclass(frozen=True)
@@ -45,7 +230,7 @@ class Condition:
 
 @dataclass(frozen=True)
 class SessionEntry:
-    """One recording of a study: whose, when, in what, and where it lies.
+    """One recording of a study: whose, when, in what condition, and where it lies.
 
     `source` is the name by which its epochs go in an analysis; `code` is the blinded name of its
     condition as the table has it, `condition` what the key says, or the code without a key.
@@ -60,82 +245,13 @@ class SessionEntry:
 
 
 @dataclass(frozen=True)
-class DayMedian:
-    """The included epochs of one measure on one day of one subject, in one condition."""
+class RatingMean:
+    """The model's mean rating in one condition, with its 95 % interval by Kenward and Roger."""
 
-    measure: str
-    subject: str
-    day: str
     condition: str
-    n: int
-    median: float
-    q1: float
-    q3: float
-
-
-_OFFSETS = {"condition in day": "condition within a day"}
-
-
-@dataclass(frozen=True)
-class DayTest:
-    """A comparison in which days count, not epochs.
-
-    Attributes
-    ----------
-    measure, title, unit : str
-    reference, other : str
-        The estimate is reference − other.
-    estimate, low, high : float
-        From the mixed model of `statistics.day_difference`, with Kenward and Roger's interval
-        at `confidence`.
-    p : float
-        Kenward and Roger's.
-    df : float
-    days_reference, days_other : int
-    p_days : float
-        Of the exact rank-sum test of the medians of the days; nan where there are too few.
-    day_share : float
-        The share of the variance between epochs of one condition that is between days.
-    offsets : tuple of str
-        What had an offset in the model: ``subject``, ``day``, ``condition in day``.
-    remark : str
-        Why there is no test, else empty.
-    """
-
-    measure: str
-    title: str
-    unit: str
-    reference: str
-    other: str
-    estimate: float
+    mean: float
     low: float
     high: float
-    p: float
-    df: float
-    days_reference: int
-    days_other: int
-    p_days: float
-    day_share: float
-    confidence: float = 0.95
-    offsets: tuple[str, ...] = ()
-    remark: str = ""
-
-    @property
-    def model(self) -> str:
-        """Of what the model had offsets, in words."""
-        named = [f"each {_OFFSETS.get(name, name)}" for name in self.offsets]
-        return " and ".join([", ".join(named[:-1]), *named[-1:]][len(named) < 2 :])
-
-
-@dataclass(frozen=True)
-class MeasureEffect:
-    """The effect size of one measure, with intervals that resample whole days."""
-
-    measure: str
-    title: str
-    unit: str
-    effects: Effects
-    p_holm: float
 
 
 @dataclass(frozen=True)
@@ -144,12 +260,13 @@ class RatingsFound:
 
     `rows` are (condition, examiner, subject, day, score) in the order of the table; the corrected
     scores in `fit` go with them. `contrast_days` is the same contrast with an offset for every day
-    too, None where the days cannot be told.
+    too, None where the data cannot separate days.
     """
 
     source: str
     rows: tuple[tuple[str, str, str, str, float], ...]
     fit: Mixed
+    means: tuple[RatingMean, ...]
     contrast: Contrast
     reference: str
     other: str
@@ -159,15 +276,13 @@ class RatingsFound:
 
 @dataclass(frozen=True)
 class SensitivityRow:
-    """The conclusion on one measure by another road.
+    """The comparison of one measure by another method.
 
     `method` is the estimator; `inertia` says whether J was held at its median (``fixed``) or
-    fitted with B and K in each epoch (``free``).
+    fitted with B and K in each epoch (``free``). `p_day` is that of the test by days.
     """
 
-    measure: str
-    title: str
-    unit: str
+    measure: Measure
     method: str
     inertia: Literal["fixed", "free"]
     n_reference: int
@@ -202,7 +317,7 @@ class Exclusion:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """One recording of the table that does not count at all, and why.
+    """One recording of a study's table that does not count at all, and why.
 
     `condition` is as the table has it, a code or a name.
     """
@@ -215,59 +330,83 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
-class Cohort:
-    """What a study folder adds to an analysis.
+class StudyResult:
+    """Everything that was concluded from two conditions of recordings, a study or a table.
 
     Attributes
     ----------
-    conditions : tuple of Condition
-    sessions : tuple of SessionEntry
-    blinded : bool
-        Conditions are codes, because no key was given.
-    days : tuple of DayMedian
-    day_tests : tuple of DayTest
-    effects : tuple of MeasureEffect
-        One for each measure, the ratings among them.
-    differences : mapping of (str, str) to EffectDifference
-        Between the effect sizes of two measures, by their names.
-    ratings : RatingsFound or None
-    sensitivity : tuple of SensitivityRow
-    exclusions : tuple of Exclusion
-    virtual : bool
-        Every session comes from the virtual rig.
-    changes : tuple of str
-        What is new since the last analysis was kept, in sentences.
-    left_out : tuple of LeftOut
-        Recordings of the table that do not count.
-    several : bool
-        J was held at each subject's own median, for there are several subjects.
+    title : str
+    reference, other : str
+        The conditions that are compared; `other` is empty where there is only one.
+    comparisons : tuple of Comparison
+        One for each measure; the ratings of a study are the last.
+    differences : tuple of EffectPair
+    notices : tuple of Notice
+    seed, resamples : int
+        Of the bootstrap.
+    source, by : str
+        The table and its column of conditions, where columns of a table are compared.
+    analysis, epochs, settings
+        What was analysed; empty for columns of a table.
+    provenance : mapping of str to str
+    conditions, sessions, blinded, virtual, ratings, sensitivity, exclusions, left_out, changes
+        Of a study folder alone; `sessions` is empty if there is none. `blinded`: the conditions are
+        codes, for no key was given. `virtual`: every session comes from the virtual rig.
+        `changes`: what is new since the last analysis was kept, in sentences.
     """
 
-    conditions: tuple[Condition, ...]
-    sessions: tuple[SessionEntry, ...]
-    blinded: bool
-    days: tuple[DayMedian, ...]
-    day_tests: tuple[DayTest, ...]
-    effects: tuple[MeasureEffect, ...]
-    differences: Mapping[tuple[str, str], EffectDifference]
-    ratings: RatingsFound | None
-    sensitivity: tuple[SensitivityRow, ...]
-    exclusions: tuple[Exclusion, ...]
-    virtual: bool = False
-    changes: tuple[str, ...] = field(default=())
-    left_out: tuple[LeftOut, ...] = ()
-    several: bool = False
-
-
-@dataclass(frozen=True)
-class Study:
-    """Everything that a report shows; `cohort` where it comes from a study folder."""
-
     title: str
-    settings: Settings
-    epochs: tuple[Epoch, ...]
-    analysis: Analysis
+    reference: str
+    other: str
     comparisons: tuple[Comparison, ...]
-    notices: tuple[Notice, ...]
-    provenance: Mapping[str, str]
-    cohort: Cohort | None = None
+    differences: tuple[EffectPair, ...] = ()
+    notices: tuple[Notice, ...] = ()
+    seed: int = 1
+    resamples: int = 9999
+    source: str = ""
+    by: str = ""
+    analysis: Analysis = Analysis("", (), (), math.nan, ())  # noqa: RUF009
+    epochs: tuple[Epoch, ...] = ()
+    settings: Settings = field(default_factory=Settings)
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    conditions: tuple[Condition, ...] = ()
+    sessions: tuple[SessionEntry, ...] = ()
+    blinded: bool = False
+    virtual: bool = False
+    ratings: RatingsFound | None = None
+    sensitivity: tuple[SensitivityRow, ...] = ()
+    exclusions: tuple[Exclusion, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
+    changes: tuple[str, ...] = ()
+
+    @property
+    def condition_names(self) -> tuple[str, ...]:
+        """All conditions in one order: as compared, then as recorded."""
+        compared = [name for name in (self.reference, self.other) if name]
+        found = self.analysis
+        results: tuple[Fit | Score, ...] = (*found.fits, *found.fixed_inertia, *found.scores)
+        recorded = [each.condition for each in (*self.epochs, *results)]
+        tabled = [name for each in self.comparisons for name in each.summaries]
+        return tuple(dict.fromkeys([*compared, *recorded, *tabled]))
+
+    @property
+    def several_subjects(self) -> bool:
+        """Whether J was held at each subject's own median, for there are several subjects."""
+        return len({session.subject for session in self.sessions}) > 1
+
+    def comparison(self, measure: str) -> Comparison | None:
+        """Return the comparison of a measure by its stored name."""
+        return next((each for each in self.comparisons if each.measure.name == measure), None)
+
+    def table(self) -> pd.DataFrame:
+        """Return the comparisons as a pandas table, a row for each measure."""
+        import pandas as pd
+
+        return pd.DataFrame(comparison_rows(self.comparisons))
+
+    def _repr_html_(self) -> str:
+        columns = ["title", "unit", "median_reference", "median_other", "shift", "shift_low",
+                   "shift_high", "p", "p_holm", "r", "days_p", "days_p_holm"]  # fmt: skip
+        shown = self.table().reindex(columns=columns).dropna(axis="columns", how="all")
+        heading = f"{self.title}: {self.reference} − {self.other}".strip(": ")
+        return f"<p>{escape(heading)}</p>{shown.to_html(index=False, float_format='{:.4g}'.format)}"

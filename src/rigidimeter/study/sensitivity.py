@@ -1,26 +1,24 @@
-"""The conclusion by other roads: other estimators, and the inertia held or fitted freely."""
+"""The same comparison by other estimators, and with the inertia held or fitted freely."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from rigidimeter.estimation import METHODS
 from rigidimeter.records import Analysis, Fit, Notice
-from rigidimeter.study.comparison import (
-    FEWEST_FOR_TEST,
-    MEASURES,
-    Comparison,
-    Measure,
-    compare_results,
-)
-from rigidimeter.study.day_model import day_test, valued
-from rigidimeter.study.results import SensitivityRow, SessionEntry
+from rigidimeter.study.comparison import FEWEST_FOR_TEST, day_test, observed, rank_test
+from rigidimeter.study.results import MEASURES, Comparison, Measure, SensitivityRow, SessionEntry
 
 __all__ = ["sensitivity_methods", "sensitivity_rows"]
 
 _INERTIA, _DAMPING, _STIFFNESS = MEASURES[:3]
+_STAGES: Mapping[Measure, tuple[Literal["fixed", "free"], ...]] = {
+    _INERTIA: ("free",),
+    _DAMPING: ("fixed", "free"),
+    _STIFFNESS: ("fixed", "free"),
+}
 
 
 def sensitivity_methods() -> tuple[str, ...]:
@@ -38,6 +36,8 @@ def sensitivity_rows(
 ) -> tuple[list[SensitivityRow], list[Notice]]:
     """Return one row for each measure, method and stage; a method that cannot says why.
 
+    Rows are in the order of measures, then of methods, with J fixed before J free.
+
     Parameters
     ----------
     analyses : mapping of str to Analysis
@@ -50,31 +50,25 @@ def sensitivity_rows(
     one_offset : bool
         As for `day_test`.
     """
-    rows: list[SensitivityRow] = []
+    usable: dict[str, Analysis] = {}
     notices: list[Notice] = []
     for method, analysis in analyses.items():
         lacking = _lacking(analysis.fits, pair)
         if lacking:
             text = f"the sensitivity analysis has no {method}: {lacking}"
             notices.append(Notice("warning", text))
-            continue
-        for measure, inertia, fits in _stages(analysis):
-            compared = compare_results(measure, fits, *pair)
-            values = valued(measure.name, fits, sessions)
-            p_day = day_test(compared, values, one_offset=one_offset).p
-            stage = "free" if measure is _INERTIA else "fixed"
-            used = method == chosen and inertia == stage
-            rows.append(_row(compared, method, inertia, p_day, used))
+        else:
+            usable[method] = analysis
+    rows = []
+    for measure, stages in _STAGES.items():
+        for method, analysis in usable.items():
+            for inertia in stages:
+                fits = analysis.fixed_inertia if inertia == "fixed" else analysis.fits
+                used = method == chosen and inertia == stages[0]
+                found = rank_test(observed(measure, fits, pair, sessions))
+                p_day = day_test(found, one_offset=one_offset).p
+                rows.append(_row(found, method, inertia, p_day, used))
     return rows, notices
-
-
-def _stages(
-    analysis: Analysis,
-) -> Iterator[tuple[Measure, Literal["fixed", "free"], Sequence[Fit]]]:
-    for measure in (_DAMPING, _STIFFNESS):
-        yield measure, "fixed", analysis.fixed_inertia
-    for measure in (_INERTIA, _DAMPING, _STIFFNESS):
-        yield measure, "free", analysis.fits
 
 
 def _lacking(fits: Sequence[Fit], pair: tuple[str, str]) -> str:
@@ -92,21 +86,19 @@ def _lacking(fits: Sequence[Fit], pair: tuple[str, str]) -> str:
 
 
 def _row(
-    compared: Comparison,
+    found: Comparison,
     method: str,
     inertia: Literal["fixed", "free"],
     p_day: float,
     chosen: bool,
 ) -> SensitivityRow:
-    test = compared.test
+    test = found.test
     return SensitivityRow(
-        measure=compared.measure,
-        title=compared.title,
-        unit=compared.unit,
+        measure=found.measure,
         method=method,
         inertia=inertia,
-        n_reference=compared.summaries[compared.reference].n,
-        n_other=compared.summaries[compared.other].n,
+        n_reference=found.summaries[found.reference].n,
+        n_other=found.summaries[found.other].n,
         shift=test.shift if test else math.nan,
         shift_low=test.shift_low if test else math.nan,
         shift_high=test.shift_high if test else math.nan,

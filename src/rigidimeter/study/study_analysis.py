@@ -20,15 +20,13 @@ from rigidimeter.records import Analysis, Delay, Epoch, Notice
 from rigidimeter.settings import Settings
 from rigidimeter.study.analysis import analyse
 from rigidimeter.study.blinding import Naming, naming
-from rigidimeter.study.comparison import FEWEST_FOR_TEST, MEASURES, Comparison, compare
-from rigidimeter.study.day_model import day_medians_of, day_test, valued
-from rigidimeter.study.effects import Measured, effects_of, ratings_measured
+from rigidimeter.study.comparison import compare_measures, day_tests, gathered, lacking
 from rigidimeter.study.exclusions import exclusions_of, operators_exclusions
-from rigidimeter.study.ratings_model import rated
-from rigidimeter.study.results import Cohort, SessionEntry, Study
+from rigidimeter.study.ratings_model import rated, ratings_comparison, ratings_days
+from rigidimeter.study.results import RATING, SensitivityRow, SessionEntry, StudyResult
 from rigidimeter.study.sensitivity import sensitivity_methods, sensitivity_rows
 from rigidimeter.study.sessions import Gathered, gather
-from rigidimeter.study.warnings import doubts
+from rigidimeter.study.warnings import analysis_warnings
 
 __all__ = ["StudyRead", "analyse_study", "read_study", "steps"]
 
@@ -131,7 +129,7 @@ def analyse_study(
     seed: int = 1,
     resamples: int = 9999,
     progress: Callable[[str], None] = lambda _: None,
-) -> Study:
+) -> StudyResult:
     """Analyse a study: estimates, comparisons, days, effects, ratings, sensitivity, exclusions.
 
     Parameters
@@ -146,62 +144,49 @@ def analyse_study(
     pair = read.names.pair
     one_offset = read.folder.about.analysis.one_offset_a_day
     main, notices = _analysed(read.epochs, sessions, read.settings, read.method, progress)
-    comparisons = compare(main, *pair)
-    notices += _lacking(comparisons, pair)
-    by_measure = {
-        measure: valued(measure.name, results, sessions)
-        for measure in MEASURES
-        if (results := measure.results(main))
-    }
-    found, said = rated(read.folder, read.names)
-    notices += said
-    measured = [Measured(m.name, m.title, m.unit, values) for m, values in by_measure.items()]
-    if found is not None:
-        measured.append(ratings_measured(found))
-    effects, differences = effects_of(measured, pair, seed, resamples)
-    analyses = {main.method: main}
+    comparisons = gathered(main, pair, sessions)
+    ratings, said = rated(read.folder, read.names)
+    if ratings is not None:
+        comparisons = (*comparisons, ratings_comparison(ratings))
+    comparisons, differences = compare_measures(comparisons, seed=seed, resamples=resamples)
+    notices += [*lacking([c for c in comparisons if c.measure is not RATING], pair), *said]
+    comparisons = day_tests(
+        comparisons,
+        one_offset=one_offset,
+        ready={} if ratings is None else {RATING.name: ratings_days(ratings)},
+    )
+    rows: list[SensitivityRow] = []
     fitted = [epoch for epoch in read.epochs if epoch.task == "prbs"]
     if fitted and all(pair):
+        analyses = {main.method: main}
         for method in sensitivity_methods():
             if method != main.method:
                 analyses[method], _ = _analysed(
                     fitted, sessions, read.settings, method, progress, main.delays or None
                 )
-    ordered = {name: analyses[name] for name in sensitivity_methods() if name in analyses}
-    rows, said = sensitivity_rows(
-        {**ordered, **analyses}, main.method, sessions, pair, one_offset=one_offset
-    )
-    notices += said if fitted and all(pair) else []
-    cohort = Cohort(
+        ordered = {name: analyses[name] for name in sensitivity_methods()} | analyses
+        rows, said = sensitivity_rows(ordered, main.method, sessions, pair, one_offset=one_offset)
+        notices += said
+    return StudyResult(
+        title=read.folder.about.title,
+        reference=pair[0],
+        other=pair[1],
+        comparisons=comparisons,
+        differences=differences,
+        notices=(*read.notices, *notices),
+        seed=seed,
+        resamples=resamples,
+        analysis=main,
+        epochs=read.epochs,
+        settings=read.settings,
         conditions=read.names.conditions,
         sessions=tuple(sessions.values()),
         blinded=read.names.blinded,
-        days=tuple(
-            day for measure, values in by_measure.items() for day in day_medians_of(measure, values)
-        ),
-        day_tests=tuple(
-            day_test(c, values, one_offset=one_offset)
-            for c, values in zip(comparisons, by_measure.values(), strict=True)
-            if c.paired
-        ),
-        effects=effects,
-        differences=differences,
-        ratings=found,
-        sensitivity=tuple(rows) if fitted and all(pair) else (),
-        exclusions=tuple(exclusions_of(read.epochs, main, sessions, read.operator)),
         virtual=all(epoch.virtual for epoch in read.epochs),
+        ratings=ratings,
+        sensitivity=tuple(rows),
+        exclusions=tuple(exclusions_of(read.epochs, main, sessions, read.operator)),
         left_out=read.gathered.left_out,
-        several=len({entry.subject for entry in sessions.values()}) > 1,
-    )
-    return Study(
-        title=read.folder.about.title,
-        settings=read.settings,
-        epochs=read.epochs,
-        analysis=main,
-        comparisons=comparisons,
-        notices=(*read.notices, *notices),
-        provenance={},
-        cohort=cohort,
     )
 
 
@@ -235,7 +220,7 @@ def _analysed(
         by_subject.setdefault(sessions[epoch.source].subject, []).append(epoch)
     if len(by_subject) < 2:
         found = analyse(epochs, settings, method, delays=delays, progress=progress)
-        return found, list(doubts(found))
+        return found, list(analysis_warnings(found))
     reason = ""
     if method == "auto":
         method, reason = choose_method([epoch for epoch in epochs if epoch.task == "prbs"])
@@ -244,9 +229,9 @@ def _analysed(
         for subject, own in by_subject.items()
     }
     notices = [
-        Notice(doubt.level, f"subject {subject}: {doubt.text}")
+        Notice(notice.level, f"subject {subject}: {notice.text}")
         for subject, part in parts.items()
-        for doubt in doubts(part)
+        for notice in analysis_warnings(part)
     ]
     reasons = dict.fromkeys([reason, *(part.method_reason for part in parts.values())])
     fits = [fit for part in parts.values() for fit in part.fits]
@@ -265,31 +250,3 @@ def _analysed(
         text = f"J is held at the median of each subject, in kg·m²: {held}"
         notices.append(Notice("warning", text))
     return merged, notices
-
-
-def _lacking(comparisons: Sequence[Comparison], pair: tuple[str, str]) -> list[Notice]:
-    """Say once what keeps a comparison from being tested."""
-    if not comparisons:
-        return [Notice("error", "no epoch could be fitted or scored, so nothing is compared")]
-    recorded = {
-        name: sum(
-            c.summaries[name].n + c.excluded[name] for c in comparisons if name in c.summaries
-        )
-        for name in pair
-    }
-    absent = [name or "a second condition" for name, count in recorded.items() if not count]
-    if absent:
-        present = [name for name, count in recorded.items() if count]
-        text = (
-            f"there is no session in {' or '.join(absent)}, only in "
-            f"{present[0] if present else 'other conditions'}, so nothing is compared"
-        )
-        return [Notice("error", text)]
-    why: dict[str, list[str]] = {}
-    for c in comparisons:
-        if c.test is None and min(s.n for s in c.summaries.values()) < FEWEST_FOR_TEST:
-            why.setdefault(c.remark, []).append(c.title)
-    return [
-        Notice("error", f"no test of {', '.join(titles)}: {remark}")
-        for remark, titles in why.items()
-    ]

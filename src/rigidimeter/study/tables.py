@@ -1,58 +1,80 @@
-"""A study's conclusions as plain values and as tables: everything, unrounded.
+"""The conclusions as one JSON document and as tables: every number, unrounded.
 
-Two analyses of the same inputs give the same bytes: no time, and no place, is written down.
+A table of one name has the same rows and columns wherever it is written. Two analyses of the same
+inputs give the same bytes: neither time nor place is written down.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING, Any
 
 from rigidimeter.documents import csv_text, plain_values
 from rigidimeter.recording import estimates_document
-from rigidimeter.study.comparison import Comparison
-from rigidimeter.study.results import Cohort, RatingsFound, Study
+from rigidimeter.statistics import Contrast, RankSum, interval_of
 
-__all__ = ["STUDY_COMPARISON_SCHEMA", "comparison_row", "study_document", "study_tables"]
+if TYPE_CHECKING:
+    from rigidimeter.study.results import Comparison, RatingsFound, StudyResult
 
-STUDY_COMPARISON_SCHEMA = "rigidimeter.study-comparison/1"
+__all__ = [
+    "COMPARISON_SCHEMA",
+    "TEST",
+    "Rows",
+    "comparison_document",
+    "comparison_rows",
+    "result_tables",
+    "table_csv",
+]
+
+COMPARISON_SCHEMA = "rigidimeter.comparison/2"
 TEST = "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected"
 
+Rows = Sequence[Mapping[str, Any]]
 
-def study_document(study: Study, cohort: Cohort, place: str) -> dict[str, Any]:
-    """Return every conclusion of a study; what does not exist is null.
+_TESTED = tuple(field.name for field in fields(RankSum))
+_SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
+_QUARTILES = ("median", "q1", "q3")
+_BY = ("protocol", "check", "estimate", "operator")
+
+
+def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
+    """Return every conclusion as plain values; what does not exist is null.
 
     `place` is the study's folder as sentences name it; it is taken out of them.
     """
-    analysis = study.analysis
+    analysis = result.analysis
+    tables = result_tables(result)
     document = {
-        "schema": STUDY_COMPARISON_SCHEMA,
-        "title": study.title,
-        "blinded": cohort.blinded,
-        "virtual": cohort.virtual,
-        "conditions": [asdict(condition) for condition in cohort.conditions],
-        "sessions": [asdict(session) for session in cohort.sessions],
-        "left_out": [asdict(out) for out in cohort.left_out],
+        "schema": COMPARISON_SCHEMA,
+        "title": result.title,
+        "source": result.source,
+        "by": result.by,
+        "reference": result.reference,
+        "other": result.other,
+        "seed": result.seed,
+        "resamples": result.resamples,
+        "blinded": result.blinded,
+        "virtual": result.virtual,
+        "conditions": tables["conditions"],
+        "sessions": tables["sessions"],
+        "left_out": tables["left_out"],
         "method": analysis.method,
         "method_reason": analysis.method_reason,
         "inertia_kg_m2": analysis.inertia_kg_m2,
-        "inertia_by_subject": cohort.several,
-        "comparisons": [comparison_row(comparison) for comparison in study.comparisons],
-        "days": [asdict(day) for day in cohort.days],
-        "day_tests": [asdict(test) for test in cohort.day_tests],
-        "effects": [asdict(effect) for effect in cohort.effects],
-        "effect_differences": [
-            {"first": first, "second": second} | asdict(difference)
-            for (first, second), difference in cohort.differences.items()
-        ],
-        "ratings": None if cohort.ratings is None else _ratings(cohort.ratings),
-        "sensitivity": [asdict(row) for row in cohort.sensitivity],
-        "exclusions": [asdict(exclusion) for exclusion in cohort.exclusions],
+        "inertia_by_subject": result.several_subjects,
+        "comparisons": [_comparison(comparison) for comparison in result.comparisons],
+        "days": tables["days"],
+        "effect_differences": tables["effect_differences"],
+        "ratings": None if result.ratings is None else _ratings(result.ratings),
+        "sensitivity": tables["sensitivity"],
+        "exclusions": tables["excluded_epochs"],
         "notices": [
             {"level": notice.level, "text": notice.text.replace(f"{place}/", "")}
-            for notice in study.notices
+            if place
+            else asdict(notice)
+            for notice in result.notices
         ],
     }
     plain = plain_values(document)
@@ -60,31 +82,67 @@ def study_document(study: Study, cohort: Cohort, place: str) -> dict[str, Any]:
     return plain
 
 
-def comparison_row(comparison: Comparison) -> dict[str, Any]:
-    """Return one comparison of epochs."""
-    names = [name for name in (comparison.reference, comparison.other) if name]
-    row = {
-        "measure": comparison.measure,
-        "unit": comparison.unit,
-        "reference": comparison.reference,
-        "other": comparison.other,
+def _comparison(c: Comparison) -> dict[str, Any]:
+    """Return one comparison; the keys of its test are flat, those by days are under `days`."""
+    return {
+        **_names(c),
         "groups": {
-            name: asdict(comparison.summaries[name]) | {"excluded": comparison.excluded[name]}
-            for name in names
+            name: asdict(c.summaries[name]) | {"excluded": c.excluded[name]} for name in c.pair
         },
         "test": TEST,
-        **(asdict(comparison.test) if comparison.test is not None else {}),
-        "remark": comparison.remark,
+        **_tested(c),
+        "remark": c.remark,
+        "days": None if c.days is None else _days(c),
     }
-    plain = plain_values(row)
-    assert isinstance(plain, dict)
-    return plain
+
+
+def _names(c: Comparison) -> dict[str, Any]:
+    m = c.measure
+    return {"measure": m.name, "title": m.title, "unit": m.unit, "reference": c.reference,
+            "other": c.other}  # fmt: skip
+
+
+def _tested(c: Comparison) -> dict[str, Any]:
+    return {
+        **{name: getattr(c.test, name, None) for name in _TESTED},
+        "p_holm": c.p_holm,
+        **{name: getattr(c.effects, name, None) for name in _SIZES},
+        "interval_method": getattr(c.effects, "method", None),
+    }
+
+
+def _days(c: Comparison) -> dict[str, Any]:
+    row: dict[str, Any] = asdict(c.days) if c.days is not None else {}
+    row["days_reference"], row["days_other"] = row.pop("n_days_x"), row.pop("n_days_y")
+    return row | {"p_holm": c.days_p_holm}
+
+
+def comparison_rows(comparisons: Iterable[Comparison]) -> list[dict[str, Any]]:
+    """Return the comparisons as a table, one row for each measure."""
+    rows = []
+    for c in comparisons:
+        row = _names(c)
+        for side, name in zip(("reference", "other"), (c.reference, c.other), strict=True):
+            known = name in c.pair
+            numbers = asdict(c.summaries[name]) if known else dict.fromkeys(("n", *_QUARTILES))
+            row[f"n_{side}"] = numbers["n"]
+            row[f"excluded_{side}"] = c.excluded[name] if known else None
+            row |= {f"{quartile}_{side}": numbers[quartile] for quartile in _QUARTILES}
+        row |= _tested(c) | {"remark": c.remark}
+        if c.days is not None:
+            days = _days(c)
+            days["offsets"] = " + ".join(days["offsets"])
+            row |= {
+                name if name.startswith("days_") else f"days_{name}": value
+                for name, value in days.items()
+            }
+        rows.append(row)
+    return rows
 
 
 def _ratings(found: RatingsFound) -> dict[str, Any]:
     fit = found.fit
     errors = [math.sqrt(value) for value in fit.covariance.diagonal().tolist()]
-    columns = ("condition", "examiner", "subject", "day", "score")
     return {
         "source": found.source,
         "n": fit.n,
@@ -92,60 +150,197 @@ def _ratings(found: RatingsFound) -> dict[str, Any]:
         "other": found.other,
         "means": dict(zip(fit.conditions, fit.means.tolist(), strict=True)),
         "means_se": dict(zip(fit.conditions, errors, strict=True)),
+        "means_low": {mean.condition: mean.low for mean in found.means},
+        "means_high": {mean.condition: mean.high for mean in found.means},
         "variances": dict(fit.variances),
         "variance_residual": fit.variance_residual,
         "offsets": {name: dict(offsets) for name, offsets in fit.offsets.items()},
         "reml_deviance": fit.deviance,
         "contrast": asdict(found.contrast),
         "contrast_days": None if found.contrast_days is None else asdict(found.contrast_days),
-        "rows": [
-            dict(zip(columns, row, strict=True)) | {"corrected": corrected}
-            for row, corrected in zip(found.rows, fit.corrected.tolist(), strict=True)
-        ],
+        "rows": _rating_rows(found),
         "notices": list(found.notices),
     }
 
 
-def study_tables(study: Study, cohort: Cohort) -> dict[str, str]:
-    """Return the tables as CSV by file name; one without rows is left out."""
-    estimates = estimates_document(study.analysis)
-    fixed = estimates["fixed_inertia"]["epochs"]
-    epochs = [
-        one | {f"fixed_inertia_{name}": value for name, value in two.items() if name in one
-               and isinstance(value, float)}
-        for one, two in zip(estimates["epochs"], fixed, strict=True)
-    ]  # fmt: skip
-    whose = {s.source: {"subject": s.subject, "day": s.day} for s in cohort.sessions}
-    ratings = cohort.ratings
-    tables: dict[str, Sequence[Mapping[str, Any]]] = {
-        "comparisons": [_flat(comparison_row(c)) for c in study.comparisons],
-        "days": [asdict(day) for day in cohort.days],
-        "day_tests": [asdict(test) for test in cohort.day_tests],
-        "effects": [_flat(asdict(effect)) for effect in cohort.effects],
-        "effect_differences": [
-            {"first": first, "second": second} | asdict(difference)
-            for (first, second), difference in cohort.differences.items()
-        ],
-        "ratings": [] if ratings is None else _ratings(ratings)["rows"],
-        "sensitivity": [asdict(row) for row in cohort.sensitivity],
-        "exclusions": [asdict(exclusion) for exclusion in cohort.exclusions],
-        "left_out": [asdict(out) for out in cohort.left_out],
-        "epochs": [whose[row["source"]] | _flat(row) for row in epochs],
-        "scores": [whose[row["source"]] | _flat(row) for row in estimates["scores"]],
-    }
+def _rating_rows(found: RatingsFound) -> list[dict[str, Any]]:
+    columns = ("condition", "examiner", "subject", "day", "score")
+    return [
+        dict(zip(columns, row, strict=True)) | {"corrected": corrected}
+        for row, corrected in zip(found.rows, found.fit.corrected.tolist(), strict=True)
+    ]
+
+
+def _rating_offsets(found: RatingsFound) -> Iterator[dict[str, Any]]:
+    """Yield every offset; the count of ratings where one column of the table tells it."""
+    for grouping, offsets in found.fit.offsets.items():
+        sd = math.sqrt(found.fit.variances[grouping])
+        place = {"examiner": 1, "subject": 2}.get(grouping)
+        for name, offset in offsets.items():
+            count = None if place is None else sum(row[place] == name for row in found.rows)
+            yield {"grouping": grouping, "name": name, "ratings": count, "offset": offset, "sd": sd}
+
+
+def _rating_contrast(found: RatingsFound) -> Iterator[dict[str, Any]]:
+    """Yield the contrast by each choice of degrees of freedom, with its 95 % interval."""
+    yield from _choices(found.contrast)
+    if found.contrast_days is not None:
+        *_, last = _choices(found.contrast_days)
+        yield last | {"freedom": f"{last['freedom']}, with an offset for each day too"}
+
+
+def _choices(c: Contrast) -> Iterator[dict[str, Any]]:
+    for name, se, f, df, p in (
+        ("residual, n − p", c.se, c.f, c.df_residual, c.p_residual),
+        ("Satterthwaite", c.se, c.f, c.df_satterthwaite, c.p_satterthwaite),
+        ("Kenward–Roger", c.se_kenward_roger, c.f_kenward_roger, c.df_kenward_roger,
+         c.p_kenward_roger),
+    ):  # fmt: skip
+        low, high = interval_of(c.estimate, se, df)
+        yield {"freedom": name, "estimate": c.estimate, "low": low, "high": high, "se": se,
+               "f": f, "df": df, "p": p}  # fmt: skip
+
+
+def result_tables(result: StudyResult) -> dict[str, Rows]:
+    """Return every table of conclusions by name; some have no rows."""
+    ratings = result.ratings
+    titles = {c.measure.name: c.measure.title for c in result.comparisons}
     return {
-        f"{name}.csv": csv_text(list(dict.fromkeys(key for row in rows for key in row)), rows)
-        for name, rows in tables.items()
-        if rows
+        "comparisons": comparison_rows(result.comparisons),
+        "summaries": list(_summaries(result.comparisons)),
+        "days": [
+            {"measure": c.measure.name} | asdict(day)
+            for c in result.comparisons
+            for day in c.day_medians
+        ],
+        "effect_differences": [
+            {
+                "first": pair.first,
+                "second": pair.second,
+                "first_title": titles[pair.first],
+                "second_title": titles[pair.second],
+                "estimate": pair.difference.estimate,
+                "low": pair.difference.low,
+                "high": pair.difference.high,
+                "p": pair.difference.p,
+                "p_holm": pair.p_holm,
+                "paired": pair.difference.paired,
+            }
+            for pair in result.differences
+        ],
+        "ratings": [] if ratings is None else _rating_rows(ratings),
+        "rating_offsets": [] if ratings is None else list(_rating_offsets(ratings)),
+        "rating_contrast": [] if ratings is None else list(_rating_contrast(ratings)),
+        "sensitivity": [
+            {"measure": m.name, "title": m.title, "unit": m.unit}
+            | {name: value for name, value in vars(row).items() if name != "measure"}
+            for row in result.sensitivity
+            for m in [row.measure]
+        ],
+        "conditions": list(_conditions(result)),
+        "sessions": [asdict(session) for session in result.sessions],
+        "excluded_epochs": [asdict(exclusion) for exclusion in result.exclusions],
+        "left_out": [asdict(out) for out in result.left_out],
+        "account": list(_account(result)),
+        "estimates": list(_estimates(result)),
+        "scores": list(_scores(result)),
     }
 
 
-def _flat(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return nested tables as columns with compound names; lists are left out."""
-    flat: dict[str, Any] = {}
-    for name, value in row.items():
-        if isinstance(value, Mapping):
-            flat |= _flat(value, f"{prefix}{name}_")
-        elif not isinstance(value, (list, tuple)):
-            flat[prefix + name] = value
-    return flat
+def _summaries(comparisons: Iterable[Comparison]) -> Iterator[dict[str, Any]]:
+    for c in comparisons:
+        for name, summary in c.summaries.items():
+            if summary.n or c.excluded[name]:
+                yield {
+                    "measure": c.measure.name,
+                    "title": c.measure.title,
+                    "unit": c.measure.unit,
+                    "condition": name,
+                    "n": summary.n,
+                    "excluded": c.excluded[name],
+                    "median": summary.median,
+                    "q1": summary.q1,
+                    "q3": summary.q3,
+                }
+
+
+def _conditions(result: StudyResult) -> Iterator[dict[str, Any]]:
+    """Yield each condition; a code without its stimulation, which would give it away."""
+    for condition in result.conditions:
+        mine = [each for each in result.sessions if each.condition == condition.name]
+        days = len({(each.subject, each.day) for each in mine})
+        about = asdict(condition)
+        if result.blinded:
+            about = dict.fromkeys(about) | {"name": condition.name}
+        yield about | {"days": days, "sessions": len(mine)}
+
+
+def _account(result: StudyResult) -> Iterator[dict[str, Any]]:
+    """Yield for each task and condition what was recorded, what counts, and who left out the rest.
+
+    `unlisted` are epochs that neither count nor are among the exclusions.
+    """
+    if not result.sessions:
+        return
+    analysis = result.analysis
+    counted = {
+        "prbs": {(f.source, f.epoch) for f in analysis.fixed_inertia if f.outcome.included},
+        "sinusoid": {(s.source, s.epoch) for s in analysis.scores if s.outcome.included},
+    }
+    fitted = {(fit.source, fit.epoch) for fit in analysis.fits}
+    out = {(e.source, e.epoch): e.by for e in reversed(result.exclusions)}
+    for task, included in counted.items():
+        for condition in result.condition_names:
+            recorded = {
+                key
+                for epoch in result.epochs
+                for key in [(epoch.source, epoch.label)]
+                if epoch.condition == condition
+                and (epoch.task or ("prbs" if key in fitted else "sinusoid")) == task
+            }
+            if not recorded:
+                continue
+            by: list[str] = [out[key] for key in recorded & out.keys()]
+            counts = len(recorded & included - out.keys())
+            yield {
+                "task": task,
+                "condition": condition,
+                "recorded": len(recorded),
+                "included": counts,
+                **{f"by_{name}": by.count(name) for name in _BY},
+                "unlisted": len(recorded) - counts - len(by),
+            }
+
+
+def _estimates(result: StudyResult) -> Iterator[dict[str, Any]]:
+    """Yield each fit with subject and day, and the fit at fixed inertia beside it."""
+    whose = _whose(result)
+    estimates = estimates_document(result.analysis)
+    fixed = estimates["fixed_inertia"]["epochs"]
+    for one, two in zip(estimates["epochs"], fixed, strict=True):
+        beside = {
+            f"fixed_inertia_{name}": value
+            for name, value in two.items()
+            if isinstance(value, float)
+        }
+        yield whose.get(one["source"], {}) | _flat(one) | beside
+
+
+def _scores(result: StudyResult) -> Iterator[dict[str, Any]]:
+    whose = _whose(result)
+    for row in estimates_document(result.analysis)["scores"]:
+        yield whose.get(row["source"], {}) | _flat(row)
+
+
+def _whose(result: StudyResult) -> dict[str, dict[str, str]]:
+    return {s.source: {"subject": s.subject, "day": s.day} for s in result.sessions}
+
+
+def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the cells that fit into a table."""
+    return {name: value for name, value in row.items() if not isinstance(value, (list, dict))}
+
+
+def table_csv(rows: Rows) -> str:
+    """Return a table as CSV; a column is there if any row has it."""
+    return csv_text(list(dict.fromkeys(name for row in rows for name in row)), rows)

@@ -1,4 +1,4 @@
-"""What looks wrong with an analysis as a whole, and what to do about it."""
+"""What looks wrong with an analysis in general, and what to do about it."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import numpy as np
 
 from rigidimeter.records import Analysis, Notice
 
-__all__ = ["doubts"]
+__all__ = ["analysis_warnings"]
 
 DIFFERENT_INERTIA = 0.15
 """Sources whose median J differ by more than this hardly are one joint."""
 
 
-def doubts(analysis: Analysis) -> tuple[Notice, ...]:
-    """Return what looks wrong with an analysis as a whole, and what to do about it."""
-    return (*_misfit_doubts(analysis), *_source_doubts(analysis), *_sign_doubts(analysis))
+def analysis_warnings(analysis: Analysis) -> tuple[Notice, ...]:
+    """Return what looks wrong with an analysis in general, and what to do about it."""
+    return (*_misfit(analysis), *_different_inertia(analysis), *_wrong_sign(analysis))
 
 
-def _misfit_doubts(analysis: Analysis) -> tuple[Notice, ...]:
+def _misfit(analysis: Analysis) -> tuple[Notice, ...]:
     return tuple(
         Notice("warning", f"{fit.condition or 'all epochs'}: {finding.text}; {finding.remedy}")
         for fit in analysis.pooled
@@ -25,7 +25,7 @@ def _misfit_doubts(analysis: Analysis) -> tuple[Notice, ...]:
     )
 
 
-def _source_doubts(analysis: Analysis) -> tuple[Notice, ...]:
+def _different_inertia(analysis: Analysis) -> tuple[Notice, ...]:
     """Say so when sources differ in J: one median for all would put the difference into K."""
     by_source: dict[str, list[float]] = {}
     for fit in analysis.fits:
@@ -46,7 +46,7 @@ def _source_doubts(analysis: Analysis) -> tuple[Notice, ...]:
     return (Notice("warning", text),)
 
 
-def _sign_doubts(analysis: Analysis) -> tuple[Notice, ...]:
+def _wrong_sign(analysis: Analysis) -> tuple[Notice, ...]:
     included = [fit for fit in analysis.fits if fit.outcome.included]
     of_all = f"of {len(included)} included epochs"
     turned = [

@@ -2,47 +2,41 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rigidimeter.records import Analysis, Channel, Epoch, Fit, Motion, Notice, Outcome, Score
-from rigidimeter.settings import Settings
 from rigidimeter.statistics import (
     TwoGroups,
-    compare_effects,
     day_difference,
     difference,
-    effect_sizes,
     fit_mixed,
     holm,
     ranksum,
-    summarise,
     two_groups,
 )
 from rigidimeter.study import (
-    MEASURES,
-    Cohort,
+    RATING,
+    Comparison,
     Condition,
-    DayMedian,
-    DayTest,
     Exclusion,
-    MeasureEffect,
+    Measure,
     RatingsFound,
     SensitivityRow,
     SessionEntry,
-    Study,
-    compare,
+    StudyResult,
+    compare_measures,
 )
+from rigidimeter.study.comparison import day_tests, gathered, no_days
+from rigidimeter.study.ratings_model import means_of, ratings_comparison, ratings_days
 
 JOINT = {"inertia_kg_m2": 0.0045, "damping_nm_s_rad": 0.137, "stiffness_nm_rad": 1.75}
 LOWER = {"inertia_kg_m2": 1.0, "damping_nm_s_rad": 0.84, "stiffness_nm_rad": 0.81}
 SCATTER = {"inertia_kg_m2": 0.03, "damping_nm_s_rad": 0.09, "stiffness_nm_rad": 0.12}
 LEFT_OUT = Outcome("excluded", "the arm touched the position limit")
-RATING = ("rating", "Examiners' rating", "1")
 
 
 def _channels(
@@ -93,8 +87,8 @@ class Design:
     both_on_a_day: bool = False
 
 
-def made_study(design: Design | None = None, **parts: object) -> Study:
-    """Return a study with a cohort; `parts` replace fields of the cohort."""
+def made_study(design: Design | None = None, **parts: object) -> StudyResult:
+    """Return the result of a study folder; `parts` replace its fields."""
     design = design or Design()
     rng = np.random.default_rng(design.seed)
     sessions = _sessions(design)
@@ -104,40 +98,29 @@ def made_study(design: Design | None = None, **parts: object) -> Study:
     for session in sessions:
         _fill(design, session, rng, fits, scores, epochs)
     analysis = Analysis("iv", tuple(fits), tuple(fits), JOINT["inertia_kg_m2"], tuple(scores))
-    comparisons = compare(analysis, *design.names)
-    samples = {
-        measure.name: _groups(measure.results(analysis), measure.name, sessions, design.names)
-        for measure in MEASURES
-    }
+    by_source = {session.source: session for session in sessions}
     ratings = _ratings(design, sessions, rng)
-    samples["rating"] = _rating_groups(ratings, design.names)
-    named = {measure.name: (measure.title, measure.unit) for measure in MEASURES}
-    named["rating"] = RATING[1:]
-    effects = {name: effect_sizes(group, rng, resamples=199) for name, group in samples.items()}
-    adjusted = holm([found.test.p for found in effects.values()])
-    cohort = Cohort(
+    comparisons = (*gathered(analysis, design.names, by_source), ratings_comparison(ratings))
+    comparisons, differences = compare_measures(comparisons, resamples=199)
+    comparisons = day_tests(comparisons, ready={RATING.name: ratings_days(ratings)})
+    result = StudyResult(
+        title="Elbow rigidity",
+        reference=design.names[0],
+        other=design.names[1],
+        comparisons=comparisons,
+        differences=differences,
+        notices=(Notice("warning", "one column was empty"),),
+        resamples=199,
+        analysis=analysis,
+        epochs=tuple(epochs),
+        provenance={"rigidimeter": "0"},
         conditions=(
             Condition(design.names[0], "stimulation off"),
             Condition(design.names[1], "stimulation on", 130.0, 0.32, "mA", 60.0, "C+ 1-", 15.0),
         ),
         sessions=sessions,
-        blinded=False,
-        days=tuple(_day_medians(analysis, sessions)),
-        day_tests=tuple(
-            _day_test(name, *named[name], group, design.names)
-            for name, group in samples.items()
-            if name != "rating"
-        ),
-        effects=tuple(
-            MeasureEffect(name, *named[name], effects[name], p)
-            for name, p in zip(effects, adjusted, strict=True)
-        ),
-        differences={
-            (a, b): compare_effects(samples[a], samples[b], rng, paired=True, resamples=199)
-            for a, b in itertools.combinations(samples, 2)
-        },
         ratings=ratings,
-        sensitivity=tuple(_sensitivity(samples, named, design.names)),
+        sensitivity=tuple(_sensitivity(comparisons)),
         exclusions=tuple(
             Exclusion(
                 s.subject, s.day, s.condition, s.source, fit.epoch, "prbs", by, fit.outcome.reason
@@ -148,16 +131,7 @@ def made_study(design: Design | None = None, **parts: object) -> Study:
             for by in ["operator" if "moved" in fit.outcome.reason else "protocol"]
         ),
     )
-    return Study(
-        title="Elbow rigidity",
-        settings=Settings(),
-        epochs=tuple(epochs),
-        analysis=analysis,
-        comparisons=comparisons,
-        notices=(Notice("warning", "one column was empty"),),
-        provenance={"rigidimeter": "0"},
-        cohort=replace(cohort, **parts),
-    )
+    return replace(result, **parts)
 
 
 def _sessions(design: Design) -> tuple[SessionEntry, ...]:
@@ -256,73 +230,6 @@ def _fill(
         )
 
 
-def _groups(
-    results: Sequence[Fit | Score],
-    name: str,
-    sessions: Sequence[SessionEntry],
-    names: tuple[str, str],
-) -> TwoGroups:
-    unit = {s.source: f"{s.subject}/{s.day}" for s in sessions}
-    x, y = (
-        [
-            (float(getattr(r, name)), unit[r.source])
-            for r in results
-            if r.condition == condition and r.outcome.included
-        ]
-        for condition in names
-    )
-    return two_groups([v for v, _ in x], [v for v, _ in y], [u for _, u in x], [u for _, u in y])
-
-
-def _day_test(
-    name: str, title: str, unit: str, group: TwoGroups, names: tuple[str, str]
-) -> DayTest:
-    subjects = [[u.partition("/")[0] for u in units] for units in (group.x_units, group.y_units)]
-    found = day_difference(
-        group.x,
-        group.y,
-        group.x_units,
-        group.y_units,
-        x_subjects=subjects[0],
-        y_subjects=subjects[1],
-    )
-    return DayTest(
-        name,
-        title,
-        unit,
-        *names,
-        found.estimate,
-        found.low,
-        found.high,
-        found.p,
-        found.df,
-        found.n_days_x,
-        found.n_days_y,
-        found.p_days,
-        found.day_share,
-        offsets=found.offsets,
-    )
-
-
-def _day_medians(analysis: Analysis, sessions: Sequence[SessionEntry]) -> list[DayMedian]:
-    found = []
-    for measure in MEASURES:
-        for s in sessions:
-            values = [
-                float(getattr(r, measure.name))
-                for r in measure.results(analysis)
-                if r.source == s.source and r.outcome.included
-            ]
-            if values:
-                m = summarise(values)
-                found.append(
-                    DayMedian(
-                        measure.name, s.subject, s.day, s.condition, m.n, m.median, m.q1, m.q3
-                    )
-                )
-    return found
-
-
 def _ratings(
     design: Design, sessions: Sequence[SessionEntry], rng: np.random.Generator
 ) -> RatingsFound:
@@ -360,16 +267,11 @@ def ratings_found(
         "ratings.csv",
         rows,
         fit,
+        means_of(fit),
         difference(fit, *names),
         *names,
         contrast_days=difference(with_days, *names),
     )
-
-
-def _rating_groups(ratings: RatingsFound, names: tuple[str, str]) -> TwoGroups:
-    rows = list(zip(ratings.rows, ratings.fit.corrected.tolist(), strict=True))
-    x, y = ([(v, f"{r[2]}/{r[3]}") for r, v in rows if r[0] == name] for name in names)
-    return two_groups([v for v, _ in x], [v for v, _ in y], [u for _, u in x], [u for _, u in y])
 
 
 PULL = {
@@ -382,39 +284,31 @@ PULL = {
 }
 
 
-def _sensitivity(
-    samples: dict[str, TwoGroups],
-    named: dict[str, tuple[str, str]],
-    names: tuple[str, str],
-) -> list[SensitivityRow]:
+def _sensitivity(comparisons: Sequence[Comparison]) -> list[SensitivityRow]:
+    """Let voluntary torque pull the joint down, and here in the other condition alone."""
     rows = []
-    for name in JOINT:
+    for c in comparisons:
+        if c.measure.name not in JOINT:
+            continue
+        x, y = (c.of(name) for name in c.pair)
+        group = two_groups(
+            [o.value for o in x], [o.value for o in y], [o.unit for o in x], [o.unit for o in y]
+        )
         for (method, inertia), factor in PULL.items():
-            if name == "inertia_kg_m2" and inertia == "fixed":
-                continue
-            group = samples[name]
-            # Voluntary torque pulls the joint down, and here in the other condition alone.
-            rows.append(sensitivity_row(name, *named[name], method, inertia, group, factor))
+            if c.measure.name != "inertia_kg_m2" or inertia != "fixed":
+                rows.append(sensitivity_row(c.measure, method, inertia, group, factor))
     return rows
 
 
 def sensitivity_row(
-    name: str,
-    title: str,
-    unit: str,
-    method: str,
-    inertia: str,
-    group: TwoGroups,
-    factor: float,
+    measure: Measure, method: str, inertia: str, group: TwoGroups, factor: float
 ) -> SensitivityRow:
     """Return the conclusion with the other condition multiplied by a factor."""
     x, y = group.x, group.y * factor
     test = ranksum(x, y)
     p_day = day_difference(x, y, group.x_units, group.y_units).p
     return SensitivityRow(
-        name,
-        title,
-        unit,
+        measure,
         method,
         inertia,  # type: ignore[arg-type]
         test.n_x,
@@ -425,16 +319,28 @@ def sensitivity_row(
         test.p,
         test.r,
         p_day,
-        method == "iv" and inertia == ("free" if name == "inertia_kg_m2" else "fixed"),
+        method == "iv" and inertia == ("free" if measure.name == "inertia_kg_m2" else "fixed"),
     )
 
 
-def untested(study: Study, measure: str, remark: str) -> Study:
+def altered(study: StudyResult, change: Callable[[Comparison], Comparison]) -> StudyResult:
+    """Return the study with every comparison changed, its tests by days adjusted anew."""
+    changed = [change(c) for c in study.comparisons]
+    adjusted = holm([c.days.p if c.days is not None else math.nan for c in changed])
+    return replace(
+        study,
+        comparisons=tuple(
+            replace(c, days_p_holm=p) for c, p in zip(changed, adjusted, strict=True)
+        ),
+    )
+
+
+def untested(study: StudyResult, measure: str, remark: str) -> StudyResult:
     """Return the study with one measure that days could not test."""
-    assert study.cohort is not None
-    nothing = dict.fromkeys(("estimate", "low", "high", "p", "df", "p_days", "day_share"), math.nan)
-    tests = tuple(
-        replace(t, **nothing, remark=remark) if t.measure == measure else t
-        for t in study.cohort.day_tests
-    )
-    return replace(study, cohort=replace(study.cohort, day_tests=tests))
+
+    def change(c: Comparison) -> Comparison:
+        if c.measure.name != measure or c.days is None:
+            return c
+        return replace(c, days=no_days(c.days.n_days_x, c.days.n_days_y, remark))
+
+    return altered(study, change)

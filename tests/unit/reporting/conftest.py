@@ -1,6 +1,7 @@
 """Epochs of a joint that obeys Eq. 3 exactly, and studies made of them by hand."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.experiment import prbs_levels
 from rigidimeter.records import Analysis, Channel, Epoch, Fit, Motion, Notice, Outcome, Score
 from rigidimeter.settings import Settings
-from rigidimeter.study import Study, analyse, compare
+from rigidimeter.study import StudyResult, analyse, compare_analysis
 
 RATE_HZ = 250.0
 OFF = JointDynamics(0.0045, 0.1368, 1.751)
@@ -114,26 +115,23 @@ def scaled(joint: JointDynamics, by: float) -> JointDynamics:
     )
 
 
-MakeStudy = Callable[..., Study]
+MakeStudy = Callable[..., StudyResult]
 
 
 @pytest.fixture(scope="session")
 def make_study() -> MakeStudy:
     """Return a function that makes a study from epochs: all of it, or with parts replaced."""
 
-    def make(epochs: list[Epoch], **parts: object) -> Study:
+    def make(epochs: list[Epoch], **parts: object) -> StudyResult:
         settings = Settings()
         analysis = parts.pop("analysis", None) or analyse(epochs, settings)
         fields = {
-            "title": "A study",
             "settings": settings,
             "epochs": tuple(epochs),
-            "analysis": analysis,
-            "comparisons": compare(analysis),
-            "notices": (),
             "provenance": {"program": "rigidimeter 0"},
         }
-        return Study(**{**fields, **parts})
+        found = compare_analysis(analysis, title="A study", resamples=199)
+        return replace(found, **{**fields, **parts})
 
     return make
 
@@ -164,7 +162,7 @@ def epochs() -> list[Epoch]:
 
 
 @pytest.fixture(scope="session")
-def periodic_study(make_study: MakeStudy) -> Study:
+def periodic_study(make_study: MakeStudy) -> StudyResult:
     """Return two epochs of each condition, each begun elsewhere in the sequence."""
     rng = np.random.default_rng(11)
     return make_study(
@@ -177,7 +175,7 @@ def periodic_study(make_study: MakeStudy) -> Study:
 
 
 @pytest.fixture(scope="session")
-def study(epochs: list[Epoch], make_study: MakeStudy) -> Study:
+def study(epochs: list[Epoch], make_study: MakeStudy) -> StudyResult:
     return make_study(epochs, notices=(Notice("warning", "one column was empty"),))
 
 

@@ -18,7 +18,7 @@ from rigidimeter.reporting.pictures import (
     rating_pictures,
     sensitivity_pictures,
 )
-from rigidimeter.study import Study
+from rigidimeter.study import StudyResult
 
 NAMES = ("OFF", "DBS")
 COLOURS, MARKERS = condition_colours(NAMES), condition_markers(NAMES)
@@ -26,7 +26,7 @@ SMALL = Design(days=(3, 2), epochs=(4, 4), scores=(3, 3))
 
 
 @pytest.fixture(scope="module")
-def study() -> Study:
+def study() -> StudyResult:
     return made_study(SMALL)
 
 
@@ -126,7 +126,7 @@ def test_sensitivity_keeps_methods_together_and_marks_the_chosen_one() -> None:
     assert high > 0.4
 
 
-def test_pictures_of_a_study(study: Study) -> None:
+def test_pictures_of_a_study(study: StudyResult) -> None:
     shown = [
         *effect_pictures(study),
         *day_pictures(study),
@@ -150,22 +150,22 @@ def test_pictures_of_a_study(study: Study) -> None:
     assert "17 included epochs of 5 days" in shown[1].caption
 
 
-def test_virtual_data_say_so_in_every_figure(study: Study) -> None:
-    assert study.cohort is not None
-    virtual = dataclasses.replace(study, cohort=dataclasses.replace(study.cohort, virtual=True))
+def test_virtual_data_say_so_in_every_figure(study: StudyResult) -> None:
+    virtual = dataclasses.replace(study, virtual=True)
     for draw in (effect_pictures, rating_pictures, sensitivity_pictures):
         (plain,), (marked,) = draw(study), draw(virtual)
         assert "virtual data" not in plain.svg
         assert "<!-- virtual data -->" in marked.svg
 
 
-def test_nothing_is_drawn_of_what_is_not_there(study: Study) -> None:
-    for without in (dataclasses.replace(study, cohort=None), empty(study)):
+def test_nothing_is_drawn_of_what_is_not_there(study: StudyResult) -> None:
+    for without in (
+        dataclasses.replace(study, sessions=(), ratings=None, sensitivity=()),
+        empty(study),
+    ):
         for draw in (effect_pictures, day_pictures, rating_pictures, sensitivity_pictures):
             assert draw(without) == []
 
 
-def empty(study: Study) -> Study:
-    assert study.cohort is not None
-    nothing = dataclasses.replace(study.cohort, days=(), effects=(), ratings=None, sensitivity=())
-    return dataclasses.replace(study, cohort=nothing)
+def empty(study: StudyResult) -> StudyResult:
+    return dataclasses.replace(study, comparisons=(), ratings=None, sensitivity=())

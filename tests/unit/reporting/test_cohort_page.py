@@ -8,15 +8,14 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from tests.unit.reporting.cohorts import Design, made_study, untested
+from tests.unit.reporting.cohorts import Design, altered, made_study, untested
 
 from rigidimeter.reporting import page as page_module
 from rigidimeter.reporting import write_report
 from rigidimeter.reporting.numbers import interval, number, p_value
 from rigidimeter.reporting.page import DRAWN, render_page
 from rigidimeter.reporting.report_tables import all_tables
-from rigidimeter.reporting.test_tables import day_holm, pair_holm
-from rigidimeter.study import Condition, Study
+from rigidimeter.study import Condition, StudyResult
 
 SMALL = Design(days=(4, 3), epochs=(4, 4), scores=(3, 3))
 NASTY = "<script>alert('x')</script>&amp;\"$_$"
@@ -72,7 +71,7 @@ class Tables(HTMLParser):
         return [[" ".join(cell.split()) for cell in row] for row in found]
 
 
-def shown(study: Study) -> Tables:
+def shown(study: StudyResult) -> Tables:
     """Return the page without any figure, which is quick."""
     none: Mapping[str, list] = {group: [] for group in DRAWN}
     return Tables(render_page(study, all_tables(study), none))
@@ -83,44 +82,43 @@ def words(page: Tables, section: str = "") -> str:
 
 
 @pytest.fixture(scope="module")
-def study() -> Study:
+def study() -> StudyResult:
     return made_study(SMALL)
 
 
 @pytest.fixture(scope="module")
-def page(study: Study) -> Tables:
+def page(study: StudyResult) -> Tables:
     return shown(study)
 
 
-def test_the_main_table_has_epochs_and_days_of_every_measure(study: Study, page: Tables) -> None:
-    cohort = study.cohort
-    assert cohort is not None
+def test_the_main_table_has_epochs_and_days_of_every_measure(
+    study: StudyResult, page: Tables
+) -> None:
     rows = {row[0].rpartition(" ")[0]: row for row in page.table("OFF against DBS")[2:]}
-    adjusted = day_holm(cohort)
-    effects = {effect.measure: effect for effect in cohort.effects}
     assert len(rows) == 6
-    for c in study.comparisons:
-        row = rows[c.title]
-        test, summary = c.test, c.summaries["OFF"]
-        (day,) = (t for t in cohort.day_tests if t.measure == c.measure)
+    for c in study.comparisons[:-1]:
+        row = rows[c.measure.title]
+        test, summary, day = c.test, c.summaries["OFF"], c.days
         assert test is not None
+        assert day is not None
         quartiles = interval(summary.q1, summary.q3, 3)
         out = f"{summary.n} ({c.excluded['OFF']})"
         assert row[1] == f"{number(summary.median, 3)} {quartiles} {out}"
         shift = interval(test.shift_low, test.shift_high, 3)
         assert row[3].startswith(f"{number(test.shift, 3)} {shift}")
         assert row[4] == f"{number(test.z, 3)} {test.r:.2f}".replace("-", "−")
-        assert row[5] == f"{p_value(test.p)} ({p_value(effects[c.measure].p_holm)})"
+        assert row[5] == f"{p_value(test.p)} ({p_value(c.p_holm)})"
         assert row[6].startswith(f"{number(day.estimate, 3)} {interval(day.low, day.high, 3)}")
-        assert f"{day.days_reference} and {day.days_other} days" in row[6]
-        assert row[7] == f"{p_value(day.p)} ({p_value(adjusted[c.measure])})"
+        assert f"{day.n_days_x} and {day.n_days_y} days" in row[6]
+        assert row[7] == f"{p_value(day.p)} ({p_value(c.days_p_holm)})"
         assert row[8] == p_value(day.p_days)
         assert row[9] == f"{100 * day.day_share:.0f} %"
 
 
-def test_ratings_stand_in_the_main_table_with_their_own_model(study: Study, page: Tables) -> None:
-    assert study.cohort is not None
-    found = study.cohort.ratings
+def test_ratings_stand_in_the_main_table_with_their_own_model(
+    study: StudyResult, page: Tables
+) -> None:
+    found = study.ratings
     assert found is not None
     assert found.contrast_days is not None
     (row,) = (r for r in page.table("OFF against DBS") if r[0].startswith("Examiners"))
@@ -137,14 +135,12 @@ def test_ratings_stand_in_the_main_table_with_their_own_model(study: Study, page
     assert offsets == {name: number(b) for name, b in found.fit.offsets["examiner"].items()}
 
 
-def test_differences_between_effects_are_all_told(study: Study, page: Tables) -> None:
-    assert study.cohort is not None
+def test_differences_between_effects_are_all_told(study: StudyResult, page: Tables) -> None:
     rows = page.table("Differences between effect sizes")[1:]
-    adjusted = pair_holm(study.cohort)
-    assert len(rows) == len(study.cohort.differences) == 15
-    for row, (pair, found) in zip(rows, study.cohort.differences.items(), strict=True):
-        assert row[2].startswith(number(found.estimate))
-        assert row[3:5] == [p_value(found.p), p_value(adjusted[pair])]
+    assert len(rows) == len(study.differences) == 15
+    for row, pair in zip(rows, study.differences, strict=True):
+        assert row[2].startswith(number(pair.difference.estimate))
+        assert row[3:5] == [p_value(pair.difference.p), p_value(pair.p_holm)]
 
 
 def test_the_head_tells_days_conditions_and_stimulation(page: Tables) -> None:
@@ -156,10 +152,11 @@ def test_the_head_tells_days_conditions_and_stimulation(page: Tables) -> None:
     assert "The recordings" in page.text
 
 
-def test_every_excluded_epoch_is_there_and_the_account_balances(study: Study, page: Tables) -> None:
-    assert study.cohort is not None
+def test_every_excluded_epoch_is_there_and_the_account_balances(
+    study: StudyResult, page: Tables
+) -> None:
     rows = page.table("Epochs that do not count: who said so, and why")[1:]
-    assert len(rows) == len(study.cohort.exclusions) == 3
+    assert len(rows) == len(study.exclusions) == 3
     assert {row[6] for row in rows} == {"protocol", "operator"}
     for row in page.table("Every recorded epoch, counted once")[1:]:
         recorded, *parts = (int(cell) for cell in row[2:])
@@ -168,17 +165,15 @@ def test_every_excluded_epoch_is_there_and_the_account_balances(study: Study, pa
     assert "neither included nor listed" not in words(page)
 
 
-def test_an_epoch_that_vanished_is_cried_out(study: Study) -> None:
-    assert study.cohort is not None
-    fewer = dataclasses.replace(study.cohort, exclusions=study.cohort.exclusions[1:])
-    text = words(shown(dataclasses.replace(study, cohort=fewer)), "exclusions")
+def test_an_epoch_that_vanished_is_cried_out(study: StudyResult) -> None:
+    fewer = dataclasses.replace(study, exclusions=study.exclusions[1:])
+    text = words(shown(fewer), "exclusions")
     assert "1 recorded epoch is neither included nor listed as left out" in text
 
 
-def test_sensitivity_and_changes(study: Study, page: Tables) -> None:
-    assert study.cohort is not None
-    rows = page.table("The shift by other roads")[1:]
-    assert len(rows) == len(study.cohort.sensitivity) == 15
+def test_sensitivity_and_changes(study: StudyResult, page: Tables) -> None:
+    rows = page.table("The shift by other methods")[1:]
+    assert len(rows) == len(study.sensitivity) == 15
     assert [row[0] for row in rows if row[-1] == "yes"] == [
         "Inertia J",
         "Viscous damping B",
@@ -190,7 +185,7 @@ def test_sensitivity_and_changes(study: Study, page: Tables) -> None:
 
 
 def test_a_study_without_ratings_sensitivity_or_exclusions() -> None:
-    bare = made_study(SMALL, ratings=None, sensitivity=(), exclusions=(), differences={})
+    bare = made_study(SMALL, ratings=None, sensitivity=(), exclusions=(), differences=())
     page = shown(bare)
     text = words(page)
     assert "The study has no ratings." in text
@@ -200,7 +195,7 @@ def test_a_study_without_ratings_sensitivity_or_exclusions() -> None:
     assert not any(name.startswith("Differences") for name in page.rows)
 
 
-def test_a_measure_that_days_cannot_test_says_why(study: Study) -> None:
+def test_a_measure_that_days_cannot_test_says_why(study: StudyResult) -> None:
     page = shown(untested(study, "work_j", "there is one day in each condition"))
     (row,) = (r for r in page.table("OFF against DBS") if r[0].startswith("Work"))
     assert row[-1] == "there is one day in each condition"
@@ -219,19 +214,18 @@ def test_a_blinded_study_keeps_its_codes_and_tells_no_stimulation() -> None:
 @pytest.mark.parametrize(("both", "one", "told"), [(1, 1, True), (1, 0, False), (0, 1, False)])
 def test_one_offset_a_day_is_told_where_days_have_both(both: bool, one: bool, told: bool) -> None:
     study = made_study(dataclasses.replace(SMALL, both_on_a_day=bool(both)))
-    assert study.cohort is not None
     if one:
-        tests = tuple(dataclasses.replace(t, offsets=("day",)) for t in study.cohort.day_tests)
-        study = dataclasses.replace(
-            study, cohort=dataclasses.replace(study.cohort, day_tests=tests)
+        study = altered(
+            study,
+            lambda c: dataclasses.replace(c, days=dataclasses.replace(c.days, offsets=("day",))),
         )
     sentence = "A day was taken to move both its conditions alike."
     assert (sentence in words(shown(study))) is told
 
 
-def test_several_subjects_are_told_apart() -> None:
+def test_several_subjects_are_distinguished() -> None:
     design = Design((3, 3), (3, 3), (2, 2), subjects=("M1", "M2"), both_on_a_day=True)
-    page = shown(made_study(design, several=True))
+    page = shown(made_study(design))
     assert "2: M1, M2" in words(page, "study")
     assert "6: 6 in OFF and 6 in DBS, 6 in both" in words(page, "study")
     assert "an offset for each subject, each day and each condition within a day" in words(
@@ -241,12 +235,10 @@ def test_several_subjects_are_told_apart() -> None:
 
 
 def test_one_condition_alone_has_a_page() -> None:
-    study = made_study(SMALL)
-    assert study.cohort is not None
-    cohort = dataclasses.replace(
-        study.cohort, day_tests=(), effects=(), differences={}, ratings=None, sensitivity=()
+    study = dataclasses.replace(
+        made_study(SMALL), comparisons=(), differences=(), ratings=None, sensitivity=()
     )
-    page = shown(dataclasses.replace(study, comparisons=(), cohort=cohort))
+    page = shown(study)
     assert "No two conditions were compared." in words(page, "comparison")
     assert "No effect size could be computed." in words(page, "effects")
 
@@ -256,11 +248,8 @@ def test_special_characters_are_escaped(tmp_path: Path) -> None:
         SMALL, names=(NASTY, "DBS"), subjects=(NASTY,), examiners=(NASTY, "B")
     )
     study = made_study(design, changes=(NASTY,))
-    assert study.cohort is not None
     conditions = (Condition(NASTY, NASTY, electrodes=NASTY), Condition("DBS"))
-    study = dataclasses.replace(
-        study, title=NASTY, cohort=dataclasses.replace(study.cohort, conditions=conditions)
-    )
+    study = dataclasses.replace(study, title=NASTY, conditions=conditions)
     page = shown(study)
     assert "script" not in page.tags
     assert page.text.count(NASTY) > 20
@@ -270,7 +259,7 @@ OWN = ("effects", "ratings", "sensitivity")
 
 
 def test_the_same_cohort_gives_the_same_bytes(
-    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    study: StudyResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The other figures have their own test, and take long.
     drawn = {name: draw if name in OWN else (lambda _: []) for name, draw in DRAWN.items()}
@@ -279,7 +268,7 @@ def test_the_same_cohort_gives_the_same_bytes(
     again = write_report(study, tmp_path / "b")
     files = [path for path in first.parent.rglob("*") if path.is_file()]
     names = {path.relative_to(first.parent).as_posix() for path in files}
-    assert {"methods.txt", "tables/day_tests.csv", "tables/account.csv"} <= names
+    assert {"methods.txt", "tables/comparisons.csv", "tables/account.csv"} <= names
     assert {f"figures/{name}.svg" for name in OWN} <= names
     for path in files:
         assert (again.parent / path.relative_to(first.parent)).read_bytes() == path.read_bytes()
@@ -288,9 +277,10 @@ def test_the_same_cohort_gives_the_same_bytes(
     assert not re.search(r"url\(|@import|https?:", text)
 
 
-def test_no_number_is_rounded_in_the_files(study: Study) -> None:
+def test_no_number_is_rounded_in_the_files(study: StudyResult) -> None:
     tables = all_tables(study)
-    assert study.cohort is not None
-    estimates = [row[5] for row in tables["day_tests"].rows]
-    assert estimates[:-1] == [test.estimate for test in study.cohort.day_tests]
+    table = tables["comparisons"]
+    place = [column.name for column in table.columns].index("days_estimate")
+    estimates = [row[place] for row in table.rows]
+    assert estimates == [c.days.estimate for c in study.comparisons if c.days]
     assert not any(isinstance(cell, float) and math.isinf(cell) for cell in estimates)

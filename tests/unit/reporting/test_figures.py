@@ -22,7 +22,7 @@ from rigidimeter.reporting.figures import (
     torque_limit_nm,
     torque_parts,
 )
-from rigidimeter.study import Study
+from rigidimeter.study import StudyResult
 
 STAMPS = np.arange(5000) / 250
 LEVELS = np.where(np.random.default_rng(5).random(400) < 0.5, -1.0, 1.0)
@@ -99,7 +99,7 @@ def test_spectrum_of_a_line_peaks_at_the_line() -> None:
     assert axes.get_ylabel().endswith("((N·m)²/Hz)")
 
 
-def test_parts_of_the_model_add_up_to_it(study: Study) -> None:
+def test_parts_of_the_model_add_up_to_it(study: StudyResult) -> None:
     fit = study.analysis.fixed_inertia[1]
     epoch = study.epochs[1]
     signals = epoch_signals(epoch, fit.method, study.settings.estimation)
@@ -120,14 +120,14 @@ def test_parts_of_the_model_add_up_to_it(study: Study) -> None:
         assert axes.get_xlim() == pytest.approx((1.0, 8.0), abs=0.02)
 
 
-def test_torque_without_a_perturbation_has_one_panel_less(study: Study) -> None:
+def test_torque_without_a_perturbation_has_one_panel_less(study: StudyResult) -> None:
     fit, epoch = study.analysis.fits[1], study.epochs[1]
     signals = epoch_signals(epoch, fit.method, study.settings.estimation)
     figure = torque_parts(signals, fit, "black", origin_s=0.0, window_s=60.0, limit_nm=1.0)
     assert len(figure.axes) == 4
 
 
-def test_loop_is_in_degrees(study: Study) -> None:
+def test_loop_is_in_degrees(study: StudyResult) -> None:
     epoch = next(epoch for epoch in study.epochs if epoch.task == "sinusoid")
     cycles = scoring_cycles(epoch, study.settings.scores)
     limits = loop_limits([cycles])

@@ -16,7 +16,7 @@ from rigidimeter.reporting.pictures import impedance_pictures, voluntary_picture
 from rigidimeter.reporting.pictures.frequency import alike
 from rigidimeter.reporting.pictures.stored_figure import analysed_epoch
 from rigidimeter.settings import Settings
-from rigidimeter.study import Study
+from rigidimeter.study import StudyResult
 
 from .conftest import OFF, periodic_epoch
 
@@ -104,7 +104,9 @@ def test_every_point_is_drawn_and_those_without_coherence_are_hollow() -> None:
     assert coherence.get_xlabel() == "Frequency (Hz)"
 
 
-def test_the_figure_is_made_of_epochs_that_repeat(periodic_study: Study, study: Study) -> None:
+def test_the_figure_is_made_of_epochs_that_repeat(
+    periodic_study: StudyResult, study: StudyResult
+) -> None:
     (picture,) = impedance_pictures(periodic_study)
     assert "OFF: 2 of 2 included epochs; DBS: 2 of 2 included epochs" in picture.caption
     assert picture.svg == impedance_pictures(periodic_study)[0].svg
@@ -142,7 +144,7 @@ def test_any_condition_is_in_the_legends(name: str) -> None:
         assert len(figure.axes[0].get_legend().get_texts()) == entries
 
 
-def test_the_sd_that_the_spectrum_quotes_is_that_of_the_noise(periodic_study: Study) -> None:
+def test_the_sd_that_the_spectrum_quotes_is_that_of_the_noise(periodic_study: StudyResult) -> None:
     (picture,) = voluntary_pictures(periodic_study)
     # White noise of 0.01 N·m at 250 samples/s in the band up to 10 Hz.
     expected = 0.01 * np.sqrt(2 * (10 - 0.15) / 250)
@@ -156,7 +158,7 @@ def test_what_does_not_count_is_not_drawn(make_study, make_analysis) -> None:
 
 
 def test_figures_show_the_epoch_on_the_clock_it_was_analysed_on(
-    study: Study, make_study, make_analysis
+    study: StudyResult, make_study, make_analysis
 ) -> None:
     epoch = study.epochs[1]
     analysis = make_analysis({"OFF": 1})

@@ -4,31 +4,20 @@ import math
 import pytest
 
 from rigidimeter.records import Outcome
-from rigidimeter.reporting.measures import conditions, measures, split_pooled, verdict
+from rigidimeter.reporting.measures import epoch_verdict
 from rigidimeter.reporting.pictures import representative_fits
-from rigidimeter.study import Study
+from rigidimeter.study import StudyResult, split_pooled
 
 
-def test_included_values_are_those_that_were_compared(study: Study) -> None:
-    found = {measure.name: measure for measure in measures(study)}
-    assert list(found) == [comparison.measure for comparison in study.comparisons]
-    for comparison in study.comparisons:
-        assert found[comparison.measure].values == comparison.values
-        assert found[comparison.measure].excluded == comparison.excluded
-        assert found[comparison.measure].title == comparison.title
-        assert found[comparison.measure].unit == comparison.unit
-
-
-def test_estimates_bring_their_intervals(study: Study) -> None:
-    found = {measure.name: measure for measure in measures(study)}
+def test_estimates_bring_their_intervals(study: StudyResult) -> None:
     included = [fit for fit in study.analysis.fixed_inertia if fit.outcome.included]
     off = [fit for fit in included if fit.condition == "OFF"]
-    stiffness = found["stiffness_nm_rad"]
-    assert [e.low for e in stiffness.estimates["OFF"]] == [fit.stiffness_nm_rad_low for fit in off]
+    stiffness = study.comparison("stiffness_nm_rad")
+    assert [o.low for o in stiffness.of("OFF")] == [fit.stiffness_nm_rad_low for fit in off]
     pooled, _ = split_pooled(study.analysis)
     assert stiffness.pooled["DBS"].high == pooled["DBS"].stiffness_nm_rad_high
-    assert all(math.isnan(e.low) for e in found["work_j"].estimates["OFF"])
-    assert found["work_j"].pooled == {}
+    assert all(math.isnan(o.low) for o in study.comparison("work_j").of("OFF"))
+    assert study.comparison("work_j").pooled == {}
 
 
 @pytest.mark.parametrize(
@@ -42,7 +31,7 @@ def test_estimates_bring_their_intervals(study: Study) -> None:
         (["OFF"], [], [], False),
     ],
 )
-def test_the_fit_to_all_conditions_is_told_from_that_without_a_name(
+def test_the_fit_to_all_conditions_is_distinguished_from_that_without_a_name(
     recorded, pooled, named, overall, make_analysis
 ) -> None:
     analysis = make_analysis(dict.fromkeys(recorded, 2))
@@ -57,19 +46,19 @@ def test_the_fit_to_all_conditions_is_told_from_that_without_a_name(
 
 def test_verdict_says_which_way(make_study, make_analysis) -> None:
     made = make_study([], analysis=make_analysis({"OFF": 40, "DBS": 40}))
-    assert verdict(made).startswith("DBS against OFF: ")
-    stiffness = {c.measure: c for c in made.comparisons}["stiffness_nm_rad"]
+    assert epoch_verdict(made).startswith("DBS against OFF: ")
+    stiffness = {c.measure.name: c for c in made.comparisons}["stiffness_nm_rad"]
     assert stiffness.test is not None
-    assert f"p\xa0=\xa0{stiffness.test.p:.3g}" in verdict(made)
+    assert f"p\xa0=\xa0{stiffness.test.p:.3g}" in epoch_verdict(made)
 
 
-def test_verdict_of_a_lower_stiffness(study: Study) -> None:
-    assert "lower" in verdict(study)
-    assert verdict(study).index("lower") < verdict(study).index("stiffness K")
+def test_verdict_of_a_lower_stiffness(study: StudyResult) -> None:
+    assert "lower" in epoch_verdict(study)
+    assert epoch_verdict(study).index("lower") < epoch_verdict(study).index("stiffness K")
 
 
 def test_verdict_without_comparison_gives_medians(make_study, make_analysis) -> None:
-    text = verdict(make_study([], analysis=make_analysis({"": 3})))
+    text = epoch_verdict(make_study([], analysis=make_analysis({"": 3})))
     assert text.startswith("No comparison of conditions. Medians, (no condition): Inertia J ")
     assert text.count("(n = 3)") == 5
 
@@ -77,11 +66,11 @@ def test_verdict_without_comparison_gives_medians(make_study, make_analysis) -> 
 def test_verdict_of_nothing(make_study, make_analysis) -> None:
     failed = make_analysis({"OFF": 2}, Outcome("failed", "no torque"), scores=False)
     for analysis in (failed, make_analysis({})):
-        assert "No epoch could be included" in verdict(make_study([], analysis=analysis))
+        assert "No epoch could be included" in epoch_verdict(make_study([], analysis=analysis))
 
 
-def test_conditions_keep_one_order(study: Study) -> None:
-    assert conditions(study) == ("OFF", "DBS")
+def test_conditions_keep_one_order(study: StudyResult) -> None:
+    assert study.condition_names == ("OFF", "DBS")
 
 
 def test_the_representative_is_the_included_fit_with_the_median_vaf(

@@ -10,7 +10,7 @@ import pytest
 from rigidimeter.records import Delay, Outcome
 from rigidimeter.reporting.page_table import Cell, Table, csv_text
 from rigidimeter.reporting.report_tables import all_tables
-from rigidimeter.study import Study, compare
+from rigidimeter.study import StudyResult
 
 
 def read_back(text: str, table: Table) -> list[list[Cell]]:
@@ -35,7 +35,7 @@ def assert_reads_back(text: str, table: Table) -> None:
         assert all(same(a, b) for a, b in zip(row, expected, strict=True)), (row, expected)
 
 
-def test_every_table_reads_back_equal(study: Study) -> None:
+def test_every_table_reads_back_equal(study: StudyResult) -> None:
     for table in all_tables(study).values():
         assert_reads_back(csv_text(table), table)
 
@@ -46,7 +46,7 @@ def test_tables_without_numbers_read_back_equal(make_study, make_analysis) -> No
         assert_reads_back(csv_text(table), table)
 
 
-def test_stored_names_carry_units(study: Study) -> None:
+def test_stored_names_carry_units(study: StudyResult) -> None:
     names = {column.name for table in all_tables(study).values() for column in table.columns}
     assert {
         "inertia_kg_m2",
@@ -60,7 +60,7 @@ def test_stored_names_carry_units(study: Study) -> None:
     } <= names
 
 
-def test_fits_hold_what_the_analysis_holds(study: Study) -> None:
+def test_fits_hold_what_the_analysis_holds(study: StudyResult) -> None:
     tables = all_tables(study)
     for name in ("fits", "fixed_inertia"):
         columns = [column.name for column in tables[name].columns]
@@ -74,7 +74,7 @@ def test_fits_hold_what_the_analysis_holds(study: Study) -> None:
             assert cells["outcome"] == fit.outcome.kind
 
 
-def test_fits_hold_their_intervals_bounds_and_findings(study: Study) -> None:
+def test_fits_hold_their_intervals_bounds_and_findings(study: StudyResult) -> None:
     table = all_tables(study)["fits"]
     columns = [column.name for column in table.columns]
     for row, fit in zip(table.rows, study.analysis.fits, strict=True):
@@ -98,7 +98,7 @@ def test_the_band_is_on_the_page_where_it_differs(make_study, make_analysis) -> 
         assert ("band 0.150 to 10.0 Hz" in table.caption) is not shown
 
 
-def test_pooled_estimates_are_by_condition_and_for_all(study: Study) -> None:
+def test_pooled_estimates_are_by_condition_and_for_all(study: StudyResult) -> None:
     table = all_tables(study)["pooled"]
     columns = [column.name for column in table.columns]
     rows = [dict(zip(columns, row, strict=True)) for row in table.rows]
@@ -126,24 +126,24 @@ def test_delays_say_what_was_done(make_study, make_analysis) -> None:
     assert rows[2][4] == "not corrected: not told from zero"
 
 
-def test_results_hold_what_the_comparisons_hold(study: Study) -> None:
-    table = all_tables(study)["results"]
+def test_results_hold_what_the_comparisons_hold(study: StudyResult) -> None:
+    table = all_tables(study)["comparisons"]
     columns = [column.name for column in table.columns]
     for row, comparison in zip(table.rows, study.comparisons, strict=True):
         cells = dict(zip(columns, row, strict=True))
-        assert cells["measure"] == comparison.measure
+        assert cells["measure"] == comparison.measure.name
         assert cells["median_other"] == comparison.summaries[comparison.other].median
         assert comparison.test is not None
         for field in ("shift", "shift_low", "z", "p", "r", "p_uncorrected", "u"):
             assert cells[field] == getattr(comparison.test, field)
 
 
-def test_summaries_agree_with_the_comparisons(study: Study) -> None:
+def test_summaries_agree_with_the_comparisons(study: StudyResult) -> None:
     rows = {(row[0], row[3]): row[4:] for row in all_tables(study)["summaries"].rows}
     for comparison in study.comparisons:
         for condition, s in comparison.summaries.items():
             expected = (s.n, comparison.excluded[condition], s.median, s.q1, s.q3)
-            assert rows[comparison.measure, condition] == expected
+            assert rows[comparison.measure.name, condition] == expected
 
 
 def test_exclusions_name_each_epoch_and_reason_once(make_study, make_analysis) -> None:
@@ -160,7 +160,7 @@ def test_an_epoch_of_which_nothing_was_made_is_listed(study, make_study, make_an
     assert reason
 
 
-def test_controller_is_given_per_radian_and_per_degree(study: Study) -> None:
+def test_controller_is_given_per_radian_and_per_degree(study: StudyResult) -> None:
     values = [(row[2], row[3]) for row in all_tables(study)["design"].rows]
     numbers = {unit: value for value, unit in values}
     assert numbers["kg·m²/deg"] == pytest.approx(0.0008, rel=1e-12)
@@ -168,7 +168,7 @@ def test_controller_is_given_per_radian_and_per_degree(study: Study) -> None:
     assert numbers["N·m·s/deg"] == pytest.approx(0.028, rel=1e-12)
 
 
-def test_every_setting_has_its_key_and_unit(study: Study) -> None:
+def test_every_setting_has_its_key_and_unit(study: StudyResult) -> None:
     rows = {row[0]: row[1:] for row in all_tables(study)["settings"].rows}
     assert rows["prbs.clock_hz"] == ("20.0", "Hz")
     assert rows["rig.torque.noise_sd_nm"] == ("0.005", "N·m")
@@ -177,7 +177,7 @@ def test_every_setting_has_its_key_and_unit(study: Study) -> None:
     assert rows["protocol.rests_s[0]"] == ("10.0", "s")
 
 
-def test_counts_add_up(study: Study) -> None:
+def test_counts_add_up(study: StudyResult) -> None:
     rows = all_tables(study)["counts"].rows
     assert sum(row[2] for row in rows) == len(study.epochs)
     assert {row[:3] for row in rows} == {
@@ -190,6 +190,6 @@ def test_counts_add_up(study: Study) -> None:
 
 def test_three_conditions_are_all_summarised(make_study, make_analysis) -> None:
     analysis = make_analysis({"OFF": 6, "DBS": 6, "levodopa": 4})
-    made = make_study([], analysis=analysis, comparisons=compare(analysis))
+    made = make_study([], analysis=analysis)
     conditions = {row[3] for row in all_tables(made)["summaries"].rows}
     assert conditions == {"OFF", "DBS", "levodopa"}

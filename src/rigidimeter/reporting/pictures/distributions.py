@@ -3,59 +3,52 @@
 from __future__ import annotations
 
 from rigidimeter.reporting.figures import condition_colours, distribution
-from rigidimeter.reporting.measures import Measure, condition_name, conditions, measures
+from rigidimeter.reporting.measures import condition_name
 from rigidimeter.reporting.numbers import interval, number, p_and_r
 from rigidimeter.reporting.pictures.stored_figure import Picture, drawn
-from rigidimeter.statistics import summarise
-from rigidimeter.study import Study
+from rigidimeter.study import Comparison, StudyResult
 
 __all__ = ["distribution_pictures"]
 
 
-def distribution_pictures(study: Study) -> list[Picture]:
-    """Return a figure for each measure that has an included value."""
-    colours = condition_colours(conditions(study))
+def distribution_pictures(study: StudyResult) -> list[Picture]:
+    """Return a figure for each measure of the epochs that has an included value."""
+    colours = condition_colours(study.condition_names)
     return [
         Picture(
-            f"distribution_{measure.name}",
+            f"distribution_{c.measure.name}",
             drawn(
                 study,
                 distribution(
-                    measure.label,
-                    {condition_name(key): values for key, values in measure.values.items()},
+                    c.measure.label,
+                    {condition_name(key): values for key, values in c.values.items()},
                     {condition_name(key): colour for key, colour in colours.items()},
-                    _test_remark(study, measure),
+                    p_and_r(c.test.p, c.test.r) if c.test is not None else "",
                     ends={
-                        condition_name(key): [(e.low, e.high) for e in found]
-                        for key, found in measure.estimates.items()
+                        condition_name(key): [(e.low, e.high) for e in c.of(key)]
+                        for key in c.summaries
                     },
-                    pooled={condition_name(key): e for key, e in measure.pooled.items()},
+                    pooled={
+                        condition_name(key): (e.value, e.low, e.high) for key, e in c.pooled.items()
+                    },
                 ),
             ),
-            f"{measure.title}, every included epoch a point. {_in_words(measure)}",
-            f"{measure.title}.",
+            f"{c.measure.title}, every included epoch a point. {_in_words(c)}",
+            f"{c.measure.title}.",
         )
-        for measure in measures(study)
-        if any(measure.values.values())
+        for c in study.comparisons
+        if c.observations and c.measure.origin != "ratings"
     ]
 
 
-def _test_remark(study: Study, measure: Measure) -> str:
-    tests = [c.test for c in study.comparisons if c.measure == measure.name]
-    if len(tests) != 1 or tests[0] is None:
-        return ""
-    return p_and_r(tests[0].p, tests[0].r)
-
-
-def _in_words(measure: Measure) -> str:
+def _in_words(c: Comparison) -> str:
     parts = []
-    for condition, values in measure.values.items():
-        s = summarise(values)
+    for condition, s in c.summaries.items():
         text = f"{condition_name(condition)}: n = {s.n}"
         if s.n:
             text += f", median {number(s.median)}, quartiles {number(s.q1)} to {number(s.q3)}"
-        if condition in measure.pooled:
-            pooled = measure.pooled[condition]
+        if condition in c.pooled:
+            pooled = c.pooled[condition]
             text += f", all together {number(pooled.value)} {interval(pooled.low, pooled.high)}"
         parts.append(text)
-    return f"{'; '.join(parts)} ({measure.unit})."
+    return f"{'; '.join(parts)} ({c.measure.unit})."

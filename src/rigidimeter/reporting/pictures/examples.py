@@ -15,7 +15,7 @@ from rigidimeter.reporting.figures import (
     torque_limit_nm,
     torque_parts,
 )
-from rigidimeter.reporting.measures import condition_name, conditions, short_names
+from rigidimeter.reporting.measures import condition_name, short_names
 from rigidimeter.reporting.numbers import number
 from rigidimeter.reporting.pictures.stored_figure import (
     Picture,
@@ -27,7 +27,7 @@ from rigidimeter.reporting.pictures.stored_figure import (
     representatives,
     slug,
 )
-from rigidimeter.study import Study
+from rigidimeter.study import StudyResult
 
 __all__ = ["loop_pictures", "perturbation_pictures", "torque_pictures"]
 
@@ -35,7 +35,7 @@ TORQUE_WINDOW_S = 7.0
 """How much of an epoch the torque figures show: more would be too dense to read."""
 
 
-def perturbation_pictures(study: Study) -> list[Picture]:
+def perturbation_pictures(study: StudyResult) -> list[Picture]:
     """Return the perturbation of one epoch and its spectrum, if any was recorded."""
     shown = [epoch for fit in representative_fits(study) if (epoch := analysed_epoch(study, fit))]
     for epoch in (*shown, *study.epochs):
@@ -77,9 +77,9 @@ def _perturbation(epoch: Epoch) -> Channel | None:
     return channel if math.isfinite(high - low) and high > low else None
 
 
-def torque_pictures(study: Study) -> list[Picture]:
+def torque_pictures(study: StudyResult) -> list[Picture]:
     """Return measured and modelled torque of a representative epoch of each condition."""
-    colours = condition_colours(conditions(study))
+    colours = condition_colours(study.condition_names)
     found = [
         (fit, epoch, epoch_signals(epoch, fit.method, study.settings.estimation))
         for fit in representative_fits(study)
@@ -125,9 +125,9 @@ def _fitted_elsewhere(signals: Signals, fit: Fit) -> str:
     return f"; fit and VAF are of the lines from {_hz(fit.band_hz)}"
 
 
-def loop_pictures(study: Study) -> list[Picture]:
+def loop_pictures(study: StudyResult) -> list[Picture]:
     """Return the torque-angle loops of a representative sinusoid epoch of each condition."""
-    colours = condition_colours(conditions(study))
+    colours = condition_colours(study.condition_names)
     chosen = representatives(study, study.analysis.scores, lambda score: score.work_j)
     found = [
         (score, scoring_cycles(epoch, study.settings.scores))

@@ -16,10 +16,10 @@ from rigidimeter.records import Epoch, Fit
 from rigidimeter.reporting.figures import condition_colours
 from rigidimeter.reporting.figures.impedance import Response, impedance
 from rigidimeter.reporting.figures.unexplained_torque import density, voluntary_spectrum
-from rigidimeter.reporting.measures import condition_name, conditions, split_pooled
+from rigidimeter.reporting.measures import condition_name
 from rigidimeter.reporting.numbers import number
 from rigidimeter.reporting.pictures.stored_figure import Picture, analysed_epoch, drawn
-from rigidimeter.study import Study
+from rigidimeter.study import StudyResult, split_pooled
 
 __all__ = ["impedance_pictures", "voluntary_pictures"]
 
@@ -28,7 +28,7 @@ SAME_FREQUENCY = 1e-3
 """Lines of two epochs that differ by less than this fraction are the same line."""
 
 
-def impedance_pictures(study: Study) -> list[Picture]:
+def impedance_pictures(study: StudyResult) -> list[Picture]:
     """Return torque over angle at the perturbation's lines with the model over it.
 
     Only from included epochs whose perturbation was recorded and repeats.
@@ -36,7 +36,7 @@ def impedance_pictures(study: Study) -> list[Picture]:
     fits, _ = split_pooled(study.analysis)
     shown: dict[str, Response] = {}
     used: dict[str, tuple[int, int]] = {}
-    for condition in conditions(study):
+    for condition in study.condition_names:
         epochs = [
             epoch
             for fit in study.analysis.fits
@@ -53,7 +53,7 @@ def impedance_pictures(study: Study) -> list[Picture]:
         used[condition] = len(observations), len(epochs)
     if not shown:
         return []
-    colours = condition_colours(conditions(study))
+    colours = condition_colours(study.condition_names)
     figure = impedance(
         {condition_name(key): response for key, response in shown.items()},
         {condition_name(key): colours[key] for key in shown},
@@ -80,7 +80,7 @@ def impedance_pictures(study: Study) -> list[Picture]:
     ]
 
 
-def _observations(study: Study, epochs: Sequence[Epoch]) -> list[Observation]:
+def _observations(study: StudyResult, epochs: Sequence[Epoch]) -> list[Observation]:
     """Return the epochs that can be seen at the lines of their perturbation."""
     drive_of = drives(epochs, study.settings)
     found = []
@@ -113,7 +113,7 @@ def _joint(fit: Fit | None) -> JointDynamics | None:
     return JointDynamics(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad)
 
 
-def voluntary_pictures(study: Study) -> list[Picture]:
+def voluntary_pictures(study: StudyResult) -> list[Picture]:
     """Return the spectrum of what J, B and K leave of the torque, epoch by epoch."""
     spectra: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     sizes_nm: dict[str, list[float]] = {}
@@ -132,7 +132,7 @@ def voluntary_pictures(study: Study) -> list[Picture]:
         bands.append(signals.band_hz)
     if not spectra:
         return []
-    order = [condition for condition in conditions(study) if condition in spectra]
+    order = [condition for condition in study.condition_names if condition in spectra]
     labels = {
         key: f"{condition_name(key)}: SD {number(float(np.median(sizes_nm[key])), 3)} N·m "
         f"(median of {len(sizes_nm[key])})"
@@ -141,7 +141,7 @@ def voluntary_pictures(study: Study) -> list[Picture]:
     band_hz = max(low for low, _ in bands), min(high for _, high in bands)
     figure = voluntary_spectrum(
         {key: spectra[key] for key in order},
-        condition_colours(conditions(study)),
+        condition_colours(study.condition_names),
         labels,
         band_hz,
     )

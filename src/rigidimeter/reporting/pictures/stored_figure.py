@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from rigidimeter.estimation import aligned
 from rigidimeter.records import Epoch, Fit, Score
 from rigidimeter.reporting.figures import svg_text
-from rigidimeter.reporting.measures import conditions, short_names
-from rigidimeter.study import Study
+from rigidimeter.reporting.measures import short_names
+from rigidimeter.study import StudyResult
 
 __all__ = [
     "Picture",
@@ -37,9 +37,9 @@ class Picture:
     caption: str
 
 
-def drawn(study: Study, figure: Figure) -> str:
+def drawn(study: StudyResult, figure: Figure) -> str:
     """Return the figure as SVG, marked where what it shows was simulated."""
-    cohort = study.cohort is not None and study.cohort.virtual
+    cohort = study.sessions and study.virtual
     some = sum(epoch.virtual for epoch in study.epochs)
     if cohort or (some and some == len(study.epochs)):
         return svg_text(figure, "virtual data")
@@ -50,12 +50,12 @@ _Result = TypeVar("_Result", Fit, Score)
 
 
 def representatives(
-    study: Study, results: Iterable[_Result], key: Callable[[_Result], float]
+    study: StudyResult, results: Iterable[_Result], key: Callable[[_Result], float]
 ) -> list[_Result]:
     """Return for each condition the included result with the median (lower middle) key."""
     results = list(results)
     chosen = []
-    for condition in conditions(study):
+    for condition in study.condition_names:
         ranked = sorted(
             (r for r in results if r.condition == condition and r.outcome.included), key=key
         )
@@ -64,7 +64,7 @@ def representatives(
     return chosen
 
 
-def representative_fits(study: Study) -> list[Fit]:
+def representative_fits(study: StudyResult) -> list[Fit]:
     """Return for each condition the included fit with the median VAF.
 
     From the fits at fixed inertia, whose damping and stiffness the report compares; from the free
@@ -75,7 +75,7 @@ def representative_fits(study: Study) -> list[Fit]:
     return fixed or representatives(study, analysis.fits, lambda fit: fit.vaf_percent)
 
 
-def analysed_epoch(study: Study, result: Fit | Score) -> Epoch | None:
+def analysed_epoch(study: StudyResult, result: Fit | Score) -> Epoch | None:
     """Return the epoch of a result as it was analysed: on one clock where it was not."""
     for epoch in study.epochs:
         if (epoch.source, epoch.label) == (result.source, result.epoch):
@@ -83,7 +83,7 @@ def analysed_epoch(study: Study, result: Fit | Score) -> Epoch | None:
     return None
 
 
-def place(study: Study, result: Fit | Score) -> str:
+def place(study: StudyResult, result: Fit | Score) -> str:
     """Return epoch and source: labels repeat from one session to the next."""
     names = short_names(epoch.source for epoch in study.epochs)
     return f"epoch {result.epoch} of {names.get(result.source, result.source)}"

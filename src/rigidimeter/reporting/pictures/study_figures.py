@@ -2,48 +2,47 @@
 
 from __future__ import annotations
 
-from rigidimeter.records import Fit, Score
 from rigidimeter.reporting.figures import condition_colours, condition_markers
 from rigidimeter.reporting.figures.day_points import DayStrip, days
 from rigidimeter.reporting.figures.forest import Effect, forest
 from rigidimeter.reporting.figures.method_sensitivity import Road, sensitivity
 from rigidimeter.reporting.figures.rating_points import Mark, Mean, ratings
-from rigidimeter.reporting.measures import condition_name, conditions
+from rigidimeter.reporting.measures import condition_name
 from rigidimeter.reporting.numbers import interval, number
 from rigidimeter.reporting.pictures.stored_figure import Picture, drawn
-from rigidimeter.reporting.test_tables import compared_pair, mean_interval, sorted_rows
 from rigidimeter.statistics import largest_r
-from rigidimeter.study import MEASURES, Study
+from rigidimeter.study import StudyResult
 
 __all__ = ["day_pictures", "effect_pictures", "rating_pictures", "sensitivity_pictures"]
 
 
-def effect_pictures(study: Study) -> list[Picture]:
-    """Return the effect sizes of all measures in one figure."""
-    cohort = study.cohort
-    if cohort is None or not cohort.effects:
+def effect_pictures(study: StudyResult) -> list[Picture]:
+    """Return the effect sizes of all measures of a study folder in one figure."""
+    found = [(c.measure, e) for c in study.comparisons if (e := c.effects) is not None]
+    if not study.sessions or not found:
         return []
     rows = [
         Effect(
-            e.title,
-            f"n = {e.effects.test.n_x} and {e.effects.test.n_y}",
-            e.effects.r,
-            e.effects.r_low,
-            e.effects.r_high,
-            largest_r(e.effects.test.n_x, e.effects.test.n_y),
-            f"{number(e.effects.r, 2)} {interval(e.effects.r_low, e.effects.r_high, 2)}",
+            measure.title,
+            f"n = {e.test.n_x} and {e.test.n_y}",
+            e.r,
+            e.r_low,
+            e.r_high,
+            largest_r(e.test.n_x, e.test.n_y),
+            f"{number(e.r, 2)} {interval(e.r_low, e.r_high, 2)}",
         )
-        for e in cohort.effects
+        for measure, e in found
     ]
-    percent = f"{100 * cohort.effects[0].effects.confidence:g} %"
-    reference, other = compared_pair(study) or ("the reference", "the other")
-    told = "; ".join(f"{e.title} {row.words}" for e, row in zip(cohort.effects, rows, strict=True))
+    percent = f"{100 * found[0][1].confidence:g} %"
+    told = "; ".join(f"{row.name} {row.words}" for row in rows)
     return [
         Picture(
             "effects",
             drawn(
                 study,
-                forest(rows, f"Effect size r; above zero: {reference} larger than {other}"),
+                forest(
+                    rows, f"Effect size r; above zero: {study.reference} larger than {study.other}"
+                ),
             ),
             f"Effect sizes r with {percent} intervals. {told}.",
             f"Effect sizes r with {percent} intervals, whole days resampled. Dotted: what is "
@@ -53,35 +52,30 @@ def effect_pictures(study: Study) -> list[Picture]:
     ]
 
 
-def day_pictures(study: Study) -> list[Picture]:
-    """Return each measure day by day."""
-    cohort = study.cohort
-    if cohort is None:
-        return []
-    order = [condition_name(name) for name in conditions(study)]
+def day_pictures(study: StudyResult) -> list[Picture]:
+    """Return each measure day by day, in the order of the sessions."""
+    order = [condition_name(name) for name in study.condition_names]
     colours, markers = condition_colours(order), condition_markers(order)
-    medians = {(d.measure, d.subject, d.day, d.condition): d for d in cohort.days}
+    visits = dict.fromkeys((s.subject, s.day, s.condition) for s in study.sessions)
     pictures = []
-    for measure in MEASURES:
-        strips: dict[tuple[str, str, str], list[float]] = {}
-        results: list[Fit | Score] = list(measure.results(study.analysis))
-        for session in cohort.sessions:
-            strips.setdefault((session.subject, session.day, session.condition), []).extend(
-                float(getattr(result, measure.name))
-                for result in results
-                if result.source == session.source
-                and result.condition == session.condition
-                and result.outcome.included
-            )
+    for c in study.comparisons:
+        medians = {(d.subject, d.day, d.condition): d for d in c.day_medians}
         shown = [
-            DayStrip(subject, day, condition_name(condition), values, m.median, m.q1, m.q3)
-            for (subject, day, condition), values in strips.items()
-            if (m := medians.get((measure.name, subject, day, condition))) and values
+            DayStrip(
+                m.subject,
+                m.day,
+                condition_name(m.condition),
+                [o.value for o in c.of(m.condition) if (o.subject, o.day) == (m.subject, m.day)],
+                m.median,
+                m.q1,
+                m.q3,
+            )
+            for visit in visits
+            if (m := medians.get(visit))
         ]
         if not shown:
             continue
-        label = f"{measure.title}\n({measure.unit})"
-        figure = days(label, shown, colours, markers)
+        title, unit = c.measure.title, c.measure.unit
         told = "; ".join(
             f"{s.subject} day {s.day} {s.condition}: median {number(s.median)}, n = {len(s.values)}"
             for s in shown
@@ -89,28 +83,26 @@ def day_pictures(study: Study) -> list[Picture]:
         count = sum(len(s.values) for s in shown)
         pictures.append(
             Picture(
-                f"days_{measure.name}",
-                drawn(study, figure),
-                f"{measure.title} by day. {told} ({measure.unit}).",
-                f"{measure.title}: {count} included epochs of {len({s[:2] for s in shown})} days.",
+                f"days_{c.measure.name}",
+                drawn(study, days(f"{title}\n({unit})", shown, colours, markers)),
+                f"{title} by day. {told} ({unit}).",
+                f"{title}: {count} included epochs of {len({s[:2] for s in shown})} days.",
             )
         )
     return pictures
 
 
-def rating_pictures(study: Study) -> list[Picture]:
+def rating_pictures(study: StudyResult) -> list[Picture]:
     """Return the examiners' scores with the means of the model."""
-    if study.cohort is None or study.cohort.ratings is None:
+    found = study.ratings
+    if found is None:
         return []
-    found = study.cohort.ratings
     marks = [
         Mark(condition_name(row[0]), row[1], row[4], value)
         for row, value in zip(found.rows, found.fit.corrected.tolist(), strict=True)
     ]
-    means = {
-        condition_name(name): Mean(*mean_interval(found, name)) for name in found.fit.conditions
-    }
-    order = [condition_name(name) for name in (*conditions(study), *found.fit.conditions)]
+    means = {condition_name(m.condition): Mean(m.mean, m.low, m.high) for m in found.means}
+    order = [condition_name(name) for name in (*study.condition_names, *found.fit.conditions)]
     told = "; ".join(
         f"{name} {number(mean.value, 3)} {interval(mean.low, mean.high, 3)}"
         for name, mean in means.items()
@@ -127,14 +119,13 @@ def rating_pictures(study: Study) -> list[Picture]:
     ]
 
 
-def sensitivity_pictures(study: Study) -> list[Picture]:
+def sensitivity_pictures(study: StudyResult) -> list[Picture]:
     """Return the shift of each measure by method and by how J was treated."""
-    cohort = study.cohort
-    if cohort is None or not cohort.sensitivity:
+    if not study.sensitivity:
         return []
     roads: dict[str, list[Road]] = {}
-    for row in sorted_rows(cohort.sensitivity):
-        roads.setdefault(f"{row.title} ({row.unit})", []).append(
+    for row in study.sensitivity:
+        roads.setdefault(row.measure.label, []).append(
             Road(
                 row.method,
                 row.inertia == "fixed",
@@ -144,16 +135,15 @@ def sensitivity_pictures(study: Study) -> list[Picture]:
                 row.chosen,
             )
         )
-    reference, other = compared_pair(study) or ("the reference", "the other")
     told = "; ".join(
-        f"{row.title}, {row.method}, J {row.inertia}: {number(row.shift, 3)} "
-        f"{interval(row.shift_low, row.shift_high, 3)} {row.unit}"
-        for row in cohort.sensitivity
+        f"{row.measure.title}, {row.method}, J {row.inertia}: {number(row.shift, 3)} "
+        f"{interval(row.shift_low, row.shift_high, 3)} {row.measure.unit}"
+        for row in study.sensitivity
     )
     return [
         Picture(
             "sensitivity",
-            drawn(study, sensitivity(roads, f"Shift, {reference} − {other}")),
+            drawn(study, sensitivity(roads, f"Shift, {study.reference} − {study.other}")),
             f"Shifts by method. {told}.",
             "The Hodges–Lehmann shift with its interval by each method, in the unit above the "
             "panel. Filled squares: J held at its median; open circles: J fitted in each epoch. "

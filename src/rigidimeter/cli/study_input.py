@@ -13,7 +13,7 @@ from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.records import Fit, Score
-    from rigidimeter.study import Cohort, Study
+    from rigidimeter.study import StudyResult
 
 __all__ = ["Analysed", "KeyOption", "analysed_study", "study_files", "study_of"]
 
@@ -38,11 +38,9 @@ _OF_RECORDINGS = {
 
 @dataclass(frozen=True)
 class Analysed:
-    """An analysed study, its sessions, whether it was kept, and the status: 1 with a bad input."""
+    """An analysed study, whether it was kept, and the status: 1 with a bad input."""
 
-    study: Study
-    cohort: Cohort
-    paths: tuple[Path, ...]
+    result: StudyResult
     kept: bool
     status: int
 
@@ -113,29 +111,27 @@ def analysed_study(
     read = read_study(folder, key=key, settings=chosen, method=recordings.method, pair=pair)
     read = replace(read, settings=adjusted(read.settings, recordings))
     with Meter("study", steps(read)) as meter:
-        study = analyse_study(
+        result = analyse_study(
             read, seed=seed, resamples=resamples, progress=lambda _: meter.advance()
         )
-    say(study.notices)
-    bad = any(notice.level == "error" for notice in study.notices)
-    bad |= _say_failed(study)
-    cohort = study.cohort
-    assert cohort is not None
+    say(result.notices)
+    bad = any(notice.level == "error" for notice in result.notices)
+    bad |= _say_failed(result)
     changes, kept = [], True
     try:
-        changes = keep(read, study, cohort, seed, resamples)
+        changes = keep(read, result)
     except UserError as error:
         typer.echo(f"error: the analysis is not kept: {error}", err=True)
         kept = False
-    cohort = replace(cohort, changes=tuple(changes))
-    paths = tuple(folder / session.path for session in cohort.sessions)
+    sessions = (folder / session.path for session in result.sessions)
     tables = (path for name, path in read.folder.files.items() if name != "key")
-    study = replace(study, cohort=cohort, provenance=provenance((*tables, *paths), study.settings))
-    return Analysed(study, cohort, paths, kept, int(bad or not kept))
+    facts = provenance((*tables, *sessions), result.settings)
+    result = replace(result, changes=tuple(changes), provenance=facts)
+    return Analysed(result, kept, int(bad or not kept))
 
 
-def _say_failed(study: Study) -> bool:
-    results: list[Fit | Score] = [*study.analysis.fits, *study.analysis.scores]
+def _say_failed(found: StudyResult) -> bool:
+    results: list[Fit | Score] = [*found.analysis.fits, *found.analysis.scores]
     failed = [
         (result.source, result.epoch, result.outcome.reason)
         for result in results

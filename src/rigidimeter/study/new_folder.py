@@ -1,16 +1,16 @@
-"""`rigidimeter study new`: an empty study folder, with comments."""
+"""An empty study folder: study.toml and its tables, with comments and no rows."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
+from rigidimeter.documents import write_text
 from rigidimeter.errors import UserError
+from rigidimeter.recording.study_folder import TABLE_COLUMNS
+from rigidimeter.recording.study_toml import STUDY_FILE
 
-__all__ = ["new"]
+__all__ = ["write_new_study"]
 
 SKELETON = """\
 schema = "rigidimeter.study/1"
@@ -55,24 +55,14 @@ ABOUT = {
 }
 
 
-def new(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="New folder.", show_default=False)],
-    title: Annotated[str, typer.Option("--title", metavar="TEXT", help="Title of the study.")] = "",
-) -> None:
-    """Make a study folder: study.toml and its tables, with comments and no rows.
+def write_new_study(folder: Path, title: str = "") -> None:
+    """Make a study folder; without a title it has the folder's name.
 
-    Write a row in sessions.csv for each session folder or recording, then compare and report.
-
-    \\b
-    For example:
-      rigidimeter study new study --title "Elbow, winter"
-      rigidimeter compare study
-      rigidimeter report study --out study/report
+    Raises
+    ------
+    UserError
+        If one of its files is there already, or the folder cannot be written.
     """
-    from rigidimeter.documents import write_text
-    from rigidimeter.recording.study_folder import TABLE_COLUMNS
-    from rigidimeter.recording.study_toml import STUDY_FILE
-
     names = (STUDY_FILE, *(f"{name}.csv" for name in ABOUT))
     there = [name for name in names if (folder / name).exists()]
     if there:
@@ -90,4 +80,3 @@ def new(
         write_text(folder / f"{name}.csv", f"{about}{','.join(columns)}\n")
     shown = json.dumps(title.strip() or folder.resolve().name, ensure_ascii=False)
     write_text(folder / STUDY_FILE, SKELETON.format(title=shown))
-    typer.echo(f"{folder}: write your sessions into {folder / 'sessions.csv'}")

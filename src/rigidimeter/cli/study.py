@@ -1,4 +1,4 @@
-"""`rigidimeter study simulate`: a whole study on the virtual rig."""
+"""`rigidimeter study`: make a study folder, empty or virtual; `compare` and `report` read it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,38 @@ import typer
 
 from rigidimeter.errors import UserError
 
-__all__ = ["simulate"]
+__all__ = ["study"]
+
+study = typer.Typer(
+    name="study",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Make a study folder: an empty one, or one from the virtual rig.",
+)
 
 
+@study.command()
+def new(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="New folder.", show_default=False)],
+    title: Annotated[str, typer.Option("--title", metavar="TEXT", help="Title of the study.")] = "",
+) -> None:
+    """Make a study folder: study.toml and its tables, with comments and no rows.
+
+    Write a row in sessions.csv for each session folder or recording, then compare and report.
+
+    \\b
+    For example:
+      rigidimeter study new study --title "Elbow, winter"
+      rigidimeter compare study
+      rigidimeter report study --out study/report
+    """
+    from rigidimeter.study.new_folder import write_new_study
+
+    write_new_study(folder, title)
+    typer.echo(f"{folder}: write your sessions into {folder / 'sessions.csv'}")
+
+
+@study.command()
 def simulate(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder for the study.")],
     seed: Annotated[

@@ -1,0 +1,160 @@
+"""A comparison as lines for a terminal."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rigidimeter.study import Comparison, RatingsFound, StudyResult
+
+__all__ = ["comparison_lines"]
+
+BY = {
+    "protocol": "by the protocol",
+    "check": "by a check",
+    "estimate": "without an estimate",
+    "operator": "by the operator",
+}
+UNBOUNDED = (
+    "",
+    "† Too few values for an interval at this confidence: the smallest and the largest",
+    "  difference stand in its place.",
+)
+
+
+def comparison_lines(found: StudyResult) -> list[str]:
+    """Return everything that was concluded."""
+    from rigidimeter.study import TEST
+
+    lines = []
+    if found.source:
+        lines = [f"{found.source} by {found.by}: {found.reference} − {found.other}"]
+    lines += [TEST, ""]
+    several = sum(c.test is not None for c in found.comparisons) > 1
+    for c in found.comparisons:
+        lines += _epochs(c, several)
+    if any(c.test is not None and not c.test.shift_bounded for c in found.comparisons):
+        lines += UNBOUNDED
+    if found.blinded:
+        codes = ", ".join(condition.name for condition in found.conditions)
+        lines += ["", f"Blinded: the conditions are the codes {codes}; give the key with --key."]
+    lines += [*_days(found), *_effects(found)]
+    if found.ratings is not None:
+        lines += _ratings(found.ratings)
+    if found.sensitivity:
+        lines += ["", "By other methods (p of epochs, p of days; * as above):"]
+        for row in found.sensitivity:
+            mark = "*" if row.chosen else " "
+            lines.append(
+                f" {mark}{row.measure.title}, {row.method}, J {row.inertia}: shift "
+                f"{row.shift:.4g}, p {_p(row.p)}, by days {_p(row.p_day)}"
+            )
+    return [*lines, *_exclusions(found)] if found.sessions else lines
+
+
+def _epochs(c: Comparison, several: bool) -> Iterator[str]:
+    yield c.measure.label
+    for name in c.pair:
+        s = c.summaries[name]
+        excluded = f", excluded {c.excluded[name]:2d}" if c.measure.counted == "epochs" else ""
+        yield f"  {name:>10}: n {s.n:3d}{excluded}, median {s.median:.4g} " + (
+            f"[{s.q1:.4g} to {s.q3:.4g}]"
+        )
+    if c.test is None:
+        yield f"  no test: {c.remark}"
+        return
+    t = c.test
+    adjusted = f" (by Holm {c.p_holm:.2g})" if several else ""
+    yield (
+        f"  {c.reference} − {c.other}: shift {t.shift:.4g} [{t.shift_low:.4g} to "
+        f"{t.shift_high:.4g}]{'' if t.shift_bounded else ' †'}, z {t.z:.3f}, "
+        f"p {t.p:.2g}{adjusted}, r {t.r:.3f}"
+    )
+
+
+def _days(found: StudyResult) -> Iterator[str]:
+    tested = [(c, c.days) for c in found.comparisons if c.days is not None]
+    if not tested:
+        return
+    model = next((days.model for _, days in tested if days.model), "each day")
+    yield ""
+    yield f"Days, not epochs: mixed model with an offset for {model} (Kenward-Roger)"
+    for c, d in tested:
+        yield f"{c.measure.label}: {d.n_days_x} and {d.n_days_y} days"
+        if d.remark:
+            yield f"  no test: {d.remark}"
+            continue
+        medians = "" if math.isnan(d.p_days) else f", rank-sum of day medians p {_p(d.p_days)}"
+        yield (
+            f"  {c.reference} − {c.other}: {d.estimate:.4g} [{d.low:.4g} to {d.high:.4g}], "
+            f"p {_p(d.p)} (by Holm {_p(c.days_p_holm)}; {d.df:.1f} df){medians}"
+        )
+        if not math.isnan(d.day_share):
+            yield f"  of the variance between epochs, {100 * d.day_share:.0f} % is between days"
+
+
+def _effects(found: StudyResult) -> Iterator[str]:
+    sized = [(c.measure, c.effects) for c in found.comparisons if c.effects is not None]
+    if not sized:
+        return
+    resampled = "whole days" if found.sessions else "sessions or single values"
+    yield ""
+    yield f"Effect sizes, 95 % intervals by resampling {resampled}"
+    for measure, e in sized:
+        yield (
+            f"  {measure.title}: r {e.r:.3f} [{e.r_low:.3f} to {e.r_high:.3f}], rank-biserial "
+            f"{e.rank_biserial:.3f} [{e.rank_biserial_low:.3f} to {e.rank_biserial_high:.3f}] "
+            f"({e.method})"
+        )
+    titles = {measure.name: measure.title for measure, _ in sized}
+    if found.differences:
+        yield "Which separates the conditions better (difference of rank-biserial correlations):"
+    for each in found.differences:
+        d = each.difference
+        how = "paired" if d.paired else "independent"
+        pair = f"  {titles[each.first]} − {titles[each.second]}: {d.estimate:.3f}"
+        if math.isnan(d.p):
+            yield f"{pair}, without an interval: resampling changes nothing ({how})"
+        else:
+            yield (
+                f"{pair} [{d.low:.3f} to {d.high:.3f}], p {_p(d.p)}, by Holm {_p(each.p_holm)} "
+                f"({how})"
+            )
+
+
+def _ratings(found: RatingsFound) -> Iterator[str]:
+    c, fit = found.contrast, found.fit
+    yield ""
+    yield f"Examiners' ratings ({found.source}): {fit.n} in {len(fit.conditions)} conditions"
+    means = ", ".join(
+        f"{name} {mean:.3g}" for name, mean in zip(fit.conditions, fit.means, strict=True)
+    )
+    yield f"  means {means}"
+    yield (
+        f"  {found.reference} − {found.other}: {c.estimate:.3g}, SE {c.se:.3g}, "
+        f"F(1, {c.df_residual:g}) = {c.f:.3g}, p {_p(c.p_residual)}; Kenward-Roger p "
+        f"{_p(c.p_kenward_roger)}"
+    )
+    if found.contrast_days is not None:
+        d = found.contrast_days
+        yield (
+            f"  with an offset for every day: {d.estimate:.3g}, SE {d.se_kenward_roger:.3g}, "
+            f"p {_p(d.p_kenward_roger)} ({d.df_kenward_roger:.1f} df)"
+        )
+
+
+def _exclusions(found: StudyResult) -> Iterator[str]:
+    yield ""
+    counts = Counter((exclusion.by, exclusion.reason) for exclusion in found.exclusions)
+    yield f"Epochs that do not count: {len(found.exclusions)}"
+    for (by, reason), count in counts.most_common():
+        yield f"  {count:3d} {BY[by]}: {reason}"
+    for out in found.left_out:
+        yield f"Left out: {out.path}: {out.reason}"
+
+
+def _p(value: float) -> str:
+    return "–" if math.isnan(value) else f"{value:.2g}"

@@ -1,0 +1,177 @@
+"""Two groups in the columns of any table, as observations that `study.comparison` compares."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.text_table import Labelled
+from rigidimeter.records import Notice
+from rigidimeter.study.comparison import compare_measures, measured
+from rigidimeter.study.results import Comparison, Measure, Observation, StudyResult
+
+__all__ = ["compare_columns"]
+
+_ALPHA = 0.05
+_FEW_SESSIONS = 10
+_SHOWN = 8
+
+
+def compare_columns(
+    table: Labelled,
+    values: Sequence[str],
+    by: str,
+    pair: tuple[str | None, str | None] = (None, None),
+    *,
+    session: str | None = None,
+    seed: int = 1,
+    resamples: int = 9999,
+) -> StudyResult:
+    """Compare two groups of a table in one column or several.
+
+    Parameters
+    ----------
+    table : Labelled
+    values : sequence of str
+        Columns of numbers.
+    by : str
+        The column that names the group.
+    pair : tuple of str or None
+        Reference and other group; the first two where not given, ``OFF`` first where it occurs.
+    session : str, optional
+        A column whose labels are resampled as units; else each row is one.
+    seed, resamples : int
+        Of the bootstrap.
+
+    Raises
+    ------
+    UserError
+        If a column or a group is not there, or a cell is no number.
+    """
+    labels = table.column(by, "--by")
+    for name in values:
+        table.column(name, "--value")
+    units = table.column(session, "--session") if session is not None else None
+    names = _pair(table.source, by, labels, pair)
+    rows, notices = _kept(table, labels, names, by)
+    comparisons = []
+    for name in dict.fromkeys(values):
+        one, said = _column(table, name, labels, units, names, rows)
+        comparisons.append(one)
+        notices += said
+    tested, differences = compare_measures(comparisons, seed=seed, resamples=resamples)
+    for each in tested:
+        notices += _cautions(table.source, each, units is not None)
+    return StudyResult(
+        "",
+        *names,
+        tested,
+        differences,
+        tuple(Notice("warning", text) for text in notices),
+        seed,
+        resamples,
+        source=table.source,
+        by=by,
+    )
+
+
+def _pair(
+    source: str, by: str, labels: Sequence[str], wanted: tuple[str | None, str | None]
+) -> tuple[str, str]:
+    known = sorted((name for name in dict.fromkeys(labels) if name), key=lambda n: n != "OFF")
+    listed = ", ".join(known[:_SHOWN]) + (", ..." if len(known) > _SHOWN else "")
+    for option, name in zip(("--reference", "--other"), wanted, strict=True):
+        if name is not None and name not in known:
+            raise UserError(f"{option} {name}: column {by} of {source} has only {listed}")
+    if wanted[0] is not None and wanted[0] == wanted[1]:
+        raise UserError(f"--reference and --other are both {wanted[0]}; name two groups")
+    if len(known) < 2:
+        raise UserError(
+            f"{source}: a comparison needs two groups, but column {by} has "
+            f"{f'only {listed}' if known else 'none'}; name another column with --by"
+        )
+    if len(known) > 2 and None in wanted:
+        raise UserError(
+            f"{source}: column {by} has {len(known)} groups ({listed}); choose two with "
+            "--reference and --other"
+        )
+    first, second = wanted
+    first = first or next(name for name in known if name != second)
+    return first, second or next(name for name in known if name != first)
+
+
+def _kept(
+    table: Labelled, labels: Sequence[str], names: Sequence[str], by: str
+) -> tuple[list[int], list[str]]:
+    """Return the rows of both groups, without those that an analysis has excluded."""
+    rows = [k for k, label in enumerate(labels) if label in names]
+    notices = []
+    nameless = [table.lines[k] for k, label in enumerate(labels) if not label]
+    if nameless:
+        notices.append(f"{table.source}: no {by} in {_lines(nameless)}; left out")
+    outcomes = table.columns.get("outcome")
+    if outcomes is not None and set(outcomes) <= {"included", "excluded", "failed"}:
+        out = [table.lines[k] for k in rows if outcomes[k] != "included"]
+        rows = [k for k in rows if outcomes[k] == "included"]
+        if out:
+            notices.append(
+                f"{table.source}: outcome is excluded or failed in {_lines(out)}; left out"
+            )
+    return rows, notices
+
+
+def _column(
+    table: Labelled,
+    name: str,
+    labels: Sequence[str],
+    units: Sequence[str] | None,
+    names: tuple[str, str],
+    rows: Sequence[int],
+) -> tuple[Comparison, list[str]]:
+    observations, missing = [], []
+    for row in rows:
+        line = table.lines[row]
+        value = table.number(name, row)
+        unit = units[row] if units is not None else f"line {line}"
+        if value is None or not unit:
+            missing.append(line)
+        else:
+            observations.append(Observation(value, labels[row], epoch=f"line {line}", unit=unit))
+    found = measured(Measure(name, name, "", "column"), observations, names)
+    for group in names:
+        if not found.summaries[group].n:
+            raise UserError(
+                f"{table.source}: {name} has no value in {group}, so there is nothing to compare"
+            )
+    notices = [f"{table.source}: no {name} in {_lines(missing)}; left out"] if missing else []
+    return found, notices
+
+
+def _cautions(source: str, found: Comparison, by_session: bool) -> list[str]:
+    """Say where a test could not find a difference, or an interval comes out too narrow."""
+    name = found.measure.name
+    if found.test is None:
+        return [f"{source}: {name}: {found.remark}. Medians and quartiles are given without one"]
+    sizes = [found.summaries[group].n for group in found.pair]
+    counts = " and ".join(f"{n} in {group}" for n, group in zip(sizes, found.pair, strict=True))
+    said = []
+    least = 2 / math.comb(sum(sizes), sizes[0])
+    if least > _ALPHA:
+        said.append(
+            f"{source}: {name} has {counts}; even groups that do not overlap have an exact p of "
+            f"{least:.2g}, so this test cannot show a difference"
+        )
+    sessions = min(len({o.unit for o in found.of(group)}) for group in found.pair)
+    if by_session and sessions < _FEW_SESSIONS:
+        said.append(
+            f"{source}: {name} has {sessions} sessions in one group; so few make a bootstrap "
+            "interval too narrow"
+        )
+    return said
+
+
+def _lines(lines: Sequence[int]) -> str:
+    shown = ", ".join(map(str, lines[:5]))
+    more = f" and {len(lines) - 5} more" if len(lines) > 5 else ""
+    return f"line{'' if len(lines) == 1 else 's'} {shown}{more}"
