@@ -352,7 +352,9 @@ def test_one_offset_a_day_is_chosen_in_the_description(compared, study) -> None:
         file.write("\n[analysis]\none_offset_a_day = true\n")
     ran, one = compared()
     assert "an offset for each day (" in ran.out
-    assert [test["df"] for test in one["day_tests"]] != [test["df"] for test in each["day_tests"]]
+    assert [row["days"]["df"] for row in one["comparisons"]] != [
+        row["days"]["df"] for row in each["comparisons"]
+    ]
 
 
 def test_the_comparison_as_json_is_the_kept_one(compared, study, tmp_path) -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.text_table import Labelled
+from rigidimeter.recording.formats import TextTable
 from rigidimeter.records import Notice
 from rigidimeter.study.comparison import compare_measures, measured
 from rigidimeter.study.results import Comparison, Measure, Observation, StudyResult
@@ -19,7 +19,7 @@ _SHOWN = 8
 
 
 def compare_columns(
-    table: Labelled,
+    table: TextTable,
     values: Sequence[str],
     by: str,
     pair: tuple[str | None, str | None] = (None, None),
@@ -32,7 +32,7 @@ def compare_columns(
 
     Parameters
     ----------
-    table : Labelled
+    table : TextTable
     values : sequence of str
         Columns of numbers.
     by : str
@@ -102,7 +102,7 @@ def _pair(
 
 
 def _kept(
-    table: Labelled, labels: Sequence[str], names: Sequence[str], by: str
+    table: TextTable, labels: Sequence[str], names: Sequence[str], by: str
 ) -> tuple[list[int], list[str]]:
     """Return the rows of both groups, without those that an analysis has excluded."""
     rows = [k for k, label in enumerate(labels) if label in names]
@@ -122,7 +122,7 @@ def _kept(
 
 
 def _column(
-    table: Labelled,
+    table: TextTable,
     name: str,
     labels: Sequence[str],
     units: Sequence[str] | None,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read_estimates
+from rigidimeter.recording.formats import TextTable, read_text_table
 from rigidimeter.recording.study_folder import is_study
-from rigidimeter.recording.text_table import Labelled, read_labelled
 from rigidimeter.records import Analysis
 from rigidimeter.settings import Settings
 from rigidimeter.study.columns import compare_columns
@@ -76,13 +76,13 @@ def compare(
         return compare_analysis(x, *pair, seed=seed, resamples=resamples)
     if not isinstance(x, (str, PathLike)):
         return compare_columns(
-            _labelled(x), _names(value), by, (reference, other), session=session, seed=seed,
+            _as_text(x), _names(value), by, (reference, other), session=session, seed=seed,
             resamples=resamples,
         )  # fmt: skip
     path = Path(x)
     if value is not None:
         return compare_columns(
-            read_labelled(path), _names(value), by, (reference, other), session=session, seed=seed,
+            read_text_table(path), _names(value), by, (reference, other), session=session, seed=seed,
             resamples=resamples,
         )  # fmt: skip
     if is_study(path):
@@ -132,11 +132,11 @@ def _names(value: str | Sequence[str] | None) -> list[str]:
     return [value] if isinstance(value, str) else list(value)
 
 
-def _labelled(table: pd.DataFrame) -> Labelled:
+def _as_text(table: pd.DataFrame) -> TextTable:
     """Return a table of pandas as text, its rows numbered as in a file with one header line."""
     columns = {
         str(name): tuple("" if missing else str(cell) for cell, missing in zip(
             table[name], table[name].isna(), strict=True))
         for name in table.columns
     }  # fmt: skip
-    return Labelled("the table", columns, tuple(range(2, len(table) + 2)))
+    return TextTable("the table", columns, tuple(range(2, len(table) + 2)))

@@ -1,5 +1,6 @@
 """`rigidimeter compare TABLE --value`: any table in two groups."""
 
+import csv
 import json
 from pathlib import Path
 
@@ -43,31 +44,30 @@ def test_one_column_is_the_rank_sum_test(compared, tmp_path) -> None:
     assert ran.status == 0, ran.err
     x, y = columns["a"][:20], columns["a"][20:]
     test = ranksum(x, y)
-    assert found["schema"] == "rigidimeter.comparison/1"
+    assert found["schema"] == "rigidimeter.comparison/2"
+    assert (found["reference"], found["other"]) == ("OFF", "DBS")
+    (row,) = found["comparisons"]
     for key in ("z", "p", "r", "shift", "shift_low", "shift_high"):
-        assert found[key] == getattr(test, key)
-    assert set(found["groups"]) == {"OFF", "DBS"}
-    assert set(found["groups"]["OFF"]) == {"n", "median", "q1", "q3"}
-    assert found["groups"]["DBS"]["median"] == np.median(y)
-    assert found["rank_biserial"] == pytest.approx(rank_biserial(x, y))
-    assert found["r_low"] < found["r"] < found["r_high"]
-    assert found["convention"] == "OFF minus DBS"
-    assert found["p_holm"] == found["p"]
-    assert len(found["comparisons"]) == 1
+        assert row[key] == getattr(test, key)
+    assert set(row["groups"]) == {"OFF", "DBS"}
+    assert set(row["groups"]["OFF"]) == {"n", "median", "q1", "q3", "excluded"}
+    assert row["groups"]["DBS"]["median"] == np.median(y)
+    assert row["rank_biserial"] == pytest.approx(rank_biserial(x, y))
+    assert row["r_low"] < row["r"] < row["r_high"]
+    assert row["p_holm"] == row["p"]
     assert "rank-biserial" in ran.out
 
 
 def test_several_columns_are_adjusted_and_compared(compared, tmp_path) -> None:
     path, _ = table(tmp_path / "t.csv")
     ran, found = compared(path, "--value", "a", "--value", "b", "--value", "c")
-    assert [row["value"] for row in found["comparisons"]] == ["a", "b", "c"]
-    assert found["z"] == found["comparisons"][0]["z"]
+    assert [row["measure"] for row in found["comparisons"]] == ["a", "b", "c"]
     assert all(row["p_holm"] >= row["p"] for row in found["comparisons"])
     one, two, _ = found["effect_differences"]
     assert (one["first"], one["second"], one["paired"]) == ("a", "b", True)
-    assert one["low"] > 0  # a parts the groups better than b, from the same rows
+    assert one["low"] > 0  # a separates the groups better than b, from the same rows
     assert two["low"] < 0 < two["high"]  # c as well as a, the other way round
-    assert "Which parts the groups better" in ran.out
+    assert "Which separates the conditions better" in ran.out
     again = compared(path, "--value", "a", "--value", "b", "--value", "c")[1]
     assert again == found
 
@@ -100,25 +100,26 @@ def test_excluded_epochs_and_empty_cells_are_left_out_and_said(compared, tmp_pat
     lines[2] = lines[2].replace("included", "excluded")
     path.write_text("\n".join(lines))
     _, found = compared(path, "--value", "a")
-    assert found["groups"]["OFF"]["n"] == 18
-    assert any("no a in line 2; left out" in notice for notice in found["notices"])
-    assert any("excluded or failed in line 3" in notice for notice in found["notices"])
+    assert found["comparisons"][0]["groups"]["OFF"]["n"] == 18
+    assert any("no a in line 2; left out" in notice["text"] for notice in found["notices"])
+    assert any("excluded or failed in line 3" in notice["text"] for notice in found["notices"])
 
 
 def test_two_values_give_medians_and_no_test(compared, tmp_path) -> None:
     path, _ = table(tmp_path / "t.csv", 5, 2)
     ran, found = compared(path, "--value", "a")
     assert ran.status == 0
-    assert found["p"] is None
-    assert found["r"] is None
-    assert found["groups"]["DBS"]["n"] == 2
-    assert "a test needs 3 values in each group; there are 5 in OFF and 2 in DBS" in ran.out
+    (row,) = found["comparisons"]
+    assert row["p"] is None
+    assert row["r"] is None
+    assert row["groups"]["DBS"]["n"] == 2
+    assert "a test needs 3 values in each condition; there are 5 in OFF and 2 in DBS" in ran.out
 
 
 def test_three_against_three_cannot_show_a_difference(compared, tmp_path) -> None:
     path, _ = table(tmp_path / "t.csv", 3, 3)
     _, found = compared(path, "--value", "a")
-    assert "exact p of 0.1" in found["notices"][0]
+    assert "exact p of 0.1" in found["notices"][0]["text"]
 
 
 def test_more_groups_are_chosen_by_name(compared, tmp_path) -> None:
@@ -129,7 +130,7 @@ def test_more_groups_are_chosen_by_name(compared, tmp_path) -> None:
     ran, found = compared(
         path, "--value", "a", "--by", "day", "--reference", "OFF1", "--other", "OFF0"
     )
-    assert found["convention"] == "OFF1 minus OFF0"
+    assert (found["reference"], found["other"]) == ("OFF1", "OFF0")
 
 
 @pytest.mark.parametrize(
@@ -140,7 +141,6 @@ def test_more_groups_are_chosen_by_name(compared, tmp_path) -> None:
         (("--value", "day"), "line 2: day is 'OFF0', which is not a number"),
         (("--value", "a", "--reference", "ON"), "--reference ON: column condition of"),
         (("--value", "a", "--reference", "OFF", "--other", "OFF"), "are both OFF"),
-        (("--value", "a", "--csv", "x.csv"), "--csv is not written with --value"),
         (("--value", "a", "--session", "x"), "Name the right one with --session"),
     ],
 )
@@ -151,6 +151,15 @@ def test_what_is_wrong_is_one_sentence(compared, tmp_path, options, sentence: st
     assert sentence in ran.err
     assert ran.err.count("\n") == 1
     assert found is None
+
+
+def test_the_csv_has_a_row_for_each_column(rigidimeter, tmp_path) -> None:
+    path, _ = table(tmp_path / "t.csv")
+    out = tmp_path / "out.csv"
+    assert rigidimeter("compare", path, "--value", "a", "--value", "b", "--csv", out).status == 0
+    rows = list(csv.DictReader(out.read_text("utf-8").splitlines()))
+    assert [row["measure"] for row in rows] == ["a", "b"]
+    assert {row["n_reference"] for row in rows} == {"20"}
 
 
 def test_one_group_and_two_tables_are_refused(rigidimeter, tmp_path) -> None:

@@ -6,7 +6,14 @@ import pytest
 from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Channel, Epoch, Fit, Outcome, Score
 from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.study import analyse, compare, conditions, doubts, estimate, task_of
+from rigidimeter.study import (
+    analyse,
+    analysis_warnings,
+    compare_analysis,
+    conditions,
+    estimate,
+    task_of,
+)
 
 
 def fit(condition, B=0.1, K=1.0, J=0.004, outcome=None):
@@ -92,7 +99,7 @@ def test_off_is_the_reference_wherever_it_comes():
 def test_excluded_epochs_are_counted_and_left_out():
     fits = [fit("OFF", K=k) for k in (2.0, 2.1, 2.2)] + [fit("DBS", K=k) for k in (1.0, 1.1, 1.2)]
     fits.append(fit("OFF", K=99.0, outcome=Outcome("excluded", "limit")))
-    stiffness = next(c for c in compare(analysis(fits)) if c.measure == "stiffness_nm_rad")
+    stiffness = compare_analysis(analysis(fits)).comparison("stiffness_nm_rad")
     assert stiffness.values == {"OFF": (2.0, 2.1, 2.2), "DBS": (1.0, 1.1, 1.2)}
     assert stiffness.excluded == {"OFF": 1, "DBS": 0}
     assert stiffness.test is not None
@@ -101,7 +108,7 @@ def test_excluded_epochs_are_counted_and_left_out():
 
 
 def test_too_few_epochs_give_summaries_and_a_reason():
-    (inertia, *_) = compare(analysis([fit("OFF"), fit("DBS")]))
+    (inertia, *_) = compare_analysis(analysis([fit("OFF"), fit("DBS")])).comparisons
     assert inertia.test is None
     assert "needs 3 epochs" in inertia.remark
     assert inertia.summaries["OFF"].n == 1
@@ -109,16 +116,16 @@ def test_too_few_epochs_give_summaries_and_a_reason():
 
 def test_one_condition_gives_its_summary():
     scores = [Score("s", "1", "OFF", Outcome(), 0.4, 0.3, 8, 1.0)]
-    found = compare(analysis([], scores))
-    assert [c.measure for c in found] == ["impulse_nm_s", "work_j"]
+    found = compare_analysis(analysis([], scores)).comparisons
+    assert [c.measure.name for c in found] == ["impulse_nm_s", "work_j"]
     assert found[0].remark == "only one condition was recorded"
 
 
 def test_what_no_joint_can_be_is_doubted():
-    assert doubts(analysis([fit("OFF")])) == ()
-    (notice,) = doubts(analysis([fit("OFF", J=-0.001), fit("OFF")]))
+    assert analysis_warnings(analysis([fit("OFF")])) == ()
+    (notice,) = analysis_warnings(analysis([fit("OFF", J=-0.001), fit("OFF")]))
     assert "J is not greater than zero in 1 of 2" in notice.text
-    (notice,) = doubts(analysis([fit("OFF", J=-0.1, B=-0.1, K=-1.0)]))
+    (notice,) = analysis_warnings(analysis([fit("OFF", J=-0.1, B=-0.1, K=-1.0)]))
     assert "--reaction" in notice.text
     bad = fit("OFF", J=-0.1, outcome=Outcome("excluded", "limit"))
-    assert doubts(analysis([bad])) == ()
+    assert analysis_warnings(analysis([bad])) == ()

@@ -7,28 +7,38 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from tests.small_study import DAYS, record
 
+from rigidimeter.errors import UserError
 from rigidimeter.recording import read_session
 from rigidimeter.records import Fit
 from rigidimeter.settings import Settings
 from rigidimeter.statistics import day_difference, difference, fit_mixed, holm, ranksum
-from rigidimeter.study import Study, analyse, analyse_study, compare, read_study
+from rigidimeter.study import (
+    RATING,
+    StudyResult,
+    analyse,
+    analyse_study,
+    compare,
+    compare_analysis,
+    read_study,
+)
 
 RESAMPLES = 200
 
 
-def analysed(folder: Path, **options) -> Study:
+def analysed(folder: Path, **options) -> StudyResult:
     return analyse_study(read_study(folder, **options), resamples=RESAMPLES)
 
 
 @pytest.fixture(scope="module")
-def whole(fitted_study: Path) -> Study:
+def whole(fitted_study: Path) -> StudyResult:
     return analysed(fitted_study)
 
 
-def test_the_analysis_is_that_of_its_sessions(fitted_study: Path, whole: Study) -> None:
+def test_the_analysis_is_that_of_its_sessions(fitted_study: Path, whole: StudyResult) -> None:
     epochs = []
     for condition in DAYS:
         for day in DAYS[condition]:
@@ -36,32 +46,31 @@ def test_the_analysis_is_that_of_its_sessions(fitted_study: Path, whole: Study) 
     by_hand = analyse(epochs, whole.settings)
     values = [fit.stiffness_nm_rad for fit in by_hand.fixed_inertia]
     assert [fit.stiffness_nm_rad for fit in whole.analysis.fixed_inertia] == values
-    expected = compare(by_hand, "OFF", "DBS")
-    for ours, theirs in zip(whole.comparisons, expected, strict=True):
+    expected = compare_analysis(by_hand, "OFF", "DBS").comparisons
+    for ours, theirs in zip(whole.comparisons[:-1], expected, strict=True):
         assert ours.test == theirs.test
     assert not [notice for notice in whole.notices if notice.level == "error"]
 
 
-def test_days_are_tested_by_the_days_of_the_table(whole: Study) -> None:
+def test_days_are_tested_by_the_days_of_the_table(whole: StudyResult) -> None:
     by_day = {condition: [d for d in DAYS[condition] for _ in range(2)] for condition in DAYS}
-    assert whole.cohort is not None
-    for comparison, test in zip(whole.comparisons, whole.cohort.day_tests, strict=True):
+    for comparison in whole.comparisons[:-1]:
+        test = comparison.days
+        assert test is not None
         expected = day_difference(
             comparison.values["OFF"], comparison.values["DBS"], by_day["OFF"], by_day["DBS"]
         )
         assert test.estimate == pytest.approx(expected.estimate)
         assert (test.p, test.df, test.p_days) == (expected.p, expected.df, expected.p_days)
-        assert (test.days_reference, test.days_other) == (3, 3)
-    third = [d for d in whole.cohort.days if d.measure == "stiffness_nm_rad"][2]
+        assert (test.n_days_x, test.n_days_y) == (3, 3)
+    third = whole.comparison("stiffness_nm_rad").day_medians[2]
     fits = [f for f in whole.analysis.fixed_inertia if f.source == "sessions/3-OFF"]
     assert (third.day, third.condition, third.n) == ("3", "OFF", 2)
     assert third.median == pytest.approx(np.median([f.stiffness_nm_rad for f in fits]))
 
 
-def test_ratings_and_effects(fitted_study: Path, whole: Study) -> None:
-    cohort = whole.cohort
-    assert cohort is not None
-    assert cohort.ratings is not None
+def test_ratings_and_effects(fitted_study: Path, whole: StudyResult) -> None:
+    assert whole.ratings is not None
     with (fitted_study / "ratings.csv").open() as file:
         rows = list(csv.DictReader(file))
     fit = fit_mixed(
@@ -69,30 +78,36 @@ def test_ratings_and_effects(fitted_study: Path, whole: Study) -> None:
         [row["condition"] for row in rows],
         {"examiner": [row["examiner"] for row in rows]},
     )
-    assert cohort.ratings.contrast == difference(fit, "OFF", "DBS")
+    assert whole.ratings.contrast == difference(fit, "OFF", "DBS")
     corrected = {name: [] for name in DAYS}
     for row, score in zip(rows, fit.corrected.tolist(), strict=True):
         corrected[row["condition"]].append(score)
-    found = {effect.measure: effect for effect in cohort.effects}
-    assert found["rating"].effects.test == ranksum(corrected["OFF"], corrected["DBS"])
-    expected = holm([effect.effects.test.p for effect in cohort.effects])
-    assert tuple(effect.p_holm for effect in cohort.effects) == expected
-    assert len(cohort.differences) == math.comb(len(cohort.effects), 2)
-    assert all(difference.paired for difference in cohort.differences.values())
-    assert cohort.virtual
-    assert not cohort.blinded
+    found = whole.comparisons
+    assert found[-1].measure is RATING
+    assert found[-1].test == ranksum(corrected["OFF"], corrected["DBS"])
+    assert tuple(c.p_holm for c in found) == holm([c.test.p for c in found])
+    assert tuple(c.days_p_holm for c in found) == holm([c.days.p for c in found])
+    assert found[-1].days.p == whole.ratings.contrast_days.p_kenward_roger
+    assert len(whole.differences) == math.comb(len(found), 2)
+    assert all(pair.difference.paired for pair in whole.differences)
+    assert tuple(pair.p_holm for pair in whole.differences) == holm(
+        [pair.difference.p for pair in whole.differences]
+    )
+    assert whole.virtual
+    assert not whole.blinded
 
 
-def test_every_method_stands_beside_the_chosen_one(whole: Study) -> None:
-    assert whole.cohort is not None
-    rows = whole.cohort.sensitivity
-    assert [row.method for row in rows] == ["published"] * 5 + ["bandlimited"] * 5 + ["iv"] * 5
-    chosen = {row.measure: row for row in rows if row.chosen}
+def test_every_method_stands_beside_the_chosen_one(whole: StudyResult) -> None:
+    rows = whole.sensitivity
+    methods = ["published", "bandlimited", "iv"]
+    twice = [method for method in methods for _ in range(2)]
+    assert [row.method for row in rows] == methods + twice + twice
+    chosen = {row.measure.name: row for row in rows if row.chosen}
     assert {row.method for row in chosen.values()} == {"iv"}
-    for comparison in whole.comparisons:
+    for comparison in whole.comparisons[:-1]:
         assert comparison.test is not None
-        assert chosen[comparison.measure].p == comparison.test.p
-        assert chosen[comparison.measure].shift == comparison.test.shift
+        assert chosen[comparison.measure.name].p == comparison.test.p
+        assert chosen[comparison.measure.name].shift == comparison.test.shift
     assert chosen["inertia_kg_m2"].inertia == "free"
     assert chosen["stiffness_nm_rad"].inertia == "fixed"
 
@@ -101,10 +116,8 @@ def test_another_measure_moves_no_other_number(study: Path) -> None:
     first = analysed(study)
     (study / "ratings.csv").unlink()
     second = analysed(study)
-    assert first.cohort is not None
-    assert second.cohort is not None
-    assert first.cohort.effects[0].effects == second.cohort.effects[0].effects
-    assert second.cohort.ratings is None
+    assert first.comparisons[0].effects == second.comparisons[0].effects
+    assert second.ratings is None
 
 
 def test_a_key_gives_codes_their_conditions(study: Path) -> None:
@@ -118,17 +131,15 @@ def test_a_key_gives_codes_their_conditions(study: Path) -> None:
     key.write_text("code,condition\nQ,OFF\nZ,DBS\n")
     found = analysed(study, key=key)
     assert [c.test for c in found.comparisons] == [c.test for c in expected.comparisons]
-    assert found.cohort is not None
-    assert found.cohort.sessions[0].code == "Q"
+    assert found.sessions[0].code == "Q"
     blinded = analysed(study)
-    assert blinded.cohort is not None
-    assert blinded.cohort.blinded
-    assert [c.name for c in blinded.cohort.conditions] == ["Q", "Z"]
+    assert blinded.blinded
+    assert [c.name for c in blinded.conditions] == ["Q", "Z"]
     assert {epoch.condition for epoch in blinded.epochs} == {"Q", "Z"}
     assert any("blinded" in notice.text for notice in blinded.notices)
     assert [c.test for c in blinded.comparisons] == [c.test for c in expected.comparisons]
-    assert blinded.cohort.ratings is not None
-    assert blinded.cohort.ratings.reference == "Q"
+    assert blinded.ratings is not None
+    assert blinded.ratings.reference == "Q"
 
 
 def test_codes_in_the_recordings_go_through_the_key(study: Path, edit) -> None:
@@ -145,8 +156,7 @@ def test_codes_in_the_recordings_go_through_the_key(study: Path, edit) -> None:
 def test_the_operator_takes_an_epoch_out_with_name_and_reason(study: Path) -> None:
     (study / "exclusions.csv").write_text("path,epoch,reason,by\n./sessions/2-OFF,2,coughed,NB\n")
     found = analysed(study)
-    assert found.cohort is not None
-    (exclusion,) = found.cohort.exclusions
+    (exclusion,) = found.exclusions
     assert (exclusion.by, exclusion.reason, exclusion.who) == ("operator", "coughed", "NB")
     assert (exclusion.source, exclusion.epoch, exclusion.day) == ("sessions/2-OFF", "2", "2")
     assert found.comparisons[0].excluded == {"OFF": 1, "DBS": 0}
@@ -184,5 +194,27 @@ def test_parts_tell_two_sessions_of_one_day_apart(study: Path, edit) -> None:
     (study / "sessions.csv").write_text("\n".join([text[0], *rows]) + "\n")
     found = analysed(study)
     assert found.comparisons[0].summaries["OFF"].n == 8
-    assert found.cohort is not None
-    assert found.cohort.day_tests[0].days_reference == 3
+    assert found.comparisons[0].days.n_days_x == 3
+
+
+def test_the_front_door_gives_the_same(study: Path, tmp_path: Path) -> None:
+    found = compare(study, resamples=RESAMPLES)
+    expected = analysed(study)
+    assert found.comparisons == expected.comparisons
+    assert found.differences == expected.differences
+    assert not (study / "analysis").exists()
+    turned = compare(study, "OFF", reference="DBS", resamples=RESAMPLES)
+    assert turned.comparisons[0].test.shift == -found.comparisons[0].test.shift
+    table = found.table()
+    assert list(table["measure"]) == [c.measure.name for c in found.comparisons]
+    assert list(table["days_p_holm"]) == [c.days_p_holm for c in found.comparisons]
+    assert "Small study" in found._repr_html_()
+
+
+def test_a_table_and_its_file_give_the_same(study: Path) -> None:
+    path = study / "ratings.csv"
+    from_file = compare(path, value="score", resamples=RESAMPLES)
+    from_table = compare(pd.read_csv(path), value="score", resamples=RESAMPLES)
+    assert from_table.comparisons == from_file.comparisons
+    with pytest.raises(UserError, match="value="):
+        compare(pd.read_csv(path))

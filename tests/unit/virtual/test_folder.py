@@ -12,7 +12,7 @@ from tests.unit.virtual.tiny import SHORT, tiny
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read_session, session_settings
-from rigidimeter.study import analyse, compare
+from rigidimeter.study import analyse, compare_analysis
 from rigidimeter.virtual.study_design import PAPER, PUSHING
 from rigidimeter.virtual.study_plan import plan_study
 from rigidimeter.virtual.virtual_study import study_length_s, write_virtual_study
@@ -79,7 +79,10 @@ def test_the_tables_name_every_session(folder: Path) -> None:
 def test_its_sessions_are_estimated_and_compared(folder: Path) -> None:
     paths = [folder / row["path"] for row in rows_of(folder / "sessions.csv")]
     epochs = [epoch for path in paths for epoch in read_session(path)[0]]
-    found = {c.measure: c for c in compare(analyse(epochs, session_settings(paths[0])))}
+    found = {
+        c.measure.name: c
+        for c in compare_analysis(analyse(epochs, session_settings(paths[0]))).comparisons
+    }
     assert all(len(values) == 2 for c in found.values() for values in c.values.values())
     assert found["inertia_kg_m2"].summaries["OFF"].median == pytest.approx(0.0045, rel=0.15)
 
@@ -115,7 +118,10 @@ def test_pushing_moves_the_published_estimate_and_not_the_instrumental_one(
     epochs = [e for plan in plans for e in read_session(tmp_path / "study" / plan.folder)[0]]
     shift_percent = {}
     for method in ("published", "iv"):
-        found = {c.measure: c for c in compare(analyse(epochs, plans[0].settings, method))}
+        found = {
+            c.measure.name: c
+            for c in compare_analysis(analyse(epochs, plans[0].settings, method)).comparisons
+        }
         damping = found["damping_nm_s_rad"].summaries
         shift_percent[method] = 100 * (damping["DBS"].median / damping["OFF"].median - 1)
     assert shift_percent["published"] < -30.0
