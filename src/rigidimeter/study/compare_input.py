@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read_estimates
@@ -74,17 +74,13 @@ def compare(
     if isinstance(x, Analysis):
         pair = chosen_pair(conditions(x), reference, other)
         return compare_analysis(x, *pair, seed=seed, resamples=resamples)
-    if not isinstance(x, (str, PathLike)):
+    path = Path(x) if isinstance(x, (str, PathLike)) else None
+    if path is None or value is not None:
+        table = _as_text(x) if path is None else read_text_table(path)
+        wanted = (reference, other)
         return compare_columns(
-            _as_text(x), _names(value), by, (reference, other), session=session, seed=seed,
-            resamples=resamples,
-        )  # fmt: skip
-    path = Path(x)
-    if value is not None:
-        return compare_columns(
-            read_text_table(path), _names(value), by, (reference, other), session=session, seed=seed,
-            resamples=resamples,
-        )  # fmt: skip
+            table, _names(value), by, wanted, session=session, seed=seed, resamples=resamples
+        )
     if is_study(path):
         read = read_study(
             path, key=None if key is None else Path(key), settings=settings, method=method,
@@ -132,7 +128,7 @@ def _names(value: str | Sequence[str] | None) -> list[str]:
     return [value] if isinstance(value, str) else list(value)
 
 
-def _as_text(table: pd.DataFrame) -> TextTable:
+def _as_text(table: Any) -> TextTable:
     """Return a table of pandas as text, its rows numbered as in a file with one header line."""
     columns = {
         str(name): tuple("" if missing else str(cell) for cell, missing in zip(
