@@ -1,4 +1,4 @@
-"""Read what the user named, and go on with the rest when one input is bad."""
+"""What commands do with their inputs: analyse them, protect them, report what was wrong."""
 
 from __future__ import annotations
 

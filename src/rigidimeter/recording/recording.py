@@ -27,7 +27,7 @@ class Recording:
     epochs : tuple of Epoch
         In the order of the paths and, within each, of the file; at least one.
     notices : tuple of Notice
-        What was wrong or doubtful. A path that could not be read has one of level `error`.
+        What was wrong or looked wrong. A path that could not be read has one of level `error`.
     settings : Settings
         Those given, else those of the first session folder, else the defaults.
     paths : tuple of Path

@@ -36,9 +36,9 @@ class Recovery:
 def recover(folder: Path, reason: str = "the recording process ended without closing") -> Recovery:
     """Close an interrupted session folder.
 
-    The stream is cut after its last whole batch and ended; the torn bytes, if any, are kept beside
-    it in `samples.torn`. Open epochs end with `fail` and the reason, and so does the session.
-    Running it again changes nothing.
+    The stream is cut after its last complete batch and ended; the bytes cut off, if any, are kept
+    beside it in `samples.torn`. Open epochs end with `fail` and the reason, and so does the
+    session. Running it again changes nothing.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What is left of an interrupted session, in the order that was drawn for it."""
+"""The epochs that an interrupted session did not run, in their planned order."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Rest:
     epochs : tuple of PlannedEpoch
         Those that were not run to their end, with their own numbers and rests.
     done : int
-        How many were.
+        How many epochs were run to their end.
     virtual : bool
         Whether it was recorded on the virtual rig.
     continues : dict
@@ -45,9 +45,8 @@ class Rest:
 def rest_of(folder: Path) -> Rest:
     """Return what is left of a session, however it ended.
 
-    An epoch is done when it ended with success, or for a reason of its own after which the session
-    went on: an arm that came to the limit comes there again. The one in which the session ended is
-    run again.
+    An epoch is done when it ended with success, or failed and the session continued: an arm that
+    reached its limit would reach it again. The epoch in which the session ended is repeated.
 
     Raises
     ------
@@ -65,14 +64,13 @@ def rest_of(folder: Path) -> Rest:
                 f"{folder}/manifest.json: protocol holds {entry!r}, which is no planned epoch"
             ) from None
     if not planned:
-        raise UserError(f"{folder}: the session has no protocol to go on with")
+        raise UserError(f"{folder}: the session has no protocol, so it cannot be continued")
     ended = [event for event in events if event.get("event") == "epoch_ended"]
     done = {event["epoch"] for event in ended if event["outcome"] == "success"}
     done |= {event["epoch"] for event in ended[:-1] if event["outcome"] == "fail"}
     if ended and ended[-1]["outcome"] == "fail" and _went_on(events, ended[-1]):
         done.add(ended[-1]["epoch"])
-    # Each session may begin a little off where the one before began, so the first one counts: the
-    # limits must not move on with every session.
+    # The first session sets the origin: otherwise the limits would drift from session to session.
     origins = [manifest.get("continues", {}), *events]
     origin = next(({"origin_rad": o["origin_rad"]} for o in origins if "origin_rad" in o), {})
     left = tuple(epoch for epoch in planned if epoch.number not in done)

@@ -1,7 +1,7 @@
 """The raw log: samples appended as an Arrow IPC stream, events as JSON lines.
 
 A stream needs no footer, so what was written before the process was killed can be read: every
-whole batch. One batch holds at most `BATCH_S` seconds.
+complete batch. One batch holds at most `BATCH_S` seconds.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ BATCH_S = 0.1
 
 
 class Sample(NamedTuple):
-    """One tick of the loop. Units stand in the names; see `SAMPLE_UNITS`.
+    """One tick of the loop. The units are in the names; see `SAMPLE_UNITS`.
 
     `epoch` is the number of the epoch, -1 during rests. `limited` is a `guard.Limited` value, and
     `cause` a `guard.Cause` value. The command is what was sent after the guard; the request is what
@@ -125,8 +125,8 @@ def sample_dtypes() -> dict[str, np.dtype[Any]]:
 class SampleLog:
     """Append samples to an Arrow stream, a batch at a time.
 
-    A batch is in the file whole or not at all: where the disk is full, what was written of it is
-    taken back, and it can be tried again.
+    Either all of a batch is in the file or none of it: when the disk is full, the part that was
+    written is removed, and the batch can be written again.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ class SampleLog:
 
 
 def _batches(file: pa.NativeFile) -> Iterator[pa.RecordBatch]:
-    """Yield each whole batch; stop where the stream is torn."""
+    """Yield each complete batch; stop where the stream breaks off."""
     try:
         reader = pa.ipc.open_stream(file, options=pa.ipc.IpcReadOptions(use_threads=False))
     except (pa.ArrowInvalid, OSError):
@@ -220,7 +220,7 @@ def _batches(file: pa.NativeFile) -> Iterator[pa.RecordBatch]:
 
 
 def read_samples(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the columns of every whole batch; empty columns where there is none.
+    """Return the columns of all complete batches; empty columns if there is none.
 
     Raises
     ------
@@ -245,9 +245,9 @@ def read_samples(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def stream_extent(path: Path) -> tuple[int, bool]:
-    """Return the length in bytes up to the last whole batch, and whether the stream is closed.
+    """Return the length in bytes up to the last complete batch, and whether the stream is closed.
 
-    The length is that of the schema alone when no batch is whole, and 0 when not even that is.
+    Without a complete batch the length is that of the schema; without a complete schema it is 0.
     """
     end = 0
     with pa.OSFile(str(path), "rb") as file:
@@ -296,7 +296,7 @@ def read_events(path: Path) -> tuple[list[dict[str, Any]], bool]:
     Raises
     ------
     UserError
-        If a whole line is not a JSON object.
+        If a complete line is not a JSON object.
     """
     events: list[dict[str, Any]] = []
     lines = path.read_bytes().split(b"\n")

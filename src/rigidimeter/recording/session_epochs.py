@@ -17,7 +17,7 @@ from rigidimeter.settings import Settings, parse_settings
 __all__ = ["is_session", "read_session", "session_settings"]
 
 MUCH_LIMITED = 0.01
-"""Above this share of limited ticks the reader is told."""
+"""Above this share of limited ticks there is a warning."""
 
 
 def is_session(path: Path) -> bool:
@@ -46,7 +46,7 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
     settings = session_settings(folder)
     for name in (SAMPLES, EVENTS):
         if not (folder / name).is_file():
-            raise UserError(f"{folder}: the session has lost its {name}")
+            raise UserError(f"{folder}: the session has no {name}")
     samples = read_samples(folder / SAMPLES)
     events, _ = read_events(folder / EVENTS)
     notices: list[Notice] = []

@@ -74,7 +74,7 @@ class SessionWriter:
     virtual : bool
         Whether the rig is simulated.
     continues : mapping
-        What session this one goes on with, if any.
+        The session that this one continues, if any.
 
     Raises
     ------
@@ -179,9 +179,9 @@ class SessionWriter:
 
 
 def lock(file: BinaryIO) -> bool:
-    """Mark an event file as being written until it is closed; return whether nobody else does.
+    """Lock an event file until it is closed; return False if another process holds the lock.
 
-    The lock goes with the process, so a killed one leaves none.
+    The lock ends with the process, also when it is killed.
     """
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

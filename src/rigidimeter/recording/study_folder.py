@@ -7,7 +7,7 @@
     key.csv         code, condition
 
 Only the first two must exist. What is wrong with one row is a notice of level `error`, and the row
-is left out; what leaves nothing to go on with is a `UserError`. Nothing is decided here about what
+is left out; what leaves nothing to analyse is a `UserError`. Nothing is decided here about what
 the rows mean.
 """
 
@@ -48,7 +48,7 @@ class Row:
 
     @property
     def where(self) -> str:
-        """File and line, as sentences begin."""
+        """File and line, for the beginning of a message."""
         return f"{self.source}, line {self.line}"
 
     def __getitem__(self, column: str) -> str:
@@ -124,7 +124,7 @@ def read_study_folder(folder: Path, key: Path | None = None) -> StudyFolder:
                 )
             tables[name] = None
             continue
-        # A key is known by its role: it may lie anywhere, and its place is nobody's business.
+        # A key is listed by its role: it may be kept anywhere, and its place is not recorded.
         files["key" if name == "key" else getattr(about, name)] = path
         tables[name] = _read_table(path, name, notices)
     if not tables["sessions"]:

@@ -7,12 +7,10 @@ its range with the range and the unit.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
 from pydantic import Field, ValidationError, model_validator
-from pydantic_core import ErrorDetails
 
 from rigidimeter.documents import read_toml
 from rigidimeter.errors import UserError
@@ -68,7 +66,7 @@ class RatingTable(Section):
 
     scale: list[float] = Field(
         default_factory=lambda: [0.0, 3.0], min_length=2, max_length=2,
-        json_schema_extra={"unit": "1"},
+        json_schema_extra={"meaning": "two numbers, the lowest and the highest score"},
     )  # fmt: skip
     step: float = Field(0.5, ge=0.0, le=100.0, json_schema_extra={"unit": "1"})
 
@@ -159,37 +157,5 @@ def read_study_toml(path: Path) -> StudyToml:
     try:
         return StudyToml.model_validate(values)
     except ValidationError as error:
-        told = "; ".join(dict.fromkeys(_told(values, detail) for detail in error.errors()))
-        raise UserError(f"{path}: {told}") from None
-
-
-def _told(values: Mapping[str, Any], detail: ErrorDetails) -> str:
-    where = ".".join(map(str, detail["loc"]))
-    kind, shown = detail["type"], detail["input"]
-    if kind == "missing":
-        return f'{where} is missing; write {where} = "..."'
-    if kind == "string_type":
-        return f'{where} = {shown} is not allowed: it must be a text, as in {where} = "{shown}"'
-    if detail["loc"][:2] == ("rating", "scale"):
-        scale = values["rating"]["scale"]
-        return (
-            f"rating.scale = {scale!r} is not allowed: it must be two numbers, the lowest and the "
-            "highest score"
-        )
-    if kind in ("model_type", "dict_type"):
-        return f"{where} = {shown!r} is not allowed: it must be a table, as in [{where}]"
-    numeric = ("float_type", "finite_number", "greater_than_equal", "less_than_equal")
-    if kind in numeric and isinstance(field := _condition_field(detail["loc"]), str):
-        return f"{where} = {shown!r} is not allowed: it must be {field}"
-    return sentence(StudyToml, values, detail)
-
-
-def _condition_field(where: Sequence[str | int]) -> str | None:
-    """Return what an optional number of a condition must be."""
-    field = ConditionTable.model_fields.get(str(where[-1]))
-    if field is None or where[0] != "conditions" or not isinstance(field.json_schema_extra, dict):
-        return None
-    unit = field.json_schema_extra["unit"]
-    ends = {name: getattr(m, name) for m in field.metadata for name in ("ge", "le")
-            if hasattr(m, name)}  # fmt: skip
-    return f"a number of at least {ends['ge']:g} {unit} and at most {ends['le']:g} {unit}"
+        text = "; ".join(dict.fromkeys(sentence(StudyToml, values, d) for d in error.errors()))
+        raise UserError(f"{path}: {text}") from None

@@ -25,11 +25,27 @@ def sentence(root: type[BaseModel], values: Mapping[str, Any], detail: ErrorDeta
     if detail["type"] == "value_error":
         text = str(detail["msg"]).removeprefix("Value error, ")
         return f"{key}: {text}" if key else text
-    value = detail["input"]
+    if detail["type"] == "missing":
+        return f'{key} is missing; write {key} = "..."'
+    value: Any = detail["input"]
+    if isinstance(where[-1], int) and field is not None and not _models_in(field.annotation):
+        # One number of a list: show all of them.
+        where = where[:-1]
+        key, value = _dotted(where), values
+        for part in where:
+            value = value[part]
     shown = repr(value) if isinstance(value, str) else _plain(value)
+    if detail["type"] in ("model_type", "dict_type"):
+        return f"{key} = {shown} is not allowed: it must be a table{_header(where)}"
     if field is None:
         return f"{key} = {shown}: {detail['msg']}"
-    return f"{key} = {shown} is not allowed: it must be {_expected(field)}"
+    as_text = f', as in {key} = "{shown}"' if detail["type"] == "string_type" else ""
+    return f"{key} = {shown} is not allowed: it must be {_expected(field)}{as_text}"
+
+
+def _header(where: Sequence[str | int]) -> str:
+    """Return how a table begins, for one that is not in a list."""
+    return "" if any(isinstance(part, int) for part in where) else f", as in [{_dotted(where)}]"
 
 
 def _dotted(where: Sequence[str | int]) -> str:
@@ -95,9 +111,19 @@ def _unknown_key(
     return f"{key} is not a setting; the nearest is {here} (known here: {', '.join(known)})"
 
 
+def _without_none(annotation: Any) -> Any:
+    """Return what an optional value is where there is one."""
+    if typing.get_origin(annotation) not in (types.UnionType, typing.Union):
+        return annotation
+    return next(inner for inner in typing.get_args(annotation) if inner is not types.NoneType)
+
+
 def _expected(field: FieldInfo) -> str:
-    extra = field.json_schema_extra
-    unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    if "meaning" in extra:
+        return str(extra["meaning"])
+    unit = str(extra.get("unit", ""))
+    annotation = _without_none(field.annotation)
     suffix = "" if unit in ("", "1") else f" {unit}"
     bounds = {
         name: getattr(item, name)
@@ -105,17 +131,17 @@ def _expected(field: FieldInfo) -> str:
         for name in ("gt", "ge", "le", "lt", "min_length", "max_length")
         if getattr(item, name, None) is not None
     }
-    if typing.get_origin(field.annotation) is typing.Literal:
-        return "one of " + ", ".join(repr(choice) for choice in typing.get_args(field.annotation))
-    if field.annotation is str:
+    if typing.get_origin(annotation) is typing.Literal:
+        return "one of " + ", ".join(repr(choice) for choice in typing.get_args(annotation))
+    if annotation is str:
         return f"a text of {bounds['min_length']} to {bounds['max_length']} letters"
-    if field.annotation not in (int, float):
-        if _is_container(field.annotation):
-            inner = typing.get_args(field.annotation)
+    if annotation not in (int, float):
+        if _is_container(annotation):
+            inner = typing.get_args(annotation)
             what = "numbers" if inner and inner[-1] is float else "tables"
             return f"a non-empty list of {what}{f' in {unit}' if suffix else ''}"
         return "a table"
-    whole = field.annotation is int
+    whole = annotation is int
     shown = {name: f"{bound:.0f}" if whole else f"{bound:g}" for name, bound in bounds.items()}
     low = f"greater than {shown['gt']}" if "gt" in shown else f"at least {shown['ge']}"
     kind = "a whole number" if whole else "a number"

@@ -110,5 +110,5 @@ def test_the_way_on_is_offered(session, rigidimeter, virtual, option):
 
 def test_a_session_without_a_protocol_cannot_go_on(tmp_path):
     SessionWriter(tmp_path / "s", SETTINGS, [], {}, virtual=True).close(0.0, "fail", "")
-    with pytest.raises(UserError, match="no protocol to go on with"):
+    with pytest.raises(UserError, match="no protocol, so it cannot be"):
         rest_of(tmp_path / "s")

@@ -1,7 +1,7 @@
-"""The standard columns of somebody else's file: found by name, turned into numbers, put on a clock.
+"""The standard columns of a file: found by name, converted to numbers, with a time for each row.
 
-A file calls its torque whatever it likes. Here a column gets its standard name, by itself or as
-the user says, and every refusal names the option that would put it right.
+Files use names of their own. A column gets its standard name here, either because it has it
+already or because the user says so; every refusal names the option that helps.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from rigidimeter.records import Notice
 
 __all__ = ["Stretch", "by_label", "by_length", "constant_label", "lettered"]
 
-_WHOLE = 0.95
+_COMPLETE = 0.95
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def by_length(source: str, clock: Rows, length_s: float) -> tuple[list[Stretch],
     last = stretches[-1]
     # The file ends one interval after its last stamp.
     left_s = float(elapsed[-1]) + step_s - int(index[-1]) * length_s
-    if left_s < _WHOLE * length_s:
+    if left_s < _COMPLETE * length_s:
         text = (
             f"{source}: the last {seconds(left_s)}, from {seconds(float(time_s[last.start]))} on, "
             f"are shorter than an epoch of {length_s:g} s and were left out"

@@ -1,7 +1,7 @@
-"""Samples that are not there: lost ones, gaps, and sensors that are merely slower.
+"""Missing samples: lost ones, gaps, and sensors that are only slower.
 
 A column may be filled only on every k-th row, or on rows of its own among those of other sensors.
-Its own stamps tell which: where leaving out the empty rows keeps its intervals regular, nothing was
+Its own time stamps show which: if its intervals are regular without the empty rows, nothing was
 lost.
 """
 
@@ -209,14 +209,14 @@ def about_breaks(
         }
         if not chosen:
             continue
-        told = [
+        shown = [
             f"{seconds(stop_s - start_s)} from {seconds(start_s)} to {seconds(stop_s)} in "
             + ("all channels" if len(gaps) == n_signals else " and ".join(g.signal for g in gaps))
             for (start_s, stop_s), gaps in list(chosen.items())[:_SHOWN]
         ]
         more = f"; and {len(chosen) - _SHOWN} more" if len(chosen) > _SHOWN else ""
         what = "samples are missing for" if lost else "there is a gap of"
-        text = f"{source}, epoch {label}: {what} {'; '.join(told)}{more}; {_cut(label, pieces)}"
+        text = f"{source}, epoch {label}: {what} {'; '.join(shown)}{more}; {_cut(label, pieces)}"
         notices.append(Notice("error" if lost else "warning", text))
     return notices
 

@@ -1,8 +1,8 @@
-"""Whether a MATLAB file of version 5 to 7 is whole, before scipy's compiled reader trusts it.
+"""Check a MATLAB file of version 5 to 7 before scipy's compiled reader gets it.
 
-That reader takes type codes and sizes as they come and ends the whole process on a wrong one. So
-the file is walked first: a file is a row of elements, each with a tag that gives its type and its
-size; a matrix is an element that holds elements. Source: MathWorks, "MAT-File Format", 2019,
+That reader does not check type codes and sizes, and a wrong one can crash the process. A file is a
+sequence of elements, each with a tag that gives its type and its size; a matrix is an element that
+holds elements. Source: MathWorks, "MAT-File Format", 2019,
 chapter 1.
 """
 

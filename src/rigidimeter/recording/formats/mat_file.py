@@ -42,7 +42,7 @@ def read_mat(path: Path) -> Table:
 def _entries(path: Path) -> dict[str, NDArray[Any]]:
     check_mat5(path.read_bytes())
     with warnings.catch_warnings():
-        # A doubtful file is refused: its warning becomes the reason.
+        # A file that scipy warns of is refused, with the warning as the reason.
         warnings.simplefilter("error", scipy.io.matlab.MatReadWarning)
         loaded = scipy.io.loadmat(path, simplify_cells=True)
     return _flat({name: value for name, value in loaded.items() if not name.startswith("__")})

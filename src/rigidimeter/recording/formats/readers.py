@@ -41,7 +41,7 @@ class Reader:
         sentence that begins with the path.
     sniff : callable, optional
         Whether a path holds this format. It decides between readers of one suffix, and finds the
-        reader of a path whose suffix nobody has. A reader without it takes every file with one of
+        reader of a path with an unknown suffix. A reader without it takes every file with one of
         its suffixes.
     settings : callable, optional
         Returns the settings with which a path was recorded.
@@ -134,7 +134,7 @@ def read_table(path: Path) -> Table:
 
 
 def formats_text() -> str:
-    """Return what can be read, as sentences say it."""
+    """Return the list of formats for help texts and messages."""
     shown = [
         f"{reader.name}s" + (f" ({', '.join(reader.suffixes)})" if reader.suffixes else "")
         for reader in READERS

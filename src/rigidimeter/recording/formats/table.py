@@ -1,4 +1,4 @@
-"""A table of columns, as a file holds it before anything is known of its meaning."""
+"""A table of columns, as a file holds it, before its columns are interpreted."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rigidimeter.errors import UserError
 __all__ = ["MISSING", "Table", "alike", "label_text", "nearest", "printable", "table_of_arrays"]
 
 MISSING = frozenset({"", "na", "n/a", "#n/a", "#na", "nan", "-nan", "null", "none", "<na>"})
-"""Texts, in lower case, that stand for a sample that is not there."""
+"""Texts, in lower case, that mark a missing sample."""
 
 _SHOWN = 20
 
@@ -54,7 +54,7 @@ class Table:
 
     @property
     def listed(self) -> str:
-        """The names of the columns as sentences show them."""
+        """The names of the columns, for messages."""
         names = list(self.columns)
         more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
         return ", ".join(name[:60] for name in names[:_SHOWN]) + more
@@ -110,7 +110,7 @@ def label_text(value: object) -> str:
 
 
 def printable(name: str) -> str:
-    """Return a name without line feeds and the like, as it can stand in a sentence."""
+    """Return a name without line feeds and the like, for messages."""
     return "".join(letter if letter.isprintable() else "?" for letter in name)
 
 
@@ -130,7 +130,7 @@ _ALIASES: Mapping[str, tuple[str, ...]] = {
 
 
 def alike(standard: str, candidate: str) -> float:
-    """Return how like a name is to a standard one or what people call it, 0 to 1."""
+    """Return how similar a name is to a standard name or its common synonyms, 0 to 1."""
     spoken = {candidate.lower(), candidate.lower().rsplit(".", 1)[-1]}
     known = (standard.lower(), *_ALIASES.get(standard, ()))
     return max(difflib.SequenceMatcher(None, a, b).ratio() for a in known for b in spoken)
