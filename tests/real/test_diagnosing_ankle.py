@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.estimation import epoch_signals, fit_inertia_damping_stiffness
-from rigidimeter.estimation.diagnostics import diagnose
+from rigidimeter.estimation.diagnostics import Case, diagnose
 from rigidimeter.estimation.uncertainty import block_bootstrap, hac_covariance
 from rigidimeter.recording.formats.readers import read_recording
 from rigidimeter.recording.formats.table_epochs import ReadOptions
@@ -30,7 +30,7 @@ def ankle(shared_data):
 def diagnosed(epoch):
     signals = epoch_signals(epoch, "bandlimited", SETTINGS.estimation)
     parameters = fit_inertia_damping_stiffness(signals).value
-    return {f.name: f for f in diagnose(epoch, signals, parameters, SETTINGS.diagnostics)}
+    return {f.name: f for f in diagnose(Case(epoch, signals, parameters, SETTINGS.diagnostics))}
 
 
 def test_a_measured_epoch_is_sound(ankle):

@@ -13,18 +13,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import signal
 
-from rigidimeter.estimation.diagnostics.finding_text import judged
-from rigidimeter.estimation.diagnostics.power_lines import inside, lines
+from rigidimeter.estimation.diagnostics.check_record import Check, Look, at_least, at_most
 from rigidimeter.estimation.scores import single_frequency_share
 from rigidimeter.estimation.signals import Array, Signals, kinematics, spline
-from rigidimeter.records import Channel, Epoch, Finding
+from rigidimeter.records import PARAMETERS, Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings
 
-__all__ = ["band_share", "coherence", "conditioning", "imposed_sinusoid", "perturbation_nm"]
+__all__ = ["EXCITATION_CHECKS", "lines_inside", "perturbation_nm", "power_lines"]
 
-PARAMETERS = ("J", "B", "K")
 MIDDLE_PERCENT = 90.0
 SEGMENTS = 8
 """Stretches, half overlapping, over which a coherence is averaged: 4 s each in an epoch of 18 s.
@@ -33,47 +32,39 @@ Signals that have nothing to do with each other then still show about 0.2.
 """
 
 
-def conditioning(signals: Signals, settings: DiagnosticsSettings) -> Finding:
+def conditioning(signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return whether the regressors can be told apart, and if not which two and because of what."""
     regressors = np.column_stack(
         [signals.acceleration_rad_s2, signals.velocity_rad_s, signals.angle_rad]
     )
     lengths = np.linalg.norm(regressors, axis=0)
     most = settings.condition_number_most
-    remedy = "use a perturbation with more frequencies, or hold J at the median of other epochs"
     if not np.all(lengths > 0):
-        return judged(
-            "conditioning",
+        return Look(
             math.inf,
             most,
-            settings,
-            failed=True,
-            fact=f"the condition number of the motion is infinite (at most {most:g})",
-            meaning="the joint did not move",
-            remedy=remedy,
+            True,
+            f"the condition number of the motion is infinite (at most {most:g})",
+            "the joint did not move",
         )
     _, singular, right = np.linalg.svd(regressors / lengths, full_matrices=False)
     value = float(singular[0] / singular[-1]) if singular[-1] > 0 else math.inf
     # The weakest direction adds and subtracts what cannot be told apart.
     first, second = sorted(np.argsort(np.abs(right[-1]))[-2:])
     low_hz, high_hz = _middle_hz(signals)
-    return judged(
-        "conditioning",
+    return at_most(
         value,
         most,
-        settings,
-        failed=not value <= most,
-        fact=f"the condition number of the motion is {value:.3g} (at most {most:g})",
+        f"the condition number of the motion is {value:.3g} (at most {most:g})",
         meaning=(
-            f"this epoch cannot tell {PARAMETERS[first]} from {PARAMETERS[second]}, because "
-            f"{MIDDLE_PERCENT:g} % of the velocity's power lies between {low_hz:.2g} and "
-            f"{high_hz:.2g} Hz"
+            f"this epoch cannot tell {PARAMETERS[first].symbol} from "
+            f"{PARAMETERS[second].symbol}, because {MIDDLE_PERCENT:g} % of the velocity's power "
+            f"lies between {low_hz:.2g} and {high_hz:.2g} Hz"
         ),
-        remedy=remedy,
     )
 
 
-def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Finding:
+def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return how far torque and velocity follow the perturbation, by Welch's method.
 
     The value is the median over the lines of the band, for the weaker of the two.
@@ -83,16 +74,13 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
     values = {}
     for name, effect in (("torque", signals.torque_nm), ("velocity", signals.velocity_rad_s)):
         frequency, shared = signal.coherence(cause, effect, signals.rate_hz, nperseg=length)
-        values[name] = float(np.median(shared[inside(frequency, signals.band_hz)]))
+        values[name] = float(np.median(shared[lines_inside(frequency, signals.band_hz)]))
     weaker = min(values, key=lambda name: values[name])
     value, least = values[weaker], settings.coherence_least
-    return judged(
-        "coherence",
+    return at_least(
         value,
         least,
-        settings,
-        failed=not value >= least,
-        fact=(
+        (
             f"the coherence of perturbation and {weaker} has a median of {value:.2f} in the band "
             f"(at least {least:g})"
         ),
@@ -100,11 +88,10 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
             f"only {100 * value:.0f} % of the {weaker}'s power follows the perturbation; the rest "
             "is the subject, noise, or a joint that is not linear"
         ),
-        remedy="ask the subject to relax, perturb more strongly, or pool epochs with instruments",
     )
 
 
-def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Finding:
+def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return how much of the recorded torque and velocity lies in the band of the fit."""
     _, velocity, _ = kinematics(epoch, signals.time_s)
     torque = spline(epoch.channels["torque_nm"])(signals.time_s)
@@ -115,36 +102,23 @@ def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) ->
     weaker = min(shares, key=lambda name: shares[name])
     value, least = 100.0 * shares[weaker], settings.band_share_least_percent
     low, high = signals.band_hz
-    return judged(
-        "band_share",
+    return at_least(
         value,
         least,
-        settings,
-        failed=not value >= least,
-        fact=(
+        (
             f"{value:.0f} % of the {weaker}'s power lies in the band, {low:g} to {high:.3g} Hz (at "
             f"least {least:g} %)"
-        ),
-        meaning="most of what was measured is drift below or noise above what is fitted",
-        remedy=(
-            "look for drift of the sensor and for slow pushes; check the rate and the unit of the "
-            "time; set estimation.band_low_hz and band_high_hz to what was perturbed"
         ),
     )
 
 
-def imposed_sinusoid(epoch: Epoch, settings: DiagnosticsSettings) -> Finding:
+def imposed_sinusoid(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return whether the motion is a single sinusoid, which no fit of three parameters can use."""
     value, most = 100.0 * single_frequency_share(epoch), settings.single_frequency_most_percent
-    return judged(
-        "imposed_sinusoid",
+    return at_most(
         value,
         most,
-        settings,
-        failed=not value <= most,
-        fact=f"the strongest line holds {value:.0f} % of the angle's variance (at most {most:g} %)",
-        meaning="the motion is a sinusoid, in which J and K are one number, K − J ω²",
-        remedy="score it as an imposed sinusoid (--task sinusoid), or use a PRBS",
+        f"the strongest line holds {value:.0f} % of the angle's variance (at most {most:g} %)",
     )
 
 
@@ -156,15 +130,79 @@ def perturbation_nm(channel: Channel, time_s: Array) -> Array:
 
 
 def _share(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> float:
-    frequency, power = lines(values, rate_hz, tapered=True)
+    frequency, power = power_lines(values, rate_hz, tapered=True)
     total = float(np.sum(power))
-    return float(np.sum(power[inside(frequency, band_hz)])) / total if total > 0 else 0.0
+    return float(np.sum(power[lines_inside(frequency, band_hz)])) / total if total > 0 else 0.0
 
 
 def _middle_hz(signals: Signals) -> tuple[float, float]:
     """Return between which frequencies the middle of the velocity's power lies."""
-    frequency, power = lines(signals.velocity_rad_s, signals.rate_hz, tapered=True)
+    frequency, power = power_lines(signals.velocity_rad_s, signals.rate_hz, tapered=True)
     running = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
     outside = (1.0 - MIDDLE_PERCENT / 100.0) / 2.0
     low, high = np.searchsorted(running, [outside, 1.0 - outside])
     return float(frequency[low]), float(frequency[min(high, frequency.size - 1)])
+
+
+def power_lines(values: Array, rate_hz: float, *, tapered: bool = False) -> tuple[Array, Array]:
+    """Return frequencies and the power at each; without a taper it sums to the variance.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Its mean is taken off.
+    rate_hz : float
+    tapered : bool
+        Through Hann's window, for signals whose slow part would leak into all other lines.
+    """
+    n = values.size
+    centred = values - np.mean(values)
+    if tapered:
+        centred = centred * np.hanning(n) * np.sqrt(8.0 / 3.0)
+    power = np.asarray(2.0 * np.abs(np.fft.rfft(centred)) ** 2 / n**2, dtype=np.float64)
+    power[0] /= 2.0
+    if n % 2 == 0:
+        power[-1] /= 2.0
+    frequency = np.asarray(np.fft.rfftfreq(n, 1.0 / rate_hz), dtype=np.float64)
+    return frequency, power
+
+
+def lines_inside(frequency_hz: Array, band_hz: tuple[float, float]) -> NDArray[np.intp]:
+    """Return which lines lie in a band, ends included, zero left out."""
+    low, high = band_hz
+    return np.flatnonzero((frequency_hz > 0) & (frequency_hz >= low) & (frequency_hz <= high))
+
+
+EXCITATION_CHECKS = (
+    Check(
+        "conditioning",
+        (),
+        lambda c: conditioning(c.signals, c.settings),
+        "the motion cannot tell J, B and K apart",
+        "use a perturbation with more frequencies, or hold J at the median of other epochs",
+    ),
+    Check(
+        "imposed_sinusoid",
+        (),
+        lambda c: imposed_sinusoid(c.epoch, c.settings),
+        "the motion is a sinusoid, in which J and K are one number, K − J ω²",
+        "score it as an imposed sinusoid (--task sinusoid), or use a PRBS",
+    ),
+    Check(
+        "band_share",
+        (),
+        lambda c: band_share(c.epoch, c.signals, c.settings),
+        "most of what was measured is drift below or noise above what is fitted",
+        (
+            "look for drift of the sensor and for slow pushes; check the rate and the unit of the "
+            "time; set estimation.band_low_hz and band_high_hz to what was perturbed"
+        ),
+    ),
+    Check(
+        "coherence",
+        ("perturbation_nm",),
+        lambda c: coherence(c.epoch, c.signals, c.settings),
+        "the rest is the subject, noise, or a joint that is not linear",
+        "ask the subject to relax, perturb more strongly, or pool epochs with instruments",
+    ),
+)

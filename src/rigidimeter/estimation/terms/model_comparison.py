@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from rigidimeter.estimation.bandlimited import band_hz, bandlimited_signals
-from rigidimeter.estimation.diagnostics import reconstructed_torque_nm, voluntary_torque
+from rigidimeter.estimation.diagnostics import reconstructed_torque_nm
+from rigidimeter.estimation.diagnostics.movement_checks import voluntary_torque
 from rigidimeter.estimation.methods import fit_epoch
 from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE, before_fit
 from rigidimeter.estimation.signals import Signals, motion_channels
@@ -185,11 +186,11 @@ def _voluntary_torque(epoch: Epoch, settings: Settings) -> str:
         return ""
     signals = bandlimited_signals(epoch, settings.estimation)
     own_nm = reconstructed_torque_nm(signals, fit.value)
-    finding = voluntary_torque(own_nm, signals, settings.diagnostics)
-    if not finding.remedy:
+    look = voluntary_torque(own_nm, signals, settings.diagnostics)
+    if not look.failed:
         return ""
     return (
-        f"{finding.value:.2g} % of the torque's variance is the subject's own, which the loop puts "
+        f"{look.value:.2g} % of the torque's variance is the subject's own, which the loop puts "
         "into the motion too; a term that fits it predicts it in both halves and says nothing of "
         "the joint"
     )

@@ -125,7 +125,7 @@ def voluntary_pictures(study: StudyResult) -> list[Picture]:
             continue
         whole = aligned(epoch, study.analysis.delays)
         signals = epoch_signals(whole, "bandlimited", study.settings.estimation)
-        parameters = fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad
+        parameters = fit.value
         own_nm = reconstructed_torque_nm(signals, parameters)
         spectra.setdefault(fit.condition, []).append(density(own_nm, signals.rate_hz))
         sizes_nm.setdefault(fit.condition, []).append(float(np.std(own_nm)))

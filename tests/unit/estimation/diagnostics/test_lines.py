@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from rigidimeter.estimation.diagnostics.power_lines import inside, lines
+from rigidimeter.estimation.diagnostics.excitation_checks import lines_inside, power_lines
 
 
 @pytest.mark.parametrize("n", [1000, 1001])
 def test_the_lines_sum_to_the_variance(n):
     values = np.random.default_rng(0).standard_normal(n) + 3.0
-    frequency, power = lines(values, 100.0)
+    frequency, power = power_lines(values, 100.0)
     assert np.sum(power) == pytest.approx(np.var(values), rel=1e-12)
     assert frequency[1] == pytest.approx(100.0 / n)
 
@@ -15,7 +15,7 @@ def test_the_lines_sum_to_the_variance(n):
 def test_a_sinusoid_has_half_its_amplitude_squared_on_its_line():
     t = np.arange(2000) / 100.0
     for tapered in (False, True):
-        frequency, power = lines(0.3 * np.sin(2 * np.pi * 2.0 * t), 100.0, tapered=tapered)
-        near = inside(frequency, (1.85, 2.15))
+        frequency, power = power_lines(0.3 * np.sin(2 * np.pi * 2.0 * t), 100.0, tapered=tapered)
+        near = lines_inside(frequency, (1.85, 2.15))
         assert np.sum(power[near]) == pytest.approx(0.045, rel=2e-3)
         assert np.sum(power) == pytest.approx(0.045, rel=2e-3)

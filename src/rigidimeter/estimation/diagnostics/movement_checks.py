@@ -10,26 +10,17 @@ is seen here is the least of it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
-from rigidimeter.estimation.diagnostics.finding_text import judged
-from rigidimeter.estimation.diagnostics.power_lines import inside, lines
+from rigidimeter.estimation.diagnostics.check_record import Check, Look, at_most
+from rigidimeter.estimation.diagnostics.excitation_checks import lines_inside, power_lines
 from rigidimeter.estimation.signals import Array, Signals
-from rigidimeter.records import Channel, Finding
+from rigidimeter.records import Channel
 from rigidimeter.settings import DiagnosticsSettings
 
-__all__ = [
-    "active_movement",
-    "active_seconds",
-    "emg_activity",
-    "emg_envelope_v",
-    "reconstructed_torque_nm",
-    "voluntary_torque",
-]
+__all__ = ["MOVEMENT_CHECKS", "voluntary_torque"]
 
 WINDOW_S = 1.0
 BASELINE_QUANTILE = 0.2
@@ -38,43 +29,22 @@ BASELINE_QUANTILE = 0.2
 _SHOWN = 5
 
 
-def reconstructed_torque_nm(signals: Signals, parameters: Array | Sequence[float]) -> Array:
-    """Return M_sub of Eq. 5 in N·m, shape (n,), in the band of the signals."""
-    J, B, K = parameters
-    return (
-        J * signals.acceleration_rad_s2
-        + B * signals.velocity_rad_s
-        + K * signals.angle_rad
-        - signals.torque_nm
-    )
-
-
-def voluntary_torque(
-    voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings
-) -> Finding:
+def voluntary_torque(voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return how much of the torque's variance is the subject's own, in the voluntary band."""
-    frequency, share = lines(voluntary_nm, signals.rate_hz)
+    frequency, share = power_lines(voluntary_nm, signals.rate_hz)
     low, high = settings.voluntary_low_hz, settings.voluntary_high_hz
-    power = float(np.sum(share[inside(frequency, (low, high))]))
+    power = float(np.sum(share[lines_inside(frequency, (low, high))]))
     total = float(np.var(signals.torque_nm))
     value = 100.0 * power / total if total > 0 else float("nan")
     most = settings.voluntary_share_most_percent
-    return judged(
-        "voluntary_torque",
+    return at_most(
         value,
         most,
-        settings,
-        failed=not value <= most,
-        fact=(
+        (
             f"the subject's own torque has an SD of {np.std(voluntary_nm):.3g} N·m; its power from "
             f"{low:g} to {high:g} Hz, {power:.2g} N²m², is {value:.2g} % of the torque's variance "
             f"(at most {most:g} %)"
         ),
-        meaning=(
-            "least squares takes part of it for the joint, J and B come out low in the loop; iv "
-            "does not, and is less precise"
-        ),
-        remedy="record the perturbation, use iv and pool epochs, or leave the epoch out",
     )
 
 
@@ -98,9 +68,7 @@ def active_seconds(
     return signals.time_s[: count * length : length], np.sqrt(np.mean(windows**2, axis=1))
 
 
-def active_movement(
-    voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings
-) -> Finding:
+def active_movement(voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return in what share of the seconds the subject pushed by itself.
 
     A second is active if the SD of M_sub in it is above `active_torque_nm` and above
@@ -115,18 +83,13 @@ def active_movement(
     most = settings.active_most_percent
     when = ", ".join(f"{second:.1f} s" for second in start_s[active][:_SHOWN])
     more = " and later" if np.count_nonzero(active) > _SHOWN else ""
-    return judged(
-        "active_movement",
+    return at_most(
         value,
         most,
-        settings,
-        failed=not value <= most,
-        fact=(
+        (
             f"the subject's own torque passes {above_nm:.2g} N·m in {value:.0f} % of the seconds "
             f"(at most {most:g} %)" + (f", from {when}{more}" if when else "")
         ),
-        meaning="the subject moved, and the estimate is of a joint that is not at rest",
-        remedy="ask the subject to relax and repeat, or leave these seconds out",
     )
 
 
@@ -137,7 +100,7 @@ def emg_envelope_v(emg: Channel, window_s: float) -> Array:
     return np.asarray(uniform_filter1d(rectified, length, mode="nearest"))
 
 
-def emg_activity(emg: Channel, settings: DiagnosticsSettings) -> Finding:
+def emg_activity(emg: Channel, settings: DiagnosticsSettings) -> Look:
     """Return in what share of the time the EMG stands above its own baseline.
 
     A muscle that is active from beginning to end has no baseline to stand above.
@@ -146,16 +109,39 @@ def emg_activity(emg: Channel, settings: DiagnosticsSettings) -> Finding:
     baseline = float(np.quantile(envelope, BASELINE_QUANTILE))
     factor, most = settings.emg_baseline_factor, settings.emg_active_most_percent
     value = 100.0 * float(np.mean(envelope > factor * baseline))
-    return judged(
-        "emg_activity",
+    return at_most(
         value,
         most,
-        settings,
-        failed=not value <= most,
-        fact=(
+        (
             f"the EMG stands above {factor:g} times its baseline of {1e6 * baseline:.3g} µV in "
             f"{value:.0f} % of the time (at most {most:g} %)"
         ),
-        meaning="the muscle was active",
-        remedy="ask the subject to relax and repeat, or leave the active part out",
     )
+
+
+MOVEMENT_CHECKS = (
+    Check(
+        "voluntary_torque",
+        (),
+        lambda c: voluntary_torque(c.voluntary_nm, c.signals, c.settings),
+        (
+            "least squares takes part of it for the joint, J and B come out low in the loop; iv "
+            "does not, and is less precise"
+        ),
+        "record the perturbation, use iv and pool epochs, or leave the epoch out",
+    ),
+    Check(
+        "active_movement",
+        (),
+        lambda c: active_movement(c.voluntary_nm, c.signals, c.settings),
+        "the subject moved, and the estimate is of a joint that is not at rest",
+        "ask the subject to relax and repeat, or leave these seconds out",
+    ),
+    Check(
+        "emg_activity",
+        ("emg_v",),
+        lambda c: emg_activity(c.epoch.channels["emg_v"], c.settings),
+        "the muscle was active",
+        "ask the subject to relax and repeat, or leave the active part out",
+    ),
+)

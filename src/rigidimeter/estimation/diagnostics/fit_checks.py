@@ -1,4 +1,4 @@
-"""What the fit left over, and whether it foresees torque that it has not seen.
+"""Whether the fit explains the torque, and whether a joint can have these numbers.
 
 A residual that is white within the band carries nothing more to be explained, and textbook standard
 errors hold for it. One that still follows the perturbation says that the model lacks something: a
@@ -14,53 +14,46 @@ from scipy import signal
 from scipy.special import digamma
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
-from rigidimeter.estimation.diagnostics.excitation_checks import perturbation_nm
-from rigidimeter.estimation.diagnostics.finding_text import judged
-from rigidimeter.estimation.diagnostics.power_lines import inside, lines
+from rigidimeter.estimation.diagnostics.check_record import Check, Look, at_least
+from rigidimeter.estimation.diagnostics.excitation_checks import (
+    lines_inside,
+    perturbation_nm,
+    power_lines,
+)
 from rigidimeter.estimation.signals import Array, Signals
-from rigidimeter.records import Epoch, Finding
+from rigidimeter.records import Epoch
 from rigidimeter.settings import DiagnosticsSettings
 
-__all__ = ["held_out_vaf", "residual_perturbation", "residual_whiteness"]
+__all__ = ["PARAMETER_CHECKS", "RESIDUAL_CHECKS"]
 
 LINES_TOGETHER = 8
 LONGEST_LAG_S = 1.0
 
 
-def residual_whiteness(
-    residual_nm: Array, signals: Signals, settings: DiagnosticsSettings
-) -> Finding:
+def residual_whiteness(residual_nm: Array, signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return the spectral flatness of the residual within the band: 1 for white.
 
     The geometric over the arithmetic mean of the power, lines taken eight together; their mean
     logarithm is that of white noise less ln 8 − ψ(8), which is made up for.
     """
-    frequency, power = lines(residual_nm, signals.rate_hz)
-    power = power[inside(frequency, signals.band_hz)]
+    frequency, power = power_lines(residual_nm, signals.rate_hz)
+    power = power[lines_inside(frequency, signals.band_hz)]
     groups = max(power.size // LINES_TOGETHER, 1)
     means = power[: groups * LINES_TOGETHER].reshape(groups, -1).mean(axis=1)
     value, least = math.nan, settings.residual_flatness_least
     if np.all(means > 0):
         made_up = math.log(LINES_TOGETHER) - float(digamma(LINES_TOGETHER))
         value = min(float(np.exp(np.mean(np.log(means)) + made_up) / np.mean(means)), 1.0)
-    return judged(
-        "residual_whiteness",
+    return at_least(
         value,
         least,
-        settings,
-        failed=not value >= least,
-        fact=f"the residual's spectral flatness in the band is {value:.2f} (at least {least:g})",
-        meaning=(
-            "the residual is coloured, by the subject's own torque or by what the model lacks, and "
-            "standard errors for white noise are too small"
-        ),
-        remedy="use the intervals for coloured residuals; see the residual's spectrum",
+        f"the residual's spectral flatness in the band is {value:.2f} (at least {least:g})",
     )
 
 
 def residual_perturbation(
     epoch: Epoch, residual_nm: Array, signals: Signals, settings: DiagnosticsSettings
-) -> Finding:
+) -> Look:
     """Return how much of the torque follows the perturbation and is yet not explained.
 
     The largest correlation of residual and perturbation, at any lag up to 1 s either way, times the
@@ -82,21 +75,14 @@ def residual_perturbation(
     sd = float(np.std(signals.torque_nm))
     value = 100.0 * r * float(np.std(residual)) / sd if sd > 0 else math.nan
     most = settings.residual_perturbation_most_percent
-    return judged(
-        "residual_perturbation",
+    return Look(
         value,
         most,
-        settings,
-        failed=not (value <= most or r <= chance),
-        fact=(
+        not (value <= most or r <= chance),
+        (
             f"what is left over follows the perturbation by {value:.2g} % of the torque's SD (at "
             f"most {most:g} %; correlation {r:.2f} at a lag of {delay_s:.2g} s, by chance up to "
             f"{chance:.2f})"
-        ),
-        meaning="the model lacks something that the perturbation causes",
-        remedy=(
-            "look for a delay between torque and motion, for a reflex, for stiffness that changes "
-            "with the angle; the subject's own torque biases least squares in this way too"
         ),
     )
 
@@ -121,7 +107,7 @@ def _chance_correlation(a: Array, b: Array, rate_hz: float, lag: int) -> float:
     return deviation * math.sqrt(2.0 * math.log(crossings / 0.05))
 
 
-def held_out_vaf(signals: Signals, settings: DiagnosticsSettings) -> Finding:
+def held_out_vaf(signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return how much of the second half's torque the parameters of the first half explain."""
     half = signals.time_s.size // 2
     regressors = np.column_stack(
@@ -133,16 +119,99 @@ def held_out_vaf(signals: Signals, settings: DiagnosticsSettings) -> Finding:
     left = torque[half:] - scaled[half:] @ parameters
     variance, least = float(np.var(torque[half:])), settings.held_out_vaf_least_percent
     value = 100.0 * (1.0 - float(np.var(left)) / variance) if variance > 0 else math.nan
-    return judged(
-        "held_out_vaf",
+    return at_least(
         value,
         least,
-        settings,
-        failed=not value >= least,
-        fact=(
+        (
             f"the first half's J, B and K explain {value:.1f} % of the second half's torque (at "
             f"least {least:g} %)"
         ),
-        meaning="the fit does not foresee torque that it has not seen",
-        remedy="look for movement of the subject's own, and for a change during the epoch",
     )
+
+
+def negative_parameters(parameters: Array) -> Look:
+    """Return how many of J, B and K are not above zero (none may be)."""
+    wrong = [name for name, value in zip("JBK", parameters, strict=True) if not value > 0]
+    if not wrong:
+        return Look(0.0, 0.0, False, "J, B and K are above zero")
+    verb = "is" if len(wrong) == 1 else "are"
+    fact = f"{' and '.join(wrong)} {verb} not above zero (0 of 3 may be)"
+    if len(wrong) < len(parameters):
+        return Look(float(len(wrong)), 0.0, True, fact)
+    meaning = "the torque has the sign of the joint's reaction"
+    return Look(float(len(wrong)), 0.0, True, fact, meaning, "say --reaction")
+
+
+def implausible_parameters(parameters: Array, settings: DiagnosticsSettings) -> Look:
+    """Return by what factor the worst of J, B and K is outside its range; at most 1 is inside.
+
+    Only sizes are looked at; signs are another check's business.
+    """
+    J, B, K = (abs(value) for value in parameters)
+    factors = {
+        f"J = {J:.3g} kg·m² is large": J / settings.inertia_most_kg_m2,
+        f"J = {J:.3g} kg·m² is small": settings.inertia_least_kg_m2 / J if J > 0 else math.inf,
+        f"B = {B:.3g} N·m·s/rad is large": B / settings.damping_most_nm_s_rad,
+        f"K = {K:.3g} N·m/rad is large": K / settings.stiffness_most_nm_rad,
+    }
+    worst = max(factors, key=lambda text: factors[text])
+    value = factors[worst]
+    failed = not value <= 1.0
+    return Look(
+        value,
+        1.0,
+        failed,
+        (
+            f"{worst}, {value:.3g} times the end of its range (at most 1)"
+            if failed
+            else "J, B and K are of a size that joints have"
+        ),
+    )
+
+
+RESIDUAL_CHECKS = (
+    Check(
+        "residual_whiteness",
+        (),
+        lambda c: residual_whiteness(-c.voluntary_nm, c.signals, c.settings),
+        (
+            "the residual is coloured, by the subject's own torque or by what the model lacks, and "
+            "standard errors for white noise are too small"
+        ),
+        "use the intervals for coloured residuals; see the residual's spectrum",
+    ),
+    Check(
+        "residual_perturbation",
+        ("perturbation_nm",),
+        lambda c: residual_perturbation(c.epoch, -c.voluntary_nm, c.signals, c.settings),
+        "the model lacks something that the perturbation causes",
+        (
+            "look for a delay between torque and motion, for a reflex, for stiffness that changes "
+            "with the angle; the subject's own torque biases least squares in this way too"
+        ),
+    ),
+    Check(
+        "held_out_vaf",
+        (),
+        lambda c: held_out_vaf(c.signals, c.settings),
+        "the fit does not foresee torque that it has not seen",
+        "look for movement of the subject's own, and for a change during the epoch",
+    ),
+)
+
+PARAMETER_CHECKS = (
+    Check(
+        "negative_parameters",
+        (),
+        lambda c: negative_parameters(c.parameters),
+        "the subject may have pushed, or the channels are late against each other",
+        "check the stamps of torque and motion, and see the voluntary torque",
+    ),
+    Check(
+        "implausible_parameters",
+        (),
+        lambda c: implausible_parameters(c.parameters, c.settings),
+        "no joint of a person or an animal is like that",
+        "check the units of torque (N·m) and angle (rad, not degrees) and the time (s)",
+    ),
+)

@@ -1,0 +1,228 @@
+"""Whether the sensors measured, belong together, and the arm had room.
+
+A sensor at the end of its range repeats its extreme value; one that hangs repeats whatever it had.
+A living signal does neither for long: it has noise. A joint at the position limit, or a command
+that the guard changed, is not the perturbation as designed.
+
+The velocity belongs to the angle in scale and in time. Over any stretch of length T, a velocity
+that is g times too small and stamped τ too late obeys
+
+    θ(t + T) − θ(t) = g ∫ v dt + τ (v(t + T) − v(t))
+
+to the first order in τ, with the integral over the stretch. Both follow from one least-squares fit
+over many stretches. Degrees for radians give g = 57.3 or 0.0175, a wrong sign gives g = −1; a
+velocity that a filter made late gives τ.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_most
+from rigidimeter.estimation.signals import Array
+from rigidimeter.records import Channel, Epoch
+from rigidimeter.settings import DiagnosticsSettings
+
+__all__ = ["CHANNEL_CHECKS"]
+
+FITTED = ("torque_nm", "angle_rad", "velocity_rad_s")
+FEWEST_AT_EXTREME = 3
+"""An extreme reached by chance is not repeated three times in a row."""
+
+
+def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
+    """Return the largest share of samples in which a channel repeats its extreme value."""
+    shares = {c.name: 100.0 * _share_at_extremes(c) for c in _fitted(epoch)}
+    worst = max(shares, key=lambda name: shares[name])
+    value, most = shares[worst], settings.saturated_most_percent
+    return at_most(
+        value,
+        most,
+        f"{worst} repeats its extreme values in {value:.2g} % of samples (at most {most:g} %)",
+    )
+
+
+def frozen(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
+    """Return the longest time for which a channel repeats one value."""
+    found = {channel.name: _longest_repetition(channel) for channel in _fitted(epoch)}
+    worst = max(found, key=lambda name: found[name][0])
+    (value, start_s), most = found[worst], settings.frozen_most_s
+    when = f", from {start_s:.3g} s" if value > 0 else ""
+    return at_most(
+        value, most, f"{worst} repeats one value for {value:.2g} s (at most {most:g} s){when}"
+    )
+
+
+def guard_limited(limited: ArrayLike, settings: DiagnosticsSettings) -> Look:
+    """Return in what share of the ticks the guard changed the command.
+
+    Parameters
+    ----------
+    limited : array, shape (n,)
+        The recorded column: 0 where the command was sent as asked for.
+    settings : DiagnosticsSettings
+    """
+    value = 100.0 * float(np.mean(np.asarray(limited) > 0))
+    most = settings.limited_most_percent
+    return at_most(
+        value, most, f"the guard changed {value:.2g} % of the commands (at most {most:g} %)"
+    )
+
+
+def position_limit(angle: Channel, limit_rad: float, settings: DiagnosticsSettings) -> Look:
+    """Return how near the joint came to the position limit, in % of it."""
+    value = 100.0 * float(np.max(np.abs(angle.values))) / limit_rad
+    most = settings.position_most_percent
+    return at_most(
+        value,
+        most,
+        (
+            f"the joint came to {value:.0f} % of the position limit of "
+            f"{math.degrees(limit_rad):.3g} deg (at most {most:g} %)"
+        ),
+    )
+
+
+def _fitted(epoch: Epoch) -> list[Channel]:
+    return [epoch.channels[name] for name in FITTED if name in epoch.channels]
+
+
+def _runs(values: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return first rows and lengths of the stretches of equal values."""
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0) + 1))
+    return starts, np.diff(starts, append=values.size)
+
+
+def _share_at_extremes(channel: Channel) -> float:
+    starts, lengths = _runs(channel.values)
+    level = channel.values[starts]
+    extreme = (level == np.max(level)) | (level == np.min(level))
+    return float(np.sum(lengths[extreme & (lengths >= FEWEST_AT_EXTREME)])) / len(channel)
+
+
+def _longest_repetition(channel: Channel) -> tuple[float, float]:
+    """Return how long the longest stretch lasts, and when it begins, in s."""
+    starts, lengths = _runs(channel.values)
+    stops = starts + lengths - 1
+    spans = channel.time_s[stops] - channel.time_s[starts]
+    longest = int(np.argmax(spans))
+    return float(spans[longest]), float(channel.time_s[starts[longest]])
+
+
+STRETCH_S = 0.25
+
+
+def velocity_fit(epoch: Epoch) -> tuple[float, float]:
+    """Return the scale g and the delay τ in s of the velocity against the angle.
+
+    NaN where the epoch does not move or is too short.
+    """
+    angle, velocity = epoch.channels["angle_rad"], epoch.channels["velocity_rad_s"]
+    low = max(angle.time_s[0], velocity.time_s[0])
+    high = min(angle.time_s[-1], velocity.time_s[-1])
+    starts = angle.time_s[(angle.time_s >= low) & (angle.time_s <= high - STRETCH_S)]
+    if starts.size < 3:
+        return np.nan, np.nan
+    time_s, values = velocity.time_s, velocity.values
+    areas = 0.5 * (values[1:] + values[:-1]) * np.diff(time_s)
+    travelled = np.concatenate(([0.0], np.cumsum(areas)))
+
+    def over(of_s: Array, signal: Array) -> Array:
+        after = np.interp(starts + STRETCH_S, of_s, signal)
+        return np.asarray(after - np.interp(starts, of_s, signal), dtype=np.float64)
+
+    regressors = np.column_stack([over(time_s, travelled), over(time_s, values)])
+    scales = np.linalg.norm(regressors, axis=0)
+    if not scales.all():
+        return np.nan, np.nan
+    solution = np.linalg.lstsq(regressors / scales, over(angle.time_s, angle.values))[0] / scales
+    return float(solution[0]), float(solution[1])
+
+
+def velocity_scale(fitted: tuple[float, float], settings: DiagnosticsSettings) -> Look:
+    """Return by how much the velocity's scale is off, in %."""
+    value, most = 100.0 * abs(fitted[0] - 1.0), settings.velocity_scale_most_percent
+    return at_most(
+        value,
+        most,
+        (
+            f"angle_rad changes {fitted[0]:.3g} times as much as velocity_rad_s says (within "
+            f"{most:g} % of 1)"
+        ),
+    )
+
+
+def velocity_delay(fitted: tuple[float, float], settings: DiagnosticsSettings) -> Look:
+    """Return how late the velocity is against the angle, in ms; negative where it is early."""
+    scale, delay_s = fitted
+    value, most = 1e3 * delay_s / scale, settings.velocity_delay_most_ms
+    return Look(
+        value,
+        most,
+        not abs(value) <= most,
+        f"velocity_rad_s is {value:.2g} ms late against angle_rad (at most {most:g} ms)",
+    )
+
+
+def _position_limit(case: Case) -> Look | None:
+    if case.position_limit_rad is None:
+        return None
+    return position_limit(case.epoch.channels["angle_rad"], case.position_limit_rad, case.settings)
+
+
+def _velocity(
+    case: Case, check: Callable[[tuple[float, float], DiagnosticsSettings], Look]
+) -> Look | None:
+    fitted = velocity_fit(case.epoch)
+    # What does not move is found by other checks.
+    return check(fitted, case.settings) if np.isfinite(fitted).all() else None
+
+
+CHANNEL_CHECKS = (
+    Check(
+        "saturation",
+        (),
+        lambda c: saturation(c.epoch, c.settings),
+        "the sensor or its amplifier was at the end of its range",
+        "choose a larger range or a smaller perturbation, and repeat",
+    ),
+    Check(
+        "frozen",
+        (),
+        lambda c: frozen(c.epoch, c.settings),
+        "the sensor hung, or the joint was held",
+        "check the sensor's cable and its rate; leave that stretch out",
+    ),
+    Check(
+        "velocity_scale",
+        ("angle_rad", "velocity_rad_s"),
+        lambda c: _velocity(c, velocity_scale),
+        "one of them is in another unit, has another sign, or is another joint's",
+        "check the units and signs of both channels",
+    ),
+    Check(
+        "velocity_delay",
+        ("angle_rad", "velocity_rad_s"),
+        lambda c: _velocity(c, velocity_delay),
+        "a filter or a buffer moved one of them, and B and K take each other's part",
+        "correct the stamps, or leave velocity_rad_s out: it is made from the angle then",
+    ),
+    Check(
+        "guard_limited",
+        (),
+        lambda c: None if c.limited is None else guard_limited(c.limited, c.settings),
+        "the arm did not follow the perturbation as designed",
+        "use a smaller perturbation or wider limits in [guard]",
+    ),
+    Check(
+        "position_limit",
+        ("angle_rad",),
+        _position_limit,
+        "it was held back there, which the fit takes for stiffness",
+        "use a smaller perturbation, or begin nearer to the middle of the range",
+    ),
+)
