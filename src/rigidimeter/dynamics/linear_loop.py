@@ -15,8 +15,10 @@ motion between two ticks is solved exactly, so any latency is exact, whole ticks
 slower than the loop is read again until it has news: the age of the reading goes through a
 pattern, and its mean response is taken; `loop_poles` takes the pattern itself. For a sensor of
 interval n T that is e^(−jω latency) Σ e^(−jωkT)/n, k = 0 … n − 1: a delay of latency + (n − 1) T/2
-and a gain of sin(nωT/2) / (n sin(ωT/2)). Jitter is taken at its bound. The guard is left out: it is
-not linear.
+and a gain of sin(nωT/2) / (n sin(ωT/2)). Where the edges of the perturbation stay in step with the
+sensor, the loop is always in the same phase and not in the mean of all: with chips of 50 ms the
+velocity then differs by 0.1 % of its standard deviation at 100 samples/s, and by 1.6 % at 50.
+Jitter is taken at its bound. The guard is left out: it is not linear.
 """
 
 from __future__ import annotations
