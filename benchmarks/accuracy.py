@@ -21,13 +21,10 @@ import numpy as np
 from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import estimate_delays, fit_epochs
-from rigidimeter.estimation.closedloop.closed_loop_fit import (
-    CLOSED_LOOP,
-    drives,
-    least_squares_start,
-    observe,
-)
+from rigidimeter.estimation.closedloop.closed_loop_fit import CLOSED_LOOP
+from rigidimeter.estimation.closedloop.linear_problems import least_squares_start
 from rigidimeter.estimation.closedloop.refine import fit_pooled
+from rigidimeter.estimation.prepared import PreparedEpoch, Source, prepare
 from rigidimeter.records import Channel, Epoch, Fit
 from rigidimeter.settings import EstimationSettings, Settings, parse_settings
 from rigidimeter.virtual.batch import simulate_chunks
@@ -87,21 +84,23 @@ def pooled_bias(n: int) -> list[str]:
         settings = settings_with(sd)
         kept: dict[str, list[Any]] = {method: [] for method in CLOSED_LOOP}
         squares, excluded, first = [], 0, None
+        source: Source | None = None
         for epochs in sessions(settings, n, 11):
             good = [epoch for epoch in epochs if epoch.closed.included]
             excluded += len(epochs) - len(good)
-            drive = drives(good, settings)[good[0].source]
+            source = source or Source(good, settings)
             for epoch in good:
                 first = first or epoch.channels["perturbation_nm"]
                 shared = replace(
                     epoch, channels={**epoch.channels, "perturbation_nm": first}
                 )  # one copy of the sequence is enough
+                prepared = PreparedEpoch(shared, settings, source)
                 for method, members in kept.items():
-                    members.append(observe(shared, settings, method, drive))
+                    members.append(CLOSED_LOOP[method].observe(prepared))
             squares += fit_epochs(good[:3], "bandlimited", settings)[0]
         for method, observations in kept.items():
             start = least_squares_start(observations)
-            fit, _ = fit_pooled(observations, CLOSED_LOOP[method], start)
+            fit, _ = fit_pooled(observations, CLOSED_LOOP[method].linearise, start)
             error, se = fit.values / TRUTH - 1, fit.standard_errors / TRUTH
             rows.append(
                 [
@@ -192,7 +191,7 @@ def delay(n: int) -> list[str]:
                 for epochs in sessions(settings, n, 13):
                     for i in range(0, len(epochs), 5):
                         moved = [_late(epoch, late_s) for epoch in epochs[i : i + 5]]
-                        (found,) = estimate_delays({"batch": moved}, settings)
+                        (found,) = estimate_delays({"batch": prepare(moved, settings)})
                         errors.append(found.delay_s - late_s)
                         claimed.append(found.delay_s_se)
                 worst = 1e3 * np.max(np.abs(errors))

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.paired import Row, in_ms, paired
 from rigidimeter.estimation import fit_epoch, fit_epochs
-from rigidimeter.estimation.closedloop import EpochStream
+from rigidimeter.estimation.closedloop.epoch_stream import EpochStream
 from rigidimeter.settings import Settings
 from rigidimeter.virtual.batch import simulate_chunks, simulate_epochs
 

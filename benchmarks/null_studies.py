@@ -32,19 +32,19 @@ import argparse
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.dynamics import draw_joint
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.estimation import fit_epochs, score_epoch
-from rigidimeter.estimation.closedloop import closed_loop_fit as estimate
+from rigidimeter.estimation import score_epoch
+from rigidimeter.estimation.closedloop.closed_loop_fit import CLOSED_LOOP, fit_closed_loop
+from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.scores import angular_impulse_nm_s, loop_area_j, scoring_cycles
 from rigidimeter.paper.imposed import imposed_epoch
 from rigidimeter.records import Epoch
@@ -202,11 +202,11 @@ def _estimates(
         seed=int(np.random.SeedSequence(seed, spawn_key=(PRBS, key)).generate_state(1)[0]),
     )
     epochs = [batch.epoch(i) for i in range(len(batch))]
-    with _observed_once():
-        first, _ = fit_epochs(epochs, "iv", settings)
-        if math.isnan(inertia_kg_m2):
-            inertia_kg_m2 = float(np.median([fit.inertia_kg_m2 for fit in first]))
-        second, _ = fit_epochs(epochs, "iv", settings, inertia_kg_m2)
+    prepared = prepare(epochs, settings)
+    first, _ = fit_closed_loop(CLOSED_LOOP["iv"], prepared, pooled=False)
+    if math.isnan(inertia_kg_m2):
+        inertia_kg_m2 = float(np.median([fit.inertia_kg_m2 for fit in first]))
+    second, _ = fit_closed_loop(CLOSED_LOOP["iv"], prepared, inertia_kg_m2, pooled=False)
     assert all(fit.outcome.included for fit in (*first, *second))
     found = {}
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(SINUSOID, key)))
@@ -222,30 +222,6 @@ def _estimates(
         ]
         found[f"{name} impulse"], found[f"{name} work"] = np.array(scores).T
     return found
-
-
-@contextmanager
-def _observed_once() -> Iterator[None]:
-    """Let the second stage take what the first has observed: lines and drive are the same."""
-    observe, drives = estimate.observe, estimate.drives
-    lines: dict[int, Any] = {}
-    models: list[Any] = []
-
-    def observed(epoch: Epoch, *rest: Any) -> Any:
-        if id(epoch) not in lines:
-            lines[id(epoch)] = observe(epoch, *rest)
-        return lines[id(epoch)]
-
-    def driven(epochs: Sequence[Epoch], settings: Settings) -> Any:
-        if not models:
-            models.append(drives(epochs, settings))
-        return models[0]
-
-    estimate.observe, estimate.drives = observed, driven
-    try:
-        yield
-    finally:
-        estimate.observe, estimate.drives = observe, drives
 
 
 def _of(plans: Sequence[DayPlan], condition: str) -> list[DayPlan]:

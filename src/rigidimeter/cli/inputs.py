@@ -41,7 +41,7 @@ def analyse_inputs(recording: Recording, method: str) -> Analysis:
         known = ", ".join(method_names())
         raise UserError(f"--method {method}: there is no such method; known: {known}")
     with Meter("estimate", 2 * len(recording.epochs)) as meter:
-        return estimate(recording, method, progress=lambda _: meter.advance())
+        return estimate(recording, method, progress=meter.advance)
 
 
 def keep_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:

@@ -59,9 +59,8 @@ def model(
       rigidimeter model elbow.csv --terms inertia,damping,stiffness,offset,coulomb --band-hz 0 20
     """
     from rigidimeter.documents import write_json
-    from rigidimeter.estimation import aligned, estimate_delays
     from rigidimeter.estimation.terms import candidates, model_epoch, parse_terms
-    from rigidimeter.study import task_of
+    from rigidimeter.study import Preparation
 
     if recordings.method not in ("auto", "bandlimited"):
         raise UserError(
@@ -84,21 +83,15 @@ def model(
     bad = read.failed
     rows: list[dict[str, Any]] = []
     lines: list[str] = []
-    perturbed = [e for e in read.epochs if task_of(e, read.settings) != "sinusoid"]
-    by_source: dict[str, list[Epoch]] = {}
-    for epoch in perturbed:
-        by_source.setdefault(epoch.source, []).append(epoch)
-    delays = estimate_delays(by_source, read.settings)
-    for epoch in perturbed:
+    for prepared in Preparation(read.epochs, read.settings).perturbed():
+        epoch = prepared.epoch
         row: dict[str, Any] = {
             "source": epoch.source,
             "epoch": epoch.label,
             "condition": epoch.condition,
         }
         try:
-            found = model_epoch(
-                aligned(epoch, delays), models, read.settings, compare=compare, high_hz=high_hz
-            )
+            found = model_epoch(epoch, models, read.settings, compare=compare, high_hz=high_hz)
         except ValueError as error:
             typer.echo(f"error: {epoch.name}: {error}", err=True)
             rows.append(row | {"outcome": "failed", "reason": str(error), "models": []})

@@ -111,9 +111,7 @@ def analysed_study(
     read = read_study(folder, key=key, settings=chosen, method=recordings.method, pair=pair)
     read = replace(read, settings=adjusted(read.settings, recordings))
     with Meter("study", steps(read)) as meter:
-        result = analyse_study(
-            read, seed=seed, resamples=resamples, progress=lambda _: meter.advance()
-        )
+        result = analyse_study(read, seed=seed, resamples=resamples, progress=meter.advance)
     say(result.notices)
     bad = any(notice.level == "error" for notice in result.notices)
     bad |= _say_failed(result)

@@ -48,12 +48,14 @@ from rigidimeter.dynamics.velocity_drive import (
 from rigidimeter.settings import ControllerSettings, RigSettings, Settings, SubjectSettings
 
 __all__ = [
+    "Circle",
     "ClosedLoopMotion",
     "Loop",
     "OpenLoop",
     "Parameters",
     "Reading",
     "closed_loop_motion",
+    "on_circle",
     "reading_pattern",
     "voluntary_motion_sd",
 ]
@@ -194,7 +196,7 @@ class Loop:
         parameters : (float, float, float)
             J, B and K of the joint; the loop with it must be stable.
         """
-        circle = _on_circle(self, perturbation_nm.size, rate_hz, 1)
+        circle = on_circle(self, perturbation_nm.size, rate_hz, 1)
         command = circle.to(perturbation_nm) * circle.loop.command(parameters)
         return ArmMotion(*(circle.back(command * part) for part in circle.loop.motion))
 
@@ -206,7 +208,7 @@ class Loop:
         ∂M/∂J = S a and so on, with the sensitivity S = 1 / (1 + L): in the loop a stiffer joint
         also moves less.
         """
-        circle = _on_circle(self, motion[0].size, rate_hz, 1)
+        circle = on_circle(self, motion[0].size, rate_hz, 1)
         around = 1.0 + circle.loop.gain(parameters)
         return [circle.back(circle.to(part) / around) for part in motion]
 
@@ -229,7 +231,7 @@ def closed_loop_motion(
     """
     torque = np.asarray(perturbation_nm, dtype=np.float64)
     loop = Loop(settings.controller, settings.rig)
-    circle = _on_circle(loop, torque.size, settings.rig.tick_rate_hz, 2)
+    circle = on_circle(loop, torque.size, settings.rig.tick_rate_hz, 2)
     command = circle.to(torque) * circle.loop.command(joint.parameters)
     parts = (command, *(command * part for part in circle.loop.motion))
     return ClosedLoopMotion(*(circle.back(part) for part in parts))
@@ -249,7 +251,7 @@ def voluntary_motion_sd(settings: Settings, subject: SubjectSettings) -> tuple[f
     )
 
 
-class _Circle(NamedTuple):
+class Circle(NamedTuple):
     """The loop at the frequencies of an FFT, on a circle just outside the unit circle.
 
     A record is damped before its FFT, and the damping is undone afterwards. So the integrator of
@@ -257,20 +259,23 @@ class _Circle(NamedTuple):
     """
 
     length: int
+    z: Complex
     damping: Array
     loop: OpenLoop
 
     def to(self, record: Array) -> Complex:
+        """Return the spectrum of a record, one value a tick."""
         return np.asarray(scipy.fft.rfft(record * self.damping, self.length))
 
     def back(self, spectrum: Complex) -> Array:
+        """Return the record that has a spectrum."""
         return np.asarray(
             scipy.fft.irfft(spectrum, self.length)[: self.damping.size] / self.damping
         )
 
 
 @lru_cache(maxsize=8)
-def _on_circle(loop: Loop, n: int, rate_hz: float, times: int) -> _Circle:
+def on_circle(loop: Loop, n: int, rate_hz: float, times: int) -> Circle:
     """Return the loop for records of `n` ticks, in an FFT of `times` that length.
 
     The wrap-around is damped by e^(−D), and undoing the damping amplifies rounding at the end of
@@ -282,7 +287,8 @@ def _on_circle(loop: Loop, n: int, rate_hz: float, times: int) -> _Circle:
     radius = _DIGITS * times / (times + 1) / length
     angle = 2.0 * np.pi * np.arange(length // 2 + 1) / length
     damping = np.exp(-radius * np.arange(n))
-    return _Circle(length, damping, loop.at(np.exp(radius + 1j * angle), rate_hz))
+    z = np.exp(radius + 1j * angle)
+    return Circle(length, z, damping, loop.at(z, rate_hz))
 
 
 def _lowpass(cutoff_hz: float, z: Complex, rate_hz: float) -> Complex:

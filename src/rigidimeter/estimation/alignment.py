@@ -12,24 +12,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigidimeter.dynamics import DriveModel
-from rigidimeter.estimation.bandlimited import band_hz
-from rigidimeter.estimation.closedloop.closed_loop_fit import (
-    closed_loop_obstacle,
-    drives,
+from rigidimeter.estimation.closedloop.delay import SCAN_STEP_S, estimate_delay
+from rigidimeter.estimation.closedloop.linear_problems import (
+    direct,
+    instrumental,
     least_squares_start,
-    observe,
 )
-from rigidimeter.estimation.closedloop.delay import SCAN_STEP_S, direct, estimate_delay
-from rigidimeter.estimation.closedloop.drive_fit import loop_of
-from rigidimeter.estimation.closedloop.instruments import instrumental
-from rigidimeter.estimation.closedloop.refine import Linearise, Observation
-from rigidimeter.estimation.closedloop.spectral_lines import epoch_grid, epoch_lines
-from rigidimeter.estimation.screening import before_fit
-from rigidimeter.records import Channel, Delay, Epoch
-from rigidimeter.settings import Settings
+from rigidimeter.estimation.closedloop.observation import (
+    closed_loop_obstacle,
+    observe,
+    observe_motion,
+)
+from rigidimeter.estimation.method_record import Progress
+from rigidimeter.estimation.prepared import PreparedEpoch, torque_earlier
+from rigidimeter.records import Delay, Epoch
 
-__all__ = ["aligned", "estimate_delays"]
+__all__ = ["aligned", "aligned_prepared", "estimate_delays"]
 
 MOST_EPOCHS = 12
 """A delay is common to its source; from this many epochs it is known well enough."""
@@ -53,74 +51,77 @@ LEAST_S = 1e-4
 
 
 def estimate_delays(
-    perturbed: Mapping[str, Sequence[Epoch]], settings: Settings
+    perturbed: Mapping[str, Sequence[PreparedEpoch]], progress: Progress = lambda _: None
 ) -> tuple[Delay, ...]:
     """Estimate how late the torque is in each source.
 
     Parameters
     ----------
-    perturbed : mapping of str to sequence of Epoch
+    perturbed : mapping of str to sequence of PreparedEpoch
         The perturbation epochs of each source; a source without any has an empty sequence.
-    settings : Settings
+    progress : callable
+        The work of one epoch is 1.
 
     Returns
     -------
     tuple of Delay
     """
-    return tuple(_estimate(source, epochs, settings) for source, epochs in perturbed.items())
+    delays = []
+    for source, epochs in perturbed.items():
+        delays.append(_estimate(source, epochs))
+        progress(float(len(epochs)))
+    return tuple(delays)
 
 
 def aligned(epoch: Epoch, delays: Sequence[Delay]) -> Epoch:
     """Return the epoch with its torque moved by the delay of its source, if that is corrected."""
-    for delay in delays:
-        if delay.source == epoch.source and delay.corrected:
-            return _moved(epoch, delay.delay_s)
-    return epoch
+    delay_s = _corrected_s(epoch.source, delays)
+    return torque_earlier(epoch, delay_s) if delay_s else epoch
 
 
-def _moved(epoch: Epoch, delay_s: float) -> Epoch:
-    torque = epoch.channels.get("torque_nm")
-    if torque is None:
-        return epoch
-    earlier = Channel(torque.name, torque.time_s - delay_s, torque.values)
-    return replace(epoch, channels={**epoch.channels, torque.name: earlier})
+def aligned_prepared(prepared: PreparedEpoch, delays: Sequence[Delay]) -> PreparedEpoch:
+    """Return `aligned` of a prepared epoch; the same object where nothing is corrected."""
+    delay_s = _corrected_s(prepared.epoch.source, delays)
+    return prepared.moved(delay_s) if delay_s else prepared
 
 
-def _estimate(source: str, epochs: Sequence[Epoch], settings: Settings) -> Delay:
-    sound = [epoch for epoch in epochs if not before_fit(epoch, settings.estimation)]
+def _corrected_s(source: str, delays: Sequence[Delay]) -> float:
+    return sum(delay.delay_s for delay in delays if delay.source == source and delay.corrected)
+
+
+def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
+    sound = [epoch for epoch in epochs if not epoch.obstacle]
     if not sound:
         return Delay(source, remark="no perturbation epoch tells the channels' delay")
-    known = [epoch for epoch in sound if not closed_loop_obstacle(epoch)]
-    linearise: Linearise = instrumental if known else direct
+    known = [prepared for prepared in sound if not closed_loop_obstacle(prepared.epoch)]
     used = (known or sound)[:MOST_EPOCHS]
-    estimation = settings.estimation
+    estimation = used[0].settings.estimation
     longest_s = estimation.longest_delay_s
     try:
-        drive = drives(used, settings).get(source)
-        total_s, error_s = _settled(used, settings, drive, linearise)
-        half = _settled(used, _half_the_band(settings), drive, linearise) if known else None
+        total_s, error_s = _settled(used, perturbed=bool(known))
+        if not np.isfinite(total_s) or abs(total_s) > longest_s - SCAN_STEP_S / 2:
+            return Delay(
+                source,
+                remark=f"no delay of the torque within ±{1e3 * longest_s:g} ms explains it "
+                "(estimation.longest_delay_s)",
+            )
+        found = Delay(source, total_s, error_s)
+        if not known:
+            return replace(
+                found,
+                remark="not corrected: without the recorded perturbation a reflex, or a subject "
+                "who pushes, looks like a delay",
+            )
+        if abs(total_s) < max(SIGNIFICANT * error_s, LEAST_S):
+            return replace(found, remark="not corrected: not told from zero")
+        half_s, half_error_s = _settled([_in_half_the_band(one) for one in used], perturbed=True)
     except ValueError as error:
         return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
-    if not np.isfinite(total_s) or abs(total_s) > longest_s - SCAN_STEP_S / 2:
-        return Delay(
-            source,
-            remark=f"no delay of the torque within ±{1e3 * longest_s:g} ms explains it "
-            "(estimation.longest_delay_s)",
-        )
-    found = Delay(source, total_s, error_s)
-    if half is None:
-        return replace(
-            found,
-            remark="not corrected: without the recorded perturbation a reflex, or a subject who "
-            "pushes, looks like a delay",
-        )
-    if abs(total_s) < max(SIGNIFICANT * error_s, LEAST_S):
-        return replace(found, remark="not corrected: not told from zero")
-    apart_s, allowed_s = abs(half[0] - total_s), SIGNIFICANT * np.hypot(error_s, half[1])
+    apart_s, allowed_s = abs(half_s - total_s), SIGNIFICANT * np.hypot(error_s, half_error_s)
     if apart_s > max(allowed_s, SAME_S + SAME_SHARE * abs(total_s)):
         return replace(
             found,
-            remark=f"not corrected: in the lower half of the band it is {1e3 * half[0]:.3g} ms; a "
+            remark=f"not corrected: in the lower half of the band it is {1e3 * half_s:.3g} ms; a "
             "delay is the same at all frequencies, a soft cuff between drive and joint is not",
         )
     if not estimation.correct_delay:
@@ -128,26 +129,25 @@ def _estimate(source: str, epochs: Sequence[Epoch], settings: Settings) -> Delay
     return replace(found, corrected=True)
 
 
-def _settled(
-    epochs: Sequence[Epoch],
-    settings: Settings,
-    drive: DriveModel | None,
-    linearise: Linearise,
-) -> tuple[float, float]:
+def _settled(epochs: Sequence[PreparedEpoch], *, perturbed: bool) -> tuple[float, float]:
     """Return the delay at which none is left, and its standard error, in s.
 
     The zero of what is left is sought by secants: between coarse samples moving the torque by what
-    is left takes only part of it away.
+    is left takes only part of it away. Where the perturbation is not known, least squares gives a
+    delay without moving anything.
     """
-    known = linearise is instrumental
+    longest_s = epochs[0].settings.estimation.longest_delay_s
     before: tuple[float, float] | None = None
     total_s, error_s = 0.0, float("nan")
-    for _ in range(ROUNDS if known else 1):
-        observations = [
-            _observe(_moved(epoch, total_s), settings, drive, known) for epoch in epochs
-        ]
-        start = least_squares_start(observations)
-        fit = estimate_delay(observations, start, settings.estimation.longest_delay_s, linearise)
+    for _ in range(ROUNDS if perturbed else 1):
+        moved = [epoch.moved(total_s) if total_s else epoch for epoch in epochs]
+        observations = [epoch.once(observe if perturbed else observe_motion) for epoch in moved]
+        fit = estimate_delay(
+            observations,
+            least_squares_start(observations),
+            longest_s,
+            instrumental if perturbed else direct,
+        )
         left_s, error_s = float(fit.values[-1]), float(fit.standard_errors[-1])
         step_s = left_s
         if before is not None and abs(left_s) < abs(before[1]) and left_s != before[1]:
@@ -155,28 +155,13 @@ def _settled(
             step_s = float(np.clip(step_s, -MOST_STRETCH * abs(left_s), MOST_STRETCH * abs(left_s)))
         before = total_s, left_s
         total_s += step_s
-        if abs(left_s) < SETTLED_S or abs(total_s) > settings.estimation.longest_delay_s:
+        if abs(left_s) < SETTLED_S or abs(total_s) > longest_s:
             break
     return total_s, error_s
 
 
-def _half_the_band(settings: Settings) -> Settings:
-    estimation = settings.estimation
+def _in_half_the_band(prepared: PreparedEpoch) -> PreparedEpoch:
+    estimation = prepared.settings.estimation
     high_hz = max(0.5 * estimation.band_high_closed_loop_hz, 2.0 * estimation.band_low_hz)
     narrower = estimation.model_copy(update={"band_high_closed_loop_hz": high_hz})
-    return settings.model_copy(update={"estimation": narrower})
-
-
-def _observe(
-    epoch: Epoch, settings: Settings, drive: DriveModel | None, perturbed: bool
-) -> Observation:
-    if perturbed:
-        return observe(epoch, settings, "iv", drive)
-    torque = epoch.channels["torque_nm"]
-    rig = settings.rig
-    grid = epoch_grid(epoch, band_hz(epoch, settings.estimation), settings.estimation.trim_s)
-    loop = loop_of(
-        settings, torque.rate_hz, DriveModel(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
-    )
-    everywhere = np.ones(grid.line.size, dtype=np.bool_)
-    return Observation(epoch_lines(epoch, grid, None), torque, loop, everywhere, None)
+    return replace(prepared, settings=prepared.settings.model_copy(update={"estimation": narrower}))

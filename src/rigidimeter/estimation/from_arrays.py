@@ -7,9 +7,10 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimeter.estimation.alignment import aligned, estimate_delays
+from rigidimeter.estimation.alignment import aligned_prepared, estimate_delays
 from rigidimeter.estimation.diagnostics import checked
-from rigidimeter.estimation.methods import choose_method, fit_epoch, method_named
+from rigidimeter.estimation.methods import choose_method, method_named
+from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel, Epoch, Fit, readonly
 from rigidimeter.settings import Settings
@@ -95,12 +96,13 @@ def identify(
     lacking = [name for name in chosen.needs if name not in channels]
     if lacking:
         raise ValueError(f"method {chosen.name} needs {' and '.join(lacking)}")
+    (prepared,) = prepare([epoch], settings)
     if not chosen.as_recorded:
-        epoch = aligned(epoch, estimate_delays({epoch.source: [epoch]}, settings))
-    fit = fit_epoch(epoch, chosen.name, settings)
+        prepared = aligned_prepared(prepared, estimate_delays({epoch.source: [prepared]}))
+    (fit,), _ = chosen.fit([prepared], None, lambda _: None, False)
     if fit.outcome.kind == "failed":
         raise ValueError(f"method {chosen.name}: {fit.outcome.reason}")
-    return checked(epoch, fit, settings)
+    return checked(prepared, fit)
 
 
 def _array(name: str, values: ArrayLike) -> Array:

@@ -21,7 +21,8 @@ from scipy import signal
 
 from rigidimeter.estimation.closedloop.line_noise import Smoother
 from rigidimeter.estimation.method_record import Progress
-from rigidimeter.estimation.screening import after_fit, before_fit, unusable
+from rigidimeter.estimation.prepared import PreparedEpoch
+from rigidimeter.estimation.screening import after_fit, unusable
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.estimation.uncertainty import (
     Estimate,
@@ -31,7 +32,7 @@ from rigidimeter.estimation.uncertainty import (
     t_interval,
 )
 from rigidimeter.records import Epoch, Fit, Outcome
-from rigidimeter.settings import EstimationSettings, Settings
+from rigidimeter.settings import EstimationSettings
 
 __all__ = ["POOLED_TEXT", "fit_inertia_damping_stiffness", "fit_least_squares", "intervals_text"]
 
@@ -126,25 +127,24 @@ def fit_inertia_damping_stiffness(
 def fit_least_squares(
     method: str,
     signals_of: SignalsOf,
-    epochs: Sequence[Epoch],
-    settings: Settings,
-    inertia_kg_m2: float | None,
-    progress: Progress,
+    epochs: Sequence[PreparedEpoch],
+    inertia_kg_m2: float | None = None,
+    progress: Progress = lambda _: None,
+    pooled: bool = True,
 ) -> tuple[list[Fit], list[Fit]]:
     """Fit every epoch, and all epochs of a condition put one after the other.
 
     `signals_of` prepares the signals of an epoch; for the rest see `method_record.FitEpochs`.
     """
-    estimation = settings.estimation
     fits = []
     kept: dict[str, list[tuple[Fit, Signals]]] = {}
-    for epoch in epochs:
+    for prepared in epochs:
+        epoch = prepared.epoch
         try:
-            obstacle = before_fit(epoch, estimation)
-            if obstacle:
-                raise ValueError(obstacle)
-            signals = signals_of(epoch, estimation)
-            found = fit_inertia_damping_stiffness(signals, inertia_kg_m2, estimation)
+            signals = prepared.signals(signals_of)
+            found = fit_inertia_damping_stiffness(
+                signals, inertia_kg_m2, prepared.settings.estimation
+            )
         except ValueError as error:
             outcome = unusable(epoch, str(error))
             fits.append(Fit(epoch.source, epoch.label, epoch.condition, method, outcome))
@@ -160,11 +160,14 @@ def fit_least_squares(
             fits.append(fit)
             if fit.outcome.included:
                 kept.setdefault(epoch.condition, []).append((fit, signals))
-        progress(epoch.name)
-    groups = list(kept.items())
+        progress(1.0)
+    groups = list(kept.items()) if pooled else []
     if len(groups) > 1:
         groups.append(("", [member for _, members in groups for member in members]))
-    return fits, [_pooled(name, members, estimation, inertia_kg_m2) for name, members in groups]
+    return fits, [
+        _pooled(name, members, epochs[0].settings.estimation, inertia_kg_m2)
+        for name, members in groups
+    ]
 
 
 def _pooled(

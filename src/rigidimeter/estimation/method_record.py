@@ -6,13 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Signals
 from rigidimeter.records import Epoch, Fit
-from rigidimeter.settings import EstimationSettings, Settings
+from rigidimeter.settings import EstimationSettings
 
 __all__ = ["FitEpochs", "Method", "Progress"]
 
-Progress = Callable[[str], None]
+Progress = Callable[[float], None]
+"""Called with the amount of work that was done since the last call."""
 
 
 class FitEpochs(Protocol):
@@ -20,21 +22,23 @@ class FitEpochs(Protocol):
 
     def __call__(
         self,
-        epochs: Sequence[Epoch],
-        settings: Settings,
+        epochs: Sequence[PreparedEpoch],
         inertia_kg_m2: float | None,
         progress: Progress,
+        pooled: bool,
     ) -> tuple[list[Fit], list[Fit]]:
         """Fit every epoch, and all epochs of each condition together.
 
         Parameters
         ----------
-        epochs : sequence of Epoch
-        settings : Settings
+        epochs : sequence of PreparedEpoch
+            Each with its settings.
         inertia_kg_m2 : float or None
             Hold J at this value (Eq. 7).
         progress : callable
-            Called with the name of each epoch once it is done.
+            The work of one epoch is 1.
+        pooled : bool
+            Whether the fits of all epochs together are wanted.
 
         Returns
         -------
@@ -42,7 +46,7 @@ class FitEpochs(Protocol):
             One for each epoch, in order; one that could not be fitted has failed, with the reason.
         pooled : list of Fit
             One for each condition with an epoch that counts, and with several one for all of them
-            together, whose condition is empty; their `epoch` is ``pooled``.
+            together, whose condition is empty; their `epoch` is ``pooled``. None if not wanted.
         """
 
 

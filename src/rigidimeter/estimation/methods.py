@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from rigidimeter.estimation.bandlimited import BANDLIMITED, bandlimited_signals
-from rigidimeter.estimation.closedloop import IV, ML, SPECTRAL, closed_loop_obstacle
-from rigidimeter.estimation.method_record import Method, Progress
+from rigidimeter.estimation.closedloop.closed_loop_fit import IV, ML, SPECTRAL
+from rigidimeter.estimation.closedloop.observation import closed_loop_obstacle
+from rigidimeter.estimation.method_record import Method
+from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.published_method import PUBLISHED
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.signals import Signals
@@ -85,17 +87,17 @@ def epoch_signals(epoch: Epoch, method: str, settings: EstimationSettings) -> Si
 
 
 def fit_epochs(
-    epochs: Sequence[Epoch],
+    epochs: Iterable[Epoch],
     method: str,
     settings: Settings,
     inertia_kg_m2: float | None = None,
-    progress: Progress = lambda _: None,
 ) -> tuple[list[Fit], list[Fit]]:
     """Fit every epoch, and all epochs of a condition together, by the method of that name.
 
-    Parameters and values are those of `method_record.FitEpochs`.
+    For epochs that are fitted once; `prepare` those that are fitted again. Parameters and values
+    are those of `method_record.FitEpochs`.
     """
-    return method_named(method).fit(epochs, settings, inertia_kg_m2, progress)
+    return method_named(method).fit(prepare(epochs, settings), inertia_kg_m2, lambda _: None, True)
 
 
 def fit_epoch(

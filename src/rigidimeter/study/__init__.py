@@ -4,7 +4,7 @@ Acquisition and study meet only in recorded files, so a laboratory can analyse w
 installed.
 """
 
-from rigidimeter.study.analysis import analyse, estimate, task_of
+from rigidimeter.study.analysis import Preparation, analyse, estimate, task_of
 from rigidimeter.study.archive import UNCHANGED, keep
 from rigidimeter.study.columns import compare_columns
 from rigidimeter.study.compare_input import compare
@@ -58,6 +58,7 @@ __all__ = [
     "LeftOut",
     "Measure",
     "Observation",
+    "Preparation",
     "RatingMean",
     "RatingsFound",
     "SensitivityRow",

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from rigidimeter.estimation import (
-    aligned,
     choose_method,
     estimate_delays,
-    fit_epochs,
     method_named,
     score_epoch,
     single_frequency_share,
 )
-from rigidimeter.estimation.closedloop import drives
+from rigidimeter.estimation.alignment import aligned_prepared
 from rigidimeter.estimation.diagnostics import checked
+from rigidimeter.estimation.method_record import Progress
+from rigidimeter.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Delay, Epoch, Fit, Task
 from rigidimeter.settings import Settings
 
-__all__ = ["analyse", "estimate", "task_of"]
+__all__ = ["Preparation", "analyse", "analyse_prepared", "estimate", "task_of"]
 
 SINGLE_FREQUENCY_SHARE = 0.85
 """Above this share of the angle's variance in one line, the epoch is an imposed sinusoid.
@@ -41,13 +41,70 @@ def task_of(epoch: Epoch, settings: Settings) -> Task:
     return "sinusoid" if single_frequency_share(epoch) > SINGLE_FREQUENCY_SHARE else "prbs"
 
 
+class Preparation:
+    """The epochs of one joint with what every analysis of them needs, each made once.
+
+    Methods, checks and figures take from it what they share: tasks, the drive and the delay of each
+    source, signals and spectral lines of each epoch. It keeps them as long as it is held.
+
+    Parameters
+    ----------
+    epochs : iterable of Epoch
+    settings : Settings
+    """
+
+    def __init__(self, epochs: Iterable[Epoch], settings: Settings) -> None:
+        self.settings = settings
+        self.epochs = tuple(epochs)
+        tasks = [task_of(epoch, settings) for epoch in self.epochs]
+        both = list(zip(self.epochs, tasks, strict=True))
+        self._perturbed = prepare((e for e, task in both if task == "prbs"), settings)
+        self._imposed = prepare((e for e, task in both if task == "sinusoid"), settings)
+        self._delays: tuple[Delay, ...] | None = None
+        self._aligned: dict[int, PreparedEpoch] = {}
+
+    def delays(self, progress: Progress = lambda _: None) -> tuple[Delay, ...]:
+        """Return how late the torque is in each source."""
+        if self._delays is None:
+            by_source: dict[str, list[PreparedEpoch]] = {e.source: [] for e in self.epochs}
+            for prepared in self._perturbed:
+                by_source[prepared.epoch.source].append(prepared)
+            self._delays = estimate_delays(by_source, progress)
+        return self._delays
+
+    def perturbed(self, *, as_recorded: bool = False) -> list[PreparedEpoch]:
+        """Return the perturbation epochs, on one clock or as they were recorded."""
+        return self._perturbed if as_recorded else self._on_one_clock(self._perturbed)
+
+    def imposed(self, *, as_recorded: bool = False) -> list[PreparedEpoch]:
+        """Return the epochs of imposed sinusoids, on one clock or as they were recorded."""
+        return self._imposed if as_recorded else self._on_one_clock(self._imposed)
+
+    def _on_one_clock(self, epochs: Sequence[PreparedEpoch]) -> list[PreparedEpoch]:
+        delays = self.delays()
+        for prepared in epochs:
+            if id(prepared) not in self._aligned:
+                self._aligned[id(prepared)] = aligned_prepared(prepared, delays)
+        return [self._aligned[id(prepared)] for prepared in epochs]
+
+
 def analyse(
     epochs: Iterable[Epoch],
     settings: Settings,
     method: str = "auto",
     *,
-    delays: Sequence[Delay] | None = None,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = lambda _: None,
+) -> Analysis:
+    """Analyse epochs once; see `analyse_prepared`."""
+    return analyse_prepared(Preparation(epochs, settings), method, progress=progress)
+
+
+def analyse_prepared(
+    preparation: Preparation,
+    method: str = "auto",
+    *,
+    fits_alone: bool = False,
+    progress: Progress = lambda _: None,
 ) -> Analysis:
     """Fit every perturbation epoch and score every sinusoidal one.
 
@@ -58,54 +115,42 @@ def analyse(
 
     Parameters
     ----------
-    epochs : iterable of Epoch
-    settings : Settings
+    preparation : Preparation
     method : str
         The name of one of `estimation.METHODS`; ``auto`` chooses by what was recorded.
-    delays : sequence of Delay, optional
-        Of every source, as another analysis of the same epochs found them: they do not depend on
-        the method, and cost the most.
+    fits_alone : bool
+        Leave out the pooled fits and the scores of the sinusoids.
     progress : callable
-        Called with the name of each epoch once it is done, in either stage.
+        Called with the work that was done, `work` in all.
     """
-    everything = list(epochs)
-    tasks = [task_of(epoch, settings) for epoch in everything]
-    fitted = [epoch for epoch, task in zip(everything, tasks, strict=True) if task == "prbs"]
     reason = ""
     if method == "auto":
-        method, reason = choose_method(fitted)
-    used: Sequence[Delay] = ()
+        method, reason = choose_method([p.epoch for p in preparation.perturbed(as_recorded=True)])
     estimator = method_named(method)
-    if not estimator.as_recorded:
-        by_source: dict[str, list[Epoch]] = {epoch.source: [] for epoch in everything}
-        for epoch in fitted:
-            by_source[epoch.source].append(epoch)
-        used = estimate_delays(by_source, settings) if delays is None else delays
-        everything = [aligned(epoch, used) for epoch in everything]
-        fitted = [aligned(epoch, used) for epoch in fitted]
+    as_recorded = estimator.as_recorded
+    delays = () if as_recorded else preparation.delays(progress)
+    fitted = preparation.perturbed(as_recorded=as_recorded)
     scores = []
-    for epoch, task in zip(everything, tasks, strict=True):
-        if task == "sinusoid":
-            scores.append(score_epoch(epoch, settings.scores, settings.estimation))
-            progress(epoch.name)
+    for prepared in () if fits_alone else preparation.imposed(as_recorded=as_recorded):
+        settings = prepared.settings
+        scores.append(score_epoch(prepared.epoch, settings.scores, settings.estimation))
+        progress(1.0)
     if "perturbation_nm" in estimator.needs:
-        reason += _without_drive(fitted, settings, bool(reason))
-    fits, pooled = fit_epochs(fitted, method, settings, progress=progress)
-    fits = [checked(epoch, fit, settings) for epoch, fit in zip(fitted, fits, strict=True)]
-    refused = [
-        not fit.outcome.included and epoch.closed.included and fit.n_samples > 0
-        for epoch, fit in zip(fitted, fits, strict=True)
+        reason += _without_drive(fitted, bool(reason))
+    fits, pooled = estimator.fit(fitted, None, progress, not fits_alone)
+    fits = [checked(prepared, fit) for prepared, fit in zip(fitted, fits, strict=True)]
+    counted = [
+        prepared.closed_as(fit.outcome)
+        if not fit.outcome.included and prepared.epoch.closed.included and fit.n_samples > 0
+        else prepared
+        for prepared, fit in zip(fitted, fits, strict=True)
     ]
-    if any(refused):  # what a check excludes must not be in the pool either
-        kept = [
-            replace(epoch, closed=fit.outcome) if out else epoch
-            for epoch, fit, out in zip(fitted, fits, refused, strict=True)
-        ]
-        _, pooled = fit_epochs(kept, method, settings)
+    if pooled and counted != fitted:  # what a check excludes must not be in the pool either
+        _, pooled = estimator.fit(counted, None, lambda _: None, True)
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
     if included:
-        second, _ = fit_epochs(fitted, method, settings, inertia_kg_m2, progress)
+        second, _ = estimator.fit(fitted, inertia_kg_m2, progress, False)
         # What did not count in the first stage does not in the second.
         fixed = [
             two if one.outcome.included else replace(two, outcome=one.outcome)
@@ -120,14 +165,15 @@ def analyse(
         inertia_kg_m2,
         tuple(scores),
         tuple(pooled),
-        tuple(used),
+        delays,
         reason,
     )
 
 
-def _without_drive(epochs: Sequence[Epoch], settings: Settings, after: bool) -> str:
+def _without_drive(epochs: Sequence[PreparedEpoch], after: bool) -> str:
     """Say of which sources the drive is unknown, and what that costs."""
-    unknown = [source for source, drive in drives(epochs, settings).items() if drive is None]
+    sources = {prepared.epoch.source: prepared.source for prepared in epochs}
+    unknown = [name for name, source in sources.items() if source.drive is None]
     if not unknown:
         return ""
     return (
@@ -142,7 +188,7 @@ def estimate(
     method: str = "auto",
     *,
     settings: Settings | None = None,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = lambda _: None,
 ) -> Analysis:
     """Estimate J, B and K of every epoch, and score the imposed sinusoids.
 
@@ -154,7 +200,7 @@ def estimate(
     settings : Settings, optional
         Instead of those of the recording.
     progress : callable
-        Called with the name of each epoch once it is done.
+        Called with the work that was done.
 
     Returns
     -------

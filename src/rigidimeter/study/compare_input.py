@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigidimeter.errors import UserError
+from rigidimeter.estimation.method_record import Progress
 from rigidimeter.recording import read_estimates
 from rigidimeter.recording.formats import TextTable, read_text_table
 from rigidimeter.recording.study_folder import is_study
@@ -37,7 +38,7 @@ def compare(
     method: str = "auto",
     seed: int = 1,
     resamples: int = 9999,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = lambda _: None,
 ) -> StudyResult:
     """Compare two conditions: medians, rank-sum tests, shifts, effect sizes.
 
@@ -64,7 +65,7 @@ def compare(
     seed, resamples : int
         Of the bootstrap.
     progress : callable
-        Called with the name of each epoch of a study folder that is done.
+        Called with the work that was done on a study folder, `study_analysis.steps` in all.
 
     Raises
     ------

@@ -15,10 +15,11 @@ import numpy as np
 
 from rigidimeter.errors import UserError
 from rigidimeter.estimation import choose_method, method_names
+from rigidimeter.estimation.method_record import Progress
 from rigidimeter.recording.study_folder import Row, StudyFolder, read_study_folder
-from rigidimeter.records import Analysis, Delay, Epoch, Notice
+from rigidimeter.records import Analysis, Epoch, Notice
 from rigidimeter.settings import Settings
-from rigidimeter.study.analysis import analyse
+from rigidimeter.study.analysis import Preparation, analyse_prepared
 from rigidimeter.study.blinding import Naming, naming
 from rigidimeter.study.comparison import compare_measures, day_tests, gathered, lacking
 from rigidimeter.study.exclusions import exclusions_of, operators_exclusions
@@ -128,7 +129,7 @@ def analyse_study(
     *,
     seed: int = 1,
     resamples: int = 9999,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = lambda _: None,
 ) -> StudyResult:
     """Analyse a study: estimates, comparisons, days, effects, ratings, sensitivity, exclusions.
 
@@ -143,7 +144,8 @@ def analyse_study(
     sessions = {s.entry.source: s.entry for s in read.gathered.sessions}
     pair = read.names.pair
     one_offset = read.folder.about.analysis.one_offset_a_day
-    main, notices = _analysed(read.epochs, sessions, read.settings, read.method, progress)
+    subjects = _by_subject(read.epochs, sessions, read.settings)
+    main, notices = _analysed(subjects, read.method, progress)
     comparisons = gathered(main, pair, sessions)
     ratings, said = rated(read.folder, read.names)
     if ratings is not None:
@@ -161,9 +163,7 @@ def analyse_study(
         analyses = {main.method: main}
         for method in sensitivity_methods():
             if method != main.method:
-                analyses[method], _ = _analysed(
-                    fitted, sessions, read.settings, method, progress, main.delays or None
-                )
+                analyses[method], _ = _analysed(subjects, method, progress, fits_alone=True)
         ordered = {name: analyses[name] for name in sensitivity_methods()} | analyses
         rows, said = sensitivity_rows(ordered, main.method, sessions, pair, one_offset=one_offset)
         notices += said
@@ -206,27 +206,34 @@ def _pair(names: Naming, wanted: tuple[str | None, str | None]) -> tuple[str, st
     return found[0], found[1]
 
 
+def _by_subject(
+    epochs: Sequence[Epoch], sessions: Mapping[str, SessionEntry], settings: Settings
+) -> dict[str, Preparation]:
+    own: dict[str, list[Epoch]] = {}
+    for epoch in epochs:
+        own.setdefault(sessions[epoch.source].subject, []).append(epoch)
+    return {subject: Preparation(epochs, settings) for subject, epochs in own.items()}
+
+
 def _analysed(
-    epochs: Sequence[Epoch],
-    sessions: Mapping[str, SessionEntry],
-    settings: Settings,
+    subjects: Mapping[str, Preparation],
     method: str,
-    progress: Callable[[str], None],
-    delays: Sequence[Delay] | None = None,
+    progress: Progress,
+    *,
+    fits_alone: bool = False,
 ) -> tuple[Analysis, list[Notice]]:
     """Analyse each subject apart and put the parts together, in the order of the epochs."""
-    by_subject: dict[str, list[Epoch]] = {}
-    for epoch in epochs:
-        by_subject.setdefault(sessions[epoch.source].subject, []).append(epoch)
-    if len(by_subject) < 2:
-        found = analyse(epochs, settings, method, delays=delays, progress=progress)
+    if len(subjects) < 2:
+        (preparation,) = subjects.values()
+        found = analyse_prepared(preparation, method, fits_alone=fits_alone, progress=progress)
         return found, list(analysis_warnings(found))
     reason = ""
     if method == "auto":
-        method, reason = choose_method([epoch for epoch in epochs if epoch.task == "prbs"])
+        everything = [p for own in subjects.values() for p in own.perturbed(as_recorded=True)]
+        method, reason = choose_method([prepared.epoch for prepared in everything])
     parts = {
-        subject: analyse(own, settings, method, delays=delays, progress=progress)
-        for subject, own in by_subject.items()
+        subject: analyse_prepared(own, method, fits_alone=fits_alone, progress=progress)
+        for subject, own in subjects.items()
     }
     notices = [
         Notice(notice.level, f"subject {subject}: {notice.text}")

@@ -17,16 +17,16 @@ from rigidimeter.estimation import METHODS, Method
 from rigidimeter.records import Fit, Outcome
 
 
-def guess(epochs, settings, inertia_kg_m2, progress):
+def guess(epochs, inertia_kg_m2, progress, pooled):
     """Say the same of every joint."""
     value = np.array([0.004 if inertia_kg_m2 is None else inertia_kg_m2, 0.1, 1.5])
 
     def fit(epoch):
-        progress(epoch.name)
+        progress(1.0)
         return Fit(epoch.source, epoch.label, epoch.condition, "toy", Outcome(), value,
                    np.zeros(3), value, value, np.zeros(3), n_samples=1000, r_squared=0.9)
 
-    return [fit(epoch) for epoch in epochs], []
+    return [fit(prepared.epoch) for prepared in epochs], []
 
 
 METHODS.append(Method("toy", "a guess", (), "by a guess of ours", guess))

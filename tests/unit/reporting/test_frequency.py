@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.estimation.closedloop.closed_loop_fit import observe
+from rigidimeter.estimation.closedloop.observation import observe_periods
 from rigidimeter.estimation.closedloop.periodic_response import impedance as without_model
+from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Channel, Delay, Outcome
 from rigidimeter.reporting.figures import condition_colours, svg_text
 from rigidimeter.reporting.figures.impedance import COHERENT, Response, impedance, model_nm_rad
@@ -26,7 +27,7 @@ def observations():
     """Return epochs without noise that begin at three places of the sequence."""
     rng = np.random.default_rng(2)
     epochs = [periodic_epoch(OFF, str(i), "OFF", rng, 21 * i, noise_nm=0.0) for i in range(3)]
-    return [observe(epoch, Settings(), "spectral", None) for epoch in epochs]
+    return [observe_periods(epoch) for epoch in prepare(epochs, Settings())]
 
 
 def test_the_model_is_eq_3_over_frequency() -> None:
@@ -63,7 +64,8 @@ def test_only_epochs_with_the_same_lines_are_added(observations) -> None:
         name: Channel(name, channel.time_s[:4000], channel.values[:4000])
         for name, channel in shorter.channels.items()
     }
-    two = observe(dataclasses.replace(shorter, channels=cut), Settings(), "spectral", None)
+    (prepared,) = prepare([dataclasses.replace(shorter, channels=cut)], Settings())
+    two = observe_periods(prepared)
     assert len(alike([two, *observations])) == 4  # two periods have the lines of three
     grid = two.lines.grid
     other = dataclasses.replace(grid, omega_rad_s=1.01 * grid.omega_rad_s)

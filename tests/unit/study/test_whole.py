@@ -166,20 +166,29 @@ def test_several_subjects_each_have_their_median_inertia(monkeypatch, fitted_stu
     """Epochs of two subjects, the second twice as heavy: J is held at each one's own."""
     from rigidimeter.study import study_analysis as module
 
-    def fake(epochs, settings, method, **_):
+    def fake(preparation, method, **_):
         from rigidimeter.records import Analysis, Outcome
 
         fits = tuple(
-            Fit(e.source, e.label, e.condition, method, Outcome(), np.full(3, 1.0 + len(epochs)))
-            for e in epochs
+            Fit(
+                e.source,
+                e.label,
+                e.condition,
+                method,
+                Outcome(),
+                np.full(3, 1.0 + len(preparation.epochs)),
+            )
+            for e in preparation.epochs
         )
-        return Analysis(method, fits, fits, 1.0 + len(epochs), ())
+        return Analysis(method, fits, fits, 1.0 + len(preparation.epochs), ())
 
-    monkeypatch.setattr(module, "analyse", fake)
+    monkeypatch.setattr(module, "analyse_prepared", fake)
     read = read_study(fitted_study)
     sessions = {s.entry.source: s.entry for s in read.gathered.sessions}
     sessions["sessions/1-OFF"] = replace(sessions["sessions/1-OFF"], subject="M2")
-    found, notices = module._analysed(read.epochs, sessions, Settings(), "iv", lambda _: None)
+    found, notices = module._analysed(
+        module._by_subject(read.epochs, sessions, Settings()), "iv", lambda _: None
+    )
     assert sorted({fit.inertia_kg_m2 for fit in found.fits}) == [3.0, 11.0]
     assert "M2 3, M1 11" in notices[-1].text
 

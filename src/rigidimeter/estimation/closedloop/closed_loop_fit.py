@@ -7,310 +7,220 @@ epoch says of J, B and K is its own.
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
 
-from rigidimeter.dynamics import DriveModel
-from rigidimeter.estimation.closedloop.delay import direct
-from rigidimeter.estimation.closedloop.drive_fit import fit_drive, loop_of
-from rigidimeter.estimation.closedloop.instruments import LEAST, instrumental
 from rigidimeter.estimation.closedloop.lack_of_fit import misfits, worst_misfit
-from rigidimeter.estimation.closedloop.maximum_likelihood import output_error
-from rigidimeter.estimation.closedloop.periodic_response import periodic, whole_periods
+from rigidimeter.estimation.closedloop.linear_problems import (
+    Linearise,
+    Problem,
+    holding,
+    instrumental,
+    least_squares_start,
+    output_error,
+    periodic,
+)
+from rigidimeter.estimation.closedloop.observation import Observation, observe, observe_periods
 from rigidimeter.estimation.closedloop.refine import (
     ENOUGH_EPOCHS,
     SHARED_FROM,
-    Linearise,
     LineFit,
-    Observation,
-    Problem,
     fit_pooled,
     fit_single,
 )
-from rigidimeter.estimation.closedloop.spectral_lines import epoch_grid, epoch_lines
 from rigidimeter.estimation.method_record import Method, Progress
-from rigidimeter.estimation.screening import (
-    USABLE_FRACTION_OF_RATE,
-    after_fit,
-    before_fit,
-    unusable,
-)
-from rigidimeter.estimation.signals import Array, motion_channels
+from rigidimeter.estimation.prepared import PreparedEpoch
+from rigidimeter.estimation.screening import after_fit, unusable
+from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.uncertainty import Estimate
-from rigidimeter.records import Channel, Epoch, Finding, Fit
+from rigidimeter.records import Epoch, Finding, Fit
 from rigidimeter.settings import EstimationSettings, Settings
 
-__all__ = [
-    "CLOSED_LOOP",
-    "IV",
-    "ML",
-    "SPECTRAL",
-    "closed_loop_obstacle",
-    "drives",
-    "fit_closed_loop",
-    "least_squares_start",
-    "observe",
-]
+__all__ = ["CLOSED_LOOP", "IV", "ML", "SPECTRAL", "LineMethod", "fit_closed_loop"]
 
 WORST_R_SQUARED = -10.0
 """A subject who pushes may turn R² negative; one far below says that a channel is wrong."""
 
-MOST_TRIED = 5
-"""So many epochs of a source may fail to show the drive before it is taken for unknown."""
-
-CLOSED_LOOP: Mapping[str, Linearise] = {
-    "iv": instrumental,
-    "spectral": periodic,
-    "ml": output_error,
-}
-"""The methods that need the perturbation, and how each makes its linear problem."""
+POOLED_SHARE = 0.9
+"""The share of the work that is done once the epochs of a condition are fitted together."""
 
 
-def closed_loop_obstacle(epoch: Epoch) -> str:
-    """Return why the methods of the closed loop cannot be used, or an empty text."""
-    perturbation = epoch.channels.get("perturbation_nm")
-    if perturbation is None:
-        return "perturbation_nm was not recorded"
-    if len(perturbation) < 2 or not np.all(np.isfinite(perturbation.values)):
-        return "perturbation_nm holds no samples or numbers that are not finite"
-    if float(np.ptp(perturbation.values)) == 0.0:
-        return "perturbation_nm is constant"
-    torque = epoch.channels.get("torque_nm")
-    if torque is not None and np.array_equal(torque.values, perturbation.values):
-        return "perturbation_nm holds the same numbers as torque_nm"
-    return ""
+class LineMethod(NamedTuple):
+    """A method of the closed loop.
 
-
-def _even(perturbation: Channel) -> Channel:
-    """Return the perturbation at every tick: the last level is held where ticks are missing."""
-    spacing = np.diff(perturbation.time_s)
-    interval_s = float(np.median(spacing))
-    if float(np.ptp(spacing)) < 0.5 * interval_s:
-        return perturbation
-    count = int((perturbation.time_s[-1] - perturbation.time_s[0]) / interval_s + 0.5) + 1
-    time_s = perturbation.time_s[0] + interval_s * np.arange(count)
-    last = np.searchsorted(perturbation.time_s, time_s + 0.5 * interval_s, side="right") - 1
-    return Channel(perturbation.name, time_s, perturbation.values[np.maximum(last, 0)])
-
-
-def drives(epochs: Sequence[Epoch], settings: Settings) -> dict[str, DriveModel | None]:
-    """Return the drive of each source, identified from its first epoch that allows it."""
-    rig = settings.rig
-    start = DriveModel(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
-    found: dict[str, DriveModel | None] = {}
-    tried: dict[str, int] = {}
-    for epoch in epochs:
-        found.setdefault(epoch.source, None)
-        sound = not before_fit(epoch, settings.estimation) and epoch.closed.included
-        if sound and found[epoch.source] is None and tried.get(epoch.source, 0) < MOST_TRIED:
-            tried[epoch.source] = tried.get(epoch.source, 0) + 1
-            found[epoch.source] = fit_drive(epoch, start)
-    return found
-
-
-def observe(epoch: Epoch, settings: Settings, method: str, drive: DriveModel | None) -> Observation:
-    """Prepare one epoch.
-
-    Raises
-    ------
-    ValueError
-        If the epoch cannot be used; the text says why.
+    Attributes
+    ----------
+    name : str
+    observe : callable
+        Makes the lines of an epoch.
+    linearise : callable
+        Makes the linear problems at given parameters.
+    keeps_problem : bool
+        Single epochs use the problem of the pooled estimate as it is.
     """
-    obstacle = before_fit(epoch, settings.estimation) or closed_loop_obstacle(epoch)
-    if obstacle:
-        raise ValueError(obstacle)
-    estimation, rig = settings.estimation, settings.rig
-    torque, perturbation = epoch.channels["torque_nm"], _even(epoch.channels["perturbation_nm"])
-    limiting = [torque] if drive is not None else [torque, *motion_channels(epoch)]
-    slowest = min(channel.rate_hz for channel in limiting)
-    high = min(estimation.band_high_closed_loop_hz, USABLE_FRACTION_OF_RATE * slowest)
-    periods = 0
 
-    def samples(available: int, rate_hz: float) -> int:
-        nonlocal periods
-        periods, count = whole_periods(perturbation, rate_hz, available)
-        return count
+    name: str
+    observe: Callable[[PreparedEpoch], Observation]
+    linearise: Linearise
+    keeps_problem: bool = True
 
-    grid = epoch_grid(
-        epoch,
-        (estimation.band_low_hz, high),
-        estimation.trim_s,
-        samples if method == "spectral" else None,
-    )
-    assumed = drive or DriveModel(
-        min(rig.drive_bandwidth_hz, 0.45 * perturbation.mean_rate_hz), rig.drive_damping_ratio
-    )
-    excited = grid.line % periods == 0 if periods else np.ones(grid.line.size, dtype=np.bool_)
-    loop = loop_of(settings, torque.rate_hz, assumed)
-    late_ns = round((grid.time_s[0] - perturbation.time_s[0]) * 1e9)
-    sequence = hashlib.sha256(perturbation.values.tobytes()).digest()
-    return Observation(
-        epoch_lines(epoch, grid, drive),
-        perturbation,
-        loop,
-        excited,
-        (
-            sequence,
-            loop,
-            late_ns,
-            grid.time_s.size,
-            round(1e6 * grid.rate_hz),
-            int(grid.line[0]),
-            int(grid.line[-1]),
-        ),
-    )
+
+CLOSED_LOOP: Mapping[str, LineMethod] = {
+    "iv": LineMethod("iv", observe, instrumental),
+    "spectral": LineMethod("spectral", observe_periods, periodic),
+    "ml": LineMethod("ml", observe, output_error, keeps_problem=False),
+}
+"""The methods that need the perturbation."""
+
+
+class _Member(NamedTuple):
+    """An epoch that could be observed, and its place among all."""
+
+    place: int
+    epoch: Epoch
+    observation: Observation
 
 
 def fit_closed_loop(
-    method: str,
-    epochs: Sequence[Epoch],
-    settings: Settings,
+    method: LineMethod,
+    epochs: Sequence[PreparedEpoch],
     inertia_kg_m2: float | None = None,
     progress: Progress = lambda _: None,
+    pooled: bool = True,
 ) -> tuple[list[Fit], list[Fit]]:
     """Fit J, B and K (or B and K at a given inertia) to every epoch and to each condition.
 
-    Parameters
-    ----------
-    method : str
-        A key of `CLOSED_LOOP`.
-    epochs : sequence of Epoch
-    settings : Settings
-        Controller, rig and estimation.
-    inertia_kg_m2 : float, optional
-        Hold J at this value.
-    progress : callable
-        Called with the name of each epoch once it is done.
-
-    Returns
-    -------
-    fits : list of Fit
-        One for each epoch, in order; one that could not be fitted has failed, with the reason.
-    pooled : list of Fit
-        One for each condition with an epoch that counts, and one for all of them together where
-        there are several; their `epoch` is ``pooled``.
+    Parameters and values are those of `method_record.FitEpochs`.
     """
-    linearise = CLOSED_LOOP[method]
-    estimation = settings.estimation
-    draws = estimation.bootstrap_draws if estimation.intervals == "bootstrap" else 0
-    if inertia_kg_m2 is not None:
-        linearise = _holding(linearise, inertia_kg_m2)
-    drive_of = drives(epochs, settings)
-    fits: list[Fit | None] = [None] * len(epochs)
-    groups: dict[str, list[tuple[int, Observation]]] = {}
-    for place, epoch in enumerate(epochs):
+    fits: dict[int, Fit] = {}
+    groups: dict[str, list[_Member]] = {}
+    for place, prepared in enumerate(epochs):
         try:
-            observation = observe(epoch, settings, method, drive_of[epoch.source])
+            observation = prepared.once(method.observe)
         except ValueError as error:
-            fits[place] = _without_numbers(epoch, method, str(error))
-            progress(epoch.name)
+            fits[place] = _without_numbers(prepared.epoch, method.name, str(error))
+            progress(1.0)
             continue
-        groups.setdefault(epoch.condition, []).append((place, observation))
-    pooled = []
-    counting: list[tuple[int, Observation]] = []
+        member = _Member(place, prepared.epoch, observation)
+        groups.setdefault(prepared.epoch.condition, []).append(member)
+    of_conditions = []
     for condition, members in groups.items():
-        good = [member for member in members if epochs[member[0]].closed.included]
-        counting += good
-        start = least_squares_start([observation for _, observation in (good or members)])
-        start = start if inertia_kg_m2 is None else start[1:]
-        shared: LineFit | None = None
-        made: dict[int, Problem] = {}
-        if good:
-            try:
-                shared, problems = fit_pooled([o for _, o in good], linearise, start, draws)
-            except ValueError:
-                shared = None  # each epoch will say why
-            else:
-                made = {place: p for (place, _), p in zip(good, problems, strict=True)}
-                pooled.append(_pooled_fit(method, condition, shared, good, epochs, inertia_kg_m2))
-        singles: dict[int, LineFit] = {}
-        for place, observation in members:
-            epoch = epochs[place]
-            share = shared if shared is not None and len(good) >= SHARED_FROM else None
-            reuse = made.get(place) if method != "ml" else None
-            try:
-                fit = fit_single(
-                    observation,
-                    linearise,
-                    shared.values if shared is not None else start,
-                    share.shape if share is not None else None,
-                    reuse if share is not None else None,
-                    draws,
-                )
-            except ValueError as error:
-                fits[place] = _without_numbers(epoch, method, str(error))
-            else:
-                fits[place] = _epoch_fit(epoch, method, fit, observation, inertia_kg_m2)
-                singles[place] = fit
-            progress(epoch.name)
-        if shared is not None:
-            finding = _misfit(good, made, singles, settings)
-            if finding is not None:
-                pooled[-1] = replace(pooled[-1], findings=(finding,))
-    if len(groups) > 1 and counting:
-        start = least_squares_start([observation for _, observation in counting])
-        start = start if inertia_kg_m2 is None else start[1:]
+        settings = epochs[members[0].place].settings
+        own, together = _fit_condition(
+            method, condition, members, settings, inertia_kg_m2, progress
+        )
+        fits |= own
+        of_conditions += together
+    if pooled and len(groups) > 1:
+        counting = [m for members in groups.values() for m in members if m.epoch.closed.included]
+        of_conditions += _fit_all(method, counting, epochs[0].settings, inertia_kg_m2)
+    return [fits[place] for place in range(len(epochs))], of_conditions if pooled else []
+
+
+def _fit_condition(
+    method: LineMethod,
+    condition: str,
+    members: Sequence[_Member],
+    settings: Settings,
+    inertia_kg_m2: float | None,
+    progress: Progress,
+) -> tuple[dict[int, Fit], list[Fit]]:
+    """Return the fit of each epoch of a condition, and that of all of them that count."""
+    linearise, draws = _problems(method, inertia_kg_m2), _draws(settings)
+    good = [member for member in members if member.epoch.closed.included]
+    start = _start(good or members, inertia_kg_m2)
+    shared: LineFit | None = None
+    made: dict[int, Problem] = {}
+    if good:
         try:
-            everything, _ = fit_pooled([o for _, o in counting], linearise, start, draws)
+            shared, problems = fit_pooled([m.observation for m in good], linearise, start, draws)
         except ValueError:
-            pass  # as the conditions have
+            pass  # each epoch will say why
         else:
-            pooled.append(_pooled_fit(method, "", everything, counting, epochs, inertia_kg_m2))
-    return [fit for fit in fits if fit is not None], pooled
+            made = {member.place: p for member, p in zip(good, problems, strict=True)}
+    progress(POOLED_SHARE * len(members))
+    # Few epochs do not know the shape of their noise together any better than each alone.
+    share = shared if len(good) >= SHARED_FROM else None
+    fits: dict[int, Fit] = {}
+    singles: dict[int, LineFit] = {}
+    for place, epoch, observation in members:
+        try:
+            fit = fit_single(
+                observation,
+                linearise,
+                shared.values if shared is not None else start,
+                share.shape if share is not None else None,
+                made.get(place) if share is not None and method.keeps_problem else None,
+                draws,
+            )
+        except ValueError as error:
+            fits[place] = _without_numbers(epoch, method.name, str(error))
+        else:
+            fits[place] = _epoch_fit(epoch, method.name, fit, observation, inertia_kg_m2)
+            singles[place] = fit
+        progress(1.0 - POOLED_SHARE)
+    if shared is None:
+        return fits, []
+    finding = _misfit(good, made, singles, settings)
+    together = _pooled_fit(method.name, condition, shared, good, inertia_kg_m2)
+    return fits, [together if finding is None else replace(together, findings=(finding,))]
+
+
+def _fit_all(
+    method: LineMethod,
+    members: Sequence[_Member],
+    settings: Settings,
+    inertia_kg_m2: float | None,
+) -> list[Fit]:
+    """Return the fit of the epochs of all conditions, if there is one."""
+    if not members:
+        return []
+    linearise, start = _problems(method, inertia_kg_m2), _start(members, inertia_kg_m2)
+    observations = [member.observation for member in members]
+    try:
+        everything, _ = fit_pooled(observations, linearise, start, _draws(settings))
+    except ValueError:
+        return []  # the epochs have said why
+    return [_pooled_fit(method.name, "", everything, members, inertia_kg_m2)]
+
+
+def _problems(method: LineMethod, inertia_kg_m2: float | None) -> Linearise:
+    return method.linearise if inertia_kg_m2 is None else holding(method.linearise, inertia_kg_m2)
+
+
+def _start(members: Sequence[_Member], inertia_kg_m2: float | None) -> Array:
+    start = least_squares_start([member.observation for member in members])
+    return start if inertia_kg_m2 is None else start[1:]
+
+
+def _draws(settings: Settings) -> int:
+    estimation = settings.estimation
+    return estimation.bootstrap_draws if estimation.intervals == "bootstrap" else 0
 
 
 def _misfit(
-    good: Sequence[tuple[int, Observation]],
+    good: Sequence[_Member],
     made: Mapping[int, Problem],
     singles: Mapping[int, LineFit],
     settings: Settings,
 ) -> Finding | None:
     """Return what the epochs of the commonest sequence leave of their response to it."""
-    groups: dict[Hashable, list[int]] = {}
-    for place, observation in good:
-        if place in singles:
-            groups.setdefault(observation.response_key, []).append(place)
-    places = max(groups.values(), key=len, default=[])
-    of_place = dict(good)
+    groups: dict[Hashable, list[_Member]] = {}
+    for member in good:
+        if member.place in singles:
+            groups.setdefault(member.observation.response_key, []).append(member)
+    most = max(groups.values(), key=len, default=[])
     parts = misfits(
-        [of_place[place] for place in places],
-        [made[place] for place in places],
-        [singles[place] for place in places],
+        [member.observation for member in most],
+        [made[member.place] for member in most],
+        [singles[member.place] for member in most],
     )
     return worst_misfit(parts, settings.diagnostics)
-
-
-def _holding(linearise: Linearise, inertia_kg_m2: float) -> Linearise:
-    """Return the problems of B and K alone (Eq. 7)."""
-
-    def held(observations: Sequence[Observation], values: Array) -> list[Problem]:
-        full = linearise(observations, np.concatenate(([inertia_kg_m2], values)))
-        return [
-            Problem(
-                problem.instruments[:, 1:],
-                problem.regressors[:, 1:],
-                problem.target - inertia_kg_m2 * problem.regressors[:, 0],
-            )
-            for problem in full
-        ]
-
-    return held
-
-
-def least_squares_start(observations: Sequence[Observation]) -> Array:
-    """Return where to begin: least squares, kept where the loop can be simulated; shape (3,)."""
-    gram, moment = np.zeros((3, 3)), np.zeros(3)
-    for problem in direct(observations, np.empty(0)):
-        gram += (problem.regressors.conj().T @ problem.regressors).real
-        moment += (problem.regressors.conj().T @ problem.target).real
-    scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(np.float64).tiny))
-    values = np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale
-    return np.asarray(np.maximum(values, 10 * LEAST), dtype=np.float64)
 
 
 def _estimate(fit: LineFit, inertia_kg_m2: float | None) -> Estimate:
@@ -364,14 +274,13 @@ def _pooled_fit(
     method: str,
     condition: str,
     fit: LineFit,
-    members: Sequence[tuple[int, Observation]],
-    epochs: Sequence[Epoch],
+    members: Sequence[_Member],
     inertia_kg_m2: float | None,
 ) -> Fit:
     """Return the estimate from all epochs of a condition; its statistics are over all of them."""
     singles = [
-        _epoch_fit(epochs[place], method, fit, observation, inertia_kg_m2)
-        for place, observation in members
+        _epoch_fit(member.epoch, method, fit, member.observation, inertia_kg_m2)
+        for member in members
     ]
     sources = dict.fromkeys(single.source for single in singles)
     weight = np.array([single.n_samples for single in singles], dtype=np.float64)
@@ -423,7 +332,7 @@ IV = Method(
     title="instrumental variables, made from the perturbation",
     needs=("perturbation_nm",),
     methods_text="by refined instrumental variables made from the known perturbation",
-    fit=partial(fit_closed_loop, "iv"),
+    fit=partial(fit_closed_loop, CLOSED_LOOP["iv"]),
     references=("riv", "riv_loop"),
     intervals_text=_intervals_text,
     pooled_text=_POOLED_TEXT,
@@ -434,7 +343,7 @@ SPECTRAL = Method(
     title="instrumental variables at the lines of a periodic perturbation",
     needs=("perturbation_nm",),
     methods_text="by instrumental variables at the lines of the periodic perturbation",
-    fit=partial(fit_closed_loop, "spectral"),
+    fit=partial(fit_closed_loop, CLOSED_LOOP["spectral"]),
     intervals_text=_intervals_text,
     pooled_text=_POOLED_TEXT,
 )
@@ -444,7 +353,7 @@ ML = Method(
     needs=("perturbation_nm",),
     methods_text="by maximum likelihood of the torque that the perturbation causes in the whole "
     "loop",
-    fit=partial(fit_closed_loop, "ml"),
+    fit=partial(fit_closed_loop, CLOSED_LOOP["ml"]),
     intervals_text=_intervals_text,
     pooled_text=_POOLED_TEXT,
 )

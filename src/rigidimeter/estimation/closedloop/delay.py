@@ -6,7 +6,7 @@ If the torque is stamped τ after the motion that it belongs to, every line turn
 
 With J, B and K alone the turn looks like more damping and less inertia at low frequency, but its
 part τ J ω³ is like nothing else, so τ is estimated beside them. It is common to a source: one
-amplifier, one bus. The instruments are those of `instruments` turned alike, so a subject who pushes
+amplifier, one bus. The instruments are those of ``iv`` turned alike, so a subject who pushes
 does not move it.
 """
 
@@ -16,14 +16,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigidimeter.estimation.closedloop.instruments import instrumental
-from rigidimeter.estimation.closedloop.refine import (
-    Linearise,
-    LineFit,
-    Observation,
-    Problem,
-    fit_pooled,
-)
+from rigidimeter.estimation.closedloop.linear_problems import Linearise, Problem, instrumental
+from rigidimeter.estimation.closedloop.observation import Observation
+from rigidimeter.estimation.closedloop.refine import LineFit, fit_pooled
 from rigidimeter.estimation.signals import Array
 
 SCAN_STEP_S = 0.005
@@ -35,13 +30,7 @@ MOST_VALLEYS = 3
 SCAN_HIGH_HZ = 20.0
 """And is made below this frequency."""
 
-__all__ = ["SCAN_STEP_S", "delayed", "direct", "estimate_delay"]
-
-
-def direct(observations: Sequence[Observation], values: Array) -> list[Problem]:
-    """Return the problems of least squares: the measured motion is its own instrument."""
-    del values  # they do not depend on the parameters
-    return [Problem(lines.motion, lines.motion, lines.torque_nm) for lines, *_ in observations]
+__all__ = ["SCAN_STEP_S", "estimate_delay"]
 
 
 def delayed(linearise: Linearise) -> Linearise:

@@ -19,14 +19,11 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from rigidimeter.dynamics import DriveModel
-from rigidimeter.estimation.closedloop.closed_loop_fit import (
-    CLOSED_LOOP,
-    drives,
-    least_squares_start,
-    observe,
-)
-from rigidimeter.estimation.closedloop.refine import Observation, fit_pooled
+from rigidimeter.estimation.closedloop.linear_problems import instrumental, least_squares_start
+from rigidimeter.estimation.closedloop.observation import Observation, observe
+from rigidimeter.estimation.closedloop.refine import fit_pooled
 from rigidimeter.estimation.closedloop.spectral_lines import SAME_TIME, Grid
+from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Epoch
 from rigidimeter.settings import Settings
@@ -55,17 +52,17 @@ class EpochStream:
     """
 
     def __init__(self, first: Sequence[Epoch], settings: Settings) -> None:
-        drive_of = drives(first, settings)
-        observations = [observe(epoch, settings, "iv", drive_of[epoch.source]) for epoch in first]
+        prepared = prepare(first, settings)
+        observations = [observe(epoch) for epoch in prepared]
         start = least_squares_start(observations)
-        fit, problems = fit_pooled(observations, CLOSED_LOOP["iv"], start)
+        fit, problems = fit_pooled(observations, instrumental, start)
         self._epoch, observation = first[0], observations[0]
         self._grid: Grid = observation.lines.grid
         self._offset_s = float(self._grid.time_s[0] - self._epoch.channels["torque_nm"].time_s[0])
         self._stamps_s = self._grid.time_s - self._grid.time_s[0]
         weight = fit.shape.at(observation.lines)
         self._weighted: Complex = problems[0].instruments / weight[:, None]
-        self._ratio = self._sampled_ratio(observation, drive_of[first[0].source])
+        self._ratio = self._sampled_ratio(observation, prepared[0].source.drive)
         for epoch in first:
             self._values(epoch)
         self._count = 0

@@ -18,7 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from rigidimeter.estimation.closedloop.refine import LineFit, Observation, Problem
+from rigidimeter.estimation.closedloop.linear_problems import Problem
+from rigidimeter.estimation.closedloop.observation import Observation
+from rigidimeter.estimation.closedloop.refine import LineFit
 from rigidimeter.records import Finding
 from rigidimeter.settings import DiagnosticsSettings
 

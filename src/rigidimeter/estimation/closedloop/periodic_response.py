@@ -1,4 +1,4 @@
-"""The periodic response: what repeats with the perturbation, against what does not.
+"""Torque over angle at the lines of a periodic perturbation: the joint without a model.
 
 Over P whole periods the response to a periodic perturbation is in every P-th line; the lines in
 between hold nothing but noise, so signal and noise are seen apart in one epoch. The ratio at the
@@ -6,11 +6,8 @@ excited lines,
 
     γ²(f) = |response|² / (|response|² + noise)
 
-is the coherence between perturbation and torque. J, B and K are fitted to the excited lines alone,
-each weighted with the inverse of the noise beside it: γ²/(1 − γ²) times the response.
-
-The ratio of torque to angle at the excited lines is the impedance of the joint, K − J ω² + i B ω,
-without any model: `impedance` gives it for a figure.
+is the coherence between perturbation and torque, and the ratio of torque to angle the impedance of
+the joint, K − J ω² + i B ω.
 """
 
 from __future__ import annotations
@@ -20,19 +17,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
-from rigidimeter.estimation.closedloop.instruments import instrumental
-from rigidimeter.estimation.closedloop.refine import Observation, Problem
+from rigidimeter.estimation.closedloop.observation import Observation
 from rigidimeter.estimation.signals import Array
-from rigidimeter.records import Channel
 
-__all__ = ["Impedance", "impedance", "period_s", "periodic", "whole_periods"]
+__all__ = ["Impedance", "impedance"]
 
 Complex = NDArray[np.complex128]
-
-REPEATS = 0.999
-"""The correlation of a perturbation with itself one period later, at least."""
 
 
 class Impedance(NamedTuple):
@@ -41,57 +32,6 @@ class Impedance(NamedTuple):
     frequency_hz: Array
     impedance_nm_rad: Complex
     coherence: Array
-
-
-def period_s(perturbation: Channel) -> float | None:
-    """Return the shortest period of a perturbation; None if it does not repeat within the epoch."""
-    values = perturbation.values - np.mean(perturbation.values)
-    n = values.size
-    spectrum = fft.rfft(values, 2 * n)
-    products = fft.irfft(np.abs(spectrum) ** 2)[: n // 2 + 1]
-    power = np.concatenate(([0.0], np.cumsum(values**2)))
-    lag = np.arange(products.size)
-    scale = np.sqrt((power[n] - power[lag]) * power[n - lag])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        correlation = products / scale
-    low = np.flatnonzero(correlation < 0.5)
-    if low.size == 0:
-        return None
-    again = np.flatnonzero(correlation[low[0] :] > REPEATS)
-    if again.size == 0:
-        return None
-    # The best of the neighbours: a period need not be a whole number of ticks.
-    first = low[0] + again[0]
-    near = slice(first, min(first + 3, products.size))
-    return float(first + np.argmax(correlation[near])) / perturbation.mean_rate_hz
-
-
-def whole_periods(perturbation: Channel, grid_rate_hz: float, samples: int) -> tuple[int, int]:
-    """Return how many whole periods an epoch holds, and how many samples they are.
-
-    Raises
-    ------
-    ValueError
-        If the epoch does not hold two whole periods.
-    """
-    period = period_s(perturbation)
-    periods = 0 if period is None else int(samples / grid_rate_hz / period + 1e-6)
-    if period is None or periods < 2:
-        raise ValueError(
-            "the spectral method needs two whole periods of the perturbation in an epoch; "
-            "use --method iv"
-        )
-    return periods, round(periods * period * grid_rate_hz)
-
-
-def periodic(observations: Sequence[Observation], values: Array) -> list[Problem]:
-    """Return the problems of the excited lines: the others have no weight but show the noise."""
-    return [
-        problem._replace(instruments=problem.instruments * observation.excited[:, None])
-        for observation, problem in zip(
-            observations, instrumental(observations, values), strict=True
-        )
-    ]
 
 
 def impedance(observations: Sequence[Observation]) -> Impedance:

@@ -11,20 +11,19 @@ known from so many lines that it need not be smoothed over neighbours that diffe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.dynamics import Loop
 from rigidimeter.estimation.closedloop.line_noise import Smoother, drawn_lines, line_covariance
+from rigidimeter.estimation.closedloop.linear_problems import Linearise, Problem
+from rigidimeter.estimation.closedloop.observation import Observation
 from rigidimeter.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.estimation.signals import Array
-from rigidimeter.records import Channel
 
-__all__ = ["LineFit", "Observation", "Problem", "Shape", "fit_pooled", "fit_single"]
+__all__ = ["LineFit", "Shape", "fit_pooled", "fit_single"]
 
 Complex = NDArray[np.complex128]
 
@@ -55,34 +54,6 @@ estimate; of fewer it is the larger of scatter and lines."""
 
 SHARED_FROM = 4
 """From this many epochs on, they share the shape of their noise."""
-
-
-class Observation(NamedTuple):
-    """One epoch, ready: its lines, the perturbation at its ticks, and the loop it ran in.
-
-    `excited` says at which lines a periodic perturbation has power; everywhere where it is not
-    periodic. Epochs with the same `response_key` have the same response to the perturbation.
-    """
-
-    lines: Lines
-    perturbation: Channel
-    loop: Loop
-    excited: NDArray[np.bool_]
-    response_key: Hashable
-
-
-class Problem(NamedTuple):
-    """The linear problem at given parameters.
-
-    `instruments` and `regressors` have shape (m, p), `target` (m,).
-    """
-
-    instruments: Complex
-    regressors: Complex
-    target: Complex
-
-
-Linearise = Callable[[Sequence[Observation], Array], list[Problem]]
 
 
 @dataclass(frozen=True)

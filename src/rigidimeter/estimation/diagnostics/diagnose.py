@@ -10,9 +10,8 @@ from rigidimeter.estimation.diagnostics.check_record import Case, Check
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
-from rigidimeter.estimation.screening import before_fit
-from rigidimeter.records import Epoch, Finding, Fit, Outcome
-from rigidimeter.settings import Settings
+from rigidimeter.estimation.prepared import PreparedEpoch
+from rigidimeter.records import Finding, Fit, Outcome
 from rigidimeter.units import rad_from_deg
 
 __all__ = ["CHECKS", "checked", "diagnose"]
@@ -41,13 +40,12 @@ def diagnose(case: Case) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-def checked(epoch: Epoch, fit: Fit, settings: Settings) -> Fit:
+def checked(prepared: PreparedEpoch, fit: Fit) -> Fit:
     """Return the fit with what the checks found, excluded if one of them says so."""
-    if fit.n_samples == 0:
-        return fit
-    if before_fit(epoch, settings.estimation):
+    epoch, settings = prepared.epoch, prepared.settings
+    if fit.n_samples == 0 or prepared.obstacle:
         return fit  # the fit has said why
-    signals = bandlimited_signals(epoch, settings.estimation)
+    signals = prepared.signals(bandlimited_signals)
     from_session = epoch.excitation_hz is not None
     limit_rad = rad_from_deg(settings.guard.position_limit_deg) if from_session else None
     case = Case(epoch, signals, fit.value, settings.diagnostics, position_limit_rad=limit_rad)

@@ -8,10 +8,10 @@ import numpy as np
 
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import aligned, epoch_signals
-from rigidimeter.estimation.closedloop.closed_loop_fit import drives, observe
+from rigidimeter.estimation.closedloop.observation import Observation, observe_periods
 from rigidimeter.estimation.closedloop.periodic_response import impedance as without_model
-from rigidimeter.estimation.closedloop.refine import Observation
 from rigidimeter.estimation.diagnostics import reconstructed_torque_nm
+from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Epoch, Fit
 from rigidimeter.reporting.figures import condition_colours
 from rigidimeter.reporting.figures.impedance import Response, impedance
@@ -82,11 +82,10 @@ def impedance_pictures(study: StudyResult) -> list[Picture]:
 
 def _observations(study: StudyResult, epochs: Sequence[Epoch]) -> list[Observation]:
     """Return the epochs that can be seen at the lines of their perturbation."""
-    drive_of = drives(epochs, study.settings)
     found = []
-    for epoch in epochs:
+    for epoch in prepare(epochs, study.settings):
         try:
-            found.append(observe(epoch, study.settings, "spectral", drive_of[epoch.source]))
+            found.append(observe_periods(epoch))
         except ValueError:
             continue  # it does not repeat, or was not recorded: the page says what is needed
     return found

@@ -5,7 +5,8 @@ import pytest
 
 from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.estimation import aligned, estimate_delays
-from rigidimeter.estimation.closedloop.periodic_response import period_s
+from rigidimeter.estimation.closedloop.observation import period_s
+from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Channel
 
 
@@ -20,7 +21,7 @@ def late(epoch, delay_s):
 def test_an_injected_delay_is_found_and_taken_out(simulated, rig, delay_s):
     settings, epochs = simulated(2, voluntary_sd_nm=0.1, **rig)
     moved = [late(epoch, delay_s) for epoch in epochs]
-    (found,) = estimate_delays({epochs[0].source: moved}, settings)
+    (found,) = estimate_delays({epochs[0].source: prepare(moved, settings)})
     assert found.delay_s == pytest.approx(delay_s, abs=5e-4)
     assert found.delay_s_se < 5e-4
     assert found.corrected
@@ -30,13 +31,13 @@ def test_an_injected_delay_is_found_and_taken_out(simulated, rig, delay_s):
 
 def test_a_latency_that_the_stamps_do_not_know_is_a_delay(simulated):
     settings, epochs = simulated(3, torque={"latency_s": 0.005, "stamp_latency_s": 0.001})
-    (found,) = estimate_delays({epochs[0].source: epochs}, settings)
+    (found,) = estimate_delays({epochs[0].source: prepare(epochs, settings)})
     assert found.delay_s == pytest.approx(0.004, abs=2e-4)
 
 
 def test_no_delay_changes_nothing(simulated):
     settings, epochs = simulated(2)
-    (found,) = estimate_delays({epochs[0].source: epochs}, settings)
+    (found,) = estimate_delays({epochs[0].source: prepare(epochs, settings)})
     assert abs(found.delay_s) < 1e-4
     assert not found.corrected
     assert aligned(epochs[0], [found]) is epochs[0]
@@ -45,15 +46,15 @@ def test_no_delay_changes_nothing(simulated):
 def test_without_the_perturbation_it_is_said_and_not_corrected(simulated):
     settings, (epoch,) = simulated()
     kept = {k: c for k, c in epoch.channels.items() if k != "perturbation_nm"}
-    (found,) = estimate_delays({"file": [late(replace(epoch, channels=kept), 0.004)]}, settings)
+    moved = prepare([late(replace(epoch, channels=kept), 0.004)], settings)
+    (found,) = estimate_delays({"file": moved})
     assert found.delay_s == pytest.approx(0.004, abs=5e-4)
     assert not found.corrected
     assert "without the recorded perturbation" in found.remark
 
 
-def test_a_source_without_perturbation_epochs_says_so(simulated):
-    settings, _ = simulated()
-    (found,) = estimate_delays({"file": []}, settings)
+def test_a_source_without_perturbation_epochs_says_so():
+    (found,) = estimate_delays({"file": []})
     assert np.isnan(found.delay_s)
     assert found.remark
 

@@ -5,7 +5,6 @@ import pytest
 
 from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.estimation import choose_method, fit_epochs
-from rigidimeter.estimation.closedloop import fit_closed_loop
 from rigidimeter.records import Channel, Outcome
 from rigidimeter.settings import ControllerSettings
 
@@ -102,7 +101,7 @@ def test_conditions_are_pooled_apart_and_together(simulated):
 def test_an_epoch_that_did_not_end_well_does_not_count_in_the_pool(simulated):
     settings, epochs = simulated(3)
     bad = replace(epochs[0], closed=Outcome("excluded", "it touched the limit"))
-    fits, (pooled,) = fit_closed_loop("iv", [bad, *epochs[1:]], settings)
+    fits, (pooled,) = fit_epochs([bad, *epochs[1:]], "iv", settings)
     assert [fit.outcome.kind for fit in fits] == ["excluded", "included", "included"]
     assert pooled.n_samples == fits[1].n_samples + fits[2].n_samples
 
@@ -128,7 +127,7 @@ def test_an_epoch_that_did_not_end_well_does_not_count_in_the_pool(simulated):
 )
 def test_an_epoch_that_cannot_be_fitted_says_why(simulated, change, words):
     settings, (epoch,) = simulated()
-    (fit,), pooled = fit_closed_loop("iv", [change(epoch)], settings)
+    (fit,), pooled = fit_epochs([change(epoch)], "iv", settings)
     assert fit.outcome.kind == "failed"
     assert words in fit.outcome.reason
     assert pooled == []
@@ -139,7 +138,7 @@ def test_spectral_needs_two_periods(simulated):
     short = replace(epoch, channels={
         k: Channel(k, c.time_s[:11000], c.values[:11000]) for k, c in epoch.channels.items()
     })  # fmt: skip
-    (fit,), _ = fit_closed_loop("spectral", [short], settings)
+    (fit,), _ = fit_epochs([short], "spectral", settings)
     assert "two whole periods" in fit.outcome.reason
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.estimation import fit_epochs
-from rigidimeter.estimation.closedloop import EpochStream
+from rigidimeter.estimation.closedloop.epoch_stream import EpochStream
 from rigidimeter.records import Channel
 
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")

@@ -1,0 +1,205 @@
+"""One epoch as the methods of the closed loop see it: its lines, and what perturbed it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Hashable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from rigidimeter.dynamics import DriveModel
+from rigidimeter.estimation.bandlimited import band_hz
+from rigidimeter.estimation.closedloop.drive_fit import loop_of
+from rigidimeter.estimation.closedloop.excitation import Excitation, excitation
+from rigidimeter.estimation.closedloop.spectral_lines import Grid, Lines, epoch_grid, epoch_lines
+from rigidimeter.estimation.prepared import PreparedEpoch
+from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE
+from rigidimeter.estimation.signals import motion_channels
+from rigidimeter.records import Channel, Epoch
+
+__all__ = [
+    "Observation",
+    "closed_loop_obstacle",
+    "observe",
+    "observe_motion",
+    "observe_periods",
+    "period_s",
+    "whole_periods",
+]
+
+REPEATS = 0.999
+"""The correlation of a perturbation with itself one period later, at least."""
+
+
+class Observation(NamedTuple):
+    """One epoch, ready.
+
+    Attributes
+    ----------
+    lines : Lines
+    perturbation : Channel
+        At every tick.
+    excitation : Excitation or None
+        The loop that the epoch ran in; None where the perturbation is not known.
+    excited : array of bool, shape (m,)
+        The lines at which a periodic perturbation has power; all where it is not periodic.
+    response_key : hashable
+        Epochs with the same one have the same response to the perturbation.
+    """
+
+    lines: Lines
+    perturbation: Channel
+    excitation: Excitation | None
+    excited: NDArray[np.bool_]
+    response_key: Hashable
+
+
+def closed_loop_obstacle(epoch: Epoch) -> str:
+    """Return why the methods of the closed loop cannot be used, or an empty text."""
+    perturbation = epoch.channels.get("perturbation_nm")
+    if perturbation is None:
+        return "perturbation_nm was not recorded"
+    if len(perturbation) < 2 or not np.all(np.isfinite(perturbation.values)):
+        return "perturbation_nm holds no samples or numbers that are not finite"
+    if float(np.ptp(perturbation.values)) == 0.0:
+        return "perturbation_nm is constant"
+    torque = epoch.channels.get("torque_nm")
+    if torque is not None and np.array_equal(torque.values, perturbation.values):
+        return "perturbation_nm holds the same numbers as torque_nm"
+    return ""
+
+
+def observe(prepared: PreparedEpoch) -> Observation:
+    """Return an epoch at all lines of the band.
+
+    Raises
+    ------
+    ValueError
+        If the epoch cannot be used; the text says why.
+    """
+    perturbation = _perturbation(prepared)
+    grid = _grid(prepared, None)
+    return _observed(prepared, perturbation, grid, np.ones(grid.line.size, dtype=np.bool_))
+
+
+def observe_periods(prepared: PreparedEpoch) -> Observation:
+    """Return whole periods of an epoch, so that the perturbation is in some of the lines alone.
+
+    Raises
+    ------
+    ValueError
+        If the epoch cannot be used, or does not hold two whole periods; the text says why.
+    """
+    perturbation = _perturbation(prepared)
+    periods = 0
+
+    def samples(available: int, rate_hz: float) -> int:
+        nonlocal periods
+        periods, count = whole_periods(perturbation, rate_hz, available)
+        return count
+
+    grid = _grid(prepared, samples)
+    return _observed(prepared, perturbation, grid, grid.line % periods == 0)
+
+
+def observe_motion(prepared: PreparedEpoch) -> Observation:
+    """Return an epoch whose perturbation is not known, in the band of least squares."""
+    epoch, estimation = prepared.epoch, prepared.settings.estimation
+    grid = epoch_grid(epoch, band_hz(epoch, estimation), estimation.trim_s)
+    everywhere = np.ones(grid.line.size, dtype=np.bool_)
+    lines = epoch_lines(epoch, grid, None)
+    return Observation(lines, epoch.channels["torque_nm"], None, everywhere, None)
+
+
+def period_s(perturbation: Channel) -> float | None:
+    """Return the shortest period of a perturbation; None if it does not repeat within the epoch."""
+    values = perturbation.values - np.mean(perturbation.values)
+    n = values.size
+    spectrum = fft.rfft(values, 2 * n)
+    products = fft.irfft(np.abs(spectrum) ** 2)[: n // 2 + 1]
+    power = np.concatenate(([0.0], np.cumsum(values**2)))
+    lag = np.arange(products.size)
+    scale = np.sqrt((power[n] - power[lag]) * power[n - lag])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = products / scale
+    low = np.flatnonzero(correlation < 0.5)
+    if low.size == 0:
+        return None
+    again = np.flatnonzero(correlation[low[0] :] > REPEATS)
+    if again.size == 0:
+        return None
+    # The best of the neighbours: a period need not be a whole number of ticks.
+    first = low[0] + again[0]
+    near = slice(first, min(first + 3, products.size))
+    return float(first + np.argmax(correlation[near])) / perturbation.mean_rate_hz
+
+
+def whole_periods(perturbation: Channel, grid_rate_hz: float, samples: int) -> tuple[int, int]:
+    """Return how many whole periods an epoch holds, and how many samples they are.
+
+    Raises
+    ------
+    ValueError
+        If the epoch does not hold two whole periods.
+    """
+    period = period_s(perturbation)
+    periods = 0 if period is None else int(samples / grid_rate_hz / period + 1e-6)
+    if period is None or periods < 2:
+        raise ValueError(
+            "the spectral method needs two whole periods of the perturbation in an epoch; "
+            "use --method iv"
+        )
+    return periods, round(periods * period * grid_rate_hz)
+
+
+def _perturbation(prepared: PreparedEpoch) -> Channel:
+    obstacle = prepared.obstacle or closed_loop_obstacle(prepared.epoch)
+    if obstacle:
+        raise ValueError(obstacle)
+    return _even(prepared.epoch.channels["perturbation_nm"])
+
+
+def _even(perturbation: Channel) -> Channel:
+    """Return the perturbation at every tick: the last level is held where ticks are missing."""
+    spacing = np.diff(perturbation.time_s)
+    interval_s = float(np.median(spacing))
+    if float(np.ptp(spacing)) < 0.5 * interval_s:
+        return perturbation
+    count = int((perturbation.time_s[-1] - perturbation.time_s[0]) / interval_s + 0.5) + 1
+    time_s = perturbation.time_s[0] + interval_s * np.arange(count)
+    last = np.searchsorted(perturbation.time_s, time_s + 0.5 * interval_s, side="right") - 1
+    return Channel(perturbation.name, time_s, perturbation.values[np.maximum(last, 0)])
+
+
+def _grid(prepared: PreparedEpoch, samples: Callable[[int, float], int] | None) -> Grid:
+    epoch, estimation = prepared.epoch, prepared.settings.estimation
+    torque = epoch.channels["torque_nm"]
+    limiting = [torque] if prepared.source.drive else [torque, *motion_channels(epoch)]
+    slowest = min(channel.rate_hz for channel in limiting)
+    high = min(estimation.band_high_closed_loop_hz, USABLE_FRACTION_OF_RATE * slowest)
+    return epoch_grid(epoch, (estimation.band_low_hz, high), estimation.trim_s, samples)
+
+
+def _observed(
+    prepared: PreparedEpoch, perturbation: Channel, grid: Grid, excited: NDArray[np.bool_]
+) -> Observation:
+    epoch, rig = prepared.epoch, prepared.settings.rig
+    drive = prepared.source.drive
+    assumed = drive or DriveModel(
+        min(rig.drive_bandwidth_hz, 0.45 * perturbation.mean_rate_hz), rig.drive_damping_ratio
+    )
+    loop = loop_of(prepared.settings, epoch.channels["torque_nm"].rate_hz, assumed)
+    key = (
+        hashlib.sha256(perturbation.values.tobytes()).digest(),
+        loop,
+        round((grid.time_s[0] - perturbation.time_s[0]) * 1e9),
+        grid.time_s.size,
+        round(1e6 * grid.rate_hz),
+        int(grid.line[0]),
+        int(grid.line[-1]),
+    )
+    made = prepared.source.once(key, lambda: excitation(perturbation, loop, grid))
+    return Observation(epoch_lines(epoch, grid, drive), perturbation, made, excited, key)
