@@ -8,9 +8,8 @@ from rigidimeter.commissioning.commissioning_record import (
     write_record,
 )
 from rigidimeter.commissioning.coverage import check_record
-from rigidimeter.commissioning.manual_checks import Operator
 from rigidimeter.commissioning.sequence import commission
-from rigidimeter.commissioning.trial import Timebase
+from rigidimeter.commissioning.trial import Operator, Timebase
 
 __all__ = [
     "Check",

@@ -8,46 +8,17 @@ beforehand answers for none of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from rigidimeter.commissioning.checks import Check, impossible, untried, within, yes
-from rigidimeter.commissioning.trial import Timebase, freshen, hold, listen, trial
-from rigidimeter.devices.base import Rig
-from rigidimeter.settings import Settings
-from rigidimeter.settings.commissioning_settings import CommissioningSettings
+from rigidimeter.commissioning.trial import Operator, Setup, freshen, hold, listen, trial
 
-__all__ = ["Operator", "known_angle", "known_torque", "told"]
+__all__ = ["known_angle", "known_torque", "told"]
 
 SETTLE_S = 0.5
 KNOWN_ANGLE_S = 1.0
 ANGLE, TORQUE = "known angle", "known torque"
-
-
-@dataclass(frozen=True)
-class Operator:
-    """Who is asked and told.
-
-    Parameters
-    ----------
-    ask : callable
-        Puts a question; True is consent, or yes. Nothing has power while it waits.
-    say : callable
-        Is told what comes next.
-    present : bool
-        Whether somebody is there. If not, what only a person can do or tell is not asked.
-    known_torque_nm, known_angle_deg : float or None
-        A torque that hands or a weight put on the joint, toward positive angles; an angle by which
-        hands turn the joint.
-    """
-
-    ask: Callable[[str], bool]
-    say: Callable[[str], None] = lambda _: None
-    present: bool = True
-    known_torque_nm: float | None = None
-    known_angle_deg: float | None = None
 
 
 def told(operator: Operator, name: str, question: str, remedy: str) -> Check:
@@ -58,43 +29,40 @@ def told(operator: Operator, name: str, question: str, remedy: str) -> Check:
     return yes(name, good, "yes" if good else "no", "yes", remedy)
 
 
-def known_angle(
-    rig: Rig, settings: Settings, time: Timebase, operator: Operator, limits: CommissioningSettings
-) -> Check:
+def known_angle(setup: Setup) -> Check:
     """Compare an angle by which hands turn the joint, without power."""
-    wanted_deg, percent = operator.known_angle_deg, limits.scale_tolerance_percent
+    operator, percent = setup.operator, setup.limits.scale_tolerance_percent
+    wanted_deg = operator.known_angle_deg
     limit = f"as known ± {percent:g} %"
     if wanted_deg is None:
         return impossible(ANGLE, limit, "give --known-angle-deg to compare with")
     if not operator.present:
         return untried(ANGLE, limit)
-    rate_hz = settings.rig.tick_rate_hz
-    before_rad = _angle_rad(rig, time, rate_hz)
+    before_rad = _angle_rad(setup)
     if not operator.ask(f"Without power: turn the joint by {wanted_deg:+g} deg by hand. Done?"):
         return impossible(ANGLE, limit, "the operator did not do it")
-    turned_deg = math.degrees(_angle_rad(rig, time, rate_hz) - before_rad)
+    turned_deg = math.degrees(_angle_rad(setup) - before_rad)
     operator.ask("Turn it back to where it was. Done?")
     return within(ANGLE, turned_deg, "deg", wanted_deg, percent, _WRONG_SCALE)
 
 
-def known_torque(
-    rig: Rig, settings: Settings, time: Timebase, operator: Operator, limits: CommissioningSettings
-) -> Check:
+def known_torque(setup: Setup) -> Check:
     """Compare a torque put on by hand; the drive holds against it, so it reads the opposite."""
+    operator, limits = setup.operator, setup.limits
     known_nm, percent = operator.known_torque_nm, limits.known_tolerance_percent
     limit = f"as known ± {percent:g} %"
     if known_nm is None:
         return impossible(TORQUE, limit, "give --known-torque-nm to compare with")
     if not operator.present:
         return untried(TORQUE, limit)
-    before = trial(rig, settings, time, [hold(SETTLE_S)]).heard.torque_nm
+    before = trial(setup, hold(SETTLE_S)).heard.torque_nm
     held_s = limits.known_torque_s
     if not operator.ask(
         f"Put a torque of {known_nm:g} N·m on the joint, toward positive angles, and keep it for "
         f"{held_s + SETTLE_S:g} s after you agree; the drive will hold against it. Ready?"
     ):
         return impossible(TORQUE, limit, "the operator did not agree to it")
-    heard = trial(rig, settings, time, [hold(SETTLE_S + held_s)]).heard
+    heard = trial(setup, hold(SETTLE_S + held_s)).heard
     late = heard.torque_nm[heard.time_s > SETTLE_S]
     value = -float(np.nanmedian(late) - np.nanmedian(before)) if len(late) else math.nan
     operator.ask("Take the torque off again. Done?")
@@ -107,8 +75,8 @@ _WRONG_SCALE = (
 )
 
 
-def _angle_rad(rig: Rig, time: Timebase, rate_hz: float) -> float:
+def _angle_rad(setup: Setup) -> float:
     """Return the mean angle over a short while without power."""
-    freshen(rig, time, rate_hz)
-    heard = listen(rig, time, rate_hz, KNOWN_ANGLE_S)
+    freshen(setup)
+    heard = listen(setup, KNOWN_ANGLE_S)
     return float(np.nanmean(heard.angle_rad[len(heard.angle_rad) // 2 :]))

@@ -1,7 +1,7 @@
 """What a rig shows while it moves by a known little: directions, scales, delays, bandwidth.
 
 The motions go through loop and guard without any feedback, so what was commanded is known. First a
-nudge of a fraction of a degree: a scale that is wrong by 57 shows there, and nothing larger is
+move of a fraction of a degree: a scale that is wrong by 57 shows there, and nothing larger is
 tried. Then the swing, slow and known; then small quick steps of the velocity, pseudo-random, for
 delay and bandwidth.
 """
@@ -18,7 +18,6 @@ from rigidimeter.commissioning.response import (
     Following,
     arm_seen,
     following,
-    sent_angle_rad,
     velocity_scale,
 )
 from rigidimeter.commissioning.trial import Array, Heard, Tried, stopped_for
@@ -30,16 +29,17 @@ from rigidimeter.units import rad_from_deg
 
 __all__ = [
     "ANGLE_PER_COMMAND",
-    "nudge_check",
+    "COMPLETED",
+    "small_move_check",
+    "smooth_motion",
     "step_checks",
     "steps",
     "swing",
     "swing_checks",
-    "way",
 ]
 
-ANGLE_PER_COMMAND = "angle per command"
-NUDGE_PERCENT = 30.0
+ANGLE_PER_COMMAND, COMPLETED = "angle per command", "motions were completed"
+SMALL_MOVE_PERCENT = 30.0
 EXPLAINED = 0.5
 """A torque of which an arm explains less than this share shows no arm."""
 
@@ -48,34 +48,7 @@ PEAK = 1.875
 
 # Quick enough to show the drive's bandwidth, slow enough for a loop of 50 ticks/s.
 STEP_S = 0.04
-STEPS: tuple[int, ...] = (
-    1,
-    1,
-    1,
-    1,
-    1,
-    -1,
-    -1,
-    1,
-    1,
-    -1,
-    1,
-    -1,
-    -1,
-    1,
-    -1,
-    -1,
-    -1,
-    -1,
-    1,
-    -1,
-    1,
-    -1,
-    1,
-    1,
-    1,
-)
-STEPS += (-1, 1, 1, -1, -1, -1)
+STEPS = [1.0 if sign == "+" else -1.0 for sign in "+++++--++-+--+----+-+-+++-++---"]
 """A maximal-length sequence of 31; it is followed by its opposite, so that the arm comes back."""
 
 
@@ -85,27 +58,22 @@ def swing(settings: Settings, amplitude_deg: float, speed_deg_s: float, cycles: 
     amplitude_rad, speed_rad_s = rad_from_deg(amplitude_deg), rad_from_deg(speed_deg_s)
     twice = 2 * amplitude_rad
     distances = (amplitude_rad, *((-twice, twice) * cycles), -amplitude_rad)
-    return np.concatenate([way(distance, speed_rad_s, tick_s) for distance in distances])
+    return np.concatenate([smooth_motion(distance, speed_rad_s, tick_s) for distance in distances])
 
 
 def steps(settings: Settings, limits: CommissioningSettings) -> Array:
     """Return pseudo-random velocity steps in rad/s, one a tick, that end where they began."""
     ticks = max(1, round(STEP_S * settings.rig.tick_rate_hz))
-    once = np.repeat(np.array(STEPS, dtype=np.float64), ticks)
+    once = np.repeat(np.array(STEPS), ticks)
     pair = np.concatenate([once, -once])
     times = max(1, round(limits.steps_s * settings.rig.tick_rate_hz / len(pair)))
     return rad_from_deg(limits.step_deg_s) * np.tile(pair, times)
 
 
-def angles(velocity_rad_s: Array, settings: Settings) -> Array:
-    """Return the angle that belongs to velocities, one a tick."""
-    return np.cumsum(velocity_rad_s) / settings.rig.tick_rate_hz
-
-
-def nudge_check(tried: Tried, settings: Settings) -> Check:
+def small_move_check(tried: Tried, settings: Settings) -> Check:
     """Check direction and rough scale of the first motion."""
     found = following(tried.heard, settings.rig.drive_damping_ratio)
-    check = within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, NUDGE_PERCENT, _SCALE_REMEDY)
+    check = within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, SMALL_MOVE_PERCENT, _SCALE_REMEDY)
     if tried.cause is Cause.NONE:
         return check
     if tried.cause not in _NOT_AS_COMMANDED:  # a motion cut short tells nothing of the scale
@@ -123,7 +91,7 @@ def swing_checks(
     found = following(heard, settings.rig.drive_damping_ratio)
     checks = [
         yes(
-            "motions were completed",
+            COMPLETED,
             tried.cause is Cause.NONE,
             "yes" if tried.cause is Cause.NONE else stopped_for(tried.cause),
             "yes",
@@ -161,12 +129,11 @@ def torque_sign(heard: Heard, damping_ratio: float, drive_scale: float) -> tuple
             "spring or a relaxed arm's weight to the joint, and let nobody push"
         )
         return impossible(name, limit, why), work_j
-    value = getattr(seen, _FIELDS[seen.strongest])
     remedy = (
         f"the {seen.strongest} looks negative, so torque and angle have opposite signs: turn the "
         "sign of the one that is wrong in the rig file; with it the loop would run away"
     )
-    return yes(name, value > 0, _arm_words(seen, work_j), limit, remedy), work_j
+    return yes(name, seen.strongest_is_positive, _arm_words(seen, work_j), limit, remedy), work_j
 
 
 def step_checks(tried: Tried, settings: Settings) -> tuple[list[Check], Following, ArmSeen]:
@@ -217,17 +184,6 @@ def drift_check(heard: Heard, limit_deg: float) -> Check:
     )
 
 
-def moved_rad(heard: Heard) -> float:
-    """Return how far what was sent would have moved the joint at most."""
-    angle = sent_angle_rad(heard, heard.time_s)
-    return float(np.max(np.abs(angle)))
-
-
-_FIELDS = {
-    "inertia": "inertia_kg_m2",
-    "damping": "damping_nm_s_rad",
-    "stiffness": "stiffness_nm_rad",
-}
 _REASON_REMEDY = "remove the reason and commission again"
 _NOT_AS_COMMANDED = (Cause.POSITION_LIMIT_EXCEEDED, Cause.NOT_FOLLOWING, Cause.OVERSPEED)
 """What the guard stops for where sign or scale are wrong."""
@@ -244,7 +200,7 @@ def _arm_words(seen: ArmSeen, work_j: float) -> str:
     )
 
 
-def way(distance_rad: float, speed_rad_s: float, tick_s: float) -> Array:
+def smooth_motion(distance_rad: float, speed_rad_s: float, tick_s: float) -> Array:
     """Return velocities of a smooth motion over a distance, one a tick; they add up to it."""
     n = max(2, math.ceil(PEAK * abs(distance_rad) / speed_rad_s / tick_s))
     places = np.array(

@@ -65,6 +65,12 @@ class ArmSeen(NamedTuple):
     strongest: str
     """Which of inertia, damping, stiffness makes the most torque."""
 
+    @property
+    def strongest_is_positive(self) -> bool:
+        """Whether that one is above zero, as of a joint that resists."""
+        J, B, K = self[:3]
+        return {"inertia": J, "damping": B, "stiffness": K}[self.strongest] > 0
+
 
 def sent_angle_rad(heard: Heard, at_s: Array) -> Array:
     """Return the integral of what was sent up to these times."""

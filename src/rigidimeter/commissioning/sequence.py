@@ -2,7 +2,7 @@
 
     read back, without power     facts, rates, losses, noise, lateness
     by hand, without power       mechanical stops, a known angle
-    a nudge                      does it move at all as told
+    a small move                 does it move at all as told
     a swing, and quick steps     directions, scales, delays, bandwidth, margins
     a known torque               by hand
     silence                      watchdog
@@ -24,13 +24,13 @@ import numpy as np
 from rigidimeter.commissioning.checks import Check, impossible, yes
 from rigidimeter.commissioning.commissioning_record import CommissioningRecord
 from rigidimeter.commissioning.coverage import covered, kept_facts
-from rigidimeter.commissioning.manual_checks import Operator, known_angle, known_torque, told
+from rigidimeter.commissioning.manual_checks import known_angle, known_torque, told
 from rigidimeter.commissioning.margins import margin_checks
 from rigidimeter.commissioning.motion_tests import (
     ANGLE_PER_COMMAND,
-    angles,
+    COMPLETED,
     drift_check,
-    nudge_check,
+    small_move_check,
     step_checks,
     steps,
     swing,
@@ -47,6 +47,8 @@ from rigidimeter.commissioning.static_tests import (
 from rigidimeter.commissioning.stopping import emergency_stop_checks, watchdog_checks
 from rigidimeter.commissioning.trial import (
     Array,
+    Operator,
+    Setup,
     Timebase,
     Tried,
     follow,
@@ -67,35 +69,19 @@ SETTLE_S = 0.5
 
 
 @dataclass
-class _Trials:
-    """What is tried, by whom, with which limits; and what came of it so far."""
+class _Findings:
+    """What came of the trials so far."""
 
-    rig: Rig
-    settings: Settings
-    time: Timebase
-    operator: Operator
-    limits: CommissioningSettings
     checks: list[Check] = field(default_factory=list)
     numbers: dict[str, float] = field(default_factory=dict)
 
-    def good(self, *names: str) -> bool:
-        """Return whether all checks of these names passed; without names, whether none failed."""
-        if not names:
-            return not any(check.outcome == "failed" for check in self.checks)
-        return all(check.passed for check in self.checks if check.name in names)
+    def none_failed(self) -> bool:
+        """Whether no check failed."""
+        return not any(check.outcome == "failed" for check in self.checks)
 
     def refrain(self, why: str) -> None:
         """Say of the rest that it was not tried."""
         self.checks.append(impossible("everything after this", "tried", why))
-
-    def move(self, velocity_rad_s: Array, *, pause_after: bool = True) -> Tried:
-        """Enable the rig, stand still, move, and stand still."""
-        pause, motion = (
-            hold(SETTLE_S),
-            follow(angles(velocity_rad_s, self.settings), velocity_rad_s),
-        )
-        stretches = [pause, motion, pause] if pause_after else [pause, motion]
-        return trial(self.rig, self.settings, self.time, stretches)
 
 
 def commission(
@@ -129,16 +115,17 @@ def commission(
     made_utc, software, signed_by : str
         For the record.
     """
-    trials = _Trials(rig, settings, time, operator, limits or CommissioningSettings())
+    setup = Setup(rig, settings, time, operator, limits or CommissioningSettings())
+    found = _Findings()
     facts: Mapping[str, Any] = {}
     name, limit = "devices read back", "what the rig file says"
     try:
         rig.connect()
         facts = rig.configure()
         name, limit = "devices answer", "throughout"
-        _try_all(trials, facts)
+        _try_all(setup, found, facts)
     except DeviceError as error:
-        trials.checks.append(yes(name, False, "refused", limit, str(error)))
+        found.checks.append(yes(name, False, "refused", limit, str(error)))
     finally:
         rig.close()
     return CommissioningRecord(
@@ -147,67 +134,53 @@ def commission(
         emulated=rigfile.emulated,
         facts=kept_facts(facts),
         covered=covered(settings),
-        checks=tuple(trials.checks),
-        numbers={name: value for name, value in trials.numbers.items() if math.isfinite(value)},
+        checks=tuple(found.checks),
+        numbers={name: value for name, value in found.numbers.items() if math.isfinite(value)},
         software=software,
         made_utc=made_utc,
         signed_by=signed_by,
     )
 
 
-def _try_all(trials: _Trials, facts: Mapping[str, Any]) -> None:
-    rig, settings, time, operator, limits = (
-        trials.rig,
-        trials.settings,
-        trials.time,
-        trials.operator,
-        trials.limits,
-    )
-    trials.checks += facts_checks(facts, settings, limits)
-    _without_power(trials)
-    if not trials.good():
-        trials.refrain("a check without power failed; put that right first")
+def _try_all(setup: Setup, found: _Findings, facts: Mapping[str, Any]) -> None:
+    operator, limits = setup.operator, setup.limits
+    found.checks += facts_checks(facts, setup.settings, limits)
+    _without_power(setup, found)
+    if not found.none_failed():
+        found.refrain("a check without power failed; put that right first")
         return
     if not operator.ask(
         "Nobody's arm may be in the rig; a spring, or a weight like a relaxed arm's, is fastened "
         f"to the joint. The drive will get power and move it by up to {limits.swing_deg:g} deg at "
         f"{limits.swing_speed_deg_s:g} deg/s. The emergency stop is at hand. Go on?"
     ):
-        trials.refrain("the operator did not agree to it")
+        found.refrain("the operator did not agree to it")
         return
-    if not _moving(trials):
-        trials.refrain("the motions went wrong; put that right first")
+    if not (_small_move(setup, found) and _swing(setup, found) and _steps(setup, found)):
+        found.refrain("the motions went wrong; put that right first")
         return
-    trials.checks.append(known_torque(rig, settings, time, operator, limits))
+    found.checks.append(known_torque(setup))
     operator.say("Watchdog: nothing is written for a while; the drive must stop by itself.")
-    watchdog_s = facts["drive"]["watchdog_s"]
-    trials.checks += watchdog_checks(rig, settings, time, limits, watchdog_s, operator.ask)
-    trials.checks += emergency_stop_checks(rig, settings, time, limits, operator)
+    found.checks += watchdog_checks(setup, facts["drive"]["watchdog_s"])
+    found.checks += emergency_stop_checks(setup)
 
 
-def _without_power(trials: _Trials) -> None:
-    rig, settings, time, operator, limits = (
-        trials.rig,
-        trials.settings,
-        trials.time,
-        trials.operator,
-        trials.limits,
-    )
-    rate_hz = settings.rig.tick_rate_hz
+def _without_power(setup: Setup, found: _Findings) -> None:
+    rig, settings, operator, limits = setup.rig, setup.settings, setup.operator, setup.limits
     operator.say(f"At rest, without power: {limits.idle_s:g} s. Nobody touches the joint.")
-    freshen(rig, time, rate_hz)
-    listen(rig, time, rate_hz, SETTLE_S)  # a drive that was never asked has nothing to say yet
+    freshen(setup)
+    listen(setup, SETTLE_S)  # a drive that was never asked has nothing to say yet
     before = dict(rig.counts)
-    heard = listen(rig, time, rate_hz, limits.idle_s)
-    trials.checks += rate_checks(
+    heard = listen(setup, limits.idle_s)
+    found.checks += rate_checks(
         "torque", heard.torque_time_s, settings.rig.torque.rate_hz, settings, limits
     )
-    trials.checks.append(lost_check(before, rig.counts, limits))
-    trials.checks += noise_checks(heard, settings)
-    trials.checks.append(lateness(heard, settings))
+    found.checks.append(lost_check(before, rig.counts, limits))
+    found.checks += noise_checks(heard, settings)
+    found.checks.append(lateness(heard, settings))
     torque = heard.torque_nm[np.isfinite(heard.torque_nm)]
-    trials.numbers["torque_bias_nm"] = float(np.mean(torque)) if len(torque) else 0.0
-    trials.checks.append(
+    found.numbers["torque_bias_nm"] = float(np.mean(torque)) if len(torque) else 0.0
+    found.checks.append(
         told(
             operator,
             "mechanical stops",
@@ -216,44 +189,49 @@ def _without_power(trials: _Trials) -> None:
             "fit them; the position limit of the software believes the encoder and is none",
         )
     )
-    trials.checks.append(known_angle(rig, settings, time, operator, limits))
+    found.checks.append(known_angle(setup))
 
 
-def _moving(trials: _Trials) -> bool:
-    """Nudge, swing and step; return whether all of it went as told."""
-    settings, operator, limits = trials.settings, trials.operator, trials.limits
-    operator.say(f"A nudge of {limits.nudge_deg:g} deg.")
-    at_rest = trial(trials.rig, settings, trials.time, [hold(SETTLE_S)])
-    trials.checks += rate_checks(
+def _small_move(setup: Setup, found: _Findings) -> bool:
+    """Give power, then move by a fraction of a degree; return whether that went as told."""
+    settings, limits = setup.settings, setup.limits
+    setup.operator.say(f"A small move of {limits.nudge_deg:g} deg.")
+    at_rest = trial(setup, hold(SETTLE_S))
+    found.checks += rate_checks(
         "motion", at_rest.heard.motion_time_s, settings.rig.motion.rate_hz, settings, limits
     )
-    trials.checks.append(drift_check(at_rest.heard, 0.5 * limits.nudge_deg))
+    found.checks.append(drift_check(at_rest.heard, 0.5 * limits.nudge_deg))
     if at_rest.cause is not Cause.NONE:
         words = at_rest.cause.sentence
-        trials.checks.append(
-            yes("motions were completed", False, words, "yes", "remove the reason")
-        )
-    if not trials.good():
+        found.checks.append(yes(COMPLETED, False, words, "yes", "remove the reason"))
+    if not found.none_failed():
         return False
-    nudge = swing(settings, limits.nudge_deg, 0.2 * limits.swing_speed_deg_s, 1)
-    check = nudge_check(trials.move(nudge, pause_after=False), settings)
+    velocity = swing(settings, limits.nudge_deg, 0.2 * limits.swing_speed_deg_s, 1)
+    tried = trial(setup, hold(SETTLE_S), follow(velocity, setup.rate_hz))
+    check = small_move_check(tried, settings)
     if not check.passed:
-        trials.checks.append(check)
-        return False
-    return _swing(trials) and _step(trials)
+        found.checks.append(check)
+    return check.passed
 
 
-def _swing(trials: _Trials) -> bool:
-    settings, operator, limits = trials.settings, trials.operator, trials.limits
+def _move(setup: Setup, velocity_rad_s: Array) -> Tried:
+    """Stand still, move, and stand still."""
+    return trial(setup, hold(SETTLE_S), follow(velocity_rad_s, setup.rate_hz), hold(SETTLE_S))
+
+
+def _swing(setup: Setup, found: _Findings) -> bool:
+    settings, operator, limits = setup.settings, setup.operator, setup.limits
     operator.say(f"Slowly by {limits.swing_deg:g} deg to both sides.")
-    swung = trials.move(swing(settings, limits.swing_deg, limits.swing_speed_deg_s, limits.swings))
+    velocity = swing(settings, limits.swing_deg, limits.swing_speed_deg_s, limits.swings)
+    swung = _move(setup, velocity)
     checks, followed = swing_checks(swung, settings, limits)
     sign, work_j = torque_sign(swung.heard, settings.rig.drive_damping_ratio, followed.scale)
-    trials.checks += [*checks, sign]
-    trials.numbers.update(
+    found.checks += [*checks, sign]
+    found.numbers.update(
         angle_per_command=followed.scale, slow_delay_s=followed.delay_s, work_j=work_j
     )
-    if not trials.good(ANGLE_PER_COMMAND, "motions were completed", sign.name):
+    needed = (ANGLE_PER_COMMAND, COMPLETED, sign.name)
+    if not all(check.passed for check in found.checks if check.name in needed):
         return False
     seen = told(
         operator,
@@ -262,19 +240,19 @@ def _swing(trials: _Trials) -> bool:
         "as far to the other side, and back?",
         "turn sign, or put right the counts per turn, in the rig file",
     )
-    trials.checks.append(seen)
+    found.checks.append(seen)
     return seen.outcome != "failed"
 
 
-def _step(trials: _Trials) -> bool:
-    settings = trials.settings
-    trials.operator.say("Small quick steps.")
-    stepped = trials.move(steps(settings, trials.limits))
+def _steps(setup: Setup, found: _Findings) -> bool:
+    settings = setup.settings
+    setup.operator.say("Small quick steps.")
+    stepped = _move(setup, steps(settings, setup.limits))
     checks, drive, arm = step_checks(stepped, settings)
     delay_s = arm.delay_s if checks[-1].passed else None
     margins, numbers = margin_checks(settings, drive.bandwidth_hz, delay_s)
-    trials.checks += [*checks, *margins]
-    trials.numbers.update(
+    found.checks += [*checks, *margins]
+    found.numbers.update(
         numbers,
         bandwidth_hz=drive.bandwidth_hz,
         motion_delay_s=drive.delay_s,

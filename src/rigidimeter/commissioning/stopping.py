@@ -8,17 +8,16 @@ until an operator agrees; and so after the emergency stop, when it is released.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from rigidimeter.acquisition import ControlLoop, control_modes
 from rigidimeter.commissioning.checks import Check, below, impossible, untried, yes
-from rigidimeter.commissioning.manual_checks import Operator, told
-from rigidimeter.commissioning.motion_tests import way
+from rigidimeter.commissioning.manual_checks import told
+from rigidimeter.commissioning.motion_tests import smooth_motion
 from rigidimeter.commissioning.trial import (
     Heard,
-    Timebase,
+    Setup,
     follow,
     freshen,
     hold,
@@ -28,13 +27,9 @@ from rigidimeter.commissioning.trial import (
 )
 from rigidimeter.devices.base import DeviceError, Rig
 from rigidimeter.guard import Cause
-from rigidimeter.settings import Settings
-from rigidimeter.settings.commissioning_settings import CommissioningSettings
 from rigidimeter.units import rad_from_deg
 
 __all__ = ["emergency_stop_checks", "watchdog_checks"]
-
-Ask = Callable[[str], bool]
 
 SETTLE_S = 0.3
 TEMPTED_S = 0.4
@@ -50,41 +45,32 @@ STOP, POWER = "emergency stop", "hardware enable drops the power"
 RELEASE = "stays stopped after the release"
 
 
-def watchdog_checks(
-    rig: Rig,
-    settings: Settings,
-    time: Timebase,
-    limits: CommissioningSettings,
-    watchdog_s: float | None,
-    ask: Ask,
-) -> list[Check]:
+def watchdog_checks(setup: Setup, watchdog_s: float | None) -> list[Check]:
     """Fall silent, at rest and in a slow motion; the drive must stop by itself and stay so."""
     if watchdog_s is None:
         why = "the drive has no watchdog that could be tried"
         return [impossible(name, "", why) for name in (REPORT, RESTART, AGAIN, WATCHDOG)]
-    most_s = watchdog_s + limits.watchdog_margin_s
-    rate_hz = settings.rig.tick_rate_hz
+    rig, time = setup.rig, setup.time
+    most_s = watchdog_s + setup.limits.watchdog_margin_s
     reported_s = math.inf
     tempted: Heard | None = None
 
-    def silence(loop: ControlLoop) -> None:
+    def silence(_: ControlLoop) -> None:
         nonlocal reported_s, tempted
         before = rig.read().motion_status
         began_s = time.now()
         # A driver may give the drive up by its own clock. Only what comes from the drive counts.
         heard = listen(
-            rig,
-            time,
-            rate_hz,
+            setup,
             most_s,
             write_rad_s=None,
             until=lambda r: r.cause in REPORTS and r.motion_status != before,
         )
         if rig.read().motion_status != before:
             reported_s = float(heard.time_s[-1]) - began_s
-            tempted = _tempt(rig, time, rate_hz)
+            tempted = _tempt(setup)
 
-    tried = trial(rig, settings, time, [hold(SETTLE_S), silence])
+    tried = trial(setup, hold(SETTLE_S), silence)
     if tried.cause is not Cause.NONE:
         why = "remove the reason and commission again"
         return [yes(WATCHDOG, False, stopped_for(tried.cause), "tried", why)]
@@ -94,19 +80,17 @@ def watchdog_checks(
     else:
         late = "the drive says too late that it stopped: shorten its watchdog"
         checks = [below(REPORT, reported_s, "s", most_s, late), _stayed(RESTART, tempted)]
-        checks.append(_again(rig, settings, time, ask))
+        checks.append(_again(setup))
         if not checks[-1].passed:
             why = "the drive has no power again after the watchdog"
             return [*checks, impossible(WATCHDOG, "", why)]
-    return [*checks, _overrun(rig, settings, time, limits, watchdog_s)]
+    return [*checks, _overrun(setup, watchdog_s)]
 
 
-def emergency_stop_checks(
-    rig: Rig, settings: Settings, time: Timebase, limits: CommissioningSettings, operator: Operator
-) -> list[Check]:
+def emergency_stop_checks(setup: Setup) -> list[Check]:
     """Let the operator press the emergency stop, tell whether the power went, and release it."""
+    rig, operator, wait_s = setup.rig, setup.operator, setup.limits.emergency_stop_wait_s
     limits_of = {STOP: "seen at once", POWER: "yes", RELEASE: f"at most {MOST_DEG:g} deg"}
-    wait_s = limits.emergency_stop_wait_s
     if not operator.present:
         return [untried(name, limit) for name, limit in limits_of.items()]
 
@@ -127,7 +111,7 @@ def emergency_stop_checks(
         control_modes.hold(loop, wait_s)
         after = rig.read().motion_status
 
-    tried = trial(rig, settings, time, [wait])
+    tried = trial(setup, wait)
     # A driver may give the drive up by its own clock; one that was switched off says nothing.
     said = after != before or tried.cause is Cause.DRIVE_LOST
     seen = tried.cause in REPORTS and said
@@ -150,23 +134,20 @@ def emergency_stop_checks(
         "Release the emergency stop again, and keep hands off the joint. Released?"
     ):
         return [*checks, *none_of((RELEASE,), "the operator did not release it")]
-    freshen(rig, time, settings.rig.tick_rate_hz)
-    return [*checks, _stayed(RELEASE, _tempt(rig, time, settings.rig.tick_rate_hz))]
+    freshen(setup)
+    return [*checks, _stayed(RELEASE, _tempt(setup))]
 
 
-def _tempt(rig: Rig, time: Timebase, rate_hz: float) -> Heard:
+def _tempt(setup: Setup) -> Heard:
     """Command a slow motion to a rig that must not move; it ends as soon as it does."""
-    start_rad = rig.read().angle_rad
-    most_rad = rad_from_deg(MOST_DEG)
+    start_rad, most_rad = setup.rig.read().angle_rad, rad_from_deg(MOST_DEG)
     heard = listen(
-        rig,
-        time,
-        rate_hz,
+        setup,
         TEMPTED_S,
         write_rad_s=rad_from_deg(TEMPTED_DEG_S),
         until=lambda reading: abs(reading.angle_rad - start_rad) > most_rad,
     )
-    rig.write(0.0)
+    setup.rig.write(0.0)
     return heard
 
 
@@ -177,14 +158,15 @@ def _stayed(name: str, heard: Heard) -> Check:
     return below(name, moved, "deg", MOST_DEG, remedy)
 
 
-def _again(rig: Rig, settings: Settings, time: Timebase, ask: Ask) -> Check:
+def _again(setup: Setup) -> Check:
     """Enable the rig again, once the operator agrees."""
     limit = "enabled, at rest"
-    if not ask("The watchdog has stopped the drive. May it be reset and get power again?"):
+    question = "The watchdog has stopped the drive. May it be reset and get power again?"
+    if not setup.operator.ask(question):
         return impossible(AGAIN, limit, "the operator did not agree to it")
     try:
-        _reset(rig)
-        tried = trial(rig, settings, time, [hold(SETTLE_S)])
+        _reset(setup.rig)
+        tried = trial(setup, hold(SETTLE_S))
     except DeviceError as error:
         return yes(AGAIN, False, "refused", limit, str(error))
     good = tried.cause is Cause.NONE
@@ -198,39 +180,29 @@ def _reset(rig: Rig) -> None:
         reset()
 
 
-def _overrun(
-    rig: Rig,
-    settings: Settings,
-    time: Timebase,
-    limits: CommissioningSettings,
-    watchdog_s: float,
-) -> Check:
+def _overrun(setup: Setup, watchdog_s: float) -> Check:
     """Fall silent while the joint moves slowly; see how long it went on, and bring it back."""
-    rate_hz = settings.rig.tick_rate_hz
+    rig, rate_hz, limits = setup.rig, setup.rate_hz, setup.limits
     speed_rad_s = rad_from_deg(limits.swing_speed_deg_s)
     most_s = watchdog_s + limits.watchdog_margin_s
     before = after = math.nan
     n = round(SETTLE_S * rate_hz)
     velocity = np.minimum(np.arange(1, n + 1) / (0.5 * n), 1.0) * speed_rad_s
 
-    def silence(loop: ControlLoop) -> None:
+    def silence(_: ControlLoop) -> None:
         nonlocal before, after
         before = rig.read().angle_rad
-        listen(rig, time, rate_hz, 2.0 * most_s + SETTLE_S, write_rad_s=None)
-        after = float(listen(rig, time, rate_hz, SETTLE_S).angle_rad[-1])
+        listen(setup, 2.0 * most_s + SETTLE_S, write_rad_s=None)
+        after = float(listen(setup, SETTLE_S).angle_rad[-1])
 
-    tried = trial(
-        rig,
-        settings,
-        time,
-        [hold(SETTLE_S), follow(np.cumsum(velocity) / rate_hz, velocity), silence],
-    )
+    tried = trial(setup, hold(SETTLE_S), follow(velocity, rate_hz), silence)
     if math.isnan(after):
         why = "remove the reason and commission again"
         return yes(WATCHDOG, False, stopped_for(tried.cause), "tried", why)
     went_on_s = abs(after - before) / speed_rad_s
     _reset(rig)
-    back = way(-after, 0.5 * speed_rad_s, 1.0 / rate_hz)
-    trial(rig, settings, time, [hold(SETTLE_S), follow(np.cumsum(back) / rate_hz, back)])
+    back = smooth_motion(-after, 0.5 * speed_rad_s, 1.0 / rate_hz)
+    trial(setup, hold(SETTLE_S), follow(back, rate_hz))
     remedy = "the drive goes on when the computer is dead: set its watchdog and try again"
-    return below(WATCHDOG, went_on_s, "s", most_s + settings.guard.reaction_time_s, remedy)
+    most_s += setup.settings.guard.reaction_time_s
+    return below(WATCHDOG, went_on_s, "s", most_s, remedy)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,10 +21,13 @@ from rigidimeter.devices.base import Now, Reading, Rig
 from rigidimeter.guard import Cause, Reaction
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import Settings
+from rigidimeter.settings.commissioning_settings import CommissioningSettings
 
 __all__ = [
     "Array",
     "Heard",
+    "Operator",
+    "Setup",
     "Stretch",
     "Timebase",
     "Tried",
@@ -66,6 +70,46 @@ class Timebase:
     wait_until: Callable[[float], float]
 
 
+@dataclass(frozen=True)
+class Operator:
+    """Who is asked and told.
+
+    Parameters
+    ----------
+    ask : callable
+        Puts a question; True is consent, or yes. Nothing has power while it waits.
+    say : callable
+        Is told what comes next.
+    present : bool
+        Whether somebody is there. If not, what only a person can do or tell is not asked.
+    known_torque_nm, known_angle_deg : float or None
+        A torque that hands or a weight put on the joint, toward positive angles; an angle by which
+        hands turn the joint.
+    """
+
+    ask: Callable[[str], bool]
+    say: Callable[[str], None] = lambda _: None
+    present: bool = True
+    known_torque_nm: float | None = None
+    known_angle_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What is tried, with which protocol and clock, by whom, and with which limits."""
+
+    rig: Rig
+    settings: Settings
+    time: Timebase
+    operator: Operator
+    limits: CommissioningSettings
+
+    @property
+    def rate_hz(self) -> float:
+        """Ticks a second."""
+        return self.settings.rig.tick_rate_hz
+
+
 class Heard(NamedTuple):
     """Readings, one a tick, as arrays of the same length.
 
@@ -95,8 +139,8 @@ class Tried:
 class _Shifted:
     """Rig and clock of a loop that begins now: the times of the readings count from there."""
 
-    def __init__(self, rig: Rig, time: Timebase, origin_s: float) -> None:
-        self._rig, self._time, self._origin_s = rig, time, origin_s
+    def __init__(self, setup: Setup, origin_s: float) -> None:
+        self._rig, self._time, self._origin_s = setup.rig, setup.time, origin_s
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._rig, name)
@@ -112,7 +156,7 @@ class _Shifted:
         return self._time.wait_until(self._origin_s + deadline_s) - self._origin_s
 
 
-def trial(rig: Rig, settings: Settings, time: Timebase, stretches: Sequence[Stretch]) -> Tried:
+def trial(setup: Setup, *stretches: Stretch) -> Tried:
     """Enable the rig at zero velocity, run the stretches, take the power away.
 
     Raises
@@ -120,14 +164,17 @@ def trial(rig: Rig, settings: Settings, time: Timebase, stretches: Sequence[Stre
     DeviceError
         If the drive does not come up; it is without power then.
     """
+    rig, settings = setup.rig, setup.settings
+    # No correction by the reading: what is commanded is known exactly.
+    controller = settings.controller.model_copy(update={"tracking_gain_per_s": 0.0})
+    settings = settings.model_copy(update={"controller": controller})
     samples: list[Sample] = []
-    freshen(rig, time, settings.rig.tick_rate_hz)
+    freshen(setup)
     try:
         rig.enable()
-        _empty(rig, time)
-        origin_s = time.now() + 1.0 / settings.rig.tick_rate_hz
-        here: Any = _Shifted(rig, time, origin_s)
-        loop = ControlLoop(_feedforward(settings), here, here, samples.append)
+        _empty(setup)
+        here: Any = _Shifted(setup, setup.time.now() + 1.0 / setup.rate_hz)
+        loop = ControlLoop(settings, here, here, samples.append)
         try:
             for stretch in stretches:
                 stretch(loop)
@@ -140,12 +187,13 @@ def trial(rig: Rig, settings: Settings, time: Timebase, stretches: Sequence[Stre
                 rig.stop()
     finally:
         rig.disable()
-    return Tried(_from_samples(samples), cause)
+    return Tried(_heard([_OF_SAMPLE(sample) for sample in samples]), cause)
 
 
-def follow(angle_rad: Array, velocity_rad_s: Array) -> Stretch:
-    """Return the stretch that commands velocities, one a tick; the angle is for the record."""
-    angle, velocity = angle_rad.tolist(), velocity_rad_s.tolist()
+def follow(velocity_rad_s: Array, rate_hz: float) -> Stretch:
+    """Return the stretch that commands velocities, one a tick; their sum is for the record."""
+    angle = (np.cumsum(velocity_rad_s) / rate_hz).tolist()
+    velocity = velocity_rad_s.tolist()
     return lambda loop: control_modes.follow(loop, DURING_TRIAL, angle, velocity)
 
 
@@ -155,9 +203,7 @@ def hold(duration_s: float) -> Stretch:
 
 
 def listen(
-    rig: Rig,
-    time: Timebase,
-    tick_rate_hz: float,
+    setup: Setup,
     duration_s: float,
     *,
     write_rad_s: float | None = 0.0,
@@ -168,40 +214,29 @@ def listen(
     For a rig without power, for one that is not written to, and for one that must not move; it ends
     early when `until` says so.
     """
+    rig, time, rate_hz = setup.rig, setup.time, setup.rate_hz
     rows: list[tuple[float, ...]] = []
-    start_s = time.now() + 1.0 / tick_rate_hz
-    for k in range(round(duration_s * tick_rate_hz)):
-        due_s = start_s + k / tick_rate_hz
+    start_s = time.now() + 1.0 / rate_hz
+    for k in range(round(duration_s * rate_hz)):
+        due_s = start_s + k / rate_hz
         now_s = time.wait_until(due_s)
         reading = rig.read()
         sent = rig.write(write_rad_s) if write_rad_s is not None else 0.0
-        rows.append(
-            (
-                now_s,
-                now_s - due_s,
-                reading.torque_nm,
-                reading.torque_time_s,
-                reading.angle_rad,
-                reading.velocity_rad_s,
-                reading.motion_time_s,
-                sent,
-                reading.cause,
-            )
-        )
+        rows.append((now_s, now_s - due_s, *reading[:5], sent, reading.cause))
         if until(reading):
             break
     return _heard(rows)
 
 
-def freshen(rig: Rig, time: Timebase, tick_rate_hz: float) -> None:
+def freshen(setup: Setup) -> None:
     """Read away what piled up while nobody listened, without power, until the news are new."""
-    _empty(rig, time)
-    listen(rig, time, tick_rate_hz, FRESHEN_S, until=lambda r: r.cause not in PILED_UP)
+    _empty(setup)
+    listen(setup, FRESHEN_S, until=lambda reading: reading.cause not in PILED_UP)
 
 
-def _empty(rig: Rig, time: Timebase) -> None:
+def _empty(setup: Setup) -> None:
     for _ in range(MOST_READS):
-        if time.now() - rig.read().torque_time_s < FRESH_S:
+        if setup.time.now() - setup.rig.read().torque_time_s < FRESH_S:
             return
 
 
@@ -220,33 +255,13 @@ def stopped_for(cause: Cause) -> str:
     return f"the guard {how} the rig: {cause.sentence}"
 
 
-def _feedforward(settings: Settings) -> Settings:
-    """Return the settings with no correction by the reading: what is commanded is known exactly."""
-    controller = settings.controller.model_copy(update={"tracking_gain_per_s": 0.0})
-    return settings.model_copy(update={"controller": controller})
-
-
-def _from_samples(samples: Sequence[Sample]) -> Heard:
-    return _heard(
-        [
-            (
-                s.time_s,
-                s.lateness_s,
-                s.torque_nm,
-                s.torque_time_s,
-                s.angle_rad,
-                s.velocity_rad_s,
-                s.motion_time_s,
-                s.velocity_command_rad_s,
-                s.cause,
-            )
-            for s in samples
-        ]
-    )
+_OF_SAMPLE = attrgetter(
+    *("time_s", "lateness_s", "torque_nm", "torque_time_s", "angle_rad", "velocity_rad_s"),
+    *("motion_time_s", "velocity_command_rad_s", "cause"),
+)
+"""The values of `Heard`, in its order."""
 
 
 def _heard(rows: Sequence[tuple[float, ...]]) -> Heard:
-    table = np.array(rows, dtype=np.float64).reshape(-1, 9)
-    time, late, torque, torque_time, angle, velocity, motion_time, sent, cause = table.T
-    causes = cause.astype(np.int64)
-    return Heard(time, late, torque, torque_time, angle, velocity, motion_time, sent, causes)
+    *columns, cause = np.array(rows, dtype=np.float64).reshape(-1, len(Heard._fields)).T
+    return Heard._make([*columns, cause.astype(np.int64)])

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rigidimeter.commissioning import motion_tests as moving
+from rigidimeter.commissioning import motion_tests as motion_tests
 from rigidimeter.commissioning.trial import Tried
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
@@ -26,9 +26,12 @@ from rigidimeter.settings import Settings
 def test_only_a_motion_that_is_not_as_commanded_speaks_of_sign_and_counts(
     monkeypatch: pytest.MonkeyPatch, cause: Cause, remedy: str, scale: float
 ) -> None:
-    monkeypatch.setattr(moving, "following", lambda *_: SimpleNamespace(scale=scale))
+    monkeypatch.setattr(motion_tests, "following", lambda *_: SimpleNamespace(scale=scale))
     heard: Any = None
-    check = moving.nudge_check(Tried(heard, cause), Settings())
+    tried, settings = Tried(heard, cause), Settings()
+    check = motion_tests.small_move_check(tried, settings)
     assert check.outcome == "failed"
     assert check.remedy.startswith(remedy)
-    assert moving.nudge_check(Tried(heard, Cause.NONE), Settings()).passed == (scale == 1.0)
+    assert motion_tests.small_move_check(Tried(heard, Cause.NONE), Settings()).passed == (
+        scale == 1.0
+    )
