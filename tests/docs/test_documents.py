@@ -218,9 +218,11 @@ def test_the_sample_columns_are_those_of_the_log() -> None:
 
 def test_the_manifest_and_event_keys_are_those_of_a_session(tmp_path: Path) -> None:
     writer = SessionWriter(tmp_path / "s", Settings(), [], {"session": 1}, virtual=True)
-    writer.session_started()
-    writer.epoch_started(1, "1", "prbs", "OFF", 0.0, planned_s=20.0, true_joint={})
-    writer.epoch_ended(1, 20.0, "success", "", limited_ticks=0)
+    writer.event("session_started", time_s=0.0)
+    named = {"label": "1", "task": "prbs", "condition": "OFF"}
+    writer.event("epoch_started", epoch=1, **named, time_s=0.0, planned_s=20.0, true_joint={})
+    ending = {"time_s": 20.0, "outcome": "success", "reason": "", "limited_ticks": 0}
+    writer.event("epoch_ended", epoch=1, **ending)
     writer.close(20.0, "success", "")
     assert list(table(FILES, "manifest.json")) == list(read_manifest(tmp_path / "s"))
     events, _ = read_events(tmp_path / "s" / "events.jsonl")

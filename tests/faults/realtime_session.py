@@ -28,8 +28,8 @@ def ticks(duration_s, side):
     """Write an epoch of ticks until it is over or there is a cause to stop."""
     sink = side.sink
     side.ready()
-    sink.session_started()
-    sink.epoch_started(1, "one", "prbs", "rest", 0.0)
+    sink.event("session_started", time_s=0.0)
+    sink.event("epoch_started", epoch=1, label="one", task="prbs", condition="rest", time_s=0.0)
     clock = DeadlineClock()
     cause = tick = 0
     while not cause and tick < duration_s * RATE_HZ:
@@ -39,7 +39,7 @@ def ticks(duration_s, side):
         cause = side.supervision.cause(now_s)
         tick += 1
     outcome, reason = ("fail", Cause(cause).sentence) if cause else ("success", "")
-    sink.epoch_ended(1, tick / RATE_HZ, outcome, reason)
+    sink.event("epoch_ended", epoch=1, time_s=tick / RATE_HZ, outcome=outcome, reason=reason)
     sink.close(tick / RATE_HZ, outcome, reason)
 
 

@@ -121,7 +121,7 @@ def run_session(
         angle_rad.tolist(),
         velocity_rad_s.tolist(),
     )
-    sink.session_started()
+    sink.event("session_started", time_s=0.0)
     try:
         run.change_state(after(run.run, Command.START))
         rig.enable()
@@ -188,12 +188,13 @@ def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
     """Run one epoch and close it."""
     settings, sink, run = session.settings, session.sink, session.run
     facts = session.before_epoch(planned)
-    sink.epoch_started(
-        planned.number,
-        planned.label,
-        planned.task,
-        planned.condition,
-        run.loop.time_s,
+    sink.event(
+        "epoch_started",
+        epoch=planned.number,
+        label=planned.label,
+        task=planned.task,
+        condition=planned.condition,
+        time_s=run.loop.time_s,
         planned_s=planned.duration_s,
         **facts,
     )
@@ -206,11 +207,12 @@ def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
     ending: Ending = "fail" if why else "success"
     if ticks.interrupted and not why:
         ending, why = "abort", "ended by the operator"
-    sink.epoch_ended(
-        planned.number,
-        run.loop.time_s,
-        ending,
-        why,
+    sink.event(
+        "epoch_ended",
+        epoch=planned.number,
+        time_s=run.loop.time_s,
+        outcome=ending,
+        reason=why,
         limited_ticks=ticks.limited_ticks,
         missed_ticks=ticks.missed_ticks,
         counts=dict(session.rig.counts),
@@ -303,7 +305,8 @@ def _close(session: _Session) -> None:
         finally:
             time_s = run.loop.time_s
             if run.open_epoch is not None:
-                sink.epoch_ended(run.open_epoch, time_s, run.outcome, run.reason)
+                ending = {"outcome": run.outcome, "reason": run.reason}
+                sink.event("epoch_ended", epoch=run.open_epoch, time_s=time_s, **ending)
             sink.close(time_s, run.outcome, run.reason)
 
 

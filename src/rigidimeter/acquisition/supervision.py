@@ -48,21 +48,8 @@ class Sink(Protocol):
     def sample(self, sample: Sample) -> None:
         """Take one tick."""
 
-    def session_started(self) -> None:
-        """Say that the loop runs."""
-
-    def epoch_started(
-        self, number: int, label: str, task: str, condition: str, time_s: float, **facts: Any
-    ) -> None:
-        """Say that an epoch begins."""
-
-    def epoch_ended(
-        self, number: int, time_s: float, outcome: Any, reason: str, **facts: Any
-    ) -> None:
-        """Say that an epoch is over."""
-
     def event(self, kind: str, **facts: Any) -> None:
-        """Say what else happened that belongs in the record."""
+        """Record something that happened: the session or an epoch began or ended, and what else."""
 
     def close(self, time_s: float, outcome: Any, reason: str) -> None:
         """Say that the session is over."""

@@ -140,7 +140,9 @@ class SessionWriter:
         append_line(self._events, line)
 
     def event(self, kind: str, **facts: Any) -> None:
-        """Record something else that happened."""
+        """Record something that happened; an epoch's samples are in the file before its end is."""
+        if kind == "epoch_ended":
+            self._log.flush()
         append_event(self._events, {"event": kind, **facts})
 
     def descriptors(self) -> tuple[int, int]:
@@ -151,25 +153,6 @@ class SessionWriter:
         """End the stream and close the files; for a session whose last event is written."""
         self._log.close()
         self._events.close()
-
-    def session_started(self) -> None:
-        """Say that the loop runs."""
-        self.event("session_started", time_s=0.0)
-
-    def epoch_started(
-        self, number: int, label: str, task: str, condition: str, time_s: float, **facts: Any
-    ) -> None:
-        """Say that an epoch begins, with whatever facts belong to it."""
-        named = {"epoch": number, "label": label, "task": task, "condition": condition}
-        self.event("epoch_started", **named, time_s=time_s, **facts)
-
-    def epoch_ended(
-        self, number: int, time_s: float, outcome: Ending, reason: str, **facts: Any
-    ) -> None:
-        """Close an epoch; its samples are in the file before the event is."""
-        self._log.flush()
-        ending = {"time_s": time_s, "outcome": outcome, "reason": reason}
-        self.event("epoch_ended", epoch=number, **ending, **facts)
 
     def close(self, time_s: float, outcome: Ending, reason: str) -> None:
         """Close the session with its outcome."""

@@ -38,11 +38,13 @@ class Rig:
             self.tick += 1
 
     def begin(self):
-        self.sink.session_started()
-        self.sink.epoch_started(1, "one", "prbs", "rest", 0.0)
+        self.sink.event("session_started", time_s=0.0)
+        named = {"label": "one", "task": "prbs", "condition": "rest"}
+        self.sink.event("epoch_started", epoch=1, **named, time_s=0.0)
 
     def end(self):
-        self.sink.epoch_ended(1, self.tick / RATE_HZ, "success", "")
+        time_s = self.tick / RATE_HZ
+        self.sink.event("epoch_ended", epoch=1, time_s=time_s, outcome="success", reason="")
         self.sink.close(self.tick / RATE_HZ, "success", "")
 
     def kill(self):

@@ -197,13 +197,13 @@ def test_the_two_clocks_are_those_of_the_machine(shared_status, rings):
 def test_the_sink_keeps_events_in_their_place(shared_status, rings):
     samples, events = rings
     sink = RingSink(samples, events, shared_status, tick_rate_hz=10.0)
-    sink.session_started()
+    sink.event("session_started", time_s=0.0)
     sink.state_changed(Run(State.RUNNING))
-    sink.epoch_started(1, "one", "prbs", "rest", 0.0, planned_s=0.4)
+    sink.event("epoch_started", epoch=1, time_s=0.0, planned_s=0.4)
     for k in range(4):
         sink.sample(sample(k))
     assert shared_status.condition(Role.LOOP) is Condition.RUNNING
-    sink.epoch_ended(1, 0.4, "success", "")
+    sink.event("epoch_ended", epoch=1, time_s=0.4, outcome="success", reason="")
     sink.sample(sample(4))
     sink.close(0.5, "success", "")
     sink.close(9.9, "fail", "again")

@@ -26,12 +26,14 @@ def session(tmp_path):
         writer = SessionWriter(
             folder, SETTINGS, planned, {"session": 1}, virtual=virtual, continues=continues
         )
-        writer.session_started()
+        writer.event("session_started", time_s=0.0)
         if origin_rad is not None:
             writer.event("rig_enabled", time_s=0.0, origin_rad=origin_rad)
         for epoch in EPOCHS[:done]:
-            writer.epoch_started(epoch.number, epoch.label, epoch.task, epoch.condition, 0.0)
-            writer.epoch_ended(epoch.number, 1.0, "success", "")
+            named = {"label": epoch.label, "task": epoch.task, "condition": epoch.condition}
+            writer.event("epoch_started", epoch=epoch.number, **named, time_s=0.0)
+            ending = {"time_s": 1.0, "outcome": "success", "reason": ""}
+            writer.event("epoch_ended", epoch=epoch.number, **ending)
         if closed:
             writer.close(1.0, "abort", "aborted by the operator")
         else:

@@ -216,7 +216,7 @@ def test_a_stream_of_other_columns_is_refused(simulate):
 
 def test_a_session_that_is_being_recorded_is_left_alone(tmp_path):
     writer = SessionWriter(tmp_path / "s", Settings(), [], {"session": 1}, virtual=True)
-    writer.session_started()
+    writer.event("session_started", time_s=0.0)
     with pytest.raises(UserError, match="still being recorded"):
         recover(tmp_path / "s")
     writer.close(0.0, "success", "")

@@ -67,13 +67,7 @@ class Estimator:
             resting=int(found.resting),
             missed_samples=self._missed,
             time_s=float(rows["time_s"][-1]),
-            inertia_kg_m2=found.inertia_kg_m2,
-            inertia_kg_m2_se=found.inertia_kg_m2_se,
-            damping_nm_s_rad=found.damping_nm_s_rad,
-            damping_nm_s_rad_se=found.damping_nm_s_rad_se,
-            stiffness_nm_rad=found.stiffness_nm_rad,
-            stiffness_nm_rad_se=found.stiffness_nm_rad_se,
-            memory_s=found.memory_s,
+            **{name: getattr(found, name) for name in LiveEstimate._fields[4:]},
         )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.shared_memory import Memory
 from rigidimeter.acquisition.processes.shared_status import SharedStatus
@@ -25,17 +27,14 @@ class SessionMemory:
     @classmethod
     def create(cls, tick_rate_hz: float, ring_s: float) -> SessionMemory:
         """Make all three, or none: rings for `ring_s` of samples, and a shared status."""
-        samples = SampleRing.create(max(16, round(ring_s * tick_rate_hz)))
-        try:
+        with ExitStack() as undo:
+            samples = SampleRing.create(max(16, round(ring_s * tick_rate_hz)))
+            undo.callback(_drop, samples.memory)
             events = EventRing.create()
-            try:
-                return cls(samples, events, SharedStatus.create())
-            except BaseException:
-                _drop(events.memory)
-                raise
-        except BaseException:
-            _drop(samples.memory)
-            raise
+            undo.callback(_drop, events.memory)
+            made = cls(samples, events, SharedStatus.create())
+            undo.pop_all()
+        return made
 
     @classmethod
     def attach(cls, names: tuple[str, str, str]) -> SessionMemory:

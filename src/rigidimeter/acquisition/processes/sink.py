@@ -112,32 +112,6 @@ class RingSink:
         """
         self._events.push(self._samples.written, {"event": kind, **facts})
 
-    def session_started(self) -> None:
-        """Say that the loop runs."""
-        self.event("session_started", time_s=0.0)
-
-    def epoch_started(
-        self, number: int, label: str, task: str, condition: str, time_s: float, **facts: Any
-    ) -> None:
-        """Say that an epoch begins, with whatever facts belong to it."""
-        self.event(
-            "epoch_started",
-            epoch=number,
-            label=label,
-            task=task,
-            condition=condition,
-            time_s=time_s,
-            **facts,
-        )
-
-    def epoch_ended(
-        self, number: int, time_s: float, outcome: Ending, reason: str, **facts: Any
-    ) -> None:
-        """Close an epoch."""
-        self.event(
-            "epoch_ended", epoch=number, time_s=time_s, outcome=outcome, reason=reason, **facts
-        )
-
     def stopping(self) -> None:
         """Say that no more ticks are due: what follows may take longer than a tick may."""
         self._status.beat(Role.LOOP)

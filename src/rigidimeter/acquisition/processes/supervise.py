@@ -119,7 +119,7 @@ def supervise(
         return process
 
     try:
-        with _Interrupts(status):
+        with _signals_are_orders(status):
             me = os.getpid()
             recorder = start("recorder", recorder_main, recording, shared.names, patience, me)
             loop = start("loop", loop_main, target, recording, shared.names, realtime, patience, me)
@@ -171,35 +171,30 @@ def _undisturbed() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-class _Interrupts:
-    """Turns the signals of the terminal and SIGTERM into orders to the loop."""
+@contextlib.contextmanager
+def _signals_are_orders(status: SharedStatus) -> Iterator[None]:
+    """Turn the signals of the terminal and SIGTERM into orders to the loop."""
+    count = 0
 
-    def __init__(self, status: SharedStatus) -> None:
-        self._status = status
-        self._count = 0
-        self._before: dict[int, Any] = {}
+    def asked(number: int, _: FrameType | None) -> None:
+        nonlocal count
+        count += 1
+        if number == signal.SIGINT and count == 1:
+            with contextlib.suppress(ValueError):  # so many orders wait that nobody takes them
+                status.post(Order(Command.ABORT))
+                return
+        status.raise_flag(Flag.END_ASKED)
 
-    def __enter__(self) -> _Interrupts:
-        if threading.current_thread() is threading.main_thread():
-            numbers = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
-            if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
-                numbers.remove(signal.SIGHUP)  # started with `nohup`, which is meant so
-            for number in numbers:
-                self._before[number] = signal.signal(number, self._asked)
-        return self
-
-    def _asked(self, number: int, _: FrameType | None) -> None:
-        self._count += 1
-        if number == signal.SIGINT and self._count == 1:
-            try:
-                self._status.post(Order(Command.ABORT))
-            except ValueError:  # so many orders wait that nobody takes them
-                self._status.raise_flag(Flag.END_ASKED)
-        else:
-            self._status.raise_flag(Flag.END_ASKED)
-
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._before.items():
+    numbers: list[int] = []
+    if threading.current_thread() is threading.main_thread():
+        numbers = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+        if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+            numbers.remove(signal.SIGHUP)  # started with `nohup`, which is meant so
+    before = {number: signal.signal(number, asked) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
             signal.signal(number, handler)
 
 
