@@ -19,7 +19,6 @@ from scipy import signal
 
 from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares, intervals_text
 from rigidimeter.estimation.method_record import Method
-from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE
 from rigidimeter.estimation.signals import (
     Array,
     Signals,
@@ -30,7 +29,7 @@ from rigidimeter.estimation.signals import (
     uniform_grid,
 )
 from rigidimeter.records import Epoch
-from rigidimeter.settings import EstimationSettings
+from rigidimeter.settings import USABLE_FRACTION_OF_RATE, EstimationSettings
 
 __all__ = ["BANDLIMITED", "band_hz", "bandlimited_signals", "zero_phase_band"]
 

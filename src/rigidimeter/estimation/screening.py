@@ -6,12 +6,9 @@ import numpy as np
 
 from rigidimeter.estimation.signals import motion_channels
 from rigidimeter.records import Epoch, Outcome
-from rigidimeter.settings import EstimationSettings
+from rigidimeter.settings import USABLE_FRACTION_OF_RATE, EstimationSettings
 
 __all__ = ["after_fit", "before_fit", "unusable"]
-
-USABLE_FRACTION_OF_RATE = 0.4
-"""A channel carries information up to half its rate; interpolation is good to about 0.4 of it."""
 
 LEAST_BAND_RATIO = 4.0
 """A band narrower than two octaves cannot tell three parameters apart."""

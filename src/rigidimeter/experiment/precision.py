@@ -49,7 +49,6 @@ from rigidimeter.dynamics import (
 from rigidimeter.dynamics.velocity_drive import Array, Complex
 from rigidimeter.errors import UserError
 from rigidimeter.experiment.predicted_record import (
-    USABLE_FRACTION_OF_RATE,
     Record,
     expected_record,
     layout,
@@ -57,7 +56,7 @@ from rigidimeter.experiment.predicted_record import (
     weighted_products,
 )
 from rigidimeter.records import readonly
-from rigidimeter.settings import RigSettings, Settings, SubjectSettings
+from rigidimeter.settings import USABLE_FRACTION_OF_RATE, RigSettings, Settings, SubjectSettings
 
 __all__ = ["PARAMETERS", "Errors", "Precision", "predicted_precision"]
 

@@ -41,10 +41,15 @@ from rigidimeter.dynamics import ClosedLoopMotion, sensor_density, subject_densi
 from rigidimeter.dynamics.velocity_drive import Array
 from rigidimeter.errors import UserError
 from rigidimeter.records import readonly
-from rigidimeter.settings import EstimationSettings, RigSettings, SubjectSettings
+from rigidimeter.settings import (
+    FEWEST_LINES,
+    USABLE_FRACTION_OF_RATE,
+    EstimationSettings,
+    RigSettings,
+    SubjectSettings,
+)
 
 __all__ = [
-    "USABLE_FRACTION_OF_RATE",
     "Layout",
     "Record",
     "expected_record",
@@ -53,12 +58,6 @@ __all__ = [
     "noise_spectrum",
     "weighted_products",
 ]
-
-USABLE_FRACTION_OF_RATE = 0.4
-"""The estimation uses a channel up to this share of its rate."""
-
-_FEWEST_LINES = 8
-"""The estimation asks for as many."""
 
 _MEMORY = 10.0
 """The autocovariance of the subject's torque has decayed after so many periods of its lowest
@@ -206,10 +205,10 @@ def layout(record: Record, estimation: EstimationSettings) -> Layout:
     length_s = n / record.rate_hz
     first = max(math.ceil(low_hz * length_s - _ROUNDING) - 1, 1)
     line = np.arange(first, math.floor(high_hz * length_s + _ROUNDING) + 1, dtype=np.intp)
-    if line.size < _FEWEST_LINES:
+    if line.size < FEWEST_LINES:
         raise UserError(
             f"the band {low_hz:g} to {high_hz:g} Hz holds {line.size} lines of an epoch of "
-            f"{length_s:.3g} s; the fit needs at least {_FEWEST_LINES}"
+            f"{length_s:.3g} s; the fit needs at least {FEWEST_LINES}"
         )
     return Layout(record.rate_hz, _window(n, record.rate_hz, estimation.trim_s), line)
 

@@ -1,6 +1,8 @@
 """Validated settings: TOML with the unit in every key."""
 
 from rigidimeter.settings.estimation_settings import (
+    FEWEST_LINES,
+    USABLE_FRACTION_OF_RATE,
     DiagnosticLevels,
     DiagnosticsSettings,
     EstimationSettings,
@@ -33,7 +35,9 @@ from rigidimeter.settings.rig_settings import (
 )
 
 __all__ = [
+    "FEWEST_LINES",
     "GAP_S",
+    "USABLE_FRACTION_OF_RATE",
     "BlockSettings",
     "ControllerSettings",
     "DiagnosticLevels",

@@ -9,6 +9,8 @@ from pydantic import model_validator
 from rigidimeter.settings.section import Section, quantity
 
 __all__ = [
+    "FEWEST_LINES",
+    "USABLE_FRACTION_OF_RATE",
     "DiagnosticLevels",
     "DiagnosticsSettings",
     "EstimationSettings",
@@ -16,6 +18,12 @@ __all__ = [
     "OnlineSettings",
     "ScoreSettings",
 ]
+
+USABLE_FRACTION_OF_RATE = 0.4
+"""A channel carries information up to half its rate; interpolation is good to about 0.4 of it."""
+
+FEWEST_LINES = 8
+"""Spectral lines that a band must hold for a fit of J, B and K."""
 
 Level = Literal["note", "doubt", "exclude"]
 

@@ -30,12 +30,12 @@ from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.closedloop.drive_fit import driven
 from rigidimeter.estimation.signals import Array, kinematics, motion_channels, spline, uniform_grid
 from rigidimeter.records import Channel, Epoch
+from rigidimeter.settings import FEWEST_LINES
 
 __all__ = ["Grid", "Lines", "epoch_grid", "epoch_lines", "response_lines"]
 
 Complex = NDArray[np.complex128]
 
-FEWEST_LINES = 8
 SAME_TIME = 0.01
 """Stamps closer than this share of an interval are the same time: clocks are rounded."""
 

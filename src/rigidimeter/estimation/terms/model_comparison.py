@@ -16,14 +16,14 @@ from rigidimeter.estimation.bandlimited import band_hz, bandlimited_signals
 from rigidimeter.estimation.diagnostics import reconstructed_torque_nm
 from rigidimeter.estimation.diagnostics.movement_checks import voluntary_torque
 from rigidimeter.estimation.methods import fit_epoch
-from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE, before_fit
+from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.signals import Signals, motion_channels
 from rigidimeter.estimation.terms.catalogue import REFLEXES, parse_terms
 from rigidimeter.estimation.terms.reflex import REFLEX_KINDS
 from rigidimeter.estimation.terms.term_fit import TermsFit, fit_terms, predict
 from rigidimeter.estimation.terms.wideband import wideband_signals
 from rigidimeter.records import Epoch
-from rigidimeter.settings import Settings
+from rigidimeter.settings import USABLE_FRACTION_OF_RATE, Settings
 
 __all__ = [
     "BASE",

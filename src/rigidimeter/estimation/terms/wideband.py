@@ -14,7 +14,6 @@ import numpy as np
 from scipy import fft, signal
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
-from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE
 from rigidimeter.estimation.signals import (
     Array,
     Signals,
@@ -25,6 +24,7 @@ from rigidimeter.estimation.signals import (
     uniform_grid,
 )
 from rigidimeter.records import Epoch
+from rigidimeter.settings import USABLE_FRACTION_OF_RATE
 
 __all__ = ["banded", "wideband_from_angle", "wideband_signals"]
 
