@@ -19,7 +19,7 @@ from rigidimeter.experiment import (
     prbs_nm,
     sinusoid,
 )
-from rigidimeter.experiment.excitation import line_spacing_hz, plateau_n2m2_hz
+from rigidimeter.experiment.perturbation_band import line_spacing_hz, plateau_n2m2_hz
 from rigidimeter.settings import (
     BlockSettings,
     GuardSettings,

@@ -10,11 +10,11 @@ from rigidimeter.experiment.epochs_needed import (
     ranksum_power,
     sample_size,
 )
-from rigidimeter.experiment.excitation import check_band, power_spectrum
 from rigidimeter.experiment.joint_bandwidth import APPENDIX_A, Corner, corners
 from rigidimeter.experiment.multisine import MultisineComparison, compare_multisine, multisine_nm
 from rigidimeter.experiment.optimise import Candidate, check_criterion, optimise
 from rigidimeter.experiment.overview import Design, design
+from rigidimeter.experiment.perturbation_band import check_band, power_spectrum
 from rigidimeter.experiment.perturbations import (
     chip_count,
     period_s,

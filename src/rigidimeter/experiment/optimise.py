@@ -31,7 +31,7 @@ from rigidimeter.dynamics import (
 from rigidimeter.dynamics.velocity_drive import Array
 from rigidimeter.errors import UserError
 from rigidimeter.experiment.demand import demand
-from rigidimeter.experiment.excitation import check_band
+from rigidimeter.experiment.perturbation_band import check_band
 from rigidimeter.experiment.perturbations import prbs_nm
 from rigidimeter.experiment.precision import Precision, predicted_precision
 from rigidimeter.settings import PrbsSettings, Settings

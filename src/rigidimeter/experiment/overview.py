@@ -20,10 +20,10 @@ from rigidimeter.dynamics import JointDynamics, Stability, loop_stability, media
 from rigidimeter.errors import UserError
 from rigidimeter.experiment.demand import Demand, beyond_limits, demand, ideal_response
 from rigidimeter.experiment.epochs_needed import Detection, Wanted, detect, planned_epochs
-from rigidimeter.experiment.excitation import BandCheck, check_band
 from rigidimeter.experiment.joint_bandwidth import Corners, corners
 from rigidimeter.experiment.multisine import MultisineComparison, compare_multisine
 from rigidimeter.experiment.optimise import Candidate, assess, check_criterion, optimise
+from rigidimeter.experiment.perturbation_band import BandCheck, check_band
 from rigidimeter.experiment.perturbations import prbs_nm, sinusoid
 from rigidimeter.experiment.precision import PARAMETERS, Precision, predicted_precision
 from rigidimeter.experiment.session_order import Protocol, plan

@@ -16,9 +16,9 @@ from rigidimeter.estimation.closedloop.drive_fit import loop_of
 from rigidimeter.estimation.closedloop.excitation import Excitation, excitation
 from rigidimeter.estimation.closedloop.spectral_lines import Grid, Lines, epoch_grid, epoch_lines
 from rigidimeter.estimation.prepared import PreparedEpoch
-from rigidimeter.estimation.screening import USABLE_FRACTION_OF_RATE
 from rigidimeter.estimation.signals import motion_channels
 from rigidimeter.records import Channel, Epoch
+from rigidimeter.settings import USABLE_FRACTION_OF_RATE
 
 __all__ = [
     "Observation",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.experiment import check_band, power_spectrum, prbs_nm
-from rigidimeter.experiment.excitation import (
+from rigidimeter.experiment.perturbation_band import (
     HALF_POWER_DB,
     envelope_db,
     envelope_edge_hz,
