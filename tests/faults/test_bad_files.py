@@ -44,6 +44,7 @@ def refusal(path, **options) -> str:
         (HEAD.replace(b"angle", b"\x81") + ROWS, "is not a text file in UTF-8"),
         (HEAD.replace(b"angle", b"\xb0\x1b") + ROWS, "is not a text file in UTF-8"),
         (HEAD + ROWS + b'0.5,"1,1\n0.6,1,1\n', "line 52 has 2 values"),
+        (HEAD + b'0.5,"1,1\n' + 400 * ROWS, "is not a readable table: field larger than"),
         (HEAD + ROWS + b'0.5,"1"x,1\n', "line 52: torque_nm holds '1x', which is not a number"),
     ],
 )  # fmt: skip

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rigidimeter.errors import UserError
@@ -91,11 +90,7 @@ def read(
     """
     asked = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
     conditions = _conditions(condition, len(asked))
-    if task not in (None, "prbs", "sinusoid"):
-        raise UserError(f"--task {task}: must be prbs or sinusoid")
-    columns = dict(column or {})
-    rate_hz = _positive("--rate-hz", rate_hz)
-    epoch_length_s = _positive("--epoch-length-s", epoch_length_s)
+    options = ReadOptions(dict(column or {}), rate_hz, reaction, epoch_length_s, task=task)
     chosen = settings if isinstance(settings, Settings) else None
     if isinstance(settings, str | Path):
         chosen = load_settings(Path(settings))
@@ -110,8 +105,7 @@ def read(
                 recorded = reader.settings(path)
                 first = first or recorded
                 notices += _about_settings(path, recorded, first, compared)
-            options = ReadOptions(columns, rate_hz, reaction, epoch_length_s, name, task)
-            found, remarks = read_recording(path, options)
+            found, remarks = read_recording(path, replace(options, condition=name))
         except UserError as error:
             notices.append(Notice("error", str(error)))
             continue
@@ -150,9 +144,3 @@ def _conditions(condition: str | Sequence[str] | None, n_paths: int) -> list[str
             "of them, or once for each in their order"
         )
     return names
-
-
-def _positive(option: str, value: float | None) -> float | None:
-    if value is not None and not 0 < value < math.inf:
-        raise UserError(f"{option} {value:g}: must be a number greater than 0")
-    return value

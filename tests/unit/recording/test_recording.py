@@ -64,8 +64,8 @@ def test_what_cannot_be_read_is_said_and_the_rest_is_read(tmp_path):
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"rate_hz": -1.0}, "--rate-hz -1: must be a number greater than 0"),
-        ({"epoch_length_s": np.nan}, "--epoch-length-s nan: must be a number greater than 0"),
+        ({"rate_hz": -1.0}, "--rate-hz -1: the sampling rate must be greater than 0 Hz"),
+        ({"epoch_length_s": np.nan}, "--epoch-length-s nan: the length must be greater than 0 s"),
         ({"task": "walk"}, "--task walk: must be prbs or sinusoid"),
     ],
 )

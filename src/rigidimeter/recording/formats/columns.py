@@ -130,8 +130,6 @@ def time_stamps(
     UserError
         If there is neither time nor rate, if they disagree, or if the time does not increase.
     """
-    if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise UserError(f"--rate-hz {rate_hz:g}: the sampling rate must be greater than 0 Hz")
     if time_name is not None:
         time_s = numbers(table, "time_s", time_name)
         _increasing(table, time_name, time_s)

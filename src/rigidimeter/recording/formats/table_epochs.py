@@ -78,6 +78,11 @@ class ReadOptions:
         For files without a condition column.
     task : {"prbs", "sinusoid"} or None
         For files without a task column.
+
+    Raises
+    ------
+    UserError
+        If a value is out of its range.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -86,6 +91,17 @@ class ReadOptions:
     epoch_length_s: float | None = None
     condition: str = ""
     task: Task | None = None
+
+    def __post_init__(self) -> None:
+        positive = (
+            ("--rate-hz", self.rate_hz, "the sampling rate", "Hz"),
+            ("--epoch-length-s", self.epoch_length_s, "the length", "s"),
+        )
+        for option, value, what, unit in positive:
+            if value is not None and not 0 < value < math.inf:
+                raise UserError(f"{option} {value:g}: {what} must be greater than 0 {unit}")
+        if self.task not in (None, *get_args(Task)):
+            raise UserError(f"--task {self.task}: must be {' or '.join(get_args(Task))}")
 
 
 def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], list[Notice]]:
@@ -96,16 +112,13 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
     UserError
         If the table cannot be read as a recording; the sentence says what would be right.
     """
-    length_s = options.epoch_length_s
-    if length_s is not None and not (math.isfinite(length_s) and length_s > 0):
-        raise UserError(f"--epoch-length-s {length_s:g}: the length must be greater than 0 s")
     names = find_columns(table, options.columns)
     n_rows = table.columns[names["torque_nm"]].size
     clock = Rows.of(time_stamps(table, names.get("time_s"), options.rate_hz, n_rows))
     signals, notices = _signals(table, names, clock, options.reaction)
     notices += _about_units(table.source, signals, clock.step_s)
     labels = {name: _label_column(table, names[name], n_rows) for name in LABELS if name in names}
-    stretches, more = _stretches(table, clock, labels.get("epoch"), length_s)
+    stretches, more = _stretches(table, clock, labels.get("epoch"), options.epoch_length_s)
     notices += more
     epochs: list[Epoch] = []
     losses: dict[str, dict[str, list[Loss]]] = {name: {} for name in signals}

@@ -214,7 +214,10 @@ def _open(path: Path, rows_are: str, example: str) -> _Text:
     delimiter, names = _header(source, head.decode("utf-8"), example)
     if not body.strip():
         body = b""
-    starts, counts = _records(body, delimiter)
+    try:
+        starts, counts = _records(body, delimiter)
+    except csv.Error as error:  # such as a quote that is never closed
+        raise UserError(f"{source} is not a readable table: {error}") from None
     wrong = np.flatnonzero(counts != len(names))
     if wrong.size:
         count, line = int(counts[wrong[0]]), int(lines[1:][starts[wrong[0]]])
