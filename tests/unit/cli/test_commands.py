@@ -132,7 +132,10 @@ def test_a_report_of_a_foreign_recording(rigidimeter, tmp_path):
     [
         (["estimate", "none.csv"], "none.csv: there is no such file"),
         (["estimate", "{session}", "--method", "magic"], "known: auto, published, bandlimited, iv"),
-        (["estimate", "{session}", "--rate-hz", "-5"], "--rate-hz -5: the sampling rate must be greater"),
+        (
+            ["estimate", "{session}", "--rate-hz", "-5"],
+            "--rate-hz -5: the sampling rate must be greater",
+        ),
         (["estimate", "{session}", "--column", "torque_nm"], "write NAME=COLUMN"),
         (["estimate", "{session}", "--column", "a=b", "--column", "a=c"], "already given"),
         (["estimate", "{session}", "--task", "dance"], "must be prbs or sinusoid"),
