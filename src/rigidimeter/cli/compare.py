@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.comparison_text import comparison_lines
-from rigidimeter.cli.inputs import Recordings, analyse_inputs, keep_inputs, say, status
-from rigidimeter.cli.options import reads_recordings
+from rigidimeter.cli.inputs import analyse_inputs, keep_inputs, say, status
+from rigidimeter.cli.options import Recordings, reads_recordings
 from rigidimeter.cli.study_input import KeyOption, analysed_study, study_files, study_of
 from rigidimeter.errors import UserError
 

@@ -64,7 +64,8 @@ def demo(
       rigidimeter demo
       rigidimeter demo --out small --prbs-epochs 3 --sinusoid-epochs 3
     """
-    from rigidimeter.cli.inputs import Recordings, analyse_inputs, say, status
+    from rigidimeter.cli.inputs import analyse_inputs, say, status
+    from rigidimeter.cli.options import Recordings
     from rigidimeter.cli.reporting import make_report
     from rigidimeter.recording import write_estimates_json
 

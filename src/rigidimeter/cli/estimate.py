@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from rigidimeter.cli.inputs import Recordings, analyse_inputs, keep_inputs, say, status
-from rigidimeter.cli.options import reads_recordings
+from rigidimeter.cli.inputs import analyse_inputs, keep_inputs, say, status
+from rigidimeter.cli.options import Recordings, reads_recordings
 
 if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Outcome, Score

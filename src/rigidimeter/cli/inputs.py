@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from rigidimeter.cli.options import Recordings, adjusted
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -16,8 +15,6 @@ if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Notice, Score
 
 __all__ = [
-    "Recordings",
-    "adjusted",
     "analyse_inputs",
     "keep_inputs",
     "say",

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rigidimeter.cli.inputs import Recordings, keep_inputs, say
-from rigidimeter.cli.options import reads_recordings
+from rigidimeter.cli.inputs import keep_inputs, say
+from rigidimeter.cli.options import Recordings, reads_recordings
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

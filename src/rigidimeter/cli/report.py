@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from rigidimeter.cli.inputs import Recordings, analyse_inputs, say, status
-from rigidimeter.cli.options import reads_recordings
+from rigidimeter.cli.inputs import analyse_inputs, say, status
+from rigidimeter.cli.options import Recordings, reads_recordings
 from rigidimeter.cli.study_input import KeyOption, analysed_study, study_of
 from rigidimeter.errors import UserError
 

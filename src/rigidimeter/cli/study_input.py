@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rigidimeter.cli.inputs import Recordings, adjusted, say
+from rigidimeter.cli.inputs import say
+from rigidimeter.cli.options import Recordings, adjusted
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
