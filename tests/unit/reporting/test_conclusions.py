@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from tests.unit.reporting.cohorts import Design, altered, made_study, sensitivity_row, untested
 
+from rigidimeter.estimation import METHODS, Method
+from rigidimeter.estimation.closedloop import IV
 from rigidimeter.reporting.conclusions import method_dependence, study_verdict
 from rigidimeter.reporting.prose import methods_prose
 from rigidimeter.statistics import two_groups
@@ -186,6 +188,18 @@ def test_methods_hold_the_facts_of_the_study(study: StudyResult) -> None:
     for name in ("Werning", "Young", "Gilson", "Kenward", "Hodges", "Efron", "Holm"):
         assert sum(name in reference for reference in prose.references) >= 1
     assert "Newcombe" not in text
+
+
+def test_methods_take_the_text_of_an_estimator_from_outside(study: StudyResult) -> None:
+    toy = Method("toy", "a guess", (), "by a guess of ours", IV.fit, references=("bca",))
+    by_toy = dataclasses.replace(study, analysis=dataclasses.replace(study.analysis, method="toy"))
+    METHODS.append(toy)
+    try:
+        text = methods_prose(by_toy).text
+    finally:
+        METHODS.remove(toy)
+    assert "were estimated epoch by epoch by a guess of ours (Efron 1987) in the band" in text
+    assert "by the method “toy”" in methods_prose(by_toy).text
 
 
 def test_methods_leave_out_what_was_not(study: StudyResult) -> None:
