@@ -46,7 +46,7 @@ class FitEpochs(Protocol):
             One for each epoch, in order; one that could not be fitted has failed, with the reason.
         pooled : list of Fit
             One for each condition with an epoch that counts, and with several one for all of them
-            together, whose condition is empty; their `epoch` is ``pooled``. None if not wanted.
+            together, whose condition is empty; their `epoch` is ``pooled``. Empty if not wanted.
         """
 
 

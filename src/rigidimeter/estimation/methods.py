@@ -51,8 +51,8 @@ def method_named(name: str) -> Method:
 def choose_method(epochs: Sequence[Epoch]) -> tuple[str, str]:
     """Return the method that suits what was recorded, and why.
 
-    With the perturbation, instrumental variables: they do not mind a subject who pushes. An epoch
-    that lacks it then fails, unless most do. Without it nothing but least squares is left.
+    With the perturbation, instrumental variables, which a subject who pushes does not bias. An
+    epoch that lacks it then fails, unless most do. Without it only least squares is possible.
     """
     if not epochs:
         return "bandlimited", "there is no epoch to fit"
@@ -60,15 +60,14 @@ def choose_method(epochs: Sequence[Epoch]) -> tuple[str, str]:
     if 2 * len(obstacles) > len(epochs):
         return (
             "bandlimited",
-            f"{obstacles[0]} (in {len(obstacles)} of {len(epochs)} epochs), so the motion itself "
-            "has to stand as the instrument: a subject who pushes in a closed loop biases the "
-            "estimate",
+            f"{obstacles[0]} (in {len(obstacles)} of {len(epochs)} epochs), so least squares is "
+            "used: a subject who pushes in a closed loop biases the estimate",
         )
     where = f" in {len(epochs) - len(obstacles)} of {len(epochs)} epochs" if obstacles else ""
     return (
         "iv",
-        f"the perturbation was recorded{where}, so its own part of the motion can be the "
-        "instrument: a subject who pushes does not bias the estimate",
+        f"the perturbation was recorded{where}, so the motion that it causes is the instrument: a "
+        "subject who pushes does not bias the estimate",
     )
 
 

@@ -1,46 +1,38 @@
-"""An estimator or a term from outside the package: one file, given to --load."""
+"""The examples of the how-to: what is added from outside the package by one file and --load."""
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from rigidimeter.estimation import METHODS
+from rigidimeter.estimation.diagnostics import CHECKS
 from rigidimeter.estimation.terms import TERMS
 
-ESTIMATOR = '''
-import numpy as np
-
-from rigidimeter.estimation import METHODS, Method
-from rigidimeter.records import Fit, Outcome
+ROOT = Path(__file__).parents[3]
+HOW_TO = ROOT / "docs" / "how-to" / "add-an-estimator.md"
+ESTIMATOR, CHECK, TERM = re.findall(r"```python\n(.*?)```", HOW_TO.read_text("utf-8"), re.S)
 
 
-def guess(epochs, inertia_kg_m2, progress, pooled):
-    """Say the same of every joint."""
-    value = np.array([0.004 if inertia_kg_m2 is None else inertia_kg_m2, 0.1, 1.5])
-
-    def fit(epoch):
-        progress(1.0)
-        return Fit(epoch.source, epoch.label, epoch.condition, "toy", Outcome(), value,
-                   np.zeros(3), value, value, np.zeros(3), n_samples=1000, r_squared=0.9)
-
-    return [fit(prepared.epoch) for prepared in epochs], []
-
-
-METHODS.append(Method("toy", "a guess", (), "by a guess of ours", guess))
-'''
+@pytest.fixture(autouse=True)
+def _forget() -> Iterator[None]:
+    """Take out of the lists what a test has loaded."""
+    lists: tuple[list[Any], ...] = (METHODS, CHECKS, TERMS)
+    known = [each[:] for each in lists]
+    yield
+    for each, before in zip(lists, known, strict=True):
+        each[:] = before
 
 
 @pytest.fixture
-def estimator(tmp_path: Path) -> Iterator[Path]:
-    """Write the estimator to a file; forget it afterwards."""
-    known = METHODS[:]
-    path = tmp_path / "toy_estimator.py"
+def estimator(tmp_path: Path) -> Path:
+    path = tmp_path / "robust.py"
     path.write_text(ESTIMATOR)
-    yield path
-    METHODS[:] = known
+    return path
 
 
 @pytest.fixture
@@ -58,34 +50,48 @@ def recording(tmp_path: Path) -> Path:
 
 
 def test_the_help_names_it(rigidimeter, estimator):
-    assert "toy (a guess)" not in rigidimeter("estimate", "--help").out
+    named = "robust (least squares in which large residuals count less)"
+    assert named not in " ".join(rigidimeter("estimate", "--help").out.split())
     ran = rigidimeter("--load", estimator, "estimate", "--help")
-    assert "toy (a guess)" in " ".join(ran.out.split())
+    assert named in " ".join(ran.out.split())
     assert "bandlimited (least squares" in " ".join(ran.out.split())
 
 
 def test_estimate_and_report_use_it(rigidimeter, estimator, recording, tmp_path):
-    chosen = ["--method", "toy", recording]
+    chosen = ["--method", "robust", recording]
     ran = rigidimeter("estimate", *chosen)
     assert ran.status == 1
     assert "known: auto, published, bandlimited, iv, spectral, ml" in ran.err
     ran = rigidimeter("--load", estimator, "estimate", *chosen, "--json", tmp_path / "e.json")
     assert ran.status == 0, ran.err
     document = json.loads((tmp_path / "e.json").read_text())
-    assert document["method"] == "toy"
-    assert document["epochs"][0]["stiffness_nm_rad"] == 1.5
+    assert document["method"] == "robust"
+    (epoch,), (fixed,) = document["epochs"], document["fixed_inertia"]["epochs"]
+    assert epoch["stiffness_nm_rad"] == pytest.approx(1.7, rel=0.01)
+    assert fixed["inertia_kg_m2"] == epoch["inertia_kg_m2"] == pytest.approx(0.0045, rel=0.02)
+    assert epoch["stiffness_nm_rad_se"] is None
     ran = rigidimeter("report", *chosen, "--out", tmp_path / "report")
     assert ran.status == 0, ran.err
-    assert "a guess" in (tmp_path / "report" / "report.html").read_text("utf-8")
+    page = (tmp_path / "report" / "report.html").read_text("utf-8")
+    assert "least squares in which large residuals count less" in page
 
 
-def test_a_term_of_the_torque_is_one_entry(rigidimeter, recording, tmp_path, monkeypatch):
-    monkeypatch.setattr("rigidimeter.estimation.terms.catalogue.TERMS", TERMS[:])
-    path = tmp_path / "quintic.py"
-    path.write_text(
-        "from rigidimeter.estimation.terms.catalogue import TERMS, Term\n"
-        "TERMS.append(Term('quintic', 'N·m/rad⁵', 'A spring.', lambda m: m.angle_rad**5))\n"
+def test_a_check_is_one_entry(rigidimeter, recording, tmp_path):
+    (tmp_path / "near_range.py").write_text(CHECK.replace("9.0", "0.001"))
+    ran = rigidimeter(
+        "--load", tmp_path / "near_range.py", "estimate", recording, "--json", tmp_path / "e.json"
     )
+    assert ran.status == 0, ran.err
+    (epoch,) = json.loads((tmp_path / "e.json").read_text())["epochs"]
+    (found,) = (found for found in epoch["findings"] if found["name"] == "near_range")
+    assert found["level"] == "doubt"
+    assert found["text"].endswith("the sensor may have been at the end of its range")
+    assert "Remedy: use a smaller perturbation" in " ".join(ran.out.split())
+
+
+def test_a_term_of_the_torque_is_one_entry(rigidimeter, recording, tmp_path):
+    path = tmp_path / "quintic.py"
+    path.write_text(TERM)
     assert "quintic" in rigidimeter("--load", path, "model", "--help").out
     ran = rigidimeter("--load", path, "model", recording, "--terms", "stiffness,quintic")
     assert ran.status == 0, ran.err
