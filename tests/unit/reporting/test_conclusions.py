@@ -9,7 +9,6 @@ import pytest
 from tests.unit.reporting.cohorts import Design, altered, made_study, sensitivity_row, untested
 
 from rigidimeter.estimation import METHODS, Method
-from rigidimeter.estimation.closedloop import IV
 from rigidimeter.reporting.conclusions import method_dependence, study_verdict
 from rigidimeter.reporting.prose import methods_prose
 from rigidimeter.statistics import two_groups
@@ -191,7 +190,7 @@ def test_methods_hold_the_facts_of_the_study(study: StudyResult) -> None:
 
 
 def test_methods_take_the_text_of_an_estimator_from_outside(study: StudyResult) -> None:
-    toy = Method("toy", "a guess", (), "by a guess of ours", IV.fit, references=("bca",))
+    toy = Method("toy", "a guess", (), "by a guess of ours", METHODS[0].fit, references=("bca",))
     by_toy = dataclasses.replace(study, analysis=dataclasses.replace(study.analysis, method="toy"))
     METHODS.append(toy)
     try:
