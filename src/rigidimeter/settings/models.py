@@ -59,7 +59,7 @@ class Settings(Section):
     subject: dict[str, SubjectSettings] = Field(
         default_factory=lambda: {
             "OFF": SubjectSettings(),
-            "DBS": SubjectSettings(damping_nm_s_rad=0.115, stiffness_nm_rad=1.42),
+            "DBS": SubjectSettings(damping_nm_s_rad=0.119, stiffness_nm_rad=1.44),
         }
     )
     protocol: ProtocolSettings = ProtocolSettings()

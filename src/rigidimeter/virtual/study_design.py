@@ -16,12 +16,13 @@ An examiner feels the joint of the day, not its name:
 rounded to the next step of the scale and kept within it; B_0 and K_0 are the medians of the first
 condition.
 
-Where the numbers come from. OFF is the joint of Sec. 3.4. The paper prints none for DBS: B 0.119
-and K 1.44 are chosen, 13 and 18 % less. The scatter then follows from Table 2: r = z/√N = .35
-and .37 with N = 78 + 23 mean that OFF and DBS differ by 0.92 and 0.98 standard deviations, if the
-logarithms are normal, so the coefficients of variation between epochs are about 15 and 20 %. How
-much of that lies between days the paper does not say; a third of the variance is chosen. So are
-the scatter of J, the voluntary torque of a subject at rest, and all of the examiners.
+Where the numbers come from. The joints are those of the default settings: OFF that of Sec. 3.4, DBS
+13 % less viscous and 18 % less stiff, which is chosen, for the paper prints none. The scatter then
+follows from Table 2: r = z/√N = .35 and .37 with N = 78 + 23 mean that OFF and DBS differ by 0.92
+and 0.98 standard deviations, if the logarithms are normal, so the coefficients of variation between
+epochs are about 15 and 20 %. How much of that lies between days the paper does not say; a third of
+the variance is chosen. So are the scatter of J, the voluntary torque of a subject at rest, and all
+of the examiners.
 """
 
 from __future__ import annotations
@@ -30,9 +31,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from rigidimeter.settings import Settings, SubjectSettings
 from rigidimeter.virtual.paper_rates import PAPER_RATES
 
-__all__ = ["DESIGNS", "NULL", "PAPER", "PUSHING", "ConditionDesign", "StudyDesign"]
+__all__ = [
+    "DESIGNS",
+    "NULL",
+    "PAPER",
+    "PUSHING",
+    "ConditionDesign",
+    "StudyDesign",
+    "two_day_design",
+]
 
 
 @dataclass(frozen=True)
@@ -117,7 +127,7 @@ class StudyDesign:
     title: str
     subject: str
     conditions: tuple[ConditionDesign, ...]
-    inertia_kg_m2: float = 0.0045
+    inertia_kg_m2: float = SubjectSettings().inertia_kg_m2
     day_inertia_cv_percent: float = 2.0
     day_damping_cv_percent: float = 9.0
     day_stiffness_cv_percent: float = 12.0
@@ -141,11 +151,12 @@ class StudyDesign:
     )
 
 
+_SUBJECT = Settings().subject
 _OFF = ConditionDesign(
     name="OFF",
     title="stimulation off",
-    damping_nm_s_rad=0.1368,
-    stiffness_nm_rad=1.751,
+    damping_nm_s_rad=_SUBJECT["OFF"].damping_nm_s_rad,
+    stiffness_nm_rad=_SUBJECT["OFF"].stiffness_nm_rad,
     days=(1, 2, 3, 4, 5, 6, 7, 8, 9),
     prbs_epochs=78,
     sinusoid_epochs=92,
@@ -153,8 +164,8 @@ _OFF = ConditionDesign(
 _DBS = ConditionDesign(
     name="DBS",
     title="stimulation on",
-    damping_nm_s_rad=0.119,
-    stiffness_nm_rad=1.44,
+    damping_nm_s_rad=_SUBJECT["DBS"].damping_nm_s_rad,
+    stiffness_nm_rad=_SUBJECT["DBS"].stiffness_nm_rad,
     days=(2, 4, 6, 8),
     prbs_epochs=23,
     sinusoid_epochs=46,
@@ -187,3 +198,30 @@ takes for a softer joint."""
 
 DESIGNS: Mapping[str, StudyDesign] = {design.name: design for design in (PAPER, PUSHING, NULL)}
 """By name."""
+
+
+def two_day_design(prbs_epochs: int, sinusoid_epochs: int) -> StudyDesign:
+    """Return a study of two days with both conditions on each, at the default sampling rates.
+
+    Parameters
+    ----------
+    prbs_epochs, sinusoid_epochs : int
+        On each day in each condition.
+    """
+    days = (1, 2)
+    conditions = tuple(
+        replace(
+            condition,
+            days=days,
+            prbs_epochs=len(days) * prbs_epochs,
+            sinusoid_epochs=len(days) * sinusoid_epochs,
+        )
+        for condition in PAPER.conditions
+    )
+    return replace(
+        PAPER,
+        name="two days",
+        title="A virtual study of elbow rigidity",
+        conditions=conditions,
+        settings={"protocol": PAPER.settings["protocol"]},
+    )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
 from dataclasses import asdict
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +15,54 @@ from rigidimeter.acquisition import DeadlineClock, SimulatedClock
 from rigidimeter.acquisition.session_run import SessionResult, run_session
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.documents import read_json, write_json
+from rigidimeter.errors import UserError
 from rigidimeter.experiment import PlannedEpoch, plan
-from rigidimeter.recording import SessionWriter
-from rigidimeter.settings import Settings
+from rigidimeter.recording import Recording, SessionWriter, read
+from rigidimeter.settings import Settings, load_settings
 
-__all__ = ["run_virtual_session", "session_length_s"]
+__all__ = ["run_virtual_session", "session_length_s", "simulate"]
 
 
 def session_length_s(settings: Settings) -> float:
     """Return how long the session of these settings lasts, in s."""
     return plan(settings.protocol, settings.prbs, settings.sinusoid, settings.seed).total_s
+
+
+def simulate(
+    settings: Settings | str | PathLike[str] | None = None,
+    out: str | PathLike[str] | None = None,
+    *,
+    seed: int | None = None,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Recording:
+    """Run a protocol on the virtual rig, as fast as it goes, and return what was recorded.
+
+    Parameters
+    ----------
+    settings : Settings or path, optional
+        Or a TOML file of them. Without any: four PRBS and four sinusoidal epochs in OFF.
+    out : path, optional
+        New folder for the session; without one nothing stays on disk.
+    seed : int, optional
+        Of everything random, instead of that of the settings.
+    progress : callable
+        Takes the session time in s, about once a second of it.
+
+    Raises
+    ------
+    UserError
+        If the settings are wrong, the folder cannot be written, or the session fails.
+    """
+    if not isinstance(settings, Settings):
+        settings = load_settings(None if settings is None else Path(settings))
+    if seed is not None:
+        settings = settings.model_copy(update={"seed": seed})
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place) / "session" if out is None else Path(out)
+        result = run_virtual_session(settings, folder, progress=progress)
+        if result.outcome != "success":
+            raise UserError(f"{folder}: the session ended with {result.outcome}: {result.reason}")
+        return read(folder)
 
 
 def run_virtual_session(

@@ -51,7 +51,7 @@ def test_a_session_goes_from_simulation_to_estimate_to_comparison(rigidimeter, t
     assert ran.status == 0, ran.err
     document = json.loads(out.read_text())
     stiffness = [epoch["stiffness_nm_rad"] for epoch in document["epochs"]]
-    np.testing.assert_allclose(stiffness, [1.751] * 3 + [1.42] * 3, rtol=0.01)
+    np.testing.assert_allclose(stiffness, [1.751] * 3 + [1.44] * 3, rtol=0.01)
     assert [score["condition"] for score in document["scores"]] == ["OFF"]
     assert len(table.read_text().splitlines()) == 7
 
@@ -248,9 +248,10 @@ def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(rigidimeter, tmp_pat
     assert (other / "chapter.txt").read_text() == "years of work"
     earlier = tmp_path / "demo"
     (earlier / "sessions").mkdir(parents=True)
-    ran = rigidimeter("demo", "--out", earlier, "--prbs-epochs", 1, "--sinusoid-epochs", 1)
+    ran = rigidimeter("demo", "--out", earlier, "--prbs-epochs", 2, "--sinusoid-epochs", 2)
     assert ran.status == 0, ran.err
     assert ran.out.strip().endswith("report.html")
+    assert (earlier / "analysis" / "comparison.json").is_file()
     assert (tmp_path / "demo-1" / "sessions").is_dir()
 
 

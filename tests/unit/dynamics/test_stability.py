@@ -162,4 +162,4 @@ def test_a_range_of_one_joint_has_no_other_worst() -> None:
 
 
 def test_the_joint_is_that_of_the_condition() -> None:
-    assert median_joint(Settings().subject["DBS"]) == JointDynamics(0.0045, 0.115, 1.42)
+    assert median_joint(Settings().subject["DBS"]) == JointDynamics(0.0045, 0.119, 1.44)

@@ -172,7 +172,7 @@ def test_every_setting_has_its_key_and_unit(study: StudyResult) -> None:
     rows = {row[0]: row[1:] for row in all_tables(study)["settings"].rows}
     assert rows["prbs.clock_hz"] == ("20.0", "Hz")
     assert rows["rig.torque.noise_sd_nm"] == ("0.005", "N·m")
-    assert rows["subject.DBS.stiffness_nm_rad"] == ("1.42", "N·m/rad")
+    assert rows["subject.DBS.stiffness_nm_rad"] == ("1.44", "N·m/rad")
     assert rows["protocol.blocks[1].task"] == ("sinusoid", "")
     assert rows["protocol.rests_s[0]"] == ("10.0", "s")
 
