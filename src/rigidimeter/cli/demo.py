@@ -41,7 +41,7 @@ def demo(
     """
     from rigidimeter.cli.options import Recordings
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.cli.reporting import write_page
+    from rigidimeter.cli.report import write_page
     from rigidimeter.cli.study_input import analysed_study
     from rigidimeter.virtual.study_design import two_day_design
     from rigidimeter.virtual.study_plan import plan_study

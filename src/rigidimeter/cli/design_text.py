@@ -63,8 +63,8 @@ def write_folder(folder: Path, design: Design) -> list[str]:
     UserError
         If the folder cannot be made or a file cannot be written.
     """
-    from rigidimeter.reporting.figures import svg_text
-    from rigidimeter.reporting.figures.open_loop import bode
+    from rigidimeter.reporting.open_loop import bode
+    from rigidimeter.reporting.style import svg_text
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "analyse_inputs",
+    "command_line",
     "keep_inputs",
     "say",
     "status",
@@ -39,6 +42,11 @@ def analyse_inputs(recording: Recording, method: str) -> Analysis:
         raise UserError(f"--method {method}: there is no such method; known: {known}")
     with Meter("estimate", 2 * len(recording.epochs)) as meter:
         return estimate(recording, method, progress=meter.advance)
+
+
+def command_line() -> str:
+    """Return the command as it could be given again."""
+    return shlex.join(["rigidimeter", *sys.argv[1:]])
 
 
 def keep_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rigidimeter.cli.inputs import analyse_inputs, say, status
+from rigidimeter.cli.inputs import analyse_inputs, command_line, say, status
 from rigidimeter.cli.options import Recordings, reads_recordings
 from rigidimeter.cli.study_input import KeyOption, analysed_study, study_of
 from rigidimeter.errors import UserError
 
-__all__ = ["report"]
+if TYPE_CHECKING:
+    from rigidimeter.study import StudyResult
 
-TITLE = "Joint rigidity"
+__all__ = ["report", "write_page"]
 
 
 @reads_recordings
@@ -34,8 +34,8 @@ def report(
 ) -> None:
     """Analyse recordings and write one self-contained HTML page, with its tables and figures.
 
-    Of a study folder (with a study.toml) the page shows days, effect sizes, ratings, other methods
-    and every exclusion too.
+    For a study folder (with a study.toml) the page also shows days, effect sizes, ratings, other
+    methods and every exclusion.
 
     \b
     For example:
@@ -43,8 +43,8 @@ def report(
       rigidimeter report study --out study/report
       rigidimeter report ankle.csv --reaction --epoch-length-s 20 --out report
     """
-    from rigidimeter.cli.reporting import make_report, write_page
     from rigidimeter.recording import is_session, write_estimates_json
+    from rigidimeter.reporting import recording_result
 
     if is_session(out):
         raise UserError(f"--out {out}: is a session folder; name another folder for the report")
@@ -55,16 +55,23 @@ def report(
                 f"{folder / 'report'}"
             )
         found = analysed_study(folder, recordings, key)
-        study = found.result if title is None else replace(found.result, title=title)
-        page = write_page(study, out)
-        write_estimates_json(out / "estimates.json", study.analysis)
-        typer.echo(str(page))
-        raise typer.Exit(found.status)
-    read = recordings.read()
-    say(read.notices)
-    analysis = analyse_inputs(read, recordings.method)
-    exit_status = status(read, analysis)
-    page = make_report(title or TITLE, read, analysis, out)
-    write_estimates_json(out / "estimates.json", analysis)
+        result, exit_status = found.result, found.status
+    else:
+        read = recordings.read()
+        say(read.notices)
+        analysis = analyse_inputs(read, recordings.method)
+        exit_status = status(read, analysis)
+        result = recording_result(read, analysis, command_line())
+    page = write_page(result, out, title)
+    write_estimates_json(out / "estimates.json", result.analysis)
     typer.echo(str(page))
     raise typer.Exit(exit_status)
+
+
+def write_page(result: StudyResult, out: Path, title: str | None = None) -> Path:
+    """Write the report of a result with progress; return the page's path."""
+    from rigidimeter import reporting
+    from rigidimeter.cli.progress import Meter
+
+    with Meter("report", 1.0) as meter:
+        return reporting.report(result, out, title, progress=meter.reach)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rigidimeter.cli.inputs import say
+from rigidimeter.cli.inputs import command_line, say
 from rigidimeter.cli.options import Recordings, adjusted
 from rigidimeter.errors import UserError
 
@@ -104,9 +104,8 @@ def analysed_study(
         If there is nothing to analyse.
     """
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.cli.provenance import provenance
     from rigidimeter.settings import load_settings
-    from rigidimeter.study import analyse_study, keep, read_study, steps
+    from rigidimeter.study import analyse_study, keep, provenance, read_study, steps
 
     chosen = load_settings(recordings.settings) if recordings.settings is not None else None
     read = read_study(folder, key=key, settings=chosen, method=recordings.method, pair=pair)
@@ -124,7 +123,7 @@ def analysed_study(
         kept = False
     sessions = (folder / session.path for session in result.sessions)
     tables = (path for name, path in read.folder.files.items() if name != "key")
-    facts = provenance((*tables, *sessions), result.settings)
+    facts = provenance((*tables, *sessions), result.settings, command_line())
     result = replace(result, changes=tuple(changes), provenance=facts)
     return Analysed(result, kept, int(bad or not kept))
 

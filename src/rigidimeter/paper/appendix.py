@@ -7,12 +7,19 @@ from collections.abc import Callable, Mapping
 
 from rigidimeter.experiment import APPENDIX_A, Corner, corners
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import AGREES, DIFFERS, Row, near, rounded, within_percent
+from rigidimeter.paper.comparison_table import (
+    AGREES,
+    DIFFERS,
+    Picture,
+    Row,
+    near,
+    rounded,
+    within_percent,
+)
 from rigidimeter.paper.context import Workshop
 from rigidimeter.paper.figures import arm_bode
-from rigidimeter.reporting.figures import svg_text
 from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.pictures import Picture
+from rigidimeter.reporting.style import svg_text
 
 __all__ = ["ROWS"]
 

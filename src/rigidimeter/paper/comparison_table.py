@@ -15,10 +15,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.pictures import Picture
 
 __all__ = [
     "AGREES",
@@ -26,6 +25,7 @@ __all__ = [
     "UNPUBLISHED",
     "VERDICTS",
     "Check",
+    "Picture",
     "Row",
     "Verdict",
     "bounded",
@@ -112,6 +112,15 @@ def bounded(
 ) -> Check:
     """Hold a number against a statement without one, such as "falls"."""
     return Check(what, unit, None, ours, low, high)
+
+
+class Picture(NamedTuple):
+    """A figure as it is stored: file name without suffix, SVG, alternative text, caption."""
+
+    name: str
+    svg: str
+    alt: str
+    caption: str
 
 
 @dataclass(frozen=True)

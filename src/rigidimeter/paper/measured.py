@@ -13,18 +13,13 @@ import numpy as np
 
 from rigidimeter.estimation import scoring_cycles
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import AGREES, Row, within_percent
+from rigidimeter.paper.comparison_table import AGREES, Picture, Row, within_percent
 from rigidimeter.paper.context import Workshop
 from rigidimeter.paper.printed_effects import rating_model
-from rigidimeter.reporting.figures import (
-    condition_colours,
-    distribution,
-    loop,
-    loop_limits,
-    svg_text,
-)
 from rigidimeter.reporting.numbers import number, p_value
-from rigidimeter.reporting.pictures import Picture
+from rigidimeter.reporting.sections.distribution import distribution
+from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits
+from rigidimeter.reporting.style import condition_colours, svg_text
 from rigidimeter.statistics import difference, summarise
 from rigidimeter.study import Comparison
 

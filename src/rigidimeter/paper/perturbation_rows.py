@@ -13,12 +13,12 @@ import numpy as np
 
 from rigidimeter.experiment import check_band, power_spectrum, prbs_nm
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import AGREES, Row, bounded, near
+from rigidimeter.paper.comparison_table import AGREES, Picture, Row, bounded, near
 from rigidimeter.paper.context import Workshop
 from rigidimeter.records import Channel
-from rigidimeter.reporting.figures import perturbation, spectrum, svg_text
 from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.pictures import Picture
+from rigidimeter.reporting.sections.perturbation_figure import perturbation, spectrum
+from rigidimeter.reporting.style import svg_text
 
 __all__ = ["ROWS"]
 

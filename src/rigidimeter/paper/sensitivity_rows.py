@@ -11,13 +11,12 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import AGREES, DIFFERS, Row, bounded
+from rigidimeter.paper.comparison_table import AGREES, DIFFERS, Picture, Row, bounded
 from rigidimeter.paper.context import Workshop
 from rigidimeter.paper.figures import sensitivity
 from rigidimeter.paper.score_rows import scaled, scored, work_change_percent, work_closed_form_j
-from rigidimeter.reporting.figures import svg_text
 from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.pictures import Picture
+from rigidimeter.reporting.style import svg_text
 from rigidimeter.settings import Settings
 
 __all__ = ["DELAY_S", "PERCENTS", "ROWS"]

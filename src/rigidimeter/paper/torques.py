@@ -17,13 +17,12 @@ from rigidimeter.dynamics import closed_loop_motion
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import Signals, aligned, epoch_signals
 from rigidimeter.estimation.bandlimited import zero_phase_band
-from rigidimeter.paper.comparison_table import Row
+from rigidimeter.paper.comparison_table import Picture, Row
 from rigidimeter.paper.context import Workshop
 from rigidimeter.paper.figures import traces
 from rigidimeter.records import Channel
-from rigidimeter.reporting.figures import svg_text
 from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.pictures import Picture
+from rigidimeter.reporting.style import svg_text
 from rigidimeter.settings import Settings
 
 __all__ = ["ROWS"]

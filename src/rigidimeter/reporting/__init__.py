@@ -1,5 +1,17 @@
-"""The report of a study: one page, its tables as CSV, its figures as SVG."""
+"""The report of a result: one page, its tables as CSV, its figures as SVG."""
 
-from rigidimeter.reporting.page import write_report
+from rigidimeter.reporting.contents import Column, Figure, Section, Table, bullets, paragraph
+from rigidimeter.reporting.make_report import recording_result, report
+from rigidimeter.reporting.sections import SECTIONS
 
-__all__ = ["write_report"]
+__all__ = [
+    "SECTIONS",
+    "Column",
+    "Figure",
+    "Section",
+    "Table",
+    "bullets",
+    "paragraph",
+    "recording_result",
+    "report",
+]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rigidimeter.estimation import METHODS, Method
 from rigidimeter.settings import EstimationSettings
 
-__all__ = ["interval_basis", "method_of", "method_title", "pooled_basis"]
+__all__ = ["interval_basis", "is_least_squares", "method_of", "method_title", "pooled_basis"]
 
 
 def method_of(name: str) -> Method | None:
@@ -29,3 +29,9 @@ def pooled_basis(name: str) -> str:
     """Return what the intervals of all epochs together hold for."""
     method = method_of(name)
     return "" if method is None else method.pooled_text
+
+
+def is_least_squares(name: str) -> bool:
+    """Return whether voluntary torque biases a method: it does not use the perturbation."""
+    method = method_of(name)
+    return method is not None and "perturbation_nm" not in method.needs

@@ -1,10 +1,21 @@
-"""Numbers as people read them. Only the page rounds; what is stored keeps every digit."""
+"""Numbers and names as people read them. What is stored keeps every digit."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
+from pathlib import PurePath
 
-__all__ = ["interval", "number", "p_and_r", "p_value"]
+__all__ = [
+    "condition_name",
+    "interval",
+    "number",
+    "p_and_r",
+    "p_value",
+    "plural",
+    "series",
+    "short_names",
+]
 
 SMALLEST_P = 1e-300
 """Below this a p-value has run out of floating point."""
@@ -69,3 +80,29 @@ def p_and_r(p: float, r: float) -> str:
     """
     text = f"p = {p_value(p)}, r = {r:.2f}".replace("= <", "<").replace("= -", "= −")
     return text.replace(" =", "\N{NO-BREAK SPACE}=").replace("= ", "=\N{NO-BREAK SPACE}")
+
+
+def plural(count: int, noun: str) -> str:
+    """Return ``1 epoch`` or ``2 epochs``."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def series(items: Sequence[str]) -> str:
+    """Return ``a``, ``a and b`` or ``a, b and c``."""
+    return " and ".join([", ".join(items[:-1]), items[-1]] if len(items) > 1 else items)
+
+
+def condition_name(condition: str) -> str:
+    """Return the condition as people read it."""
+    return condition or "(no condition)"
+
+
+def short_names(sources: Iterable[str]) -> dict[str, str]:
+    """Return the last parts of each path: as few as keep the sources apart."""
+    unique = list(dict.fromkeys(sources))
+    parts = {source: PurePath(source).parts for source in unique}
+    for depth in range(1, max(map(len, parts.values()), default=1) + 1):
+        names = {source: "/".join(parts[source][-depth:]) or source for source in unique}
+        if len(set(names.values())) == len(unique):
+            return names
+    return {source: source for source in unique}

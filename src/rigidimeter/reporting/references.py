@@ -1,4 +1,4 @@
-"""What a methods paragraph cites, and how it does."""
+"""The sources that the methods paragraphs cite."""
 
 from __future__ import annotations
 

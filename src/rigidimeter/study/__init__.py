@@ -14,6 +14,7 @@ from rigidimeter.study.comparison import (
     conditions,
     split_pooled,
 )
+from rigidimeter.study.provenance import provenance
 from rigidimeter.study.results import (
     MEASURES,
     RATING,
@@ -79,6 +80,7 @@ __all__ = [
     "estimate",
     "keep",
     "leader",
+    "provenance",
     "read_study",
     "result_tables",
     "split_pooled",

@@ -318,12 +318,21 @@ def _estimates(result: StudyResult) -> Iterator[dict[str, Any]]:
     estimates = estimates_document(result.analysis)
     fixed = estimates["fixed_inertia"]["epochs"]
     for one, two in zip(estimates["epochs"], fixed, strict=True):
-        beside = {
-            f"fixed_inertia_{name}": value
-            for name, value in two.items()
-            if isinstance(value, float)
-        }
-        yield whose.get(one["source"], {}) | _flat(one) | beside
+        low_hz, high_hz = one.pop("band_hz") or (None, None)
+        found = [finding["name"] for finding in one.pop("findings")]
+        beside = {name: two[name] for name in ("outcome", "reason", *_numbers(two))}
+        yield (
+            whose.get(one["source"], {})
+            | one
+            | {"band_low_hz": low_hz, "band_high_hz": high_hz}
+            | {"n_findings": len(found), "findings": ", ".join(found)}
+            | {f"fixed_inertia_{name}": value for name, value in beside.items()}
+        )
+
+
+def _numbers(row: Mapping[str, Any]) -> list[str]:
+    """Return the names of the numbers of an estimate; one that does not exist is null."""
+    return [name for name in row if name != "band_hz" and isinstance(row[name], float | None)]
 
 
 def _scores(result: StudyResult) -> Iterator[dict[str, Any]]:

@@ -10,18 +10,11 @@ from matplotlib.figure import Figure
 
 from rigidimeter.estimation import epoch_signals, scoring_cycles
 from rigidimeter.records import Channel
-from rigidimeter.reporting.figures import (
-    changes,
-    condition_colours,
-    distribution,
-    loop,
-    loop_limits,
-    perturbation,
-    spectrum,
-    svg_text,
-    torque_limit_nm,
-    torque_parts,
-)
+from rigidimeter.reporting.sections.distribution import distribution
+from rigidimeter.reporting.sections.perturbation_figure import changes, perturbation, spectrum
+from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits
+from rigidimeter.reporting.sections.torque_fit import torque_limit_nm, torque_parts
+from rigidimeter.reporting.style import condition_colours, svg_text
 from rigidimeter.study import StudyResult
 
 STAMPS = np.arange(5000) / 250

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from rigidimeter.reporting.numbers import number, p_and_r, p_value
+from rigidimeter.reporting.numbers import number, p_and_r, p_value, short_names
 
 
 @pytest.mark.parametrize(
@@ -45,3 +45,17 @@ def test_p_is_never_printed_as_zero(p: float, text: str) -> None:
 
 def test_p_and_r_do_not_break_over_lines() -> None:
     assert p_and_r(0.0, -0.5) == "p < 1e-300, r\xa0=\xa0−0.50"
+
+
+def test_short_names_tell_sources_apart() -> None:
+    assert short_names(["/a/b/x.csv", "/a/c/y.csv"]) == {
+        "/a/b/x.csv": "x.csv",
+        "/a/c/y.csv": "y.csv",
+    }
+    assert short_names(["/a/b/x.csv", "/a/c/x.csv", "/a/b/x.csv"]) == {
+        "/a/b/x.csv": "b/x.csv",
+        "/a/c/x.csv": "c/x.csv",
+    }
+    assert short_names(["x", "./x"]) == {"x": "x", "./x": "./x"}
+    assert short_names([]) == {}
+    assert short_names(["", "/"]) == {"": "", "/": "/"}

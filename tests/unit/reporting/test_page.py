@@ -3,6 +3,7 @@
 import base64
 import csv
 import dataclasses
+import math
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -11,10 +12,8 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from rigidimeter.records import Epoch, Finding, Notice, Outcome
-from rigidimeter.reporting import write_report
-from rigidimeter.reporting.measures import short_names
 from rigidimeter.reporting.numbers import interval, number
-from rigidimeter.reporting.report_tables import all_tables
+from rigidimeter.reporting.page import contents, tables, write_report
 from rigidimeter.study import StudyResult, analyse
 
 NASTY = "<script>alert('x')</script>&amp;\"$_$"
@@ -72,20 +71,24 @@ def test_page_needs_nothing_beside_it(written: Path, page: Page) -> None:
     assert not re.search(r"url\(|@import|https?:", written.read_text(encoding="utf-8"))
 
 
-def test_every_table_lies_beside_the_page(written: Path, study: StudyResult) -> None:
-    tables = all_tables(study)
-    assert {path.stem for path in (written.parent / "tables").iterdir()} == set(tables)
-    for name, table in tables.items():
+def test_every_table_is_written_with_all_of_its_values(written: Path, study: StudyResult) -> None:
+    made = tables(contents(study))
+    assert {path.stem for path in (written.parent / "tables").iterdir()} == set(made)
+    for name, table in made.items():
         path = written.parent / "tables" / f"{name}.csv"
         with path.open(encoding="utf-8", newline="") as file:
-            header, *rows = csv.reader(file)
-        assert header == [column.name for column in table.columns]
+            reader = csv.DictReader(file)
+            rows = list(reader)
         assert len(rows) == len(table.rows)
+        assert {column.name for column in table.columns} <= set(reader.fieldnames or ())
         for row, expected in zip(rows, table.rows, strict=True):
-            for text, cell in zip(row, expected, strict=True):
-                assert text == ("" if cell is None else str(cell))
-                if isinstance(cell, float) and cell == cell:
-                    assert float(text) == cell
+            for key, value in expected.items():
+                if isinstance(value, float) and not math.isnan(value):
+                    assert float(row[key]) == value
+                elif value is not None and not isinstance(value, float):
+                    assert row[key] == str(value)
+                else:
+                    assert row[key] == ""
 
 
 def test_every_figure_of_the_page_lies_beside_it(written: Path, page: Page) -> None:
@@ -122,11 +125,11 @@ def test_page_says_what_was_done(page: Page, study: StudyResult) -> None:
     text = " ".join(page.text.split())
     assert "the arm touched the position limit" in text
     assert "one column was empty" in text
-    assert "two-sided Wilcoxon rank-sum test, asymptotic" in text
+    assert "Two-sided Wilcoxon rank-sum test, asymptotic" in text
     assert "tie and continuity correction" in text
     assert "0.0008" in text
     assert "0.0458366" in text
-    assert "The settings of this study" in text
+    assert "Main settings" in text
     assert "virtual subject" not in text.lower()
 
 
@@ -173,7 +176,7 @@ def test_page_tells_what_the_estimates_know(page: Page, study: StudyResult) -> N
     text = " ".join(page.text.split())
     analysis = study.analysis
     assert "Method: iv (instrumental variables" in text
-    assert f"Chosen because {analysis.method_reason}." in text
+    assert f"Chosen automatically: {analysis.method_reason}." in text
     for delay in analysis.delays:
         assert f"{number(1e3 * delay.delay_s)}" in text
     for fit in (*analysis.fits, *analysis.fixed_inertia, *analysis.pooled):
@@ -181,7 +184,7 @@ def test_page_tells_what_the_estimates_know(page: Page, study: StudyResult) -> N
     assert "(all)" in text
     assert "From 10 epochs on they come from the scatter between epochs; with fewer, the" in text
     assert "Intervals are made from the power of the residual at each frequency" in text
-    assert "has a recorded perturbation that repeats at least twice" in text
+    assert "needs a recorded perturbation that repeats at least twice" in text
 
 
 def test_a_method_asked_for_by_name_says_so(study: StudyResult, make_study, tmp_path: Path) -> None:
@@ -189,10 +192,10 @@ def test_a_method_asked_for_by_name_says_so(study: StudyResult, make_study, tmp_
     made = make_study(epochs, analysis=analyse(epochs, study.settings, "published"))
     text = " ".join(page_of(made, tmp_path).text.split())
     assert (
-        "Method: published (least squares as the paper prints it). It was asked for by name."
+        "Method: published (least squares as the paper prints it). It was requested by name."
         in text
     )
-    assert "No delay between torque and motion was looked for." in text
+    assert "The delay between torque and motion was not estimated." in text
     assert "Intervals hold for a residual of any colour" in text
     assert "The joint is taken for one that does not change" in text
 
@@ -201,7 +204,7 @@ def test_the_joint_over_frequency_is_on_the_page(
     periodic_study: StudyResult, tmp_path: Path
 ) -> None:
     text = " ".join(page_of(periodic_study, tmp_path).text.split())
-    assert "Torque over angle at the lines of the perturbation" in text
+    assert "Torque over angle at the frequencies of the perturbation" in text
     assert (tmp_path / "figures" / "impedance.svg").exists()
 
 
@@ -244,8 +247,8 @@ def test_a_foreign_recording_of_torque_and_angle(study, make_study, tmp_path: Pa
     channels = {name: epoch.channels[name] for name in ("torque_nm", "angle_rad")}
     foreign = Epoch("C:\\data\\wrist.csv", "1", channels)
     page = page_of(make_study([foreign], provenance={}), tmp_path)
-    assert "The recordings hold no perturbation channel." in page.text
-    assert "No scored epoch with an imposed sinusoid." in page.text
+    assert "The recordings have no perturbation channel." in page.text
+    assert "No epoch with an imposed sinusoid was scored." in page.text
     assert "(no condition)" in page.text
     assert (tmp_path / "figures" / "torque_1_unnamed.svg").exists()
 
@@ -275,10 +278,13 @@ def test_degenerate_studies(
         assert fit.outcome.reason in page.text
 
 
-def test_short_samples_mark_their_interval(make_study, make_analysis, tmp_path: Path) -> None:
+def test_short_samples_say_what_their_interval_is(
+    make_study, make_analysis, tmp_path: Path
+) -> None:
     made = make_study([], analysis=make_analysis({"OFF": 3, "DBS": 3}))
     assert any(comparison.test is not None for comparison in made.comparisons)
-    assert "†" in page_of(made, tmp_path).text
+    text = page_of(made, tmp_path).text
+    assert "too few values for an interval at this confidence" in text
 
 
 def test_epochs_without_samples(make_study, make_analysis, tmp_path: Path) -> None:
@@ -290,20 +296,6 @@ def test_epochs_without_samples(make_study, make_analysis, tmp_path: Path) -> No
 def test_a_name_that_is_no_text_is_written_all_the_same(study, make_study, tmp_path: Path) -> None:
     odd = dataclasses.replace(study.epochs[1], source="/caf\udce9.csv", condition="caf\udce9")
     assert "caf\\udce9" in page_of(make_study([odd]), tmp_path).text
-
-
-def test_short_names_tell_sources_apart() -> None:
-    assert short_names(["/a/b/x.csv", "/a/c/y.csv"]) == {
-        "/a/b/x.csv": "x.csv",
-        "/a/c/y.csv": "y.csv",
-    }
-    assert short_names(["/a/b/x.csv", "/a/c/x.csv", "/a/b/x.csv"]) == {
-        "/a/b/x.csv": "b/x.csv",
-        "/a/c/x.csv": "c/x.csv",
-    }
-    assert short_names(["x", "./x"]) == {"x": "x", "./x": "./x"}
-    assert short_names([]) == {}
-    assert short_names(["", "/"]) == {"": "", "/": "/"}
 
 
 def test_a_recording_without_a_condition_is_not_compared_with_itself(

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MultipleLocator
 
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.reporting.figures import styled
-from rigidimeter.reporting.figures.style import GREY, note
+from rigidimeter.reporting.style import GREY, note, styled
 
 __all__ = ["arm_bode"]
 

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rigidimeter.reporting.figures import styled
-from rigidimeter.reporting.figures.style import GREY, note
+from rigidimeter.reporting.style import GREY, note, styled
 
 __all__ = ["sensitivity"]
 

@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from rigidimeter.reporting.figures import styled
-from rigidimeter.reporting.figures.style import note
+from rigidimeter.reporting.style import note, styled
 
 __all__ = ["traces"]
 

@@ -1,0 +1,88 @@
+"""`report`: from a result, an analysis or recordings to a written report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording import Recording, read
+from rigidimeter.recording.study_folder import is_study
+from rigidimeter.records import Analysis
+from rigidimeter.reporting.page import write_report
+from rigidimeter.study import StudyResult, analyse, compare, compare_analysis, provenance
+
+__all__ = ["recording_result", "report"]
+
+TITLE = "Joint rigidity"
+
+AnyPath = str | PathLike[str]
+
+
+def report(
+    result: StudyResult | Analysis | Recording | AnyPath | Sequence[AnyPath],
+    out: AnyPath,
+    title: str | None = None,
+    *,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Path:
+    """Write a report: one HTML page that needs no other file, its tables and its figures.
+
+    Parameters
+    ----------
+    result : StudyResult, Analysis, Recording, path or sequence of paths
+        What `compare`, `estimate` or `read` returned; or a study folder, session folders and files,
+        which are read and analysed. Estimates alone have no figures of the recorded signals.
+    out : path
+        The folder; made if it does not exist. Files of the same names are replaced.
+    title : str, optional
+        Default: the title of the study, else "Joint rigidity".
+    progress : callable
+        Takes the share of the page that is done, from 0 to 1.
+
+    Returns
+    -------
+    Path
+        Of the page, ``OUT/report.html``.
+
+    Raises
+    ------
+    UserError
+        If something cannot be read, or the folder cannot be written.
+    """
+    shown = _result(result)
+    shown = replace(shown, title=title or shown.title or TITLE)
+    try:
+        return write_report(shown, Path(out), progress)
+    except OSError as error:
+        raise UserError(
+            f"{out}: the report cannot be written ({error.strerror or error})"
+        ) from None
+
+
+def _result(
+    result: StudyResult | Analysis | Recording | AnyPath | Sequence[AnyPath],
+) -> StudyResult:
+    if isinstance(result, StudyResult):
+        return result
+    if isinstance(result, Analysis):
+        return compare_analysis(result, resamples=0)
+    if isinstance(result, Recording):
+        return recording_result(result, analyse(result.epochs, result.settings))
+    paths = [Path(result)] if isinstance(result, (str, PathLike)) else [Path(one) for one in result]
+    if len(paths) == 1 and is_study(paths[0]):
+        return compare(paths[0])
+    return _result(read(paths))
+
+
+def recording_result(recording: Recording, analysis: Analysis, command: str = "") -> StudyResult:
+    """Return the comparison of a recording's first two conditions, with all that a report shows."""
+    return replace(
+        compare_analysis(analysis, resamples=0),
+        settings=recording.settings,
+        epochs=recording.epochs,
+        notices=recording.notices,
+        provenance=provenance(recording.paths, recording.settings, command),
+    )

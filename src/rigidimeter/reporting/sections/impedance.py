@@ -1,0 +1,246 @@
+"""The joint over frequency: torque over angle at the perturbation's lines, the model over it.
+
+With Eq. 3 torque over angle is K − J ω² + i B ω: its magnitude is K at low frequency, dips where
+ω² = K/J down to B ω and then rises with J ω²; its phase goes from 0 to 180 deg.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
+from matplotlib.ticker import LogLocator, MultipleLocator
+from numpy.typing import NDArray
+
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.estimation.closedloop.observation import Observation, observe_periods
+from rigidimeter.estimation.closedloop.periodic_response import impedance as without_model
+from rigidimeter.estimation.prepared import prepare
+from rigidimeter.records import Epoch, Fit
+from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
+from rigidimeter.reporting.numbers import condition_name, number
+from rigidimeter.reporting.representative import analysed_epoch
+from rigidimeter.reporting.style import GREY, condition_colours, listed, plain_ticks, styled
+from rigidimeter.study import StudyResult, split_pooled
+
+__all__ = ["COHERENT", "SECTION", "Response", "alike", "impedance", "model_nm_rad"]
+
+Array = NDArray[np.float64]
+
+COHERENT = 0.5
+"""Points of less coherence are hollow: most of their power is not the perturbation's."""
+
+_MARKERS = "osD^v"
+_DASHES = ("-", "--", "-.", ":")
+_POINTS = 400
+
+
+class Response(NamedTuple):
+    """The measured impedance of one condition, and the joint fitted to it if there is one."""
+
+    frequency_hz: Array
+    impedance_nm_rad: NDArray[np.complex128]
+    coherence: Array
+    joint: JointDynamics | None
+
+
+FEWEST_LINES = 2
+SAME_FREQUENCY = 1e-3
+"""Lines of two epochs that differ by less than this fraction are the same line."""
+
+
+def _blocks(result: StudyResult) -> Iterator[Block]:
+    fits, _ = split_pooled(result.analysis)
+    shown: dict[str, Response] = {}
+    used: dict[str, tuple[int, int]] = {}
+    for condition in result.condition_names:
+        epochs = [
+            epoch
+            for fit in result.analysis.fits
+            if fit.condition == condition and fit.outcome.included
+            if (epoch := analysed_epoch(result, fit)) is not None
+        ]
+        observations = alike(_observations(result, epochs))
+        if not observations:
+            continue
+        found = without_model(observations)
+        if found.frequency_hz.size < FEWEST_LINES:
+            continue
+        shown[condition] = Response(*found, _joint(fits.get(condition)))
+        used[condition] = len(observations), len(epochs)
+    if not shown:
+        yield paragraph(
+            "This needs a recorded perturbation that repeats at least twice within an included "
+            "epoch, and there is none: without one, the response cannot be separated from noise.",
+            "nothing",
+        )
+        return
+    yield paragraph(
+        Markup(
+            "Torque over angle at the frequencies of the perturbation, without any model, averaged "
+            "over the epochs of each condition. Hollow points have a coherence below 0.5. The line "
+            "is the model of all epochs together, "
+            '<span class="formula">K − J ω² + i B ω</span>. Bottom panel: the coherence of the '
+            "torque with what repeats, 1 where nothing but the perturbation moved the joint. A "
+            "point of coherence γ² has a relative uncertainty of about √(1/γ² − 1): a tenth at "
+            "0.99, a third at 0.9."
+        )
+    )
+    colours = condition_colours(result.condition_names)
+    counts = "; ".join(
+        f"{condition_name(key)}: {some} of {every} included epochs"
+        for key, (some, every) in used.items()
+    )
+    medians = "; ".join(
+        f"{condition_name(key)} {number(float(np.median(response.coherence)), 3)}"
+        for key, response in shown.items()
+    )
+    first = next(iter(shown.values()))
+    yield Figure(
+        "impedance",
+        f"{counts}. Median coherence: {medians}.",
+        f"Torque over angle against frequency at {first.frequency_hz.size} lines of the "
+        f"perturbation from {number(first.frequency_hz[0], 3)} to "
+        f"{number(first.frequency_hz[-1], 3)} Hz: magnitude, phase and coherence, with the "
+        f"model of each condition. Median coherence: {medians}. {counts}.",
+        partial(
+            impedance,
+            {condition_name(key): response for key, response in shown.items()},
+            {condition_name(key): colours[key] for key in shown},
+        ),
+        "tall",
+    )
+
+
+def _observations(result: StudyResult, epochs: Sequence[Epoch]) -> list[Observation]:
+    """Return the epochs that can be observed at the lines of their perturbation."""
+    found = []
+    for epoch in prepare(epochs, result.settings):
+        try:
+            found.append(observe_periods(epoch))
+        except ValueError:
+            continue  # it does not repeat, or was not recorded: the page says what is needed
+    return found
+
+
+def alike(observations: Sequence[Observation]) -> list[Observation]:
+    """Return the largest set of epochs that have their excited lines at the same frequencies."""
+    groups: list[list[Observation]] = []
+    for observation in observations:
+        lines = observation.lines.grid.omega_rad_s[observation.excited]
+        for group in groups:
+            known = group[0].lines.grid.omega_rad_s[group[0].excited]
+            if known.size == lines.size and np.allclose(known, lines, rtol=SAME_FREQUENCY):
+                group.append(observation)
+                break
+        else:
+            groups.append([observation])
+    return max(groups, key=len, default=[])
+
+
+def _joint(fit: Fit | None) -> JointDynamics | None:
+    if fit is None or not np.isfinite(fit.inertia_kg_m2):
+        return None
+    return JointDynamics(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad)
+
+
+def model_nm_rad(joint: JointDynamics, frequency_hz: Array) -> NDArray[np.complex128]:
+    """Return K − J ω² + i B ω in N·m/rad."""
+    omega = 2 * np.pi * frequency_hz
+    J, B, K = joint.inertia_kg_m2, joint.damping_nm_s_rad, joint.stiffness_nm_rad
+    return np.asarray(K - J * omega**2 + 1j * B * omega, dtype=np.complex128)
+
+
+def impedance(responses: Mapping[str, Response], colours: Mapping[str, str]) -> Drawing:
+    """Draw magnitude, phase and coherence of each condition.
+
+    Parameters
+    ----------
+    responses : mapping of str to Response
+        By condition, at least one, each with at least two lines.
+    colours : mapping of str to str
+        By condition.
+    """
+    lowest = min(float(r.frequency_hz[0]) for r in responses.values())
+    highest = max(float(r.frequency_hz[-1]) for r in responses.values())
+    with styled():
+        figure = Drawing(figsize=(7.4, 6.4))
+        magnitude, phase, coherence = figure.subplots(
+            3, 1, sharex=True, height_ratios=(1.5, 1.1, 0.8)
+        )
+        for place, (name, response) in enumerate(responses.items()):
+            marker = _MARKERS[place % len(_MARKERS)]
+            values = response.impedance_nm_rad
+            measured = (np.abs(values), np.degrees(np.angle(values)), response.coherence)
+            for axes, points in zip((magnitude, phase, coherence), measured, strict=True):
+                _points(axes, response, points, colours[name], marker, listed(name))
+            if response.joint is not None:
+                _model(
+                    magnitude,
+                    phase,
+                    response.joint,
+                    np.geomspace(lowest, highest, _POINTS),
+                    colours[name],
+                    _DASHES[place % len(_DASHES)],
+                    f"{listed(name)}, model",
+                )
+        magnitude.set_xscale("log")
+        magnitude.set_yscale("log")
+        magnitude.set_ylabel("Torque over angle\n(N·m/rad)")
+        phase.set_ylabel("Phase (deg)")
+        phase.set_ylim(-190, 190)
+        phase.yaxis.set_major_locator(MultipleLocator(90))
+        coherence.set_ylabel("Coherence (1)")
+        coherence.set_ylim(-0.04, 1.04)
+        coherence.set_xlabel("Frequency (Hz)")
+        coherence.set_xlim(lowest / 1.1, highest * 1.1)
+        coherence.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        plain_ticks(coherence.xaxis, magnitude.yaxis)
+        magnitude.grid(visible=False, which="minor")
+        magnitude.legend(loc="upper left", ncols=2)
+        coherence.axhline(COHERENT, color=GREY, linewidth=0.6, dashes=(2, 2))
+        figure.align_ylabels()
+    return figure
+
+
+def _points(
+    axes: Axes, response: Response, values: Array, colour: str, marker: str, name: str
+) -> None:
+    coherent = response.coherence >= COHERENT
+    for chosen, face in ((coherent, colour), (~coherent, "none")):
+        if np.any(chosen):
+            axes.plot(
+                response.frequency_hz[chosen],
+                values[chosen],
+                marker,
+                color=colour,
+                markerfacecolor=face,
+                markersize=3.0,
+                markeredgewidth=0.7,
+                alpha=0.55,
+                label=f"{name}, measured" if face != "none" else None,
+            )
+
+
+def _model(
+    magnitude: Axes,
+    phase: Axes,
+    joint: JointDynamics,
+    frequency_hz: Array,
+    colour: str,
+    dashes: str,
+    label: str,
+) -> None:
+    values = model_nm_rad(joint, frequency_hz)
+    sizes, angles_deg = np.abs(values), np.degrees(np.angle(values))
+    style: dict[str, Any] = {"color": colour, "linestyle": dashes, "linewidth": 1.2, "zorder": 3}
+    magnitude.plot(frequency_hz, sizes, label=label, **style)
+    phase.plot(frequency_hz, angles_deg, **style)
+
+
+SECTION = Section("impedance", "The joint over frequency", _blocks)

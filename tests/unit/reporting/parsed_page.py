@@ -1,0 +1,57 @@
+"""A report's page as text and tables."""
+
+from html.parser import HTMLParser
+
+
+class ParsedPage(HTMLParser):
+    """The text of a page, and the cells of every table by its caption."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: set[str] = set()
+        self.text = ""
+        self.rows: dict[str, list[list[str]]] = {}
+        self._caption = ""
+        self._inside = ""
+        self._sections: list[str] = []
+        self.sections: dict[str, str] = {}
+        self.feed(html)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        if tag == "section":
+            self._sections.append(dict(attrs)["id"] or "")
+        if tag == "caption":
+            self._caption, self._inside = "", "caption"
+        elif tag == "tr":
+            self.rows.setdefault(self._caption.strip(), []).append([])
+        elif tag in ("td", "th"):
+            self.rows[self._caption.strip()][-1].append("")
+            self._inside = "cell"
+        elif tag == "br" and self._inside == "cell":
+            self.rows[self._caption.strip()][-1][-1] += " "
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in ("caption", "td", "th"):
+            self._inside = ""
+        if tag == "section":
+            self._sections.pop()
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+        if self._sections:
+            place = self._sections[-1]
+            self.sections[place] = self.sections.get(place, "") + data
+        if self._inside == "caption":
+            self._caption += data
+        elif self._inside == "cell":
+            self.rows[self._caption.strip()][-1][-1] += data
+
+    def table(self, caption: str) -> list[list[str]]:
+        (found,) = (rows for name, rows in self.rows.items() if name.startswith(caption))
+        return [[" ".join(cell.split()) for cell in row] for row in found]
+
+    def words(self, section: str = "") -> str:
+        """Return the text of the page, or of one section, with single spaces."""
+        return " ".join((self.sections[section] if section else self.text).split())

@@ -1,0 +1,66 @@
+"""Which fits a report shows: those of conditions together, and those that stand for one."""
+
+import dataclasses
+import math
+
+import pytest
+
+from rigidimeter.records import Outcome
+from rigidimeter.reporting.representative import representative_fits
+from rigidimeter.study import StudyResult, split_pooled
+
+
+def test_estimates_bring_their_intervals(study: StudyResult) -> None:
+    included = [fit for fit in study.analysis.fixed_inertia if fit.outcome.included]
+    off = [fit for fit in included if fit.condition == "OFF"]
+    stiffness = study.comparison("stiffness_nm_rad")
+    assert [o.low for o in stiffness.of("OFF")] == [fit.stiffness_nm_rad_low for fit in off]
+    pooled, _ = split_pooled(study.analysis)
+    assert stiffness.pooled["DBS"].high == pooled["DBS"].stiffness_nm_rad_high
+    assert all(math.isnan(o.low) for o in study.comparison("work_j").of("OFF"))
+    assert study.comparison("work_j").pooled == {}
+
+
+@pytest.mark.parametrize(
+    ("recorded", "pooled", "named", "overall"),
+    [
+        (["OFF", "DBS"], ["OFF", "DBS", ""], ["OFF", "DBS"], True),
+        (["OFF"], ["OFF"], ["OFF"], False),
+        ([""], [""], [""], False),
+        (["", "OFF"], ["", "OFF", ""], ["", "OFF"], True),
+        (["OFF", "DBS"], ["OFF", "DBS"], ["OFF", "DBS"], False),
+        (["OFF"], [], [], False),
+    ],
+)
+def test_the_fit_to_all_conditions_is_distinguished_from_that_without_a_name(
+    recorded, pooled, named, overall, make_analysis
+) -> None:
+    analysis = make_analysis(dict.fromkeys(recorded, 2))
+    fits = tuple(
+        dataclasses.replace(analysis.fits[0], condition=name, epoch="pooled", n_samples=place)
+        for place, name in enumerate(pooled)
+    )
+    by_condition, everything = split_pooled(dataclasses.replace(analysis, pooled=fits))
+    assert list(by_condition) == named
+    assert everything is (fits[-1] if overall else None)
+
+
+def test_conditions_keep_one_order(study: StudyResult) -> None:
+    assert study.condition_names == ("OFF", "DBS")
+
+
+def test_the_representative_is_the_included_fit_with_the_median_vaf(
+    make_study, make_analysis
+) -> None:
+    analysis = make_analysis({"OFF": 5, "DBS": 4})
+    vaf = [90.0, 60.0, 80.0, 99.0, 70.0, 50.0, 10.0, 30.0, 20.0]
+    fits = [
+        dataclasses.replace(fit, vaf_percent=percent)
+        for fit, percent in zip(analysis.fits, vaf, strict=True)
+    ]
+    fits[3] = dataclasses.replace(fits[3], outcome=Outcome("excluded", "limit"))
+    fits[0] = dataclasses.replace(fits[0], outcome=Outcome("excluded", "limit"))
+    made = make_study([], analysis=dataclasses.replace(analysis, fixed_inertia=tuple(fits)))
+    chosen = [(fit.condition, fit.vaf_percent) for fit in representative_fits(made)]
+    # Three are left of OFF; of the four of DBS the lower middle one is taken.
+    assert chosen == [("OFF", 70.0), ("DBS", 20.0)]

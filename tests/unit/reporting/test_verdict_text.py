@@ -1,0 +1,199 @@
+"""Sentences of a study folder say what its numbers say, and no more."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from tests.unit.reporting.cohorts import Design, altered, made_study, sensitivity_row, untested
+
+from rigidimeter.records import Outcome
+from rigidimeter.reporting.verdict_text import dependence_sentences, verdict_sentence
+from rigidimeter.statistics import two_groups
+from rigidimeter.study import Comparison, Measure, SensitivityRow, StudyResult
+
+SMALL = Design(days=(5, 4), epochs=(5, 5), scores=(4, 4))
+
+
+@pytest.fixture(scope="module")
+def study() -> StudyResult:
+    return made_study(SMALL)
+
+
+DAMPING = Measure("b", "Damping", "N", "fixed_inertia")
+
+
+def groups(effect: float, scatter: float = 0.1):
+    rng = np.random.default_rng(4)
+    x = 1.0 + scatter * rng.standard_normal(30)
+    y = 1.0 - effect + scatter * rng.standard_normal(30)
+    return two_groups(
+        x, y, [f"M/{i // 5}" for i in range(30)], [f"M/{6 + i // 5}" for i in range(30)]
+    )
+
+
+def rows(*methods: tuple[str, str, float, float]) -> tuple[SensitivityRow, ...]:
+    return tuple(
+        dataclasses.replace(
+            sensitivity_row(DAMPING, method, ways, groups(effect, scatter), 1.0),
+            chosen=method == "iv" and ways == "fixed",
+        )
+        for method, ways, effect, scatter in methods
+    )
+
+
+def said(study: StudyResult, *methods: tuple[str, str, float, float]) -> str:
+    (sentence,) = dependence_sentences(dataclasses.replace(study, sensitivity=rows(*methods)))
+    return sentence
+
+
+def test_a_clear_effect_is_shown_and_none_is_not(study: StudyResult) -> None:
+    text = verdict_sentence(study)
+    assert text.startswith(
+        "Tested by days (p adjusted by Holm’s method for 6 measures): DBS is lower than OFF in"
+    )
+    assert "stiffness K (p" in text
+    none = verdict_sentence(made_study(dataclasses.replace(SMALL, effect=0.0)))
+    assert "is lower" not in none
+    assert "no difference is shown in inertia J" in none
+
+
+def test_the_sign_is_that_of_the_estimate(study: StudyResult) -> None:
+    def turned(c: Comparison) -> Comparison:
+        d = c.days
+        assert d is not None
+        return dataclasses.replace(
+            c, days=dataclasses.replace(d, estimate=-d.estimate, low=-d.high, high=-d.low)
+        )
+
+    text = verdict_sentence(altered(study, turned))
+    assert "DBS is higher than OFF in" in text
+    assert "lower" not in text
+
+
+def test_a_p_that_only_one_measure_alone_would_bear_is_not_claimed(study: StudyResult) -> None:
+    def weaker(c: Comparison) -> Comparison:
+        assert c.days is not None
+        p = 0.03 if c.measure.name == "work_j" else 0.6
+        return dataclasses.replace(c, days=dataclasses.replace(c.days, p=p))
+
+    text = verdict_sentence(altered(study, weaker))
+    assert "is lower" not in text
+    assert "work (p\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}0.18)" in text
+
+
+def test_the_lead_is_claimed_only_where_it_is_beyond_chance(study: StudyResult) -> None:
+    sizes = {c.measure.name: abs(c.effects.rank_biserial) for c in study.comparisons if c.effects}
+    first = max(sizes, key=lambda name: sizes[name])
+
+    def with_p(p_of: Callable[[tuple[str, str]], float]) -> StudyResult:
+        pairs = [
+            dataclasses.replace(d, p_holm=p_of((d.first, d.second))) for d in study.differences
+        ]
+        return dataclasses.replace(study, differences=tuple(pairs))
+
+    text = verdict_sentence(with_p(lambda pair: 1e-5 if "inertia_kg_m2" in pair else 1.0))
+    assert "it is significantly larger than that of inertia J" in text
+    assert "it is not significantly larger than that of" in text
+    text = verdict_sentence(with_p(lambda pair: 1.0))
+    assert "it is not significantly larger than that of any other" in text
+    text = verdict_sentence(with_p(lambda pair: math.nan if first in pair else 1.0))
+    assert "significantly" not in text
+    assert "could not be tested" in text
+
+
+def test_prefixes_and_missing_tests(study: StudyResult) -> None:
+    other = dataclasses.replace(study, virtual=True, blinded=True)
+    assert verdict_sentence(other).startswith(
+        "Virtual data. Blinded: the names of the conditions are codes. Tested by days"
+    )
+    lacking = untested(study, "work_j", "one day in each condition")
+    assert "Not tested by days: work." in verdict_sentence(lacking)
+    alone = dataclasses.replace(study, comparisons=())
+    assert "No epoch could be included" in verdict_sentence(alone)
+
+
+def test_agreeing_methods(study: StudyResult) -> None:
+    assert (
+        said(study, ("published", "fixed", 0.3, 0.1), ("iv", "fixed", 0.3, 0.1))
+        == "Damping: every method shows the difference."
+    )
+    assert (
+        said(study, ("published", "fixed", 0.0, 0.1), ("iv", "fixed", 0.0, 0.1))
+        == "Damping: no method shows a difference."
+    )
+    text = said(study, ("published", "fixed", 0.6, 0.1), ("iv", "fixed", 0.3, 0.1))
+    assert "The size depends on the method" in text
+
+
+def test_voluntary_torque_is_named_where_the_intervals_say_so(study: StudyResult) -> None:
+    text = said(study, ("published", "fixed", 0.3, 0.1), ("iv", "fixed", 0.0, 0.1))
+    assert text.startswith("Damping: “published” shows a difference, “iv” does not.")
+    assert "Voluntary torque would explain this" in text
+
+
+def test_voluntary_torque_is_not_blamed_where_other_least_squares_are_not_moved(
+    study: StudyResult,
+) -> None:
+    text = said(
+        study,
+        ("published", "fixed", 0.3, 0.1),
+        ("bandlimited", "fixed", 0.0, 0.1),
+        ("iv", "fixed", 0.0, 0.1),
+    )
+    assert "“published” shows a difference, “bandlimited” and “iv” do not." in text
+    assert "would bias “bandlimited” too, so it is not the likely reason" in text
+    assert "would explain this" not in text
+
+
+def test_shifts_that_differ_in_p_alone_are_called_so(study: StudyResult) -> None:
+    text = said(study, ("iv", "fixed", 0.3, 0.1), ("iv", "free", 0.33, 0.7))
+    assert "“iv” (J fixed) shows a difference, “iv” (J free) does not." in text
+    assert "they differ more in p than in size" in text
+
+
+def test_lack_of_precision_is_not_taken_for_voluntary_torque(study: StudyResult) -> None:
+    text = said(study, ("published", "fixed", 0.3, 0.1), ("iv", "fixed", 0.25, 1.2))
+    assert "Voluntary torque" not in text
+    assert "lack of precision could be the reason" in text
+
+
+def test_least_squares_may_hide_a_difference(study: StudyResult) -> None:
+    text = said(study, ("published", "fixed", 0.0, 0.1), ("iv", "fixed", 0.3, 0.1))
+    assert text.startswith("Damping: “iv” shows a difference, “published” does not.")
+    assert "it can hide a difference as well as make one" in text
+
+
+def test_opposite_signs_and_held_inertia(study: StudyResult) -> None:
+    text = said(study, ("published", "fixed", 0.3, 0.1), ("iv", "fixed", -0.3, 0.1))
+    assert (
+        "the sign depends on the method. “published” shows DBS lower than OFF, “iv” higher" in text
+    )
+    text = said(study, ("iv", "fixed", 0.3, 0.1), ("iv", "free", 0.0, 0.1))
+    assert "“iv” (J fixed) shows a difference, “iv” (J free) does not." in text
+
+
+def test_verdict_says_which_way(make_study, make_analysis) -> None:
+    made = make_study([], analysis=make_analysis({"OFF": 40, "DBS": 40}))
+    assert verdict_sentence(made).startswith("DBS compared with OFF: ")
+    stiffness = {c.measure.name: c for c in made.comparisons}["stiffness_nm_rad"]
+    assert stiffness.test is not None
+    assert f"p\xa0=\xa0{stiffness.test.p:.3g}" in verdict_sentence(made)
+
+
+def test_verdict_of_a_lower_stiffness(make_study, epochs) -> None:
+    text = verdict_sentence(make_study(epochs))
+    assert text.index("lower") < text.index("stiffness K")
+
+
+def test_verdict_without_comparison_gives_medians(make_study, make_analysis) -> None:
+    text = verdict_sentence(make_study([], analysis=make_analysis({"": 3})))
+    assert text.startswith("No comparison of conditions. Medians: (no condition): Inertia J ")
+    assert text.count("(n = 3)") == 5
+
+
+def test_verdict_of_nothing(make_study, make_analysis) -> None:
+    failed = make_analysis({"OFF": 2}, Outcome("failed", "no torque"), scores=False)
+    for analysis in (failed, make_analysis({})):
+        assert "No epoch could be included" in verdict_sentence(make_study([], analysis=analysis))
