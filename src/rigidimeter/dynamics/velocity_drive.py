@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from types import ModuleType
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import scipy
@@ -190,13 +190,10 @@ class DriveModel:
 
     def after(self, elapsed_s: Array, motion: ArmMotion, command_rad_s: Array) -> ArmMotion:
         """Return the motion a time after each tick, from that at the tick and its command."""
-        m11, m12, m21, m22, n1, n2 = drive_coefficients(
-            self.bandwidth_hz, self.damping_ratio, elapsed_s
-        )
-        acceleration, velocity, angle = motion
-        lag = velocity - command_rad_s
-        return ArmMotion(
-            m21 * lag + m22 * acceleration,
-            command_rad_s + m11 * lag + m12 * acceleration,
-            angle + command_rad_s * elapsed_s + n1 * lag + n2 * acceleration,
-        )
+        # `drive_step`, element by element.
+        coefficients = drive_coefficients(self.bandwidth_hz, self.damping_ratio, elapsed_s)
+        steps: Any = (elapsed_s, *coefficients)
+        states: Any = motion[::-1]
+        commands: Any = command_rad_s
+        moved: Any = drive_step(Drive(*steps), DriveState(*states), commands)
+        return ArmMotion(*moved[::-1])

@@ -105,14 +105,13 @@ class Design:
         """Return the predicted standard errors, one row a condition and method."""
         import pandas as pd
 
-        rows = {
-            (condition, method): getattr(found, method).free
+        rows = [
+            (condition, method, *getattr(found, method).free)
             for condition, found in self.precision.items()
             for method in ("bound", "iv", "least_squares")
-        }
-        columns = [f"{name}_se" for name in PARAMETERS]
-        index = pd.MultiIndex.from_tuples(rows, names=["condition", "method"])
-        return pd.DataFrame(list(rows.values()), index=index, columns=columns)
+        ]
+        columns = ["condition", "method", *(f"{name}_se" for name in PARAMETERS)]
+        return pd.DataFrame(rows, columns=columns).set_index(["condition", "method"])
 
     def _repr_html_(self) -> str:
         sentences = [*self.warnings, *self.stability.warnings, *self.remarks]

@@ -25,6 +25,8 @@ def test_an_unstable_loop_has_no_precision() -> None:
     assert found.remarks[0] == "subject OFF: no standard errors, since the loop is unstable"
     assert found.ranked is found.multisine is None
     assert found.detections == ()
+    assert found.table().empty
+    assert "is unstable" in found._repr_html_()
 
 
 def test_a_condition_without_errors_has_a_remark() -> None:
