@@ -1,4 +1,4 @@
-"""What the design foresees against the product's own estimates on the virtual rig."""
+"""What the design predicts against the product's own estimates on the virtual rig."""
 
 from collections.abc import Iterator
 
@@ -25,7 +25,7 @@ SESSION = 25
 
 
 def plan(voluntary_sd_nm: float, rig: dict) -> tuple[Settings, Precision]:
-    """Return settings whose only subject has this voluntary torque, and what is foreseen."""
+    """Return settings whose only subject has this voluntary torque, and what is predicted."""
     subject = {"OFF": {"voluntary_sd_nm": voluntary_sd_nm}}
     settings = parse_settings(
         {"subject": subject, "rig": rig, "protocol": {"blocks": [{"epochs": 1}]}}

@@ -2,7 +2,7 @@
 
 Peers answer when they are asked, not at fixed ticks, so the state is advanced to the moment of each
 question, exactly, under the command that was in force since the last one. The equations are those
-of `simulation.drive` and `simulation.arm`.
+of `rigidimeter.dynamics.velocity_drive` and `joint`.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ def bode(settings: Settings, margins: dict[str, Margins], worst: dict[str, Margi
     settings : Settings
         For the loop.
     margins, worst : dict of str to Margins
-        By condition, as `rigidimeter.experiment.loop_stability` finds them.
+        By condition, as `rigidimeter.dynamics.loop_stability` finds them.
     """
     colours = condition_colours(margins)
     frequency_hz = np.geomspace(_LOWEST_HZ, settings.rig.tick_rate_hz / 2.0, 1200)

@@ -107,7 +107,7 @@ def test_mistakes_are_sentences(tmp_path: Path) -> None:
         run("--out", str(tmp_path / "out"))
 
 
-def test_prints_what_is_foreseen() -> None:
+def test_prints_what_is_predicted() -> None:
     words = " ".join(run().split())
     for expected in (
         "subject OFF 28.3 dB 92.1 deg 1472 ms 0.95 stable",
@@ -121,14 +121,14 @@ def test_prints_what_is_foreseen() -> None:
     assert "would bias least squares" not in words
 
 
-def test_the_subjects_own_torque_is_foreseen(tmp_path: Path) -> None:
+def test_the_subjects_own_torque_biases_least_squares(tmp_path: Path) -> None:
     settings = tmp_path / "rig.toml"
     settings.write_text("[subject.OFF]\nvoluntary_sd_nm = 0.2\n")
     words = " ".join(run("--settings", str(settings)).split())
     assert "would bias least squares: J by -43 %, B by -69 %, K by +3 %" in words
 
 
-def test_numbers_of_what_is_foreseen(tmp_path: Path) -> None:
+def test_numbers_of_what_is_predicted(tmp_path: Path) -> None:
     numbers = tmp_path / "numbers.json"
     run("--json", str(numbers), "--detect", "damping=20%", "--detect", "stiffness=0.3")
     document = json.loads(numbers.read_text())
