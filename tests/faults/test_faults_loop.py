@@ -18,8 +18,8 @@ from tests.faults.trials import (
     run,
 )
 
-from rigidimeter.acquisition.processes.ring import SampleRing
-from rigidimeter.acquisition.processes.shared_status import Role, SharedStatus
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.shared_status import Role
 from rigidimeter.acquisition.processes.sink import SharedSupervision
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order
 from rigidimeter.devices.base import DeviceError
@@ -139,16 +139,16 @@ def test_fault_18_emergency_stop(rig, tmp_path, measured):
 
 
 class SharedDesk:
-    """The shared_status and the ring as the loop sees them, on the clock of the trial."""
+    """The shared memory as the loop sees them, on the clock of the trial."""
 
     def __init__(self, made, **options):
-        self.shared_status, self.ring = SharedStatus.create(), SampleRing.create(100_000)
+        self.shared = SessionMemory.create(made.rate_hz, ring_s=100_000 / made.rate_hz)
+        self.shared_status, self.ring = self.shared.status, self.shared.samples
         now_ns = lambda: 10**9 + round(1e9 * made.clock.now_s())  # noqa: E731
         self.shared_status._now_ns = now_ns
         self.suspended_s = 0.0
         self.supervision = SharedSupervision(
-            self.shared_status,
-            self.ring,
+            self.shared,
             now_ns=now_ns,
             boot_ns=lambda: now_ns() + round(1e9 * self.suspended_s),
             **options,
@@ -179,9 +179,8 @@ class SharedDesk:
         return writer
 
     def close(self):
-        for memory in (self.shared_status.memory, self.ring.memory):
-            memory.unlink()
-            memory.close()
+        self.shared.unlink()
+        self.shared.close()
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ import pytest
 from rigidimeter.acquisition.processes.recorder import Recorder, Recording
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.ring_recovery import recover_from_rings
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.acquisition.processes.sink import RingSink
 from rigidimeter.errors import UserError
@@ -25,11 +26,10 @@ class Rig:
         self.folder = folder
         self.samples, self.events = SampleRing.create(capacity), EventRing.create(32, 512)
         self.shared_status = SharedStatus.create()
-        self.sink = RingSink(self.samples, self.events, self.shared_status, RATE_HZ)
+        self.shared = SessionMemory(self.samples, self.events, self.shared_status)
+        self.sink = RingSink(self.shared, RATE_HZ)
         self.writer = Recording(folder, Settings(), virtual=True).writer()
-        self.recorder = Recorder(
-            self.writer, self.samples, self.events, self.shared_status, RATE_HZ
-        )
+        self.recorder = Recorder(self.writer, self.shared, RATE_HZ)
         self.tick = 0
 
     def run(self, ticks):
@@ -53,9 +53,7 @@ class Rig:
             file.close()
 
     def recover_from_rings(self):
-        return recover_from_rings(
-            self.folder, self.samples, self.events, "the recorder was killed", RATE_HZ
-        )
+        return recover_from_rings(self.folder, self.shared, "the recorder was killed", RATE_HZ)
 
     def ticks(self):
         columns = read_samples(self.folder / "samples.arrows")

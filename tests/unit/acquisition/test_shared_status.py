@@ -4,6 +4,7 @@ import time
 import pytest
 
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import (
     Condition,
     Flag,
@@ -108,8 +109,7 @@ def sample(k: int) -> Sample:
 def test_causes_to_stop(shared_status, rings, now):
     samples, _ = rings
     supervision = SharedSupervision(
-        shared_status,
-        samples,
+        SessionMemory(*rings, shared_status),
         console_lost_s=0.5,
         recorder_lost_s=2.0,
         most_lag=6,
@@ -143,7 +143,7 @@ def supervision(shared_status, rings, now):
     before = Time()
     before.ns = now.ns + 7_000_000_000  # suspended for 7 s since it was started, but not by us
     return SharedSupervision(
-        shared_status, rings[0], stall_s=0.1, now_ns=now, boot_ns=before
+        SessionMemory(*rings, shared_status), stall_s=0.1, now_ns=now, boot_ns=before
     ), before
 
 
@@ -178,7 +178,7 @@ def test_a_loop_held_up_between_two_clocks_was_not_suspended(shared_status, ring
         return at
 
     supervision = SharedSupervision(
-        shared_status, rings[0], stall_s=0.1, now_ns=held_up, boot_ns=held_up
+        SessionMemory(*rings, shared_status), stall_s=0.1, now_ns=held_up, boot_ns=held_up
     )
     held_up_ns = 500_000_000
     assert supervision.cause(0.0) == Cause.NONE
@@ -189,14 +189,14 @@ def test_the_two_clocks_are_those_of_the_machine(shared_status, rings):
     real = SharedStatus(shared_status.memory)
     real.beat(Role.CONSOLE)
     real.beat(Role.RECORDER)
-    supervision = SharedSupervision(real, rings[0], stall_s=0.1)
+    supervision = SharedSupervision(SessionMemory(*rings, real), stall_s=0.1)
     time.sleep(0.15)
     assert supervision.cause(0.0) == Cause.NONE
 
 
 def test_the_sink_keeps_events_in_their_place(shared_status, rings):
     samples, events = rings
-    sink = RingSink(samples, events, shared_status, tick_rate_hz=10.0)
+    sink = RingSink(SessionMemory(*rings, shared_status), tick_rate_hz=10.0)
     sink.event("session_started", time_s=0.0)
     sink.state_changed(Run(State.RUNNING))
     sink.event("epoch_started", epoch=1, time_s=0.0, planned_s=0.4)
@@ -215,7 +215,7 @@ def test_the_sink_keeps_events_in_their_place(shared_status, rings):
         ("session_ended", 5),
     ]
     assert found[-1].facts["outcome"] == "success"
-    assert sink.lag() == 5
+    assert samples.lag() == 5
     status = shared_status.loop()
     assert (status.state, status.tick, status.missed_deadlines) == (State.RUNNING, 4, 1)
     assert shared_status.condition(Role.LOOP) is Condition.STOPPING

@@ -60,7 +60,6 @@ class LoopSide:
 
     sink: RingSink
     supervision: SharedSupervision
-    status: SharedStatus
     ready: Callable[[], Prepared]
 
 
@@ -100,10 +99,9 @@ def loop_main(
         sys.exit(1)
     recorder = WatchedProcess(status.pid(Role.RECORDER))
     rate_hz = recording.settings.rig.tick_rate_hz
-    sink = RingSink(shared.samples, shared.events, status, rate_hz)
+    sink = RingSink(shared, rate_hz)
     supervision = SharedSupervision(
-        status,
-        shared.samples,
+        shared,
         console_lost_s=patience.console_lost_s,
         recorder_lost_s=patience.recorder_lost_s,
         stall_s=recording.settings.loop.stall_s,
@@ -121,7 +119,7 @@ def loop_main(
 
     code = 0
     try:
-        target(LoopSide(sink, supervision, status, ready))
+        target(LoopSide(sink, supervision, ready))
         sink.close(sink.last_time_s, "fail", "the loop ended without closing the session")
     except UserError as error:  # a sentence, which stands in the record and is shown at the end
         code = 1
@@ -134,9 +132,7 @@ def loop_main(
     finally:
         status.set_condition(Role.LOOP, Condition.FAILED if code else Condition.DONE)
         _leave_real_time()
-        remarks: list[str] = []
-        complete(Role.LOOP, shared, recording, recorder, patience, remarks)
-        for remark in remarks:
+        for remark in complete(Role.LOOP, shared, recording, recorder, patience):
             print(remark, file=sys.stderr, flush=True)
         if os.getppid() != console_pid:
             shared.unlink()

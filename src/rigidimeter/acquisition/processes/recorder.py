@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.acquisition.processes.ring import ROW, Event, EventRing, SampleRing
-from rigidimeter.acquisition.processes.shared_status import Role, SharedStatus
+from rigidimeter.acquisition.processes.ring import ROW, Event
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.shared_status import Role
 from rigidimeter.documents import json_line
 from rigidimeter.recording.sample_log import BATCH_S
 from rigidimeter.recording.session_folder import SessionWriter
@@ -90,9 +91,7 @@ class Recorder:
     Parameters
     ----------
     writer : SessionWriter
-    samples : SampleRing
-    events : EventRing
-    status : SharedStatus
+    shared : SessionMemory
     tick_rate_hz : float
         Sets how many samples make a batch.
     """
@@ -100,12 +99,11 @@ class Recorder:
     def __init__(
         self,
         writer: SessionWriter,
-        samples: SampleRing,
-        events: EventRing,
-        status: SharedStatus,
+        shared: SessionMemory,
         tick_rate_hz: float,
     ) -> None:
-        self._writer, self._samples, self._events, self._status = writer, samples, events, status
+        self._writer, self._status = writer, shared.status
+        self._samples, self._events = shared.samples, shared.events
         self._batch = max(1, int(BATCH_S * tick_rate_hz))
         self._open_epoch: int | None = None
         self._last_time_s = 0.0

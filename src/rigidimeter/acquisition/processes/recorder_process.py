@@ -1,5 +1,8 @@
 """The recorder's process: it records until the session is closed, whoever else is killed.
 
+A write only gives the samples to the system. A thread has the files put on the disk, which may hold
+that up for long; the recorder asks it, goes on writing, and looks later what came of it.
+
 It beats its heart between any two writes. A disk that does not take a write is tried again and
 again, and the operator told so. When the loop has ended, or is not heard of, the session is closed
 with that as the reason.
@@ -11,12 +14,11 @@ import math
 import os
 import signal
 import sys
+import threading
 import time
 import traceback
 
-from rigidimeter.acquisition.processes.fsync_worker import FsyncWorker
 from rigidimeter.acquisition.processes.recorder import Patience, Recorder, Recording
-from rigidimeter.acquisition.processes.ring import SampleRing
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Role, SharedStatus
 from rigidimeter.acquisition.processes.watchdog import WatchedProcess, leave_signals_to_the_console
@@ -43,14 +45,12 @@ def recorder_main(
     leave_signals_to_the_console()
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends with the session, not before
     shared = SessionMemory.attach(names)
-    samples, status = shared.samples, shared.status
+    status = shared.status
     status.join(Role.RECORDER)
     try:
         writer = recording.writer()
         status.set_condition(Role.RECORDER, Condition.READY, "")
-        rate_hz = recording.settings.rig.tick_rate_hz
-        recorder = Recorder(writer, samples, shared.events, status, rate_hz)
-        ended_well = _record(recorder, writer, status, samples, patience, recording, console_pid)
+        ended_well = _record(writer, recording, shared, patience, console_pid)
         status.set_condition(Role.RECORDER, Condition.DONE if ended_well else Condition.FAILED)
     except UserError as error:
         status.set_condition(Role.RECORDER, Condition.FAILED, str(error))
@@ -67,21 +67,76 @@ def recorder_main(
         shared.close()
 
 
+class FsyncWorker:
+    """Has files put on the disk when asked; it may hang, the asker does not.
+
+    `busy` says that it is at work, `error` what came of the last time, empty if all went well.
+
+    Parameters
+    ----------
+    descriptors : tuple of int
+    status : SharedStatus
+        Shows how many samples are on the disk.
+    """
+
+    def __init__(self, descriptors: tuple[int, ...], status: SharedStatus) -> None:
+        # Copies, so that a file that is closed meanwhile is not mistaken for another.
+        self._descriptors = tuple(os.dup(descriptor) for descriptor in descriptors)
+        self._status = status
+        self._asked = threading.Semaphore(0)
+        self._ending = False
+        self.busy = False
+        self._samples = 0
+        self.error = ""
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def ask(self, samples: int) -> None:
+        """Have the files put on the disk, which hold so many samples; not if that is under way."""
+        if not self.busy:
+            self.busy = True
+            self._samples = samples
+            self._asked.release()
+
+    def _run(self) -> None:
+        while True:
+            self._asked.acquire()
+            if self._ending:
+                return
+            try:
+                for descriptor in self._descriptors:
+                    os.fsync(descriptor)
+                self._status.synced_samples = self._samples
+                self.error = ""
+            except OSError as error:
+                self.error = error.strerror or str(error)
+            self.busy = False
+
+    def close(self) -> None:
+        """End the thread; one that hangs is left to the end of the process."""
+        self._ending = True
+        self._asked.release()
+        self._thread.join(timeout=1.0)
+        if not self._thread.is_alive():
+            for descriptor in self._descriptors:
+                os.close(descriptor)
+
+
 def _loop_lives(status: SharedStatus) -> bool:
     pid = status.pid(Role.LOOP)
     return bool(pid) and WatchedProcess(pid).alive()
 
 
 def _record(
-    recorder: Recorder,
     writer: SessionWriter,
-    status: SharedStatus,
-    samples: SampleRing,
-    patience: Patience,
     recording: Recording,
+    shared: SessionMemory,
+    patience: Patience,
     console_pid: int,
 ) -> bool:
     """Record until the session is closed; return whether it is in the files."""
+    status, samples = shared.status, shared.samples
+    recorder = Recorder(writer, shared, recording.settings.rig.tick_rate_hz)
     fsync_worker = FsyncWorker(writer.descriptors(), status)
     loop: WatchedProcess | None = None
     since_s: float | None = None  # the disk has taken nothing since then
@@ -112,7 +167,7 @@ def _record(
                     f"({error.strerror or error}); {samples.lag()} samples wait: make room",
                 )
             if recorder.ended:
-                return _synced(fsync_worker, status, samples, patience, recording)
+                return _synced(fsync_worker, shared, patience, recording)
             over_s = over_s or (now_s if why or recorder.closing else None)
             if since_s is not None and over_s is not None and now_s - over_s > patience.disk_s:
                 return False
@@ -125,14 +180,10 @@ def _record(
 
 
 def _synced(
-    fsync_worker: FsyncWorker,
-    status: SharedStatus,
-    samples: SampleRing,
-    patience: Patience,
-    recording: Recording,
+    fsync_worker: FsyncWorker, shared: SessionMemory, patience: Patience, recording: Recording
 ) -> bool:
     """Wait until the closed files are on the disk, as long as that is reasonable."""
-    until_s = time.monotonic() + patience.disk_s
+    status, until_s = shared.status, time.monotonic() + patience.disk_s
     asked = False
     while time.monotonic() < until_s:
         status.beat(Role.RECORDER)
@@ -140,7 +191,7 @@ def _synced(
             if asked and not fsync_worker.error:
                 return True
             asked = True
-            fsync_worker.ask(samples.recorded)
+            fsync_worker.ask(shared.samples.recorded)
         time.sleep(0.005)
     status.set_condition(
         Role.RECORDER,

@@ -46,7 +46,7 @@ class Recovered:
 
 
 def recover_from_rings(
-    folder: Path, samples: SampleRing, events: EventRing, reason: str, tick_rate_hz: float
+    folder: Path, shared: SessionMemory, reason: str, tick_rate_hz: float
 ) -> Recovered:
     """Complete a session folder from the rings, and close it.
 
@@ -55,7 +55,7 @@ def recover_from_rings(
     Parameters
     ----------
     folder : Path
-    samples, events : SampleRing, EventRing
+    shared : SessionMemory
     reason : str
         Why it was necessary; an epoch or session that the loop did not close ends with it.
     tick_rate_hz : float
@@ -68,6 +68,7 @@ def recover_from_rings(
     OSError
         If the disk does not take it.
     """
+    samples, events = shared.samples, shared.events
     read_manifest(folder)
     path = folder / EVENTS
     with path.open("ab", buffering=0) as file:
@@ -105,9 +106,8 @@ def complete(
     recording: Recording,
     recorder: WatchedProcess,
     patience: Patience,
-    remarks: list[str],
-) -> None:
-    """See the recorder to its end; if that is not a good one, do its work.
+) -> list[str]:
+    """See the recorder to its end, and do its work if that is not a good one; return remarks.
 
     Parameters
     ----------
@@ -117,9 +117,8 @@ def complete(
     recording : Recording
     recorder : WatchedProcess
     patience : Patience
-    remarks : list of str
-        What the operator should know is added to them.
     """
+    remarks: list[str] = []
     status = shared.status
     since_s = time.monotonic()
     hung = False
@@ -140,19 +139,15 @@ def complete(
         late = shared.samples.lag()
         if late:
             remarks.append(f"{late} samples came after the session was closed")
-        return
+        return remarks
     note = status.note(Role.RECORDER)
     reason = note or ("the recorder hung" if hung else "the recorder was killed")
     try:
-        recover_from_rings(
-            recording.folder,
-            shared.samples,
-            shared.events,
-            reason,
-            recording.settings.rig.tick_rate_hz,
-        )
+        rate_hz = recording.settings.rig.tick_rate_hz
+        recover_from_rings(recording.folder, shared, reason, rate_hz)
     except (UserError, OSError) as error:
         remarks.append(f"{recording.folder}: the session could not be completed ({error})")
+    return remarks
 
 
 def _samples(path: Path, ring: SampleRing, tick_rate_hz: float) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import dataclass
 
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.shared_memory import Memory
@@ -11,18 +12,13 @@ from rigidimeter.acquisition.processes.shared_status import SharedStatus
 __all__ = ["SessionMemory"]
 
 
+@dataclass(frozen=True)
 class SessionMemory:
-    """Rings and shared status, made by the console or attached to by the others.
+    """Rings and shared status, made by the console or attached to by the others."""
 
-    Parameters
-    ----------
-    samples : SampleRing
-    events : EventRing
-    status : SharedStatus
-    """
-
-    def __init__(self, samples: SampleRing, events: EventRing, status: SharedStatus) -> None:
-        self.samples, self.events, self.status = samples, events, status
+    samples: SampleRing
+    events: EventRing
+    status: SharedStatus
 
     @classmethod
     def create(cls, tick_rate_hz: float, ring_s: float) -> SessionMemory:

@@ -8,13 +8,12 @@ from functools import partial
 from time import monotonic_ns
 from typing import Any
 
-from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import (
     Condition,
     LoopStatus,
     Nanoseconds,
     Role,
-    SharedStatus,
 )
 from rigidimeter.acquisition.run_states import Order, Run, State
 from rigidimeter.guard import Cause
@@ -41,21 +40,17 @@ class RingSink:
 
     Parameters
     ----------
-    samples : SampleRing
-    events : EventRing
-    status : SharedStatus
+    shared : SessionMemory
         The loop's heart beats there with every sample, and its status is shown now and then.
     tick_rate_hz : float
         A tick that is later than a whole one has missed its deadline.
     """
 
-    def __init__(
-        self, samples: SampleRing, events: EventRing, status: SharedStatus, tick_rate_hz: float
-    ) -> None:
-        self._samples, self._events, self._status = samples, events, status
-        self._push = samples.push
-        self._words = status.memory.words
-        self._heart = status.places()[-1]
+    def __init__(self, shared: SessionMemory, tick_rate_hz: float) -> None:
+        self._samples, self._events, self._status = shared.samples, shared.events, shared.status
+        self._push = shared.samples.push
+        self._words = shared.status.memory.words
+        self._heart = shared.status.places()[-1]
         self._interval_s = 1.0 / tick_rate_hz
         self._missed = 0
         self._state = State.IDLE
@@ -100,7 +95,7 @@ class RingSink:
         self._state = run.state
         self._show_s = -math.inf
         if run.state in (State.STOPPING, State.FAULTED):
-            self.stopping()
+            self._stopping()
 
     def event(self, kind: str, **facts: Any) -> None:
         """Record something that happened.
@@ -112,7 +107,7 @@ class RingSink:
         """
         self._events.push(self._samples.written, {"event": kind, **facts})
 
-    def stopping(self) -> None:
+    def _stopping(self) -> None:
         """Say that no more ticks are due: what follows may take longer than a tick may."""
         self._status.beat(Role.LOOP)
         self._status.set_condition(Role.LOOP, Condition.STOPPING)
@@ -122,12 +117,8 @@ class RingSink:
         if self.closed:
             return
         self.closed = True
-        self.stopping()
+        self._stopping()
         self.event("session_ended", time_s=time_s, outcome=outcome, reason=reason)
-
-    def lag(self) -> int:
-        """Return how many samples wait for the recorder."""
-        return self._samples.lag()
 
 
 _boot_ns: Nanoseconds = partial(time.clock_gettime_ns, CLOCK_BOOTTIME)
@@ -142,8 +133,7 @@ class SharedSupervision:
 
     Parameters
     ----------
-    status : SharedStatus
-    samples : SampleRing
+    shared : SessionMemory
     console_lost_s : float
         An older heartbeat of the console is a cause to stop: a dead-man's switch.
     recorder_lost_s : float
@@ -160,8 +150,7 @@ class SharedSupervision:
 
     def __init__(
         self,
-        status: SharedStatus,
-        samples: SampleRing,
+        shared: SessionMemory,
         *,
         console_lost_s: float = 1.0,
         recorder_lost_s: float = 5.0,
@@ -172,17 +161,17 @@ class SharedSupervision:
         boot_ns: Nanoseconds = _boot_ns,
     ) -> None:
         self.attended = attended
-        self._status, self._samples = status, samples
+        self._status, self._samples = shared.status, shared.samples
         self._console_ns = round(1e9 * console_lost_s)
         self._recorder_ns = round(1e9 * recorder_lost_s)
-        self._most_lag = samples.capacity // 2 if most_lag is None else most_lag
+        self._most_lag = shared.samples.capacity // 2 if most_lag is None else most_lag
         self._now_ns, self._boot_ns = now_ns, boot_ns
         # The clock that goes on is read first: what goes by between the two readings makes the
         # difference smaller, and so never looks like a suspension.
         awake_ns = max(boot_ns() - now_ns() for _ in range(3))
         self._suspended_ns = awake_ns + round(1e9 * stall_s)
-        self._words = status.memory.words
-        self._places = status.places()
+        self._words = shared.status.memory.words
+        self._places = shared.status.places()
 
     def cause(self, now_s: float) -> int:
         """Return a `guard.Cause` to stop for, 0 if there is none."""

@@ -138,7 +138,7 @@ def supervise(
             remarks = _see_through(loop, recorder, status, patience, console)
             recorder_watch = WatchedProcess(recorder.pid or 0)
             try:
-                complete(Role.CONSOLE, shared, recording, recorder_watch, patience, remarks)
+                remarks += complete(Role.CONSOLE, shared, recording, recorder_watch, patience)
             finally:
                 recorder_watch.close()
             if estimator is not None:
