@@ -1,17 +1,17 @@
 """How late the machine wakes a process, measured beside each test that keeps time.
 
 A test by the machine's clock is as exact as the machine is. Beside every test marked `realtime` a
-small process sleeps to absolute deadlines, one a millisecond, at the priority of the test itself,
-and notes how late it was woken. A test that compares a measured time with a bound allows what the
-probe saw in addition:
+small process on each processor sleeps to absolute deadlines, one a millisecond, at the priority of
+the test itself, and notes how late it was woken. A test that compares a measured time with a bound
+allows what the probe saw in addition:
 
     assert took_s < 0.4 + lateness.worst_s(began_s)
 
 A machine that stood still for longer than a test can resolve says nothing about the software, so
 the test is repeated. If that happens every time, the test fails, and says that the machine is too
 busy to judge. That holds for a test that failed while the machine stood still, and for one that
-passed with so wide a bound that it would have passed whatever happened. The probe is a process and
-not a thread: what the software under test does to its own interpreter must not widen a bound.
+passed with so wide a bound that it would have passed whatever happened. The probes are processes
+and not threads: what the software under test does to its own interpreter must not widen a bound.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ from _pytest.runner import runtestprotocol
 
 ATTEMPTS = 4
 ROWS = 20_000
+BYTES = 16 + 16 * ROWS
+MOST_PROCESSORS = 8
 NOTED_S = 0.0005
 """Less than that is not noted."""
 
@@ -40,22 +42,31 @@ PROBE = """
 import mmap, os, struct, sys, time
 view = mmap.mmap(int(sys.argv[1]), 0)
 rows, noted_s = int(sys.argv[2]), float(sys.argv[3])
+at = 0
+for processor in sys.argv[5:]:
+    at += 16 + 16 * rows
+    if os.fork() == 0:
+        os.sched_setaffinity(0, [int(processor)])
+        break
+else:
+    at = 0
+    os.sched_setaffinity(0, [int(sys.argv[4])])
 row, next_s = 0, time.monotonic()
 parent = os.getppid()
 while os.getppid() == parent:
     next_s += 0.001
-    struct.pack_into("qd", view, 0, row, next_s)
+    struct.pack_into("qd", view, at, row, next_s)
     time.sleep(max(next_s - time.monotonic(), 0.0))
     now_s = time.monotonic()
     if now_s - next_s > noted_s:
-        struct.pack_into("dd", view, 16 + 16 * (row % rows), next_s, now_s)
+        struct.pack_into("dd", view, at + 16 + 16 * (row % rows), next_s, now_s)
         row += 1
         next_s = now_s
 """
 
 
 class LatenessProbe:
-    """A process that notes when it should have been woken, and when it was.
+    """A process on each processor that notes when it should have been woken, and when it was.
 
     Parameters
     ----------
@@ -74,17 +85,19 @@ class LatenessProbe:
     def __enter__(self) -> Self:
         self.allowed_s = 0.0
         self._file = tempfile.TemporaryFile()
-        self._file.truncate(16 + 16 * ROWS)
+        processors = sorted(os.sched_getaffinity(0))[:MOST_PROCESSORS]
+        self._starts = range(0, BYTES * len(processors), BYTES)
+        self._file.truncate(BYTES * len(processors))
         self._view = mmap.mmap(self._file.fileno(), 0)
         descriptor = self._file.fileno()
-        command = [sys.executable, "-S", "-c", PROBE, str(descriptor), str(ROWS), str(NOTED_S)]
+        command = [sys.executable, "-S", "-c", PROBE, descriptor, ROWS, NOTED_S, *processors]
         self._process = subprocess.Popen(
-            command,
+            list(map(str, command)),
             pass_fds=[descriptor],
             preexec_fn=ordinary_priority if self._ordinary else None,
         )
         until_s = time.monotonic() + 30.0
-        while not self._due_s():
+        while not all(self._due_s(start) for start in self._starts):
             assert time.monotonic() < until_s, "the lateness probe did not start"
             time.sleep(0.001)
         self._began_s = time.monotonic()
@@ -96,8 +109,8 @@ class LatenessProbe:
         self._view.close()
         self._file.close()
 
-    def _due_s(self) -> float:
-        return float(struct.unpack_from("d", self._view, 8)[0])
+    def _due_s(self, start: int) -> float:
+        return float(struct.unpack_from("d", self._view, start + 8)[0])
 
     def worst_s(self, since_s: float) -> float:
         """Return the longest lateness since a time of `time.monotonic`, to widen a bound by."""
@@ -106,13 +119,15 @@ class LatenessProbe:
         return worst_s
 
     def _worst_s(self, since_s: float) -> float:
-        (count,) = struct.unpack_from("q", self._view, 0)
-        worst_s = time.monotonic() - self._due_s()  # it may be late just now
-        for row in range(min(count, ROWS)):
-            due_s, woken_s = struct.unpack_from("dd", self._view, 16 + 16 * row)
-            if woken_s > since_s:
-                worst_s = max(worst_s, woken_s - max(due_s, since_s))
-        return max(worst_s, 0.0)
+        worst_s = 0.0
+        for start in self._starts:
+            (count,) = struct.unpack_from("q", self._view, start)
+            worst_s = max(worst_s, time.monotonic() - self._due_s(start))  # it may be late just now
+            rows = self._view[start + 16 : start + 16 + 16 * min(count, ROWS)]
+            for due_s, woken_s in struct.iter_unpack("dd", rows):
+                if woken_s > since_s:
+                    worst_s = max(worst_s, woken_s - max(due_s, since_s))
+        return worst_s
 
     def stood_still_s(self) -> float:
         """Return the longest lateness of all, without widening a bound by it."""

@@ -81,13 +81,13 @@ def tried(
     **operator: Any,
 ) -> tuple[CommissioningRecord, list[str]]:
     clock, rigfile = DeadlineClock(), load_rig(rig)
+    chosen = chosen.model_copy(update={"commissioning": QUICK})
     record = commission(
         rigfile.build(clock.now_s, chosen.rig.tick_rate_hz),
         rigfile,
         chosen,
         Timebase(clock.now_s, clock.wait_until),
         Operator(ask=ask, **{"present": False, **operator}),
-        limits=QUICK,
         made_utc="2026-01-01T00:00:00+00:00",
         software="0",
     )

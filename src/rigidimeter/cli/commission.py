@@ -108,7 +108,6 @@ def commission(
             chosen,
             Timebase(clock.now_s, clock.wait_until),
             operator,
-            limits=chosen.commissioning,
             made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
             software=__version__,
             signed_by=signed_by,

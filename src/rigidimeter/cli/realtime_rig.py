@@ -58,7 +58,7 @@ def run_loop(
     rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, home)
 
     def approve(facts: Mapping[str, Any]) -> tuple[str, ...]:
-        return check_record(rigfile, facts, settings, settings.commissioning).not_tried
+        return check_record(rigfile, facts, settings).not_tried
 
     with rigfile.claim():
         _run(settings, protocol, rig, lambda _: {}, clock, side, approve)

@@ -70,7 +70,7 @@ def run(
         # What is wrong with the rig or its record is said before any process starts, and so is
         # that another has the rig; the loop's process then claims it.
         rigfile = load_rig(rig)
-        check_record(rigfile, None, settings, settings.commissioning)
+        check_record(rigfile, None, settings)
         rigfile.claim().close()
     recording = Recording(
         out,

@@ -20,7 +20,6 @@ from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.documents import plain_values
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings
-from rigidimeter.settings.commissioning_settings import CommissioningSettings
 
 __all__ = ["EXACT", "LIMITS", "check_record", "covered", "kept_facts"]
 
@@ -73,7 +72,6 @@ def check_record(
     rigfile: RigFile,
     facts: Mapping[str, Any] | None,
     settings: Settings,
-    limits: CommissioningSettings | None = None,
     *,
     now_utc: datetime | None = None,
     path: Path | None = None,
@@ -87,9 +85,7 @@ def check_record(
         What the rig's `configure` returned; None before it is connected, when the devices are not
         compared yet.
     settings : Settings
-        Of the protocol that is to run.
-    limits : CommissioningSettings, optional
-        Says for how many days a record holds.
+        Of the protocol that is to run; they also say for how many days a record holds.
     now_utc : datetime, optional
         Today, where that is not the clock's.
     path : Path, optional
@@ -111,7 +107,7 @@ def check_record(
         _same_devices(path, record.facts, kept_facts(facts))
     if record.objection:
         raise UserError(f"{path}: {record.objection}")
-    days = (limits or CommissioningSettings()).validity_days
+    days = settings.commissioning.validity_days
     days = min(days, record.covered.get("validity_days", days))
     today = now_utc or datetime.now(UTC)
     age = today - datetime.fromisoformat(record.made_utc)

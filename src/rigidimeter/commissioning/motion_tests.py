@@ -24,7 +24,6 @@ from rigidimeter.commissioning.trial import Array, Heard, Tried, stopped_for
 from rigidimeter.control import minimum_jerk
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
-from rigidimeter.settings.commissioning_settings import CommissioningSettings
 from rigidimeter.units import rad_from_deg
 
 __all__ = [
@@ -61,11 +60,12 @@ def swing(settings: Settings, amplitude_deg: float, speed_deg_s: float, cycles: 
     return np.concatenate([smooth_motion(distance, speed_rad_s, tick_s) for distance in distances])
 
 
-def steps(settings: Settings, limits: CommissioningSettings) -> Array:
+def steps(settings: Settings) -> Array:
     """Return pseudo-random velocity steps in rad/s, one a tick, that end where they began."""
     ticks = max(1, round(STEP_S * settings.rig.tick_rate_hz))
     once = np.repeat(np.array(STEPS), ticks)
     pair = np.concatenate([once, -once])
+    limits = settings.commissioning
     times = max(1, round(limits.steps_s * settings.rig.tick_rate_hz / len(pair)))
     return rad_from_deg(limits.step_deg_s) * np.tile(pair, times)
 
@@ -83,11 +83,9 @@ def small_move_check(tried: Tried, settings: Settings) -> Check:
     return check
 
 
-def swing_checks(
-    tried: Tried, settings: Settings, limits: CommissioningSettings
-) -> tuple[list[Check], Following]:
+def swing_checks(tried: Tried, settings: Settings) -> tuple[list[Check], Following]:
     """Check directions and scales over the slow motion."""
-    heard, percent = tried.heard, limits.scale_tolerance_percent
+    heard, percent = tried.heard, settings.commissioning.scale_tolerance_percent
     found = following(heard, settings.rig.drive_damping_ratio)
     checks = [
         yes(

@@ -61,7 +61,6 @@ from rigidimeter.devices.base import DeviceError, Rig
 from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
-from rigidimeter.settings.commissioning_settings import CommissioningSettings
 
 __all__ = ["commission"]
 
@@ -91,7 +90,6 @@ def commission(
     time: Timebase,
     operator: Operator,
     *,
-    limits: CommissioningSettings | None = None,
     made_utc: str,
     software: str,
     signed_by: str = "",
@@ -107,15 +105,14 @@ def commission(
     rigfile : RigFile
         Which it was built from.
     settings : Settings
-        Of the protocol that will run on it.
+        Of the protocol that will run on it; `settings.commissioning` says what is tried.
     time : Timebase
         Of the same clock that the drivers have.
     operator : Operator
-    limits : CommissioningSettings, optional
     made_utc, software, signed_by : str
         For the record.
     """
-    setup = Setup(rig, settings, time, operator, limits or CommissioningSettings())
+    setup = Setup(rig, settings, time, operator)
     found = _Findings()
     facts: Mapping[str, Any] = {}
     name, limit = "devices read back", "what the rig file says"
@@ -144,7 +141,7 @@ def commission(
 
 def _try_all(setup: Setup, found: _Findings, facts: Mapping[str, Any]) -> None:
     operator, limits = setup.operator, setup.limits
-    found.checks += facts_checks(facts, setup.settings, limits)
+    found.checks += facts_checks(facts, setup.settings)
     _without_power(setup, found)
     if not found.none_failed():
         found.refrain("a check without power failed; put that right first")
@@ -173,9 +170,9 @@ def _without_power(setup: Setup, found: _Findings) -> None:
     before = dict(rig.counts)
     heard = listen(setup, limits.idle_s)
     found.checks += rate_checks(
-        "torque", heard.torque_time_s, settings.rig.torque.rate_hz, settings, limits
+        "torque", heard.torque_time_s, settings.rig.torque.rate_hz, settings
     )
-    found.checks.append(lost_check(before, rig.counts, limits))
+    found.checks.append(lost_check(before, rig.counts, limits.lost_percent))
     found.checks += noise_checks(heard, settings)
     found.checks.append(lateness(heard, settings))
     torque = heard.torque_nm[np.isfinite(heard.torque_nm)]
@@ -198,7 +195,7 @@ def _small_move(setup: Setup, found: _Findings) -> bool:
     setup.operator.say(f"A small move of {limits.nudge_deg:g} deg.")
     at_rest = trial(setup, hold(SETTLE_S))
     found.checks += rate_checks(
-        "motion", at_rest.heard.motion_time_s, settings.rig.motion.rate_hz, settings, limits
+        "motion", at_rest.heard.motion_time_s, settings.rig.motion.rate_hz, settings
     )
     found.checks.append(drift_check(at_rest.heard, 0.5 * limits.nudge_deg))
     if at_rest.cause is not Cause.NONE:
@@ -224,7 +221,7 @@ def _swing(setup: Setup, found: _Findings) -> bool:
     operator.say(f"Slowly by {limits.swing_deg:g} deg to both sides.")
     velocity = swing(settings, limits.swing_deg, limits.swing_speed_deg_s, limits.swings)
     swung = _move(setup, velocity)
-    checks, followed = swing_checks(swung, settings, limits)
+    checks, followed = swing_checks(swung, settings)
     sign, work_j = torque_sign(swung.heard, settings.rig.drive_damping_ratio, followed.scale)
     found.checks += [*checks, sign]
     found.numbers.update(
@@ -247,7 +244,7 @@ def _swing(setup: Setup, found: _Findings) -> bool:
 def _steps(setup: Setup, found: _Findings) -> bool:
     settings = setup.settings
     setup.operator.say("Small quick steps.")
-    stepped = _move(setup, steps(settings, setup.limits))
+    stepped = _move(setup, steps(settings))
     checks, drive, arm = step_checks(stepped, settings)
     delay_s = arm.delay_s if checks[-1].passed else None
     margins, numbers = margin_checks(settings, drive.bandwidth_hz, delay_s)

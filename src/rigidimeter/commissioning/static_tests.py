@@ -12,7 +12,6 @@ from rigidimeter.commissioning.checks import Check, above, below, impossible, nu
 from rigidimeter.commissioning.trial import Array, Heard, new_samples
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
-from rigidimeter.settings.commissioning_settings import CommissioningSettings
 
 __all__ = ["facts_checks", "lateness", "lost_check", "noise_checks", "rate_checks"]
 
@@ -22,28 +21,20 @@ BRAKING = "braking_rad_s2"
 """What a drive's facts call the slowest of its own ways to brake."""
 
 
-def facts_checks(
-    facts: Mapping[str, Any], settings: Settings, limits: CommissioningSettings
-) -> list[Check]:
+def facts_checks(facts: Mapping[str, Any], settings: Settings) -> list[Check]:
     """Check what the devices said of themselves, and hold it against guard and loop."""
     sensor, drive = facts["torque_sensor"], facts["drive"]
     who = [f"{found['model'] or 'unknown'} {found['serial']}".strip() for found in (sensor, drive)]
     watchdog_s = drive["watchdog_s"]
     checks = [yes("devices read back", True, ", ".join(who), "what the rig file says", "")]
     name, what = "watchdog configured", "the drive must stop by itself when nobody commands it"
+    longest_s = settings.commissioning.watchdog_longest_s
     if watchdog_s is None:
-        checks.append(
-            yes(
-                name,
-                False,
-                "none",
-                f"at most {number(limits.watchdog_longest_s, 's')}",
-                f"{what}; set it",
-            )
-        )
+        limit = f"at most {number(longest_s, 's')}"
+        checks.append(yes(name, False, "none", limit, f"{what}; set it"))
     else:
         remedy = f"{what}; shorten its watchdog in the rig file"
-        checks.append(below(name, watchdog_s, "s", limits.watchdog_longest_s, remedy))
+        checks.append(below(name, watchdog_s, "s", longest_s, remedy))
         checks.append(_stalls_first(watchdog_s, settings))
     return [*checks, _braking(drive["values"].get(BRAKING), settings)]
 
@@ -83,7 +74,6 @@ def rate_checks(
     stamps_s: Array,
     expected_hz: float,
     settings: Settings,
-    limits: CommissioningSettings,
 ) -> list[Check]:
     """Check that new samples come often enough and never stay away.
 
@@ -99,7 +89,11 @@ def rate_checks(
     stamps = stamps[np.isfinite(stamps)]
     span_s = float(stamps[-1] - stamps[0]) if len(stamps) > 1 else 0.0
     rate_hz = (len(stamps) - 1) / span_s if span_s > 0 else 0.0
-    wanted_hz = 0.01 * limits.least_rate_percent * min(expected_hz, settings.rig.tick_rate_hz)
+    wanted_hz = (
+        0.01
+        * settings.commissioning.least_rate_percent
+        * min(expected_hz, settings.rig.tick_rate_hz)
+    )
     gap_s = float(np.max(np.diff(stamps))) if len(stamps) > 1 else math.inf
     return [
         above(
@@ -120,9 +114,7 @@ def rate_checks(
     ]
 
 
-def lost_check(
-    before: Mapping[str, int], after: Mapping[str, int], limits: CommissioningSettings
-) -> Check:
+def lost_check(before: Mapping[str, int], after: Mapping[str, int], limit_percent: float) -> Check:
     """Check that what the wires counted as lost or damaged is next to nothing."""
     gone = {name: count - before.get(name, 0) for name, count in after.items()}
     received = sum(count for name, count in gone.items() if name.endswith("_received"))
@@ -130,7 +122,7 @@ def lost_check(
     percent = 100.0 * bad / received if received else (100.0 if bad else 0.0)
     worst = ", ".join(f"{n} {c}" for n, c in gone.items() if c and n.endswith(BAD_COUNTS))
     remedy = f"look at cables, switches and other traffic ({worst})"
-    return below("lost or damaged messages", percent, "%", limits.lost_percent, remedy)
+    return below("lost or damaged messages", percent, "%", limit_percent, remedy)
 
 
 def noise_checks(heard: Heard, settings: Settings) -> list[Check]:

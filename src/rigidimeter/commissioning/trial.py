@@ -96,13 +96,17 @@ class Operator:
 
 @dataclass(frozen=True)
 class Setup:
-    """What is tried, with which protocol and clock, by whom, and with which limits."""
+    """What is tried, with which settings and clock, and by whom."""
 
     rig: Rig
     settings: Settings
     time: Timebase
     operator: Operator
-    limits: CommissioningSettings
+
+    @property
+    def limits(self) -> CommissioningSettings:
+        """What is tried, and what it must come to."""
+        return self.settings.commissioning
 
     @property
     def rate_hz(self) -> float:

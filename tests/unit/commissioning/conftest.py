@@ -214,7 +214,7 @@ def commissioned(settings: Settings, rigfile: RigFile, monkeypatch: Any) -> Comm
         rig = ComposedRig(
             FakeSensor(arm, time.now, faults), FakeDrive(arm, time.now, faults), RATE_HZ
         )
-        chosen = settings if tables is None else settings.model_copy(update=dict(tables))
+        chosen = settings.model_copy(update={"commissioning": QUICK, **(tables or {})})
         wires = {"drive": (object, SimpleNamespace(emulated=emulated))}
         return commission(
             rig,
@@ -227,7 +227,6 @@ def commissioned(settings: Settings, rigfile: RigFile, monkeypatch: Any) -> Comm
                 known_torque_nm=known_torque_nm,
                 known_angle_deg=known_angle_deg,
             ),
-            limits=QUICK,
             made_utc="2026-01-01T00:00:00+00:00",
             software="0",
             signed_by=signed_by,
