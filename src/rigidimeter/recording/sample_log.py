@@ -114,6 +114,7 @@ _SCHEMA = pa.schema(
 )
 _FIRST = len(Sample._fields) - len(Sample._field_defaults)
 """Columns that every recording has; later versions added the others."""
+_READING = pa.ipc.IpcReadOptions(use_threads=False)
 _DTYPES = [np.dtype(field.type.to_pandas_dtype()) for field in _SCHEMA]
 
 
@@ -209,7 +210,7 @@ class SampleLog:
 def _batches(file: pa.NativeFile) -> Iterator[pa.RecordBatch]:
     """Yield each complete batch; stop where the stream breaks off."""
     try:
-        reader = pa.ipc.open_stream(file, options=pa.ipc.IpcReadOptions(use_threads=False))
+        reader = pa.ipc.open_stream(file, options=_READING)
     except (pa.ArrowInvalid, OSError):
         return
     while True:
@@ -227,17 +228,29 @@ def read_samples(path: Path) -> dict[str, NDArray[Any]]:
     UserError
         If the stream is not one that `SampleLog` wrote.
     """
+    data = pa.BufferReader(path.read_bytes())
     table: pa.Table | None
-    with pa.OSFile(str(path), "rb") as file:
+    try:
+        table = pa.ipc.open_stream(data, options=_READING).read_all()
+    except (pa.ArrowInvalid, OSError):  # the stream breaks off, or is none
+        data.seek(0)
         try:
-            batches = list(_batches(file))
+            batches = list(_batches(data))
             table = pa.Table.from_batches(batches, None if batches else _SCHEMA)
         except pa.ArrowInvalid:
             table = None
     if table is None or not set(Sample._fields[:_FIRST]) <= set(table.column_names):
         raise UserError(f"{path}: holds other columns than a recording of this version")
+    names = [name for name in Sample._fields if name in table.column_names]
+    table = table.select(names).combine_chunks()
+    if any(table.schema.field(name).type != _SCHEMA.field(name).type for name in names) or any(
+        column.null_count for column in table.columns
+    ):
+        raise UserError(f"{path}: holds other columns than a recording of this version")
     columns = {
-        name: table.column(name).to_numpy() for name in Sample._fields if name in table.column_names
+        # Not to_numpy, which imports pandas.
+        name: np.from_dlpack(column.chunk(0)) if len(table) else np.empty(0, sample_dtypes()[name])
+        for name, column in zip(names, table.columns, strict=True)
     }
     for name, default in Sample._field_defaults.items():  # recorded before there was this column
         columns.setdefault(name, np.full(len(table), default, _DTYPES[Sample._fields.index(name)]))

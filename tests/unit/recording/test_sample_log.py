@@ -1,6 +1,7 @@
 import math
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from rigidimeter.errors import UserError
@@ -10,6 +11,7 @@ from rigidimeter.recording.sample_log import (
     SampleLog,
     read_events,
     read_samples,
+    sample_dtypes,
     stream_extent,
 )
 
@@ -84,3 +86,21 @@ def test_a_damaged_event_is_named(tmp_path):
     path.write_text('{"event": "a"}\nrubbish\n')
     with pytest.raises(UserError, match="line 2 is not a JSON object"):
         read_events(path)
+
+
+@pytest.mark.parametrize("change", ["type", "null", "name"])
+def test_a_stream_of_other_columns_is_refused(tmp_path, change):
+    arrays = {name: np.zeros(3, dtype) for name, dtype in sample_dtypes().items()}
+    columns = {name: pa.array(values) for name, values in arrays.items()}
+    if change == "type":
+        columns["torque_nm"] = pa.array(np.zeros(3, np.float32))
+    elif change == "null":
+        columns["torque_nm"] = pa.array([0.0, None, 0.0])
+    else:
+        columns["torque"] = columns.pop("torque_nm")
+    path = tmp_path / "samples.arrows"
+    table = pa.table(columns)
+    with pa.ipc.new_stream(str(path), table.schema) as stream:
+        stream.write_table(table)
+    with pytest.raises(UserError, match="holds other columns than a recording of this version"):
+        read_samples(path)

@@ -162,7 +162,7 @@ def test_a_folder_that_is_no_session_is_refused(tmp_path, simulate):
 def test_a_session_without_its_samples_is_refused(simulate):
     folder = simulate()
     (folder / "samples.arrows").unlink()
-    with pytest.raises(UserError, match=r"lost its samples\.arrows"):
+    with pytest.raises(UserError, match=r"has no samples\.arrows"):
         read_session(folder)
 
 
