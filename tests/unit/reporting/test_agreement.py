@@ -1,0 +1,226 @@
+"""The page, the tables, the JSON and the terminal show the same numbers."""
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.unit.reporting.cohorts import Design, made_study
+from tests.unit.reporting.parsed_page import ParsedPage
+
+from rigidimeter.cli.comparison_text import comparison_lines
+from rigidimeter.cli.estimate import _lines as estimate_lines
+from rigidimeter.documents import read_json, write_json
+from rigidimeter.recording import estimates_document
+from rigidimeter.reporting import SECTIONS
+from rigidimeter.reporting import page as page_module
+from rigidimeter.reporting.page import write_report
+from rigidimeter.study import StudyResult, comparison_document
+
+NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:e[+-]\d+)?")
+PARAMETERS = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
+DRAWN = ("distributions", "days", "perturbation", "torque", "voluntary", "loops", "impedance")
+
+Row = dict[str, str]
+
+
+def numbers(text: str) -> list[float]:
+    return [float(found.replace("−", "-")) for found in NUMBER.findall(text)]
+
+
+def assert_shows(text: str, values: Sequence[float | None], digits: int) -> None:
+    """Assert that the text has these numbers in this order, rounded to so many digits or more."""
+    expected = [value for value in values if value is not None]
+    found = numbers(text)
+    assert len(found) == len(expected), (text, expected)
+    for one, value in zip(found, expected, strict=True):
+        size = math.floor(math.log10(abs(value))) if value else 0
+        assert abs(one - value) <= 0.501 * 10.0 ** (size - digits + 1), (text, expected)
+
+
+@pytest.fixture(scope="module")
+def study() -> StudyResult:
+    return made_study(Design(days=(4, 3), epochs=(4, 4), scores=(3, 3)))
+
+
+@pytest.fixture(scope="module")
+def json(study: StudyResult, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Return both documents as they are read back from their files."""
+    folder = tmp_path_factory.mktemp("json")
+    write_json(folder / "comparison.json", comparison_document(study))
+    write_json(folder / "estimates.json", estimates_document(study.analysis))
+    return {name: read_json(folder / f"{name}.json") for name in ("comparison", "estimates")}
+
+
+@pytest.fixture(scope="module")
+def folder(study: StudyResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the written report, without the figures of the recordings, which take long."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page_module, "SECTIONS", [s for s in SECTIONS if s.name not in DRAWN])
+        return write_report(study, tmp_path_factory.mktemp("report")).parent
+
+
+@pytest.fixture(scope="module")
+def page(folder: Path) -> ParsedPage:
+    return ParsedPage((folder / "report.html").read_text(encoding="utf-8"))
+
+
+def rows_of(folder: Path, table: str) -> list[Row]:
+    with (folder / "tables" / f"{table}.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def assert_same(row: Row, values: dict[str, Any], prefix: str = "") -> None:
+    """Assert that the cells of a CSV are the numbers of a JSON object, to the last digit."""
+    compared = [name for name, value in values.items() if isinstance(value, float)]
+    assert compared
+    for name in compared:
+        assert float(row[prefix + name]) == values[name], name
+
+
+def test_comparisons_over_epochs(study, json, folder: Path, page: ParsedPage) -> None:
+    lines = comparison_lines(study)
+    shown = page.table("OFF against DBS: each epoch counted")[2:]
+    for c, row, cells in zip(
+        json["comparison"]["comparisons"], rows_of(folder, "comparisons"), shown, strict=True
+    ):
+        assert row["measure"] == c["measure"]
+        test = {name: c[name] for name in ("shift", "shift_low", "shift_high", "z", "p", "p_holm",
+                                           "r", "r_low", "r_high", "rank_biserial")}  # fmt: skip
+        assert_same(row, test)
+        for side, name in (("reference", "OFF"), ("other", "DBS")):
+            group = c["groups"][name]
+            assert_same(row, {f"{key}_{side}": group[key] for key in ("median", "q1", "q3")})
+        assert_shows(cells[5], [c["shift"], c["shift_low"], c["shift_high"]], 3)
+        assert_shows(cells[6], [c["z"]], 3)
+        assert_shows(cells[7], [c["r"]], 2)
+        assert_shows(cells[8], [c["p"], c["p_holm"]], 2)
+        for cell, name in ((cells[2], "OFF"), (cells[4], "DBS")):
+            assert_shows(cell, [c["groups"][name][key] for key in ("median", "q1", "q3")], 3)
+        place = next(k for k, line in enumerate(lines) if line.startswith(c["title"]))
+        line = lines[place + 3]
+        ends = [c["shift"], c["shift_low"], c["shift_high"]]
+        assert_shows(line.split(", z")[0], ends, 4)
+        assert_shows(line.split(", p")[1].split(", r")[0], [c["p"], c["p_holm"]], 2)
+
+
+def test_comparisons_by_days(study, json, folder: Path, page: ParsedPage) -> None:
+    lines = comparison_lines(study)
+    shown = page.table("OFF against DBS: days counted")[1:]
+    begin = next(k for k, line in enumerate(lines) if line.startswith("Days, not epochs"))
+    for c, row, cells in zip(
+        json["comparison"]["comparisons"], rows_of(folder, "comparisons"), shown, strict=True
+    ):
+        days = c["days"]
+        names = ("estimate", "low", "high", "p", "p_holm", "df", "p_days", "day_share")
+        assert_same(row, {name: days[name] for name in names}, "days_")
+        assert_shows(cells[1], [days["estimate"], days["low"], days["high"]], 4)
+        assert_shows(cells[5], [days["p"], days["p_holm"]], 2)
+        assert_shows(cells[6], [days["p_days"]], 2)
+        place = next(k for k, line in enumerate(lines) if k > begin and line.startswith(c["title"]))
+        estimate, _, rest = lines[place + 1].partition(", p ")
+        assert_shows(estimate, [days["estimate"], days["low"], days["high"]], 4)
+        assert_shows(rest, [days["p"], days["p_holm"], days["df"], days["p_days"]], 2)
+
+
+def test_differences_between_effects(study, json, folder: Path, page: ParsedPage) -> None:
+    lines = comparison_lines(study)
+    shown = page.table("Differences between effect sizes")[1:]
+    begin = next(k for k, line in enumerate(lines) if "difference of rank-biserial" in line)
+    for number, (d, row, cells) in enumerate(
+        zip(
+            json["comparison"]["effect_differences"],
+            rows_of(folder, "effect_differences"),
+            shown,
+            strict=True,
+        )
+    ):
+        assert (row["first"], row["second"]) == (d["first"], d["second"])
+        assert_same(row, d)
+        assert_shows(cells[2], [d["estimate"], d["low"], d["high"]], 4)
+        assert_shows(cells[3], [d["p"]], 2)
+        assert_shows(cells[4], [d["p_holm"]], 2)
+        line = lines[begin + 1 + number].partition(": ")[2]
+        ends, _, rest = line.partition(", p ")
+        values = [d[name] for name in ("estimate", "low", "high") if rest or name == "estimate"]
+        for one, value in zip(numbers(ends), values, strict=True):
+            assert one == pytest.approx(value, abs=0.000501)
+        assert_shows(rest, [d["p"], d["p_holm"]] if rest else [], 2)
+
+
+def test_ratings(study, json, folder: Path, page: ParsedPage) -> None:
+    found = json["comparison"]["ratings"]
+    contrast, by_days = found["contrast"], found["contrast_days"]
+    shown = page.table("Contrast of the ratings")[1:]
+    rows = rows_of(folder, "rating_contrast")
+    for row, cells in zip(rows, shown, strict=True):
+        assert_shows(cells[1], [float(row[name]) for name in ("estimate", "low", "high")], 4)
+        assert_shows(cells[-1], [float(row["p"])], 2)
+    assert [float(row["p"]) for row in rows] == [
+        contrast["p_residual"],
+        contrast["p_satterthwaite"],
+        contrast["p_kenward_roger"],
+        by_days["p_kenward_roger"],
+    ]
+    lines = comparison_lines(study)
+    begin = next(k for k, line in enumerate(lines) if line.startswith("Examiners' ratings"))
+    assert_shows(lines[begin + 2].rpartition("Kenward-Roger p")[2], [float(rows[2]["p"])], 2)
+    for row in rows_of(folder, "rating_offsets"):
+        assert float(row["offset"]) == found["offsets"][row["grouping"]][row["name"]]
+    means = page.words("ratings").partition("intervals: ")[2]
+    expected = []
+    for name in ("OFF", "DBS"):
+        expected += [found[key][name] for key in ("means", "means_low", "means_high")]
+    assert_shows(means.partition(" Contrast")[0], expected, 3)
+
+
+def test_sensitivity(study, json, folder: Path, page: ParsedPage) -> None:
+    lines = [line for line in comparison_lines(study) if ": shift " in line and ", J " in line]
+    for s, row, cells, line in zip(
+        json["comparison"]["sensitivity"],
+        rows_of(folder, "sensitivity"),
+        page.table("The shift by each method")[1:],
+        lines,
+        strict=True,
+    ):
+        assert (row["measure"], row["method"], row["inertia"]) == (
+            s["measure"],
+            s["method"],
+            s["inertia"],
+        )
+        assert_same(row, s)
+        assert_shows(cells[5], [s["shift"], s["shift_low"], s["shift_high"]], 4)
+        assert_shows(cells[7], [s["p"]], 2)
+        assert_shows(cells[8], [s["p_day"]], 2)
+        assert_shows(line.partition(": shift ")[2], [s["shift"], s["p"], s["p_day"]], 2)
+
+
+def test_estimates_and_scores_of_every_epoch(study, json, folder: Path, page: ParsedPage) -> None:
+    epochs, fixed = json["estimates"]["epochs"], json["estimates"]["fixed_inertia"]["epochs"]
+    rows = rows_of(folder, "estimates")
+    free = page.table("Inertia, damping and stiffness, epoch by epoch")
+    held = page.table("Damping and stiffness with the inertia fixed")
+    lines = [line for line in estimate_lines(study.analysis) if " ±" in line and "0.9700" in line]
+    assert len(lines) == len(epochs) + len(fixed)
+    for place, (one, two, row) in enumerate(zip(epochs, fixed, rows, strict=True)):
+        assert (row["source"], row["epoch"]) == (one["source"], one["epoch"])
+        assert_same(row, one)
+        assert_same(row, two, "fixed_inertia_")
+        for table, found in ((free, one), (held, two)):
+            for name, symbol in zip(PARAMETERS, "JBK", strict=True):
+                heading = next(
+                    k for k, text in enumerate(table[0]) if text.startswith(f"{symbol} ")
+                )
+                ends = [found[name], found[f"{name}_low"], found[f"{name}_high"]]
+                assert_shows(table[1 + place][heading], ends, 4)
+        for line, found in ((lines[place], one), (lines[len(epochs) + place], two)):
+            assert line.split()[0] == found["epoch"]
+            values = [value for name in PARAMETERS for value in (found[name], found[f"{name}_se"])]
+            assert_shows(line.split(found["condition"])[1].split("0.9700")[0], values, 2)
+            for name in PARAMETERS:
+                assert f" {found[name]:.4g}" in line or f" {found[name]:.5g}" in line
+    for score, row in zip(json["estimates"]["scores"], rows_of(folder, "scores"), strict=True):
+        assert_same(row, score)
