@@ -95,7 +95,7 @@ def _wrapped(text: str, indent: str = "") -> list[str]:
 
 
 def _delay_lines(analysis: Analysis) -> list[str]:
-    """Say how late the torque is, for each source where that could be told."""
+    """Say how late the torque is in each source, where that is known."""
     lines = []
     for delay in analysis.delays:
         if math.isfinite(delay.delay_s):

@@ -88,11 +88,11 @@ def bandlimited_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
     band = band_hz(epoch, settings)
     used = [torque, *motion_channels(epoch)]
     rate_hz = grid_rate_hz(used, band[1])
-    whole = uniform_grid(used, rate_hz)
-    angle, velocity, acceleration = kinematics(epoch, whole)
+    full = uniform_grid(used, rate_hz)
+    angle, velocity, acceleration = kinematics(epoch, full)
     edge = math.ceil(EDGE_SAMPLES * rate_hz / min(channel.rate_hz for channel in used))
-    inner = slice(edge, whole.size - edge)
-    time_s = whole[inner]
+    inner = slice(edge, full.size - edge)
+    time_s = full[inner]
     trim = max(round(settings.trim_s * rate_hz) - edge, 0)
     keep = slice(trim, time_s.size - trim)
     return Signals(

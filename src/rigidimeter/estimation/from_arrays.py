@@ -33,7 +33,7 @@ def identify(
     """Estimate inertia J, damping B and stiffness K from one stretch of recording.
 
     The numbers are those that ``rigidimeter estimate`` gives for the same data as one epoch: a
-    delay of the torque is corrected where it can be told, and every check is made.
+    delay of the torque is corrected where it is known, and every check is made.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What stands in the way of an estimate, in words that say what to do about it."""
+"""Why an epoch cannot be estimated or does not count, and what to do about it."""
 
 from __future__ import annotations
 

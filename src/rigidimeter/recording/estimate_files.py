@@ -174,8 +174,8 @@ def _read_pooled(row: Mapping[str, Any] | None, method: str) -> tuple[Fit, ...]:
     if row is None:
         return ()
     fits = [_fit(part, method) for part in row["conditions"].values()]
-    whole = _fit(row, method)
-    return tuple(fits if whole in fits else [*fits, whole])
+    overall = _fit(row, method)
+    return tuple(fits if overall in fits else [*fits, overall])
 
 
 def _score(row: Mapping[str, Any]) -> Score:

@@ -1,6 +1,6 @@
 """The frozen types that travel between the rooms.
 
-Units stand in every name. Arrays are float64 and read-only once inside a record.
+Every name ends in its unit. Arrays are float64 and read-only once inside a record.
 """
 
 from rigidimeter.records.epochs import (

@@ -60,8 +60,8 @@ class Look(NamedTuple):
     """What a check saw.
 
     `value` and `threshold` are in the unit that `fact` states; `failed` says whether the value is
-    on the wrong side, which one that is not a number is. `meaning` and `remedy` stand in place of
-    those of the check where they are not empty.
+    on the wrong side; one that is not a number is. `meaning` and `remedy` replace those of the
+    check where they are not empty.
     """
 
     value: float

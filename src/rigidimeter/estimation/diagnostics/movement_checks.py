@@ -1,6 +1,6 @@
 """Whether the subject moved by itself: by the torque the joint does not explain, and by EMG.
 
-Once J, B and K are known the subject's own torque can be had back (Eq. 5):
+Once J, B and K are known, so is the subject's own torque (Eq. 5):
 
     M_sub = J θ'' + B θ' + K θ − M_meas
 

@@ -10,7 +10,7 @@ from rigidimeter.estimation.terms.model_comparison import (
     fit_model,
     model_epoch,
 )
-from rigidimeter.estimation.terms.term_fit import Prediction, TermsFit, fit_terms, predict
+from rigidimeter.estimation.terms.term_fit import TermsFit, fit_terms, predicted_vaf_percent
 from rigidimeter.estimation.terms.wideband import wideband_from_angle, wideband_signals
 
 __all__ = [
@@ -18,7 +18,6 @@ __all__ = [
     "Comparison",
     "EpochModels",
     "ModelRow",
-    "Prediction",
     "Term",
     "TermsFit",
     "candidates",
@@ -27,7 +26,7 @@ __all__ = [
     "fit_terms",
     "model_epoch",
     "parse_terms",
-    "predict",
+    "predicted_vaf_percent",
     "term_names",
     "wideband_from_angle",
     "wideband_signals",

@@ -123,7 +123,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "directional-stiffness": ("stiffness+", "stiffness-"),
     "directional-coulomb": ("coulomb+", "coulomb-"),
 }
-"""Names that stand for several terms."""
+"""Names for several terms together."""
 
 
 def term_named(name: str) -> Term | None:

@@ -20,7 +20,7 @@ from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.signals import Signals, motion_channels
 from rigidimeter.estimation.terms.catalogue import REFLEXES, parse_terms
 from rigidimeter.estimation.terms.reflex import REFLEX_KINDS
-from rigidimeter.estimation.terms.term_fit import TermsFit, fit_terms, predict
+from rigidimeter.estimation.terms.term_fit import TermsFit, fit_terms, predicted_vaf_percent
 from rigidimeter.estimation.terms.wideband import wideband_signals
 from rigidimeter.records import Epoch
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE, Settings
@@ -110,7 +110,7 @@ def compare_models(
     for model in models:
         row = fit_model(first, model, band_hz, trim_s)
         if row.fit is not None:
-            row = replace(row, held_out_vaf_percent=predict(row.fit, rest).vaf_percent)
+            row = replace(row, held_out_vaf_percent=predicted_vaf_percent(row.fit, rest))
         rows.append(row)
     return Comparison(tuple(rows), *_recommend(rows))
 

@@ -30,22 +30,16 @@ class ResidualTest(NamedTuple):
 
     Attributes
     ----------
-    ljung_box_q, ljung_box_p : float
-        Small p: the residual is coloured, so that standard errors must not take it for white.
+    ljung_box_p : float
+        Small: the residual is coloured, so that standard errors must not take it for white.
     input_correlation, input_p : float
         The largest correlation with the velocity at lags up to 20 samples and its probability,
         corrected for the number of lags. Small p: something of the motion is left unexplained.
-    lags : int
-    rate_hz : float
-        At which the residual was tested.
     """
 
-    ljung_box_q: float
     ljung_box_p: float
     input_correlation: float
     input_p: float
-    lags: int
-    rate_hz: float
 
 
 def residual_test(
@@ -75,12 +69,9 @@ def residual_test(
     largest = float(cross[np.argmax(np.abs(cross))])
     single = 2.0 * float(stats.norm.sf(abs(largest) / math.sqrt(variance)))
     return ResidualTest(
-        ljung_box_q=q,
         ljung_box_p=float(stats.chi2.sf(q, lags)),
         input_correlation=largest,
         input_p=min(1.0, single * cross.size),
-        lags=lags,
-        rate_hz=rate_hz * count / residual.size,
     )
 
 

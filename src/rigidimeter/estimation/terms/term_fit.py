@@ -23,7 +23,7 @@ from rigidimeter.estimation.terms.residual_tests import ResidualTest, residual_t
 from rigidimeter.estimation.terms.separable import bread, solve
 from rigidimeter.estimation.uncertainty import hac_covariance
 
-__all__ = ["Prediction", "TermParameter", "TermsFit", "fit_terms", "predict"]
+__all__ = ["TermParameter", "TermsFit", "fit_terms", "predicted_vaf_percent"]
 
 NEAR_BOUND = 1e-3
 """A parameter this near to its bound, as a share of its range, was not found inside."""
@@ -52,8 +52,6 @@ class TermsFit:
         The gain of a `reflex-fir` follows its responses, of which it is the sum.
     linear, nonlinear : arrays
         Coefficients c, and q of the reflex paths.
-    residual : array, shape (n,)
-        At `rate_hz`, ends trimmed.
     vaf_percent : float
         100 (1 − var(residual)/var(torque)), both in the band.
     aic, bic : float
@@ -61,8 +59,6 @@ class TermsFit:
         They compare fits of the same signals in the same band.
     independent_samples : float
         N.
-    degrees_of_freedom : float
-        For the t quantiles of the standard errors.
     test : ResidualTest
     remarks : tuple of str
         What to know before believing it, a sentence each.
@@ -75,13 +71,11 @@ class TermsFit:
     band_hz: tuple[float, float]
     rate_hz: float
     trim_s: float
-    residual: Array
     vaf_percent: float
     aic: float
     bic: float
     independent_samples: float
     condition_number: float
-    degrees_of_freedom: float
     test: ResidualTest
     remarks: tuple[str, ...] = ()
 
@@ -96,15 +90,6 @@ class TermsFit:
             if name in (parameter.term, f"{parameter.term} {parameter.name}"):
                 return parameter
         raise KeyError(name)
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """Effort as predicted and as measured in the band of the fit, shape (n,) each."""
-
-    predicted: Array
-    measured: Array
-    vaf_percent: float
 
 
 def fit_terms(
@@ -145,13 +130,13 @@ def fit_terms(
     return _fit(Design(motion, terms, band_hz, trim_s), band_hz, trim_s)
 
 
-def predict(fit: TermsFit, motion: Signals) -> Prediction:
-    """Predict the torque of a motion that the fit need not have seen."""
+def predicted_vaf_percent(fit: TermsFit, motion: Signals) -> float:
+    """Return how much of the torque the fit predicts, in its band, for a motion new to it."""
     design = Design(motion, fit.terms, fit.band_hz, fit.trim_s)
     predicted = design.columns(fit.nonlinear) @ fit.linear
     measured = design.torque_nm[design.keep]
     unexplained = float(np.var(measured - predicted)) / float(np.var(measured))
-    return Prediction(predicted, measured, 100.0 * (1.0 - unexplained))
+    return 100.0 * (1.0 - unexplained)
 
 
 def _both_directions(
@@ -190,7 +175,7 @@ def _fit(design: Design, band_hz: tuple[float, float], trim_s: float) -> TermsFi
     residual = solution.residual
     n, p = target.size, columns.shape[1] + nonlinear.size
     independent = min(float(n), 2.0 * (band_hz[1] - band_hz[0]) * n / design.rate_hz)
-    parameters, remarks, degrees = _parameters(design, solution.values, nonlinear, residual)
+    parameters, remarks = _parameters(design, solution.values, nonlinear, residual)
     misfit = independent * math.log(max(float(residual @ residual) / n, np.finfo(float).tiny))
     return TermsFit(
         terms=design.terms,
@@ -200,13 +185,11 @@ def _fit(design: Design, band_hz: tuple[float, float], trim_s: float) -> TermsFi
         band_hz=band_hz,
         rate_hz=design.rate_hz,
         trim_s=trim_s,
-        residual=residual,
         vaf_percent=100.0 * (1.0 - float(np.var(residual)) / float(np.var(target))),
         aic=misfit + 2.0 * p,
         bic=misfit + p * math.log(independent),
         independent_samples=independent,
         condition_number=solution.condition_number,
-        degrees_of_freedom=degrees,
         test=residual_test(residual, design.velocity_rad_s[design.keep], design.rate_hz, band_hz),
         remarks=tuple(remarks),
     )
@@ -214,8 +197,8 @@ def _fit(design: Design, band_hz: tuple[float, float], trim_s: float) -> TermsFi
 
 def _parameters(
     design: Design, linear: Array, nonlinear: Array, residual: Array
-) -> tuple[tuple[TermParameter, ...], list[str], float]:
-    """Return the parameters with HAC errors of the whole Jacobian, linear and nonlinear alike."""
+) -> tuple[tuple[TermParameter, ...], list[str]]:
+    """Return the parameters with HAC errors, linear and nonlinear ones from one Jacobian."""
     low = [bound for one in design.kernels.values() for bound in one.low]
     high = [bound for one in design.kernels.values() for bound in one.high]
     slopes, remarks = [], []
@@ -227,12 +210,9 @@ def _parameters(
     jacobian = np.column_stack((design.columns(nonlinear), *slopes))
     inner = [f"q{k}" for k in range(nonlinear.size)]
     covariance = np.full((jacobian.shape[1],) * 2, math.nan)
-    degrees = math.nan
     try:
-        scatter = hac_covariance(
-            bread(jacobian, [*design.names, *inner]), jacobian * residual[:, None]
-        )
-        covariance, degrees = scatter.covariance, scatter.degrees_of_freedom
+        inverse = bread(jacobian, [*design.names, *inner])
+        covariance = hac_covariance(inverse, jacobian * residual[:, None]).covariance
     except ValueError as obstacle:
         remarks.append(f"no standard errors: {obstacle}")
     errors = np.sqrt(np.diag(covariance))
@@ -272,4 +252,4 @@ def _parameters(
                     "determine it, and its error means nothing"
                 )
             found.append(TermParameter(term, name, value, error, unit))
-    return tuple(found), remarks, degrees
+    return tuple(found), remarks

@@ -14,7 +14,7 @@ from rigidimeter.estimation.terms import (
     compare_models,
     fit_terms,
     parse_terms,
-    predict,
+    predicted_vaf_percent,
     wideband_from_angle,
 )
 from rigidimeter.estimation.terms.reflex import kernel, pass_through, stretch_velocity
@@ -197,9 +197,9 @@ def test_the_rest_is_predicted_and_the_true_model_recommended(exact):
 
 def test_a_prediction_is_of_the_motion_given(exact):
     fit = fit_terms(driven(exact, 3.0 * exact.angle_rad), "stiffness", BAND_HZ)
-    assert predict(fit, driven(exact, 3.0 * exact.angle_rad)).vaf_percent == pytest.approx(100.0)
+    assert predicted_vaf_percent(fit, driven(exact, 3.0 * exact.angle_rad)) == pytest.approx(100.0)
     # Twice the torque: half is unexplained, a quarter of the variance.
-    assert predict(fit, driven(exact, 6.0 * exact.angle_rad)).vaf_percent == pytest.approx(75.0)
+    assert predicted_vaf_percent(fit, driven(exact, 6.0 * exact.angle_rad)) == pytest.approx(75.0)
 
 
 def test_white_noise_passes_for_white_and_a_forgotten_term_does_not(exact):
