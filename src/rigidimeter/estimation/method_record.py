@@ -94,3 +94,8 @@ class Method:
     pooled_text: str = "Those of all epochs together are its own too"
     as_recorded: bool = False
     in_sensitivity: bool = False
+
+    @property
+    def uses_perturbation(self) -> bool:
+        """Whether the perturbation is the instrument, so that voluntary torque does not bias it."""
+        return "perturbation_nm" in self.needs

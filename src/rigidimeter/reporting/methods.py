@@ -34,4 +34,4 @@ def pooled_basis(name: str) -> str:
 def is_least_squares(name: str) -> bool:
     """Return whether voluntary torque biases a method: it does not use the perturbation."""
     method = method_of(name)
-    return method is not None and "perturbation_nm" not in method.needs
+    return method is not None and not method.uses_perturbation

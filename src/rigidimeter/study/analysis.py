@@ -135,7 +135,7 @@ def analyse_prepared(
         settings = prepared.settings
         scores.append(score_epoch(prepared.epoch, settings.scores, settings.estimation))
         progress(1.0)
-    if "perturbation_nm" in estimator.needs:
+    if estimator.uses_perturbation:
         reason += _without_drive(fitted, bool(reason))
     fits, pooled = estimator.fit(fitted, None, progress, not fits_alone)
     fits = [checked(prepared, fit) for prepared, fit in zip(fitted, fits, strict=True)]

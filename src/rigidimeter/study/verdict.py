@@ -160,7 +160,7 @@ def _dependence(rows: Sequence[SensitivityRow]) -> Dependence:
 
 def _biased(row: SensitivityRow) -> bool:
     """Whether torque of the subject biases the method: it does not use the perturbation."""
-    return "perturbation_nm" not in method_named(row.method).needs
+    return not method_named(row.method).uses_perturbation
 
 
 def _within(row: SensitivityRow, standard: SensitivityRow) -> bool:

@@ -1,9 +1,10 @@
+import doctest
 import json
 
 import numpy as np
 import pytest
 
-from rigidimeter.estimation import fit_epoch, identify
+from rigidimeter.estimation import fit_epoch, from_arrays, identify
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.virtual.batch import simulate_epochs
@@ -72,6 +73,10 @@ def test_settings_are_used(arrays):
 def test_what_cannot_be_used_is_refused(arrays, change, words):
     with pytest.raises(ValueError, match=words):
         identify(**{**arrays, "rate_hz": RATE_HZ, **change})
+
+
+def test_the_example_of_the_docstring_runs():
+    assert doctest.testmod(from_arrays).failed == 0
 
 
 def test_numbers_must_be_finite_and_time_must_increase(arrays):
