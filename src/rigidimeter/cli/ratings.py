@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
-from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.study.rating_contrasts import RatingsModel
 
 __all__ = ["ratings"]
 
@@ -74,23 +78,12 @@ def ratings(
       rigidimeter ratings ratings.csv --score updrs --examiner rater --scale 0 4 --step 1
       rigidimeter ratings ratings.csv --random subject/day --contrast OFF DBS
     """
-    from rigidimeter.cli.ratings_show import model_notices, ratings_document, ratings_lines
     from rigidimeter.documents import write_json
     from rigidimeter.recording.formats import read_text_table
     from rigidimeter.records import Notice
-    from rigidimeter.statistics import fit_mixed
-    from rigidimeter.study.rating_table import RANDOM, groupings, ratings_of
+    from rigidimeter.study.rating_contrasts import model_ratings, ratings_document
 
     keep_inputs((json_out,), (table,))
-    chosen = tuple(dict.fromkeys(random or ["examiner"]))
-    for name in chosen:
-        if name not in RANDOM:
-            raise UserError(f"--random {name}: must be one of {', '.join(RANDOM)}")
-    if not (scale[0] < scale[1] and step >= 0 and abs(sum(scale)) < float("inf")):
-        raise UserError(
-            f"--scale {scale[0]:g} {scale[1]:g} --step {step:g}: write the lowest and then the "
-            "highest rating, and a step of 0 or more"
-        )
     columns = {
         "condition": condition,
         "score": score,
@@ -98,31 +91,74 @@ def ratings(
         "subject": subject,
         "day": day,
     }
-    read = read_text_table(table)
-    found = ratings_of(read, columns, chosen, scale, step)
-    conditions = [row.condition for row in found.rows]
-    pair = contrast or _first_two(conditions)
-    for name in pair:
-        if name not in conditions:
-            known = ", ".join(dict.fromkeys(conditions))
-            raise UserError(f"--contrast {name}: there is no such condition; rated are: {known}")
-    if pair[0] == pair[1]:
-        raise UserError(f"--contrast {pair[0]} {pair[1]}: name two different conditions")
-    try:
-        fit = fit_mixed(
-            [row.score for row in found.rows], conditions, groupings(found.rows, chosen)
-        )
-    except (ValueError, ArithmeticError) as error:
-        raise UserError(f"{read.source}: {error}") from None
-    of_model = model_notices(fit)
+    found = model_ratings(
+        read_text_table(table),
+        columns,
+        random or ["examiner"],
+        scale=scale,
+        step=step,
+        pair=contrast,
+    )
     say(tuple(Notice("warning", text) for text in found.notices))
     if json_out is not None:
-        notices = [*found.notices, *of_model]
-        write_json(json_out, ratings_document(read.source, found, fit, pair, notices))
-    typer.echo("\n".join(ratings_lines(read.source, found, fit, pair, of_model)))
+        write_json(json_out, ratings_document(found))
+    typer.echo("\n".join(_lines(found)))
 
 
-def _first_two(conditions: list[str]) -> tuple[str, str]:
-    """Return the first two conditions in order of appearance, ``OFF`` first where it occurs."""
-    first, second, *_ = sorted(dict.fromkeys(conditions), key=lambda name: name != "OFF")
-    return first, second
+def _lines(found: RatingsModel) -> Iterator[str]:
+    """Yield the table and its sentences."""
+    fit = found.fit
+    offsets = " + ".join(f"offset of {name}" for name in fit.variances)
+    yield f"{found.source}: {fit.n} ratings in {len(fit.conditions)} conditions"
+    yield f"score = mean of condition + {offsets} + error, fitted by REML"
+    yield from ("", f"{'condition':>12}  {'n':>4}  {'mean':>8}  {'SE':>8}")
+    for name, mean, variance in zip(
+        fit.conditions, fit.means, fit.covariance.diagonal(), strict=True
+    ):
+        se = math.sqrt(variance)
+        yield f"{name:>12}  {found.counts[name]:4d}  {mean:8.4f}  {se:8.4f}"
+    for group, offsets_of in fit.offsets.items():
+        counts = found.counts_of(group)
+        yield from ("", f"{group:>12}  {'n':>4}  {'offset':>8}")
+        for name, offset in offsets_of.items():
+            yield f"{name:>12}  {counts[name]:4d}  {offset:8.4f}"
+        variance = fit.variances[group]
+        yield f"Variance of {group}: {variance:.4g} (SD {math.sqrt(variance):.4g})."
+    residual = fit.variance_residual
+    yield f"Variance of the residual: {residual:.4g} (SD {math.sqrt(residual):.4g})."
+    yield ""
+    yield from _contrast_lines(found)
+    if len(fit.conditions) > 2:
+        yield from ("", "All pairs (p unadjusted; Holm's are in the JSON file):")
+        for pair in found.pairs:
+            c = pair.contrast
+            yield (
+                f"  {pair.first} minus {pair.second}: {c.estimate:.4g}, SE {c.se:.4g}, "
+                f"p {c.p_residual:.3g} (residual), {c.p_satterthwaite:.3g} (Satterthwaite)"
+            )
+        j = found.joint
+        yield (
+            f"All means equal: F({j.df_numerator}, {j.df_residual:.4g}) = {j.f:.4g}, "
+            f"p = {j.p_residual:.3g}; Satterthwaite F({j.df_numerator}, {j.df_satterthwaite:.4g}), "
+            f"p = {j.p_satterthwaite:.3g}"
+        )
+    yield from ("", "Corrected score = score less the offsets of its groups.")
+    if found.model_notices:
+        yield from ("", "Note:", *(f"  - {text}" for text in found.model_notices))
+
+
+def _contrast_lines(found: RatingsModel) -> Iterator[str]:
+    first, second = found.pair
+    c = found.contrast
+    way = "higher" if c.estimate > 0 else "lower" if c.estimate < 0 else "neither higher nor lower"
+    yield (
+        f"{first} minus {second}: {c.estimate:.4g} [{found.low:.4g} to {found.high:.4g}, 95 %], "
+        f"SE {c.se:.4g}"
+    )
+    for f, df, p, name in (
+        (c.f, c.df_residual, c.p_residual, "residual degrees of freedom, n − p"),
+        (c.f, c.df_satterthwaite, c.p_satterthwaite, "Satterthwaite"),
+        (c.f_kenward_roger, c.df_kenward_roger, c.p_kenward_roger, "Kenward and Roger"),
+    ):
+        yield f"  F(1, {df:.4g}) = {f:.4g}, p = {p:.3g}   {name}"
+    yield f"{first} was rated {way} than {second}; a positive difference means {first} is higher."
