@@ -26,7 +26,7 @@ def rating_sentences(result: StudyResult, cite: Cited) -> list[str]:
     if found is None:
         return []
     examiners = len({row[1] for row in found.rows})
-    estimated = tuple(name for name in found.fit.offsets if name not in found.fit.untold)
+    estimated = tuple(name for name in found.fit.offsets if name not in found.fit.inseparable)
     offsets = f" and a random intercept for {offsets_text(estimated)}" if estimated else ""
     sentences = [
         f"{plural(examiners, 'examiner')} gave {plural(len(found.rows), 'rating')}. They were "

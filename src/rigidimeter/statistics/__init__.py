@@ -9,7 +9,7 @@ from rigidimeter.statistics.contrasts import (
     joint_test,
     pairwise,
 )
-from rigidimeter.statistics.day_differences import (
+from rigidimeter.statistics.day_model import (
     DayDifference,
     day_difference,
     day_medians,

@@ -1,4 +1,4 @@
-"""How far two groups lie apart, how sure that is, and whether one measure parts them better.
+"""How far two groups lie apart, how sure that is, and whether one measure separates them better.
 
     rank-biserial  δ = (#{x > y} − #{x < y}) / (m n) = 2 U/(m n) − 1
     r = z/√N,  z the rank-sum statistic
@@ -81,7 +81,7 @@ class Effects:
 
 @dataclass(frozen=True)
 class EffectDifference:
-    """How much better one measure parts two conditions than another does.
+    """How much better one measure separates two conditions than another does.
 
     Attributes
     ----------
@@ -194,7 +194,7 @@ def compare_effects(
     resamples: int = 9999,
     confidence: float = 0.95,
 ) -> EffectDifference:
-    """Ask whether the first measure parts the two conditions better than the second.
+    """Ask whether the first measure separates the two conditions better than the second.
 
     Compared by the rank-biserial correlation: r is bounded by the group sizes, which differ between
     measures (`published.largest_r`).

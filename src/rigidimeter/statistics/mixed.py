@@ -3,7 +3,7 @@
     score = Σ_c β_c x_c + Σ_g b_g z_g + e,   b_g ~ N(0, σ_g²),  e ~ N(0, σ²)
 
 One mean for each condition and no intercept, as in Sec. 2.2; random intercepts for examiners, or
-for subjects and their days. Fitted by restricted maximum likelihood (`statistics.likelihood`);
+for subjects and their days. Fitted by restricted maximum likelihood;
 tests of the means are in `statistics.contrasts`.
 """
 
@@ -38,7 +38,7 @@ class Mixed:
     covariance : ndarray, shape (p, p)
         Of the means.
     variances : mapping of str to float
-        σ_g² of each grouping, 0 at the boundary and where it cannot be told.
+        σ_g² of each grouping, 0 at the boundary and where it cannot be estimated.
     variance_residual : float
         σ².
     offsets : mapping of str to mapping of str to float
@@ -51,8 +51,8 @@ class Mixed:
         Number of scores, and n − p.
     at_zero : tuple of str
         Groupings whose variance is estimated as zero.
-    untold : mapping of str to str
-        Groupings that the data cannot tell from something else, and from what.
+    inseparable : mapping of str to str
+        Groupings that the data cannot separate from something else, and from what.
     point : Point
         The likelihood at its best, for tests.
     blocks : tuple of slice
@@ -71,7 +71,7 @@ class Mixed:
     n: int
     df_residual: int
     at_zero: tuple[str, ...]
-    untold: Mapping[str, str]
+    inseparable: Mapping[str, str]
     point: Point
     blocks: tuple[slice, ...]
 
@@ -120,8 +120,8 @@ def fit_mixed(
 
     Notes
     -----
-    A grouping that cannot be told from the condition means, from the residual or from a grouping
-    before it is left out, and named in `untold`.
+    A grouping that cannot be separated from the condition means, from the residual or from a
+    grouping before it is left out, and named in `inseparable`.
 
     References
     ----------
@@ -147,7 +147,7 @@ def fit_mixed(
     names, x = _indicators(conditions)
     if y.size <= len(names):
         raise ValueError(f"{y.size} scores cannot give {len(names)} means and their error")
-    kept, untold = _tellable(x, groups)
+    kept, inseparable = _tellable(x, groups)
     members = {name: _indicators(groups[name]) for name in groups}
     z = [members[name][1] for name in kept]
     residual = y - _projected(np.concatenate([x, *z], axis=1), y)
@@ -158,7 +158,7 @@ def fit_mixed(
         )
     data = products(y, x, z)
     point = minimise(data)
-    return _model(y, names, kept, members, untold, data, point)
+    return _model(y, names, kept, members, inseparable, data, point)
 
 
 def likelihood_ratio(
@@ -173,7 +173,7 @@ def likelihood_ratio(
     """
     fit = fit_mixed(scores, conditions, groups)
     y = np.asarray(scores, dtype=np.float64)
-    z = [_indicators(groups[name])[1] for name in groups if name not in fit.untold]
+    z = [_indicators(groups[name])[1] for name in groups if name not in fit.inseparable]
     full, one = (
         minimise(products(y, x, z), restricted=False).deviance
         for x in (_indicators(conditions)[1], np.ones((y.size, 1)))
@@ -197,13 +197,13 @@ def _projected(columns: Array, y: Array) -> Array:
 
 
 def _tellable(x: Array, groups: Mapping[str, Sequence[str]]) -> tuple[list[str], dict[str, str]]:
-    """Return the groupings whose variance the data can tell, and why not for the others.
+    """Return the groupings whose variance can be estimated, and why not for the others.
 
     Within the residuals, the matrices I and Z_k Z_kᵀ must be linearly independent, and means and
     offsets together must leave a degree of freedom.
     """
     kept: list[str] = []
-    untold: dict[str, str] = {}
+    inseparable: dict[str, str] = {}
     rests: list[Array] = []
     for name in groups:
         levels, own = _indicators(groups[name])
@@ -211,17 +211,19 @@ def _tellable(x: Array, groups: Mapping[str, Sequence[str]]) -> tuple[list[str],
         z = [_indicators(groups[other])[1] for other in kept] + [own]
         rank = int(np.linalg.matrix_rank(np.concatenate([x, *z], axis=1)))
         if len(levels) == 1:
-            untold[name] = f"there is only one, {levels[0]}"
+            inseparable[name] = f"there is only one, {levels[0]}"
         elif np.sum(rest**2) < _NOTHING * len(x):
-            untold[name] = "it goes with the condition, so the condition means contain it"
+            inseparable[name] = "it goes with the condition, so the condition means contain it"
         elif len(x) == rank:
-            untold[name] = "each has too few scores to tell it from the residual"
+            inseparable[name] = "each has too few scores to separate it from the residual"
         elif _dependent([*rests, rest], len(x) - x.shape[1]):
-            untold[name] = "it cannot be told from the residual or from the grouping before it"
+            inseparable[name] = (
+                "it cannot be distinguished from the residual or from the grouping before it"
+            )
         else:
             kept.append(name)
             rests.append(rest)
-    return kept, untold
+    return kept, inseparable
 
 
 def _dependent(rests: Sequence[Array], free: int) -> bool:
@@ -241,7 +243,7 @@ def _model(
     names: tuple[str, ...],
     kept: Sequence[str],
     members: Mapping[str, tuple[tuple[str, ...], Array]],
-    untold: Mapping[str, str],
+    inseparable: Mapping[str, str],
     data: Products,
     point: Point,
 ) -> Mixed:
@@ -271,7 +273,7 @@ def _model(
         n=data.n,
         df_residual=df,
         at_zero=tuple(name for name in kept if variances[name] == 0),
-        untold=dict(untold),
+        inseparable=dict(inseparable),
         point=point,
         blocks=data.blocks,
     )

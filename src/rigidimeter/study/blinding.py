@@ -1,7 +1,7 @@
 """Names of conditions: what a table or a recording says, through the blinding key.
 
-With a key, a code becomes the condition that the key gives it; a condition may stand by its name
-too. Without a key, names that `study.toml` does not know are codes: the analysis runs on them as
+With a key, a code becomes the condition that the key gives it; a condition may also be given by its
+name. Without a key, names that `study.toml` does not know are codes: the analysis runs on them as
 they are, blinded.
 """
 

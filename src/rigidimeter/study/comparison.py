@@ -102,7 +102,7 @@ def gathered(
 ) -> tuple[Comparison, ...]:
     """Return every measure of an analysis with its observations, not yet tested.
 
-    `sessions`, by source, tell subject and day; then the day is what the bootstrap resamples.
+    `sessions`, by source, give subject and day; then the day is what the bootstrap resamples.
     """
     by_condition, _ = split_pooled(analysis)
     found = []

@@ -49,7 +49,7 @@ method = "auto"      # as --method takes it
 
 ABOUT = {
     "sessions": "# One row a recording: a session folder, or a file with the standard names.\n"
-    "# part tells two sessions of one day in one condition apart.\n",
+    "# part distinguishes two sessions of one day in one condition.\n",
     "ratings": "# One row a score.\n",
     "exclusions": "# Epochs that you take out: which, why, and who says so.\n",
 }

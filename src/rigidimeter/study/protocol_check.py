@@ -1,7 +1,7 @@
 """Whether all sessions of a study were commanded alike.
 
-What the rig was told is in the manifest of a session: the controller and the perturbation. Epochs
-of two versions of a protocol are two measurements, and must not be pooled.
+What the rig was commanded is in the manifest of a session: the controller and the perturbation.
+Epochs of two versions of a protocol are two measurements, and must not be pooled.
 """
 
 from __future__ import annotations

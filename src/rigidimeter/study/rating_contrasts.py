@@ -178,7 +178,7 @@ def _model_notices(fit: Mixed) -> list[str]:
         "residual explains, so all their offsets are zero and no score is corrected for them"
         for name in fit.at_zero
     ]
-    for name, reason in fit.untold.items():
+    for name, reason in fit.inseparable.items():
         said.append(f"{name} was left out of the model: {reason}; its offsets are zero")
     return said
 

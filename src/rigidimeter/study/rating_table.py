@@ -171,9 +171,9 @@ def _single(rows: Sequence[Rating], random: Sequence[str]) -> list[str]:
         once = [label for label in dict.fromkeys(labels) if labels.count(label) == 1]
         if once and len(once) < len(set(labels)) and name != "subject/day":
             said.append(
-                f"{name} {', '.join(once)} gave one rating; its offset is drawn strongly to zero"
+                f"{name} {', '.join(once)} gave one rating; its offset is strongly shrunken"
                 if name == "examiner"
-                else f"{name} {', '.join(once)} has one rating; its offset is drawn to zero"
+                else f"{name} {', '.join(once)} has one rating; its offset is shrunken"
             )
     return said
 

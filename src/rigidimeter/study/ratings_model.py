@@ -138,7 +138,9 @@ def _boundary(fit: Mixed) -> list[str]:
         "explains, so no score is corrected for them"
         for name in fit.at_zero
     ]
-    return said + [f"{name} was left out of the model: {why}" for name, why in fit.untold.items()]
+    return said + [
+        f"{name} was left out of the model: {why}" for name, why in fit.inseparable.items()
+    ]
 
 
 def _with_days(

@@ -233,7 +233,7 @@ def _twice(sessions: Sequence[_Read]) -> list[tuple[Row, str]]:
                         row,
                         f"subject {entry.subject}, day {entry.day}, {entry.condition}, {task}"
                         f"{part} is in the table already ({_line(seen[key])}); if both are parts "
-                        "of one day, tell them apart in the column part",
+                        "of one day, give each a name in the column part",
                     )
                 )
                 break

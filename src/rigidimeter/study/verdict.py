@@ -180,7 +180,7 @@ def _reason(
     shown: Sequence[SensitivityRow],
     none: Sequence[SensitivityRow],
 ) -> _Found:
-    """Tell the subject's own torque from mere lack of precision, where the intervals can.
+    """Distinguish the subject's own torque from a lack of precision, where the intervals can.
 
     Such torque biases all of least squares, so what one of its methods shows and another does not
     has another reason.

@@ -188,7 +188,7 @@ def test_a_grouping_that_cannot_be_told_is_left_out_and_said(
 ) -> None:
     conditions = ["OFF"] * 3 + ["DBS"] * 3
     fit = fit_mixed([1.0, 2.0, 2.5, 0.5, 1.0, 2.5], conditions, {"examiner": examiners})
-    assert reason in fit.untold["examiner"]
+    assert reason in fit.inseparable["examiner"]
     assert fit.variances["examiner"] == 0
     test = difference(fit, "OFF", "DBS")
     assert test.df_satterthwaite == pytest.approx(4)
@@ -198,7 +198,7 @@ def test_a_grouping_that_cannot_be_told_is_left_out_and_said(
 def test_two_groupings_that_are_one_cannot_be_told_apart() -> None:
     scores, conditions, examiners = balanced(10)
     fit = fit_mixed(scores.ravel(), conditions, {"examiner": examiners, "desk": examiners})
-    assert set(fit.untold) == {"desk"}
+    assert set(fit.inseparable) == {"desk"}
 
 
 def test_an_examiner_with_one_score_is_allowed() -> None:

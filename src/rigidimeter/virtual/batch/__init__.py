@@ -1,9 +1,7 @@
 """Many virtual epochs at once, compiled from the steps that the loop itself takes."""
 
-from rigidimeter.virtual.batch.batch_draws import EpochInputs, draw_inputs
-from rigidimeter.virtual.batch.batch_result import Batch
-from rigidimeter.virtual.batch.batch_rig import Bench, bench
-from rigidimeter.virtual.batch.batch_run import simulate_inputs
+from rigidimeter.virtual.batch.batch_rig import Bench, EpochInputs, bench, draw_inputs
+from rigidimeter.virtual.batch.batch_run import Batch, simulate_inputs
 from rigidimeter.virtual.batch.batch_simulate import (
     epoch_generator,
     simulate_chunks,

@@ -17,10 +17,14 @@ from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import prbs_nm
 from rigidimeter.settings import Settings, SubjectSettings
-from rigidimeter.virtual.batch.batch_draws import EpochInputs, draw_inputs
-from rigidimeter.virtual.batch.batch_result import Batch
-from rigidimeter.virtual.batch.batch_rig import Bench, bench
-from rigidimeter.virtual.batch.batch_run import batch_of, empty_rows, perturbation_rows, run_row
+from rigidimeter.virtual.batch.batch_rig import Bench, EpochInputs, bench, draw_inputs
+from rigidimeter.virtual.batch.batch_run import (
+    Batch,
+    batch_of,
+    empty_rows,
+    perturbation_rows,
+    run_row,
+)
 
 __all__ = ["epoch_generator", "simulate_chunks", "simulate_epochs"]
 

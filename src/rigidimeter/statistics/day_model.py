@@ -112,13 +112,13 @@ def day_difference(
     ------
     ValueError
         If a sample is empty or not finite, the labels are not as many as the values, `confidence`
-        is not between 0 and 1, or days (or subjects) cannot be told from the conditions: there is
-        one, or one in each condition.
+        is not between 0 and 1, or days (or subjects) cannot be separated from the conditions: there
+        is one, or one in each condition.
 
     Notes
     -----
     Where every day has one epoch, day and residual are one, and the test is the ordinary t-test
-    with equal variances. A component that the data cannot tell from the residual is left to it.
+    with equal variances. A component that the data cannot separate from the residual is left to it.
 
     References
     ----------
@@ -262,7 +262,7 @@ def _check_apart(name: str, labels: Sequence[str], conditions: Sequence[str]) ->
         raise ValueError(f"there is only one {name}, so what differs between {name}s is unknown")
     if len(set(labels)) == 2 == len(pairs):
         raise ValueError(
-            f"there is one {name} in each condition, so {name} and condition cannot be told apart"
+            f"there is one {name} in each condition, so {name} and condition cannot be separated"
         )
 
 
