@@ -74,12 +74,12 @@ def rest(loop: ControlLoop, duration_s: float, return_s: float) -> TickResult:
 
 
 def hold(
-    loop: ControlLoop, duration_s: float, heard: Callable[[Reading], None] = lambda _: None
+    loop: ControlLoop, duration_s: float, take: Callable[[Reading], None] = lambda _: None
 ) -> TickResult:
-    """Stand still; `heard` takes every reading."""
+    """Stand still; `take` is called with every reading."""
 
     def command(reading: Reading, _: float, __: int) -> tuple[float, float, float]:
-        heard(reading)
+        take(reading)
         return 0.0, 0.0, math.nan
 
     return run_ticks(loop, REST, round(duration_s * loop.rate_hz), command, latched=True)

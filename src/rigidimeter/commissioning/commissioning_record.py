@@ -148,7 +148,7 @@ def record_path(rig: Path) -> Path:
 
 
 def write_record(path: Path, record: CommissioningRecord) -> None:
-    """Write the record with its digest, whole or not at all."""
+    """Write the record with its digest; a failed write leaves the old record."""
     values = plain_values({**asdict(record), "passed": record.passed})
     values["digest"] = _digest(values)
     write_json(path, values)

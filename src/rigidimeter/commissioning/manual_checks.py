@@ -12,16 +12,16 @@ import math
 import numpy as np
 
 from rigidimeter.commissioning.checks import Check, impossible, untried, within, yes
-from rigidimeter.commissioning.trial import Operator, Setup, freshen, hold, listen, trial
+from rigidimeter.commissioning.trial import Operator, Setup, drop_old_samples, hold, listen, trial
 
-__all__ = ["known_angle", "known_torque", "told"]
+__all__ = ["ask_operator", "known_angle", "known_torque"]
 
 SETTLE_S = 0.5
 KNOWN_ANGLE_S = 1.0
 ANGLE, TORQUE = "known angle", "known torque"
 
 
-def told(operator: Operator, name: str, question: str, remedy: str) -> Check:
+def ask_operator(operator: Operator, name: str, question: str, remedy: str) -> Check:
     """Return the check of something that the operator says is so or not."""
     if not operator.present:
         return untried(name, "yes")
@@ -55,15 +55,15 @@ def known_torque(setup: Setup) -> Check:
         return impossible(TORQUE, limit, "give --known-torque-nm to compare with")
     if not operator.present:
         return untried(TORQUE, limit)
-    before = trial(setup, hold(SETTLE_S)).heard.torque_nm
+    before = trial(setup, hold(SETTLE_S)).readings.torque_nm
     held_s = limits.known_torque_s
     if not operator.ask(
         f"Put a torque of {known_nm:g} N·m on the joint, toward positive angles, and keep it for "
         f"{held_s + SETTLE_S:g} s after you agree; the drive will hold against it. Ready?"
     ):
         return impossible(TORQUE, limit, "the operator did not agree to it")
-    heard = trial(setup, hold(SETTLE_S + held_s)).heard
-    late = heard.torque_nm[heard.time_s > SETTLE_S]
+    readings = trial(setup, hold(SETTLE_S + held_s)).readings
+    late = readings.torque_nm[readings.time_s > SETTLE_S]
     value = -float(np.nanmedian(late) - np.nanmedian(before)) if len(late) else math.nan
     operator.ask("Take the torque off again. Done?")
     return within(TORQUE, value, "N·m", known_nm, percent, _WRONG_SCALE)
@@ -77,6 +77,6 @@ _WRONG_SCALE = (
 
 def _angle_rad(setup: Setup) -> float:
     """Return the mean angle over a short while without power."""
-    freshen(setup)
-    heard = listen(setup, KNOWN_ANGLE_S)
-    return float(np.nanmean(heard.angle_rad[len(heard.angle_rad) // 2 :]))
+    drop_old_samples(setup)
+    readings = listen(setup, KNOWN_ANGLE_S)
+    return float(np.nanmean(readings.angle_rad[len(readings.angle_rad) // 2 :]))

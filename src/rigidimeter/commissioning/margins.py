@@ -14,7 +14,7 @@ __all__ = ["margin_checks", "on_measured_rig"]
 def on_measured_rig(settings: Settings, bandwidth_hz: float, delay_s: float) -> Settings:
     """Return the settings with the rig as it was measured.
 
-    The whole delay around the loop is put on the torque, which is then new at every tick: its age
+    The delay around the loop is put on the torque, which is then new at every tick: its age
     is in the delay already.
     """
     rig = settings.rig

@@ -14,13 +14,13 @@ import numpy as np
 
 from rigidimeter.commissioning.checks import Check, above, below, impossible, within, yes
 from rigidimeter.commissioning.response import (
-    ArmSeen,
+    ArmFit,
     Following,
-    arm_seen,
+    fit_arm,
     following,
     velocity_scale,
 )
-from rigidimeter.commissioning.trial import Array, Heard, Tried, stopped_for
+from rigidimeter.commissioning.trial import Array, Readings, TrialResult, stopped_for
 from rigidimeter.control import minimum_jerk
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
@@ -70,35 +70,35 @@ def steps(settings: Settings) -> Array:
     return rad_from_deg(limits.step_deg_s) * np.tile(pair, times)
 
 
-def small_move_check(tried: Tried, settings: Settings) -> Check:
+def small_move_check(result: TrialResult, settings: Settings) -> Check:
     """Check direction and rough scale of the first motion."""
-    found = following(tried.heard, settings.rig.drive_damping_ratio)
+    found = following(result.readings, settings.rig.drive_damping_ratio)
     check = within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, SMALL_MOVE_PERCENT, _SCALE_REMEDY)
-    if tried.cause is Cause.NONE:
+    if result.cause is Cause.NONE:
         return check
-    if tried.cause not in _NOT_AS_COMMANDED:  # a motion cut short tells nothing of the scale
-        return yes(ANGLE_PER_COMMAND, False, stopped_for(tried.cause), check.limit, _REASON_REMEDY)
+    if result.cause not in _NOT_AS_COMMANDED:  # a motion cut short tells nothing of the scale
+        return yes(ANGLE_PER_COMMAND, False, stopped_for(result.cause), check.limit, _REASON_REMEDY)
     if check.passed:
-        return yes(ANGLE_PER_COMMAND, False, stopped_for(tried.cause), check.limit, _SCALE_REMEDY)
+        return yes(ANGLE_PER_COMMAND, False, stopped_for(result.cause), check.limit, _SCALE_REMEDY)
     return check
 
 
-def swing_checks(tried: Tried, settings: Settings) -> tuple[list[Check], Following]:
+def swing_checks(result: TrialResult, settings: Settings) -> tuple[list[Check], Following]:
     """Check directions and scales over the slow motion."""
-    heard, percent = tried.heard, settings.commissioning.scale_tolerance_percent
-    found = following(heard, settings.rig.drive_damping_ratio)
+    readings, percent = result.readings, settings.commissioning.scale_tolerance_percent
+    found = following(readings, settings.rig.drive_damping_ratio)
     checks = [
         yes(
             COMPLETED,
-            tried.cause is Cause.NONE,
-            "yes" if tried.cause is Cause.NONE else stopped_for(tried.cause),
+            result.cause is Cause.NONE,
+            "yes" if result.cause is Cause.NONE else stopped_for(result.cause),
             "yes",
             _REASON_REMEDY,
         ),
         within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, percent, _SCALE_REMEDY),
         within(
             "velocity per change of angle",
-            velocity_scale(heard),
+            velocity_scale(readings),
             "1",
             1.0,
             percent,
@@ -115,11 +115,13 @@ def swing_checks(tried: Tried, settings: Settings) -> tuple[list[Check], Followi
     return checks, found
 
 
-def torque_sign(heard: Heard, damping_ratio: float, drive_scale: float) -> tuple[Check, float]:
+def torque_sign(
+    readings: Readings, damping_ratio: float, drive_scale: float
+) -> tuple[Check, float]:
     """Check that the torque is that of a joint that resists; return the work done on it in J."""
     name, limit = "torque against motion", "that of a joint that resists"
-    seen = arm_seen(heard, math.inf, damping_ratio, drive_scale)
-    angle, torque = heard.angle_rad, heard.torque_nm
+    seen = fit_arm(readings, math.inf, damping_ratio, drive_scale)
+    angle, torque = readings.angle_rad, readings.torque_nm
     work_j = float(np.sum(0.5 * (torque[1:] + torque[:-1]) * np.diff(angle)))
     if seen.explained < EXPLAINED:
         why = (
@@ -134,12 +136,12 @@ def torque_sign(heard: Heard, damping_ratio: float, drive_scale: float) -> tuple
     return yes(name, seen.strongest_is_positive, _arm_words(seen, work_j), limit, remedy), work_j
 
 
-def step_checks(tried: Tried, settings: Settings) -> tuple[list[Check], Following, ArmSeen]:
+def step_checks(result: TrialResult, settings: Settings) -> tuple[list[Check], Following, ArmFit]:
     """Check delays and bandwidth by the quick steps."""
-    heard, guard = tried.heard, settings.guard
+    readings, guard = result.readings, settings.guard
     ratio = settings.rig.drive_damping_ratio
-    found = following(heard, ratio, highest_hz=0.5 * settings.rig.tick_rate_hz)
-    seen = arm_seen(heard, found.bandwidth_hz, ratio, found.scale, resists=True)
+    found = following(readings, ratio, highest_hz=0.5 * settings.rig.tick_rate_hz)
+    seen = fit_arm(readings, found.bandwidth_hz, ratio, found.scale, resists=True)
     # As the settings count it: twice the mean lag of a second-order drive, and what goes before.
     lag_s = 2.0 * ratio / (math.pi * found.bandwidth_hz) + found.delay_s
     checks = [
@@ -169,9 +171,9 @@ def step_checks(tried: Tried, settings: Settings) -> tuple[list[Check], Followin
     return checks, found, seen
 
 
-def drift_check(heard: Heard, limit_deg: float) -> Check:
+def drift_check(readings: Readings, limit_deg: float) -> Check:
     """Check that the joint stood still when power came."""
-    angle = heard.angle_rad[np.isfinite(heard.angle_rad)]
+    angle = readings.angle_rad[np.isfinite(readings.angle_rad)]
     moved = math.degrees(float(np.max(np.abs(angle)))) if len(angle) else math.inf
     return below(
         "motion when enabled",
@@ -191,7 +193,7 @@ _SCALE_REMEDY = (
 )
 
 
-def _arm_words(seen: ArmSeen, work_j: float) -> str:
+def _arm_words(seen: ArmFit, work_j: float) -> str:
     return (
         f"J {seen.inertia_kg_m2:.3g} kg·m², B {seen.damping_nm_s_rad:.3g} N·m·s/rad, "
         f"K {seen.stiffness_nm_rad:.3g} N·m/rad, work {1000 * work_j:.3g} mJ"

@@ -9,7 +9,7 @@ with h_f the second-order response of `rigidimeter.dynamics.velocity_drive`. The
 
     M(t) = J θ''(t − δ) + B θ'(t − δ) + K θ(t − δ) + M₀.
 
-Where M is taken as the loop saw it at each tick, δ is the whole delay around the loop but for the
+Where M is taken as the loop saw it at each tick, δ is the delay around the loop but for the
 drive's own response: wire, drive, sensor, wire, and waiting for the tick.
 """
 
@@ -23,13 +23,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize, nnls
 
-from rigidimeter.commissioning.trial import Array, Heard, new_samples
+from rigidimeter.commissioning.trial import Array, Readings, new_samples
 from rigidimeter.dynamics import DriveModel
 
 __all__ = [
-    "ArmSeen",
+    "ArmFit",
     "Following",
-    "arm_seen",
+    "fit_arm",
     "following",
     "sent_angle_rad",
     "velocity_scale",
@@ -54,7 +54,7 @@ class Following(NamedTuple):
     worst_rad: float
 
 
-class ArmSeen(NamedTuple):
+class ArmFit(NamedTuple):
     """The arm as the torque shows it, the delay, and the share of the torque that it explains."""
 
     inertia_kg_m2: float
@@ -72,26 +72,28 @@ class ArmSeen(NamedTuple):
         return {"inertia": J, "damping": B, "stiffness": K}[self.strongest] > 0
 
 
-def sent_angle_rad(heard: Heard, at_s: Array) -> Array:
+def sent_angle_rad(readings: Readings, at_s: Array) -> Array:
     """Return the integral of what was sent up to these times."""
-    steps = heard.sent_rad_s[:-1] * np.diff(heard.time_s)
+    steps = readings.sent_rad_s[:-1] * np.diff(readings.time_s)
     angle = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.asarray(np.interp(at_s, heard.time_s, angle))
+    return np.asarray(np.interp(at_s, readings.time_s, angle))
 
 
-def following(heard: Heard, damping_ratio: float, highest_hz: float | None = None) -> Following:
+def following(
+    readings: Readings, damping_ratio: float, highest_hz: float | None = None
+) -> Following:
     """Fit scale and delay, and up to `highest_hz` the drive's bandwidth; without it only a delay.
 
-    What answers quicker than half the tick rate cannot be told from a delay at that rate.
+    What answers quicker than half the tick rate looks like a delay at that rate.
     """
-    fresh = new_samples(heard.motion_time_s) & np.isfinite(heard.angle_rad)
-    at_s, angle = heard.motion_time_s[fresh], heard.angle_rad[fresh]
+    fresh = new_samples(readings.motion_time_s) & np.isfinite(readings.angle_rad)
+    at_s, angle = readings.motion_time_s[fresh], readings.angle_rad[fresh]
     if len(at_s) < 10:
         return Following(math.nan, math.nan, math.nan, math.inf)
 
     @lru_cache(maxsize=1)
     def model(bandwidth_hz: float) -> Callable[[Array], Array]:
-        return _drive_angle(heard, bandwidth_hz, damping_ratio)
+        return _drive_angle(readings, bandwidth_hz, damping_ratio)
 
     def fitted(bandwidth_hz: float, delay_s: float) -> tuple[float, float, float]:
         return _line(model(bandwidth_hz)(at_s - delay_s), angle)
@@ -136,30 +138,30 @@ def following(heard: Heard, damping_ratio: float, highest_hz: float | None = Non
     return Following(scale, delay_s, bandwidth_hz, worst)
 
 
-def velocity_scale(heard: Heard) -> float:
+def velocity_scale(readings: Readings) -> float:
     """Return the velocity channel over the derivative of the angle, by the integral of the one."""
-    fresh = new_samples(heard.motion_time_s)
-    at_s, angle = heard.motion_time_s[fresh], heard.angle_rad[fresh]
-    velocity = heard.velocity_rad_s[fresh]
+    fresh = new_samples(readings.motion_time_s)
+    at_s, angle = readings.motion_time_s[fresh], readings.angle_rad[fresh]
+    velocity = readings.velocity_rad_s[fresh]
     if len(at_s) < 10:
         return math.nan
     moved = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(at_s))])
     return _line(angle, moved)[0]
 
 
-def arm_seen(
-    heard: Heard,
+def fit_arm(
+    readings: Readings,
     bandwidth_hz: float,
     damping_ratio: float,
     drive_scale: float,
     *,
     resists: bool = False,
-) -> ArmSeen:
+) -> ArmFit:
     """Fit an arm to the torque as the loop saw it, tick by tick.
 
     Parameters
     ----------
-    heard : Heard
+    readings : Readings
     bandwidth_hz, damping_ratio : float
         Of the drive, as it was found to follow.
     drive_scale : float
@@ -167,11 +169,11 @@ def arm_seen(
     resists : bool
         The arm is known to resist: none of J, B and K is below zero.
     """
-    good = np.isfinite(heard.torque_nm)
-    at_s, torque = heard.time_s[good], heard.torque_nm[good]
+    good = np.isfinite(readings.torque_nm)
+    at_s, torque = readings.time_s[good], readings.torque_nm[good]
     if len(at_s) < 30:
-        return ArmSeen(math.nan, math.nan, math.nan, math.nan, 0.0, "")
-    model = _drive_angle(heard, bandwidth_hz, damping_ratio)
+        return ArmFit(math.nan, math.nan, math.nan, math.nan, 0.0, "")
+    model = _drive_angle(readings, bandwidth_hz, damping_ratio)
     grid = np.arange(at_s[0] - LONGEST_S, at_s[-1], 1.0 / GRID_HZ)
     angle = drive_scale * model(grid)
     velocity = np.gradient(angle, grid)
@@ -194,17 +196,17 @@ def arm_seen(
     shares = np.abs([J, B, K]) * np.std(table[:, :3], axis=0)
     strongest = ("inertia", "damping", "stiffness")[int(np.argmax(shares))]
     explained = 1.0 - unexplained / whole if whole > 0 else 0.0
-    return ArmSeen(float(J), float(B), float(K), delay_s, explained, strongest)
+    return ArmFit(float(J), float(B), float(K), delay_s, explained, strongest)
 
 
 def _drive_angle(
-    heard: Heard, bandwidth_hz: float, damping_ratio: float
+    readings: Readings, bandwidth_hz: float, damping_ratio: float
 ) -> Callable[[Array], Array]:
     """Return the angle of the drive's model at any time, from rest."""
     if not math.isfinite(bandwidth_hz):
-        return lambda at_s: sent_angle_rad(heard, at_s)
-    grid = np.arange(heard.time_s[0], heard.time_s[-1] + 1.0 / GRID_HZ, 1.0 / GRID_HZ)
-    mean_rad_s = np.diff(sent_angle_rad(heard, grid)) * GRID_HZ
+        return lambda at_s: sent_angle_rad(readings, at_s)
+    grid = np.arange(readings.time_s[0], readings.time_s[-1] + 1.0 / GRID_HZ, 1.0 / GRID_HZ)
+    mean_rad_s = np.diff(sent_angle_rad(readings, grid)) * GRID_HZ
     drive = DriveModel(bandwidth_hz, damping_ratio)
     followed = drive.held(mean_rad_s, 1.0 / GRID_HZ).angle_rad
     return lambda at_s: np.interp(at_s, grid[:-1], followed)

@@ -24,7 +24,7 @@ import numpy as np
 from rigidimeter.commissioning.checks import Check, impossible, yes
 from rigidimeter.commissioning.commissioning_record import CommissioningRecord
 from rigidimeter.commissioning.coverage import covered, kept_facts
-from rigidimeter.commissioning.manual_checks import known_angle, known_torque, told
+from rigidimeter.commissioning.manual_checks import ask_operator, known_angle, known_torque
 from rigidimeter.commissioning.margins import margin_checks
 from rigidimeter.commissioning.motion_tests import (
     ANGLE_PER_COMMAND,
@@ -50,9 +50,9 @@ from rigidimeter.commissioning.trial import (
     Operator,
     Setup,
     Timebase,
-    Tried,
+    TrialResult,
+    drop_old_samples,
     follow,
-    freshen,
     hold,
     listen,
     trial,
@@ -165,20 +165,20 @@ def _try_all(setup: Setup, found: _Findings, facts: Mapping[str, Any]) -> None:
 def _without_power(setup: Setup, found: _Findings) -> None:
     rig, settings, operator, limits = setup.rig, setup.settings, setup.operator, setup.limits
     operator.say(f"At rest, without power: {limits.idle_s:g} s. Nobody touches the joint.")
-    freshen(setup)
+    drop_old_samples(setup)
     listen(setup, SETTLE_S)  # a drive that was never asked has nothing to say yet
     before = dict(rig.counts)
-    heard = listen(setup, limits.idle_s)
+    readings = listen(setup, limits.idle_s)
     found.checks += rate_checks(
-        "torque", heard.torque_time_s, settings.rig.torque.rate_hz, settings
+        "torque", readings.torque_time_s, settings.rig.torque.rate_hz, settings
     )
     found.checks.append(lost_check(before, rig.counts, limits.lost_percent))
-    found.checks += noise_checks(heard, settings)
-    found.checks.append(lateness(heard, settings))
-    torque = heard.torque_nm[np.isfinite(heard.torque_nm)]
+    found.checks += noise_checks(readings, settings)
+    found.checks.append(lateness(readings, settings))
+    torque = readings.torque_nm[np.isfinite(readings.torque_nm)]
     found.numbers["torque_bias_nm"] = float(np.mean(torque)) if len(torque) else 0.0
     found.checks.append(
-        told(
+        ask_operator(
             operator,
             "mechanical stops",
             "Without power: lead the joint to both ends by hand, and back. Do mechanical stops end "
@@ -195,23 +195,23 @@ def _small_move(setup: Setup, found: _Findings) -> bool:
     setup.operator.say(f"A small move of {limits.nudge_deg:g} deg.")
     at_rest = trial(setup, hold(SETTLE_S))
     found.checks += rate_checks(
-        "motion", at_rest.heard.motion_time_s, settings.rig.motion.rate_hz, settings
+        "motion", at_rest.readings.motion_time_s, settings.rig.motion.rate_hz, settings
     )
-    found.checks.append(drift_check(at_rest.heard, 0.5 * limits.nudge_deg))
+    found.checks.append(drift_check(at_rest.readings, 0.5 * limits.nudge_deg))
     if at_rest.cause is not Cause.NONE:
         words = at_rest.cause.sentence
         found.checks.append(yes(COMPLETED, False, words, "yes", "remove the reason"))
     if not found.none_failed():
         return False
     velocity = swing(settings, limits.nudge_deg, 0.2 * limits.swing_speed_deg_s, 1)
-    tried = trial(setup, hold(SETTLE_S), follow(velocity, setup.rate_hz))
-    check = small_move_check(tried, settings)
+    result = trial(setup, hold(SETTLE_S), follow(velocity, setup.rate_hz))
+    check = small_move_check(result, settings)
     if not check.passed:
         found.checks.append(check)
     return check.passed
 
 
-def _move(setup: Setup, velocity_rad_s: Array) -> Tried:
+def _move(setup: Setup, velocity_rad_s: Array) -> TrialResult:
     """Stand still, move, and stand still."""
     return trial(setup, hold(SETTLE_S), follow(velocity_rad_s, setup.rate_hz), hold(SETTLE_S))
 
@@ -222,7 +222,7 @@ def _swing(setup: Setup, found: _Findings) -> bool:
     velocity = swing(settings, limits.swing_deg, limits.swing_speed_deg_s, limits.swings)
     swung = _move(setup, velocity)
     checks, followed = swing_checks(swung, settings)
-    sign, work_j = torque_sign(swung.heard, settings.rig.drive_damping_ratio, followed.scale)
+    sign, work_j = torque_sign(swung.readings, settings.rig.drive_damping_ratio, followed.scale)
     found.checks += [*checks, sign]
     found.numbers.update(
         angle_per_command=followed.scale, slow_delay_s=followed.delay_s, work_j=work_j
@@ -230,7 +230,7 @@ def _swing(setup: Setup, found: _Findings) -> bool:
     needed = (ANGLE_PER_COMMAND, COMPLETED, sign.name)
     if not all(check.passed for check in found.checks if check.name in needed):
         return False
-    seen = told(
+    seen = ask_operator(
         operator,
         "the joint moved as said",
         f"Did the joint move first toward positive angles, by about {limits.swing_deg:g} deg, then "

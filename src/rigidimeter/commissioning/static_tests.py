@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rigidimeter.commissioning.checks import Check, above, below, impossible, number, yes
-from rigidimeter.commissioning.trial import Array, Heard, new_samples
+from rigidimeter.commissioning.trial import Array, Readings, new_samples
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
 
@@ -125,14 +125,14 @@ def lost_check(before: Mapping[str, int], after: Mapping[str, int], limit_percen
     return below("lost or damaged messages", percent, "%", limit_percent, remedy)
 
 
-def noise_checks(heard: Heard, settings: Settings) -> list[Check]:
+def noise_checks(readings: Readings, settings: Settings) -> list[Check]:
     """Check torque at rest: it varies, but little, and is near zero."""
     zeroing = settings.zeroing
-    fresh = new_samples(heard.torque_time_s) & np.isfinite(heard.torque_nm)
-    torque = heard.torque_nm[fresh]
+    fresh = new_samples(readings.torque_time_s) & np.isfinite(readings.torque_nm)
+    torque = readings.torque_nm[fresh]
     values = np.unique(torque)
     step_nm = float(np.min(np.diff(values))) if len(values) > 1 else math.inf
-    causes = heard.cause[heard.cause != int(Cause.NONE)]
+    causes = readings.cause[readings.cause != int(Cause.NONE)]
     why = Cause(int(causes[0])).sentence if len(causes) else "no fault"
     return [
         yes(
@@ -174,11 +174,11 @@ def noise_checks(heard: Heard, settings: Settings) -> list[Check]:
     ]
 
 
-def lateness(heard: Heard, settings: Settings) -> Check:
+def lateness(readings: Readings, settings: Settings) -> Check:
     """Check that 999 of 1000 ticks begin before the next is due."""
     return below(
         "lateness of the loop (p99.9)",
-        float(np.quantile(heard.lateness_s, 0.999)),
+        float(np.quantile(readings.lateness_s, 0.999)),
         "s",
         1.0 / settings.rig.tick_rate_hz,
         "give the loop a processor of its own and a real-time priority, or lower rig.tick_rate_hz",

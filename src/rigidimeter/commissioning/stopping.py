@@ -13,13 +13,13 @@ import numpy as np
 
 from rigidimeter.acquisition import ControlLoop, control_modes
 from rigidimeter.commissioning.checks import Check, below, impossible, untried, yes
-from rigidimeter.commissioning.manual_checks import told
+from rigidimeter.commissioning.manual_checks import ask_operator
 from rigidimeter.commissioning.motion_tests import smooth_motion
 from rigidimeter.commissioning.trial import (
-    Heard,
+    Readings,
     Setup,
+    drop_old_samples,
     follow,
-    freshen,
     hold,
     listen,
     stopped_for,
@@ -32,11 +32,11 @@ from rigidimeter.units import rad_from_deg
 __all__ = ["emergency_stop_checks", "watchdog_checks"]
 
 SETTLE_S = 0.3
-TEMPTED_S = 0.4
+STOPPED_S = 0.4
 MOST_DEG = 0.2
 """A stopped joint that moves more than this has started again."""
 
-TEMPTED_DEG_S = 2.0
+STOPPED_DEG_S = 2.0
 REPORTS = (Cause.DRIVE_FAULT, Cause.DRIVE_STATE, Cause.DRIVE_LOST, Cause.EMERGENCY_STOP)
 WATCHDOG, REPORT = "watchdog", "watchdog reported"
 RESTART = "stays stopped after the watchdog"
@@ -53,33 +53,33 @@ def watchdog_checks(setup: Setup, watchdog_s: float | None) -> list[Check]:
     rig, time = setup.rig, setup.time
     most_s = watchdog_s + setup.limits.watchdog_margin_s
     reported_s = math.inf
-    tempted: Heard | None = None
+    after_stop: Readings | None = None
 
     def silence(_: ControlLoop) -> None:
-        nonlocal reported_s, tempted
+        nonlocal reported_s, after_stop
         before = rig.read().motion_status
         began_s = time.now()
         # A driver may give the drive up by its own clock. Only what comes from the drive counts.
-        heard = listen(
+        readings = listen(
             setup,
             most_s,
             write_rad_s=None,
             until=lambda r: r.cause in REPORTS and r.motion_status != before,
         )
         if rig.read().motion_status != before:
-            reported_s = float(heard.time_s[-1]) - began_s
-            tempted = _tempt(setup)
+            reported_s = float(readings.time_s[-1]) - began_s
+            after_stop = _command_stopped_rig(setup)
 
-    tried = trial(setup, hold(SETTLE_S), silence)
-    if tried.cause is not Cause.NONE:
+    result = trial(setup, hold(SETTLE_S), silence)
+    if result.cause is not Cause.NONE:
         why = "remove the reason and commission again"
-        return [yes(WATCHDOG, False, stopped_for(tried.cause), "tried", why)]
-    if tempted is None:
+        return [yes(WATCHDOG, False, stopped_for(result.cause), "tried", why)]
+    if after_stop is None:
         silent = "the drive does not say by itself that it stopped; there is nothing to confirm"
         checks = [impossible(name, "", silent) for name in (REPORT, RESTART, AGAIN)]
     else:
         late = "the drive says too late that it stopped: shorten its watchdog"
-        checks = [below(REPORT, reported_s, "s", most_s, late), _stayed(RESTART, tempted)]
+        checks = [below(REPORT, reported_s, "s", most_s, late), _stayed(RESTART, after_stop)]
         checks.append(_again(setup))
         if not checks[-1].passed:
             why = "the drive has no power again after the watchdog"
@@ -111,17 +111,17 @@ def emergency_stop_checks(setup: Setup) -> list[Check]:
         control_modes.hold(loop, wait_s)
         after = rig.read().motion_status
 
-    tried = trial(setup, wait)
+    result = trial(setup, wait)
     # A driver may give the drive up by its own clock; one that was switched off says nothing.
-    said = after != before or tried.cause is Cause.DRIVE_LOST
-    seen = tried.cause in REPORTS and said
-    words = tried.cause.sentence if tried.cause is not Cause.NONE else f"nothing in {wait_s:g} s"
+    said = after != before or result.cause is Cause.DRIVE_LOST
+    seen = result.cause in REPORTS and said
+    words = result.cause.sentence if result.cause is not Cause.NONE else f"nothing in {wait_s:g} s"
     remedy = "the emergency stop must take the drive's power away: look at its wiring"
     checks = [yes(STOP, seen, words, limits_of[STOP], remedy)]
     if not seen:
         return [*checks, *none_of((POWER, RELEASE), "the emergency stop was not seen")]
     checks.append(
-        told(
+        ask_operator(
             operator,
             POWER,
             "Did the drive's power go by itself at the moment you pressed (lamp or contactor), "
@@ -134,25 +134,25 @@ def emergency_stop_checks(setup: Setup) -> list[Check]:
         "Release the emergency stop again, and keep hands off the joint. Released?"
     ):
         return [*checks, *none_of((RELEASE,), "the operator did not release it")]
-    freshen(setup)
-    return [*checks, _stayed(RELEASE, _tempt(setup))]
+    drop_old_samples(setup)
+    return [*checks, _stayed(RELEASE, _command_stopped_rig(setup))]
 
 
-def _tempt(setup: Setup) -> Heard:
+def _command_stopped_rig(setup: Setup) -> Readings:
     """Command a slow motion to a rig that must not move; it ends as soon as it does."""
     start_rad, most_rad = setup.rig.read().angle_rad, rad_from_deg(MOST_DEG)
-    heard = listen(
+    readings = listen(
         setup,
-        TEMPTED_S,
-        write_rad_s=rad_from_deg(TEMPTED_DEG_S),
+        STOPPED_S,
+        write_rad_s=rad_from_deg(STOPPED_DEG_S),
         until=lambda reading: abs(reading.angle_rad - start_rad) > most_rad,
     )
     setup.rig.write(0.0)
-    return heard
+    return readings
 
 
-def _stayed(name: str, heard: Heard) -> Check:
-    angle = heard.angle_rad[np.isfinite(heard.angle_rad)]
+def _stayed(name: str, readings: Readings) -> Check:
+    angle = readings.angle_rad[np.isfinite(readings.angle_rad)]
     moved = math.degrees(float(np.ptp(angle))) if len(angle) else 0.0
     remedy = "a stopped drive must wait for an operator: look at its automatic restart"
     return below(name, moved, "deg", MOST_DEG, remedy)
@@ -166,11 +166,11 @@ def _again(setup: Setup) -> Check:
         return impossible(AGAIN, limit, "the operator did not agree to it")
     try:
         _reset(setup.rig)
-        tried = trial(setup, hold(SETTLE_S))
+        result = trial(setup, hold(SETTLE_S))
     except DeviceError as error:
         return yes(AGAIN, False, "refused", limit, str(error))
-    good = tried.cause is Cause.NONE
-    return yes(AGAIN, good, tried.cause.sentence, limit, "look at how the drive's fault is reset")
+    good = result.cause is Cause.NONE
+    return yes(AGAIN, good, result.cause.sentence, limit, "look at how the drive's fault is reset")
 
 
 def _reset(rig: Rig) -> None:
@@ -195,10 +195,10 @@ def _overrun(setup: Setup, watchdog_s: float) -> Check:
         listen(setup, 2.0 * most_s + SETTLE_S, write_rad_s=None)
         after = float(listen(setup, SETTLE_S).angle_rad[-1])
 
-    tried = trial(setup, hold(SETTLE_S), follow(velocity, rate_hz), silence)
+    result = trial(setup, hold(SETTLE_S), follow(velocity, rate_hz), silence)
     if math.isnan(after):
         why = "remove the reason and commission again"
-        return yes(WATCHDOG, False, stopped_for(tried.cause), "tried", why)
+        return yes(WATCHDOG, False, stopped_for(result.cause), "tried", why)
     went_on_s = abs(after - before) / speed_rad_s
     _reset(rig)
     back = smooth_motion(-after, 0.5 * speed_rad_s, 1.0 / rate_hz)

@@ -25,14 +25,14 @@ from rigidimeter.settings.commissioning_settings import CommissioningSettings
 
 __all__ = [
     "Array",
-    "Heard",
     "Operator",
+    "Readings",
     "Setup",
     "Stretch",
     "Timebase",
-    "Tried",
+    "TrialResult",
+    "drop_old_samples",
     "follow",
-    "freshen",
     "hold",
     "listen",
     "new_samples",
@@ -43,7 +43,7 @@ __all__ = [
 Array = NDArray[np.float64]
 Stretch = Callable[[ControlLoop], object]
 
-FRESHEN_S = 2.5
+DROP_S = 2.5
 FRESH_S = 0.03
 MOST_READS = 400
 """A read empties at most a part of what piled up while a question waited."""
@@ -114,7 +114,7 @@ class Setup:
         return self.settings.rig.tick_rate_hz
 
 
-class Heard(NamedTuple):
+class Readings(NamedTuple):
     """Readings, one a tick, as arrays of the same length.
 
     `time_s` is when the tick ran, `lateness_s` how late. `sent_rad_s` is what was in force after
@@ -133,10 +133,10 @@ class Heard(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Tried:
+class TrialResult:
     """What a trial gave; `cause` is why the guard ended it, `Cause.NONE` if it did not."""
 
-    heard: Heard
+    readings: Readings
     cause: Cause
 
 
@@ -160,7 +160,7 @@ class _Shifted:
         return self._time.wait_until(self._origin_s + deadline_s) - self._origin_s
 
 
-def trial(setup: Setup, *stretches: Stretch) -> Tried:
+def trial(setup: Setup, *stretches: Stretch) -> TrialResult:
     """Enable the rig at zero velocity, run the stretches, take the power away.
 
     Raises
@@ -173,7 +173,7 @@ def trial(setup: Setup, *stretches: Stretch) -> Tried:
     controller = settings.controller.model_copy(update={"tracking_gain_per_s": 0.0})
     settings = settings.model_copy(update={"controller": controller})
     samples: list[Sample] = []
-    freshen(setup)
+    drop_old_samples(setup)
     try:
         rig.enable()
         _empty(setup)
@@ -191,7 +191,7 @@ def trial(setup: Setup, *stretches: Stretch) -> Tried:
                 rig.stop()
     finally:
         rig.disable()
-    return Tried(_heard([_OF_SAMPLE(sample) for sample in samples]), cause)
+    return TrialResult(_readings([_OF_SAMPLE(sample) for sample in samples]), cause)
 
 
 def follow(velocity_rad_s: Array, rate_hz: float) -> Stretch:
@@ -212,7 +212,7 @@ def listen(
     *,
     write_rad_s: float | None = 0.0,
     until: Callable[[Reading], bool] = lambda _: False,
-) -> Heard:
+) -> Readings:
     """Read at every tick without loop and guard, and write one velocity or nothing at all.
 
     For a rig without power, for one that is not written to, and for one that must not move; it ends
@@ -229,13 +229,13 @@ def listen(
         rows.append((now_s, now_s - due_s, *reading[:5], sent, reading.cause))
         if until(reading):
             break
-    return _heard(rows)
+    return _readings(rows)
 
 
-def freshen(setup: Setup) -> None:
+def drop_old_samples(setup: Setup) -> None:
     """Read away what piled up while nobody listened, without power, until the news are new."""
     _empty(setup)
-    listen(setup, FRESHEN_S, until=lambda reading: reading.cause not in PILED_UP)
+    listen(setup, DROP_S, until=lambda reading: reading.cause not in PILED_UP)
 
 
 def _empty(setup: Setup) -> None:
@@ -263,9 +263,9 @@ _OF_SAMPLE = attrgetter(
     *("time_s", "lateness_s", "torque_nm", "torque_time_s", "angle_rad", "velocity_rad_s"),
     *("motion_time_s", "velocity_command_rad_s", "cause"),
 )
-"""The values of `Heard`, in its order."""
+"""The values of `Readings`, in its order."""
 
 
-def _heard(rows: Sequence[tuple[float, ...]]) -> Heard:
-    *columns, cause = np.array(rows, dtype=np.float64).reshape(-1, len(Heard._fields)).T
-    return Heard._make([*columns, cause.astype(np.int64)])
+def _readings(rows: Sequence[tuple[float, ...]]) -> Readings:
+    *columns, cause = np.array(rows, dtype=np.float64).reshape(-1, len(Readings._fields)).T
+    return Readings._make([*columns, cause.astype(np.int64)])

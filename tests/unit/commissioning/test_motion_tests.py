@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rigidimeter.commissioning import motion_tests as motion_tests
-from rigidimeter.commissioning.trial import Tried
+from rigidimeter.commissioning.trial import TrialResult
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
 
@@ -27,11 +27,11 @@ def test_only_a_motion_that_is_not_as_commanded_speaks_of_sign_and_counts(
     monkeypatch: pytest.MonkeyPatch, cause: Cause, remedy: str, scale: float
 ) -> None:
     monkeypatch.setattr(motion_tests, "following", lambda *_: SimpleNamespace(scale=scale))
-    heard: Any = None
-    tried, settings = Tried(heard, cause), Settings()
-    check = motion_tests.small_move_check(tried, settings)
+    readings: Any = None
+    result, settings = TrialResult(readings, cause), Settings()
+    check = motion_tests.small_move_check(result, settings)
     assert check.outcome == "failed"
     assert check.remedy.startswith(remedy)
-    assert motion_tests.small_move_check(Tried(heard, Cause.NONE), Settings()).passed == (
+    assert motion_tests.small_move_check(TrialResult(readings, Cause.NONE), Settings()).passed == (
         scale == 1.0
     )

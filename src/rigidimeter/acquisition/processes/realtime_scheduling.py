@@ -121,7 +121,7 @@ def prepare_loop_process(
     if not ORDERED:
         refused.append(
             "This processor does not keep the order of writes, so other processes may see a "
-            "sample before it is whole; record on an x86-64 machine."
+            "sample before it is complete; record on an x86-64 machine."
         )
     gc.collect()
     gc.freeze()
