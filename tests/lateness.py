@@ -9,9 +9,10 @@ allows what the probe saw in addition:
 
 A machine that stood still for longer than a test can resolve says nothing about the software, so
 the test is repeated. If that happens every time, the test fails, and says that the machine is too
-busy to judge. That holds for a test that failed while the machine stood still, and for one that
-passed with so wide a bound that it would have passed whatever happened. The probes are processes
-and not threads: what the software under test does to its own interpreter must not widen a bound.
+busy to judge. That holds for a test that passed with so wide a bound that it would have passed
+whatever happened. A failure is believed only where the machine was more punctual still, because on
+a wire one lateness adds to another (`FAILURE_SHARE`). The probes are processes and not threads:
+what the software under test does to its own interpreter must not widen a bound.
 """
 
 from __future__ import annotations
@@ -35,6 +36,9 @@ ATTEMPTS = 4
 ROWS = 20_000
 BYTES = 16 + 16 * ROWS
 MOST_PROCESSORS = 8
+FAILURE_SHARE = 0.2
+"""A test that failed is repeated from this part on of the lateness that it can resolve."""
+
 NOTED_S = 0.0005
 """Less than that is not noted."""
 
@@ -185,7 +189,7 @@ def run_beside_probe(item: pytest.Item, nextitem: pytest.Item | None) -> bool | 
             reports = runtestprotocol(item, nextitem=nextitem, log=False)
             failed = any(report.failed for report in reports)
             stood_still_s.append(probe.stood_still_s() if failed else probe.allowed_s)
-        if stood_still_s[-1] <= resolves_s:
+        if stood_still_s[-1] <= resolves_s * (FAILURE_SHARE if failed else 1.0):
             break
     else:
         late = ", ".join(f"{1e3 * late_s:.0f}" for late_s in stood_still_s)

@@ -71,7 +71,10 @@ def can_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 def _behaving(request: pytest.FixtureRequest) -> Iterator[None]:
     yield
     if "can_bench" in request.fixturenames:
-        request.getfixturevalue("can_bench").behave()
+        bench = request.getfixturevalue("can_bench")
+        bench.behave()
+        for line in ("release", "push 0", "place 0"):  # also where a test failed half-way
+            bench.command(line)
 
 
 def tried(
