@@ -16,6 +16,7 @@ from rigidimeter.study import StudyResult
 
 __all__ = [
     "INTERVAL",
+    "SESSION",
     "Block",
     "Column",
     "Figure",
@@ -77,6 +78,14 @@ class Column:
     digits: int = 4
     group: str = ""
     below: str = ""
+
+
+SESSION = (
+    Column("subject", "Subject", "label"),
+    Column("day", "Day", "label"),
+    Column("condition", "Condition", "condition"),
+)
+"""Columns of whatever belongs to a session of a study."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The report: one page that needs nothing beside it, with its tables and figures as files."""
+"""The report: one page that needs no other file, and its tables and figures as files."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
     template = environment.from_string((folder / "page.html").read_text(encoding="utf-8"))
     return template.render(
         result=result,
-        # The style is this package's own file, so it may stand as it is.
+        # The style is this package's own file and needs no escaping.
         css=Markup((folder / "page.css").read_text(encoding="utf-8")),
         contents=made,
         images={name: _data_uri(text) for name, text in svg.items()},
@@ -160,7 +160,7 @@ def _shown(value: Any, column: Column, names: Mapping[str, str]) -> str:
 def _shown_columns(table: Table, several_sources: bool) -> list[Column]:
     """Return the columns of a table without those that would say nothing.
 
-    A column of reasons without any is left out, and so is the only source beside each epoch.
+    A column of reasons is left out if all are empty, and that of sources if there is only one.
     """
     by_epoch = any(column.name == "epoch" for column in table.columns)
     return [
@@ -181,7 +181,7 @@ def _heads(columns: Iterable[Column]) -> list[tuple[str, list[Column]]]:
 
 
 def _below(row: Mapping[str, Any], column: Column, names: Mapping[str, str]) -> str:
-    """Return what stands below a value: the second value of its column, or its interval.
+    """Return what is shown below a value: the second value of its column, or its interval.
 
     A value that was held has no interval.
     """

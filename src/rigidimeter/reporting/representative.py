@@ -1,4 +1,4 @@
-"""The epochs that stand for their condition in a figure."""
+"""The epochs that represent their condition in a figure."""
 
 from __future__ import annotations
 
@@ -70,5 +70,5 @@ def origin_s(epoch: Epoch) -> float:
 
 
 def slug(condition: str) -> str:
-    """Return a name that every file system takes; the position beside it keeps names apart."""
+    """Return a name that every file system takes; two conditions may get the same one."""
     return re.sub(r"[^A-Za-z0-9]+", "-", condition).strip("-").lower()[:40] or "unnamed"

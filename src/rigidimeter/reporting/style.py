@@ -46,7 +46,7 @@ _OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = "osD^vP*X"
 _GOLDEN = 0.6180339887498949
 
-_FONT = "DejaVu Sans"  # comes with matplotlib, so the report looks alike everywhere
+_FONT = "DejaVu Sans"  # comes with matplotlib, so the report looks the same everywhere
 _STYLE: dict[Any, Any] = {
     "axes.edgecolor": GREY,
     "axes.grid": True,

@@ -17,9 +17,9 @@ from rigidimeter.reporting.sections import unexplained_torque
 from rigidimeter.reporting.sections.impedance import (
     COHERENT,
     Response,
-    alike,
     impedance,
     model_nm_rad,
+    same_lines,
 )
 from rigidimeter.reporting.sections.unexplained_torque import density, voluntary_spectrum
 from rigidimeter.reporting.style import condition_colours, svg_text
@@ -83,12 +83,12 @@ def test_only_epochs_with_the_same_lines_are_added(observations) -> None:
     }
     (prepared,) = prepare([dataclasses.replace(shorter, channels=cut)], Settings())
     two = observe_periods(prepared)
-    assert len(alike([two, *observations])) == 4  # two periods have the lines of three
+    assert len(same_lines([two, *observations])) == 4  # two periods have the lines of three
     grid = two.lines.grid
     other = dataclasses.replace(grid, omega_rad_s=1.01 * grid.omega_rad_s)
     moved = two._replace(lines=dataclasses.replace(two.lines, grid=other))
-    assert alike([moved, *observations]) == observations
-    assert alike([]) == []
+    assert same_lines([moved, *observations]) == observations
+    assert same_lines([]) == []
 
 
 def responses() -> dict[str, Response]:

@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from rigidimeter.records import Finding, Fit, Outcome
 from rigidimeter.reporting.contents import (
+    SESSION,
     Block,
     Column,
     Section,
@@ -181,9 +182,7 @@ def _study_exclusions(result: StudyResult) -> Iterator[Block]:
         "excluded_epochs",
         "Excluded epochs: by whom and why",
         (
-            Column("subject", "Subject", "label"),
-            Column("day", "Day", "label"),
-            Column("condition", "Condition", "condition"),
+            *SESSION,
             Column("source", "Session", "source"),
             Column("epoch", "Epoch", "label"),
             Column("task", "Task", "check"),
@@ -200,9 +199,7 @@ def _study_exclusions(result: StudyResult) -> Iterator[Block]:
         "Recordings left out completely",
         (
             Column("path", "Path", "text"),
-            Column("subject", "Subject", "label"),
-            Column("day", "Day", "label"),
-            Column("condition", "Condition", "condition"),
+            *SESSION,
             Column("reason", "Reason", "reason"),
         ),
         tables["left_out"],

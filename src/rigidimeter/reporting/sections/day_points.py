@@ -38,7 +38,7 @@ MOST_IN_A_ROW = 26
 
 _HALF = 0.2
 _BESIDE = 0.3
-"""How far to the right of its points the median of a day stands."""
+"""How far to the right of its points the median of a day is drawn."""
 
 
 class Day(NamedTuple):

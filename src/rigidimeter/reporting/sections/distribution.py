@@ -21,7 +21,7 @@ __all__ = ["SECTION", "distribution"]
 _STRIP = 0.26
 """Half the width of a strip, in units of the distance between conditions."""
 _ASIDE = 0.15
-"""How far to the right of median and quartiles the pooled estimate stands."""
+"""How far to the right of median and quartiles the pooled estimate is drawn."""
 
 Array = NDArray[np.float64]
 

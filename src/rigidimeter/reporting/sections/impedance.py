@@ -28,7 +28,7 @@ from rigidimeter.reporting.representative import analysed_epoch
 from rigidimeter.reporting.style import GREY, condition_colours, listed, plain_ticks, styled
 from rigidimeter.study import StudyResult, split_pooled
 
-__all__ = ["COHERENT", "SECTION", "Response", "alike", "impedance", "model_nm_rad"]
+__all__ = ["COHERENT", "SECTION", "Response", "impedance", "model_nm_rad", "same_lines"]
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             if fit.condition == condition and fit.outcome.included
             if (epoch := analysed_epoch(result, fit)) is not None
         ]
-        observations = alike(_observations(result, epochs))
+        observations = same_lines(_observations(result, epochs))
         if not observations:
             continue
         found = without_model(observations)
@@ -128,7 +128,7 @@ def _observations(result: StudyResult, epochs: Sequence[Epoch]) -> list[Observat
     return found
 
 
-def alike(observations: Sequence[Observation]) -> list[Observation]:
+def same_lines(observations: Sequence[Observation]) -> list[Observation]:
     """Return the largest set of epochs that have their excited lines at the same frequencies."""
     groups: list[list[Observation]] = []
     for observation in observations:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure as Drawing
 
 from rigidimeter.reporting.contents import (
     INTERVAL,
+    SESSION,
     Block,
     Column,
     Figure,
@@ -91,10 +92,8 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         "ratings",
         "Ratings as given, and less the offsets",
         (
-            Column("condition", "Condition", "condition"),
+            *SESSION,
             Column("examiner", "Examiner", "label"),
-            Column("subject", "Subject", "label"),
-            Column("day", "Day", "label"),
             Column("score", "Score", "setting"),
             Column("corrected", "Score less offsets"),
         ),

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from pydantic import BaseModel
 
 from rigidimeter.records import Epoch
-from rigidimeter.reporting.contents import Block, Column, Section, Table, paragraph
+from rigidimeter.reporting.contents import SESSION, Block, Column, Section, Table, paragraph
 from rigidimeter.reporting.numbers import number, plural
 from rigidimeter.settings import Settings
 from rigidimeter.study import StudyResult, result_tables
@@ -60,9 +60,7 @@ def _design(result: StudyResult) -> Iterator[Block]:
             "sessions",
             "Sessions, in the order of the study’s table",
             (
-                Column("subject", "Subject", "label"),
-                Column("day", "Day", "label"),
-                Column("condition", "Condition", "condition"),
+                *SESSION,
                 *(
                     [Column("code", "Code", "label")]
                     if any(s.code != s.condition for s in result.sessions)

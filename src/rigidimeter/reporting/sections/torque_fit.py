@@ -47,7 +47,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     text = (
         "The model is the fit with the inertia fixed. The panels of inertia, damping and stiffness "
         "show, in grey, what is left for that term to explain: the measured torque less the other "
-        "two terms. All panels have the same torque axis."
+        "two terms. These panels have the same axis in all conditions."
     )
     if not is_least_squares(result.analysis.method):
         text += (

@@ -41,8 +41,8 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         epoch = by_name.get((fit.source, fit.epoch))
         if epoch is None or not fit.outcome.included:
             continue
-        whole = aligned(epoch, result.analysis.delays)
-        signals = epoch_signals(whole, "bandlimited", result.settings.estimation)
+        moved = aligned(epoch, result.analysis.delays)
+        signals = epoch_signals(moved, "bandlimited", result.settings.estimation)
         own_nm = reconstructed_torque_nm(signals, fit.value)
         spectra.setdefault(fit.condition, []).append(density(own_nm, signals.rate_hz))
         sizes_nm.setdefault(fit.condition, []).append(float(np.std(own_nm)))
