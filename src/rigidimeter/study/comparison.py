@@ -44,6 +44,7 @@ __all__ = [
     "day_test",
     "day_tests",
     "gathered",
+    "lacking",
     "measured",
     "no_days",
     "observed",

@@ -21,6 +21,7 @@ from rigidimeter.statistics import (
     pairwise,
 )
 from rigidimeter.study.rating_table import RANDOM, Rating, groupings, ratings_of
+from rigidimeter.study.ratings_model import variance_notices
 
 __all__ = ["RatingsModel", "RatingsPair", "model_ratings", "ratings_document"]
 
@@ -162,25 +163,13 @@ def model_ratings(
         ),
         joint=joint_test(fit),
         notices=found.notices,
-        model_notices=tuple(_model_notices(fit)),
+        model_notices=tuple(variance_notices(fit)),
     )
 
 
 def _first_two(conditions: Sequence[str]) -> tuple[str, str]:
     first, second, *_ = sorted(dict.fromkeys(conditions), key=lambda name: name != "OFF")
     return first, second
-
-
-def _model_notices(fit: Mixed) -> list[str]:
-    """Say in words where a variance is at its boundary or cannot be estimated."""
-    said = [
-        f"the variance of {name} is estimated as zero, its boundary: they differ no more than the "
-        "residual explains, so all their offsets are zero and no score is corrected for them"
-        for name in fit.at_zero
-    ]
-    for name, reason in fit.inseparable.items():
-        said.append(f"{name} was left out of the model: {reason}; its offsets are zero")
-    return said
 
 
 def ratings_document(found: RatingsModel) -> dict[str, Any]:

@@ -32,7 +32,7 @@ from rigidimeter.study.results import (
     RatingsFound,
 )
 
-__all__ = ["means_of", "rated", "ratings_comparison", "ratings_days"]
+__all__ = ["means_of", "rated", "ratings_comparison", "ratings_days", "variance_notices"]
 
 FEWEST = 3
 
@@ -67,7 +67,7 @@ def rated(read: StudyFolder, names: Naming) -> tuple[RatingsFound | None, list[N
         fit = fit_mixed(scores, conditions, labels)
     except (ValueError, ArithmeticError) as error:
         return None, [*notices, Notice("error", f"{source}: {error}")]
-    odd += _boundary(fit)
+    odd += variance_notices(fit)
     notices += [Notice("warning", text) for text in odd]
     found = RatingsFound(
         source=source,
@@ -132,15 +132,16 @@ def _lone_examiners(rows: list[Rating]) -> list[str]:
     return []
 
 
-def _boundary(fit: Mixed) -> list[str]:
+def variance_notices(fit: Mixed) -> list[str]:
+    """Say in words where a variance is at its boundary or cannot be estimated."""
     said = [
-        f"the variance of {name} is estimated as zero: they differ no more than the residual "
-        "explains, so no score is corrected for them"
+        f"the variance of {name} is estimated as zero, its boundary: they differ no more than the "
+        "residual explains, so all their offsets are zero and no score is corrected for them"
         for name in fit.at_zero
     ]
-    return said + [
-        f"{name} was left out of the model: {why}" for name, why in fit.inseparable.items()
-    ]
+    for name, reason in fit.inseparable.items():
+        said.append(f"{name} was left out of the model: {reason}; its offsets are zero")
+    return said
 
 
 def _with_days(
