@@ -1,0 +1,59 @@
+"""`report` takes a result, estimates, a recording or its path, and gives one page."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording import read
+from rigidimeter.records import Epoch
+from rigidimeter.reporting import report
+from rigidimeter.study import StudyResult
+
+
+@pytest.fixture(scope="module")
+def csv_file(epochs: list[Epoch], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    channels = epochs[1].channels
+    names = ("torque_nm", "angle_rad", "velocity_rad_s", "perturbation_nm")
+    columns = [channels["torque_nm"].time_s, *(channels[name].values for name in names)]
+    path = tmp_path_factory.mktemp("recorded") / "elbow.csv"
+    header = ",".join(("time_s", *names))
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="")
+    return path
+
+
+def test_estimates_give_a_page_without_figures_of_signals(
+    study: StudyResult, tmp_path: Path
+) -> None:
+    page = report(study.analysis, tmp_path, "Estimates alone")
+    text = page.read_text(encoding="utf-8")
+    assert "<h1>Estimates alone</h1>" in text
+    assert "OFF against DBS: each epoch counted" in text
+    assert (tmp_path / "figures" / "distribution_stiffness_nm_rad.svg").exists()
+    assert not list((tmp_path / "figures").glob("torque_*"))
+
+
+def test_a_path_and_what_is_read_from_it_give_the_same_page(csv_file: Path, tmp_path: Path) -> None:
+    one = report(csv_file, tmp_path / "path")
+    two = report(read(csv_file), tmp_path / "recording")
+    assert "<h1>Joint rigidity</h1>" in one.read_text(encoding="utf-8")
+    assert str(csv_file) in one.read_text(encoding="utf-8")
+    for table in ("estimates", "pooled", "provenance"):
+        a, b = (
+            (page.parent / "tables" / f"{table}.csv").read_text().splitlines()
+            for page in (one, two)
+        )
+        # Only the time of the analysis may differ.
+        assert [x for x in a if "made (UTC)" not in x] == [x for x in b if "made (UTC)" not in x]
+
+
+def test_a_folder_that_cannot_be_written_says_so(study: StudyResult, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="the report cannot be written"):
+        report(study.analysis, tmp_path / "file")
+
+
+def test_a_path_that_does_not_exist_says_so(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"nothing\.csv"):
+        report(tmp_path / "nothing.csv", tmp_path / "out")
