@@ -1,3 +1,55 @@
-"""Measure joint rigidity with a perturbed, admittance-controlled robot."""
+"""Measure joint rigidity with a perturbed, admittance-controlled robot.
+
+From arrays, one estimate:
+
+    import rigidimeter as rm
+    fit = rm.identify(torque_nm=torque, angle_rad=angle, perturbation_nm=perturbation, rate_hz=1000)
+    fit.stiffness_nm_rad, fit.stiffness_nm_rad_se
+
+From files, everything that the command line does:
+
+    recording = rm.read("elbow.csv", epoch_length_s=20)
+    estimates = rm.estimate(recording)
+    rm.report(estimates, "report")
+
+Each name is imported when it is first used, so that `import rigidimeter` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rigidimeter.estimation import identify
+    from rigidimeter.experiment import design
+    from rigidimeter.recording import read
+    from rigidimeter.reporting import report
+    from rigidimeter.study import compare, estimate
+    from rigidimeter.virtual import simulate
+
+__all__ = ["compare", "design", "estimate", "identify", "read", "report", "simulate"]
 
 __version__ = "0.1.0"
+
+_ROOMS = {
+    "identify": "rigidimeter.estimation",
+    "read": "rigidimeter.recording",
+    "estimate": "rigidimeter.study",
+    "compare": "rigidimeter.study",
+    "simulate": "rigidimeter.virtual",
+    "design": "rigidimeter.experiment",
+    "report": "rigidimeter.reporting",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _ROOMS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    function = getattr(import_module(_ROOMS[name]), name)
+    globals()[name] = function
+    return function
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_ROOMS})

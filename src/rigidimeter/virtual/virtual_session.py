@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from os import PathLike
 from pathlib import Path
@@ -18,7 +18,7 @@ from rigidimeter.documents import read_json, write_json
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import PlannedEpoch, plan
 from rigidimeter.recording import Recording, SessionWriter, read
-from rigidimeter.settings import Settings, load_settings
+from rigidimeter.settings import Settings, settings_from
 
 __all__ = ["run_virtual_session", "session_length_s", "simulate"]
 
@@ -29,7 +29,7 @@ def session_length_s(settings: Settings) -> float:
 
 
 def simulate(
-    settings: Settings | str | PathLike[str] | None = None,
+    settings: Settings | str | Path | Mapping[str, Any] | None = None,
     out: str | PathLike[str] | None = None,
     *,
     seed: int | None = None,
@@ -39,8 +39,9 @@ def simulate(
 
     Parameters
     ----------
-    settings : Settings or path, optional
-        Or a TOML file of them. Without any: four PRBS and four sinusoidal epochs in OFF.
+    settings : Settings, path or mapping, optional
+        Settings, a TOML file of them, or their tables. Without any: four PRBS and four sinusoidal
+        epochs in OFF.
     out : path, optional
         New folder for the session; without one nothing stays on disk.
     seed : int, optional
@@ -53,8 +54,7 @@ def simulate(
     UserError
         If the settings are wrong, the folder cannot be written, or the session fails.
     """
-    if not isinstance(settings, Settings):
-        settings = load_settings(None if settings is None else Path(settings))
+    settings = settings_from(settings)
     if seed is not None:
         settings = settings.model_copy(update={"seed": seed})
     with tempfile.TemporaryDirectory() as place:
