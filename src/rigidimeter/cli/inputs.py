@@ -40,7 +40,7 @@ def analyse_inputs(recording: Recording, method: str) -> Analysis:
     if method not in method_names():
         known = ", ".join(method_names())
         raise UserError(f"--method {method}: there is no such method; known: {known}")
-    with Meter("estimate", 2 * len(recording.epochs)) as meter:
+    with Meter("estimate", 1.0) as meter:
         return estimate(recording, method, progress=meter.advance)
 
 

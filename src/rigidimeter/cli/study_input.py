@@ -105,12 +105,20 @@ def analysed_study(
     """
     from rigidimeter.cli.progress import Meter
     from rigidimeter.settings import load_settings
-    from rigidimeter.study import analyse_study, keep, provenance, read_study, steps
+    from rigidimeter.study import analyse_study, keep, provenance, read_study
 
     chosen = load_settings(recordings.settings) if recordings.settings is not None else None
-    read = read_study(folder, key=key, settings=chosen, method=recordings.method, pair=pair)
+    with Meter("read", 1.0) as meter:
+        read = read_study(
+            folder,
+            key=key,
+            settings=chosen,
+            method=recordings.method,
+            pair=pair,
+            progress=meter.advance,
+        )
     read = replace(read, settings=adjusted(read.settings, recordings))
-    with Meter("study", steps(read)) as meter:
+    with Meter("study", 1.0) as meter:
         result = analyse_study(read, seed=seed, resamples=resamples, progress=meter.advance)
     say(result.notices)
     bad = any(notice.level == "error" for notice in result.notices)

@@ -27,7 +27,7 @@ from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, torque_earlier
 from rigidimeter.records import Delay, Epoch
 
-__all__ = ["aligned", "aligned_prepared", "estimate_delays"]
+__all__ = ["MOST_EPOCHS", "aligned", "aligned_prepared", "estimate_delays"]
 
 MOST_EPOCHS = 12
 """A delay is common to its source; from this many epochs it is known well enough."""
@@ -60,7 +60,7 @@ def estimate_delays(
     perturbed : mapping of str to sequence of PreparedEpoch
         The perturbation epochs of each source; a source without any has an empty sequence.
     progress : callable
-        The work of one epoch is 1.
+        The work of one epoch is 1, of a source at most `MOST_EPOCHS`.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def estimate_delays(
     delays = []
     for source, epochs in perturbed.items():
         delays.append(_estimate(source, epochs))
-        progress(float(len(epochs)))
+        progress(float(min(len(epochs), MOST_EPOCHS)))
     return tuple(delays)
 
 

@@ -12,7 +12,7 @@ second are dropped after filtering: there the filter saw no neighbours.
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from scipy import signal
@@ -66,12 +66,20 @@ def zero_phase_band(values: Array, rate_hz: float, band: tuple[float, float]) ->
     paper's rates it tripled the scatter of K.
     """
     low, high = band
-    lowpass = signal.butter(4, high, "lowpass", fs=rate_hz, output="sos")
-    highpass = signal.butter(2, low, "highpass", fs=rate_hz, output="sos")
+    lowpass, highpass = _filters(low, high, float(f"{rate_hz:.12g}"))
     memory = min(values.size - 1, round(rate_hz / low))
     smooth = signal.sosfiltfilt(lowpass, values - np.mean(values), padtype="even")
     passed = signal.sosfiltfilt(highpass, smooth, padtype="even", padlen=memory)
     return np.asarray(passed, dtype=np.float64)
+
+
+@lru_cache(maxsize=16)
+def _filters(low_hz: float, high_hz: float, rate_hz: float) -> tuple[Array, Array]:
+    """Return low-pass and high-pass; to design them takes longer than to filter an epoch."""
+    return (
+        signal.butter(4, high_hz, "lowpass", fs=rate_hz, output="sos"),
+        signal.butter(2, low_hz, "highpass", fs=rate_hz, output="sos"),
+    )
 
 
 def bandlimited_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:

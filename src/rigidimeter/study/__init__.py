@@ -32,7 +32,7 @@ from rigidimeter.study.results import (
     SessionEntry,
     StudyResult,
 )
-from rigidimeter.study.study_analysis import StudyRead, analyse_study, read_study, steps
+from rigidimeter.study.study_analysis import StudyRead, analyse_study, read_study
 from rigidimeter.study.tables import (
     COMPARISON_SCHEMA,
     TEST,
@@ -84,7 +84,6 @@ __all__ = [
     "read_study",
     "result_tables",
     "split_pooled",
-    "steps",
     "table_csv",
     "task_of",
     "verdict",

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +17,7 @@ from rigidimeter.estimation import (
     score_epoch,
     single_frequency_share,
 )
-from rigidimeter.estimation.alignment import aligned_prepared
+from rigidimeter.estimation.alignment import MOST_EPOCHS, aligned_prepared
 from rigidimeter.estimation.diagnostics import checked
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, prepare
@@ -24,6 +27,32 @@ from rigidimeter.records import Analysis, Delay, Epoch, Fit, Task
 from rigidimeter.settings import Settings
 
 __all__ = ["Preparation", "analyse", "analyse_prepared", "estimate", "task_of"]
+
+
+class StepCosts(NamedTuple):
+    """How long each step takes for one epoch, in ms or so: only proportions matter, to progress.
+
+    The search for the delay takes longer where there is one.
+    """
+
+    delay: float
+    score: float
+    first_check: float
+    check: float
+    fit: float
+
+
+def step_costs(samples: float) -> StepCosts:
+    """Return the costs of an epoch with so many samples of torque, as they were measured."""
+    thousands = samples / 1000
+    return StepCosts(
+        delay=25 + 5 * thousands,
+        score=4 + 0.75 * thousands,
+        first_check=8 + 4.3 * thousands,
+        check=1.3 * thousands,
+        fit=1.3 * thousands,
+    )
+
 
 SINGLE_FREQUENCY_SHARE = 0.85
 """Above this share of the angle's variance in one line, the epoch is an imposed sinusoid.
@@ -69,8 +98,26 @@ class Preparation:
             by_source: dict[str, list[PreparedEpoch]] = {e.source: [] for e in self.epochs}
             for prepared in self._perturbed:
                 by_source[prepared.epoch.source].append(prepared)
-            self._delays = estimate_delays(by_source, progress)
+            self._delays = estimate_delays(by_source, lambda n: progress(self.costs.delay * n))
         return self._delays
+
+    @cached_property
+    def costs(self) -> StepCosts:
+        """What a typical epoch costs in each step."""
+        torques = [epoch.channels.get("torque_nm") for epoch in self.epochs]
+        samples = [len(torque) for torque in torques if torque is not None]
+        return step_costs(float(np.mean(samples)) if samples else 1000.0)
+
+    def work(self, methods: Sequence[str]) -> float:
+        """Return what analyses by these methods cost, the first with scores and pooled fits."""
+        n, costs = len(self._perturbed), self.costs
+        searched = 0
+        if any(name == "auto" or not method_named(name).as_recorded for name in methods):
+            sources = Counter(prepared.epoch.source for prepared in self._perturbed)
+            searched = sum(min(count, MOST_EPOCHS) for count in sources.values())
+        first = n * (2 * costs.fit + costs.first_check) + len(self._imposed) * costs.score
+        later = (len(methods) - 1) * n * (2 * costs.fit + costs.check)
+        return searched * costs.delay + first + later
 
     def perturbed(self, *, as_recorded: bool = False) -> list[PreparedEpoch]:
         """Return the perturbation epochs, on one clock or as they were recorded."""
@@ -95,8 +142,10 @@ def analyse(
     *,
     progress: Progress = lambda _: None,
 ) -> Analysis:
-    """Analyse epochs once; see `analyse_prepared`."""
-    return analyse_prepared(Preparation(epochs, settings), method, progress=progress)
+    """Analyse epochs by one method; see `analyse_prepared`. `progress` gets shares of the work."""
+    preparation = Preparation(epochs, settings)
+    work = preparation.work([method]) or 1.0
+    return analyse_prepared(preparation, method, progress=lambda done: progress(done / work))
 
 
 def analyse_prepared(
@@ -121,24 +170,31 @@ def analyse_prepared(
     fits_alone : bool
         Leave out the pooled fits and the scores of the sinusoids.
     progress : callable
-        Called with the work that was done, `work` in all.
+        Called with the work that was done, `Preparation.work` in all.
     """
     reason = ""
     if method == "auto":
         method, reason = choose_method([p.epoch for p in preparation.perturbed(as_recorded=True)])
     estimator = method_named(method)
-    as_recorded = estimator.as_recorded
+    as_recorded, costs = estimator.as_recorded, preparation.costs
+
+    def fit_progress(epochs: float) -> None:
+        progress(costs.fit * epochs)
+
     delays = () if as_recorded else preparation.delays(progress)
     fitted = preparation.perturbed(as_recorded=as_recorded)
     scores = []
     for prepared in () if fits_alone else preparation.imposed(as_recorded=as_recorded):
         settings = prepared.settings
         scores.append(score_epoch(prepared.epoch, settings.scores, settings.estimation))
-        progress(1.0)
+        progress(costs.score)
     if estimator.uses_perturbation:
         reason += _without_drive(fitted, bool(reason))
-    fits, pooled = estimator.fit(fitted, None, progress, not fits_alone)
-    fits = [checked(prepared, fit) for prepared, fit in zip(fitted, fits, strict=True)]
+    found, pooled = estimator.fit(fitted, None, fit_progress, not fits_alone)
+    fits = []
+    for prepared, fit in zip(fitted, found, strict=True):
+        fits.append(checked(prepared, fit))
+        progress(costs.check if fits_alone else costs.first_check)
     counted = [
         prepared.closed_as(fit.outcome)
         if not fit.outcome.included and prepared.epoch.closed.included and fit.n_samples > 0
@@ -150,7 +206,7 @@ def analyse_prepared(
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
     if included:
-        second, _ = estimator.fit(fitted, inertia_kg_m2, progress, False)
+        second, _ = estimator.fit(fitted, inertia_kg_m2, fit_progress, False)
         # What did not count in the first stage does not in the second.
         fixed = [
             two if one.outcome.included else replace(two, outcome=one.outcome)
@@ -200,7 +256,7 @@ def estimate(
     settings : Settings, optional
         Instead of those of the recording.
     progress : callable
-        Called with the work that was done.
+        Called with the share of the work that was done since, 1 in all.
 
     Returns
     -------

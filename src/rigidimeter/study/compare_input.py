@@ -65,7 +65,7 @@ def compare(
     seed, resamples : int
         Of the bootstrap.
     progress : callable
-        Called with the work that was done on a study folder, `study_analysis.steps` in all.
+        Called with the share of the work on a study folder that was done since, 1 in all.
 
     Raises
     ------

@@ -86,7 +86,7 @@ def place_of(path: Path) -> Path:
 
 
 def gather(
-    read: StudyFolder, names: Naming, *, progress: Callable[[str], None] = lambda _: None
+    read: StudyFolder, names: Naming, *, progress: Callable[[float], None] = lambda _: None
 ) -> Gathered:
     """Read every session of the table.
 
@@ -120,7 +120,7 @@ def gather(
         else:
             sessions.append(session)
             notices += said
-        progress(row["path"])
+        progress(1.0 / len(read.sessions))
     for find in (_twice, commanded_otherwise):
         for row, reason in find([(s.row, s.entry, s.epochs, s.settings) for s in sessions]):
             leave_out(row, reason)

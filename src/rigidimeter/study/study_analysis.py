@@ -7,7 +7,7 @@ the analysis of all. Methods of the sensitivity analysis run once each.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,12 +24,15 @@ from rigidimeter.study.blinding import Naming, naming
 from rigidimeter.study.comparison import compare_measures, day_tests, gathered, lacking
 from rigidimeter.study.exclusions import exclusions_of, operators_exclusions
 from rigidimeter.study.ratings_model import rated, ratings_comparison, ratings_days
-from rigidimeter.study.results import RATING, SensitivityRow, SessionEntry, StudyResult
+from rigidimeter.study.results import MEASURES, RATING, SensitivityRow, SessionEntry, StudyResult
 from rigidimeter.study.sensitivity import sensitivity_methods, sensitivity_rows
 from rigidimeter.study.sessions import Gathered, gather
 from rigidimeter.study.warnings import analysis_warnings
 
-__all__ = ["StudyRead", "analyse_study", "read_study", "steps"]
+__all__ = ["StudyRead", "analyse_study", "read_study"]
+
+MEASURE_MS, RESAMPLE_MS = 50.0, 0.01
+"""What the tests of a measure cost, beside the steps of `analysis.step_costs`."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,7 @@ def read_study(
     settings: Settings | None = None,
     method: str = "auto",
     pair: tuple[str | None, str | None] = (None, None),
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = lambda _: None,
 ) -> StudyRead:
     """Read a study folder and every recording in it.
 
@@ -85,7 +88,7 @@ def read_study(
     pair : (str or None, str or None)
         Other conditions than `study.toml` compares.
     progress : callable
-        Called with the path of each recording once it is read.
+        Called with the share of the recordings that was read since, 1 in all.
 
     Raises
     ------
@@ -118,12 +121,6 @@ def read_study(
     )
 
 
-def steps(read: StudyRead) -> int:
-    """Return how often `analyse_study` will report progress."""
-    fitted = sum(epoch.task == "prbs" for epoch in read.epochs)
-    return len(read.epochs) + fitted * (2 * len(sensitivity_methods()) + 1)
-
-
 def analyse_study(
     read: StudyRead,
     *,
@@ -139,13 +136,24 @@ def analyse_study(
     seed, resamples : int
         Of the bootstrap.
     progress : callable
-        Called about `steps` times, with the name of an epoch.
+        Called with the share of the work that was done since, 1 in all.
     """
     sessions = {s.entry.source: s.entry for s in read.gathered.sessions}
     pair = read.names.pair
     one_offset = read.folder.about.analysis.one_offset_a_day
     subjects = _by_subject(read.epochs, sessions, read.settings)
-    main, notices = _analysed(subjects, read.method, progress)
+    fitted = [epoch for epoch in read.epochs if epoch.task == "prbs"]
+    others = sensitivity_methods() if fitted and all(pair) else ()
+    statistics = len(MEASURES) * (MEASURE_MS + RESAMPLE_MS * resamples)
+    methods = [read.method, *others]
+    if read.method in ("auto", *others):  # the chosen method is not made again
+        methods = methods[: max(len(others), 1)]
+    work = statistics + sum(own.work(methods) for own in subjects.values())
+
+    def done(work_ms: float) -> None:
+        progress(work_ms / work)
+
+    main, notices = _analysed(subjects, read.method, done)
     comparisons = gathered(main, pair, sessions)
     ratings, said = rated(read.folder, read.names)
     if ratings is not None:
@@ -157,14 +165,14 @@ def analyse_study(
         one_offset=one_offset,
         ready={} if ratings is None else {RATING.name: ratings_days(ratings)},
     )
+    done(statistics)
     rows: list[SensitivityRow] = []
-    fitted = [epoch for epoch in read.epochs if epoch.task == "prbs"]
-    if fitted and all(pair):
+    if others:
         analyses = {main.method: main}
-        for method in sensitivity_methods():
+        for method in others:
             if method != main.method:
-                analyses[method], _ = _analysed(subjects, method, progress, fits_alone=True)
-        ordered = {name: analyses[name] for name in sensitivity_methods()} | analyses
+                analyses[method], _ = _analysed(subjects, method, done, fits_alone=True)
+        ordered = {name: analyses[name] for name in others} | analyses
         rows, said = sensitivity_rows(ordered, main.method, sessions, pair, one_offset=one_offset)
         notices += said
     return StudyResult(

@@ -189,6 +189,7 @@ CHANNEL_CHECKS = (
         lambda c: saturation(c.epoch, c.settings),
         "the sensor or its amplifier was at the end of its range",
         "choose a larger range or a smaller perturbation, and repeat",
+        of_fit=False,
     ),
     Check(
         "frozen",
@@ -196,6 +197,7 @@ CHANNEL_CHECKS = (
         lambda c: frozen(c.epoch, c.settings),
         "the sensor hung, or the joint was held",
         "check the sensor's cable and its rate; leave that stretch out",
+        of_fit=False,
     ),
     Check(
         "velocity_scale",
@@ -203,6 +205,7 @@ CHANNEL_CHECKS = (
         lambda c: _velocity(c, velocity_scale),
         "one of them is in another unit, has another sign, or is another joint's",
         "check the units and signs of both channels",
+        of_fit=False,
     ),
     Check(
         "velocity_delay",
@@ -210,6 +213,7 @@ CHANNEL_CHECKS = (
         lambda c: _velocity(c, velocity_delay),
         "a filter or a buffer moved one of them, and B and K take each other's part",
         "correct the stamps, or leave velocity_rad_s out: it is made from the angle then",
+        of_fit=False,
     ),
     Check(
         "guard_limited",
@@ -217,6 +221,7 @@ CHANNEL_CHECKS = (
         lambda c: None if c.limited is None else guard_limited(c.limited, c.settings),
         "the arm did not follow the perturbation as designed",
         "use a smaller perturbation or wider limits in [guard]",
+        of_fit=False,
     ),
     Check(
         "position_limit",
@@ -224,5 +229,6 @@ CHANNEL_CHECKS = (
         _position_limit,
         "it was held back there, which the fit takes for stiffness",
         "use a smaller perturbation, or begin nearer to the middle of the range",
+        of_fit=False,
     ),
 )

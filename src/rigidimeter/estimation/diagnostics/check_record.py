@@ -88,6 +88,9 @@ class Check:
         What it means if the check fails.
     remedy : str
         What to do about it.
+    of_fit : bool
+        Whether the function looks at J, B and K; where not, it is called once for each epoch and
+        not again for each method.
     """
 
     name: str
@@ -95,6 +98,11 @@ class Check:
     function: Callable[[Case], Look | None]
     meaning: str
     remedy: str
+    of_fit: bool = True
+
+    def looks(self, case: Case) -> Look | None:
+        """Return what the check sees, or None where it lacks what it needs."""
+        return self.function(case) if all(case.has(name) for name in self.needs) else None
 
     def finding(self, look: Look, settings: DiagnosticsSettings) -> Finding:
         """Return what was seen as a finding; a check that passed is a note without a remedy."""

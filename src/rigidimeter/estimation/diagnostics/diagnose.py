@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+
+import numpy as np
 
 from rigidimeter.estimation.bandlimited import bandlimited_signals
 from rigidimeter.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
-from rigidimeter.estimation.diagnostics.check_record import Case, Check
+from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
 from rigidimeter.estimation.prepared import PreparedEpoch
+from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Finding, Fit, Outcome
 from rigidimeter.units import rad_from_deg
 
@@ -26,33 +30,48 @@ CHECKS: list[Check] = [
 """Every check of an epoch. Code from outside the package may append its own."""
 
 
-def diagnose(case: Case) -> tuple[Finding, ...]:
+def diagnose(case: Case, seen: Mapping[str, Look | None] | None = None) -> tuple[Finding, ...]:
     """Run every check for which there is something to look at; passed ones are among the findings.
 
     The one check of several epochs together, `lack_of_fit`, is made where they are fitted together.
+
+    Parameters
+    ----------
+    case : Case
+    seen : mapping of str to Look, optional
+        What the checks of the epoch alone have seen already, by name.
     """
+    seen = seen or {}
     found = []
     for check in CHECKS:
-        if all(case.has(name) for name in check.needs):
-            look = check.function(case)
-            if look is not None:
-                found.append(check.finding(look, case.settings))
+        look = seen[check.name] if check.name in seen else check.looks(case)
+        if look is not None:
+            found.append(check.finding(look, case.settings))
     return tuple(found)
 
 
 def checked(prepared: PreparedEpoch, fit: Fit) -> Fit:
     """Return the fit with what the checks found, excluded if one of them says so."""
-    epoch, settings = prepared.epoch, prepared.settings
     if fit.n_samples == 0 or prepared.obstacle:
         return fit  # the fit has said why
-    signals = prepared.signals(bandlimited_signals)
-    from_session = epoch.excitation_hz is not None
-    limit_rad = rad_from_deg(settings.guard.position_limit_deg) if from_session else None
-    case = Case(epoch, signals, fit.value, settings.diagnostics, position_limit_rad=limit_rad)
-    findings = diagnose(case)
+    findings = diagnose(_case(prepared, fit.value), prepared.once(_seen_without_fit))
     failed = [finding for finding in findings if finding.remedy]
     grave = [finding for finding in failed if finding.level == "exclude"]
     outcome = fit.outcome
     if grave and outcome.included:
         outcome = Outcome("excluded", f"{grave[0].text}; {grave[0].remedy}")
     return replace(fit, outcome=outcome, findings=tuple(failed))
+
+
+def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
+    epoch, settings = prepared.epoch, prepared.settings
+    from_session = epoch.excitation_hz is not None
+    limit_rad = rad_from_deg(settings.guard.position_limit_deg) if from_session else None
+    signals = prepared.signals(bandlimited_signals)
+    return Case(epoch, signals, parameters, settings.diagnostics, position_limit_rad=limit_rad)
+
+
+def _seen_without_fit(prepared: PreparedEpoch) -> dict[str, Look | None]:
+    """Return what the checks see that do not look at J, B and K."""
+    case = _case(prepared, np.full(3, np.nan))
+    return {check.name: check.looks(case) for check in CHECKS if not check.of_fit}

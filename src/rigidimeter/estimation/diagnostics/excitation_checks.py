@@ -180,6 +180,7 @@ EXCITATION_CHECKS = (
         lambda c: conditioning(c.signals, c.settings),
         "the motion cannot tell J, B and K apart",
         "use a perturbation with more frequencies, or hold J at the median of other epochs",
+        of_fit=False,
     ),
     Check(
         "imposed_sinusoid",
@@ -187,6 +188,7 @@ EXCITATION_CHECKS = (
         lambda c: imposed_sinusoid(c.epoch, c.settings),
         "the motion is a sinusoid, in which J and K are one number, K − J ω²",
         "score it as an imposed sinusoid (--task sinusoid), or use a PRBS",
+        of_fit=False,
     ),
     Check(
         "band_share",
@@ -197,6 +199,7 @@ EXCITATION_CHECKS = (
             "look for drift of the sensor and for slow pushes; check the rate and the unit of the "
             "time; set estimation.band_low_hz and band_high_hz to what was perturbed"
         ),
+        of_fit=False,
     ),
     Check(
         "coherence",
@@ -204,5 +207,6 @@ EXCITATION_CHECKS = (
         lambda c: coherence(c.epoch, c.signals, c.settings),
         "the rest is the subject, noise, or a joint that is not linear",
         "ask the subject to relax, perturb more strongly, or pool epochs with instruments",
+        of_fit=False,
     ),
 )

@@ -196,6 +196,7 @@ RESIDUAL_CHECKS = (
         lambda c: held_out_vaf(c.signals, c.settings),
         "the fit does not foresee torque that it has not seen",
         "look for movement of the subject's own, and for a change during the epoch",
+        of_fit=False,
     ),
 )
 

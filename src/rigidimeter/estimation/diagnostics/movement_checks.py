@@ -143,5 +143,6 @@ MOVEMENT_CHECKS = (
         lambda c: emg_activity(c.epoch.channels["emg_v"], c.settings),
         "the muscle was active",
         "ask the subject to relax and repeat, or leave the active part out",
+        of_fit=False,
     ),
 )

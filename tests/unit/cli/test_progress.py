@@ -1,0 +1,105 @@
+"""The time left that is shown, by a clock that the test sets."""
+
+import time
+
+import numpy as np
+import pytest
+
+from rigidimeter.cli.progress import LEAST_SHARE, Meter
+from rigidimeter.records import Epoch
+from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.study import Preparation
+from rigidimeter.study.analysis import analyse, analyse_prepared
+from rigidimeter.virtual.batch import simulate_epochs
+
+
+class Clock:
+    """A clock that the test moves."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def test_the_time_left_is_that_of_an_even_speed() -> None:
+    clock = Clock()
+    meter = Meter("work", 50.0, clock)
+    for done in range(1, 51):
+        clock.now_s += 0.2
+        meter.advance()
+        if done < 5:
+            assert meter.left_s is None
+        else:
+            assert meter.left_s == pytest.approx(0.2 * (50 - done))
+
+
+def test_lines_come_after_two_seconds_and_every_five(capsys: pytest.CaptureFixture[str]) -> None:
+    clock = Clock()
+    with Meter("work", 20.0, clock) as meter:
+        for _ in range(20):
+            clock.now_s += 1.0
+            meter.advance()
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [
+        "work: 10 %, about 18 s left",
+        "work: 35 %, about 13 s left",
+        "work: 60 %, about 8 s left",
+        "work: 85 %, about 3 s left",
+    ]
+
+
+def test_no_time_is_guessed_before_a_tenth_is_done(capsys: pytest.CaptureFixture[str]) -> None:
+    clock = Clock()
+    meter = Meter("work", 100.0, clock)
+    clock.now_s += 3.0
+    meter.advance()
+    assert capsys.readouterr().err == "work: 1 %\n"
+
+
+def simulated(delay_s: float) -> tuple[list[Epoch], Settings]:
+    settings = parse_settings(
+        {
+            "subject": {"OFF": {"voluntary_sd_nm": 0.05}},
+            "protocol": {"blocks": [{"epochs": 1}]},
+            "rig": {"torque": {"latency_s": 0.001 + delay_s, "stamp_latency_s": 0.001}},
+        }
+    )
+    batch = simulate_epochs(settings, 10, conditions="OFF", seed=3)
+    epochs = [batch.epoch(i) for i in range(10)]
+    half = [
+        Epoch(f"day {i // 5}", e.label, e.channels, "OFF", "prbs") for i, e in enumerate(epochs)
+    ]
+    return half, settings
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.004], ids=["no delay", "a delay"])
+def test_the_time_left_of_an_analysis_is_never_off_by_more_than_three(delay_s: float) -> None:
+    """On the processor's clock, so that a busy machine changes nothing."""
+    epochs, settings = simulated(delay_s)
+    analyse(epochs[:2], settings)  # what is loaded once does not count
+    preparation = Preparation(epochs, settings)
+    clock, start_s = Clock(), time.process_time()
+    clock.now_s = start_s
+    meter = Meter("estimate", preparation.work(["iv", "bandlimited", "published"]), clock)
+    shown: list[tuple[float, float]] = []
+
+    def progress(done: float) -> None:
+        clock.now_s = time.process_time()
+        meter.advance(done)
+        if meter.left_s is not None:
+            shown.append((clock.now_s, meter.left_s))
+
+    analyse_prepared(preparation, "iv", progress=progress)
+    for method in ("bandlimited", "published"):
+        analyse_prepared(preparation, method, fits_alone=True, progress=progress)
+    end_s = time.process_time()
+    assert meter.share == pytest.approx(1.0)
+    now_s, left_s = np.array(shown).T
+    truly_s, least_s = end_s - now_s, LEAST_SHARE * (end_s - start_s)
+    inside = truly_s > least_s  # towards the end a difference counts, not a factor
+    assert inside.sum() > 20
+    assert np.all(left_s[inside] < 3 * truly_s[inside])
+    assert np.all(left_s[inside] > truly_s[inside] / 3)
+    assert np.all(np.abs(left_s - truly_s)[~inside] < 2 * least_s)
