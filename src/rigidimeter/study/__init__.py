@@ -14,18 +14,15 @@ from rigidimeter.study.comparison import (
     conditions,
     split_pooled,
 )
+from rigidimeter.study.measures import MEASURES, RATING, Measure, Observation
 from rigidimeter.study.provenance import provenance
 from rigidimeter.study.results import (
-    MEASURES,
-    RATING,
     Comparison,
     Condition,
     DayMedian,
     EffectPair,
     Exclusion,
     LeftOut,
-    Measure,
-    Observation,
     RatingMean,
     RatingsFound,
     SensitivityRow,

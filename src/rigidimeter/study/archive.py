@@ -25,7 +25,8 @@ from rigidimeter.documents import json_text, text_bytes, write_text
 from rigidimeter.errors import UserError
 from rigidimeter.recording import estimates_document
 from rigidimeter.settings import dump_settings
-from rigidimeter.study.results import RATING, StudyResult
+from rigidimeter.study.measures import RATING
+from rigidimeter.study.results import StudyResult
 from rigidimeter.study.sessions import file_digest
 from rigidimeter.study.study_analysis import StudyRead
 from rigidimeter.study.tables import comparison_document, result_tables, table_csv

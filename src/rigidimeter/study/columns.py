@@ -9,7 +9,8 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import TextTable
 from rigidimeter.records import Notice
 from rigidimeter.study.comparison import compare_measures, measured
-from rigidimeter.study.results import Comparison, Measure, Observation, StudyResult
+from rigidimeter.study.measures import Measure, Observation
+from rigidimeter.study.results import Comparison, StudyResult
 
 __all__ = ["compare_columns"]
 

@@ -25,16 +25,8 @@ from rigidimeter.statistics import (
     summarise,
     two_groups,
 )
-from rigidimeter.study.results import (
-    MEASURES,
-    Comparison,
-    DayMedian,
-    EffectPair,
-    Measure,
-    Observation,
-    SessionEntry,
-    StudyResult,
-)
+from rigidimeter.study.measures import MEASURES, Measure, Observation
+from rigidimeter.study.results import Comparison, DayMedian, EffectPair, SessionEntry, StudyResult
 
 __all__ = [
     "FEWEST_FOR_TEST",

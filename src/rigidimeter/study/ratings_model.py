@@ -23,14 +23,9 @@ from rigidimeter.statistics import (
 )
 from rigidimeter.study.blinding import Naming
 from rigidimeter.study.comparison import measured, no_days
+from rigidimeter.study.measures import RATING, Observation
 from rigidimeter.study.rating_table import Rating, groupings, oddities
-from rigidimeter.study.results import (
-    RATING,
-    Comparison,
-    Observation,
-    RatingMean,
-    RatingsFound,
-)
+from rigidimeter.study.results import Comparison, RatingMean, RatingsFound
 
 __all__ = ["means_of", "rated", "ratings_comparison", "ratings_days", "variance_notices"]
 

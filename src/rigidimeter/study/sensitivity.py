@@ -9,7 +9,8 @@ from typing import Literal
 from rigidimeter.estimation import METHODS
 from rigidimeter.records import Analysis, Fit, Notice
 from rigidimeter.study.comparison import FEWEST_FOR_TEST, day_test, observed, rank_test
-from rigidimeter.study.results import MEASURES, Comparison, Measure, SensitivityRow, SessionEntry
+from rigidimeter.study.measures import MEASURES, Measure
+from rigidimeter.study.results import Comparison, SensitivityRow, SessionEntry
 
 __all__ = ["sensitivity_methods", "sensitivity_rows"]
 

@@ -23,8 +23,9 @@ from rigidimeter.study.analysis import Preparation, analyse_prepared
 from rigidimeter.study.blinding import Naming, naming
 from rigidimeter.study.comparison import compare_measures, day_tests, gathered, lacking
 from rigidimeter.study.exclusions import exclusions_of, operators_exclusions
+from rigidimeter.study.measures import MEASURES, RATING
 from rigidimeter.study.ratings_model import rated, ratings_comparison, ratings_days
-from rigidimeter.study.results import MEASURES, RATING, SensitivityRow, SessionEntry, StudyResult
+from rigidimeter.study.results import SensitivityRow, SessionEntry, StudyResult
 from rigidimeter.study.sensitivity import sensitivity_methods, sensitivity_rows
 from rigidimeter.study.sessions import Gathered, gather
 from rigidimeter.study.warnings import analysis_warnings

@@ -6,17 +6,22 @@ inputs give the same bytes: neither time nor place is written down.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
 from rigidimeter.documents import csv_text, plain_values
 from rigidimeter.recording import estimates_document
-from rigidimeter.statistics import Contrast, RankSum, interval_of
+from rigidimeter.statistics import RankSum
+from rigidimeter.study.rating_rows import (
+    rating_contrast,
+    rating_offsets,
+    rating_rows,
+    ratings_values,
+)
 
 if TYPE_CHECKING:
-    from rigidimeter.study.results import Comparison, RatingsFound, StudyResult
+    from rigidimeter.study.results import Comparison, StudyResult
 
 __all__ = [
     "COMPARISON_SCHEMA",
@@ -67,7 +72,7 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
         "comparisons": [_comparison(comparison) for comparison in result.comparisons],
         "days": tables["days"],
         "effect_differences": tables["effect_differences"],
-        "ratings": None if result.ratings is None else _ratings(result.ratings),
+        "ratings": None if result.ratings is None else ratings_values(result.ratings),
         "sensitivity": tables["sensitivity"],
         "exclusions": tables["excluded_epochs"],
         "notices": [
@@ -140,67 +145,6 @@ def comparison_rows(comparisons: Iterable[Comparison]) -> list[dict[str, Any]]:
     return rows
 
 
-def _ratings(found: RatingsFound) -> dict[str, Any]:
-    fit = found.fit
-    errors = [math.sqrt(value) for value in fit.covariance.diagonal().tolist()]
-    return {
-        "source": found.source,
-        "n": fit.n,
-        "reference": found.reference,
-        "other": found.other,
-        "means": dict(zip(fit.conditions, fit.means.tolist(), strict=True)),
-        "means_se": dict(zip(fit.conditions, errors, strict=True)),
-        "means_low": {mean.condition: mean.low for mean in found.means},
-        "means_high": {mean.condition: mean.high for mean in found.means},
-        "variances": dict(fit.variances),
-        "variance_residual": fit.variance_residual,
-        "offsets": {name: dict(offsets) for name, offsets in fit.offsets.items()},
-        "reml_deviance": fit.deviance,
-        "contrast": asdict(found.contrast),
-        "contrast_days": None if found.contrast_days is None else asdict(found.contrast_days),
-        "rows": _rating_rows(found),
-        "notices": list(found.notices),
-    }
-
-
-def _rating_rows(found: RatingsFound) -> list[dict[str, Any]]:
-    columns = ("condition", "examiner", "subject", "day", "score")
-    return [
-        dict(zip(columns, row, strict=True)) | {"corrected": corrected}
-        for row, corrected in zip(found.rows, found.fit.corrected.tolist(), strict=True)
-    ]
-
-
-def _rating_offsets(found: RatingsFound) -> Iterator[dict[str, Any]]:
-    """Yield every offset; the count of ratings where one column of the table tells it."""
-    for grouping, offsets in found.fit.offsets.items():
-        sd = math.sqrt(found.fit.variances[grouping])
-        place = {"examiner": 1, "subject": 2}.get(grouping)
-        for name, offset in offsets.items():
-            count = None if place is None else sum(row[place] == name for row in found.rows)
-            yield {"grouping": grouping, "name": name, "ratings": count, "offset": offset, "sd": sd}
-
-
-def _rating_contrast(found: RatingsFound) -> Iterator[dict[str, Any]]:
-    """Yield the contrast by each choice of degrees of freedom, with its 95 % interval."""
-    yield from _choices(found.contrast)
-    if found.contrast_days is not None:
-        *_, last = _choices(found.contrast_days)
-        yield last | {"freedom": f"{last['freedom']}, with an offset for each day too"}
-
-
-def _choices(c: Contrast) -> Iterator[dict[str, Any]]:
-    for name, se, f, df, p in (
-        ("residual, n − p", c.se, c.f, c.df_residual, c.p_residual),
-        ("Satterthwaite", c.se, c.f, c.df_satterthwaite, c.p_satterthwaite),
-        ("Kenward–Roger", c.se_kenward_roger, c.f_kenward_roger, c.df_kenward_roger,
-         c.p_kenward_roger),
-    ):  # fmt: skip
-        low, high = interval_of(c.estimate, se, df)
-        yield {"freedom": name, "estimate": c.estimate, "low": low, "high": high, "se": se,
-               "f": f, "df": df, "p": p}  # fmt: skip
-
-
 def result_tables(result: StudyResult) -> dict[str, Rows]:
     """Return every table of conclusions by name; some have no rows."""
     ratings = result.ratings
@@ -228,9 +172,9 @@ def result_tables(result: StudyResult) -> dict[str, Rows]:
             }
             for pair in result.differences
         ],
-        "ratings": [] if ratings is None else _rating_rows(ratings),
-        "rating_offsets": [] if ratings is None else list(_rating_offsets(ratings)),
-        "rating_contrast": [] if ratings is None else list(_rating_contrast(ratings)),
+        "ratings": [] if ratings is None else rating_rows(ratings),
+        "rating_offsets": [] if ratings is None else list(rating_offsets(ratings)),
+        "rating_contrast": [] if ratings is None else list(rating_contrast(ratings)),
         "sensitivity": [
             {"measure": m.name, "title": m.title, "unit": m.unit}
             | {name: value for name, value in vars(row).items() if name != "measure"}
