@@ -187,7 +187,7 @@ def run(
         result = run_session(
             protocol, settings, tap, bench.clock, sink(writer), supervision=desk, **options
         )
-    except Exception as caught:
+    except (Exception, KeyboardInterrupt) as caught:  # an interrupt may come while it stops
         error = caught
     bench.settle()
     events = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
