@@ -9,12 +9,11 @@ import typer
 
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.errors import UserError
-from rigidimeter.virtual.paper_rates import PAPER_RATES
 
 if TYPE_CHECKING:
     from rigidimeter.settings import Settings
 
-__all__ = ["PAPER_RATES", "simulate"]
+__all__ = ["simulate"]
 
 
 def simulate(
@@ -99,6 +98,8 @@ def _changed(
     elif condition is not None or epochs is not None:
         raise UserError("--condition and --epochs need --task prbs or --task sinusoid")
     if paper_rates:
+        from rigidimeter.virtual.paper_rates import PAPER_RATES
+
         for sensor, changes in PAPER_RATES.items():
             values["rig"][sensor] |= changes
     return parse_settings(values, source="the options")
