@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import estimate_delays, fit_epochs
 from rigidimeter.estimation.closedloop.closed_loop_fit import CLOSED_LOOP
@@ -28,6 +27,7 @@ from rigidimeter.estimation.prepared import PreparedEpoch, Source, prepare
 from rigidimeter.records import Channel, Epoch, Fit
 from rigidimeter.settings import EstimationSettings, Settings, parse_settings
 from rigidimeter.virtual.batch import simulate_chunks
+from rigidimeter.virtual.paper_rates import PAPER_RATES
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "accuracy.md"
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")

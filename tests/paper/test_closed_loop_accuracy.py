@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.estimation import fit_epoch
 from rigidimeter.recording import read_session
 from rigidimeter.settings import Settings
+from rigidimeter.virtual.paper_rates import PAPER_RATES
 
 TRUTH = np.array([0.0045, 0.1368, 1.751])
 SEEDS = range(12)

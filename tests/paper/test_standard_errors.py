@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.estimation import fit_epoch
 from rigidimeter.recording import read_session
 from rigidimeter.settings import Settings
+from rigidimeter.virtual.paper_rates import PAPER_RATES
 
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 

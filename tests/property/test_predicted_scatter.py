@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.estimation import fit_epochs
 from rigidimeter.experiment import (
     PARAMETERS,
@@ -19,6 +18,7 @@ from rigidimeter.records import Epoch, Fit
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.statistics import ranksum
 from rigidimeter.virtual.batch import simulate_chunks
+from rigidimeter.virtual.paper_rates import PAPER_RATES
 
 SESSION = 25
 """Epochs that are fitted together."""

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.signal import butter, freqs
 
-from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.dynamics import closed_loop_motion, median_joint, sensor_density
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import prbs_nm, predicted_precision
 from rigidimeter.experiment.predicted_record import expected_record
 from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.virtual.paper_rates import PAPER_RATES
 
 RATE_HZ = 1000.0
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 
-from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.dynamics import SubjectTorque, closed_loop_motion, median_joint, subject_density
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import prbs_nm
@@ -24,6 +23,7 @@ from rigidimeter.settings import (
     parse_settings,
 )
 from rigidimeter.virtual.batch import simulate_epochs
+from rigidimeter.virtual.paper_rates import PAPER_RATES
 
 PUSHING = SubjectSettings(voluntary_sd_nm=0.2, tremor_amplitude_nm=0.1)
 

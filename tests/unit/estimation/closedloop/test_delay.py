@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.estimation import aligned, estimate_delays
 from rigidimeter.estimation.closedloop.observation import period_s
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Channel
+from rigidimeter.virtual.paper_rates import PAPER_RATES
 
 
 def late(epoch, delay_s):

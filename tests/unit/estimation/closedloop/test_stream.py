@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.cli.simulate import PAPER_RATES
 from rigidimeter.estimation import fit_epochs
 from rigidimeter.estimation.closedloop.epoch_stream import EpochStream
 from rigidimeter.records import Channel
+from rigidimeter.virtual.paper_rates import PAPER_RATES
 
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 
