@@ -43,7 +43,7 @@ FAULTS: dict[int, tuple[str, str, str]] = {
     11: ("deadlines missed", "loop: lateness of each tick", "S1"),
     12: ("wall clock jumps an hour", "none needed: monotonic time only", "no effect"),
     13: ("running at the position limit at full speed", "guard: v ≤ √(2·a·d)",
-         "held back; the epoch does not count"),
+         "limited; the epoch is excluded"),
     14: ("limit exceeded, encoder jump or sign flip", "guard: position, expected angle", "S1"),
     15: ("motion is not what was commanded; overspeed", "guard: expected angle, speed",
          "S1, then without power"),
@@ -52,16 +52,16 @@ FAULTS: dict[int, tuple[str, str, str]] = {
     17: ("contact oscillation", "guard: energy in 1 s, power, torque", "SH or S1"),
     18: ("emergency stop pressed, released", "a flag the loop reads each tick", "S0"),
     19: ("console lost or frozen", "loop: the console's heartbeat", "S1"),
-    20: ("exception, signal, failure half-way through enable", "session: its way out",
-         "S1; every step tried"),
-    21: ("disk full, recorder hangs", "loop: recorder's heartbeat, samples that wait", "S1"),
+    20: ("exception, signal, failure half-way through enable", "session: shutdown sequence",
+         "S1; every shutdown step attempted"),
+    21: ("disk full, recorder hangs", "loop: recorder's heartbeat, backlog of samples", "S1"),
     22: ("parameters changed while running", "session: bounds", "bounded, no bump, logged"),
     23: ("two faults at once, a fault while stopping", "guard: latch",
          "first cause, stronger stop"),
 }  # fmt: skip
 """Fault, what detects it, reaction: S0, S1 and SH as in the document."""
 
-VIRTUAL_CANNOT = "the simulated rig lives in the loop"
+VIRTUAL_CANNOT = "the simulated rig runs in the loop's process"
 NOT_CARRIED = {
     (5, "virtual"): "no packets",
     (9, "virtual"): VIRTUAL_CANNOT,
