@@ -20,8 +20,8 @@ import numpy as np
 
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import estimate_delays, fit_epochs
-from rigidimeter.estimation.closedloop.closed_loop_fit import CLOSED_LOOP
 from rigidimeter.estimation.closedloop.linear_problems import least_squares_start
+from rigidimeter.estimation.closedloop.perturbation_methods import CLOSED_LOOP
 from rigidimeter.estimation.closedloop.refine import fit_pooled
 from rigidimeter.estimation.prepared import PreparedEpoch, Source, prepare
 from rigidimeter.records import Channel, Epoch, Fit

@@ -43,7 +43,8 @@ from numpy.typing import NDArray
 from rigidimeter.dynamics import draw_joint
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import score_epoch
-from rigidimeter.estimation.closedloop.closed_loop_fit import CLOSED_LOOP, fit_closed_loop
+from rigidimeter.estimation.closedloop.closed_loop_fit import fit_closed_loop
+from rigidimeter.estimation.closedloop.perturbation_methods import CLOSED_LOOP
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.scores import angular_impulse_nm_s, loop_area_j, scoring_cycles
 from rigidimeter.paper.imposed import imposed_epoch

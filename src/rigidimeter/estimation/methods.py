@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from rigidimeter.estimation.bandlimited import BANDLIMITED, bandlimited_signals
-from rigidimeter.estimation.closedloop.closed_loop_fit import IV, ML, SPECTRAL
 from rigidimeter.estimation.closedloop.observation import closed_loop_obstacle
+from rigidimeter.estimation.closedloop.perturbation_methods import IV, ML, SPECTRAL
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.published_method import PUBLISHED

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from rigidimeter.estimation import aligned
+from rigidimeter.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.records import Epoch, Fit, Score
 from rigidimeter.reporting.numbers import short_names
 from rigidimeter.study import StudyResult
@@ -15,6 +16,7 @@ __all__ = [
     "analysed_epoch",
     "origin_s",
     "place",
+    "prepared_epochs",
     "representative_fits",
     "representatives",
     "slug",
@@ -56,6 +58,14 @@ def analysed_epoch(result: StudyResult, one: Fit | Score) -> Epoch | None:
         if (epoch.source, epoch.label) == (one.source, one.epoch):
             return aligned(epoch, result.analysis.delays)
     return None
+
+
+def prepared_epochs(result: StudyResult) -> dict[tuple[str, str], PreparedEpoch]:
+    """Return the perturbation epochs as they were analysed, by source and label."""
+    prepared = result.prepared or prepare(
+        (aligned(epoch, result.analysis.delays) for epoch in result.epochs), result.settings
+    )
+    return {(one.epoch.source, one.epoch.label): one for one in prepared}
 
 
 def place(result: StudyResult, one: Fit | Score) -> str:

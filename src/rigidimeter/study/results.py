@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Literal
 
+from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score
 from rigidimeter.settings import Settings
 from rigidimeter.statistics import (
@@ -269,6 +270,9 @@ class StudyResult:
         The table and its column of conditions, where columns of a table are compared.
     analysis, epochs, settings
         What was analysed; empty for columns of a table.
+    prepared : tuple of PreparedEpoch
+        The perturbation epochs as they were analysed, with what was made of them, for the figures;
+        empty where they were not analysed here.
     provenance : mapping of str to str
     conditions, sessions, blinded, virtual, ratings, sensitivity, exclusions, left_out, changes
         Of a study folder alone; `sessions` is empty if there is none. `blinded`: the conditions are
@@ -288,6 +292,7 @@ class StudyResult:
     by: str = ""
     analysis: Analysis = Analysis("", (), (), math.nan, ())  # noqa: RUF009
     epochs: tuple[Epoch, ...] = ()
+    prepared: tuple[PreparedEpoch, ...] = field(default=(), repr=False, compare=False)
     settings: Settings = field(default_factory=Settings)
     provenance: Mapping[str, str] = field(default_factory=dict)
     conditions: tuple[Condition, ...] = ()

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rigidimeter.errors import UserError
-from rigidimeter.estimation import choose_method, method_names
+from rigidimeter.estimation import choose_method, method_named, method_names
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.recording.study_folder import Row, StudyFolder, read_study_folder
 from rigidimeter.records import Analysis, Epoch, Notice
@@ -187,6 +187,11 @@ def analyse_study(
         resamples=resamples,
         analysis=main,
         epochs=read.epochs,
+        prepared=tuple(
+            prepared
+            for own in subjects.values()
+            for prepared in own.perturbed(as_recorded=method_named(main.method).as_recorded)
+        ),
         settings=read.settings,
         conditions=read.names.conditions,
         sessions=tuple(sessions.values()),

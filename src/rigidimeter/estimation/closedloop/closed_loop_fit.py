@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,28 +19,24 @@ from rigidimeter.estimation.closedloop.linear_problems import (
     Linearise,
     Problem,
     holding,
-    instrumental,
     least_squares_start,
-    output_error,
-    periodic,
 )
-from rigidimeter.estimation.closedloop.observation import Observation, observe, observe_periods
+from rigidimeter.estimation.closedloop.observation import Observation
 from rigidimeter.estimation.closedloop.refine import (
-    ENOUGH_EPOCHS,
     SHARED_FROM,
     LineFit,
     fit_pooled,
     fit_single,
 )
-from rigidimeter.estimation.method_record import Method, Progress
+from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.screening import after_fit, unusable
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.uncertainty import Estimate
 from rigidimeter.records import Epoch, Finding, Fit
-from rigidimeter.settings import EstimationSettings, Settings
+from rigidimeter.settings import Settings
 
-__all__ = ["CLOSED_LOOP", "IV", "ML", "SPECTRAL", "LineMethod", "fit_closed_loop"]
+__all__ = ["LineMethod", "fit_closed_loop"]
 
 WORST_R_SQUARED = -10.0
 """A subject who pushes may turn R² negative; one far below says that a channel is wrong."""
@@ -68,14 +63,6 @@ class LineMethod(NamedTuple):
     observe: Callable[[PreparedEpoch], Observation]
     linearise: Linearise
     keeps_problem: bool = True
-
-
-CLOSED_LOOP: Mapping[str, LineMethod] = {
-    "iv": LineMethod("iv", observe, instrumental),
-    "spectral": LineMethod("spectral", observe_periods, periodic),
-    "ml": LineMethod("ml", observe, output_error, keeps_problem=False),
-}
-"""The methods that need the perturbation."""
 
 
 class _Member(NamedTuple):
@@ -307,53 +294,3 @@ def _without_numbers(epoch: Epoch, method: str, reason: str) -> Fit:
         method=method,
         outcome=unusable(epoch, reason),
     )
-
-
-def _intervals_text(settings: EstimationSettings) -> str:
-    if settings.intervals == "bootstrap":
-        return (
-            "Intervals are made by giving each spectral line of the residual a new phase, the "
-            "subject’s own torque included"
-        )
-    return (
-        "Intervals are made from the power of the residual at each frequency, the subject’s own "
-        "torque included"
-    )
-
-
-_POOLED_TEXT = (
-    f"From {ENOUGH_EPOCHS} epochs on they come from the scatter between epochs; with fewer, the "
-    "joint is taken for one that does not change, and where epochs differ by more than their own "
-    "intervals these are too narrow"
-)
-
-IV = Method(
-    name="iv",
-    title="instrumental variables, made from the perturbation",
-    needs=("perturbation_nm",),
-    methods_text="by refined instrumental variables made from the known perturbation",
-    fit=partial(fit_closed_loop, CLOSED_LOOP["iv"]),
-    references=("riv", "riv_loop"),
-    intervals_text=_intervals_text,
-    pooled_text=_POOLED_TEXT,
-    in_sensitivity=True,
-)
-SPECTRAL = Method(
-    name="spectral",
-    title="instrumental variables at the lines of a periodic perturbation",
-    needs=("perturbation_nm",),
-    methods_text="by instrumental variables at the lines of the periodic perturbation",
-    fit=partial(fit_closed_loop, CLOSED_LOOP["spectral"]),
-    intervals_text=_intervals_text,
-    pooled_text=_POOLED_TEXT,
-)
-ML = Method(
-    name="ml",
-    title="maximum likelihood of the torque that the perturbation causes in the whole loop",
-    needs=("perturbation_nm",),
-    methods_text="by maximum likelihood of the torque that the perturbation causes in the whole "
-    "loop",
-    fit=partial(fit_closed_loop, CLOSED_LOOP["ml"]),
-    intervals_text=_intervals_text,
-    pooled_text=_POOLED_TEXT,
-)

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation.closedloop.observation import Observation, observe_periods
 from rigidimeter.estimation.closedloop.periodic_response import impedance as without_model
-from rigidimeter.estimation.prepared import prepare
-from rigidimeter.records import Epoch, Fit
+from rigidimeter.estimation.prepared import PreparedEpoch
+from rigidimeter.records import Fit
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
 from rigidimeter.reporting.numbers import condition_name, number
-from rigidimeter.reporting.representative import analysed_epoch
+from rigidimeter.reporting.representative import prepared_epochs
 from rigidimeter.reporting.style import GREY, condition_colours, listed, plain_ticks, styled
 from rigidimeter.study import StudyResult, split_pooled
 
@@ -58,14 +58,15 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     fits, _ = split_pooled(result.analysis)
     shown: dict[str, Response] = {}
     used: dict[str, tuple[int, int]] = {}
+    prepared = prepared_epochs(result)
     for condition in result.condition_names:
         epochs = [
-            epoch
+            prepared[fit.source, fit.epoch]
             for fit in result.analysis.fits
             if fit.condition == condition and fit.outcome.included
-            if (epoch := analysed_epoch(result, fit)) is not None
+            if (fit.source, fit.epoch) in prepared
         ]
-        observations = same_lines(_observations(result, epochs))
+        observations = same_lines(_observations(epochs))
         if not observations:
             continue
         found = without_model(observations)
@@ -117,12 +118,12 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     )
 
 
-def _observations(result: StudyResult, epochs: Sequence[Epoch]) -> list[Observation]:
+def _observations(epochs: Sequence[PreparedEpoch]) -> list[Observation]:
     """Return the epochs that can be observed at the lines of their perturbation."""
     found = []
-    for epoch in prepare(epochs, result.settings):
+    for epoch in epochs:
         try:
-            found.append(observe_periods(epoch))
+            found.append(epoch.once(observe_periods))
         except ValueError:
             continue  # it does not repeat, or was not recorded: the page says what is needed
     return found

@@ -12,11 +12,12 @@ from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 from scipy import signal
 
-from rigidimeter.estimation import aligned, epoch_signals
+from rigidimeter.estimation.bandlimited import bandlimited_signals
 from rigidimeter.estimation.diagnostics import reconstructed_torque_nm
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
 from rigidimeter.reporting.methods import is_least_squares
 from rigidimeter.reporting.numbers import condition_name, number
+from rigidimeter.reporting.representative import prepared_epochs
 from rigidimeter.reporting.style import condition_colours, listed, plain_ticks, styled
 from rigidimeter.study import StudyResult
 
@@ -36,13 +37,12 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     spectra: dict[str, list[tuple[Array, Array]]] = {}
     sizes_nm: dict[str, list[float]] = {}
     bands = []
-    by_name = {(epoch.source, epoch.label): epoch for epoch in result.epochs}
+    by_name = prepared_epochs(result)
     for fit in result.analysis.fits:
         epoch = by_name.get((fit.source, fit.epoch))
         if epoch is None or not fit.outcome.included:
             continue
-        moved = aligned(epoch, result.analysis.delays)
-        signals = epoch_signals(moved, "bandlimited", result.settings.estimation)
+        signals = epoch.signals(bandlimited_signals)
         own_nm = reconstructed_torque_nm(signals, fit.value)
         spectra.setdefault(fit.condition, []).append(density(own_nm, signals.rate_hz))
         sizes_nm.setdefault(fit.condition, []).append(float(np.std(own_nm)))

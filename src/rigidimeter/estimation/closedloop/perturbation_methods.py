@@ -1,0 +1,75 @@
+"""The methods that need the perturbation: what each observes and solves, and how it is described.
+
+A new one is a `LineMethod` and its `Method` record, and a line in `estimation.methods`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+from rigidimeter.estimation.closedloop.closed_loop_fit import LineMethod, fit_closed_loop
+from rigidimeter.estimation.closedloop.linear_problems import instrumental, output_error, periodic
+from rigidimeter.estimation.closedloop.observation import observe, observe_periods
+from rigidimeter.estimation.closedloop.refine import ENOUGH_EPOCHS
+from rigidimeter.estimation.method_record import Method
+from rigidimeter.settings import EstimationSettings
+
+__all__ = ["CLOSED_LOOP", "IV", "ML", "SPECTRAL"]
+
+CLOSED_LOOP: Mapping[str, LineMethod] = {
+    "iv": LineMethod("iv", observe, instrumental),
+    "spectral": LineMethod("spectral", observe_periods, periodic),
+    "ml": LineMethod("ml", observe, output_error, keeps_problem=False),
+}
+"""The methods that need the perturbation."""
+
+
+def _intervals_text(settings: EstimationSettings) -> str:
+    if settings.intervals == "bootstrap":
+        return (
+            "Intervals are made by giving each spectral line of the residual a new phase, the "
+            "subject’s own torque included"
+        )
+    return (
+        "Intervals are made from the power of the residual at each frequency, the subject’s own "
+        "torque included"
+    )
+
+
+_POOLED_TEXT = (
+    f"From {ENOUGH_EPOCHS} epochs on they come from the scatter between epochs; with fewer, the "
+    "joint is taken for one that does not change, and where epochs differ by more than their own "
+    "intervals these are too narrow"
+)
+
+IV = Method(
+    name="iv",
+    title="instrumental variables, made from the perturbation",
+    needs=("perturbation_nm",),
+    methods_text="by refined instrumental variables made from the known perturbation",
+    fit=partial(fit_closed_loop, CLOSED_LOOP["iv"]),
+    references=("riv", "riv_loop"),
+    intervals_text=_intervals_text,
+    pooled_text=_POOLED_TEXT,
+    in_sensitivity=True,
+)
+SPECTRAL = Method(
+    name="spectral",
+    title="instrumental variables at the lines of a periodic perturbation",
+    needs=("perturbation_nm",),
+    methods_text="by instrumental variables at the lines of the periodic perturbation",
+    fit=partial(fit_closed_loop, CLOSED_LOOP["spectral"]),
+    intervals_text=_intervals_text,
+    pooled_text=_POOLED_TEXT,
+)
+ML = Method(
+    name="ml",
+    title="maximum likelihood of the torque that the perturbation causes in the whole loop",
+    needs=("perturbation_nm",),
+    methods_text="by maximum likelihood of the torque that the perturbation causes in the whole "
+    "loop",
+    fit=partial(fit_closed_loop, CLOSED_LOOP["ml"]),
+    intervals_text=_intervals_text,
+    pooled_text=_POOLED_TEXT,
+)
