@@ -189,7 +189,9 @@ def run_beside_probe(item: pytest.Item, nextitem: pytest.Item | None) -> bool | 
             reports = runtestprotocol(item, nextitem=nextitem, log=False)
             failed = any(report.failed for report in reports)
             stood_still_s.append(probe.stood_still_s() if failed else probe.allowed_s)
-        if stood_still_s[-1] <= resolves_s * (FAILURE_SHARE if failed else 1.0):
+        # A pseudo-terminal passes each message through the kernel's own workers several times.
+        share = (FAILURE_SHARE / 4 if ordinary else FAILURE_SHARE) if failed else 1.0
+        if stood_still_s[-1] <= resolves_s * share:
             break
     else:
         late = ", ".join(f"{1e3 * late_s:.0f}" for late_s in stood_still_s)
