@@ -5,8 +5,8 @@
     rdt_canopen    `AtiRdt` over UDP at 1 kHz and `Cia402Drive` over CANopen, in real time
     rdt_ascii      `AtiRdt` over UDP at 1 kHz and `AsciiDrive` on a pseudo-terminal, in real time
 
-On the wires the peers' threads share the process with the loop, which makes it later than it would
-be alone. So every bound in real time is that of the settings plus `SLACK_S` plus the worst lateness
+On the wires the emulators' threads share the process with the loop, which makes it run later. So
+every bound in real time is that of the settings plus `SLACK_S` plus the worst lateness
 of the probe beside the test (`tests.lateness`); on the virtual rig nothing is added. Tests on wires
 run at a real-time priority, as the loop of a true rig does, so that other programs disturb them
 less.
@@ -32,10 +32,10 @@ from rigidimeter.devices.base import DeviceError
 from rigidimeter.devices.cia402.drive import Cia402Drive
 from rigidimeter.devices.composed import ComposedRig
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation.ascii_emulator import AsciiPeer
-from rigidimeter.emulation.cia402.cia402_emulator import Cia402Peer
+from rigidimeter.emulation.ascii_emulator import AsciiEmulator
+from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
 from rigidimeter.emulation.emulated_arm import EmulatedArm
-from rigidimeter.emulation.rdt.rdt_emulator import RdtPeer
+from rigidimeter.emulation.rdt.rdt_emulator import RdtEmulator
 from rigidimeter.settings import Settings, parse_settings
 
 CANOPEN, ASCII = "rdt_canopen", "rdt_ascii"
@@ -43,7 +43,7 @@ WIRES = (CANOPEN, ASCII)
 RIGS = ("virtual", *WIRES)
 
 SLACK_S = 0.03
-"""What a busy machine may add on a wire: three peers' threads and a loop in one process."""
+"""What a busy machine may add on a wire: three emulators' threads and a loop in one process."""
 
 JOINT = JointDynamics(0.0045, 0.1368, 1.751)
 
@@ -271,8 +271,8 @@ class Bench:
     settings: Settings
     clock: Any
     rig: Any
-    sensor_peer: Any = None
-    drive_peer: Any = None
+    sensor_emulator: Any = None
+    drive_emulator: Any = None
     arm: Any = None
     line: Any = None
     drive: Any = None
@@ -292,22 +292,22 @@ class Bench:
         elif wrong.where == "arm":
             self.arm.voluntary_nm = wrong.value
         else:
-            peer = self.sensor_peer if wrong.where == "sensor" else self.drive_peer
-            peer.misbehave(wrong.name, *(() if wrong.value is None else (wrong.value,)))
+            emulator = self.sensor_emulator if wrong.where == "sensor" else self.drive_emulator
+            emulator.misbehave(wrong.name, *(() if wrong.value is None else (wrong.value,)))
 
     def behave(self) -> None:
         if self.virtual:
             self.rig.habits.clear()
         else:
-            self.sensor_peer.behave()
-            self.drive_peer.behave()
+            self.sensor_emulator.behave()
+            self.drive_emulator.behave()
 
     @property
     def powered(self) -> bool:
         """Whether the drive has power: its own word, not the driver's."""
         if self.virtual:
             return bool(self.rig.powered)
-        state = self.drive_peer.state()
+        state = self.drive_emulator.state()
         return bool(state["power"] if "power" in state else state["powered"])
 
     def trace(self) -> Any:
@@ -336,11 +336,11 @@ class Bench:
 
 
 TOO_SLOW = ("keeps up with", "too short for a cycle", "no answer", "stopped answering")
-"""What a driver says of a serial peer whose thread did not run for a while."""
+"""What a driver says of a serial emulator whose thread did not run for a while."""
 
 
 def configured(rig: ComposedRig) -> dict[str, Any]:
-    """Configure; a busy machine may make the serial peer too slow for a moment."""
+    """Configure; a busy machine may make the serial emulator too slow for a moment."""
     for _ in range(10):
         try:
             return dict(rig.configure())
@@ -373,26 +373,26 @@ def _on_wires(name: str, settings: Settings, connected: bool) -> Iterator[Bench]
     clock = RealClock(rate_hz)
     arm = WatchedArm(JOINT)
     line = Line(clock.now_s)
-    with RdtPeer(arm, rate_hz=1000.0) as sensor_peer:
+    with RdtEmulator(arm, rate_hz=1000.0) as sensor_emulator:
         sensor = AtiRdt(
             AtiRdt.Settings(
-                address="127.0.0.1", port=sensor_peer.port, http_port=sensor_peer.http_port
+                address="127.0.0.1", port=sensor_emulator.port, http_port=sensor_emulator.http_port
             ),
             clock.now_s,
         )
-        drive_peer: Any
+        drive_emulator: Any
         drive: Any
         if name == CANOPEN:
             wire = {"interface": "virtual", "channel": f"faults {next(_channels)}"}
-            drive_peer = Cia402Peer(arm, **wire)
+            drive_emulator = Cia402Emulator(arm, **wire)
             drive = Cia402Drive(Cia402Drive.Settings(**wire, **CANOPEN_DRIVE), clock.now_s)
         else:
-            drive_peer = AsciiPeer(arm)
+            drive_emulator = AsciiEmulator(arm)
             drive = AsciiDrive(
-                AsciiDrive.Settings(port=drive_peer.port, **ASCII_DRIVE), clock.now_s
+                AsciiDrive.Settings(port=drive_emulator.port, **ASCII_DRIVE), clock.now_s
             )
         rig = ComposedRig(sensor, drive, rate_hz, line)
-        made = Bench(name, settings, clock, rig, sensor_peer, drive_peer, arm, line, drive)
+        made = Bench(name, settings, clock, rig, sensor_emulator, drive_emulator, arm, line, drive)
         try:
             if connected:
                 rig.connect()
@@ -402,4 +402,4 @@ def _on_wires(name: str, settings: Settings, connected: bool) -> Iterator[Bench]
             try:
                 rig.close()
             finally:
-                drive_peer.close()
+                drive_emulator.close()

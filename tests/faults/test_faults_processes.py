@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 from tests.faults.session import PATIENCE, RATE_HZ, SPEED_DEG_S
 from tests.lateness import PRESENT
-from tests.wire.bench import EmulatedBench
+from tests.wire.rig_process import RigProcess
 
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import read_samples
@@ -126,7 +126,7 @@ class Session:
 @contextlib.contextmanager
 def session(drive, tmp_path):
     with (
-        EmulatedBench(tmp_path / "RIG.toml", drive) as bench,
+        RigProcess(tmp_path / "RIG.toml", drive) as bench,
         Session(bench, tmp_path / "s") as running,
     ):
         yield running

@@ -1,4 +1,4 @@
-"""The serial drive against its peer on a pseudo-terminal: every habit, and a computer that dies."""
+"""The serial drive against its emulator: every misbehaviour, and a computer that dies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.lateness import ordinary_priority, same_priority
 from rigidimeter.devices.ascii.drive import AsciiDrive
 from rigidimeter.devices.base import DeviceError
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation.ascii_emulator import MISBEHAVIOURS, AsciiPeer
+from rigidimeter.emulation.ascii_emulator import MISBEHAVIOURS, AsciiEmulator
 from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.guard import Cause
 
@@ -27,16 +27,16 @@ DECELERATION_DEG_S2 = 500.0
 
 
 class Wire:
-    """A peer, its arm, and as many drivers as a test wants, one after the other."""
+    """A emulator, its arm, and as many drivers as a test wants, one after the other."""
 
     def __init__(self) -> None:
         self.arm = EmulatedArm(JointDynamics(0.08, 0.5, 2.0))
-        self.peer = AsciiPeer(self.arm, counts_per_turn=COUNTS_PER_TURN)
+        self.emulator = AsciiEmulator(self.arm, counts_per_turn=COUNTS_PER_TURN)
         self.drives: list[AsciiDrive] = []
 
     def drive(self, **settings):
         values = {
-            "port": self.peer.port,
+            "port": self.emulator.port,
             "counts_per_turn": COUNTS_PER_TURN,
             "horizon_s": HORIZON_S,
             "deceleration_deg_s2": DECELERATION_DEG_S2,
@@ -79,7 +79,7 @@ class Wire:
     def close(self):
         for drive in self.drives:
             drive.close()
-        self.peer.close()
+        self.emulator.close()
 
 
 @pytest.fixture
@@ -116,7 +116,7 @@ def test_facts_are_read_from_the_drive(wire):
     facts = wire.drive().configure()
     assert (facts.model, facts.serial) == ("EMU-055-18", "4711")
     assert facts.watchdog_s == HORIZON_S
-    assert wire.peer.state()["baud"] == 115200
+    assert wire.emulator.state()["baud"] == 115200
     assert facts.values["deceleration_counts_s2"] == pytest.approx(500_000.0)
 
 
@@ -170,7 +170,7 @@ def test_slowing_down_never_turns_the_arm_back(wire):
 def test_what_goes_wrong_is_named_and_the_arm_comes_to_rest(wire, lateness, habit, value, cause):
     drive = wire.enabled()
     wire.run(drive, SPEED_RAD_S, 0.3)
-    wire.peer.misbehave(habit, value)
+    wire.emulator.misbehave(habit, value)
     began_s = time.monotonic()
     assert wire.cause(drive, SPEED_RAD_S) is cause
     assert time.monotonic() - began_s < 0.4 + lateness.worst_s(began_s)
@@ -195,12 +195,12 @@ def test_after_a_pause_the_arm_waits_to_be_enabled_again(wire, sleeps):
         assert drive._line.wait(1.0)  # what was asked is answered; then only the clock goes on
         ahead_s = HORIZON_S + 0.1
     stood_rad = wire.arm.motion()[0]
-    asked = len(wire.peer.log)
+    asked = len(wire.emulator.log)
     sent = [drive.write(SPEED_RAD_S)]  # before anything was read
     sample, last = wire.run(drive, SPEED_RAD_S, 0.3)
     assert sample.cause == Cause.DRIVE_STATE
     assert [*sent, last] == [0.0, 0.0]
-    assert "t 1" not in [request for _, request, _ in list(wire.peer.log)[asked:]]
+    assert "t 1" not in [request for _, request, _ in list(wire.emulator.log)[asked:]]
     assert wire.arm.motion()[0] == pytest.approx(stood_rad, abs=1e-3 if sleeps else 0.05)
     assert abs(wire.arm.motion()[1]) < 0.02
     drive.disable()
@@ -212,10 +212,10 @@ def test_after_a_pause_the_arm_waits_to_be_enabled_again(wire, sleeps):
 def test_power_that_comes_back_moves_nothing(wire):
     drive = wire.enabled()
     wire.run(drive, SPEED_RAD_S, 0.3)
-    wire.peer.misbehave("power_lost")
+    wire.emulator.misbehave("power_lost")
     assert wire.cause(drive, SPEED_RAD_S) is Cause.DRIVE_STATE
     wire.run(drive, SPEED_RAD_S, 0.1)
-    wire.peer.behave()
+    wire.emulator.behave()
     angle_rad = wire.arm.motion()[0]
     wire.run(drive, SPEED_RAD_S, 0.3)
     assert wire.arm.motion()[0] == pytest.approx(angle_rad, abs=1e-3)
@@ -228,7 +228,7 @@ def test_power_that_comes_back_moves_nothing(wire):
 def test_what_the_guard_must_see_is_passed_on_as_it_is(wire, habit, value, measured_rad_s):
     drive = wire.enabled()
     wire.run(drive, SPEED_RAD_S, 0.3)
-    wire.peer.misbehave(habit, value)
+    wire.emulator.misbehave(habit, value)
     sample, sent = wire.run(drive, SPEED_RAD_S if habit != "encoder_frozen" else 0.0, 0.3)
     assert sample.cause == 0
     assert sample.velocity_rad_s == pytest.approx(measured_rad_s, abs=0.1)
@@ -248,16 +248,16 @@ def test_every_misbehaviour_has_a_test():
 
 
 def test_a_stale_target_that_does_not_go_is_refused_before_power(wire):
-    wire.peer.misbehave("stale_target", 5000)
+    wire.emulator.misbehave("stale_target", 5000)
     with pytest.raises(DeviceError, match="0x2f is 5000 after 0 was written"):
         wire.drive().configure()
-    wire.peer.behave()
+    wire.emulator.behave()
     drive = wire.drive()
     drive.configure()
-    wire.peer.misbehave("stale_target", 5000)
+    wire.emulator.misbehave("stale_target", 5000)
     with pytest.raises(DeviceError, match="0x2f is 5000"):
         drive.enable()
-    assert not any(request == "s r0x24 21" for _, request, _ in wire.peer.log)
+    assert not any(request == "s r0x24 21" for _, request, _ in wire.emulator.log)
 
 
 def test_a_stale_target_of_a_session_before_moves_nothing(wire):
@@ -273,15 +273,15 @@ def test_a_stale_target_of_a_session_before_moves_nothing(wire):
 
 
 def test_a_latched_fault_is_cleared_once_and_one_that_stays_is_refused(wire):
-    wire.peer.misbehave("fault", 3)
-    wire.peer.behave()
+    wire.emulator.misbehave("fault", 3)
+    wire.emulator.behave()
     facts = wire.drive().configure()
     assert facts.values["latched_faults_before"] == 1 << 3
-    wire.peer.misbehave("power_lost")
+    wire.emulator.misbehave("power_lost")
     drive = wire.drives[-1]
     with pytest.raises(DeviceError, match="enable input not active"):
         drive.enable()
-    assert wire.peer.state()["desired_state"] == 0
+    assert wire.emulator.state()["desired_state"] == 0
 
 
 def test_a_drive_that_is_not_there_is_named():
@@ -294,7 +294,7 @@ def test_a_drive_that_is_not_there_is_named():
 
 
 def test_a_drive_that_says_nothing_is_named(wire):
-    wire.peer.misbehave("silent")
+    wire.emulator.misbehave("silent")
     with pytest.raises(DeviceError, match=r"no answer on .* at 9600 or 115200 baud"):
         wire.drive().configure()
 
@@ -341,7 +341,13 @@ def test_the_drive_stops_by_itself_when_the_computer_dies(lateness):
     programs = {}
     try:
         for how, wire in wires.items():
-            values = [wire.peer.port, COUNTS_PER_TURN, HORIZON_S, DECELERATION_DEG_S2, SPEED_RAD_S]
+            values = [
+                wire.emulator.port,
+                COUNTS_PER_TURN,
+                HORIZON_S,
+                DECELERATION_DEG_S2,
+                SPEED_RAD_S,
+            ]
             programs[how] = subprocess.Popen(
                 [sys.executable, "-c", SCRIPT, *map(str, values)],
                 stdout=subprocess.PIPE,
@@ -367,7 +373,7 @@ def _dies_at_speed(how, wire, program, lateness):
     os.kill(program.pid, how)
     # What was on the wire then still arrives; the last command is the one the drive took.
     time.sleep(0.02)
-    last_s = moving_s = max(at for at, request, _ in list(wire.peer.log) if request == "t 1")
+    last_s = moving_s = max(at for at, request, _ in list(wire.emulator.log) if request == "t 1")
     while time.monotonic() < last_s + 1.0:
         if abs(wire.arm.motion()[1]) > 0.01 * SPEED_RAD_S:
             moving_s = time.monotonic()

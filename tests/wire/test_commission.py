@@ -33,12 +33,14 @@ pytest.importorskip("can")
 pytest.importorskip("canopen")
 pytest.importorskip("serial")
 
-_spec = importlib.util.spec_from_file_location("bench", Path(__file__).with_name("bench.py"))
+_spec = importlib.util.spec_from_file_location(
+    "rig_process", Path(__file__).with_name("rig_process.py")
+)
 assert _spec is not None
 assert _spec.loader is not None
 _module = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(_module)
-EmulatedBench = _module.EmulatedBench
+RigProcess = _module.RigProcess
 
 QUICK = CommissioningSettings(idle_s=0.6, swings=1, steps_s=1.2, known_torque_s=0.5)
 
@@ -63,7 +65,7 @@ def settings(rate_hz: float, **guard: float) -> Settings:
 
 @pytest.fixture(scope="module")
 def can_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    with EmulatedBench(tmp_path_factory.mktemp("can") / "RIG.toml") as bench:
+    with RigProcess(tmp_path_factory.mktemp("can") / "RIG.toml") as bench:
         yield bench
 
 
@@ -157,7 +159,7 @@ def _holds_for_this_rig_only(bench: Any, chosen: Settings, record: Commissioning
 
 
 def test_a_healthy_serial_rig_passes_at_a_low_tick_rate(tmp_path: Path) -> None:
-    with EmulatedBench(tmp_path / "RIG.toml", "ascii") as bench:
+    with RigProcess(tmp_path / "RIG.toml", "ascii") as bench:
         record, failed = tried(bench.rig, settings(60.0))
         assert failed == []
         assert record.passed
@@ -225,7 +227,7 @@ def test_a_dead_sensor_is_caught_and_the_record_says_so(
 
 def test_a_slow_and_noisy_sensor_is_caught(tmp_path: Path) -> None:
     options = ("--torque-rate-hz", "250", "--noise-nm", "0.4")
-    with EmulatedBench(tmp_path / "RIG.toml", "cia402", *options) as bench:
+    with RigProcess(tmp_path / "RIG.toml", "cia402", *options) as bench:
         bench.misbehave("torque", "lose", 2)
         _, failed = tried(bench.rig, settings(250.0))
     assert {"torque samples", "torque noise (SD)", "lost or damaged messages"} <= set(failed)

@@ -18,16 +18,16 @@ from rigidimeter.devices.cia402.drive import Cia402Drive
 from rigidimeter.devices.conformance import (
     DRIVE_CHECKS,
     SENSOR_CHECKS,
-    DriveBench,
+    DriveFixture,
     OtherEnd,
-    SensorBench,
+    SensorFixture,
 )
 from rigidimeter.devices.replay_device import ReplayDrive, ReplaySensor
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation.ascii_emulator import AsciiPeer
-from rigidimeter.emulation.cia402.cia402_emulator import Cia402Peer
+from rigidimeter.emulation.ascii_emulator import AsciiEmulator
+from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
 from rigidimeter.emulation.emulated_arm import EmulatedArm
-from rigidimeter.emulation.rdt.rdt_emulator import RdtPeer
+from rigidimeter.emulation.rdt.rdt_emulator import RdtEmulator
 
 JOINT = JointDynamics(0.08, 0.5, 2.0)
 CHANNEL = count()
@@ -55,7 +55,7 @@ class FakeReader:
 
 
 @contextmanager
-def analogue() -> Iterator[SensorBench]:
+def analogue() -> Iterator[SensorFixture]:
     reader = FakeReader()
     table = Path(__file__).with_name("ati_identity.toml")
     settings = AtiAnalogue.Settings(channels="Dev1/ai0:5", calibration=str(table))
@@ -64,19 +64,22 @@ def analogue() -> Iterator[SensorBench]:
         reader.silent = False
         return AtiAnalogue(settings, time.monotonic, reader)
 
-    yield SensorBench(make, time.monotonic, lambda: setattr(reader, "silent", True))
+    yield SensorFixture(make, time.monotonic, lambda: setattr(reader, "silent", True))
 
 
 @contextmanager
-def rdt() -> Iterator[SensorBench]:
-    with RdtPeer(EmulatedArm(JOINT)) as peer:
+def rdt() -> Iterator[SensorFixture]:
+    with RdtEmulator(EmulatedArm(JOINT)) as emulator:
         settings = AtiRdt.Settings(
-            address=peer.address, port=peer.port, http_port=peer.http_port, timeout_s=0.5
+            address=emulator.address,
+            port=emulator.port,
+            http_port=emulator.http_port,
+            timeout_s=0.5,
         )
-        yield SensorBench(
+        yield SensorFixture(
             lambda: AtiRdt(settings, time.monotonic),
             time.monotonic,
-            lambda: peer.misbehave("silent"),
+            lambda: emulator.misbehave("silent"),
         )
 
 
@@ -93,16 +96,16 @@ def record(ticks: int = 5000) -> dict[str, np.ndarray]:
 
 
 @contextmanager
-def replayed_sensor() -> Iterator[SensorBench]:
-    yield SensorBench(lambda: ReplaySensor(record()))
+def replayed_sensor() -> Iterator[SensorFixture]:
+    yield SensorFixture(lambda: ReplaySensor(record()))
 
 
 @contextmanager
-def ascii_bench(mode: str) -> Iterator[DriveBench]:
+def ascii_fixture(mode: str) -> Iterator[DriveFixture]:
     arm = EmulatedArm(JOINT)
-    peer = AsciiPeer(arm)
+    emulator = AsciiEmulator(arm)
     settings = AsciiDrive.Settings(
-        port=peer.port,
+        port=emulator.port,
         counts_per_turn=360_000.0,
         mode=mode,
         external_watchdog=mode == "velocity",
@@ -110,22 +113,22 @@ def ascii_bench(mode: str) -> Iterator[DriveBench]:
         horizon_s=0.2,  # the cycle is measured on a machine that is shared
     )
     try:
-        yield DriveBench(
+        yield DriveFixture(
             lambda: AsciiDrive(settings, time.monotonic),
             time.monotonic,
-            lambda: peer.misbehave("silent"),
-            OtherEnd(lambda: bool(peer.state()["power"]), lambda: arm.motion()[1]),
+            lambda: emulator.misbehave("silent"),
+            OtherEnd(lambda: bool(emulator.state()["power"]), lambda: arm.motion()[1]),
             settle_s=0.3,
         )
     finally:
-        peer.close()
+        emulator.close()
 
 
 @contextmanager
-def cia402() -> Iterator[DriveBench]:
+def cia402() -> Iterator[DriveFixture]:
     arm = EmulatedArm(JOINT)
     channel = f"conformance {next(CHANNEL)}"
-    peer = Cia402Peer(arm, interface="virtual", channel=channel)
+    emulator = Cia402Emulator(arm, interface="virtual", channel=channel)
     settings = Cia402Drive.Settings(
         interface="virtual",
         channel=channel,
@@ -137,45 +140,47 @@ def cia402() -> Iterator[DriveBench]:
         max_velocity_rad_s=3.0,
     )
     try:
-        yield DriveBench(
+        yield DriveFixture(
             lambda: Cia402Drive(settings, time.monotonic),
             time.monotonic,
-            lambda: peer.misbehave("die"),
-            OtherEnd(lambda: bool(peer.state()["power"]), lambda: arm.motion()[1]),
+            lambda: emulator.misbehave("die"),
+            OtherEnd(lambda: bool(emulator.state()["power"]), lambda: arm.motion()[1]),
             tick_s=0.005,
             settle_s=0.3,
         )
     finally:
-        peer.close()
+        emulator.close()
 
 
 @contextmanager
-def replayed_drive() -> Iterator[DriveBench]:
-    yield DriveBench(lambda: ReplayDrive(record()), tick_s=0.001, settle_s=0.1)
+def replayed_drive() -> Iterator[DriveFixture]:
+    yield DriveFixture(lambda: ReplayDrive(record()), tick_s=0.001, settle_s=0.1)
 
 
 SENSORS = {"ati-analogue": analogue, "ati-rdt": rdt, "replay": replayed_sensor}
 DRIVES = {
-    "ascii-moves": lambda: ascii_bench("moves"),
-    "ascii-velocity": lambda: ascii_bench("velocity"),
+    "ascii-moves": lambda: ascii_fixture("moves"),
+    "ascii-velocity": lambda: ascii_fixture("velocity"),
     "cia402": cia402,
     "replay": replayed_drive,
 }
 
 
 @pytest.mark.parametrize("check", SENSOR_CHECKS, ids=lambda check: check.__name__)
-@pytest.mark.parametrize("bench", SENSORS.values(), ids=SENSORS.keys())
+@pytest.mark.parametrize("fixture", SENSORS.values(), ids=SENSORS.keys())
 def test_sensor(
-    bench: Callable[[], AbstractContextManager[SensorBench]], check: Callable[[SensorBench], None]
+    fixture: Callable[[], AbstractContextManager[SensorFixture]],
+    check: Callable[[SensorFixture], None],
 ) -> None:
-    with bench() as made:
+    with fixture() as made:
         check(made)
 
 
 @pytest.mark.parametrize("check", DRIVE_CHECKS, ids=lambda check: check.__name__)
-@pytest.mark.parametrize("bench", DRIVES.values(), ids=DRIVES.keys())
+@pytest.mark.parametrize("fixture", DRIVES.values(), ids=DRIVES.keys())
 def test_drive(
-    bench: Callable[[], AbstractContextManager[DriveBench]], check: Callable[[DriveBench], None]
+    fixture: Callable[[], AbstractContextManager[DriveFixture]],
+    check: Callable[[DriveFixture], None],
 ) -> None:
-    with bench() as made:
+    with fixture() as made:
         check(made)

@@ -13,7 +13,9 @@ from rigidimeter.devices.rigfile import load_rig
 
 pytest.importorskip("serial")
 
-_spec = importlib.util.spec_from_file_location("bench", Path(__file__).with_name("bench.py"))
+_spec = importlib.util.spec_from_file_location(
+    "rig_process", Path(__file__).with_name("rig_process.py")
+)
 assert _spec is not None
 assert _spec.loader is not None
 _module = importlib.util.module_from_spec(_spec)
@@ -21,7 +23,7 @@ _spec.loader.exec_module(_module)
 
 
 def test_the_bench_answers_every_line_and_ends_in_order(tmp_path: Path) -> None:
-    with _module.EmulatedBench(tmp_path / "RIG.toml", "ascii") as bench:
+    with _module.RigProcess(tmp_path / "RIG.toml", "ascii") as bench:
         assert load_rig(bench.rig).name == "emulated rig"
         assert bench.command("place 12")["ok"]
         state = bench.state()
@@ -48,6 +50,6 @@ def test_the_bench_answers_every_line_and_ends_in_order(tmp_path: Path) -> None:
 def test_a_bench_that_cannot_start_says_why(tmp_path: Path) -> None:
     with (
         pytest.raises(AssertionError, match=r"torque-rate-hz|rate_hz"),
-        _module.EmulatedBench(tmp_path / "RIG.toml", "ascii", "--torque-rate-hz", "-1"),
+        _module.RigProcess(tmp_path / "RIG.toml", "ascii", "--torque-rate-hz", "-1"),
     ):
         pass

@@ -11,7 +11,7 @@ from rigidimeter.devices.ati.rdt import AtiRdt
 from rigidimeter.devices.base import DeviceError
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.emulation.emulated_arm import EmulatedArm
-from rigidimeter.emulation.rdt.rdt_emulator import MISBEHAVIOURS, RdtPeer
+from rigidimeter.emulation.rdt.rdt_emulator import MISBEHAVIOURS, RdtEmulator
 from rigidimeter.guard import Cause
 
 ANGLE_RAD = 0.3
@@ -28,22 +28,22 @@ def arm():
 
 
 @pytest.fixture
-def peer(arm):
-    with RdtPeer(arm) as peer:
-        yield peer
+def emulator(arm):
+    with RdtEmulator(arm) as emulator:
+        yield emulator
 
 
 @pytest.fixture
 def sensor_of():
-    """Make a driver of a peer; all are closed in the end."""
+    """Make a driver of a emulator; all are closed in the end."""
     made = []
 
-    def make(peer, now=time.monotonic, **settings):
+    def make(emulator, now=time.monotonic, **settings):
         # A busy machine may hold a thread up for longer than a real sensor ever is.
         values = {"timeout_s": 1.0, "tolerated_packets": 5, "frozen_s": 0.1, **settings}
         sensor = AtiRdt(
             AtiRdt.Settings(
-                address="127.0.0.1", port=peer.port, http_port=peer.http_port, **values
+                address="127.0.0.1", port=emulator.port, http_port=emulator.http_port, **values
             ),
             now,
         )
@@ -57,8 +57,8 @@ def sensor_of():
 
 
 @pytest.fixture
-def sensor(peer, sensor_of):
-    sensor = sensor_of(peer)
+def sensor(emulator, sensor_of):
+    sensor = sensor_of(emulator)
     sensor.configure()
     return sensor
 
@@ -92,9 +92,9 @@ def bad_counts(sensor):
     return {name: n for name, n in sensor.counts.items() if n and name != "received"}
 
 
-def test_what_arrives_is_what_was_sent_to_the_count(peer, sensor):
+def test_what_arrives_is_what_was_sent_to_the_count(emulator, sensor):
     samples = watch(sensor, 0.3)
-    sent = dict(peer.sent)
+    sent = dict(emulator.sent)
     assert len({sample.sequence for sample in samples}) > 50
     for sample in samples:
         assert sample.torque_nm == pytest.approx(sent[sample.sequence], abs=0.51e-6)
@@ -110,17 +110,17 @@ def test_the_torque_is_the_arms(arm, sensor):
 
 @pytest.mark.parametrize("unit", ["Nmm", "lbf-in", "lbf-ft", "N-m"])
 def test_the_torque_does_not_depend_on_the_sensors_unit(arm, sensor_of, unit):
-    with RdtPeer(arm, torque_unit=unit, force_unit="lbf") as peer:
-        sensor = sensor_of(peer)
+    with RdtEmulator(arm, torque_unit=unit, force_unit="lbf") as emulator:
+        sensor = sensor_of(emulator)
         facts = sensor.configure()
         sample = watch(sensor, 0.03)[-1]
-        assert sample.torque_nm == pytest.approx(dict(peer.sent)[sample.sequence], abs=0.51e-6)
+        assert sample.torque_nm == pytest.approx(dict(emulator.sent)[sample.sequence], abs=0.51e-6)
         assert facts.values["force_unit"] == "lbf"
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_lever_arms_weigh_the_forces(peer, sensor_of, sign):
-    sensor = sensor_of(peer, weights=[0.25, 0.0, -0.5, 0.0, 1.0, 0.5], sign=sign)
+def test_lever_arms_weigh_the_forces(emulator, sensor_of, sign):
+    sensor = sensor_of(emulator, weights=[0.25, 0.0, -0.5, 0.0, 1.0, 0.5], sign=sign)
     sensor.configure()
     for sample in watch(sensor, 0.02):
         fx, _, fz, _, ty, tz = (count / 1e6 for count in sample.raw)
@@ -128,8 +128,8 @@ def test_lever_arms_weigh_the_forces(peer, sensor_of, sign):
         assert sample.torque_nm == pytest.approx(expected_nm, abs=1e-12)
 
 
-def test_what_the_sensor_says_of_itself_is_kept(peer, sensor_of):
-    facts = sensor_of(peer).configure()
+def test_what_the_sensor_says_of_itself_is_kept(emulator, sensor_of):
+    facts = sensor_of(emulator).configure()
     assert (facts.model, facts.serial) == ("Emulated Net F/T", "FT00001")
     assert facts.fastest_tick_rate_hz == 1000.0
     assert facts.values["counts_per_torque"] == 1e6
@@ -137,7 +137,7 @@ def test_what_the_sensor_says_of_itself_is_kept(peer, sensor_of):
 
 
 def test_configuring_waits_for_the_first_sample_and_closing_stops_the_stream(
-    peer, sensor, lateness
+    emulator, sensor, lateness
 ):
     sample = sensor.read()
     assert sample.sequence >= 1
@@ -145,17 +145,17 @@ def test_configuring_waits_for_the_first_sample_and_closing_stops_the_stream(
     sensor.close()
     sensor.close()
     time.sleep(0.05)
-    sent = len(peer.sent)
+    sent = len(emulator.sent)
     time.sleep(0.05)
-    assert len(peer.sent) == sent
-    assert peer.requests[-1] == 0
+    assert len(emulator.sent) == sent
+    assert emulator.requests[-1] == 0
     assert sensor.read().sequence == sample.sequence
 
 
-def test_connecting_says_nothing_to_the_sensor(peer, sensor_of):
-    sensor_of(peer)
+def test_connecting_says_nothing_to_the_sensor(emulator, sensor_of):
+    sensor_of(emulator)
     time.sleep(0.05)
-    assert not peer.requests
+    assert not emulator.requests
 
 
 RUNNING = [
@@ -193,11 +193,11 @@ RUNNING = [
 
 @pytest.mark.parametrize(("name", "value", "cause", "count"), RUNNING)
 def test_a_fault_while_running_has_its_cause_and_is_counted(
-    peer, sensor, name, value, cause, count
+    emulator, sensor, name, value, cause, count
 ):
     watch(sensor, 0.05)
     assert bad_counts(sensor) == {}
-    peer.misbehave(name, value)
+    emulator.misbehave(name, value)
     found, after_s = first_cause(sensor, 0.25 if cause is Cause.NONE else 2.0)
     assert found is cause
     if count is not None:
@@ -207,41 +207,41 @@ def test_a_fault_while_running_has_its_cause_and_is_counted(
 
 
 @pytest.mark.parametrize("name", ["lose", "duplicate", "reorder", "short", "garbage", "foreign"])
-def test_a_damaged_stream_never_gives_a_torque_that_was_not_sent(peer, sensor, name):
-    peer.misbehave(name, 2)
+def test_a_damaged_stream_never_gives_a_torque_that_was_not_sent(emulator, sensor, name):
+    emulator.misbehave(name, 2)
     samples = watch(sensor, 0.1)
-    sent = dict(peer.sent)
+    sent = dict(emulator.sent)
     for sample in samples:
         assert sample.torque_nm == pytest.approx(sent[sample.sequence], abs=0.51e-6)
     sequences = [sample.sequence for sample in samples]
     assert sequences == sorted(sequences)  # the newest wins
 
 
-def test_silence_is_told_by_the_age_alone(peer, sensor):
+def test_silence_is_told_by_the_age_alone(emulator, sensor):
     watch(sensor, 0.02)
-    peer.misbehave("silent")
+    emulator.misbehave("silent")
     time.sleep(0.02)
     last = sensor.read()
     time.sleep(0.1)
     after = sensor.read()
     assert after == last
     assert time.monotonic() - after.time_s > 0.09
-    peer.behave()
-    peer.misbehave("lose_once", 0)  # nothing lost: only the silence is
+    emulator.behave()
+    emulator.misbehave("lose_once", 0)  # nothing lost: only the silence is
     time.sleep(0.05)
     # What the silence swallowed was numbered and is missed.
     assert sensor.read().cause == Cause.TORQUE_PACKETS
 
 
 @pytest.mark.parametrize("name", ["frozen_sequence", "frozen_ft_sequence", "frozen_record"])
-def test_a_sample_that_stands_still_ages_at_once(peer, sensor, name):
-    peer.misbehave(name)
+def test_a_sample_that_stands_still_ages_at_once(emulator, sensor, name):
+    emulator.misbehave(name)
     samples = watch(sensor, 0.08)
     assert len({sample.time_s for sample in samples[20:]}) == 1
 
 
-def test_a_backlog_gives_its_newest_and_no_loss(peer, sensor):
-    peer.misbehave("backlog", 0.05)
+def test_a_backlog_gives_its_newest_and_no_loss(emulator, sensor):
+    emulator.misbehave("backlog", 0.05)
     samples = watch(sensor, 0.3)
     times = sorted({sample.time_s for sample in samples})
     longest_s = max(b - a for a, b in itertools.pairwise(times))
@@ -251,8 +251,8 @@ def test_a_backlog_gives_its_newest_and_no_loss(peer, sensor):
 
 
 def test_a_loop_held_up_loses_nothing_at_7_khz(arm, sensor_of):
-    with RdtPeer(arm, rate_hz=7000.0) as peer:
-        sensor = sensor_of(peer)
+    with RdtEmulator(arm, rate_hz=7000.0) as emulator:
+        sensor = sensor_of(emulator)
         sensor.configure()
         before = sensor.read()
         time.sleep(0.15)
@@ -264,31 +264,31 @@ def test_a_loop_held_up_loses_nothing_at_7_khz(arm, sensor_of):
         sample = sensor.read()
         assert sensor.counts["lost"] == 0
         assert sensor.counts["received"] > 500
-        assert peer.sent[-1][0] - sample.sequence < 200
+        assert emulator.sent[-1][0] - sample.sequence < 200
 
 
-def test_a_read_ends_whatever_arrives(peer, sensor):
-    peer.misbehave("flood", 2000)
+def test_a_read_ends_whatever_arrives(emulator, sensor):
+    emulator.misbehave("flood", 2000)
     time.sleep(0.05)
-    peer.misbehave("silent")
+    emulator.misbehave("silent")
     received = sensor.counts["received"]
     sensor.read()
     assert sensor.counts["received"] - received <= 256
 
 
-def test_a_bias_under_load_and_a_spike_pass_to_the_guard(peer, sensor):
-    peer.misbehave("bias", 3.0)
+def test_a_bias_under_load_and_a_spike_pass_to_the_guard(emulator, sensor):
+    emulator.misbehave("bias", 3.0)
     time.sleep(0.02)
     assert newest(watch(sensor, 0.02)) == pytest.approx(TORQUE_NM + 3.0, abs=10 * NOISE_NM)
-    peer.behave()
-    peer.misbehave("spike", 2)
+    emulator.behave()
+    emulator.misbehave("spike", 2)
     time.sleep(0.02)
     assert max(sample.torque_nm for sample in watch(sensor, 0.05)) > 45.0
 
 
 def test_the_sequence_wraps_around_without_loss(arm, sensor_of):
-    with RdtPeer(arm, first_sequence=2**32 - 40) as peer:
-        sensor = sensor_of(peer)
+    with RdtEmulator(arm, first_sequence=2**32 - 40) as emulator:
+        sensor = sensor_of(emulator)
         sensor.configure()
         samples = watch(sensor, 0.2)
         assert samples[-1].sequence < 1000
@@ -314,9 +314,9 @@ def test_the_sequence_wraps_around_without_loss(arm, sensor_of):
         ("saturated", None, "saturated"),
     ],
 )
-def test_a_sensor_that_cannot_be_used_is_refused(peer, sensor_of, lateness, name, value, words):
-    peer.misbehave(name, value)
-    sensor = sensor_of(peer, timeout_s=0.3)
+def test_a_sensor_that_cannot_be_used_is_refused(emulator, sensor_of, lateness, name, value, words):
+    emulator.misbehave(name, value)
+    sensor = sensor_of(emulator, timeout_s=0.3)
     if words is None:
         sensor.configure()
         return
@@ -325,7 +325,7 @@ def test_a_sensor_that_cannot_be_used_is_refused(peer, sensor_of, lateness, name
         sensor.configure()
     assert str(refused.value).startswith("torque sensor at 127.0.0.1: ")
     assert time.monotonic() - began_s < 1.0 + lateness.worst_s(began_s)
-    peer.behave()
+    emulator.behave()
     sensor.configure()  # and it can be used when it is right again
 
 
@@ -337,9 +337,9 @@ def test_every_misbehaviour_is_tried():
 
 
 def test_no_web_server_and_no_sensor_are_refused(arm, sensor_of):
-    with RdtPeer(arm) as peer:
+    with RdtEmulator(arm) as emulator:
         pass
-    sensor = sensor_of(peer, timeout_s=0.3)
+    sensor = sensor_of(emulator, timeout_s=0.3)
     with pytest.raises(DeviceError, match=r"no answer.*check the sensor's power"):
         sensor.configure()
 
@@ -352,34 +352,34 @@ def test_no_web_server_and_no_sensor_are_refused(arm, sensor_of):
         ("changed_bias", "bias"),
     ],
 )
-def test_a_sensor_that_comes_back_changed_is_refused(peer, sensor_of, sensor, name, words):
+def test_a_sensor_that_comes_back_changed_is_refused(emulator, sensor_of, sensor, name, words):
     sensor.close()
-    peer.misbehave(name)
+    emulator.misbehave(name)
     sensor.connect()
     with pytest.raises(DeviceError, match=f"came back changed.*{words}"):
         sensor.configure()
-    sensor_of(peer).configure()  # a new session looks at it with fresh eyes
-    peer.behave()
+    sensor_of(emulator).configure()  # a new session looks at it with fresh eyes
+    emulator.behave()
     sensor.connect()
     sensor.configure()
     assert sensor.read().cause == Cause.NONE
 
 
-def test_a_sensor_that_was_refused_is_not_started_again(peer, sensor):
+def test_a_sensor_that_was_refused_is_not_started_again(emulator, sensor):
     """Enabling a rig asks for the samples anew; that must not pass by what configuring found."""
     sensor.restart()  # as it is, it may
     assert sensor.read().sequence >= 0
     sensor.close()
-    peer.misbehave("changed_units")
+    emulator.misbehave("changed_units")
     sensor.connect()
     with pytest.raises(DeviceError, match="came back changed"):
         sensor.configure()
-    asked = len(peer.requests)
+    asked = len(emulator.requests)
     with pytest.raises(DeviceError, match="it is not configured; configure it first"):
         sensor.restart()
-    assert len(peer.requests) == asked
+    assert len(emulator.requests) == asked
     assert sensor.read().sequence < 0
-    peer.behave()
+    emulator.behave()
     with pytest.raises(DeviceError, match="it is not configured"):  # well again, not looked at
         sensor.restart()
     sensor.configure()
@@ -387,9 +387,9 @@ def test_a_sensor_that_was_refused_is_not_started_again(peer, sensor):
     assert sensor.read().cause == Cause.NONE
 
 
-def test_a_sensor_that_gave_no_sample_is_not_started_again(peer, sensor_of):
-    sensor = sensor_of(peer)
-    peer.misbehave("deaf")
+def test_a_sensor_that_gave_no_sample_is_not_started_again(emulator, sensor_of):
+    sensor = sensor_of(emulator)
+    emulator.misbehave("deaf")
     for _ in range(2):
         with pytest.raises(DeviceError, match="no sample"):
             sensor.configure()
@@ -407,63 +407,44 @@ def test_a_sensor_that_gave_no_sample_is_not_started_again(peer, sensor_of):
         ({"expected_rate_hz": 7000.0}, "rate_hz is 1000.0 where"),
     ],
 )
-def test_a_sensor_that_is_not_the_expected_one_is_refused(peer, sensor_of, expected, words):
-    sensor = sensor_of(peer, **expected)
+def test_a_sensor_that_is_not_the_expected_one_is_refused(emulator, sensor_of, expected, words):
+    sensor = sensor_of(emulator, **expected)
     with pytest.raises(DeviceError, match=words):
         sensor.configure()
-    assert not peer.requests  # it was never asked to send
+    assert not emulator.requests  # it was never asked to send
 
 
-def test_the_expected_sensor_is_taken_however_its_unit_is_spelled(peer, sensor_of):
+def test_the_expected_sensor_is_taken_however_its_unit_is_spelled(emulator, sensor_of):
     sensor_of(
-        peer, expected_serial="FT00001", expected_calibration=0, expected_torque_unit="N-m"
+        emulator, expected_serial="FT00001", expected_calibration=0, expected_torque_unit="N-m"
     ).configure()
 
 
-def test_a_bias_is_refused_under_load_and_set_without(arm, peer, sensor):
-    with pytest.raises(DeviceError, match=r"load of 0\.6.*at most 0\.2 N·m"):
-        sensor.set_bias()
-    assert 0x42 not in peer.requests
-    arm.place(0.05)
-    time.sleep(0.05)
-    sensor.set_bias()
-    time.sleep(0.05)
-    assert newest(watch(sensor, 0.02)) == pytest.approx(0.0, abs=10 * NOISE_NM)
-    sensor.connect()
-    sensor.configure()  # a bias it set itself is no change
-
-
-def test_a_bias_is_refused_while_the_samples_cannot_be_used(peer, sensor):
-    peer.misbehave("saturated")
-    with pytest.raises(DeviceError, match="saturated"):
-        sensor.set_bias()
-
-
-def test_everything_at_once_stops_and_the_peer_lives_on(peer, sensor):
+def test_everything_at_once_stops_and_the_emulator_lives_on(emulator, sensor):
     for name in MISBEHAVIOURS:
         if name not in ("silent", "deaf", "backlog", "restart", "frozen_record"):
-            peer.misbehave(name, None if name.startswith("http") else 3)
+            emulator.misbehave(name, None if name.startswith("http") else 3)
     assert first_cause(sensor)[0] in (Cause.TORQUE_STATUS, Cause.TORQUE_SATURATED)
-    peer.behave()
+    emulator.behave()
     sensor.connect()
     sensor.configure()
     assert all(sample.cause == Cause.NONE for sample in watch(sensor, 0.05))
 
 
-def test_two_faults_at_once_show_the_graver(peer, sensor):
-    peer.misbehave("lose", 2)
-    peer.misbehave("frozen_values")
-    peer.misbehave("saturated")
+def test_two_faults_at_once_show_the_graver(emulator, sensor):
+    emulator.misbehave("lose", 2)
+    emulator.misbehave("frozen_values")
+    emulator.misbehave("saturated")
     assert first_cause(sensor)[0] is Cause.TORQUE_SATURATED
     assert all(sample.cause == Cause.TORQUE_SATURATED for sample in watch(sensor, 0.2))
 
 
-def test_a_wall_clock_that_jumps_has_no_effect(peer, sensor, monkeypatch):
+def test_a_wall_clock_that_jumps_has_no_effect(emulator, sensor, monkeypatch):
     monkeypatch.setattr(time, "time", lambda: 0.0)
     assert all(sample.cause == Cause.NONE for sample in watch(sensor, 0.1))
 
 
-def test_a_wire_that_is_taken_away_does_not_raise(peer, sensor):
+def test_a_wire_that_is_taken_away_does_not_raise(emulator, sensor):
     sensor._socket.close()  # as a network interface that goes down
     before = sensor.read()
     causes = [sensor.read().cause for _ in range(10)]
@@ -472,26 +453,26 @@ def test_a_wire_that_is_taken_away_does_not_raise(peer, sensor):
     sensor.close()
 
 
-def test_the_peer_ignores_what_is_no_request(peer):
+def test_the_emulator_ignores_what_is_no_request(emulator):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         for data in (b"", b"x" * 8, struct.pack(">HHI", 0x4321, 2, 0), b"x" * 60):
-            stranger.sendto(data, ("127.0.0.1", peer.port))
+            stranger.sendto(data, ("127.0.0.1", emulator.port))
     time.sleep(0.05)
-    assert not peer.requests
-    assert not peer.sent
+    assert not emulator.requests
+    assert not emulator.sent
     with pytest.raises(ValueError, match="no misbehaviour"):
-        peer.misbehave("sulk")
+        emulator.misbehave("sulk")
 
 
 @pytest.mark.parametrize("unit", ["Nm", "Nmm"])
 def test_a_client_that_others_wrote_sees_the_same_torque(arm, sensor_of, unit):
     pynetft = pytest.importorskip("pynetft")
     to_nm = {"N-m": 1.0, "N-mm": 1e-3}
-    with RdtPeer(arm, torque_unit=unit) as theirs, RdtPeer(arm, seed=2) as peer:
+    with RdtEmulator(arm, torque_unit=unit) as theirs, RdtEmulator(arm, seed=2) as emulator:
         config = pynetft.Config(
             sensor_host="127.0.0.1", rdt_port=theirs.port, http_port=theirs.http_port
         )
-        sensor = sensor_of(peer)
+        sensor = sensor_of(emulator)
         sensor.configure()
         ours, seen = [], []
         with pynetft.Client(config, queue_size=1000) as client:

@@ -51,7 +51,7 @@ def emulate(
       rigidimeter emulate --drive ascii --joint 0.0045 0.14 1.75 --rig-out RIG.toml
     """
     from rigidimeter.dynamics.joint import JointDynamics
-    from rigidimeter.emulation.emulated_rig import Bench, serve
+    from rigidimeter.emulation.emulated_rig import EmulatedRig, serve
 
     if drive not in ("cia402", "ascii"):
         raise UserError(f"--drive {drive}: must be cia402 or ascii")
@@ -59,7 +59,7 @@ def emulate(
         _check_target(rig_out)
     try:
         arm = JointDynamics(*joint)
-        bench = Bench(
+        rig = EmulatedRig(
             "ascii" if drive == "ascii" else "cia402",
             arm,
             voluntary_sd_nm=voluntary,
@@ -69,14 +69,14 @@ def emulate(
             seed=seed,
         )
     except ValueError as error:
-        raise UserError(f"the bench cannot be made: {error}") from None
+        raise UserError(f"the rig cannot be made: {error}") from None
     except ImportError as error:
         raise UserError(
             f"{error.name} is missing: pip install 'rigidimeter[canopen,serial]'"
         ) from None
-    with bench:
+    with rig:
         try:
-            serve(bench, rig_out)
+            serve(rig, rig_out)
         except KeyboardInterrupt:
             typer.echo("rigidimeter: emulation ended", err=True)
 

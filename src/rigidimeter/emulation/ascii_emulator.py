@@ -1,13 +1,13 @@
-"""A serial servo drive on a pseudo-terminal: ASCII registers, trapezoid moves, and every bad habit.
+"""An emulated serial servo drive on a pseudo-terminal: ASCII registers and trapezoid moves.
 
-The peer takes as long as a true line would: ten bits a character at its baud rate, each way, and a
-little to think. It starts at 9600 baud, changes by ``s r0x90``, and hears only noise while the
-host's port is set to another rate. A pseudo-terminal carries no break, so it keeps its rate between
-hosts. Its trajectory generator runs an absolute or relative trapezoid with its own deceleration,
-whoever is there to see; a position loop makes the arm follow.
+Replies take as long as on a real serial line: ten bits a character at the baud rate, each way, plus
+a processing delay. The drive starts at 9600 baud, changes by ``s r0x90``, and receives only noise
+while the host's port is set to another rate. A pseudo-terminal carries no break, so the drive keeps
+its rate from one host to the next. The trajectory generator runs absolute and relative trapezoids
+with its own deceleration whether or not the host is still there; a position loop moves the arm.
 
-A relative move that starts during another adds to the target before, which is the more dangerous of
-the two readings of such a drive.
+A relative move that starts during another is added to the previous target. Manuals can be read in
+two ways here; this is the more dangerous one.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ from typing import Any
 from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.emulation.trapezoid import Ramps, Trapezoid
 
-__all__ = ["MISBEHAVIOURS", "AsciiPeer"]
+__all__ = ["MISBEHAVIOURS", "AsciiEmulator"]
 
 MISBEHAVIOURS = {
-    "silent": "answers nothing",
+    "silent": "sends no replies",
     "error_replies": "refuses every request with this code",
-    "garbage": "answers with characters that mean nothing",
-    "half_replies": "stops in the middle of each answer",
-    "slow_replies": "answers this many seconds late",
-    "wrong_baud": "changes to this rate by itself",
+    "garbage": "replies with characters that are not a reply",
+    "half_replies": "stops in the middle of each reply",
+    "slow_replies": "replies this many seconds late",
+    "wrong_baud": "changes to this baud rate by itself",
     "fault": "latches the fault with this bit and takes the power away",
     "power_lost": "the hardware enable opens",
-    "does_not_follow": "takes commands and stands still",
-    "runs_away": "moves at this velocity in rad/s whatever it is told",
-    "encoder_frozen": "reports the position and velocity of this moment for ever",
+    "does_not_follow": "accepts commands and does not move",
+    "runs_away": "moves at this velocity in rad/s whatever is commanded",
+    "encoder_frozen": "keeps reporting the present position and velocity",
     "encoder_jump": "adds this many counts to the position",
-    "encoder_sign_flip": "reports position and velocity with the other sign",
+    "encoder_sign_flip": "reports position and velocity with the opposite sign",
     "stale_target": "keeps this target velocity in 0.1 counts/s, whatever is written",
-    "changes_state": "goes to this desired state by itself",
+    "changes_state": "changes to this desired state by itself",
 }
-"""What `AsciiPeer.misbehave` can do."""
+"""What `AsciiEmulator.misbehave` can do."""
 
 OFF, VELOCITY, MOVES = 0, 11, 21
 POWER_UP_BAUD = 9600
@@ -58,8 +58,8 @@ TEXTS = {0x92: "EMU-055-18", 0x81: "4711"}
 READ_ONLY = (0x18, 0x32, 0xA0)
 
 
-class AsciiPeer:
-    """The drive's end of the wire; a thread answers until `close`.
+class AsciiEmulator:
+    """The drive's end of the serial line; a thread replies until `close`.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class AsciiPeer:
     counts_per_turn : float
         Encoder counts for one turn of the joint.
     thinking_s : float
-        From the end of a request to the start of its answer.
+        From the end of a request to the start of its reply.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class AsciiPeer:
         os.set_blocking(self._master, False)
         self.port = os.ttyname(self._slave)
         self.log: deque[tuple[float, str, str]] = deque(maxlen=100_000)
-        self._habits: dict[str, Any] = {}
+        self._faults: dict[str, Any] = {}
         self._registers = {0x24: OFF, 0x2F: 0, 0x36: 1000, 0x37: 1000, 0x90: POWER_UP_BAUD}
         self._registers |= dict.fromkeys((0xA4, 0xC8, 0xCA, 0xCB), 0)
         self._registers |= dict.fromkeys((0xCC, 0xCD, 0xCF), 10_000)
@@ -99,13 +99,13 @@ class AsciiPeer:
         self._frozen: tuple[int, int] | None = None
         self._running = True
         self._lock = threading.RLock()
-        self._thread = threading.Thread(target=self._run, name="ascii-peer", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="ascii-emulator", daemon=True)
         self._thread.start()
 
-    # -- for tests ----------------------------------------------------------------------------
+    # -- for tests and operators ----------------------------------------------------------------
 
     def misbehave(self, name: str, value: float = 1) -> None:
-        """Begin a bad habit of `MISBEHAVIOURS`."""
+        """Start a misbehaviour of `MISBEHAVIOURS`."""
         if name not in MISBEHAVIOURS:
             raise ValueError(f"misbehaviour is {name!r}; one of {', '.join(MISBEHAVIOURS)}")
         with self._lock:
@@ -120,16 +120,16 @@ class AsciiPeer:
                 self._registers[0x90] = int(value)
             elif name == "stale_target":
                 self._registers[0x2F] = int(value)
-            self._habits[name] = value
+            self._faults[name] = value
 
     def behave(self) -> None:
-        """Lay every bad habit down; a latched fault stays until it is cleared."""
+        """End every misbehaviour; a latched fault stays until it is cleared."""
         with self._lock:
-            self._habits.clear()
+            self._faults.clear()
             self._frozen = None
 
     def state(self) -> dict[str, float | int | bool]:
-        """Return what the drive is doing, as seen from outside the wire."""
+        """Return the true state of the drive and the arm."""
         with self._lock:
             angle_rad, velocity_rad_s = self._arm.motion()
             return {
@@ -184,18 +184,18 @@ class AsciiPeer:
     def _answer(self, request: str, begun_s: float) -> None:
         character_s = self._character_s()
         with self._lock:
-            habits = dict(self._habits)
+            faults = dict(self._faults)
             reply = self._reply(request)
             self.log.append((time.monotonic(), request, reply))
-        if "silent" in habits:
+        if "silent" in faults:
             return
-        if "garbage" in habits:
+        if "garbage" in faults:
             reply = "\x7f#?"
         data = reply.encode("ascii") + b"\r"
-        if "half_replies" in habits:
+        if "half_replies" in faults:
             data = data[: len(data) // 2]
-        self._until(begun_s + len(data) * character_s + float(habits.get("slow_replies", 0.0)))
-        # A host that is gone leaves the line full; a true drive sends into the void as well.
+        self._until(begun_s + len(data) * character_s + float(faults.get("slow_replies", 0.0)))
+        # Nobody reads when the host is gone, and the buffer fills. A real drive would not notice.
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
 
@@ -209,8 +209,8 @@ class AsciiPeer:
                 self._generate()
 
     def _reply(self, request: str) -> str:
-        if "error_replies" in self._habits:
-            return f"e {int(self._habits['error_replies'])}"
+        if "error_replies" in self._faults:
+            return f"e {int(self._faults['error_replies'])}"
         match request.split():
             case ["g", name] if (register := _register(name)) is not None:
                 return self._read(register)
@@ -240,12 +240,12 @@ class AsciiPeer:
             return "e 15"
         if register == 0x90 and (value not in SPEEDS.values() or value > self._highest_baud):
             return "e 33"
-        if register == 0x2F and "stale_target" in self._habits:
+        if register == 0x2F and "stale_target" in self._faults:
             return "ok"
         if register == 0xA4:
             value = self._registers[0xA4] & ~value
         if register == 0x24 and value != self._registers[0x24]:
-            # Power comes and goes at rest, where the arm is.
+            # The generator restarts at rest where the arm is.
             self._generator.rest(self._counts()[0])
         self._registers[register] = value
         return "ok"
@@ -260,9 +260,9 @@ class AsciiPeer:
         if self._frozen is not None:
             return self._frozen
         position, velocity = self._counts()
-        if "encoder_sign_flip" in self._habits:
+        if "encoder_sign_flip" in self._faults:
             position, velocity = -position, -velocity
-        position += float(self._habits.get("encoder_jump", 0.0))
+        position += float(self._faults.get("encoder_jump", 0.0))
         return round(position), round(10.0 * velocity)
 
     def _powered(self) -> bool:
@@ -270,7 +270,7 @@ class AsciiPeer:
         return (
             state in (VELOCITY, MOVES)
             and not self._registers[0xA4]
-            and "power_lost" not in self._habits
+            and "power_lost" not in self._faults
         )
 
     def _status(self) -> int:
@@ -279,7 +279,7 @@ class AsciiPeer:
             status |= FAULT
         if self._registers[0x24] == OFF:
             status |= DISABLED
-        if "power_lost" in self._habits:
+        if "power_lost" in self._faults:
             status |= ENABLE_OPEN
         if not self._powered():
             status |= NO_PWM
@@ -299,7 +299,7 @@ class AsciiPeer:
         return "ok"
 
     def _wanted(self) -> float:
-        """Return the velocity in counts/s that the drive heads for."""
+        """Return the target velocity in counts/s."""
         if not self._powered():
             return 0.0
         if self._registers[0x24] == VELOCITY:
@@ -313,15 +313,15 @@ class AsciiPeer:
         return Ramps(10.0 * self._registers[0xCC], 10.0 * down)
 
     def _generate(self) -> None:
-        """Bring the generator to now, and let the arm follow it."""
+        """Advance the generator to the present time and make the arm follow it."""
         now_s = time.monotonic()
         while self._generated_s < now_s:
             step_s = min(GENERATOR_STEP_S, now_s - self._generated_s)
             self._generated_s += step_s
             self._step(step_s)
-        if "runs_away" in self._habits and self._powered():
-            self._arm.command(float(self._habits["runs_away"]))
-        elif not self._powered() or "does_not_follow" in self._habits:
+        if "runs_away" in self._faults and self._powered():
+            self._arm.command(float(self._faults["runs_away"]))
+        elif not self._powered() or "does_not_follow" in self._faults:
             self._arm.command(0.0)
         else:
             generator, moves = self._generator, self._registers[0x24] == MOVES
@@ -331,7 +331,7 @@ class AsciiPeer:
     def _step(self, step_s: float) -> None:
         generator = self._generator
         if not self._powered():
-            # The target of a move before stays, as it would in such a drive.
+            # The target of the last move is kept, as in a real drive.
             generator.place, generator.speed = self._counts()[0], 0.0
         elif self._registers[0x24] == VELOCITY:
             generator.run(0.1 * self._registers[0x2F], self._ramps(), step_s)

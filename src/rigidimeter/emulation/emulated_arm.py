@@ -1,4 +1,4 @@
-"""The plant behind the wire peers: one drive, one arm, whatever the time.
+"""The plant behind the wire emulators: one drive, one arm, whatever the time.
 
 Peers answer when they are asked, not at fixed ticks, so the state is advanced to the moment of each
 question, exactly, under the command that was in force since the last one. The equations are those
@@ -22,7 +22,7 @@ LONGEST_STEP_S = 0.5
 
 
 class EmulatedArm:
-    """A joint on a velocity drive that several peers share; safe to use from several threads.
+    """A joint on a velocity drive that several emulators share; safe to use from several threads.
 
     Parameters
     ----------

@@ -1,22 +1,22 @@
-"""A whole rig without hardware: one arm, a torque peer and a drive peer, told what to do by lines.
+"""A complete rig without hardware: an emulated torque sensor and an emulated drive on one arm.
 
-Torque comes over UDP as from an ATI Net F/T; the drive hears CANopen on a UDP multicast group, or
-ASCII registers on a pseudo-terminal. Nothing in the program under test knows the difference.
+The torque sensor sends UDP packets like an ATI Net F/T. The drive speaks CANopen on a UDP multicast
+group, or ASCII on a pseudo-terminal. The drivers under test are the same as on a real rig.
 
-One command a line in, one JSON object a line out, ``ok`` always among its keys:
+Commands are lines of text. Each is answered by one line of JSON with the key ``ok``:
 
     state                           angle, velocity, power, drive state, last stop, times
     misbehave torque|drive NAME [VALUE]
-    behave                          both peers do everything right again
-    joint J B K                     another arm, in kg·m², N·m·s/rad and N·m/rad
-    place DEG                       turn the joint to an angle, by hand
-    push NM                         a hand pushes the joint toward positive angles
+    behave                          end every misbehaviour of both emulators
+    joint J B K                     change the arm: kg·m², N·m·s/rad and N·m/rad
+    place DEG                       put the joint at an angle, at rest
+    push NM                         push the joint with a constant torque
     press, release                  the emergency stop in the drive's enable circuit
-    log                             what the drive peer noted
-    help                            the misbehaviours
-    quit                            the same as the end of the input
+    log                             the events that the drive logged
+    help                            list commands and misbehaviours
+    quit                            end, like the end of the input
 
-Times are those of CLOCK_MONOTONIC, the same in every process of the machine.
+Times are those of CLOCK_MONOTONIC, which all processes of a machine share.
 """
 
 from __future__ import annotations
@@ -35,33 +35,33 @@ from typing import IO, Any, Literal
 
 from rigidimeter.documents import plain_values
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation import ascii_emulator as ascii_peer
+from rigidimeter.emulation import ascii_emulator
 from rigidimeter.emulation.cia402 import cia402_emulator as cia402
 from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.emulation.rdt import rdt_emulator as rdt
 from rigidimeter.errors import UserError
 
-__all__ = ["MULTICAST_GROUP", "Bench", "serve"]
+__all__ = ["MULTICAST_GROUP", "EmulatedRig", "serve"]
 
 MULTICAST_GROUP = "239.74.163.2"
-"""Of the emulated CAN bus; each bench has a port of its own on it."""
+"""Of the emulated CAN bus; each rig uses its own port."""
 
 PRESSED = {
-    # An emergency stop takes the power away; the drive can come up no more until it is released.
+    # An emergency stop removes the power, and the drive cannot be enabled until it is released.
     "cia402": (("leave operation", None), ("refuse enable", None)),
     "ascii": (("power_lost", 1.0),),
 }
-"""What the drive peers do while the emergency stop is pressed."""
+"""Misbehaviours of the drive while the emergency stop is pressed."""
 
 SINES = 8
 PRIORITY = 20
-"""Of the peers, where the system grants it: a wire does not wait for other programs."""
+"""Real-time priority of the emulators where the system grants it: hardware is never preempted."""
 
 SWITCH_S = 0.0005
-"""The peers' threads are short; none of them shall wait 5 ms for another."""
+"""Thread switch interval: Python's default of 5 ms would delay one emulator behind another."""
 
 
-class Bench:
+class EmulatedRig:
     """An emulated rig; `close` it, or use it as a context.
 
     Parameters
@@ -69,7 +69,7 @@ class Bench:
     drive : {"cia402", "ascii"}
     joint : JointDynamics
     voluntary_sd_nm : float
-        The subject pushes by so much, in sines from 0.3 to 4 Hz.
+        Standard deviation of the voluntary torque, a sum of sines from 0.3 to 4 Hz.
     torque_rate_hz, noise_sd_nm, bandwidth_hz : float
         Of the torque sensor and the drive.
     seed : int
@@ -87,7 +87,7 @@ class Bench:
         seed: int = 1,
     ) -> None:
         self._kind = drive
-        _hurry()
+        _raise_priority()
         self._push_nm = 0.0
         self._voluntary = _voluntary(voluntary_sd_nm, seed)
         self.arm = EmulatedArm(
@@ -100,7 +100,7 @@ class Bench:
         self._wrong: dict[str, float | None] = {}
         self._pressed = False
         self._bus: dict[str, Any] = {}
-        self.torque = rdt.RdtPeer(self.arm, rate_hz=torque_rate_hz, seed=seed)
+        self.torque = rdt.RdtEmulator(self.arm, rate_hz=torque_rate_hz, seed=seed)
         self.torque.start()
         try:
             self.drive: Any = self._make_drive()
@@ -122,29 +122,29 @@ class Bench:
 
     def _make_drive(self) -> Any:
         if self._kind == "ascii":
-            return ascii_peer.AsciiPeer(self.arm)
+            return ascii_emulator.AsciiEmulator(self.arm)
         self._bus = {
             "interface": "udp_multicast",
             "channel": MULTICAST_GROUP,
             "port": _free_udp_port(),
         }
-        return cia402.Cia402Peer(self.arm, **self._bus)
+        return cia402.Cia402Emulator(self.arm, **self._bus)
 
-    def __enter__(self) -> Bench:
+    def __enter__(self) -> EmulatedRig:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
-        """End both peers, the one even if the other fails."""
+        """Close both emulators, each even if the other fails."""
         try:
             self.drive.close()
         finally:
             self.torque.stop()
 
     def rig_toml(self) -> str:
-        """Return the rig file that reaches this bench."""
+        """Return the contents of a rig file for this rig."""
         if self._kind == "ascii":
             drive = (
                 f'driver = "ascii"\nport = "{self.drive.port}"\n'
@@ -156,7 +156,7 @@ class Bench:
                 f'interface = "udp_multicast"\nchannel = "{MULTICAST_GROUP}"\n'
                 f"port = {self._bus['port']}\n"
                 "acceleration_rad_s2 = 150.0\ndeceleration_rad_s2 = 150.0\n"
-                # The peers are threads of one process: slower to answer than a servo.
+                # The emulators are threads of one process and reply later than a servo would.
                 "command_deadline_s = 0.1\nlost_s = 0.15\n"
             )
         return (
@@ -166,7 +166,7 @@ class Bench:
         )
 
     def ready(self) -> dict[str, Any]:
-        """Return what a person or a test must know to reach the bench."""
+        """Return what is needed to connect to the rig."""
         return {
             "ok": True,
             "ready": True,
@@ -177,7 +177,7 @@ class Bench:
         }
 
     def answer(self, line: str) -> dict[str, Any]:
-        """Do what a line says; a line that means nothing is answered, never raised."""
+        """Execute a command line; an invalid one gets an error reply and raises nothing."""
         name, *words = line.split() or [""]
         command = self._commands.get(name)
         if command is None:
@@ -187,8 +187,6 @@ class Bench:
             return {"ok": True, **command(*words)}
         except (TypeError, ValueError) as error:
             return {"ok": False, "error": f"{line.strip()!r}: {error}"}
-
-    # What the commands do
 
     def _state(self) -> dict[str, Any]:
         now_s = time.monotonic()
@@ -211,7 +209,7 @@ class Bench:
         return {"misbehaves": name, "value": value, "time_s": time.monotonic()}
 
     def _known(self, role: str, name: str) -> str:
-        """Return a misbehaviour by its own spelling; blanks, dashes and underscores are one."""
+        """Return the name as the emulator spells it; blanks, dashes and underscores are equal."""
         wanted = name.replace("_", " ").replace("-", " ")
         for known in self._misbehaviours(role):
             if known.replace("_", " ") == wanted:
@@ -223,7 +221,7 @@ class Bench:
     def _misbehaviours(self, role: str) -> Mapping[str, str]:
         if role == "torque":
             return rdt.MISBEHAVIOURS
-        return cia402.MISBEHAVIOURS if self._kind == "cia402" else ascii_peer.MISBEHAVIOURS
+        return cia402.MISBEHAVIOURS if self._kind == "cia402" else ascii_emulator.MISBEHAVIOURS
 
     def _tell_drive(self, name: str, value: float | None) -> None:
         # Emergency codes, modes and bits are whole numbers.
@@ -233,11 +231,11 @@ class Bench:
     def _behave(self) -> dict[str, Any]:
         self._wrong.clear()
         self.torque.behave()
-        self._drive_again()
+        self._restore_drive()
         return {"time_s": time.monotonic()}
 
-    def _drive_again(self) -> None:
-        """Let the drive do wrong only what is still asked for, the emergency stop included."""
+    def _restore_drive(self) -> None:
+        """Restart the misbehaviours that still apply, including the emergency stop."""
         self.drive.behave()
         for name, value in self._wrong.items():
             self._tell_drive(name, value)
@@ -267,7 +265,7 @@ class Bench:
     def _release(self) -> dict[str, Any]:
         time_s = time.monotonic()
         self._pressed = False
-        self._drive_again()
+        self._restore_drive()
         return {"time_s": time_s}
 
     def _log(self) -> dict[str, Any]:
@@ -282,20 +280,23 @@ class Bench:
 
 
 def serve(
-    bench: Bench, rig_out: Path | None = None, lines: IO[str] = sys.stdin, out: IO[str] = sys.stdout
+    rig: EmulatedRig,
+    rig_out: Path | None = None,
+    lines: IO[str] = sys.stdin,
+    out: IO[str] = sys.stdout,
 ) -> None:
-    """Write the rig file, say that the bench is ready, then answer lines until their end."""
+    """Write the rig file, report that the rig is ready, then answer commands to the input's end."""
     if rig_out is not None:
-        rig_out.write_text(bench.rig_toml(), encoding="utf-8")
+        rig_out.write_text(rig.rig_toml(), encoding="utf-8")
     sys.setswitchinterval(SWITCH_S)
-    _say(out, bench.ready() | {"rig": None if rig_out is None else str(rig_out)})
+    _say(out, rig.ready() | {"rig": None if rig_out is None else str(rig_out)})
     while line := lines.readline():
         if not line.strip():
             continue
         if line.strip() == "quit":
             _say(out, {"ok": True})
             return
-        _say(out, bench.answer(line))
+        _say(out, rig.answer(line))
 
 
 def _say(out: IO[str], answer: dict[str, Any]) -> None:
@@ -320,8 +321,8 @@ def _voluntary(sd_nm: float, seed: int) -> Callable[[float], float]:
     return lambda time_s: amplitude * sum(math.sin(w * time_s + p) for w, p in sines)
 
 
-def _hurry() -> None:
-    """Ask for a real-time priority for the threads to come; without it they are later."""
+def _raise_priority() -> None:
+    """Ask for real-time priority for the threads started later, if the system permits."""
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigidimeter.devices.ascii.ascii_language import get, move_target, parse, seconds, set_
+from rigidimeter.devices.ascii.language import get, move_target, parse, seconds, set_
 
 
 @pytest.mark.parametrize("text", ["", "v", "v 1 2", "ok!", "x 3", "v one", "e"])

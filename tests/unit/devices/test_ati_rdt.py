@@ -6,14 +6,13 @@ import pytest
 from rigidimeter.devices.ati.rdt import AtiRdt
 from rigidimeter.devices.ati.rdt_packets import (
     COUNTS,
-    SET_BIAS,
     START_REALTIME,
     STOP,
     RdtStream,
     request,
     status_words,
 )
-from rigidimeter.devices.ati.rdt_page import FORCE_UNITS_N, TORQUE_UNITS_NM, changes, parse_page
+from rigidimeter.devices.ati.rdt_setup import FORCE_UNITS_N, TORQUE_UNITS_NM, changes, parse_page
 from rigidimeter.devices.base import DeviceError
 from rigidimeter.guard import Cause
 
@@ -55,7 +54,6 @@ class Sensor:
 def test_requests_are_those_of_the_manual():
     assert request(STOP) == bytes.fromhex("1234 0000 00000000")
     assert request(START_REALTIME) == bytes.fromhex("1234 0002 00000000")
-    assert request(SET_BIAS, 1) == bytes.fromhex("1234 0042 00000001")
 
 
 def test_a_record_is_big_endian_and_signed():

@@ -51,6 +51,29 @@ def test_every_statusword_is_decoded_as_the_standard_codes_it():
         assert state_of(word) is (named[0] if named else State.UNKNOWN), f"0x{word:04X}"
 
 
+def test_words_agree_with_those_of_the_library():
+    theirs = pytest.importorskip("canopen.profiles.p402").State402
+    names = {
+        State.NOT_READY: "NOT READY TO SWITCH ON",
+        State.SWITCH_ON_DISABLED: "SWITCH ON DISABLED",
+        State.READY: "READY TO SWITCH ON",
+        State.SWITCHED_ON: "SWITCHED ON",
+        State.OPERATION_ENABLED: "OPERATION ENABLED",
+        State.QUICK_STOP_ACTIVE: "QUICK STOP ACTIVE",
+        State.FAULT_REACTION: "FAULT REACTION ACTIVE",
+        State.FAULT: "FAULT",
+    }
+    for word in range(0x10000):
+        found = [name for name, (mask, bits) in theirs.SW_MASK.items() if word & mask == bits]
+        state = state_of(word)
+        assert found == ([] if state is State.UNKNOWN else [names[state]]), f"0x{word:04X}"
+    assert theirs.CW_QUICK_STOP == Control.QUICK_STOP
+    assert theirs.CW_DISABLE_VOLTAGE == Control.DISABLE_VOLTAGE
+    way = (State.SWITCH_ON_DISABLED, State.READY, State.SWITCHED_ON, State.OPERATION_ENABLED)
+    for before, after in zip(way, way[1:], strict=False):
+        assert theirs.TRANSITIONTABLE[names[before], names[after]] == NEXT_CONTROL[before]
+
+
 def test_the_way_up_has_one_step_from_each_state_and_none_from_a_fault():
     assert NEXT_CONTROL[State.SWITCH_ON_DISABLED] == 0x06
     assert NEXT_CONTROL[State.READY] == 0x07

@@ -31,11 +31,15 @@ import math
 from collections.abc import Mapping
 from typing import ClassVar
 
-from rigidimeter.devices.ascii.ascii_language import get, move_target, set_
-from rigidimeter.devices.ascii.ascii_settings import AsciiDriveSettings, open_port
-from rigidimeter.devices.ascii.feedback import Feedback
+from rigidimeter.devices.ascii.language import Feedback, get, move_target, set_
 from rigidimeter.devices.ascii.line import AsciiLine
-from rigidimeter.devices.ascii.setup import OFF, PATIENCE, AsciiTalk
+from rigidimeter.devices.ascii.setup import (
+    OFF,
+    PATIENCE,
+    AsciiDriveSettings,
+    AsciiTalk,
+    open_port,
+)
 from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, Now
 from rigidimeter.guard import Cause
 

@@ -71,7 +71,6 @@ class AsciiLine:
         self._replies: deque[Exchange] = deque()
         self._answered = threading.Condition()
         self._pending = 0
-        self._error: str | None = None
         self._thread = threading.Thread(target=self._run, name="ascii-line", daemon=True)
         self._thread.start()
 
@@ -84,11 +83,6 @@ class AsciiLine:
     def busy(self) -> bool:
         """Whether a request is still without its answer."""
         return self._pending > 0
-
-    @property
-    def error(self) -> str | None:
-        """What the operating system said when the port failed."""
-        return self._error
 
     def submit(self, *requests: str) -> None:
         """Queue requests; returns at once."""
@@ -167,8 +161,7 @@ class AsciiLine:
             self._port.reset_input_buffer()
             self._port.write(request.encode("ascii") + b"\r")
             answer = self._port.read_until(b"\r", LONGEST_REPLY)
-        except OSError as error:  # serial.SerialException is one; the wire is gone
-            self._error = str(error)
+        except OSError:  # serial.SerialException is one; a port that is gone counts as no reply
             return None
         if not answer.endswith(b"\r"):
             return None

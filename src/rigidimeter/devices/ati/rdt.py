@@ -27,15 +27,19 @@ from typing import ClassVar
 
 from rigidimeter.devices.ati.rdt_packets import (
     COUNTS,
-    SET_BIAS,
     START_REALTIME,
     STOP,
     RdtStream,
     request,
     status_words,
 )
-from rigidimeter.devices.ati.rdt_page import SensorPage, changes, fetch_page
-from rigidimeter.devices.ati.rdt_settings import AtiRdtSettings, refuse_unexpected
+from rigidimeter.devices.ati.rdt_setup import (
+    AtiRdtSettings,
+    SensorPage,
+    changes,
+    fetch_page,
+    refuse_unexpected,
+)
 from rigidimeter.devices.base import DeviceError, DeviceFacts, Now, TorqueSample
 from rigidimeter.guard import Cause
 
@@ -198,41 +202,6 @@ class AtiRdt:
         if not self._configured:
             raise DeviceError(f"{self._device}: it is not configured; configure it first")
         self._start()
-
-    def set_bias(self, watch_s: float = 0.1) -> None:
-        """Let the sensor call its present load zero; only at rest and without load.
-
-        A bias set under load is a torque that is never seen again. So the torque is watched first,
-        and the sensor's own record of its bias is read back. Not for the loop: it waits.
-
-        Raises
-        ------
-        DeviceError
-            If there is a load, or the samples cannot be used.
-        """
-        limit_nm = self._settings.bias_limit_nm
-        worst_nm = 0.0
-        until_s = self._now() + watch_s
-        seen = 0
-        while self._wait(until_s):
-            sample = self.read()
-            if sample.cause:
-                raise DeviceError(
-                    f"{self._device}: its bias cannot be set while "
-                    f"{Cause(sample.cause).sentence}; put that right first"
-                )
-            seen += 1
-            worst_nm = max(worst_nm, abs(sample.torque_nm))
-        if not seen or not worst_nm <= limit_nm:
-            raise DeviceError(
-                f"{self._device}: bias under a load of {worst_nm:g} N·m ({seen} samples); it must "
-                f"be at most {limit_nm:g} N·m, so take the load off first"
-            )
-        self._send(SET_BIAS)
-        until_s = self._now() + watch_s  # nothing confirms it; the page shows it a little later
-        while self._wait(until_s):
-            self.read()
-        self._page = self._fetch()
 
     def close(self) -> None:
         """Stop the samples and close the wire. Safe to call at any time, and twice."""

@@ -25,8 +25,6 @@ __all__ = [
     "COUNTS",
     "NAMES",
     "RECORD",
-    "SERIOUS",
-    "SET_BIAS",
     "START_REALTIME",
     "STOP",
     "RdtStream",
@@ -37,7 +35,6 @@ __all__ = [
 
 STOP = 0x0000
 START_REALTIME = 0x0002
-SET_BIAS = 0x0042
 
 RECORD = struct.Struct("!III24s")
 """One record; its six counts are left packed until they are wanted."""
@@ -52,7 +49,7 @@ _ERROR = 1 << 31
 _SATURATED = 1 << 17
 _MONITOR = 1 << 16
 
-SERIOUS = _U32 & ~(_ERROR | _SATURATED | _MONITOR)
+_SERIOUS = _U32 & ~(_ERROR | _SATURATED | _MONITOR)
 """The bits after which no number of the sensor can be trusted, reserved ones included.
 
 Not among them: the summary bit (it comes with every other), saturation (it has a cause of its own)
@@ -116,7 +113,7 @@ def status_cause(status: int) -> int:
     if status & _SATURATED:
         return int(Cause.TORQUE_SATURATED)
     # The summary bit with nothing that explains it is an error too.
-    if status & SERIOUS or status == _ERROR:
+    if status & _SERIOUS or status == _ERROR:
         return int(Cause.TORQUE_STATUS)
     return int(Cause.NONE)
 

@@ -8,20 +8,17 @@ time. Frames that cannot leave or make no sense are counted.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from rigidimeter.devices.base import DeviceError, Now
-from rigidimeter.devices.cia402.sdo import library
-from rigidimeter.devices.cia402.setup import Cia402Settings
+from rigidimeter.devices.cia402.setup import Cia402Settings, library
 from rigidimeter.devices.cia402.state_words import (
     BOOTED,
     OPERATIONAL,
     SYNC_ID,
     Control,
-    Emergency,
     Nmt,
     State,
     command_bytes,
@@ -37,7 +34,6 @@ __all__ = ["NodeBus"]
 
 QUIET_S = 0.01
 LONGEST_DRAIN_S = 0.5
-REMEMBERED = 64
 
 
 class NodeBus:
@@ -79,7 +75,6 @@ class NodeBus:
         self.alarmed = False
         """An emergency came; whoever takes note takes this back."""
         self.emergency = 0
-        self.emergencies: deque[tuple[float, Emergency]] = deque(maxlen=REMEMBERED)
         self.counts = dict.fromkeys(
             ("received", "lost", "damaged", "unsent", "backlog", "emergencies"), 0
         )
@@ -249,7 +244,6 @@ class NodeBus:
         report = emergency(data)
         if report is None:
             return False
-        self.emergencies.append((self._now(), report))
         if report.code:  # 0 takes the ones before back; what was wrong is remembered all the same
             self.emergency = report.code
             self.alarmed = True

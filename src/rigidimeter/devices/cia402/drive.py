@@ -14,24 +14,26 @@ sent; that is right as long as the drive answers within a tick.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, Now
 from rigidimeter.devices.cia402.bus import NodeBus
-from rigidimeter.devices.cia402.power_up_sequence import FAULTS, reset_fault, walk_up
-from rigidimeter.devices.cia402.sdo import get, put, read_back, text
+from rigidimeter.devices.cia402.power_up_sequence import FAULTS, power_up, reset_fault
 from rigidimeter.devices.cia402.setup import (
     DISPLAYED_MODE,
     IDENTITY,
     Cia402Settings,
+    get,
     objects,
+    put,
+    read_back,
     scale,
+    text,
 )
 from rigidimeter.devices.cia402.state_words import (
     OPERATIONAL,
     PROFILE_VELOCITY,
     Control,
-    Emergency,
     Nmt,
     State,
     fastest_tick_rate_hz,
@@ -82,21 +84,6 @@ class Cia402Drive:
     def counts(self) -> Mapping[str, int]:
         """Measurements received whole or lost in part, frames damaged or unsent, full reads."""
         return self._wire.counts
-
-    @property
-    def state(self) -> State:
-        """The state that the drive last reported."""
-        return self._wire.state
-
-    @property
-    def emergency(self) -> int:
-        """The code of the last emergency message, 0 if none came since the drive was enabled."""
-        return self._wire.emergency
-
-    @property
-    def emergencies(self) -> Sequence[tuple[float, Emergency]]:
-        """The latest emergency messages, with the times they were read."""
-        return tuple(self._wire.emergencies)
 
     def connect(self) -> None:
         """Open the bus and let the drive wait for its settings; nothing is energised."""
@@ -178,7 +165,7 @@ class Cia402Drive:
             self._must_be_configured()
             wire.alarmed = False
             self._cause = Cause.NONE
-            walk_up(wire, self._now, self._settings.enable_timeout_s, self._who)
+            power_up(wire, self._now, self._settings.enable_timeout_s, self._who)
         except BaseException:
             self.disable()
             raise

@@ -10,13 +10,13 @@ from rigidimeter.devices.base import DeviceError, Now
 from rigidimeter.devices.cia402.bus import NodeBus
 from rigidimeter.devices.cia402.state_words import NEXT_CONTROL, Control, State
 
-__all__ = ["FAULTS", "reset_fault", "walk_up"]
+__all__ = ["FAULTS", "power_up", "reset_fault"]
 
 STEP_S = 0.005
 FAULTS = (State.FAULT, State.FAULT_REACTION)
 
 
-def walk_up(wire: NodeBus, now: Now, timeout_s: float, who: str) -> None:
+def power_up(wire: NodeBus, now: Now, timeout_s: float, who: str) -> None:
     """Take the power away, then go up to operation.
 
     Raises

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from rigidimeter.devices.base import MotionSample, VelocityDrive
 from rigidimeter.devices.conformance.fixture import (
-    DriveBench,
+    DriveFixture,
     await_,
     check_counts,
     check_facts,
@@ -25,58 +25,58 @@ __all__ = ["DRIVE_CHECKS"]
 DRIVE_COUNTS = ("received", "lost", "damaged")
 POWER_OFF_S = 0.1
 AT_REST = 0.02
-"""Of the bench's speed."""
+"""Of the fixture's speed."""
 
 
-def drive_refuses_disorder(bench: DriveBench) -> None:
+def drive_refuses_disorder(fixture: DriveFixture) -> None:
     """Each step asks for the one before; a drive not enabled sends nothing but zero."""
-    drive = bench.make()
+    drive = fixture.make()
     try:
         require(isinstance(drive.read(), MotionSample), "read returns a MotionSample always")
-        require(drive.write(bench.speed_rad_s) == 0.0, "write before connect returns 0")
+        require(drive.write(fixture.speed_rad_s) == 0.0, "write before connect returns 0")
         refuses(drive.enable, "enable before connect raises DeviceError")
         refuses(drive.configure, "configure before connect raises DeviceError")
         drive.connect()
         refuses(drive.enable, "enable before configure raises DeviceError")
-        _unpowered(bench, "after a refused enable")
+        _unpowered(fixture, "after a refused enable")
     finally:
         drive.close()
 
 
-def drive_energises_by_enable_only(bench: DriveBench) -> None:
+def drive_energises_by_enable_only(fixture: DriveFixture) -> None:
     """Neither connect nor configure nor a command gives power."""
-    drive = bench.make()
+    drive = fixture.make()
     try:
         drive.connect()
-        _unpowered(bench, "after connect")
+        _unpowered(fixture, "after connect")
         check_facts(drive.configure())
-        _unpowered(bench, "after configure")
+        _unpowered(fixture, "after configure")
         for _ in range(10):
-            require(drive.write(bench.speed_rad_s) == 0.0, "write before enable returns 0")
+            require(drive.write(fixture.speed_rad_s) == 0.0, "write before enable returns 0")
             drive.read()
-            time.sleep(bench.tick_s)
-        _unpowered(bench, "after write without enable")
+            time.sleep(fixture.tick_s)
+        _unpowered(fixture, "after write without enable")
     finally:
         drive.close()
 
 
-def drive_enables_at_rest(bench: DriveBench) -> None:
+def drive_enables_at_rest(fixture: DriveFixture) -> None:
     """Enable gives power and no motion."""
-    drive = _enabled(bench)
+    drive = _enabled(fixture)
     try:
-        end = bench.other_end
+        end = fixture.other_end
         require(end is None or end.powered(), "the motor has power after enable")
         for _ in range(20):
-            _run(drive, bench, 0.0, 1)
-            _at_rest(bench, "after enable")
+            _run(drive, fixture, 0.0, 1)
+            _at_rest(fixture, "after enable")
     finally:
         drive.close()
-    _loses_power(bench, "after close")
+    _loses_power(fixture, "after close")
 
 
-def drive_samples_flow(bench: DriveBench) -> None:
+def drive_samples_flow(fixture: DriveFixture) -> None:
     """Finite samples without a cause arrive, with new stamps, while commands go out."""
-    drive = _enabled(bench)
+    drive = _enabled(fixture)
     try:
         first = drive.read()
 
@@ -84,143 +84,143 @@ def drive_samples_flow(bench: DriveBench) -> None:
             drive.write(0.0)
             return drive.read().time_s > first.time_s
 
-        await_(newer, bench, "a new sample arrives")
+        await_(newer, fixture, "a new sample arrives")
         sample = drive.read()
         require(
             sample.cause == Cause.NONE, f"a good sample has no cause; {Cause(sample.cause).name}"
         )
         require(math.isfinite(sample.angle_rad + sample.velocity_rad_s), "a good sample is finite")
-        check_stamp(sample, bench.now)
+        check_stamp(sample, fixture.now)
     finally:
         drive.close()
 
 
-def drive_returns_what_was_sent(bench: DriveBench) -> None:
+def drive_returns_what_was_sent(fixture: DriveFixture) -> None:
     """`write` returns the velocity the drive was really given, after limit and rounding."""
-    drive = _enabled(bench)
+    drive = _enabled(fixture)
     try:
-        speed = bench.speed_rad_s
+        speed = fixture.speed_rad_s
         for wanted in (speed, -speed):
-            sent = _run(drive, bench, wanted, math.ceil(bench.settle_s / bench.tick_s))
+            sent = _run(drive, fixture, wanted, math.ceil(fixture.settle_s / fixture.tick_s))
             require(
-                abs(sent - wanted) <= bench.tolerance * speed,
+                abs(sent - wanted) <= fixture.tolerance * speed,
                 f"write({wanted:g}) returns about that; it returned {sent:g}",
             )
-            if bench.other_end is not None:
-                turning = bench.other_end.velocity_rad_s()
+            if fixture.other_end is not None:
+                turning = fixture.other_end.velocity_rad_s()
                 require(
                     abs(turning - sent) <= 0.2 * speed,
                     f"the joint turns as sent ({sent:g} rad/s); it turns at {turning:g}",
                 )
-        _run(drive, bench, 0.0, math.ceil(bench.settle_s / bench.tick_s))
-        _at_rest(bench, "after write(0)")
+        _run(drive, fixture, 0.0, math.ceil(fixture.settle_s / fixture.tick_s))
+        _at_rest(fixture, "after write(0)")
     finally:
         drive.close()
 
 
-def drive_bounds_commands(bench: DriveBench) -> None:
+def drive_bounds_commands(fixture: DriveFixture) -> None:
     """Send what is not finite, which must become zero, and what is far too large."""
-    drive = _enabled(bench)
+    drive = _enabled(fixture)
     try:
         for wanted in (1e9, -1e9):
             sent = drive.write(wanted)
             require(math.isfinite(sent) and abs(sent) < 1e6, "write limits a velocity")
         for wanted in (math.nan, math.inf, -math.inf):
-            sent = _run(drive, bench, wanted, 5)
+            sent = _run(drive, fixture, wanted, 5)
             require(sent == 0.0, f"write({wanted}) sends 0; it returned {sent}")
     finally:
         drive.close()
 
 
-def drive_read_never_waits(bench: DriveBench) -> None:
+def drive_read_never_waits(fixture: DriveFixture) -> None:
     """`read` and `write` are quick whether the drive answers or not; a lost drive is named."""
-    drive = _enabled(bench)
+    drive = _enabled(fixture)
 
     def tick() -> None:
         drive.read()
         drive.write(0.0)
 
     try:
-        check_quick(tick, 2 * bench.longest_read_s, bench.tick_s, "while the drive answers")
-        if bench.silence is not None:
-            bench.silence()
-            check_quick(tick, 2 * bench.longest_read_s, bench.tick_s, "when it does not")
+        check_quick(tick, 2 * fixture.longest_read_s, fixture.tick_s, "while the drive answers")
+        if fixture.silence is not None:
+            fixture.silence()
+            check_quick(tick, 2 * fixture.longest_read_s, fixture.tick_s, "when it does not")
             await_(
-                lambda: drive.read().cause != Cause.NONE, bench, "a drive that is silent is named"
+                lambda: drive.read().cause != Cause.NONE, fixture, "a drive that is silent is named"
             )
     finally:
         drive.close()
 
 
-def drive_counts(bench: DriveBench) -> None:
+def drive_counts(fixture: DriveFixture) -> None:
     """See that the counts have their names and go up only."""
-    drive = _enabled(bench)
+    drive = _enabled(fixture)
     try:
-        check_counts(lambda: drive.counts, DRIVE_COUNTS, lambda: _run(drive, bench, 0.0, 20))
+        check_counts(lambda: drive.counts, DRIVE_COUNTS, lambda: _run(drive, fixture, 0.0, 20))
     finally:
         drive.close()
 
 
-def drive_stops(bench: DriveBench) -> None:
+def drive_stops(fixture: DriveFixture) -> None:
     """`stop` brings a turning joint to rest, and no command moves it after that."""
-    drive = _enabled(bench)
+    drive = _enabled(fixture)
     try:
-        _run(drive, bench, bench.speed_rad_s, math.ceil(bench.settle_s / bench.tick_s))
+        _run(drive, fixture, fixture.speed_rad_s, math.ceil(fixture.settle_s / fixture.tick_s))
         drive.stop()
         drive.stop()
-        await_(lambda: _rests(bench), bench, "the joint is at rest after stop")
-        sent = _run(drive, bench, bench.speed_rad_s, 10)
+        await_(lambda: _rests(fixture), fixture, "the joint is at rest after stop")
+        sent = _run(drive, fixture, fixture.speed_rad_s, 10)
         require(sent == 0.0, f"write after stop sends 0; it returned {sent:g}")
-        _at_rest(bench, "after stop, whatever is written")
+        _at_rest(fixture, "after stop, whatever is written")
     finally:
         drive.close()
 
 
-def drive_ends_in_any_order(bench: DriveBench) -> None:
+def drive_ends_in_any_order(fixture: DriveFixture) -> None:
     """`stop`, `disable` and `close` in every order, each twice, and from every state."""
     orders = [(3, order) for order in itertools.permutations(range(3))]
     for stage, order in (*((stage, (2, 1, 0)) for stage in range(3)), *orders):
-        drive = bench.make()
+        drive = fixture.make()
         for step in (drive.connect, drive.configure, drive.enable)[:stage]:
             step()
         for number in order:
             for _ in range(2):
                 (drive.stop, drive.disable, drive.close)[number]()
-                require(drive.write(bench.speed_rad_s) == 0.0, "write returns 0 after the end")
+                require(drive.write(fixture.speed_rad_s) == 0.0, "write returns 0 after the end")
                 drive.read()
-        _loses_power(bench, "after stop, disable and close")
+        _loses_power(fixture, "after stop, disable and close")
         drive.close()
 
 
-def drive_stops_by_itself(bench: DriveBench) -> None:
+def drive_stops_by_itself(fixture: DriveFixture) -> None:
     """See that a drive whose facts name a watchdog comes to rest when nobody writes."""
-    drive = bench.make()
+    drive = fixture.make()
     try:
         drive.connect()
         watchdog_s = drive.configure().watchdog_s
-        if watchdog_s is None or bench.other_end is None:
+        if watchdog_s is None or fixture.other_end is None:
             return
         drive.enable()
-        _run(drive, bench, bench.speed_rad_s, math.ceil(bench.settle_s / bench.tick_s))
+        _run(drive, fixture, fixture.speed_rad_s, math.ceil(fixture.settle_s / fixture.tick_s))
         time.sleep(watchdog_s)
-        await_(lambda: _rests(bench), bench, f"at rest {watchdog_s:g} s after the last command")
+        await_(lambda: _rests(fixture), fixture, f"at rest {watchdog_s:g} s after the last command")
     finally:
         drive.close()
 
 
-def drive_restarts_at_rest(bench: DriveBench) -> None:
+def drive_restarts_at_rest(fixture: DriveFixture) -> None:
     """See that a driver closed at speed leaves nothing that moves the joint at the next enable."""
-    drive = _enabled(bench)
+    drive = _enabled(fixture)
     try:
-        _run(drive, bench, bench.speed_rad_s, 20)
+        _run(drive, fixture, fixture.speed_rad_s, 20)
     finally:
         drive.close()
-    await_(lambda: _rests(bench), bench, "the joint is at rest after close")
-    drive_enables_at_rest(bench)
+    await_(lambda: _rests(fixture), fixture, "the joint is at rest after close")
+    drive_enables_at_rest(fixture)
 
 
-def _enabled(bench: DriveBench) -> VelocityDrive:
-    drive = bench.make()
+def _enabled(fixture: DriveFixture) -> VelocityDrive:
+    drive = fixture.make()
     try:
         drive.connect()
         drive.configure()
@@ -231,40 +231,40 @@ def _enabled(bench: DriveBench) -> VelocityDrive:
     return drive
 
 
-def _run(drive: VelocityDrive, bench: DriveBench, velocity_rad_s: float, ticks: int) -> float:
+def _run(drive: VelocityDrive, fixture: DriveFixture, velocity_rad_s: float, ticks: int) -> float:
     """Read and write for so many ticks; return what was sent last."""
     sent = 0.0
     for _ in range(ticks):
         drive.read()
         sent = drive.write(velocity_rad_s)
-        time.sleep(bench.tick_s)
+        time.sleep(fixture.tick_s)
     return sent
 
 
-def _rests(bench: DriveBench) -> bool:
-    end = bench.other_end
-    return end is None or abs(end.velocity_rad_s()) <= AT_REST * bench.speed_rad_s
+def _rests(fixture: DriveFixture) -> bool:
+    end = fixture.other_end
+    return end is None or abs(end.velocity_rad_s()) <= AT_REST * fixture.speed_rad_s
 
 
-def _at_rest(bench: DriveBench, when: str) -> None:
-    require(_rests(bench), f"the joint is at rest {when}")
+def _at_rest(fixture: DriveFixture, when: str) -> None:
+    require(_rests(fixture), f"the joint is at rest {when}")
 
 
-def _unpowered(bench: DriveBench, when: str) -> None:
-    end = bench.other_end
+def _unpowered(fixture: DriveFixture, when: str) -> None:
+    end = fixture.other_end
     require(end is None or not end.powered(), f"the motor has no power {when}")
 
 
-def _loses_power(bench: DriveBench, when: str) -> None:
+def _loses_power(fixture: DriveFixture, when: str) -> None:
     # The order may still be on the wire when the driver has sent it.
     until_s = time.monotonic() + POWER_OFF_S
-    end = bench.other_end
+    end = fixture.other_end
     while end is not None and end.powered() and time.monotonic() < until_s:
         time.sleep(0.001)
-    _unpowered(bench, f"{when}, within {POWER_OFF_S:g} s")
+    _unpowered(fixture, f"{when}, within {POWER_OFF_S:g} s")
 
 
-DRIVE_CHECKS: tuple[Callable[[DriveBench], None], ...] = (
+DRIVE_CHECKS: tuple[Callable[[DriveFixture], None], ...] = (
     drive_refuses_disorder,
     drive_energises_by_enable_only,
     drive_enables_at_rest,

@@ -1,4 +1,4 @@
-"""The benches of the conformance checks, and what checks of sensors and of drives share."""
+"""The fixtures of the conformance checks, and what checks of sensors and of drives share."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from rigidimeter.devices.base import (
 
 __all__ = [
     "ConformanceError",
-    "DriveBench",
+    "DriveFixture",
     "OtherEnd",
-    "SensorBench",
+    "SensorFixture",
     "await_",
     "check_counts",
     "check_facts",
@@ -55,7 +55,7 @@ class OtherEnd:
 
 
 @dataclass(frozen=True)
-class SensorBench:
+class SensorFixture:
     """A sensor and how to try it.
 
     Parameters
@@ -79,8 +79,8 @@ class SensorBench:
 
 
 @dataclass(frozen=True)
-class DriveBench:
-    """A drive and how to try it; what is not said here is as of `SensorBench`.
+class DriveFixture:
+    """A drive and how to try it; what is not said here is as of `SensorFixture`.
 
     Parameters
     ----------
@@ -165,12 +165,14 @@ def check_quick(read: Callable[[], object], longest_s: float, tick_s: float, whe
     )
 
 
-def await_(condition: Callable[[], bool], bench: SensorBench | DriveBench, promise: str) -> None:
+def await_(
+    condition: Callable[[], bool], fixture: SensorFixture | DriveFixture, promise: str
+) -> None:
     """Wait until something is so, or raise."""
-    until_s = time.monotonic() + bench.settle_s
+    until_s = time.monotonic() + fixture.settle_s
     while not condition():
-        require(time.monotonic() < until_s, f"{promise}, within {bench.settle_s:g} s")
-        time.sleep(bench.tick_s)
+        require(time.monotonic() < until_s, f"{promise}, within {fixture.settle_s:g} s")
+        time.sleep(fixture.tick_s)
 
 
 def check_stamp(sample: TorqueSample | MotionSample, now: Now | None) -> None:

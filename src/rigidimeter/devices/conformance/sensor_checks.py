@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from rigidimeter.devices.base import TorqueSample, TorqueSensor
 from rigidimeter.devices.conformance.fixture import (
-    SensorBench,
+    SensorFixture,
     await_,
     check_counts,
     check_facts,
@@ -24,18 +24,18 @@ __all__ = ["SENSOR_CHECKS"]
 SENSOR_COUNTS = ("received", "lost", "repeated", "reordered", "damaged")
 
 
-def sensor_refuses_disorder(bench: SensorBench) -> None:
+def sensor_refuses_disorder(fixture: SensorFixture) -> None:
     """Read, configure and close a sensor that is not connected."""
-    sensor = bench.make()
+    sensor = fixture.make()
     sample = sensor.read()
     require(isinstance(sample, TorqueSample), "read returns a TorqueSample from the beginning")
     refuses(sensor.configure, "configure before connect raises DeviceError")
     sensor.close()
 
 
-def sensor_facts_are_complete(bench: SensorBench) -> None:
+def sensor_facts_are_complete(fixture: SensorFixture) -> None:
     """See that what `configure` returns can be stored."""
-    sensor = bench.make()
+    sensor = fixture.make()
     try:
         sensor.connect()
         check_facts(sensor.configure())
@@ -43,32 +43,32 @@ def sensor_facts_are_complete(bench: SensorBench) -> None:
         sensor.close()
 
 
-def sensor_samples_flow(bench: SensorBench) -> None:
+def sensor_samples_flow(fixture: SensorFixture) -> None:
     """Finite samples without a cause arrive, with new stamps."""
-    sensor = _sampling(bench)
+    sensor = _sampling(fixture)
     try:
         first = sensor.read()
-        await_(lambda: sensor.read().time_s > first.time_s, bench, "a new sample arrives")
+        await_(lambda: sensor.read().time_s > first.time_s, fixture, "a new sample arrives")
         sample = sensor.read()
         require(
             sample.cause == Cause.NONE, f"a good sample has no cause; {Cause(sample.cause).name}"
         )
         require(math.isfinite(sample.torque_nm), "a good sample is finite")
-        check_stamp(sample, bench.now)
+        check_stamp(sample, fixture.now)
     finally:
         sensor.close()
 
 
-def sensor_read_never_waits(bench: SensorBench) -> None:
+def sensor_read_never_waits(fixture: SensorFixture) -> None:
     """`read` is quick whether samples arrive or not."""
-    sensor = _sampling(bench)
+    sensor = _sampling(fixture)
     try:
-        check_quick(sensor.read, bench.longest_read_s, bench.tick_s, "while samples arrive")
-        if bench.silence is not None:
-            bench.silence()
-            check_quick(sensor.read, bench.longest_read_s, bench.tick_s, "when none arrive")
+        check_quick(sensor.read, fixture.longest_read_s, fixture.tick_s, "while samples arrive")
+        if fixture.silence is not None:
+            fixture.silence()
+            check_quick(sensor.read, fixture.longest_read_s, fixture.tick_s, "when none arrive")
             last = sensor.read()
-            time.sleep(2 * bench.tick_s)
+            time.sleep(2 * fixture.tick_s)
             again = sensor.read()
             require(
                 again.time_s == last.time_s or again.cause != Cause.NONE,
@@ -78,14 +78,14 @@ def sensor_read_never_waits(bench: SensorBench) -> None:
         sensor.close()
 
 
-def sensor_counts(bench: SensorBench) -> None:
+def sensor_counts(fixture: SensorFixture) -> None:
     """See that the counts have their names and go up only."""
-    sensor = _sampling(bench)
+    sensor = _sampling(fixture)
 
     def use() -> None:
         for _ in range(20):
             sensor.read()
-            time.sleep(bench.tick_s)
+            time.sleep(fixture.tick_s)
 
     try:
         check_counts(lambda: sensor.counts, SENSOR_COUNTS, use)
@@ -93,40 +93,40 @@ def sensor_counts(bench: SensorBench) -> None:
         sensor.close()
 
 
-def sensor_closes_twice(bench: SensorBench) -> None:
+def sensor_closes_twice(fixture: SensorFixture) -> None:
     """`close` may come at any time, and again; `read` does not raise after it."""
-    bench.make().close()
-    sensor = bench.make()
+    fixture.make().close()
+    sensor = fixture.make()
     sensor.connect()
     sensor.close()
     sensor.close()
-    sensor = _sampling(bench)
+    sensor = _sampling(fixture)
     for _ in range(2):
         sensor.close()
         sensor.read()
         _ = sensor.counts
 
 
-def sensor_connects_again(bench: SensorBench) -> None:
+def sensor_connects_again(fixture: SensorFixture) -> None:
     """See that a second driver takes over where the first has closed."""
     for _ in range(2):
-        sensor = _sampling(bench)
+        sensor = _sampling(fixture)
         sensor.close()
 
 
-def _sampling(bench: SensorBench) -> TorqueSensor:
-    sensor = bench.make()
+def _sampling(fixture: SensorFixture) -> TorqueSensor:
+    sensor = fixture.make()
     try:
         sensor.connect()
         sensor.configure()
-        await_(lambda: math.isfinite(sensor.read().torque_nm), bench, "a first sample arrives")
+        await_(lambda: math.isfinite(sensor.read().torque_nm), fixture, "a first sample arrives")
     except BaseException:
         sensor.close()
         raise
     return sensor
 
 
-SENSOR_CHECKS: tuple[Callable[[SensorBench], None], ...] = (
+SENSOR_CHECKS: tuple[Callable[[SensorFixture], None], ...] = (
     sensor_refuses_disorder,
     sensor_facts_are_complete,
     sensor_samples_flow,

@@ -18,26 +18,33 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from rigidimeter.emulation.cia402.objects import (
+from rigidimeter.emulation.cia402.object_dictionary import (
     COMMAND_MESSAGES,
     INVALID,
     MEASUREMENT_MESSAGES,
     PROFILE_VELOCITY,
     dictionary,
 )
-from rigidimeter.emulation.cia402.servo import DEFAULTS, GENERIC_ERROR, MISBEHAVIOURS, Servo
-from rigidimeter.emulation.cia402.state_machine import POWERED, Phase, statusword
+from rigidimeter.emulation.cia402.servo import (
+    DEFAULTS,
+    GENERIC_ERROR,
+    MISBEHAVIOURS,
+    POWERED,
+    Phase,
+    Servo,
+    statusword,
+)
 from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.errors import UserError
 
-__all__ = ["MISBEHAVIOURS", "Cia402Peer"]
+__all__ = ["MISBEHAVIOURS", "Cia402Emulator"]
 
 WATCH_S = 0.001
 HEARTBEAT_LOST, COMMAND_LOST = 0x8130, 0x8250
 WRONG_VALUE = 0x06090030
 
 
-class Cia402Peer:
+class Cia402Emulator:
     """One node on a bus of its own; `close` it.
 
     Parameters

@@ -1,6 +1,6 @@
 """An ATI Net F/T on a true wire: RDT records over UDP, the XML page over HTTP.
 
-Requests and records are those of the Net F/T manual (9620-05-NET FT). As the real one, the peer
+Requests and records are those of the Net F/T manual (9620-05-NET FT). As the real one, the emulator
 serves the client that asked last, numbers the records of each stream from 1, and counts its own
 samples at their own rate.
 
@@ -17,12 +17,18 @@ import struct
 import threading
 import time
 from collections import deque
-from dataclasses import replace
 from typing import Self
 
 from rigidimeter.emulation.emulated_arm import EmulatedArm
-from rigidimeter.emulation.rdt.rdt_faults import MISBEHAVIOURS, ONCE, Faults, fault_value
-from rigidimeter.emulation.rdt.rdt_records import RECORD, SAMPLE_RATE_HZ, RecordSource
+from rigidimeter.emulation.rdt.rdt_records import (
+    MISBEHAVIOURS,
+    ONCE,
+    RECORD,
+    SAMPLE_RATE_HZ,
+    Faults,
+    RecordSource,
+    fault_value,
+)
 from rigidimeter.emulation.rdt.rdt_web_page import (
     PageFacts,
     PageServer,
@@ -30,12 +36,12 @@ from rigidimeter.emulation.rdt.rdt_web_page import (
     page_with_faults,
 )
 
-__all__ = ["MISBEHAVIOURS", "RdtPeer"]
+__all__ = ["MISBEHAVIOURS", "RdtEmulator"]
 
 _REQUEST = struct.Struct(">HHI")
 
 
-class RdtPeer:
+class RdtEmulator:
     """One sensor on an arm; several threads of its own.
 
     Parameters
@@ -128,7 +134,7 @@ class RdtPeer:
         )
         self.http_port = self._http.server_address[1]
         self._threads = [
-            threading.Thread(target=target, name=f"rdt-peer-{name}", daemon=True)
+            threading.Thread(target=target, name=f"rdt-emulator-{name}", daemon=True)
             for name, target in (
                 ("listen", self._listen),
                 ("stream", self._stream),
@@ -187,8 +193,7 @@ class RdtPeer:
         return fault_value(self._faults, name, default)
 
     def _page_now(self) -> bytes:
-        bias = -round(self._records.bias_nm * self._page.counts_per_nm)
-        return page_text(page_with_faults(replace(self._page, bias=bias), self._faults))
+        return page_text(page_with_faults(self._page, self._faults))
 
     def _listen(self) -> None:
         while not self._ending.is_set():
@@ -205,8 +210,6 @@ class RdtPeer:
                 self._client = client
                 self._new_stream.set()
                 self._streaming.set()
-            elif command == 0x42:
-                self._records.bias_nm = self.arm.torque_nm()
 
     def _stream(self) -> None:
         interval_s = 1.0 / self.rate_hz

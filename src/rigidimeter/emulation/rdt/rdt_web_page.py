@@ -1,4 +1,4 @@
-"""The web server of the sensor's wire peer: /netftapi2.xml, and how not to serve it."""
+"""The web server of the sensor's wire emulator: /netftapi2.xml, and how not to serve it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from http.server import BaseHTTPRequestHandler
 
-from rigidimeter.emulation.rdt.rdt_faults import SUPPLY_LOW, Faults, fault_value
+from rigidimeter.emulation.rdt.rdt_records import SUPPLY_LOW, Faults, fault_value
 
 __all__ = ["PageFacts", "PageServer", "page_text", "page_with_faults"]
 

@@ -1,6 +1,6 @@
 """The emulated rig in a process of its own, told what to do through its lines.
 
-    with EmulatedBench(tmp_path / "RIG.toml") as bench:
+    with RigProcess(tmp_path / "RIG.toml") as bench:
         bench.misbehave("torque", "silent")
         bench.state()["velocity_rad_s"]
 
@@ -20,17 +20,17 @@ from typing import Any, Self
 
 from tests.lateness import ordinary_priority, same_priority
 
-__all__ = ["EmulatedBench"]
+__all__ = ["RigProcess"]
 
 ANSWER_S = 10.0
 START_S = 30.0
 
 
-class BenchError(AssertionError):
+class RigProcessError(AssertionError):
     """The bench refused a command, died or did not answer."""
 
 
-class EmulatedBench:
+class RigProcess:
     """Spawn `rigidimeter emulate`; ready when entered.
 
     Parameters
@@ -86,14 +86,16 @@ class EmulatedBench:
         try:
             process.stdin.write(line.encode() + b"\n")
         except OSError as error:
-            raise BenchError(f"{line!r}: the bench is gone ({error}): {self._said()}") from error
+            raise RigProcessError(
+                f"{line!r}: the bench is gone ({error}): {self._said()}"
+            ) from error
         answer = self._answer(line, ANSWER_S)
         if answer["ok"] is refused:
-            raise BenchError(f"{line!r}: {answer}")
+            raise RigProcessError(f"{line!r}: {answer}")
         return answer
 
     def misbehave(self, role: str, name: str, value: float | None = None) -> dict[str, Any]:
-        """Let the torque or drive peer do wrong what its help says."""
+        """Let the torque or drive emulator do wrong what its help says."""
         return self.command(f"misbehave {role} {name}" + ("" if value is None else f" {value!r}"))
 
     def behave(self) -> None:
@@ -111,7 +113,7 @@ class EmulatedBench:
         until_s = time.monotonic() + timeout_s
         while not wanted(state := self.state()):
             if time.monotonic() > until_s:
-                raise BenchError(f"after {timeout_s:g} s the state is still {state}")
+                raise RigProcessError(f"after {timeout_s:g} s the state is still {state}")
             time.sleep(0.005)
         return state
 
@@ -141,10 +143,10 @@ class EmulatedBench:
         while b"\n" not in self._heard:
             left_s = max(0.0, until_s - time.monotonic())
             if not select.select([process.stdout], [], [], left_s)[0]:
-                raise BenchError(f"{line!r}: no answer in {timeout_s:g} s: {self._said()}")
+                raise RigProcessError(f"{line!r}: no answer in {timeout_s:g} s: {self._said()}")
             chunk = process.stdout.read(65536)
             if not chunk:
-                raise BenchError(f"{line!r}: the bench ended: {self._said()}")
+                raise RigProcessError(f"{line!r}: the bench ended: {self._said()}")
             self._heard += chunk
         first, _, self._heard = self._heard.partition(b"\n")
         answer: dict[str, Any] = json.loads(first)
