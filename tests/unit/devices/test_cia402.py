@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -70,7 +71,7 @@ def test_words_agree_with_those_of_the_library():
     assert theirs.CW_QUICK_STOP == Control.QUICK_STOP
     assert theirs.CW_DISABLE_VOLTAGE == Control.DISABLE_VOLTAGE
     way = (State.SWITCH_ON_DISABLED, State.READY, State.SWITCHED_ON, State.OPERATION_ENABLED)
-    for before, after in zip(way, way[1:], strict=False):
+    for before, after in itertools.pairwise(way):
         assert theirs.TRANSITIONTABLE[names[before], names[after]] == NEXT_CONTROL[before]
 
 
