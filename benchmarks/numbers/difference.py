@@ -75,7 +75,9 @@ def compare(before: Numbers, now: Numbers, tolerance: float) -> Compared:
     return Compared(
         count=len(differences),
         worst=max(unequal, key=lambda one: one.relative, default=None),
-        differing=sorted(one for one in unequal if one.relative > tolerance),
+        differing=sorted(
+            (one for one in unequal if one.relative > tolerance), key=lambda one: one[:2]
+        ),
         missing=[name for name in before if name not in now],
         new=[name for name in now if name not in before],
     )
