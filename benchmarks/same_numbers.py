@@ -84,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
 def _say(name: str, found: Compared, passed_s: float) -> bool:
     """Print how a group compares, and return whether it is the same."""
     worst = "all equal to the bit" if found.worst is None else f"worst {found.worst}"
-    print(f"{name}: {found.count} values, {passed_s:.0f} s, {worst}")
+    print(f"{name}: {found.values} values, {passed_s:.0f} s, {worst}")
     for one in found.differing:
         print(f"  differs  {one}")
     for missing in found.missing:

@@ -150,7 +150,7 @@ def same_names(found: Iterable[Module]) -> dict[str, list[Path]]:
 
 def checked_out(revision: str, folder: Path) -> Path:
     """Put the source of a revision into a folder and return its package."""
-    command = ["git", "-C", ROOT, "archive", revision, SOURCE.as_posix()]
+    command = ["git", "-C", str(ROOT), "archive", revision, SOURCE.as_posix()]
     ran = subprocess.run(command, capture_output=True, check=False)
     if ran.returncode:
         raise SystemExit(f"--against {revision}: {ran.stderr.decode().strip()}")

@@ -40,7 +40,7 @@ class Compared(NamedTuple):
 
     Attributes
     ----------
-    count : int
+    values : int
         Values compared.
     worst : Difference or None
         The pair that is farthest apart; None if all are equal.
@@ -50,7 +50,7 @@ class Compared(NamedTuple):
         Names on one side only.
     """
 
-    count: int
+    values: int
     worst: Difference | None
     differing: list[Difference]
     missing: list[str]
@@ -63,7 +63,7 @@ def compare(before: Numbers, now: Numbers, tolerance: float) -> Compared:
     Examples
     --------
     >>> found = compare({"p": 0.5, "n": 3.0}, {"p": 0.5, "n": 4.0, "r": 0.1}, 1e-9)
-    >>> print(found.count, found.worst, found.new)
+    >>> print(found.values, found.worst, found.new)
     2 n: 3.0 is now 4.0 (0.25) ['r']
     """
     differences = [
@@ -73,7 +73,7 @@ def compare(before: Numbers, now: Numbers, tolerance: float) -> Compared:
     ]
     unequal = [one for one in differences if one.relative > 0.0]
     return Compared(
-        count=len(differences),
+        values=len(differences),
         worst=max(unequal, key=lambda one: one.relative, default=None),
         differing=sorted(
             (one for one in unequal if one.relative > tolerance), key=lambda one: one[:2]

@@ -156,9 +156,9 @@ def ankle(work: Workspace) -> Numbers:
             work.document(f"ankle-{name}", "estimate", *files, *options)
         )
     reflexes = [OFFSET, f"{OFFSET},reflex-fir+", f"{OFFSET},reflex-second-order", f"{JBK},reflex"]
-    options = ("--band-hz", 0, 40, "--compare", *_terms(*reflexes))
+    compared = ("--band-hz", 0, 40, "--compare", *_terms(*reflexes))
     found["models"] = models_numbers(
-        work.document("ankle-models", "model", *files, *ANKLE, *options)
+        work.document("ankle-models", "model", *files, *ANKLE, *compared)
     )
     return _named(found)
 
