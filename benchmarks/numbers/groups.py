@@ -27,6 +27,16 @@ __all__ = ["GROUPS", "Absent", "Group"]
 METHODS = ("iv", "spectral", "ml", "bandlimited", "published")
 JBK = "inertia,damping,stiffness"
 OFFSET = f"{JBK},offset"
+PLANNED = """\
+[subject.OFF]
+damping_nm_s_rad = 0.1368
+stiffness_nm_rad = 1.751
+voluntary_sd_nm = {voluntary}
+[subject.DBS]
+damping_nm_s_rad = 0.115
+stiffness_nm_rad = 1.42
+"""
+"""The joints of the designs."""
 ANKLE = (
     *("--column", "angle_rad=position_rad", "--column", "torque_nm=torque_Nm"),
     *("--rate-hz", 1000, "--reaction"),
@@ -58,15 +68,15 @@ def simulation(work: Workspace) -> Numbers:
 
 def design(work: Workspace) -> Numbers:
     """Return what is foreseen of a protocol, and what a search finds."""
+    relaxed = work.settings("design-relaxed", PLANNED.format(voluntary=0.0))
+    pushing = work.settings("design-pushing", PLANNED.format(voluntary=0.1))
     options = ("--detect", "damping=20%", "--detect", "stiffness=0.3", "--multisine")
-    pushing = work.settings("design-pushing", "[subject.OFF]\nvoluntary_sd_nm = 0.1")
-    options_searched = ("--settings", pushing, "--optimise")
+    options = ("--settings", relaxed, *options)
+    searched = ("--settings", pushing, "--optimise")
     return _named(
         {
             "plain": design_numbers(work.document("design", "design", *options)),
-            "searched": design_numbers(
-                work.document("design-searched", "design", *options_searched)
-            ),
+            "searched": design_numbers(work.document("design-searched", "design", *searched)),
         }
     )
 

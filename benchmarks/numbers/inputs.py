@@ -1,7 +1,7 @@
 """The inputs: fixed sessions and a small study on the virtual rig, and tables of ratings.
 
-Everything random has a fixed seed. Settings are the examples of the repository with what is said
-here in addition.
+Everything random has a fixed seed. Settings lie beside the numbers, with what is said here in
+addition; the examples of the repository may change.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import scipy.io
 __all__ = ["RATED", "Workspace", "shared_data"]
 
 ROOT = Path(__file__).parents[2]
-EXAMPLES = ROOT / "examples" / "settings"
+SETTINGS = ROOT / "tests" / "reference" / "numbers" / "settings"
 SCORES = ROOT / "tests" / "reference" / "mixed" / "scores.csv"
 RATED = {
     "unbalanced": ("examiner",),
@@ -44,7 +44,7 @@ SESSIONS = {
     "paper-rates": ("paper-rates.toml", 4, SHORT),
     "pushing": ("", 5, "[subject.OFF]\nvoluntary_sd_nm = 0.2\n" + SHORT),
 }
-"""Sessions by name: the example they are made from, the seed, and further settings."""
+"""Sessions by name: the settings they are made from, the seed, and further settings."""
 BLOCKS = {
     "elbow": (("prbs", "OFF", 2), ("prbs", "DBS", 2)),
     "paper-rates": (("prbs", "OFF", 2), ("sinusoid", "OFF", 1)),
@@ -149,8 +149,8 @@ class Workspace:
 
     def session(self, name: str) -> Path:
         """Return a session by its name in `SESSIONS`, relative to the folder."""
-        example, seed, further = SESSIONS[name]
-        settings = (EXAMPLES / example).read_text(encoding="utf-8") if example else ""
+        file, seed, further = SESSIONS[name]
+        settings = (SETTINGS / file).read_text(encoding="utf-8") if file else ""
         return self._simulated(Path("sessions") / name, settings + further, seed, BLOCKS.get(name))
 
     def study(self) -> Path:
