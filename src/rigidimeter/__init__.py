@@ -20,6 +20,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from rigidimeter.version import __version__
+
 if TYPE_CHECKING:
     from rigidimeter.estimation import identify
     from rigidimeter.experiment import design
@@ -28,9 +30,7 @@ if TYPE_CHECKING:
     from rigidimeter.study import compare, estimate
     from rigidimeter.virtual import simulate
 
-__all__ = ["compare", "design", "estimate", "identify", "read", "report", "simulate"]
-
-__version__ = "0.1.0"
+__all__ = ["__version__", "compare", "design", "estimate", "identify", "read", "report", "simulate"]
 
 _ROOMS = {
     "identify": "rigidimeter.estimation",

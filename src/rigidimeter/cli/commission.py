@@ -75,13 +75,13 @@ def commission(
     """
     from datetime import UTC, datetime
 
-    from rigidimeter import __version__
     from rigidimeter.acquisition.clock import DeadlineClock
     from rigidimeter.acquisition.processes.realtime_scheduling import prepare_loop_process
     from rigidimeter.commissioning import Operator, Timebase, record_path, write_record
     from rigidimeter.commissioning import commission as try_rig
     from rigidimeter.devices.rigfile import load_rig
     from rigidimeter.settings import load_settings
+    from rigidimeter.version import __version__
 
     rigfile, chosen = load_rig(rig), load_settings(settings)
     path = out or record_path(rig)

@@ -16,7 +16,6 @@ from typing import Annotated
 
 import typer
 
-from rigidimeter import __version__
 from rigidimeter.cli.commission import commission
 from rigidimeter.cli.compare import compare
 from rigidimeter.cli.demo import demo
@@ -33,6 +32,7 @@ from rigidimeter.cli.run import run
 from rigidimeter.cli.simulate import simulate
 from rigidimeter.cli.study import study
 from rigidimeter.errors import UserError
+from rigidimeter.version import __version__
 
 __all__ = ["main"]
 

@@ -11,11 +11,11 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from rigidimeter import __version__
 from rigidimeter.documents import json_text, write_text
 from rigidimeter.paper.comparison_table import AGREES, DIFFERS, UNPUBLISHED, VERDICTS, Row, Verdict
 from rigidimeter.paper.rows import SECTIONS
 from rigidimeter.reporting.numbers import number
+from rigidimeter.version import __version__
 
 __all__ = ["ledger_text", "render_page", "tally", "write_ledger"]
 

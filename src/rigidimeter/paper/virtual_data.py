@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from rigidimeter import __version__
 from rigidimeter.documents import read_json, write_json
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read_session
 from rigidimeter.records import Epoch
 from rigidimeter.settings import Settings
+from rigidimeter.version import __version__
 from rigidimeter.virtual.study_design import StudyDesign
 from rigidimeter.virtual.study_plan import DayPlan, plan_study
 from rigidimeter.virtual.virtual_study import write_virtual_study

@@ -20,7 +20,6 @@ import pyarrow as pa
 import scipy
 from numpy.typing import NDArray
 
-from rigidimeter import __version__
 from rigidimeter.documents import json_text, read_json, replace_file, text_bytes
 from rigidimeter.errors import UserError
 from rigidimeter.recording.sample_log import (
@@ -31,6 +30,7 @@ from rigidimeter.recording.sample_log import (
     append_line,
 )
 from rigidimeter.settings import Settings, dump_settings
+from rigidimeter.version import __version__
 
 __all__ = [
     "EVENTS",

@@ -3,6 +3,7 @@
 Every name ends in its unit. Arrays are float64 and read-only once inside a record.
 """
 
+from rigidimeter.records.analysis_record import Analysis, Findings
 from rigidimeter.records.epochs import (
     CHANNEL_UNITS,
     Channel,
@@ -14,16 +15,7 @@ from rigidimeter.records.epochs import (
     Task,
     readonly,
 )
-from rigidimeter.records.estimates import (
-    FIT_NUMBERS,
-    STATISTICS,
-    Analysis,
-    Delay,
-    Finding,
-    Findings,
-    Fit,
-    Score,
-)
+from rigidimeter.records.estimates import FIT_NUMBERS, STATISTICS, Delay, Finding, Fit, Score
 from rigidimeter.records.parameters import PARAMETER_VECTORS, PARAMETERS, Parameter
 
 __all__ = [

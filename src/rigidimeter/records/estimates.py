@@ -1,22 +1,18 @@
-"""What was estimated: parameters and their uncertainty, scores, findings, and all together."""
+"""What was estimated from an epoch: parameters and their uncertainty, scores, findings."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.records.epochs import Outcome, readonly
-from rigidimeter.records.notebook_view import analysis_html
 from rigidimeter.records.parameters import PARAMETER_VECTORS, PARAMETERS
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-__all__ = ["FIT_NUMBERS", "STATISTICS", "Analysis", "Delay", "Finding", "Findings", "Fit", "Score"]
+__all__ = ["FIT_NUMBERS", "STATISTICS", "Delay", "Finding", "Fit", "Score"]
 
 STATISTICS = ("r_squared", "vaf_percent", "condition_number", "residual_sd_nm")
 """How well a fit explains the torque, beside its parameters."""
@@ -221,71 +217,3 @@ def _named(result: Fit | Score) -> dict[str, Any]:
         "outcome": result.outcome.kind,
         "reason": result.outcome.reason,
     }
-
-
-class Findings(NamedTuple):
-    """What one check found, in one or more epochs: the first finding, and the fits of all."""
-
-    first: Finding
-    fits: tuple[Fit, ...]
-
-
-@dataclass(frozen=True)
-class Analysis:
-    """What was computed from a set of epochs.
-
-    `fits` and `fixed_inertia` run in parallel: one entry for each epoch that was fitted, in the
-    order of reading. `inertia_kg_m2` is the median that the second stage held fixed (NaN if no
-    epoch was included). `pooled` are the fits to all epochs of each condition together, and with
-    several conditions to all epochs, whose condition is empty. `method_reason` says why a method
-    was chosen where it was left open.
-    """
-
-    method: str
-    fits: tuple[Fit, ...]
-    fixed_inertia: tuple[Fit, ...]
-    inertia_kg_m2: float
-    scores: tuple[Score, ...]
-    pooled: tuple[Fit, ...] = ()
-    delays: tuple[Delay, ...] = ()
-    method_reason: str = ""
-
-    @property
-    def findings(self) -> tuple[Findings, ...]:
-        """What the checks found: for each check and level the epochs, in the order of reading."""
-        groups: dict[tuple[str, str], tuple[Finding, list[Fit]]] = {}
-        for fit in (*self.fits, *self.pooled):
-            for finding in fit.findings:
-                _, fits = groups.setdefault((finding.name, finding.level), (finding, []))
-                fits.append(fit)
-        return tuple(Findings(first, tuple(fits)) for first, fits in groups.values())
-
-    def rows(self) -> list[dict[str, Any]]:
-        """Return one row for each fitted epoch: the fit, and B and K at fixed inertia beside it.
-
-        An analysis of sinusoids alone gives a row for each score.
-        """
-        rows = []
-        for fit, fixed in zip(self.fits, self.fixed_inertia, strict=True):
-            held = {f"fixed_inertia_{name}": getattr(fixed, name) for name in FIT_NUMBERS}
-            for ending in ("_se", "_low", "_high", "_bound"):  # of a J that was held
-                del held[f"fixed_inertia_{PARAMETERS[0].name}{ending}"]
-            rows.append(
-                fit.row()
-                | {
-                    "findings": " / ".join(finding.text for finding in fit.findings),
-                    "band_low_hz": fit.band_hz[0],
-                    "band_high_hz": fit.band_hz[1],
-                }
-                | held
-            )
-        return rows or [score.row() for score in self.scores]
-
-    def table(self) -> pd.DataFrame:
-        """Return `rows` as a table, with the columns of ``rigidimeter estimate --csv``."""
-        import pandas as pd
-
-        return pd.DataFrame(self.rows())
-
-    def _repr_html_(self) -> str:
-        return analysis_html(self)

@@ -13,7 +13,6 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from rigidimeter import __version__
 from rigidimeter.documents import csv_text
 from rigidimeter.reporting.contents import Block, Column, Figure, Section, Table
 from rigidimeter.reporting.numbers import interval, number, p_value, short_names
@@ -22,6 +21,7 @@ from rigidimeter.reporting.sections.methods_prose import methods_prose
 from rigidimeter.reporting.style import svg_text
 from rigidimeter.reporting.verdict_text import verdict_sentence
 from rigidimeter.study import StudyResult
+from rigidimeter.version import __version__
 
 __all__ = ["contents", "render_page", "tables", "write_report"]
 

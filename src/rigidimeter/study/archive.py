@@ -20,7 +20,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from rigidimeter import __version__
 from rigidimeter.documents import json_text, text_bytes, write_text
 from rigidimeter.errors import UserError
 from rigidimeter.recording import estimates_document
@@ -30,6 +29,7 @@ from rigidimeter.study.results import StudyResult
 from rigidimeter.study.sessions import file_digest
 from rigidimeter.study.study_analysis import StudyRead
 from rigidimeter.study.tables import comparison_document, result_tables, table_csv
+from rigidimeter.version import __version__
 
 __all__ = ["ANALYSIS", "INPUTS_SCHEMA", "UNCHANGED", "keep"]
 

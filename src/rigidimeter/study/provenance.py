@@ -10,10 +10,10 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from rigidimeter import __version__
 from rigidimeter.recording import is_session, read_manifest
 from rigidimeter.settings import Settings, dump_settings
 from rigidimeter.study.sessions import file_digest
+from rigidimeter.version import __version__
 
 __all__ = ["provenance"]
 

@@ -13,7 +13,6 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from markupsafe import Markup
 
-from rigidimeter import __version__
 from rigidimeter.records import Epoch, Fit
 from rigidimeter.reporting.contents import Block, Section, from_study_folder, paragraph
 from rigidimeter.reporting.methods import method_of
@@ -21,6 +20,7 @@ from rigidimeter.reporting.numbers import condition_name, number, plural, series
 from rigidimeter.reporting.prose_statistics import rating_sentences, test_sentences
 from rigidimeter.reporting.references import Cited, Prose
 from rigidimeter.study import Condition, StudyResult
+from rigidimeter.version import __version__
 
 __all__ = ["SECTION", "methods_prose"]
 
