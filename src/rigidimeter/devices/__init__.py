@@ -1,4 +1,4 @@
-"""The outside world, behind one small protocol."""
+"""Torque sensors, drives and rigs, behind the protocols of `base`."""
 
 from rigidimeter.devices.base import Reading, Rig
 from rigidimeter.devices.simulated import SimulatedRig

@@ -1,15 +1,15 @@
-"""What the loop knows of a rig, and what a rig knows of its devices.
+"""Protocols of a rig, a torque sensor and a velocity drive.
 
-A device goes one way through its life, and every step may be the last:
+A device goes through these steps in order, and can be closed after any of them:
 
-    connect    open the wire; nothing is energised
-    configure  set what must be set, read back what matters, refuse what does not fit
+    connect    open the connection; nothing is energised
+    configure  write the settings, read them back, refuse a device that does not match
     enable     (drives) write zero velocity, read it back, then energise
     read, write
-    stop, disable, close    safe at any time, in any order, and twice
+    stop, disable, close    safe at any time, in any order, and when repeated
 
-`read` and `write` run in the real-time loop. They do not wait, do not raise for what a wire can do,
-and name a `guard.Cause` instead. Times are in seconds on the loop's clock, which is passed in.
+`read` and `write` run in the real-time loop. They do not wait. On a communication error they do not
+raise but name a `guard.Cause`. Times are in seconds on the loop's clock, which is passed in.
 """
 
 from __future__ import annotations
@@ -38,23 +38,23 @@ Now = Callable[[], float]
 
 
 class DeviceError(UserError):
-    """A device cannot be used: the sentence names it, what was found, and what would be right."""
+    """A device cannot be used. The message names it, what was found, and what is expected."""
 
 
 @dataclass(frozen=True)
 class DeviceFacts:
-    """What a device said of itself when it was configured; stored with the session.
+    """What a device reported when it was configured; stored with the session.
 
     Parameters
     ----------
     model, serial : str
-        As read from the device; empty where it does not say.
+        As read from the device; empty if it does not report them.
     fastest_tick_rate_hz : float
-        The fastest loop this device can keep up with.
+        The highest loop rate that this device supports.
     watchdog_s : float or None
-        After how long without a command the device stops by itself; None if it does not.
+        Time without a command after which the device stops by itself; None if it never does.
     values : mapping
-        Everything else that was read back: units, calibration, limits, firmware.
+        Other values read back: units, calibration, limits, firmware.
     """
 
     model: str
@@ -67,9 +67,9 @@ class DeviceFacts:
 class TorqueSample(NamedTuple):
     """The newest torque: applied by the drive to the joint, positive toward positive angle.
 
-    `time_s` is when it was taken, as far as the driver knows. `sequence` is the device's own count,
-    -1 where it has none; `raw` the counts as they came; `status` the device's status word. A
-    `cause` other than NONE says why the sample must not be used.
+    `time_s` is when it was measured, as far as the driver knows. `sequence` is the device's own
+    counter, -1 if it has none; `raw` holds the counts as received; `status` is the device's status
+    word. A `cause` other than NONE says why the sample must not be used.
     """
 
     torque_nm: float
@@ -96,41 +96,41 @@ class TorqueSensor(Protocol):
     """A torque sensor on the joint's axis."""
 
     def connect(self) -> None:
-        """Open the wire."""
+        """Open the connection."""
 
     def configure(self) -> DeviceFacts:
-        """Set up, read back, start the samples flowing.
+        """Write the settings, read them back and start sampling.
 
         Raises
         ------
         DeviceError
-            If the device does not answer, or is not what the settings say.
+            If the device does not answer, or does not match the settings.
         """
 
     def read(self) -> TorqueSample:
-        """Return the newest sample without waiting; the one before again if there is none."""
+        """Return the newest sample without waiting; the previous one if there is no new one."""
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """How many packets were received, lost, repeated, reordered or damaged, by these names."""
+        """Numbers of packets, by the names received, lost, repeated, reordered and damaged."""
 
     def close(self) -> None:
-        """Stop the samples and close the wire."""
+        """Stop sampling and close the connection."""
 
 
 class VelocityDrive(Protocol):
     """A drive that takes velocity commands."""
 
     def connect(self) -> None:
-        """Open the wire."""
+        """Open the connection."""
 
     def configure(self) -> DeviceFacts:
-        """Set up mode, limits and the drive's own watchdog, and read them back.
+        """Write mode, limits and the drive's own watchdog, and read them back.
 
         Raises
         ------
         DeviceError
-            If the device does not answer, or does not take what it is told.
+            If the device does not answer, or does not accept a setting.
         """
 
     def enable(self) -> None:
@@ -139,34 +139,34 @@ class VelocityDrive(Protocol):
         Raises
         ------
         DeviceError
-            If the target is not zero or the drive does not come up; it is without power then.
+            If the target is not zero or the drive does not start; it then has no power.
         """
 
     def read(self) -> MotionSample:
-        """Return the newest sample without waiting; the one before again if there is none."""
+        """Return the newest sample without waiting; the previous one if there is no new one."""
 
     def write(self, velocity_rad_s: float) -> float:
-        """Send a velocity; return what was really sent, rounded to what the wire carries."""
+        """Send a velocity; return what was actually sent, rounded to the units of the message."""
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """How many messages were received, lost or damaged, by these names."""
+        """Numbers of messages, by the names received, lost and damaged."""
 
     def stop(self) -> None:
-        """Tell the drive to brake by its own ramp and stay at rest: its quick stop."""
+        """Make the drive brake along its own ramp and stay at rest: its quick stop."""
 
     def disable(self) -> None:
-        """Take the power away at once."""
+        """Remove the power at once."""
 
     def close(self) -> None:
-        """Take the power away and close the wire."""
+        """Remove the power and close the connection."""
 
 
 class Reading(NamedTuple):
-    """The newest sample of each sensor, with the time it was taken on the loop's clock.
+    """The newest samples, with their times on the loop's clock.
 
-    Sensors have clocks of their own, so a reading may repeat the sample of the tick before; then
-    its stamp repeats too. `cause` is what a device reports, NONE if all is well.
+    Sensors sample by their own clocks, so a reading may repeat the sample of the previous tick,
+    with the same time. `cause` is what a device reports, NONE if all is well.
     """
 
     torque_nm: float
@@ -185,45 +185,45 @@ class Rig(Protocol):
     """A torque sensor and a velocity drive on one joint."""
 
     def connect(self) -> None:
-        """Open the wires; nothing is energised."""
+        """Open the connections; nothing is energised."""
 
     def configure(self) -> Mapping[str, Any]:
-        """Set up the devices; return their facts by role, as plain values.
+        """Configure the devices; return their facts by role, as plain values.
 
         Raises
         ------
         DeviceError
-            If a device does not fit the settings.
+            If a device does not match the settings.
         """
 
     def enable(self) -> None:
         """Command zero velocity, then energise."""
 
     def read(self, elapsed_ticks: int = 1) -> Reading:
-        """Return the newest readings, so many ticks after the ones before.
+        """Return the newest readings, `elapsed_ticks` ticks after the previous call.
 
-        More than one if the loop missed a deadline; a simulated rig lives through them.
+        More than one if the loop missed a deadline; a simulated rig advances by all of them.
         """
 
     def write(self, velocity_rad_s: float) -> float:
-        """Send a velocity command; return what was really sent."""
+        """Send a velocity command; return what was actually sent."""
 
     def zero(self, bias_nm: float) -> None:
-        """Take `bias_nm` off every torque from now on."""
+        """Subtract `bias_nm` from every torque from now on."""
 
     @property
     def origin_rad(self) -> float:
-        """The drive's own angle where the joint stood when it was enabled: angle 0 of the rig."""
+        """The drive's own angle at which the joint was enabled: angle 0 of the rig."""
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What the wires counted since they were opened."""
+        """Message counts since the connections were opened."""
 
     def stop(self) -> None:
-        """Let the drive brake by its own ramp: for when commands no longer reach it."""
+        """Let the drive brake along its own ramp, for example when commands no longer reach it."""
 
     def disable(self) -> None:
-        """Take the power away at once. Safe to call at any time, and twice."""
+        """Remove the power at once. Safe at any time and when repeated."""
 
     def close(self) -> None:
-        """Take the power away and close the wires. Safe to call at any time, and twice."""
+        """Remove the power and close the connections. Safe at any time and when repeated."""

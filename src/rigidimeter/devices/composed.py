@@ -1,7 +1,7 @@
-"""A rig made of a torque sensor and a velocity drive that know nothing of each other.
+"""A rig made of an independent torque sensor and velocity drive.
 
-The angle counts from where the joint stood when the drive was enabled: that is the initial
-position, to which every rest returns.
+Angles are relative to where the joint was when the drive was enabled: the initial position, to
+which the arm returns between epochs.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ from rigidimeter.guard import REACTIONS, Cause
 __all__ = ["ComposedRig", "Home"]
 
 ATTEMPTS, ATTEMPT_S = 50, 0.002
-"""How often, and after how long, devices are asked for their first sample once enabled."""
+"""How often, and at what interval, the first samples after enabling are polled."""
 
 
 class Home(NamedTuple):
-    """Where the joint must stand when it is enabled, on the drive's own scale.
+    """Where the joint must be when it is enabled, on the drive's own scale.
 
-    After a stop the joint stands anywhere. To begin from there would move the position limits with
-    it, and take the torque that holds it there for the sensor's zero.
+    After a stop the joint can be anywhere. Starting there would shift the position limits with it,
+    and the torque that holds the joint there would be taken as the sensor's zero.
     """
 
     angle_rad: float
     tolerance_rad: float
 
     def check(self, angle_rad: float) -> None:
-        """Refuse a joint that stands elsewhere.
+        """Refuse a joint that is elsewhere.
 
         Raises
         ------
         DeviceError
-            Says where it stands and where it must.
+            Says where the joint is and where it must be.
         """
         if not abs(angle_rad - self.angle_rad) <= self.tolerance_rad:
             raise DeviceError(
@@ -58,18 +58,18 @@ class Home(NamedTuple):
 
 
 class ComposedRig:
-    """One sensor, one drive, and where there is one the contact that lets the drive have power.
+    """A sensor, a drive, and optionally the contact in the drive's hardware enable circuit.
 
     Parameters
     ----------
     sensor : TorqueSensor
     drive : VelocityDrive
     tick_rate_hz : float
-        Of the loop; a device that cannot keep up is refused.
+        Of the loop; a device that is slower is refused.
     line : EnableLine, optional
         The hardware enable.
     home : Home, optional
-        Where the joint must stand to be enabled.
+        Where the joint must be to be enabled.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class ComposedRig:
         self._origin_rad = 0.0
 
     def connect(self) -> None:
-        """Open the wires; what was opened is closed again if one fails."""
+        """Open the connections; if one fails, the others are closed again."""
         try:
             self._sensor.connect()
             self._drive.connect()
@@ -95,12 +95,12 @@ class ComposedRig:
             raise
 
     def configure(self) -> Mapping[str, Any]:
-        """Set up both devices; return their facts.
+        """Configure both devices; return their facts.
 
         Raises
         ------
         DeviceError
-            If a device does not answer, does not fit, or is too slow for the loop.
+            If a device does not answer, does not match the settings, or is too slow for the loop.
         """
         facts = {"torque_sensor": self._sensor.configure(), "drive": self._drive.configure()}
         for role, found in facts.items():
@@ -116,17 +116,16 @@ class ComposedRig:
             )
 
     def enable(self) -> None:
-        """Close the contact, energise the drive at zero velocity, note where the joint stands.
+        """Close the contact, energise the drive at zero velocity, store where the joint is.
 
         Raises
         ------
         DeviceError
-            If the drive does not come up, or one of the two gives no sample; the drive is without
-            power then.
+            If the drive does not start, or a device gives no sample; the drive then has no power.
         """
         try:
             restart = getattr(self._sensor, "restart", None)
-            if restart is not None:  # nobody has read for as long as setting up took
+            if restart is not None:  # samples piled up while the drive was configured
                 restart()
             if self._line is not None:
                 self._line.close_contact()
@@ -139,10 +138,10 @@ class ComposedRig:
             raise
 
     def _fresh_angle_rad(self) -> float:
-        """Return the first angle that is a number, once the torque is fresh too.
+        """Return the first finite angle once the torque is fresh too.
 
-        A drive may have to be asked for its angle, and while the drive was set up the sensor's
-        samples piled up: they are read until the newest is reached.
+        A drive may send its angle only in reply to a command. The sensor's samples piled up while
+        the drive was configured, so they are read until a new one arrives.
         """
         newest_s = self._sensor.read().time_s
         fresh = False
@@ -165,7 +164,7 @@ class ComposedRig:
         )
 
     def read(self, elapsed_ticks: int = 1) -> Reading:
-        """Return the newest readings of both."""
+        """Return the newest readings of both devices."""
         torque: TorqueSample = self._sensor.read()
         motion: MotionSample = self._drive.read()
         cause = torque.cause
@@ -186,7 +185,7 @@ class ComposedRig:
 
     @property
     def origin_rad(self) -> float:
-        """The drive's own angle where the joint stood when it was enabled."""
+        """The drive's own angle at which the joint was enabled."""
         return self._origin_rad
 
     def write(self, velocity_rad_s: float) -> float:
@@ -194,31 +193,31 @@ class ComposedRig:
         return self._drive.write(velocity_rad_s)
 
     def zero(self, bias_nm: float) -> None:
-        """Take `bias_nm` off every torque from now on."""
+        """Subtract `bias_nm` from every torque from now on."""
         self._bias_nm += bias_nm
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What both wires counted."""
+        """Message counts of both devices."""
         return {
             **{f"torque_{name}": count for name, count in self._sensor.counts.items()},
             **{f"drive_{name}": count for name, count in self._drive.counts.items()},
         }
 
     def stop(self) -> None:
-        """Let the drive brake by its own ramp."""
+        """Let the drive brake along its own ramp."""
         self._drive.stop()
 
     def reset_fault(self) -> None:
-        """Take back the drive's fault, as the operator asks; it stays without power."""
+        """Reset the drive's fault at the operator's request; the drive stays without power."""
         reset = getattr(self._drive, "reset_fault", None)
         if reset is not None:
             reset()
 
     def disable(self) -> None:
-        """Take the power away by every way there is; one that fails does not spare the others.
+        """Remove the power both ways: by the contact and by the drive, even if one of them fails.
 
-        The contact comes first: it does not wait for a drive that no longer answers.
+        The contact comes first because it does not wait for a drive that no longer answers.
         """
         try:
             if self._line is not None:
@@ -227,9 +226,9 @@ class ComposedRig:
             self._drive.disable()
 
     def close(self) -> None:
-        """Take the power away and close the wires and the contact's port, each even if one fails.
+        """Remove the power and close all connections, each even if another fails.
 
-        What fails last is raised, with what failed before it as its context.
+        The last error is raised, with the earlier ones as its context.
         """
         with ExitStack() as steps:  # tries all of them, the last one first
             if self._line is not None:

@@ -1,21 +1,21 @@
-"""A contact in the drive's hardware enable, opened by software through a line of a serial port.
+"""A contact in the drive's hardware enable circuit, switched by a line of a serial port.
 
-RTS or DTR of a serial port drives a relay, and the relay's contact lies in the drive's enable
-circuit, in series with the emergency stop. Opening it takes the power away whatever the drive's own
-software thinks: for when commands no longer reach it.
+RTS or DTR of a serial port drives a relay whose contact is in the drive's enable circuit, in series
+with the emergency stop. Opening it removes the power whatever the state of the drive's software,
+also when commands no longer reach the drive.
 
 What it does and does not do, on Linux:
 
-- When the process ends, by itself or killed, the kernel closes the port and drops both lines (the
-  port's HUPCL flag, which is set). The contact opens.
-- When the process is stopped or hangs, the line stays as it is. This contact is no watchdog;
-  for that a relay is needed that falls open without pulses.
-- Opening the port raises both lines for a moment before the driver can lower them. Wire the relay
-  so that a moment is not enough, and close the emergency stop last.
-- Adapters differ: some keep their lines when the cable is pulled from the computer but not from
-  its supply. Try it at commissioning, by pulling and by killing.
+- When the process exits or is killed, the kernel closes the port and drops both lines (the port's
+  HUPCL flag, which is set). The contact opens.
+- When the process is stopped or hangs, the line stays as it is. This contact is no watchdog; that
+  takes a relay that opens when pulses cease.
+- Opening the port raises both lines briefly before the driver can lower them. Choose a relay that
+  does not respond to so short a pulse, and close the emergency stop last.
+- Adapters differ: some keep their lines up when the cable is unplugged from the computer while the
+  adapter still has power. Test it at commissioning: unplug the cable, and kill the process.
 
-It reports nothing back: that the relay opened is seen in the drive's status.
+There is no feedback: only the drive's status shows that the relay opened.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ class EnableLine(Protocol):
     """A contact without which the drive has no power."""
 
     def close_contact(self) -> None:
-        """Let the drive be energised."""
+        """Allow the drive to be energised."""
 
     def open_contact(self) -> None:
-        """Take the power away; safe at any time, and twice."""
+        """Remove the power; safe at any time and when repeated."""
 
     def close(self) -> None:
-        """Open the contact and close the port; safe twice."""
+        """Open the contact and close the port; safe when repeated."""
 
 
 class SerialEnableLineSettings(Section):
-    """Which line of which port drives the relay.
+    """The serial port and line that drive the relay.
 
     Parameters
     ----------
@@ -58,18 +58,18 @@ class SerialEnableLineSettings(Section):
 
 
 class SerialEnableLine:
-    """A relay on RTS or DTR of a serial port of its own; open until it is closed.
+    """A relay on RTS or DTR of a dedicated serial port.
 
-    The port is opened with the first `close_contact`, not before.
+    The port is opened by the first `close_contact`, not before.
 
     Parameters
     ----------
     settings : SerialEnableLineSettings
     now : callable
-        Not used; every driver is made with it.
+        Not used; all drivers take it.
     serial_port : callable, optional
-        Opens an object with the attributes `rts` and `dtr` and the method `close`, in place of the
-        port of that name.
+        Replaces the opening of the port: takes its name and returns an object with the attributes
+        `rts` and `dtr` and the method `close`.
     """
 
     Settings: ClassVar[type[SerialEnableLineSettings]] = SerialEnableLineSettings
@@ -91,7 +91,7 @@ class SerialEnableLine:
         Raises
         ------
         DeviceError
-            If pyserial is missing, or the line cannot be set; the contact is open then.
+            If pyserial is missing, or the line cannot be set; the contact is then open.
         """
         try:
             if self._port is None:
@@ -106,7 +106,7 @@ class SerialEnableLine:
             ) from error
 
     def open_contact(self) -> None:
-        """Lower the line; where that fails, close the port, which lowers it too."""
+        """Lower the line; if that fails, close the port, which lowers it too."""
         if self._port is None:
             return
         try:
@@ -115,11 +115,11 @@ class SerialEnableLine:
             self.close()
 
     def close(self) -> None:
-        """Open the contact and close the port; safe twice."""
+        """Open the contact and close the port; safe when repeated."""
         port, self._port = self._port, None
         if port is None:
             return
-        # A port that fails here is closed all the same, and the kernel lowers its lines.
+        # If the line cannot be set, closing the port makes the kernel lower it.
         with contextlib.suppress(OSError):
             setattr(port, self._line, False)
         with contextlib.suppress(OSError):
@@ -135,7 +135,7 @@ def _opened(name: str) -> Any:
         ) from error
     port = serial.Serial()
     port.port = name
-    # Set before opening, so that pyserial lowers both lines as its first act.
+    # Set before opening, so that pyserial lowers both lines first.
     port.rts = port.dtr = False
     try:
         port.open()

@@ -1,11 +1,11 @@
-"""A recorded session as a device: the samples come as they came then, commands change nothing.
+"""A recorded session as a device: it returns the recorded samples, and commands have no effect.
 
-For the guard and the loop to be run over what was recorded. Each `read` is one tick, the tick of
-the record; the stamps are the recorded ones, moved by `shift_s` to where the clock of the replay
-stands. After the last tick the last sample comes again and again, so its stamp grows old, as a
-sensor's does that has gone silent. What is written is kept in `written` and moves nothing.
+With it the loop and the guard can run on recorded data. Each `read` returns one recorded tick; the
+time stamps are the recorded ones plus `shift_s`, which aligns them with the present clock. After
+the last tick the last sample is repeated, so its time stamp ages as if the sensor had gone silent.
+What is written is kept in `written`.
 
-The arrays come from the caller, under the names of `Reading`: `torque_nm`, `torque_time_s`,
+The arrays are passed by the caller, under the names of `Reading`: `torque_nm`, `torque_time_s`,
 `angle_rad`, `velocity_rad_s`, `motion_time_s`, and where there are any `torque_sequence`,
 `torque_status`, `motion_sequence`, `motion_status` and `cause`.
 """
@@ -26,16 +26,20 @@ __all__ = ["ReplayDrive", "ReplaySensor"]
 TORQUE = ("torque_nm", "torque_time_s")
 MOTION = ("angle_rad", "velocity_rad_s", "motion_time_s")
 FASTEST_RAD_S = 100.0
-"""What a drive would send at most; far above any that moves an arm."""
+"""Limit of a command; far above any that moves an arm."""
 
 WHOLE_NUMBERS = ("torque_sequence", "torque_status", "motion_sequence", "motion_status", "cause")
 
 
-class _Track:
-    """Columns of one length, played row by row."""
+class _Player:
+    """Columns of one length, played row by row; what sensor and drive have in common."""
 
     def __init__(
-        self, columns: Mapping[str, ArrayLike], names: tuple[str, ...], shift_s: float
+        self,
+        columns: Mapping[str, ArrayLike],
+        names: tuple[str, ...],
+        shift_s: float,
+        watchdog_s: float | None,
     ) -> None:
         missing = [name for name in names if name not in columns]
         if missing:
@@ -54,35 +58,15 @@ class _Track:
             kind = np.int64 if name in WHOLE_NUMBERS else np.float64
             moved = array + shift_s if name.endswith("time_s") else array
             self._values[name] = moved.astype(kind).tolist()
-        self.length = length
-        self.tick = -1
-
-    def rate_hz(self, time: str) -> float:
-        """Return the rate of the ticks, from the first stamp and the last."""
-        times = self._values[time]
-        span_s = times[-1] - times[0]
-        return (self.length - 1) / span_s if span_s > 0.0 else 1.0
-
-    def advance(self) -> None:
-        """Go on by a tick, no farther than to the last."""
-        self.tick = min(self.tick + 1, self.length - 1)
-
-    def value(self, name: str, default: int = 0) -> Any:
-        """Return a column's value at this tick."""
-        values = self._values.get(name)
-        return default if values is None else values[max(self.tick, 0)]
-
-
-class _Player:
-    """What the two devices have in common: a wire that is a record."""
-
-    def __init__(self, track: _Track, time: str, watchdog_s: float | None) -> None:
-        self._track, self._time, self._watchdog_s = track, time, watchdog_s
+        self._length = length
+        self._time_s = self._values[names[-1]]
+        self._watchdog_s = watchdog_s
+        self._tick = -1
         self._connected = self._playing = False
         self._received = 0
 
     def connect(self) -> None:
-        """Nothing to open."""
+        """Do nothing but note it: there is no connection."""
         self._connected = True
 
     def configure(self) -> DeviceFacts:
@@ -91,30 +75,35 @@ class _Player:
         Raises
         ------
         DeviceError
-            If it was not connected: a replay keeps the order that a wire asks for.
+            If it was not connected: a replay requires the same order as a real device.
         """
         if not self._connected:
             raise DeviceError("replay: configure before connect; call connect first")
-        self._track.tick = -1
+        self._tick = -1
         self._playing = True
-        rate_hz = self._track.rate_hz(self._time)
-        return DeviceFacts("replay", "", rate_hz, self._watchdog_s, {"ticks": self._track.length})
+        span_s = self._time_s[-1] - self._time_s[0]
+        rate_hz = (self._length - 1) / span_s if span_s > 0.0 else 1.0
+        return DeviceFacts("replay", "", rate_hz, self._watchdog_s, {"ticks": self._length})
 
     @property
     def finished(self) -> bool:
         """Whether the last tick has been read."""
-        return self._track.tick >= self._track.length - 1
+        return self._tick >= self._length - 1
 
     def close(self) -> None:
-        """Play no further."""
+        """Stop playing."""
         self._connected = self._playing = False
 
-    def _next(self) -> _Track:
-        """Go on by a tick while it plays."""
-        if self._playing:
-            self._received += not self.finished
-            self._track.advance()
-        return self._track
+    def _advance(self) -> None:
+        """Go to the next tick while playing, but not beyond the last."""
+        if self._playing and not self.finished:
+            self._received += 1
+            self._tick += 1
+
+    def _value(self, name: str, default: int = 0) -> Any:
+        """Return the value of a column at this tick."""
+        values = self._values.get(name)
+        return default if values is None else values[max(self._tick, 0)]
 
 
 class ReplaySensor(_Player):
@@ -129,23 +118,23 @@ class ReplaySensor(_Player):
     """
 
     def __init__(self, columns: Mapping[str, ArrayLike], *, shift_s: float = 0.0) -> None:
-        super().__init__(_Track(columns, TORQUE, shift_s), "torque_time_s", None)
+        super().__init__(columns, TORQUE, shift_s, None)
 
     def read(self) -> TorqueSample:
         """Return the sample of the next tick."""
-        track = self._next()
+        self._advance()
         return TorqueSample(
-            track.value("torque_nm"),
-            track.value("torque_time_s"),
-            track.value("torque_sequence", max(track.tick, 0)),
+            self._value("torque_nm"),
+            self._value("torque_time_s"),
+            self._value("torque_sequence", max(self._tick, 0)),
             (),
-            track.value("torque_status"),
-            track.value("cause"),
+            self._value("torque_status"),
+            self._value("cause"),
         )
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """How many ticks were played."""
+        """Number of ticks played."""
         return {"received": self._received, "lost": 0, "repeated": 0, "reordered": 0, "damaged": 0}
 
 
@@ -153,13 +142,13 @@ class ReplayDrive(_Player):
     """A `VelocityDrive` that plays a record; parameters as of `ReplaySensor`."""
 
     def __init__(self, columns: Mapping[str, ArrayLike], *, shift_s: float = 0.0) -> None:
-        # A record stands still when nobody reads it, at once.
-        super().__init__(_Track(columns, MOTION, shift_s), "motion_time_s", 0.0)
+        # Without reads a replay stops at once: a watchdog of 0 s.
+        super().__init__(columns, MOTION, shift_s, 0.0)
         self._enabled = False
         self.written: list[float] = []
 
     def enable(self) -> None:
-        """Take note of commands from now on.
+        """Store commands from now on.
 
         Raises
         ------
@@ -172,19 +161,19 @@ class ReplayDrive(_Player):
 
     def read(self) -> MotionSample:
         """Return the sample of the next tick."""
-        track = self._next()
+        self._advance()
         return MotionSample(
-            track.value("angle_rad"),
-            track.value("velocity_rad_s"),
-            track.value("motion_time_s"),
-            track.value("motion_sequence", max(track.tick, 0)),
+            self._value("angle_rad"),
+            self._value("velocity_rad_s"),
+            self._value("motion_time_s"),
+            self._value("motion_sequence", max(self._tick, 0)),
             (),
-            track.value("motion_status"),
-            track.value("cause"),
+            self._value("motion_status"),
+            self._value("cause"),
         )
 
     def write(self, velocity_rad_s: float) -> float:
-        """Take note of a velocity as a drive would send it; without being enabled, of none."""
+        """Store a velocity as a drive would send it; return 0 if not enabled."""
         if not self._enabled:
             return 0.0
         finite = math.isfinite(velocity_rad_s)
@@ -194,18 +183,18 @@ class ReplayDrive(_Player):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """How many ticks were played."""
+        """Number of ticks played."""
         return {"received": self._received, "lost": 0, "damaged": 0}
 
     def stop(self) -> None:
-        """Take note of no more commands."""
+        """Store no more commands."""
         self._enabled = False
 
     def disable(self) -> None:
-        """Take note of no more commands."""
+        """Store no more commands."""
         self._enabled = False
 
     def close(self) -> None:
-        """Play no further."""
+        """Stop playing."""
         super().close()
         self._enabled = False

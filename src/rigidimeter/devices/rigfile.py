@@ -1,7 +1,7 @@
-"""RIG.toml: which devices make up a rig, each with the settings of its driver.
+"""RIG.toml: the devices of a rig, each with the settings of its driver.
 
     name = "elbow rig, room 12"
-    home_deg = 0.0             # where the joint must stand to be enabled, on the drive's scale
+    home_deg = 0.0             # where the joint must be to be enabled, on the drive's scale
     home_tolerance_deg = 3.0
 
     [torque_sensor]
@@ -12,8 +12,8 @@
     driver = "cia402"
     channel = "can0"
 
-A driver is one of the names below, or ``package.module:Class``. A driver class carries its settings
-as `Settings` and is made with ``Class(settings, now)``.
+A driver is one of the names in `DRIVERS`, or ``package.module:Class``. A driver class has its
+settings class as `Settings` and is created by ``Class(settings, now)``.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ DRIVERS: Mapping[str, Mapping[str, str]] = {
     },
     "enable_line": {"serial-line": "rigidimeter.devices.enable_line:SerialEnableLine"},
 }
-"""The drivers that come along, by role and name."""
+"""The built-in drivers, by role and name."""
 
 METHODS: Mapping[str, tuple[str, ...]] = {
     "torque_sensor": ("connect", "configure", "read", "counts", "close"),
@@ -59,16 +59,16 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     ),
     "enable_line": ("close_contact", "open_contact", "close"),
 }
-"""What a class must have to be a device of this role; see `device.base`."""
+"""Attributes that a driver of each role must have; see `devices.base`."""
 
 REQUIRED = ("torque_sensor", "drive")
 HOME: Mapping[str, float | None] = {"home_deg": None, "home_tolerance_deg": 3.0}
-"""Keys of the initial position, and what they are when absent."""
+"""Keys of the initial position, with their defaults."""
 
 
 @dataclass(frozen=True)
 class RigFile:
-    """A rig as its file describes it, checked, nothing connected.
+    """A rig as described by its file; checked, but not connected.
 
     Parameters
     ----------
@@ -77,9 +77,9 @@ class RigFile:
     devices : mapping
         Class and settings by role.
     digest : str
-        Of what the file says: a commissioning record holds for one of these.
+        Hash of the contents: a commissioning record is valid for one digest.
     home : Home or None
-        Where the joint must stand to be enabled.
+        Where the joint must be to be enabled.
     """
 
     path: Path
@@ -90,22 +90,22 @@ class RigFile:
 
     @property
     def emulated(self) -> bool:
-        """Whether every device says of its settings that they reach no hardware.
+        """Whether no device of the rig is hardware.
 
-        It follows from the wires, not from a word in the file: loopback, a pseudo-terminal, a CAN
-        bus without wires. A driver that says nothing is taken for one of hardware.
+        Each driver derives it from its connection (loopback, a pseudo-terminal, a virtual CAN bus),
+        not from an entry in the file. A driver without the property counts as hardware.
         """
         return bool(self.devices) and all(
             getattr(settings, "emulated", False) for _, settings in self.devices.values()
         )
 
     def claim(self) -> BinaryIO:
-        """Keep this rig for this process until the file that is returned is closed.
+        """Reserve this rig for this process until the returned file is closed.
 
         Raises
         ------
         UserError
-            If another process has it.
+            If another process uses it.
         """
         file = self.path.open("rb")
         try:
@@ -118,7 +118,7 @@ class RigFile:
         return file
 
     def build(self, now: Now, tick_rate_hz: float, home: Home | None = None) -> ComposedRig:
-        """Make the devices; nothing is connected yet. `home` goes before that of the file."""
+        """Create the devices without connecting. `home` overrides that of the file."""
         made = {role: driver(settings, now) for role, (driver, settings) in self.devices.items()}
         return ComposedRig(
             made["torque_sensor"],
@@ -171,7 +171,7 @@ def _home(path: Path, values: Mapping[str, Any]) -> Home | None:
 
 
 def sorted_values(values: Any) -> Any:
-    """Return nested mappings as sorted pairs: the same for the same meaning, however written."""
+    """Return nested mappings as sorted pairs, so that the order of keys does not matter."""
     if isinstance(values, Mapping):
         return sorted((key, sorted_values(value)) for key, value in values.items())
     return values
@@ -203,7 +203,7 @@ def _driver(path: Path, role: str, name: str) -> Any:
         driver = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as error:
         raise UserError(f"{path}, [{role}]: driver {name!r} cannot be loaded ({error})") from None
-    except (Exception, SystemExit) as error:  # a module of anybody's, which may raise anything
+    except (Exception, SystemExit) as error:  # a foreign module may raise anything
         what = f"{type(error).__name__}: {error}"
         raise UserError(
             f"{path}, [{role}]: driver {name!r} cannot be loaded, its module fails with {what}"

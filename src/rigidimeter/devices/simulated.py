@@ -1,4 +1,4 @@
-"""The virtual rig: a device like any other, with a simulated drive, arm, subject and sensors."""
+"""The virtual rig: simulated drive, arm, subject and sensors behind the protocol of a rig."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ __all__ = ["SimulatedRig"]
 class SimulatedRig:
     """Drive, arm, subject and sensors, one tick for each `read`.
 
-    The arm is driven by the velocity command in force since the last tick; its state at the time of
-    each sensor sample is exact, also between ticks.
+    The arm follows the velocity command that was in force since the last tick. Its state at the
+    time of each sensor sample is exact, also between ticks.
 
     Parameters
     ----------
     settings : RigSettings
     subject : SubjectSettings
-        In force until `new_epoch` changes it.
+        Used until `new_epoch` changes it.
     rng : numpy.random.Generator
-        Gives independent streams to sensors, jitter and subject.
+        Source of independent streams for sensors, jitter and subject.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class SimulatedRig:
 
     @property
     def joint(self) -> JointDynamics:
-        """The joint as it is: what an estimate should give back."""
+        """The true joint, which an estimate should recover."""
         return self._joint
 
     @joint.setter
@@ -105,7 +105,7 @@ class SimulatedRig:
         self._K = joint.stiffness_nm_rad
 
     def new_epoch(self, subject: SubjectSettings) -> JointDynamics:
-        """Draw the joint of the next epoch; call while the arm rests."""
+        """Draw the joint of the next epoch; call while the arm is at rest."""
         if subject is not self._subject:
             self._set_subject(subject)
         else:
@@ -113,24 +113,24 @@ class SimulatedRig:
         return self._joint
 
     def connect(self) -> None:
-        """There is no wire."""
+        """Do nothing: there is no connection."""
 
     def configure(self) -> Mapping[str, Any]:
-        """Say that nothing here is real."""
+        """Return facts that say the rig is simulated."""
         return {"torque_sensor": {"model": "simulated"}, "drive": {"model": "simulated"}}
 
     def zero(self, bias_nm: float) -> None:
-        """Take `bias_nm` off every torque from now on."""
+        """Subtract `bias_nm` from every torque from now on."""
         self._bias_nm = bias_nm
 
     @property
     def origin_rad(self) -> float:
-        """The arm begins at its initial position."""
+        """The arm starts at its initial position."""
         return 0.0
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Nothing is lost on the way."""
+        """No messages, no counts."""
         return {}
 
     def stop(self) -> None:
@@ -157,7 +157,7 @@ class SimulatedRig:
         self._enabled = False
 
     def read(self, elapsed_ticks: int = 1) -> Reading:
-        """Advance so many ticks and return the newest samples that have arrived."""
+        """Advance by so many ticks and return the newest samples that have arrived."""
         for _ in range(elapsed_ticks - 1):
             self._advance()
         reading = self._advance()
@@ -166,7 +166,7 @@ class SimulatedRig:
         return reading
 
     def _advance(self) -> Reading:
-        """Live one tick."""
+        """Advance by one tick."""
         now_s = self._tick * self._interval_s
         before = self._state
         if self._tick > 0:
@@ -239,6 +239,6 @@ class _Sensor(NamedTuple):
 
 
 def _flow(block: Callable[[int], NDArray[np.float64]]) -> Iterator[float]:
-    """Yield numbers one by one that are drawn a block at a time."""
+    """Yield numbers one by one from blocks drawn in advance."""
     while True:
         yield from block(BLOCK_TICKS).tolist()

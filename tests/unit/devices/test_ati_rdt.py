@@ -3,6 +3,7 @@ import struct
 
 import pytest
 
+from rigidimeter.devices.ati.calibration import FORCE_UNITS_N, TORQUE_UNITS_NM
 from rigidimeter.devices.ati.rdt import AtiRdt
 from rigidimeter.devices.ati.rdt_packets import (
     COUNTS,
@@ -12,7 +13,7 @@ from rigidimeter.devices.ati.rdt_packets import (
     request,
     status_words,
 )
-from rigidimeter.devices.ati.rdt_setup import FORCE_UNITS_N, TORQUE_UNITS_NM, changes, parse_page
+from rigidimeter.devices.ati.rdt_setup import changes, parse_page
 from rigidimeter.devices.base import DeviceError
 from rigidimeter.guard import Cause
 

@@ -1,1 +1,1 @@
-"""Servos of the Copley kind that speak ASCII on a serial line."""
+"""Copley-type servo drives controlled by ASCII commands on a serial line."""

@@ -1,28 +1,27 @@
-"""A serial servo drive of the Copley kind, commanded so that it stops when nobody commands it.
+"""A serial servo drive of the Copley type that stops by itself when commands cease.
 
 In its velocity mode such a drive keeps the last velocity for ever: if the computer dies, the arm
-goes on to the mechanical stop. So, in ``mode = "moves"``, every command is a move of its own end:
-the trajectory generator is sent an absolute target a little ahead, at the wanted velocity, and
-each command renews it. The drive keeps the velocity for `horizon_s` after the last command and then
-brakes by its own deceleration: at rest within
+moves on to the mechanical stop. So, in ``mode = "moves"``, every command is a move that ends: an
+absolute target a short distance ahead, at the wanted velocity, renewed by each command. The drive
+holds the velocity for `horizon_s` after the last command and then brakes with its own
+deceleration. It is at rest within
 
     horizon_s + v / deceleration
 
-whatever became of the computer. ``mode = "velocity"`` has no such end, and is refused unless
-`external_watchdog` says that a relay takes the power away when the loop's pulses cease.
+even if the computer is dead. ``mode = "velocity"`` has no such end and is refused unless
+`external_watchdog` says that a relay removes the power when the loop's pulses cease.
 
-One cycle is: target, velocity, start, then position, velocity, and event status or desired state
-by turns.
-`read` and `write` only exchange batches with a thread that carries them (see `line`); a
-command that meets an unfinished cycle is not sent, and `write` returns the one still in force.
-The velocity is the drive's own register: it differentiates at its control rate, where the stamps of
-a serial line, a millisecond apart, would put their jitter into a difference.
+A cycle sends target, velocity and start, then reads position, velocity, and in turn the event
+status or the desired state. `read` and `write` only exchange batches with a thread (see `line`). A
+command during an unfinished cycle is not sent, and `write` returns the one still in force. The
+velocity is the drive's own register, computed at its control rate; differences of positions would
+contain the jitter of time stamps from a serial line.
 
-A loop that was held up for longer than the horizon finds a drive that has stopped by itself, and
-must not set it going again: commands are zero from then on, as after any fault, until `enable`.
+If the loop was held up for longer than the horizon, the drive has stopped by itself and must not be
+started again: commands are zero from then on, as after any fault, until `enable`.
 
-What is from memory of the programmer's guide stands in `protocol`. A USB adapter adds its
-latency timer to every reply; set it to 1 ms.
+`language` lists what is from memory of the programmer's guide. A USB adapter adds its latency timer
+to every reply; set it to 1 ms.
 """
 
 from __future__ import annotations
@@ -85,7 +84,7 @@ class AsciiDrive:
     # -- life ---------------------------------------------------------------------------------
 
     def connect(self) -> None:
-        """Open the port at the rate a drive has after power-up; sends nothing.
+        """Open the port at the power-up baud rate; nothing is sent.
 
         Raises
         ------
@@ -97,13 +96,13 @@ class AsciiDrive:
         self._line = AsciiLine(open_port(self._settings), self._now)
 
     def configure(self) -> DeviceFacts:
-        """Set the baud rate, take the power away, set the profile and read everything back.
+        """Set the baud rate, remove the power, set the profile and read everything back.
 
         Raises
         ------
         DeviceError
-            If the drive does not answer, has a fault, does not take a value, or is too slow for
-            the horizon.
+            If the drive does not answer, has a fault, does not accept a value, or is too slow
+            for the horizon.
         """
         s = self._settings
         if s.mode == "velocity" and not s.external_watchdog:
@@ -147,12 +146,12 @@ class AsciiDrive:
         )
 
     def enable(self) -> None:
-        """Write zero velocity and a target where the arm is, read them back, then energise.
+        """Write zero velocity and the present position as target, read them back, then energise.
 
         Raises
         ------
         DeviceError
-            If the drive was not configured, a target is not zero, or the drive does not come up.
+            If the drive was not configured, a target is not zero, or the drive does not start.
         """
         if not self._configured:
             raise DeviceError("drive: enable before configure; call connect and configure first")
@@ -173,7 +172,7 @@ class AsciiDrive:
     # -- the loop -----------------------------------------------------------------------------
 
     def read(self) -> MotionSample:
-        """Return the newest sample without waiting; the one before again if there is none."""
+        """Return the newest sample without waiting; the previous one if there is no new one."""
         line, heard = self._line, self._heard
         if line is not None and self._configured:
             while (exchange := line.take()) is not None:
@@ -181,7 +180,7 @@ class AsciiDrive:
             now_s = self._now()
             if line.busy and now_s - heard.heard_s > self._settings.lost_s + self._cycle_s:
                 heard.latch(Cause.DRIVE_LOST)
-            self._mind_the_horizon(now_s)
+            self._check_horizon(now_s)
             if not self._commanding and not line.busy:
                 self._send()
         if heard.sequence < 0:
@@ -197,26 +196,26 @@ class AsciiDrive:
         )
 
     def write(self, velocity_rad_s: float) -> float:
-        """Send a velocity and return the one in force: this one, or the last if the wire is busy.
+        """Send a velocity and return the one in force: this one, or the last if the line is busy.
 
-        It is limited to `max_velocity_deg_s`. One that is not finite is sent as zero and latched.
-        After a fault, or a pause in which the drive has stopped by itself, zero is sent.
+        It is limited to `max_velocity_deg_s`. A value that is not finite is sent as zero and
+        latched. After a fault, or a pause in which the drive stopped by itself, zero is sent.
         """
         line, heard = self._line, self._heard
         if line is None or not self._commanding:
             return 0.0
-        self._mind_the_horizon(self._now())
+        self._check_horizon(self._now())
         if not math.isfinite(velocity_rad_s):
             heard.latch(Cause.COMMAND_NOT_FINITE)
             velocity_rad_s = 0.0
         if heard.cause not in (Cause.NONE, Cause.COMMAND_NOT_FINITE):
-            # Power that comes back, or an answer, must not set the arm going again; and no target
-            # can be built on a position that is not known. The move in force ends.
+            # The arm must not start again when power or replies come back, and a target needs a
+            # known position. The present move ends.
             velocity_rad_s = 0.0
         if line.busy:
             heard.counts["skipped"] += 1
         elif heard.refused and heard.cause is Cause.NONE:
-            # A drive without power refuses to move, and so does a faulty one: ask which it is.
+            # A drive without power refuses to move, and so does a faulty one: read which it is.
             if self._asked_why:
                 heard.latch(Cause.DRIVE_FAULT)
             self._asked_why = True
@@ -230,13 +229,13 @@ class AsciiDrive:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Replies received, lost, damaged, refused (``e``), and commands skipped on a busy wire."""
+        """Replies received, lost, damaged, refused (``e``), and commands skipped on a busy line."""
         return dict(self._heard.counts)
 
     # -- the end ------------------------------------------------------------------------------
 
     def stop(self) -> None:
-        """Abort the move: the drive brakes by its own deceleration and stays at rest."""
+        """Abort the move: the drive brakes with its own deceleration and stays at rest."""
         self._commanding = False
         self._sent = 0
         if self._powered:
@@ -244,14 +243,14 @@ class AsciiDrive:
             self._try(request)
 
     def disable(self) -> None:
-        """Take the power away at once; a drive that does not confirm it is named lost."""
+        """Remove the power at once; a drive that does not confirm it is reported as lost."""
         self._commanding = False
         self._sent = 0
         self._powered = False
         self._try(set_(0x24, OFF))
 
     def close(self) -> None:
-        """Take the power away and close the port."""
+        """Remove the power and close the port."""
         self.disable()
         self._speaking = self._configured = False
         line, self._line = self._line, None
@@ -285,8 +284,8 @@ class AsciiDrive:
             turns = (0xA0, 0x24) if ask_all else ((0x24,) if self._cycle % 2 else (0xA0,))
             line.submit(*commands, *map(get, (0x32, 0x18, *turns)))
 
-    def _mind_the_horizon(self, now_s: float) -> None:
-        """Notice that the last move has ended by itself, since none came to renew it."""
+    def _check_horizon(self, now_s: float) -> None:
+        """Latch a cause if the last move has ended because no command renewed it."""
         line = self._line
         if not self._commanding or self._settings.mode != "moves" or line is None or line.busy:
             return
@@ -294,7 +293,7 @@ class AsciiDrive:
             self._heard.latch(Cause.DRIVE_STATE)
 
     def _start_sampling(self) -> None:
-        """Begin again from a fresh sample, without the causes of a life before."""
+        """Start again from a fresh sample, without the causes of the previous run."""
         self._asked_why = False
         talk = self._talking()
         position, speed, status = (talk.value(register) for register in (0x32, 0x18, 0xA0))
@@ -306,7 +305,7 @@ class AsciiDrive:
         return AsciiTalk(self._line, self._settings)
 
     def _try(self, request: str) -> None:
-        """Send a request of the way out; a drive that does not grant it is lost, nothing raises."""
+        """Send a request that ends the motion; without an ok the drive is lost, but no error."""
         if self._line is not None and self._speaking:
             text = self._line.ask(request, PATIENCE * self._settings.lost_s)
             if text != "ok":

@@ -1,9 +1,9 @@
-"""The ASCII language of Copley servo drives: registers, replies, and moves that end by themselves.
+"""The ASCII language of Copley servo drives: registers, replies, and moves of limited length.
 
     s r0xNN value   set a register        -> ok
     g r0xNN         read a register       -> v value
     t 1 / t 0       start / abort a move  -> ok
-                                             e code, where a request is refused
+                                             e code, if a request is refused
 
 Each line ends with a carriage return. Registers used, in counts of the position encoder:
 
@@ -14,15 +14,15 @@ Each line ends with a carriage return. Registers used, in counts of the position
     0xcc, 0xcd, 0xcf acceleration, deceleration, deceleration of an abort, in 10 counts/s²
     0xa0 event status, 0xa4 latched faults; 0x90 baud rate; 0x81 serial number, 0x92 model
 
-The baud change, the states, the units of 0x18, 0x2f, 0x36, 0x37 and 0xca..0xcd and the profile 0
-are those of published programs for such drives. From memory of the public programmer's guide, and
-to be verified at commissioning: the bits of the event status, 0x81, 0x92 and 0xcf, that `t 1` takes
-a changed target and velocity while a move runs, and that `t 0` at rest changes nothing.
+The baud change, the states, the units of 0x18, 0x2f, 0x36, 0x37 and 0xca..0xcd and profile 0 are
+taken from published programs for such drives. The rest is from memory of the public programmer's
+guide and must be verified at commissioning: the bits of the event status, 0x81, 0x92 and 0xcf, that
+`t 1` accepts a changed target and velocity during a move, and that `t 0` at rest changes nothing.
 
-A move is absolute, not relative. What a relative move started during another one is relative *to*
-(the place, or the target before) is not said alike everywhere; in the second reading every renewal
-would add to the way still to go, and a dead computer would leave a long move behind. The same
-absolute target sent twice is the same target.
+Moves are absolute, not relative. Sources disagree on whether a relative move started during another
+one starts from the present position or from the previous target. In the second case every command
+would lengthen the remaining move, and a computer that dies would leave a long move running. An
+absolute target can be sent again without harm.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ DISABLED_BITS = {
     12: "disabled by software",
     15: "output stage off",
 }
-"""Bits of the event status of a drive without power."""
+"""Bits of the event status that mean the drive has no power."""
 
 STATUS_FAULTS = sum(1 << bit for bit in FAULT_BITS)
 STATUS_DISABLED = sum(1 << bit for bit in DISABLED_BITS)
@@ -75,14 +75,14 @@ DAMAGED_IN_A_ROW = 3
 
 
 class Reply(NamedTuple):
-    """What a line says: `kind` is ok, v, e, or ? for anything else."""
+    """A parsed reply: `kind` is ok, v, e, or ? for anything else."""
 
     kind: str
     value: int = 0
 
 
 def parse(line: str) -> Reply:
-    """Read a reply.
+    """Parse a reply.
 
     >>> parse("v -120")
     Reply(kind='v', value=-120)
@@ -111,34 +111,34 @@ def set_(register: int, value: int) -> str:
 
 
 def named_bits(status: int, names: dict[int, str]) -> str:
-    """Name the bits that are set, with commas; empty if none is."""
+    """Return the names of the bits that are set, separated by commas."""
     return ", ".join(name for bit, name in names.items() if status >> bit & 1)
 
 
 def seconds(characters: int, baud: int) -> float:
-    """Return how long characters take on the wire."""
+    """Return the time in s that so many characters take on the line."""
     return characters * BITS_PER_CHARACTER / baud
 
 
 def move_target(
     position: float, moving: float, wanted: float, deceleration: float, horizon_s: float
 ) -> int:
-    """Return the target of a move that goes on for `horizon_s` and then brakes to rest.
+    """Return the target of a move that lasts for `horizon_s` and then brakes to rest.
 
-    The place where the drive would come to rest if it braked now, plus the way of the horizon, plus
-    the braking way that the wanted velocity adds. Never shorter than the braking way: the
-    generator would run past such a target and come back.
+    The target is where the drive would stop if it braked now, plus the distance covered in the
+    horizon, plus the braking distance that the wanted velocity adds. It is never closer than the
+    braking distance, since the generator would overshoot such a target and come back.
 
     Parameters
     ----------
     position : float
-        Now, in counts.
+        Present position in counts.
     moving, wanted : float
-        The velocity now and the one commanded, in counts/s.
+        Present and commanded velocity in counts/s.
     deceleration : float
         Of the trajectory generator, in counts/s².
     horizon_s : float
-        How long to keep the velocity.
+        How long to hold the velocity.
 
     Examples
     --------
@@ -147,7 +147,8 @@ def move_target(
     >>> move_target(0.0, 0.0, 1000.0, 10_000.0, 0.05)
     100
 
-    At that speed already, and told to go slower: the braking way is that of the speed it has.
+    Already at that speed, and commanded to slow down: the braking distance is that of the present
+    speed.
 
     >>> move_target(0.0, 1000.0, 100.0, 10_000.0, 0.05)
     55
@@ -156,42 +157,46 @@ def move_target(
     same_way = moving if moving * wanted > 0.0 else 0.0
     added = max(0.0, wanted * wanted - same_way * same_way) / (2.0 * deceleration)
     target = rest + wanted * horizon_s + math.copysign(added, wanted)
-    # Away from the place: a move rounded to nothing would stand still for ever.
+    # Rounded away from the present position: a move rounded to zero would never start.
     return math.ceil(target) if wanted > 0.0 else math.floor(target)
 
 
 class Feedback:
-    """Replies in; position and velocity in the drive's units, and a cause, out.
+    """The last position, velocity and status of the drive, and the first cause.
+
+    The time stamp of a position is the end of its request: the end of the reply minus the time that
+    its characters take.
 
     Parameters
     ----------
     baud : int
     jump, fastest : float
-        How far the position may be from where it was, in counts: so much, and so much a second.
+        Largest change of position between two samples, in counts and in counts/s: `jump` plus
+        `fastest` times the time between them.
     state_on : int
-        The desired state of a drive that has power.
+        The desired state of an enabled drive.
     """
 
     def __init__(self, baud: int, jump: float, fastest: float, state_on: int) -> None:
         self._baud, self._jump, self._fastest, self._state_on = baud, jump, fastest, state_on
         self.position = self.speed = self.status = 0
-        """In counts, in 0.1 counts/s, and the event status."""
+        """Position in counts, velocity in 0.1 counts/s, and the event status."""
         self.position_s = -math.inf
         self.sequence = -1
         self.cause = Cause.NONE
         self.heard_s = 0.0
         self.refused = False
-        """A move was refused once: the next answers say why."""
+        """Whether a move was refused once; the following replies tell why."""
         self.counts = dict.fromkeys(("received", "lost", "damaged", "refused", "skipped"), 0)
         self._damaged_in_a_row = 0
 
     def latch(self, cause: Cause) -> None:
-        """Keep the first cause."""
+        """Store a cause unless there is one already."""
         if self.cause is Cause.NONE:
             self.cause = cause
 
     def begin(self, position: int, speed: int, status: int, now_s: float) -> None:
-        """Begin again from a fresh sample, without the causes of a life before."""
+        """Start again from a fresh sample, without the causes of the previous run."""
         self.cause = Cause.NONE
         self.refused = False
         self._damaged_in_a_row = 0
@@ -200,7 +205,7 @@ class Feedback:
         self._take_status(status, commanding=False)
 
     def hear(self, exchange: Exchange, *, commanding: bool) -> None:
-        """Take one answer; what is wrong with it is latched."""
+        """Process one reply; an error is latched as a cause."""
         request, text, at_s = exchange
         if text is None:
             self.counts["lost"] += 1

@@ -1,9 +1,9 @@
-"""One question, one answer: a serial line of ASCII requests that nobody waits for.
+"""Requests and replies on a serial line, carried by a thread so that the loop never waits.
 
-The drive answers each line with one line, and takes the next one only then. A loop that looked in
-once a tick would spend a tick on each answer, so a thread carries a batch of requests through, one
-by one, and sleeps in the operating system meanwhile. It holds no timer and repeats nothing: a loop
-that hangs or dies gives it no further batch, and the line falls silent.
+The drive answers each line with one line and accepts the next one only then. A loop that polled
+once per tick would need a tick for each reply. So a thread sends a batch of requests one by one and
+blocks in the operating system meanwhile. It has no timer and repeats nothing: if the loop hangs or
+dies, no further batch is submitted and the line goes silent.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ class Port(Protocol):
         """Read up to a character, or until the time is out."""
 
     def write(self, data: bytes, /) -> int | None:
-        """Write."""
+        """Write characters."""
 
     def reset_input_buffer(self) -> None:
-        """Throw away what has arrived."""
+        """Discard received characters."""
 
     def send_break(self, duration: float) -> None:
         """Hold the line at zero."""
 
     def close(self) -> None:
-        """Close."""
+        """Close the port."""
 
 
 class Exchange(NamedTuple):
-    """A request, its reply (None if none came in time) and when the reply was complete."""
+    """A request, its reply (None if none came in time) and the time the reply was complete."""
 
     request: str
     reply: str | None
@@ -54,14 +54,14 @@ class Exchange(NamedTuple):
 
 
 class AsciiLine:
-    """Batches of requests in, answers out.
+    """Sends batches of requests and collects the replies.
 
     Parameters
     ----------
     port : Port
-        Open, with its timeout set to the longest a reply may take.
+        Open, with its timeout set to the longest time that a reply may take.
     now : callable
-        Monotonic time in s, for the stamps.
+        Monotonic time in s, for the time stamps.
     """
 
     def __init__(self, port: Port, now: Now) -> None:
@@ -81,7 +81,7 @@ class AsciiLine:
 
     @property
     def busy(self) -> bool:
-        """Whether a request is still without its answer."""
+        """Whether a request is waiting for its reply."""
         return self._pending > 0
 
     def submit(self, *requests: str) -> None:
@@ -92,25 +92,19 @@ class AsciiLine:
             self._requests.put(request)
 
     def take(self) -> Exchange | None:
-        """Return the oldest answer not yet taken, None if there is none; never waits."""
+        """Return the oldest reply not yet taken, None if there is none; never waits."""
         try:
             return self._replies.popleft()
         except IndexError:
             return None
 
     def drop(self) -> None:
-        """Forget requests not yet sent and answers not yet taken."""
-        while True:
-            try:
-                request = self._requests.get_nowait()
-            except queue.Empty:
-                break
-            if request is not None:
-                self._done()
+        """Discard requests not yet sent and replies not yet taken."""
+        self._drop_requests()
         self._replies.clear()
 
     def ask(self, request: str, timeout_s: float) -> str | None:
-        """Send one request ahead of all others and wait for its answer: not for the loop."""
+        """Send a request ahead of all others and wait for its reply; not for use in the loop."""
         self.drop()
         self.submit(request)
         if not self.wait(timeout_s):
@@ -120,7 +114,7 @@ class AsciiLine:
         return replies[-1] if replies else None
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until every request has its answer; return whether that came about."""
+        """Wait until all requests are answered; return False on timeout."""
         with self._answered:
             return self._answered.wait_for(lambda: self._pending <= 0, timeout_s)
 
@@ -141,11 +135,10 @@ class AsciiLine:
             reply = self._exchange(request)
             self._replies.append(Exchange(request, reply, self._now()))
             if reply is None:
-                # What was to follow was meant for a drive that answers.
-                self._forget_rest()
+                self._drop_requests()  # the rest of the batch assumed a drive that answers
             self._done()
 
-    def _forget_rest(self) -> None:
+    def _drop_requests(self) -> None:
         while True:
             try:
                 request = self._requests.get_nowait()

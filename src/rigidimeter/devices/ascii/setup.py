@@ -1,4 +1,4 @@
-"""Questions put to a serial drive before the loop runs; each waits for its answer and checks it."""
+"""Settings and set-up of a serial drive: requests that wait for their replies and check them."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ OFF = 0
 POWER_UP_BAUD = 9600
 MEASURED_CYCLES = 7
 MARGIN = 1.4
-"""On the median cycle: a tick that meets an unfinished cycle sends no command at all."""
+"""Factor on the median cycle time: a tick during an unfinished cycle sends no command."""
 PATIENCE = 4.0
-"""A question waits this many times the longest reply: for its turn, and for its answer."""
+"""A request may take this many times the longest reply: queueing plus the reply itself."""
 
 
 class AsciiDriveSettings(Section):
-    """How the drive is wired and what it may do.
+    """Port, scaling and limits of the drive.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ class AsciiDriveSettings(Section):
 
     @property
     def emulated(self) -> bool:
-        """Whether the port is a pseudo-terminal: the other end of it is a program."""
+        """Whether the port is a pseudo-terminal, with a program at its other end."""
         return self.port.startswith("/dev/pts/")
 
 
 def open_port(settings: AsciiDriveSettings) -> Port:
-    """Open the port at the rate a drive has after power-up; sends nothing.
+    """Open the port at the power-up baud rate; nothing is sent.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def open_port(settings: AsciiDriveSettings) -> Port:
 
 
 class AsciiTalk:
-    """A conversation over a line; not for the loop, since it waits.
+    """Requests that wait for their replies; not for use in the loop.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class AsciiTalk:
         self._patience_s = PATIENCE * settings.lost_s
 
     def answer(self, request: str) -> Reply | None:
-        """Ask; return None if no answer came, or one that means nothing."""
+        """Send a request; return None if there is no valid reply."""
         text = self._line.ask(request, self._patience_s)
         reply = None if text is None else parse(text)
         return None if reply is None or reply.kind == "?" else reply
@@ -115,7 +115,7 @@ class AsciiTalk:
         Raises
         ------
         DeviceError
-            If it gives no value.
+            If the drive returns no value.
         """
         reply = self.answer(get(register))
         if reply is None or reply.kind != "v":
@@ -125,17 +125,17 @@ class AsciiTalk:
         return reply.value
 
     def text(self, register: int) -> str:
-        """Read a register that holds text; empty if the drive has none."""
+        """Read a text register; empty if the drive has none."""
         answer = self._line.ask(get(register), self._patience_s)
         return answer[2:] if answer is not None and answer.startswith("v ") else ""
 
     def command(self, request: str) -> None:
-        """Send a request that must be granted.
+        """Send a request that must be acknowledged by ok.
 
         Raises
         ------
         DeviceError
-            If it is not.
+            If it is not acknowledged.
         """
         reply = self.answer(request)
         if reply is None or reply.kind != "ok":
@@ -158,15 +158,15 @@ class AsciiTalk:
             )
 
     def agree_on_baud(self) -> None:
-        """Find the drive at its first rate, or at the one wanted, and bring it to the latter.
+        """Find the drive at its power-up baud rate or at the wanted one, and set the latter.
 
         Raises
         ------
         DeviceError
-            If it answers at neither, or does not take the rate.
+            If it answers at neither, or does not accept the rate.
         """
         line, port, baud = self._line, self._line.port, self._settings.baud
-        # A break brings a drive of an earlier session back to its first rate.
+        # A break resets a drive of an earlier session to its power-up rate.
         port.send_break(0.05)
         for rate in dict.fromkeys((POWER_UP_BAUD, baud)):
             port.baudrate = rate
@@ -178,7 +178,7 @@ class AsciiTalk:
                 "check the cable, the power and that no other program holds the drive"
             )
         if port.baudrate != baud:
-            # At which rate the answer comes is not certain, so it is not looked at.
+            # The reply may come at either rate, so it is ignored.
             line.ask(set_(0x90, baud), self._patience_s)
             port.baudrate = baud
         found = self.answer(get(0x90))
@@ -189,12 +189,12 @@ class AsciiTalk:
             )
 
     def clear_faults(self) -> int:
-        """Clear latched faults of a drive without power; return which there were.
+        """Clear the latched faults of a drive without power; return what was latched.
 
         Raises
         ------
         DeviceError
-            If one stays.
+            If a fault remains.
         """
         latched = self.value(0xA4)
         if latched:
@@ -208,12 +208,12 @@ class AsciiTalk:
         return latched
 
     def write_profile(self, acceleration: float, deceleration: float) -> float:
-        """Set zero velocity, absolute trapezoids and the ramps, given in counts/s².
+        """Set zero velocity, absolute trapezoids and the ramps in counts/s².
 
         Returns
         -------
         float
-            The deceleration as the drive has it.
+            The deceleration as the drive rounds it.
         """
         self.set(0x2F, 0)
         self.set(0xCB, 0)
@@ -230,19 +230,19 @@ class AsciiTalk:
         return 10.0 * moves if self._settings.mode == "moves" else 1000.0 * velocity
 
     def energise(self, state_on: int, most_counts: float) -> None:
-        """Write zero velocity and a target where the arm is, read them back, then energise.
+        """Write zero velocity and the present position as target, read them back, then energise.
 
         Parameters
         ----------
         state_on : int
-            The desired state of a drive with power.
+            The desired state of an enabled drive.
         most_counts : float
-            How far the arm may move meanwhile.
+            Largest movement allowed meanwhile.
 
         Raises
         ------
         DeviceError
-            If a target is not zero, or the drive does not come up at rest.
+            If a target is not zero, or the drive does not start at rest.
         """
         state = self.value(0x24)
         if state != OFF:
@@ -264,7 +264,7 @@ class AsciiTalk:
             raise DeviceError(f"drive: moved {moved} counts on enable; it must stand still")
 
     def measured_cycle_s(self, now: Now) -> float:
-        """Return how long to allow for a cycle of the loop, tried with requests of its length.
+        """Return the time to allow for a cycle, measured with requests of the same length.
 
         Raises
         ------
@@ -285,7 +285,7 @@ class AsciiTalk:
             taken_s.append(now() - began_s)
         line.drop()
         self.set(0xCB, 0)
-        # Never better than the characters allow, whatever a clock may say.
+        # Never shorter than the time that the characters take.
         replies = len(commands) * len("ok\r") + 3 * len("v -1234567\r")
         sent = sum(len(request) + 1 for request in cycle)
         return max(MARGIN * median(taken_s), seconds(sent + replies, self._settings.baud))

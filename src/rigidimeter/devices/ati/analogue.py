@@ -3,19 +3,19 @@
     load   = matrix · (V - bias)          (N and N·m; see `calibration`)
     torque = sign · weights · load        (N·m about the joint's axis)
 
-The weights stand for where the transducer sits: Tz alone if its axis is the joint's, a lever arm
-in m on a force if it is beside it. A transducer reads the load on its tool side. With the arm there
-it reads what the arm does to the drive, the opposite of what the drive applies to the joint, so
-`sign` is -1 by default; turned about, it is +1. Check it by hand, without power. The resting
-voltages `bias_v` are those without a load; what remains of the arm's weight is the business of the
-rig's zeroing.
+The weights describe the mounting: Tz alone if the transducer's axis is the joint's, a lever arm in
+m on a force if it is beside it. A transducer measures the load on its tool side. With the arm there
+it measures what the arm applies to the drive, the opposite of what the drive applies to the joint,
+so `sign` is -1 by default; mounted the other way round it is +1. Check it by hand, without power.
+The voltages `bias_v` are those without a load; the weight of the arm is removed by the rig's
+zeroing.
 
-The card samples by its own clock into its own buffer, and `read` takes what is there without
-waiting. Saturation of any sample since the last look counts, not only of the newest. Noise moves a
-working gauge every sample; six voltages that stay the same to the bit have stopped working. A
-number that is not finite goes on as it is: the guard decides.
+The card samples by its own clock into its own buffer, and `read` takes the buffered samples without
+waiting. Saturation of any sample since the last read counts, not only of the newest. Noise changes
+a working gauge at every sample, so six voltages that stay bit for bit the same mean a failure.
+Values that are not finite are passed on; the guard handles them.
 
-The reader is passed in, so that everything but `NiReader` runs without a card.
+The reader is an argument, so that everything but `NiReader` runs without a card.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ BUFFER_S = 1.0
 
 
 class ReaderError(Exception):
-    """The card did not give voltages: a wire is open, the task ended, the buffer overflowed."""
+    """The card returned no voltages: an open wire, a task that ended, a buffer overflow."""
 
 
 class VoltageReader(Protocol):
-    """Where the voltages come from."""
+    """A source of voltages."""
 
     def start(self) -> str:
         """Start sampling; return the model of the card."""
@@ -54,11 +54,11 @@ class VoltageReader(Protocol):
         """Return the voltages since the last call, without waiting, shape (samples, 6)."""
 
     def stop(self) -> None:
-        """Stop sampling; safe twice."""
+        """Stop sampling; safe when repeated."""
 
 
 class AtiAnalogueSettings(Section):
-    """How the transducer is wired.
+    """Wiring and mounting of the transducer.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class AtiAnalogueSettings(Section):
     calibration : str
         Path of the transducer's ``*.cal`` file, or of a table in TOML.
     serial : str
-        What the calibration must belong to; empty to take any.
+        Serial number that the calibration must have; empty to accept any.
     """
 
     channels: str
@@ -87,7 +87,7 @@ class AtiAnalogueSettings(Section):
 
 
 class AtiAnalogue:
-    """A `TorqueSensor` made of six voltages.
+    """A `TorqueSensor` that computes torque from six voltages.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class AtiAnalogue:
     now : callable
         Monotonic time in s.
     reader : VoltageReader, optional
-        In place of the card.
+        Replaces the card.
     """
 
     Settings: ClassVar[type[AtiAnalogueSettings]] = AtiAnalogueSettings
@@ -116,7 +116,7 @@ class AtiAnalogue:
         self._counts = dict.fromkeys(("received", "lost", "repeated", "reordered", "damaged"), 0)
 
     def connect(self) -> None:
-        """Find the card's driver; nothing is sampled yet."""
+        """Load the card's driver; nothing is sampled yet."""
         if self._reader is None:
             self._reader = NiReader(self._settings) if self._given is None else self._given
 
@@ -126,7 +126,7 @@ class AtiAnalogue:
         Raises
         ------
         DeviceError
-            If the calibration is not that of this transducer, or the card does not start.
+            If the calibration belongs to another transducer, or the card does not start.
         """
         s = self._settings
         if self._reader is None:
@@ -166,7 +166,7 @@ class AtiAnalogue:
         )
 
     def read(self) -> TorqueSample:
-        """Return the newest sample without waiting; the one before again if there is none."""
+        """Return the newest sample without waiting; the previous one if there is no new one."""
         if not self._sampling or self._reader is None:
             return self._sample
         now_s = self._now()
@@ -184,7 +184,7 @@ class AtiAnalogue:
         cause = Cause.NONE
         if now_s - self._moved_s >= self._settings.frozen_s:
             cause = Cause.TORQUE_FROZEN
-        # The louder of the two: a gauge at its end is also one that does not move.
+        # Saturation comes first: a saturated gauge does not change either.
         if (np.abs(volts) >= self._settings.saturation_v).any():
             cause = Cause.TORQUE_SATURATED
         self._sample = TorqueSample(
@@ -199,7 +199,7 @@ class AtiAnalogue:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Samples received, repeated to the bit, and reads that failed (``damaged``)."""
+        """Samples received, samples repeated bit for bit, and reads that failed (``damaged``)."""
         return dict(self._counts)
 
     def close(self) -> None:
@@ -210,9 +210,9 @@ class AtiAnalogue:
             reader.stop()
 
     def _note_frozen(self, volts: NDArray[np.float64], now_s: float) -> int:
-        """Remember when the voltages last changed; return how many samples repeat their last."""
+        """Note when the voltages last changed; return how many samples repeat the previous one."""
         before = volts[:1] if self._last is None else self._last[None]
-        # Compared as bits: a NaN repeats a NaN.
+        # Compared as bits, so that a NaN equals a NaN.
         bits = np.ascontiguousarray(np.vstack((before, volts))).view(np.int64)
         same = (bits[1:] == bits[:-1]).all(axis=1)
         if self._last is None or not same.all():
@@ -229,9 +229,8 @@ def torque_row(calibration: Calibration, weights: list[float], sign: int) -> NDA
 class NiReader:
     """Voltages from an NI-DAQ card, sampled by its own clock.
 
-    Never run against a card: no card was at hand. The calls are those of the public reference of
-    `nidaqmx`; verify at commissioning that `read` returns at once and that an unplugged connector
-    shows.
+    This has never run with a card. The calls follow the public reference of `nidaqmx`; verify at
+    commissioning that `read` returns at once and that an unplugged connector is detected.
 
     Parameters
     ----------
@@ -250,7 +249,7 @@ class NiReader:
         self._task: Any = None
 
     def start(self) -> str:
-        """Make a continuous task of six channels and start it."""
+        """Start a continuous task of six channels."""
         s, ni = self._settings, self._nidaqmx
 
         def begin() -> str:
@@ -278,7 +277,7 @@ class NiReader:
         return str(self._tried(begin))
 
     def read(self) -> NDArray[np.float64]:
-        """Take what the card has sampled since the last call."""
+        """Return what the card has sampled since the last call."""
 
         def take() -> NDArray[np.float64]:
             ready = self._task.in_stream.avail_samp_per_chan

@@ -5,10 +5,10 @@
 with the rows in the order Fx Fy Fz Tx Ty Tz, the columns in the order of the gauges G0 to G5,
 forces in N, torques in N·m.
 
-Two kinds of file are read. ATI's own ``*.cal`` is XML: the attributes of `Calibration` name the
-units, and six `UserAxis` elements hold the rows in load per volt, ready to use. The `Axis` elements
-of the same file hold the rows multiplied by a `scale` each and before the tool transform, for
-ATI's programs only; a file without `UserAxis` is refused. A ``*.toml`` file is written by hand:
+Two kinds of file can be read. ATI's own ``*.cal`` is XML: the attributes of `Calibration` name the
+units, and six `UserAxis` elements hold the rows in load per volt. The `Axis` elements of the same
+file hold the rows before the tool transform, each multiplied by a `scale`, for ATI's own programs;
+a file without `UserAxis` is refused. A ``*.toml`` file is written by hand:
 
     serial = "FT0001"
     force_unit = "N"
@@ -28,28 +28,51 @@ from numpy.typing import NDArray
 
 from rigidimeter.devices.base import DeviceError
 
-__all__ = ["AXES", "Calibration", "read_calibration"]
+__all__ = [
+    "AXES",
+    "FORCE_UNITS_N",
+    "TORQUE_UNITS_NM",
+    "Calibration",
+    "read_calibration",
+    "unit_name",
+]
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
-POUND_N = 4.4482216152605
+POUND_FORCE_N = 4.4482216152605
+KILOGRAM_FORCE_N = 9.80665
 INCH_M = 0.0254
-FORCE_N = {"N": 1.0, "kN": 1e3, "lb": POUND_N, "lbf": POUND_N, "klbf": 1e3 * POUND_N}
-TORQUE_NM = {
-    "N-m": 1.0,
-    "Nm": 1.0,
-    "N-mm": 1e-3,
-    "Nmm": 1e-3,
-    "kN-m": 1e3,
-    "lb-in": POUND_N * INCH_M,
-    "lbf-in": POUND_N * INCH_M,
-    "lb-ft": POUND_N * 12.0 * INCH_M,
-    "lbf-ft": POUND_N * 12.0 * INCH_M,
+
+FORCE_UNITS_N = {
+    "N": 1.0,
+    "kN": 1000.0,
+    "lbf": POUND_FORCE_N,
+    "klbf": 1000.0 * POUND_FORCE_N,
+    "kgf": KILOGRAM_FORCE_N,
 }
+"""Newtons in one unit."""
+
+TORQUE_UNITS_NM = {
+    "Nm": 1.0,
+    "Nmm": 1e-3,
+    "kNm": 1000.0,
+    "lbf-in": POUND_FORCE_N * INCH_M,
+    "lbf-ft": POUND_FORCE_N * 12.0 * INCH_M,
+    "kgf-cm": KILOGRAM_FORCE_N * 0.01,
+}
+"""Newton metres in one unit."""
+
+_SPELLINGS = {"N-m": "Nm", "N-mm": "Nmm", "kN-m": "kNm", "kg": "kgf", "kg-cm": "kgf-cm"}
+_SPELLINGS |= {"lb": "lbf", "lb-in": "lbf-in", "lb-ft": "lbf-ft"}
+
+
+def unit_name(written: str) -> str:
+    """Return a unit of force or torque in the spelling used here; ATI has several."""
+    return _SPELLINGS.get(written, written)
 
 
 class Calibration(NamedTuple):
-    """A matrix of 6 × 6 in N/V and N·m/V, and what the file said beside it."""
+    """A 6 × 6 matrix in N/V and N·m/V, with the other entries of the file."""
 
     matrix: NDArray[np.float64]
     serial: str
@@ -122,10 +145,10 @@ def _calibration(
     path: Path, rows: Any, *, serial: str, model: str, force_unit: str, torque_unit: str
 ) -> Calibration:
     for field, unit, known in (
-        ("force unit", force_unit, FORCE_N),
-        ("torque unit", torque_unit, TORQUE_NM),
+        ("force unit", force_unit, FORCE_UNITS_N),
+        ("torque unit", torque_unit, TORQUE_UNITS_NM),
     ):
-        if unit not in known:
+        if unit_name(unit) not in known:
             raise DeviceError(
                 f"torque sensor: {path} has {field} {unit!r}; one of {', '.join(known)} is known"
             )
@@ -139,5 +162,7 @@ def _calibration(
         raise DeviceError(
             f"torque sensor: {path} holds a singular matrix; six gauges carry six loads"
         )
-    scale = np.repeat([FORCE_N[force_unit], TORQUE_NM[torque_unit]], 3)
+    scale = np.repeat(
+        [FORCE_UNITS_N[unit_name(force_unit)], TORQUE_UNITS_NM[unit_name(torque_unit)]], 3
+    )
     return Calibration(scale[:, None] * matrix, serial, model, force_unit, torque_unit)

@@ -4,14 +4,14 @@ The torque about the joint is a weighted sum of what the sensor measures,
 
     M = sign · (w1 Fx + w2 Fy + w3 Fz + w4 Tx + w5 Ty + w6 Tz),
 
-with w1 … w3 the lever arms in m. A sensor reads the load on its tool side. Mounted on the drive
-with the arm on its tool side it reads what the arm does to the drive, the opposite of what the
-drive applies to the joint, so `sign` is −1 by default. Turned about, it is +1. A wrong sign makes
-the loop run away from the subject instead of giving way: check it by hand, without power, before
-the first run.
+with w1 … w3 the lever arms in m. A sensor measures the load on its tool side. Mounted on the drive
+with the arm on its tool side it measures what the arm applies to the drive, the opposite of what
+the drive applies to the joint, so `sign` is −1 by default. Mounted the other way round it is +1.
+With a wrong sign the loop moves against the subject instead of giving way: check the sign by hand,
+without power, before the first run.
 
-The sensor serves one client, the last that asked. Its packets carry no checksum beyond UDP's and
-no sender but an address; keep it on a wire of its own.
+The sensor serves one client, the last that sent a request. Its packets have only UDP's checksum and
+are identified only by their address, so give it a network of its own.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ from rigidimeter.guard import Cause
 __all__ = ["AtiRdt", "AtiRdtSettings"]
 
 MOST_PACKETS_A_READ = 256
-"""A read ends here, well under a tick, whatever arrives; the rest is for the next one."""
+"""Limit of one read, well below a tick; further packets are left for the next read."""
 
 RECEIVE_BUFFER = (socket.SOL_SOCKET, socket.SO_RCVBUF)
 RECEIVE_BUFFER_BYTES = 1 << 20
-"""Room for what arrives while the loop is held up; when it is full the newest would be lost."""
+"""Space for packets that arrive while the loop is held up; a full buffer drops the newest."""
 
 SO_TIMESTAMPNS = 35
-"""Linux: the kernel notes with each packet when it arrived. Python has no name for it."""
+"""Linux: the kernel stamps each packet on arrival. Python has no name for this option."""
 TIMESPEC = struct.Struct("@qq")
 NOTE_BYTES = socket.CMSG_SPACE(TIMESPEC.size)
 LONGEST_WAIT_S = 0.2
@@ -62,8 +62,8 @@ LONGEST_WAIT_S = 0.2
 class AtiRdt:
     """A `TorqueSensor`.
 
-    Once configured, an instance knows its sensor: after another `connect`, `configure` refuses one
-    with other units, calibration, tool transformation, bias or filter. A new one begins afresh.
+    An instance remembers the sensor it configured: after another `connect`, `configure` refuses one
+    with other units, calibration, tool transformation, bias or filter.
 
     Parameters
     ----------
@@ -83,24 +83,24 @@ class AtiRdt:
         self._sensor = ("", 0)
         self._page: SensorPage | None = None
         self._gains = [math.nan] * 6
-        self._buffer = bytearray(64)  # longer than a record: a longer packet shows
+        self._buffer = bytearray(64)  # longer than a record, to detect longer packets
         self._stream = RdtStream(
             settings.tolerated_packets, settings.packet_window_s, settings.frozen_s
         )
         self._sample = TorqueSample(math.nan, -math.inf)
 
     def connect(self) -> None:
-        """Open the wire; the sensor hears nothing of it yet.
+        """Open the socket; nothing is sent to the sensor yet.
 
         Raises
         ------
         DeviceError
-            If the address means nothing.
+            If the address cannot be resolved.
         """
         self.close()
         settings = self._settings
         try:
-            # Packets are compared with the number, not with the name.
+            # The source of a packet is compared with the numeric address.
             self._sensor = (socket.gethostbyname(settings.address), settings.port)
         except (OSError, UnicodeError) as error:  # a name may be malformed, too
             raise DeviceError(
@@ -110,12 +110,12 @@ class AtiRdt:
         self._open()
 
     def configure(self) -> DeviceFacts:
-        """Read the calibration back, compare it, start the samples and wait for the first.
+        """Read the calibration, compare it, start sampling and wait for the first sample.
 
         Raises
         ------
         DeviceError
-            If it does not answer, reports an error, or is not what is expected or what it was.
+            If the sensor does not answer, reports an error, or differs from what is expected.
         """
         if self._socket is None:
             raise DeviceError(f"{self._device}: it is not connected; connect before configuring")
@@ -136,14 +136,14 @@ class AtiRdt:
         return DeviceFacts(page.model, page.serial, page.rate_hz, None, values)
 
     def read(self) -> TorqueSample:
-        """Return the newest sample without waiting; the one before again if there is none.
+        """Return the newest sample without waiting; the previous one if there is no new one.
 
-        `status` holds every bit since the read before, so that none is missed between two ticks.
+        `status` holds all bits since the previous read, so that none is missed between two ticks.
         """
         wire = self._socket
         if wire is None:
             return self._sample
-        # Before the packets: a sample may look older than it is, never newer.
+        # Taken before the packets: a sample may seem older than it is, never newer.
         now_s, wall_ns = self._now(), time.time_ns()
         stream, buffers, sensor = self._stream, (self._buffer,), self._sensor
         buffer = self._buffer
@@ -162,13 +162,13 @@ class AtiRdt:
         except BlockingIOError:
             pass  # drained: the end of every ordinary read
         except OSError:
-            # The interface went away, say. The sample ages and the guard acts on it.
+            # For example, the interface went down. The sample ages, and the guard acts on that.
             touched = True
             stream.damaged(now_s)
         if not touched:
             return self._sample
         if backlog:
-            stream.sampled_s = before_s  # how old what was read is, nobody knows
+            stream.sampled_s = before_s  # the age of what was read is unknown
         raw: tuple[int, ...] = ()
         torque_nm = math.nan
         if stream.packed:
@@ -192,28 +192,28 @@ class AtiRdt:
         return dict(self._stream.counts)
 
     def restart(self) -> None:
-        """Ask for the samples anew: those that piled up while nobody read are not lost ones.
+        """Restart the stream: samples that piled up meanwhile must not count as lost.
 
         Raises
         ------
         DeviceError
-            If none comes, or the sensor was not configured since it was connected.
+            If no sample arrives, or the sensor was not configured since it was connected.
         """
         if not self._configured:
             raise DeviceError(f"{self._device}: it is not configured; configure it first")
         self._start()
 
     def close(self) -> None:
-        """Stop the samples and close the wire. Safe to call at any time, and twice."""
+        """Stop sampling and close the socket. Safe at any time and when repeated."""
         wire, self._socket = self._socket, None
         self._configured = False
         if wire is None:
             return
         try:
-            for _ in range(2):  # nothing confirms it, and a packet may be lost
+            for _ in range(2):  # it is not confirmed, and a packet may be lost
                 wire.sendto(request(STOP), self._sensor)
         except OSError:
-            self._stream.damaged(self._now())  # the wire is gone: nothing can be told to the sensor
+            self._stream.damaged(self._now())  # the sensor cannot be reached any more
         finally:
             wire.close()
 
@@ -243,9 +243,9 @@ class AtiRdt:
             )
 
     def _start(self) -> None:
-        """Ask for samples until the first arrives."""
+        """Request samples until the first one arrives."""
         if self._socket is not None:
-            self._socket.close()  # what is still under way goes to the old port
+            self._socket.close()  # packets still on their way go to the old port
         self._open()
         tries = 4
         for _ in range(tries):  # a request may be lost
@@ -279,7 +279,7 @@ class AtiRdt:
             ) from error
 
     def _wait(self, until_s: float) -> bool:
-        """Wait for a packet; False when it is too late. Not for the loop."""
+        """Wait for a packet; return False on timeout. Not for use in the loop."""
         wire, left_s = self._socket, until_s - self._now()
         if wire is None or left_s <= 0.0:
             return False
@@ -294,10 +294,10 @@ class AtiRdt:
 
 
 def _waited_s(notes: list[tuple[int, int, bytes]], wall_ns: int) -> float:
-    """Return how long a packet had lain in the kernel, 0 where that is not known.
+    """Return how long a packet waited in the kernel, in s; 0 if unknown.
 
-    The kernel stamps arrivals by the wall clock, so only the difference to the wall clock of this
-    moment is used, and only one that can be: a clock that was set in between tells nothing.
+    The kernel stamps arrivals by the wall clock, so only the difference to the present wall clock
+    is used, and only if it is plausible: the clock may have been set in between.
     """
     for level, kind, data in notes:
         if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS:

@@ -1,11 +1,11 @@
-"""The packets of the ATI Net F/T's RDT protocol, and the judgement of a stream of them; no socket.
+"""The packets of the ATI Net F/T's RDT protocol, and the checks on a stream of them; no socket.
 
-A request is 8 bytes: 0x1234, a command, a number of samples (0: until told to stop). A record is 36
+A request is 8 bytes: 0x1234, a command, a number of samples (0: until stopped). A record is 36
 bytes, all big-endian:
 
-    RDT sequence  u32   counts the records of this stream
-    FT sequence   u32   counts the sensor's own samples
-    status        u32   0 when all is well
+    RDT sequence  u32   number of the record in this stream
+    FT sequence   u32   number of the sensor's own sample
+    status        u32   0 if there is no error
     Fx Fy Fz Tx Ty Tz   i32 each, counts; divided by the counts per unit they are forces and torques
 
 References
@@ -37,7 +37,7 @@ STOP = 0x0000
 START_REALTIME = 0x0002
 
 RECORD = struct.Struct("!III24s")
-"""One record; its six counts are left packed until they are wanted."""
+"""One record; its six counts are unpacked only when needed."""
 
 COUNTS = struct.Struct("!6i")
 
@@ -50,10 +50,10 @@ _SATURATED = 1 << 17
 _MONITOR = 1 << 16
 
 _SERIOUS = _U32 & ~(_ERROR | _SATURATED | _MONITOR)
-"""The bits after which no number of the sensor can be trusted, reserved ones included.
+"""Bits that make every value of the sensor invalid, including the reserved bits.
 
-Not among them: the summary bit (it comes with every other), saturation (it has a cause of its own)
-and a monitored condition (a threshold that the user set in the sensor: a warning).
+Excluded are the summary bit (it accompanies every other), saturation (it has its own cause) and a
+monitored condition (a threshold that the user set in the sensor: a warning).
 """
 
 _STATUS_WORDS = {
@@ -91,12 +91,12 @@ _STATUS_WORDS = {
 
 
 def request(command: int, samples: int = 0) -> bytes:
-    """Return the packet that asks the sensor for something."""
+    """Return the packet of a request."""
     return _REQUEST.pack(_HEADER, command, samples)
 
 
 def status_words(status: int) -> tuple[str, ...]:
-    """Name every bit that is set, the gravest (highest) first.
+    """Return the names of the bits that are set, the most severe (highest) first.
 
     >>> status_words(0x80020000)
     ('an error (summary)', 'transducer saturated or A/D error')
@@ -112,33 +112,33 @@ def status_cause(status: int) -> int:
     """Return why samples with these status bits must not be used, `Cause.NONE` if they may."""
     if status & _SATURATED:
         return int(Cause.TORQUE_SATURATED)
-    # The summary bit with nothing that explains it is an error too.
+    # The summary bit alone is an error too.
     if status & _SERIOUS or status == _ERROR:
         return int(Cause.TORQUE_STATUS)
     return int(Cause.NONE)
 
 
 NAMES = ("received", "lost", "repeated", "reordered", "damaged", "short", "foreign", "warnings")
-"""What is counted. Short packets are among the damaged; one that comes late was lost before."""
+"""Names of the counts. Short packets also count as damaged; a late one was counted as lost."""
 
 FARTHEST_JUMP = 50_000
-"""More records than a sensor sends in 7 s: such a sequence is damage or another stream."""
+"""More records than a sensor sends in 7 s: such a jump is damage or another stream."""
 
 
 class RdtStream:
-    """Judge packets one by one: which is newest, what is missing, what repeats.
+    """Check packets one by one: which is newest, which are missing or repeated.
 
-    A packet is fresh if both its sequences went on and its counts changed: a real sensor has noise.
-    While packets arrive that are not fresh, the sensor is frozen.
+    A packet is fresh if both its sequences advanced and its counts changed, since a real sensor has
+    noise. If packets arrive that are not fresh, the sensor is frozen.
 
     Parameters
     ----------
     tolerated : int
-        How many lost, repeated, reordered or damaged packets are let pass within the window.
+        How many lost, repeated, reordered or damaged packets are tolerated within the window.
     window_s : float
         The window.
     frozen_s : float
-        For how long nothing may be fresh while packets arrive.
+        Longest time without a fresh packet while packets arrive.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ class RdtStream:
     sequence : int
         Its RDT sequence, -1 before the first.
     sampled_s : float
-        When the sensor's newest sample arrived: it stays while the FT sequence stays.
+        When the sensor's newest sample arrived; unchanged while the FT sequence is.
     """
 
     def __init__(self, tolerated: int, window_s: float, frozen_s: float) -> None:
@@ -161,8 +161,8 @@ class RdtStream:
         self.restart()
 
     def restart(self) -> None:
-        """Forget the stream, keep the counts: the sensor begins a new one."""
-        # The times of the last bad packets: full and young means too many.
+        """Reset the stream but not the counts: the sensor starts a new stream."""
+        # Times of the last bad packets; too many if it is full within the window.
         self._bad_s: deque[float] = deque(maxlen=self._worst)
         self._ft_sequence = -1
         self._stuck_since_s = math.nan
@@ -173,18 +173,18 @@ class RdtStream:
         self.sampled_s = -math.inf
 
     def begin(self) -> None:
-        """Begin to collect the status bits of another batch of packets."""
+        """Start to collect the status bits of the next batch of packets."""
         self.status = 0
 
     def take(self, size: int, buffer: bytearray, now_s: float) -> None:
-        """Judge one packet that arrived from the sensor.
+        """Check one packet from the sensor.
 
         Parameters
         ----------
         size : int
             Its length.
         buffer : bytearray
-            Holds it from the start.
+            Contains it from its first byte.
         now_s : float
         """
         counts = self.counts
@@ -198,7 +198,7 @@ class RdtStream:
             self._accept(sequence, ft_sequence, status, packed, now_s)
             self.sampled_s = now_s
             return
-        # Differences modulo 2^32, so that the wrap-around is one step like any other.
+        # Differences modulo 2^32, so that the wrap-around counts as one step.
         ahead = (sequence - self.sequence) & _U32
         ft_ahead = (ft_sequence - self._ft_sequence) & _U32
         if 0 < ahead <= FARTHEST_JUMP:
@@ -217,8 +217,8 @@ class RdtStream:
             self._accept(sequence, ft_sequence, status, packed, now_s)
         elif ahead == 0:
             counts["repeated"] += 1
-            # One copy is the network's doing. A row of them is a sensor that stands still, which
-            # is judged by its duration and not as many bad packets.
+            # A single copy comes from the network. A series of them means a frozen sensor, which is
+            # detected by its duration and not counted as many bad packets.
             if math.isnan(self._stuck_since_s):
                 self._bad_s.append(now_s)
                 self._stuck_since_s = now_s
@@ -237,12 +237,12 @@ class RdtStream:
         self._bad_s.append(now_s)
 
     def cause(self, now_s: float) -> int:
-        """Return why the newest packet must not be used; the gravest reason first."""
+        """Return why the newest packet must not be used; the most severe reason first."""
         if self.status:
             cause = status_cause(self.status)
             if cause:
                 return cause
-        # A NaN compares as false. Silence is not the sensor frozen: only packets tell.
+        # A NaN compares as false. Only packets that arrive can show a frozen sensor.
         if self._arrived_s - self._stuck_since_s >= self._frozen_s:
             return int(Cause.TORQUE_FROZEN)
         bad = self._bad_s

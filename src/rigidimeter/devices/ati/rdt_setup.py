@@ -1,7 +1,7 @@
-"""What an ATI Net F/T says of itself: the XML page /netftapi2.xml of its web server.
+"""Settings of an ATI Net F/T, and the XML page /netftapi2.xml that reports its configuration.
 
-A torque is counts / (counts per unit), in the sensor's unit. Both belong to the configuration that
-is active in the sensor and can be changed there by anybody, so they are read, never assumed.
+A torque is counts / (counts per unit), in the sensor's unit. Both depend on the active
+configuration, which anybody can change on the sensor, so they are read and never assumed.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from rigidimeter.devices.ati.calibration import FORCE_UNITS_N, TORQUE_UNITS_NM, unit_name
 from rigidimeter.devices.ati.rdt_packets import status_cause, status_words
 from rigidimeter.devices.base import DeviceError, Now
 from rigidimeter.settings.section import Section, quantity
 
 __all__ = [
-    "FORCE_UNITS_N",
-    "TORQUE_UNITS_NM",
     "AtiRdtSettings",
     "SensorPage",
     "changes",
@@ -29,40 +28,14 @@ __all__ = [
     "refuse_unexpected",
 ]
 
-POUND_FORCE_N = 4.4482216152605
-KILOGRAM_FORCE_N = 9.80665
-INCH_M = 0.0254
-
-FORCE_UNITS_N = {
-    "N": 1.0,
-    "kN": 1000.0,
-    "lbf": POUND_FORCE_N,
-    "klbf": 1000.0 * POUND_FORCE_N,
-    "kgf": KILOGRAM_FORCE_N,
-}
-"""How many newtons one unit is."""
-
-TORQUE_UNITS_NM = {
-    "Nm": 1.0,
-    "Nmm": 1e-3,
-    "kNm": 1000.0,
-    "lbf-in": POUND_FORCE_N * INCH_M,
-    "lbf-ft": POUND_FORCE_N * 12.0 * INCH_M,
-    "kgf-cm": KILOGRAM_FORCE_N * 0.01,
-}
-"""How many newton metres one unit is."""
-
-# Firmwares spell one unit in several ways.
-_SPELLINGS = {"N-m": "Nm", "N-mm": "Nmm", "kN-m": "kNm", "kg": "kgf", "kg-cm": "kgf-cm"}
-
 LARGEST_PAGE_BYTES = 65536
 
 
 class AtiRdtSettings(Section):
-    """Where the sensor is, how it is mounted, what is expected of it.
+    """Address, mounting and expected configuration of the sensor.
 
-    What is expected is compared with what the sensor says; an empty text, 0, or -1 for the
-    calibration index, expects nothing.
+    The expected values are compared with what the sensor reports; an empty text, 0, or -1 for the
+    calibration index is not compared.
     """
 
     address: str = Field("192.168.1.1", min_length=1, max_length=253)
@@ -87,7 +60,7 @@ class AtiRdtSettings(Section):
 
     @property
     def emulated(self) -> bool:
-        """Whether the address is of this computer: no sensor is inside it."""
+        """Whether the address is this computer, so that there is no hardware."""
         return self.address == "localhost" or self.address.startswith("127.")
 
     @model_validator(mode="after")
@@ -99,7 +72,7 @@ class AtiRdtSettings(Section):
 
 @dataclass(frozen=True)
 class SensorPage:
-    """What bears on the torque; two pages that differ are two different sensors.
+    """The configuration that the torque depends on; a sensor whose page differs is another one.
 
     Parameters
     ----------
@@ -108,13 +81,13 @@ class SensorPage:
     force_unit, torque_unit : str
         As in `FORCE_UNITS_N` and `TORQUE_UNITS_NM`.
     rate_hz : float
-        Of the records.
+        Rate of the records.
     serial : str
         Of the calibrated transducer.
     calibration, configuration : int
-        Which of those stored in the sensor is active; -1 if it does not say.
+        The active ones among those stored in the sensor; -1 if not reported.
     transform, bias, low_pass : str
-        The tool transformation, the software bias in counts, and the filter, as they are written.
+        The tool transformation, the software bias in counts, and the filter, as reported.
     model, firmware : str
     status : int
         The sensor's status word.
@@ -137,22 +110,17 @@ class SensorPage:
 
     @property
     def newton_per_count(self) -> float:
-        """The weight of one force count."""
+        """Force of one count, in N."""
         return FORCE_UNITS_N[self.force_unit] / self.counts_per_force
 
     @property
     def newton_metre_per_count(self) -> float:
-        """The weight of one torque count."""
+        """Torque of one count, in N·m."""
         return TORQUE_UNITS_NM[self.torque_unit] / self.counts_per_torque
 
 
-def unit_name(written: str) -> str:
-    """Return a unit by the one spelling that is used here."""
-    return _SPELLINGS.get(written, written)
-
-
 def changes(before: SensorPage, after: SensorPage) -> str:
-    """Say what differs between two readings of the page, the status aside; empty if nothing."""
+    """Return the differences between two pages as text, without the status; empty if none."""
     old, new = asdict(before), asdict(after)
     return ", ".join(
         f"{name} {old[name]!r} became {new[name]!r}"
@@ -162,18 +130,18 @@ def changes(before: SensorPage, after: SensorPage) -> str:
 
 
 def parse_page(text: bytes, device: str) -> SensorPage:
-    """Read the page.
+    """Parse the page.
 
     Parameters
     ----------
     text : bytes
     device : str
-        Named in refusals.
+        Name of the sensor in error messages.
 
     Raises
     ------
     DeviceError
-        If it is no such page, a unit is unknown, or the sensor is told not to send records.
+        If it is no such page, a unit is unknown, or RDT is disabled on the sensor.
     """
     try:
         root = ElementTree.fromstring(text)
@@ -196,7 +164,7 @@ def parse_page(text: bytes, device: str) -> SensorPage:
             )
         return value
 
-    def whole(tag: str, base: int = 10) -> int:
+    def integer(tag: str, base: int = 10) -> int:
         written = found.get(tag, "")
         try:
             return int(written, base) if written else -1
@@ -226,24 +194,24 @@ def parse_page(text: bytes, device: str) -> SensorPage:
         torque_unit=unit("scfgtu", TORQUE_UNITS_NM),
         rate_hz=positive("comrdtrate"),
         serial=found.get("cfgcalsn", ""),
-        calibration=whole("cfgcalsel"),
-        configuration=whole("setcfgsel"),
+        calibration=integer("cfgcalsel"),
+        configuration=integer("setcfgsel"),
         transform=found.get("cfgtfx", ""),
         bias=found.get("setbias", ""),
         low_pass=found.get("setuserfilter", ""),
         model=found.get("prodname", "Net F/T"),
         firmware=found.get("mfgdigver", ""),
-        status=max(whole("runstat", 16), 0),
+        status=max(integer("runstat", 16), 0),
     )
 
 
 def fetch_page(address: str, port: int, timeout_s: float, device: str, now: Now) -> SensorPage:
-    """Ask the sensor's web server for the page and read it.
+    """Fetch the page from the sensor's web server and parse it.
 
     Raises
     ------
     DeviceError
-        If there is no answer in time, or not the right one.
+        If there is no valid answer in time.
     """
     give_up_s = now() + timeout_s
     connection = http.client.HTTPConnection(address, port, timeout=timeout_s)
@@ -256,7 +224,7 @@ def fetch_page(address: str, port: int, timeout_s: float, device: str, now: Now)
                     f"{response.reason}; a Net F/T answers 200 OK"
                 )
             text = b""
-            # A server that drips keeps each wait short and the whole endless.
+            # A server that sends byte by byte would never reach the timeout of a single read.
             while piece := response.read1(4096):
                 text += piece
                 if len(text) > LARGEST_PAGE_BYTES or now() > give_up_s:
@@ -276,12 +244,12 @@ def fetch_page(address: str, port: int, timeout_s: float, device: str, now: Now)
 
 
 def refuse_unexpected(settings: AtiRdtSettings, page: SensorPage, device: str) -> None:
-    """Compare what the sensor says with what the settings expect.
+    """Compare what the sensor reports with what the settings expect.
 
     Raises
     ------
     DeviceError
-        If the sensor reports an error, or naming the first value that differs.
+        If the sensor reports an error, or if a value differs; the message names the first.
     """
     if status_cause(page.status):
         words = ", ".join(status_words(page.status))

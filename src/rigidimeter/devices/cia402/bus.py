@@ -1,8 +1,8 @@
-"""The wire to one CANopen node: frames out, frames in, nothing decided.
+"""Send and receive the frames of one CANopen node; decisions are made in `drive`.
 
-Nothing here waits but where it says so, and nothing runs by itself: what is not sent by a call is
-not sent. Times are those of the caller's clock, never those that python-can stamps, which are wall
-time. Frames that cannot leave or make no sense are counted.
+Only the functions that say so wait, and no thread sends anything by itself. Times are those of the
+caller's clock, not python-can's time stamps, which are wall time. Frames that cannot be sent or
+decoded are counted.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ LONGEST_DRAIN_S = 0.5
 
 
 class NodeBus:
-    """Send to one node, and keep what it said last.
+    """Send to one node, and store what it reported last.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class NodeBus:
     now : callable
         Seconds on the loop's clock.
     who : str
-        The drive, for messages.
+        Name of the drive in error messages.
     """
 
     def __init__(self, settings: Cia402Settings, now: Now, who: str) -> None:
@@ -59,21 +59,21 @@ class NodeBus:
         self.statusword = 0
         self.mode = 0
         self.raw = (0, 0)
-        """Position and velocity of the last whole measurement, in the drive's units."""
+        """Position and velocity of the last complete measurement, in the drive's units."""
         self.sequence = 0
-        """How many whole measurements came."""
+        """Number of complete measurements received."""
         self.sync_s = -math.inf
         """When the last SYNC was sent."""
         self.asked_s = math.inf
-        """When the oldest SYNC was sent that is not answered yet; infinite if all are."""
+        """When the oldest unanswered SYNC was sent; infinite if all are answered."""
         self.heard_s = -math.inf
         """When the last heartbeat was read."""
         self.network_state = BOOTED
-        """What it said."""
+        """The NMT state in that heartbeat."""
         self.booted = False
-        """The node restarted; whoever configures it takes this back."""
+        """Whether the node restarted; reset by `configure`."""
         self.alarmed = False
-        """An emergency came; whoever takes note takes this back."""
+        """Whether an emergency message arrived; reset by `enable` and `reset_fault`."""
         self.emergency = 0
         self.counts = dict.fromkeys(
             ("received", "lost", "damaged", "unsent", "backlog", "emergencies"), 0
@@ -81,7 +81,7 @@ class NodeBus:
 
     @property
     def is_open(self) -> bool:
-        """Whether there is a bus."""
+        """Whether the bus is open."""
         return self._bus is not None
 
     @property
@@ -95,7 +95,7 @@ class NodeBus:
         Raises
         ------
         DeviceError
-            If python-can cannot.
+            If python-can cannot open it.
         """
         if self._bus is not None:
             return
@@ -131,7 +131,7 @@ class NodeBus:
         self._send(self._message(0, bytes([command, self._settings.node_id])))
 
     def ask(self, control: Control, target: int) -> bool:
-        """Send a command, a SYNC and, when due, our heartbeat; return whether the command left."""
+        """Send a command, a SYNC and, if due, our heartbeat; return if the command was sent."""
         now_s = self._now()
         self._command.data[:] = command_bytes(control, target)
         sent = self._send(self._command)
@@ -144,12 +144,12 @@ class NodeBus:
         return sent
 
     def insist(self, control: Control) -> None:
-        """Send a controlword both ways: as a command, and past the mapping to the object itself."""
+        """Send a controlword in the command frame and as an SDO write, which needs no mapping."""
         self.ask(control, 0)
         self._send(self._message(self._ids.sdo_request, sdo_write_bytes(0x6040, 0, control, 2)))
 
     def receive(self, wait_s: float = 0.0) -> bool:
-        """Take one frame, waiting for it so long; return whether there was one."""
+        """Process one frame, waiting for it up to `wait_s`; return whether there was one."""
         if self._bus is None:
             return False
         try:
@@ -166,7 +166,7 @@ class NodeBus:
         return True
 
     def drain(self, wait_s: float = 0.0) -> None:
-        """Take all that came while nobody read, until nothing comes for so long."""
+        """Process frames that piled up, until none arrives for `wait_s`."""
         until_s = self._now() + LONGEST_DRAIN_S
         while self.receive(wait_s) and self._now() < until_s:
             pass
@@ -174,10 +174,10 @@ class NodeBus:
         self.asked_s = math.inf
 
     @contextmanager
-    def talk(self) -> Iterator[Any]:
-        """Give questions and answers (SDO); the thread that carries them ends with them."""
+    def sdo_client(self) -> Iterator[Any]:
+        """Yield an SDO client; its receiving thread ends with the context."""
         canopen = library("canopen")
-        # Late answers to what was sent without waiting must not be taken for new ones.
+        # Late answers to SDO writes that nobody waited for must not be mistaken for new ones.
         self.drain(QUIET_S)
         network = canopen.Network(self._bus)
         node = network.add_node(
@@ -200,13 +200,13 @@ class NodeBus:
         try:
             self._bus.send(message, timeout=0)
         except (self._can.CanError, OSError):
-            # Not raised: the drive does not answer what it did not get, and counts as lost.
+            # Not raised: the drive will not answer a frame it did not receive and counts as lost.
             self.counts["unsent"] += 1
             return False
         return True
 
     def _take(self, identifier: int, data: bytearray) -> bool:
-        """Take one frame; return False if it is damaged."""
+        """Decode one frame; return False if it is damaged."""
         ids = self._ids
         if identifier == ids.position:
             report = position_of(data)
@@ -244,7 +244,7 @@ class NodeBus:
         report = emergency(data)
         if report is None:
             return False
-        if report.code:  # 0 takes the ones before back; what was wrong is remembered all the same
+        if report.code:  # 0 revokes earlier ones, which are kept all the same
             self.emergency = report.code
             self.alarmed = True
             self.counts["emergencies"] += 1

@@ -1,14 +1,14 @@
 """A CiA 402 servo over CANopen in profile-velocity mode.
 
-Before the loop, questions and answers (SDO) set the drive up and prove it. In the loop there are no
-questions and no threads: each `write` sends the command and a SYNC, the drive answers every SYNC
-with its state, position and velocity, and the next `read` finds them. The heartbeat that keeps the
-drive alive is sent by `write` too. A loop that hangs falls silent with it, and the drive stops
-itself: by its heartbeat watchdog (0x1016), and sooner by its command deadline (0x1400:05) where it
-has one.
+Before the loop, SDO transfers write the settings and read them back. The loop uses neither SDOs nor
+threads: each `write` sends the command and a SYNC, the drive answers every SYNC with its state,
+position and velocity, and the next `read` receives them. `write` also sends the heartbeat that
+keeps the drive enabled. If the loop hangs, the heartbeat ends with it, and the drive stops by
+itself: by its heartbeat watchdog (0x1016), and sooner by its command deadline (0x1400:05) if it has
+one.
 
-A measurement is taken at the SYNC, so it carries the time at which the last SYNC before it was
-sent; that is right as long as the drive answers within a tick.
+A measurement is taken at the SYNC, so its time is that at which the last SYNC was sent. This is
+correct as long as the drive answers within a tick.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ BRAKING = (0x6084, 0x6085)
 class Cia402Drive:
     """A `VelocityDrive`; see the module for the protocol.
 
-    What goes wrong in the loop is kept as the first `Cause` until the next `enable`. A drive that
-    has left operation by itself is told to stay where it is: nothing here brings it back.
+    The first `Cause` in the loop is kept until the next `enable`. A drive that left operation by
+    itself is commanded to quick stop and is not enabled again.
 
     Parameters
     ----------
@@ -82,21 +82,21 @@ class Cia402Drive:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Measurements received whole or lost in part, frames damaged or unsent, full reads."""
+        """Measurements received or lost, frames damaged or unsent, reads that hit their limit."""
         return self._wire.counts
 
     def connect(self) -> None:
-        """Open the bus and let the drive wait for its settings; nothing is energised."""
+        """Open the bus and make the drive pre-operational; nothing is energised."""
         self._wire.open()
         self._wire.network(Nmt.PRE_OPERATIONAL)
 
     def configure(self) -> DeviceFacts:
-        """Write every setting, read each back, and let the drive's frames flow.
+        """Write every setting, read each back, and start the drive's cyclic frames.
 
         Raises
         ------
         DeviceError
-            If the drive does not answer, or keeps a value that was not written.
+            If the drive does not answer, or does not accept a value.
         """
         if not self._wire.is_open:
             raise DeviceError(f"{self._who}: not connected; connect it before it is configured")
@@ -104,7 +104,7 @@ class Cia402Drive:
         self._control = Control.DISABLE_VOLTAGE
         settings, who = self._settings, self._who
         self._wire.network(Nmt.PRE_OPERATIONAL)
-        with self._wire.talk() as sdo:
+        with self._wire.sdo_client() as sdo:
             self._wire.booted = False
             identity = {entry.name: get(sdo, entry, who) for entry in IDENTITY}
             firmware, name = text(sdo, 0x100A, who), text(sdo, 0x1008, who)
@@ -129,14 +129,14 @@ class Cia402Drive:
         )
 
     def reset_fault(self) -> None:
-        """Take back a fault, as the operator asks; the drive stays without power.
+        """Reset a fault at the operator's request; the drive stays without power.
 
         Raises
         ------
         DeviceError
-            If the fault is still there afterwards.
+            If the fault remains.
         """
-        self._must_be_configured()
+        self._require_configured()
         self._control = Control.DISABLE_VOLTAGE
         reset_fault(self._wire, self._now, self._settings.enable_timeout_s, self._who)
         self._cause = Cause.NONE
@@ -144,25 +144,25 @@ class Cia402Drive:
     def enable(self) -> None:
         """Write zero velocity, read it and every setting back, then energise.
 
-        The loop must begin to write within the drive's watchdog.
+        The loop must start to write within the drive's watchdog time.
 
         Raises
         ------
         DeviceError
-            If a setting or the target is not as written, or the drive does not come up in time.
+            If a setting or the target is not as written, or the drive does not start in time.
         """
-        self._must_be_configured()
+        self._require_configured()
         self._control = Control.DISABLE_VOLTAGE
         wire = self._wire
         try:
-            with wire.talk() as sdo:
+            with wire.sdo_client() as sdo:
                 for entry in self._objects:
                     if entry.index in (0x6040, 0x60FF):
                         put(sdo, entry, self._who)
                 read_back(sdo, (*self._objects, DISPLAYED_MODE), self._who)
             wire.network(Nmt.START)
             wire.drain()
-            self._must_be_configured()
+            self._require_configured()
             wire.alarmed = False
             self._cause = Cause.NONE
             power_up(wire, self._now, self._settings.enable_timeout_s, self._who)
@@ -175,7 +175,7 @@ class Cia402Drive:
         wire.heard_s, wire.network_state = self._now(), OPERATIONAL
 
     def read(self) -> MotionSample:
-        """Return the newest sample without waiting; the one before again if there is none."""
+        """Return the newest sample without waiting; the previous one if there is no new one."""
         wire = self._wire
         for _ in range(MOST_FRAMES_A_READ):
             if not wire.receive():
@@ -183,12 +183,12 @@ class Cia402Drive:
         else:
             wire.counts["backlog"] += 1
         now_s = self._now()
-        found = self._wrong(now_s)
+        found = self._find_cause(now_s)
         if found in (Cause.DRIVE_FAULT, Cause.DRIVE_STATE) and not self._in_operation():
-            # To repeat "enable operation" would bring back a drive that stopped by itself.
+            # Repeating "enable operation" would restart a drive that stopped by itself.
             self._halt(Control.QUICK_STOP)
         self._cause = self._cause or found
-        self._mind_its_watchdog(now_s)
+        self._check_watchdog(now_s)
         if wire.sequence and wire.sequence != self._sample.sequence:
             position, velocity = wire.raw
             self._sample = MotionSample(
@@ -206,8 +206,8 @@ class Cia402Drive:
         wire = self._wire
         return wire.state is State.OPERATION_ENABLED and wire.mode == PROFILE_VELOCITY
 
-    def _mind_its_watchdog(self, now_s: float) -> None:
-        """Do not call back a drive that may be braking by itself: "enable operation" would."""
+    def _check_watchdog(self, now_s: float) -> None:
+        """Halt a drive that may be braking by itself: "enable operation" would restart it."""
         if self._control is not Control.ENABLE_OPERATION:
             return
         wire = self._wire
@@ -216,8 +216,8 @@ class Cia402Drive:
             self._cause = self._cause or (Cause.DRIVE_STATE if answered else Cause.DRIVE_LOST)
             self._halt(Control.QUICK_STOP)
 
-    def _wrong(self, now_s: float) -> Cause:
-        """Return what the drive did that it was not told to."""
+    def _find_cause(self, now_s: float) -> Cause:
+        """Return why the drive is not in the commanded state, NONE if it is."""
         wire, settings = self._wire, self._settings
         if wire.booted:
             self._configured = False
@@ -235,12 +235,12 @@ class Cia402Drive:
         return Cause.DRIVE_LOST if lost else Cause.NONE
 
     def write(self, velocity_rad_s: float) -> float:
-        """Send velocity, SYNC and, when due, our heartbeat; return what was really sent.
+        """Send velocity, SYNC and, when due, our heartbeat; return what was actually sent.
 
-        A drive that is not in operation by our will is sent zero; a number that is not finite is
-        zero too. After a pause in which the drive's watchdog may have acted it is told to stop.
+        Zero is sent to a drive that is not enabled, and in place of a value that is not finite.
+        After a pause in which the drive's watchdog may have acted, a quick stop is sent.
         """
-        self._mind_its_watchdog(self._now())
+        self._check_watchdog(self._now())
         target = 0
         if self._control is Control.ENABLE_OPERATION and math.isfinite(velocity_rad_s):
             most = self._settings.max_velocity_rad_s
@@ -251,19 +251,19 @@ class Cia402Drive:
         return self._sent / self._scale.units_per_rad_s
 
     def stop(self) -> None:
-        """Brake by the drive's own quick-stop ramp; only `enable` brings it back."""
+        """Brake along the drive's quick-stop ramp; only `enable` starts it again."""
         if self._wire.is_open and self._control is not Control.DISABLE_VOLTAGE:
             self._halt(Control.QUICK_STOP)
             self._wire.insist(Control.QUICK_STOP)
 
     def disable(self) -> None:
-        """Take the power away at once."""
+        """Remove the power at once."""
         if self._wire.is_open:
             self._halt(Control.DISABLE_VOLTAGE)
             self._wire.insist(Control.DISABLE_VOLTAGE)
 
     def close(self) -> None:
-        """Take the power away, let the drive wait, close the bus."""
+        """Remove the power, make the drive pre-operational, close the bus."""
         self._configured = False
         try:
             if self._wire.is_open:
@@ -273,13 +273,13 @@ class Cia402Drive:
             self._wire.close()
 
     def _halt(self, control: Control) -> None:
-        # Power that was taken away is not given back for a gentler stop.
+        # Power that was removed is not restored for a quick stop.
         if self._control not in (control, Control.DISABLE_VOLTAGE):
             self._control = control
             self._settled_s = self._now() + self._settings.lost_s
         self._sent = 0
 
-    def _must_be_configured(self) -> None:
+    def _require_configured(self) -> None:
         self._configured = self._configured and not self._wire.booted
         if not (self._wire.is_open and self._configured):
             raise DeviceError(

@@ -1,7 +1,7 @@
-"""From no power to operation, and out of a fault: one controlword at a time, as the drive follows.
+"""Power-up to operation and fault reset, one controlword at a time.
 
-Each step sends a controlword with zero velocity and a SYNC, and looks at the statusword that comes
-back. All of it is bounded in time, waits, and belongs before the loop.
+Each step sends a controlword with zero velocity and a SYNC, and reads the statusword in the answer.
+These functions wait, for a limited time; they are not for use in the loop.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ FAULTS = (State.FAULT, State.FAULT_REACTION)
 
 
 def power_up(wire: NodeBus, now: Now, timeout_s: float, who: str) -> None:
-    """Take the power away, then go up to operation.
+    """Remove the power, then go step by step to operation.
 
     Raises
     ------
     DeviceError
-        If there is a fault, a restart, or the time is out; the caller takes the power away.
+        If there is a fault or a restart, or on timeout; the caller removes the power.
     """
     deadline_s = now() + timeout_s
     control, off = Control.DISABLE_VOLTAGE, False
     while True:
         state = _step(wire, now, control)
-        # Whatever the drive was doing before, the way begins without power.
+        # Whatever the drive was doing before, the sequence starts without power.
         off = off or state is State.SWITCH_ON_DISABLED
         if state in FAULTS or wire.alarmed or wire.booted:
             what = "restarted" if wire.booted else state.words
@@ -48,16 +48,16 @@ def power_up(wire: NodeBus, now: Now, timeout_s: float, who: str) -> None:
 
 
 def reset_fault(wire: NodeBus, now: Now, timeout_s: float, who: str) -> None:
-    """Take back a fault; the drive stays without power.
+    """Reset a fault; the drive stays without power.
 
     Raises
     ------
     DeviceError
-        If the fault is still there afterwards.
+        If the fault remains.
     """
     wire.drain()
     deadline_s = now() + timeout_s
-    # The reset is the rising edge of its bit, so the bit is taken away before and after.
+    # The reset is the rising edge of its bit, so the bit is cleared before and after.
     control, state = Control.DISABLE_VOLTAGE, State.UNKNOWN
     while now() <= deadline_s:
         state = _step(wire, now, control)

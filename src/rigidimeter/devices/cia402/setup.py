@@ -1,4 +1,4 @@
-"""What a CiA 402 drive is told before it may run, and the proof that it took it.
+"""Settings of a CiA 402 drive, the objects that are written, and the SDO transfers.
 
 Angle, velocity and acceleration are those of the joint; the drive counts at its motor:
 
@@ -6,8 +6,8 @@ Angle, velocity and acceleration are those of the joint; the drive counts at its
     velocity units      velocity_units_per_rev_s · gear_ratio / 2π    per rad/s
     acceleration units  acceleration_units_per_rev_s2 · gear_ratio / 2π per rad/s²
 
-`sign` −1 turns all three round. Every object is written and read back; enabling reads all of them
-once more, because a drive that restarted in between has lost them, its watchdog among them.
+`sign` −1 reverses position and velocity. Every object is written and read back. Enabling reads all
+of them again, because a drive that restarted in between has lost them, including its watchdog.
 """
 
 from __future__ import annotations
@@ -47,15 +47,15 @@ NOT_THERE = (0x06020000, 0x06090011)
 
 
 class Cia402Settings(Section):
-    """A servo on a CAN bus that speaks CANopen, profile CiA 402, in profile-velocity mode.
+    """A CANopen servo drive, profile CiA 402, in profile-velocity mode.
 
-    `interface` and `channel` are those of python-can. `bitrate` is what the bus runs at; with
-    socketcan it is set by the operating system, and here only says how fast a loop may be. `port`
-    is used by udp_multicast alone. `command_deadline_s` 0 asks for no such deadline; a drive that
-    has none keeps its heartbeat watchdog.
+    `interface` and `channel` are those of python-can. `bitrate` is that of the bus; with socketcan
+    the operating system sets it, and here it only limits the loop rate. `port` is used by
+    udp_multicast alone. `command_deadline_s` 0 means no command deadline; a drive without one still
+    has its heartbeat watchdog.
 
-    The decelerations are above what `guard.acceleration_limit_deg_s2` is by default, for the guard
-    counts on a drive that brakes no slower; commissioning compares the two.
+    The default decelerations are above the default `guard.acceleration_limit_deg_s2`, since the
+    guard relies on a drive that brakes at least that fast; commissioning compares the two.
     """
 
     interface: str = "socketcan"
@@ -85,7 +85,7 @@ class Cia402Settings(Section):
 
     @property
     def emulated(self) -> bool:
-        """Whether the bus is one that no drive hangs on."""
+        """Whether the bus is virtual, with no hardware connected."""
         return self.interface in ("virtual", "udp_multicast") or (
             self.interface == "socketcan" and self.channel.startswith("vcan")
         )
@@ -126,8 +126,8 @@ def scale(settings: Cia402Settings) -> Scale:
 class Object:
     """One entry of the drive's object dictionary, and the value it must have.
 
-    `optional` entries are left out where the drive does not know them; bits outside `mask` belong
-    to the drive.
+    `optional` entries are skipped if the drive does not have them; bits outside `mask` belong to
+    the drive.
     """
 
     name: str
@@ -141,7 +141,7 @@ class Object:
 
     @property
     def label(self) -> str:
-        """The name, with the address as the drive's manual writes it."""
+        """The name, with the address as written in the drive's manual."""
         return f"{self.name} (0x{self.index:04X}:{self.subindex:02X})"
 
 
@@ -155,7 +155,7 @@ IDENTITY = tuple(
 
 
 def objects(settings: Cia402Settings) -> tuple[Object, ...]:
-    """Return all that is written, in order; of an entry written twice the last value stays."""
+    """Return the objects to write, in order; if one is written twice the last value remains."""
     units = scale(settings)
     ids = frames(settings.node_id)
     watchdog_ms = round(settings.drive_watchdog_s * 1e3)
@@ -186,7 +186,7 @@ def objects(settings: Cia402Settings) -> tuple[Object, ...]:
 
 
 def _messages(ids: Frames, deadline_ms: int) -> tuple[Object, ...]:
-    """Return the mapping: one command frame, two frames that answer every SYNC, and no others."""
+    """Return the PDO mapping: one command frame, two answers to every SYNC, and no others."""
     command = ((0x6040, 16), (0x60FF, 32))
     position = ((0x6041, 16), (0x6061, 8), (0x6064, 32))
     velocity = ((0x606C, 32),)
@@ -219,7 +219,7 @@ def _message(
     entries: tuple[tuple[int, int], ...],
     more: tuple[Object, ...] = (),
 ) -> tuple[Object, ...]:
-    """Return the order in which CiA 301 lets a mapping be changed: off, emptied, filled, on."""
+    """Return the steps in which CiA 301 allows a mapping to change: off, emptied, filled, on."""
     identifier = Object(f"{name}'s identifier", index, 1, 4, id_, mask=~NO_REMOTE_REQUEST)
     count = Object(f"{name}'s number of entries", index + 0x200, 0, 1, len(entries))
     return (
@@ -237,7 +237,7 @@ def _message(
 
 
 def library(name: str) -> Any:
-    """Return a library that only this drive needs."""
+    """Import a library that only this drive needs."""
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError:
@@ -253,7 +253,7 @@ def put(sdo: Any, entry: Object, who: str) -> bool:
     Raises
     ------
     DeviceError
-        If the drive does not answer or does not take it.
+        If the drive does not answer or refuses the value.
     """
     data = entry.value.to_bytes(entry.size, "little", signed=entry.signed)
     try:
@@ -293,7 +293,7 @@ def get(sdo: Any, entry: Object, who: str) -> int | None:
 
 
 def text(sdo: Any, index: int, who: str) -> str:
-    """Read a text that a drive may have, empty if it has not."""
+    """Read an optional text object; empty if the drive does not have it."""
     try:
         data = bytes(sdo.upload(index, 0))
     except library("canopen").SdoAbortedError:

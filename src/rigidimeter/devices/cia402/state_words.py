@@ -1,6 +1,6 @@
-"""The words of CiA 402 and the frames of CANopen: pure, no bus.
+"""Statuswords and controlwords of CiA 402, and the frames of CANopen; no bus access.
 
-The state is coded in six bits of the statusword (0x6041), the way to the next one in four bits of
+The state is coded in six bits of the statusword (0x6041), and transitions are commanded by bits of
 the controlword (0x6040):
 
     switch-on disabled --0x06--> ready --0x07--> switched on --0x0F--> operation enabled
@@ -52,16 +52,16 @@ PROFILE_VELOCITY = 3
 
 SYNC_ID = 0x080
 BOOTED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x05, 0x7F
-"""What a node's heartbeat says of its state."""
+"""NMT states in a node's heartbeat."""
 
 TICK_FRAMES = (6, 0, 7, 4)
-"""The data bytes of what a tick sends and receives: command, SYNC, position, velocity."""
+"""Data bytes of the frames of one tick: command, SYNC, position, velocity."""
 
 HIGHEST_LOAD = 0.7
 
 
 class State(IntEnum):
-    """Of the drive's finite state automaton; UNKNOWN if the bits mean nothing."""
+    """State of the drive's finite state automaton; UNKNOWN if the bits code none."""
 
     UNKNOWN = 0
     NOT_READY = 1
@@ -75,7 +75,7 @@ class State(IntEnum):
 
     @property
     def words(self) -> str:
-        """The name as the standard writes it."""
+        """The name in the standard."""
         return _WORDS[self]
 
 
@@ -116,7 +116,7 @@ NEXT_CONTROL = {
     State.SWITCHED_ON: Control.ENABLE_OPERATION,
     State.OPERATION_ENABLED: Control.ENABLE_OPERATION,
 }
-"""The controlword that leads one step nearer to operation; other states have no such way."""
+"""The controlword for the next step toward operation, from the states that have one."""
 
 
 def state_of(statusword: int) -> State:
@@ -129,7 +129,7 @@ def state_of(statusword: int) -> State:
 
 
 def _coded(bits: int) -> State:
-    # Bit 5 (quick stop) means nothing in the first two states and in the two of a fault.
+    # Bit 5 (quick stop) is not defined in the first two states and in the two fault states.
     short = bits & 0x4F
     if short == 0x00:
         return State.NOT_READY
@@ -151,7 +151,7 @@ _STATES = tuple(_coded(bits) for bits in range(0x70))
 
 
 class Frames(NamedTuple):
-    """The identifiers of one node's frames, by the predefined connection set."""
+    """Identifiers of one node's frames in the predefined connection set."""
 
     command: int
     position: int
@@ -195,7 +195,7 @@ def velocity_of(data: bytes | bytearray) -> int | None:
 
 
 class Emergency(NamedTuple):
-    """What an emergency frame says; code 0 takes the ones before back."""
+    """Content of an emergency frame; code 0 revokes earlier ones."""
 
     code: int
     register: int
@@ -207,7 +207,7 @@ def emergency(data: bytes | bytearray) -> Emergency | None:
 
 
 def sdo_write_bytes(index: int, subindex: int, value: int, size: int) -> bytes:
-    """Return an expedited SDO write whose answer nobody waits for."""
+    """Return the data of an expedited SDO write; the answer is not waited for."""
     head = 0x23 | (4 - size) << 2
     return struct.pack("<BHB", head, index, subindex) + value.to_bytes(size, "little").ljust(
         4, b"\0"
@@ -215,7 +215,7 @@ def sdo_write_bytes(index: int, subindex: int, value: int, size: int) -> bytes:
 
 
 def frame_bits(data_bytes: int) -> int:
-    """Return the most bit times a frame with an 11-bit identifier can take.
+    """Return the largest number of bit times of a frame with an 11-bit identifier.
 
     >>> frame_bits(8)
     135
@@ -224,5 +224,5 @@ def frame_bits(data_bytes: int) -> int:
 
 
 def fastest_tick_rate_hz(bitrate: float, data_bytes: Iterable[int] = TICK_FRAMES) -> float:
-    """Return the tick rate at which these frames fill the bus as far as it should be filled."""
+    """Return the tick rate at which these frames use the bus up to `HIGHEST_LOAD`."""
     return HIGHEST_LOAD * bitrate / sum(frame_bits(n) for n in data_bytes)

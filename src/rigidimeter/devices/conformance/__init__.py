@@ -1,8 +1,8 @@
-"""What every torque sensor and every velocity drive must do: checks to run a driver through.
+"""Conformance checks that every driver of a torque sensor or velocity drive must pass.
 
-A fixture makes the driver and, where there is one, shows its other end: the emulated device, or the
-instruments beside a real one. Each check takes a fixture of its own, with a device fresh from the
-shelf, and raises `ConformanceError` with a sentence. They need no test-runner:
+A fixture makes the driver and, if possible, gives access to its other end: the emulated device, or
+instruments on a real one. Each check takes a new fixture, with a device in its initial state, and
+raises `ConformanceError` with a message. No test runner is needed:
 
     for check in DRIVE_CHECKS:
         with my_bench() as fixture:

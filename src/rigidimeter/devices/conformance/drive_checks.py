@@ -1,4 +1,4 @@
-"""What every velocity drive must do; see `conformance`."""
+"""Checks of velocity drives; see `conformance`."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ __all__ = ["DRIVE_CHECKS"]
 DRIVE_COUNTS = ("received", "lost", "damaged")
 POWER_OFF_S = 0.1
 AT_REST = 0.02
-"""Of the fixture's speed."""
+"""As a part of the fixture's speed."""
 
 
 def drive_refuses_disorder(fixture: DriveFixture) -> None:
-    """Each step asks for the one before; a drive not enabled sends nothing but zero."""
+    """Each step requires the previous one; a drive that is not enabled sends only zero."""
     drive = fixture.make()
     try:
         require(isinstance(drive.read(), MotionSample), "read returns a MotionSample always")
@@ -44,7 +44,7 @@ def drive_refuses_disorder(fixture: DriveFixture) -> None:
 
 
 def drive_energises_by_enable_only(fixture: DriveFixture) -> None:
-    """Neither connect nor configure nor a command gives power."""
+    """Neither connect nor configure nor a command energises the drive."""
     drive = fixture.make()
     try:
         drive.connect()
@@ -61,7 +61,7 @@ def drive_energises_by_enable_only(fixture: DriveFixture) -> None:
 
 
 def drive_enables_at_rest(fixture: DriveFixture) -> None:
-    """Enable gives power and no motion."""
+    """Enable energises the drive without motion."""
     drive = _enabled(fixture)
     try:
         end = fixture.other_end
@@ -75,7 +75,7 @@ def drive_enables_at_rest(fixture: DriveFixture) -> None:
 
 
 def drive_samples_flow(fixture: DriveFixture) -> None:
-    """Finite samples without a cause arrive, with new stamps, while commands go out."""
+    """Finite samples without a cause and with new time stamps arrive while commands are sent."""
     drive = _enabled(fixture)
     try:
         first = drive.read()
@@ -96,7 +96,7 @@ def drive_samples_flow(fixture: DriveFixture) -> None:
 
 
 def drive_returns_what_was_sent(fixture: DriveFixture) -> None:
-    """`write` returns the velocity the drive was really given, after limit and rounding."""
+    """`write` returns the velocity that was sent to the drive, after limit and rounding."""
     drive = _enabled(fixture)
     try:
         speed = fixture.speed_rad_s
@@ -119,7 +119,7 @@ def drive_returns_what_was_sent(fixture: DriveFixture) -> None:
 
 
 def drive_bounds_commands(fixture: DriveFixture) -> None:
-    """Send what is not finite, which must become zero, and what is far too large."""
+    """Commands that are not finite become zero, and very large ones are limited."""
     drive = _enabled(fixture)
     try:
         for wanted in (1e9, -1e9):
@@ -133,7 +133,7 @@ def drive_bounds_commands(fixture: DriveFixture) -> None:
 
 
 def drive_read_never_waits(fixture: DriveFixture) -> None:
-    """`read` and `write` are quick whether the drive answers or not; a lost drive is named."""
+    """`read` and `write` never wait; a drive that stops answering is reported."""
     drive = _enabled(fixture)
 
     def tick() -> None:
@@ -146,14 +146,16 @@ def drive_read_never_waits(fixture: DriveFixture) -> None:
             fixture.silence()
             check_quick(tick, 2 * fixture.longest_read_s, fixture.tick_s, "when it does not")
             await_(
-                lambda: drive.read().cause != Cause.NONE, fixture, "a drive that is silent is named"
+                lambda: drive.read().cause != Cause.NONE,
+                fixture,
+                "a drive that is silent is reported with a cause",
             )
     finally:
         drive.close()
 
 
 def drive_counts(fixture: DriveFixture) -> None:
-    """See that the counts have their names and go up only."""
+    """Check that the counts have the required names and never decrease."""
     drive = _enabled(fixture)
     try:
         check_counts(lambda: drive.counts, DRIVE_COUNTS, lambda: _run(drive, fixture, 0.0, 20))
@@ -162,7 +164,7 @@ def drive_counts(fixture: DriveFixture) -> None:
 
 
 def drive_stops(fixture: DriveFixture) -> None:
-    """`stop` brings a turning joint to rest, and no command moves it after that."""
+    """`stop` brings a moving joint to rest, and later commands do not move it."""
     drive = _enabled(fixture)
     try:
         _run(drive, fixture, fixture.speed_rad_s, math.ceil(fixture.settle_s / fixture.tick_s))
@@ -177,7 +179,7 @@ def drive_stops(fixture: DriveFixture) -> None:
 
 
 def drive_ends_in_any_order(fixture: DriveFixture) -> None:
-    """`stop`, `disable` and `close` in every order, each twice, and from every state."""
+    """`stop`, `disable` and `close` work in any order, repeated, and from every state."""
     orders = [(3, order) for order in itertools.permutations(range(3))]
     for stage, order in (*((stage, (2, 1, 0)) for stage in range(3)), *orders):
         drive = fixture.make()
@@ -193,7 +195,7 @@ def drive_ends_in_any_order(fixture: DriveFixture) -> None:
 
 
 def drive_stops_by_itself(fixture: DriveFixture) -> None:
-    """See that a drive whose facts name a watchdog comes to rest when nobody writes."""
+    """Check that a drive whose facts name a watchdog comes to rest when writing ceases."""
     drive = fixture.make()
     try:
         drive.connect()
@@ -209,7 +211,7 @@ def drive_stops_by_itself(fixture: DriveFixture) -> None:
 
 
 def drive_restarts_at_rest(fixture: DriveFixture) -> None:
-    """See that a driver closed at speed leaves nothing that moves the joint at the next enable."""
+    """After a driver was closed in motion, the next enable does not move the joint."""
     drive = _enabled(fixture)
     try:
         _run(drive, fixture, fixture.speed_rad_s, 20)
@@ -232,7 +234,7 @@ def _enabled(fixture: DriveFixture) -> VelocityDrive:
 
 
 def _run(drive: VelocityDrive, fixture: DriveFixture, velocity_rad_s: float, ticks: int) -> float:
-    """Read and write for so many ticks; return what was sent last."""
+    """Read and write for a number of ticks; return what was sent last."""
     sent = 0.0
     for _ in range(ticks):
         drive.read()
@@ -256,7 +258,7 @@ def _unpowered(fixture: DriveFixture, when: str) -> None:
 
 
 def _loses_power(fixture: DriveFixture, when: str) -> None:
-    # The order may still be on the wire when the driver has sent it.
+    # The command may still be on its way.
     until_s = time.monotonic() + POWER_OFF_S
     end = fixture.other_end
     while end is not None and end.powered() and time.monotonic() < until_s:

@@ -1,4 +1,4 @@
-"""The fixtures of the conformance checks, and what checks of sensors and of drives share."""
+"""Fixtures of the conformance checks, and functions shared by the checks."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ MANY_READS = 100
 
 
 class ConformanceError(AssertionError):
-    """A driver does not keep a promise of `device.base`."""
+    """A driver violates a requirement of `devices.base`."""
 
 
 @dataclass(frozen=True)
 class OtherEnd:
-    """What is seen of a drive from outside its driver.
+    """Observations of a drive that do not use its driver.
 
     Parameters
     ----------
     powered : callable
         Whether the motor has power.
     velocity_rad_s : callable
-        How fast the joint turns.
+        The velocity of the joint.
     """
 
     powered: Callable[[], bool]
@@ -56,18 +56,18 @@ class OtherEnd:
 
 @dataclass(frozen=True)
 class SensorFixture:
-    """A sensor and how to try it.
+    """A sensor and how to test it.
 
     Parameters
     ----------
     make : callable
         Returns a driver, not connected.
     now : callable, optional
-        The clock of its stamps; None where they are those of a record.
+        The clock of its time stamps; None if they come from a recording.
     silence : callable, optional
-        Makes the device say nothing from then on.
+        Makes the device stop sending from then on.
     tick_s, settle_s, longest_read_s : float
-        How often it is read; how long it may take to begin; what a `read` may take.
+        Interval of the reads; how long starting may take; how long a `read` may take.
     """
 
     make: Callable[[], TorqueSensor]
@@ -80,14 +80,14 @@ class SensorFixture:
 
 @dataclass(frozen=True)
 class DriveFixture:
-    """A drive and how to try it; what is not said here is as of `SensorFixture`.
+    """A drive and how to test it; the other parameters are those of `SensorFixture`.
 
     Parameters
     ----------
     other_end : OtherEnd, optional
-        Without it, what the motor does is not checked.
+        Without it, the motion of the motor is not checked.
     speed_rad_s, tolerance : float
-        A velocity to try, and how far what is sent may be from it, as a part of it.
+        A test velocity, and the relative difference allowed between it and what is sent.
     """
 
     make: Callable[[], VelocityDrive]
@@ -101,23 +101,23 @@ class DriveFixture:
     tolerance: float = 0.01
 
 
-def require(condition: bool, promise: str) -> None:
-    """Raise unless a promise is kept."""
+def require(condition: bool, requirement: str) -> None:
+    """Raise `ConformanceError` unless the condition holds."""
     if not condition:
-        raise ConformanceError(promise)
+        raise ConformanceError(requirement)
 
 
-def refuses(action: Callable[[], object], promise: str) -> None:
-    """Raise unless an action raises `DeviceError`."""
+def refuses(action: Callable[[], object], requirement: str) -> None:
+    """Raise `ConformanceError` unless the action raises `DeviceError`."""
     try:
         action()
     except DeviceError:
         return
-    raise ConformanceError(promise)
+    raise ConformanceError(requirement)
 
 
 def check_facts(facts: DeviceFacts) -> None:
-    """Check that facts are whole."""
+    """Check that facts are complete and of the right types."""
     require(isinstance(facts, DeviceFacts), "configure returns DeviceFacts")
     rate_hz = facts.fastest_tick_rate_hz
     require(math.isfinite(rate_hz) and rate_hz > 0, "fastest_tick_rate_hz is finite and above 0")
@@ -136,7 +136,7 @@ def check_facts(facts: DeviceFacts) -> None:
 def check_counts(
     counts: Callable[[], Mapping[str, int]], names: tuple[str, ...], use: Callable[[], object]
 ) -> None:
-    """Check names and direction of counts."""
+    """Check the names of counts and that they never decrease."""
     before = dict(counts())
     missing = [name for name in names if name not in before]
     require(not missing, f"counts has {', '.join(names)}; {', '.join(missing)} missing")
@@ -157,7 +157,7 @@ def check_quick(read: Callable[[], object], longest_s: float, tick_s: float, whe
         read()
         taken_s.append(time.perf_counter() - began_s)
         time.sleep(min(tick_s, 0.002))
-    # Three of them may be the fault of the computer the checks run on.
+    # Up to three may be delays of the computer that runs the checks.
     slow_s = sorted(taken_s)[-4]
     require(
         slow_s <= longest_s,
@@ -166,17 +166,17 @@ def check_quick(read: Callable[[], object], longest_s: float, tick_s: float, whe
 
 
 def await_(
-    condition: Callable[[], bool], fixture: SensorFixture | DriveFixture, promise: str
+    condition: Callable[[], bool], fixture: SensorFixture | DriveFixture, requirement: str
 ) -> None:
-    """Wait until something is so, or raise."""
+    """Wait until a condition holds; raise `ConformanceError` on timeout."""
     until_s = time.monotonic() + fixture.settle_s
     while not condition():
-        require(time.monotonic() < until_s, f"{promise}, within {fixture.settle_s:g} s")
+        require(time.monotonic() < until_s, f"{requirement}, within {fixture.settle_s:g} s")
         time.sleep(fixture.tick_s)
 
 
 def check_stamp(sample: TorqueSample | MotionSample, now: Now | None) -> None:
-    """Check that a stamp is on the clock."""
+    """Check that a time stamp is on the clock."""
     if now is not None:
         age_s = now() - sample.time_s
         require(-1e-3 <= age_s < 1.0, f"a stamp is on the loop's clock; it is {age_s:.3f} s old")

@@ -1,4 +1,4 @@
-"""What every torque sensor must do; see `conformance`."""
+"""Checks of torque sensors; see `conformance`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SENSOR_COUNTS = ("received", "lost", "repeated", "reordered", "damaged")
 
 
 def sensor_refuses_disorder(fixture: SensorFixture) -> None:
-    """Read, configure and close a sensor that is not connected."""
+    """Check that a sensor that is not connected can be read and closed but not configured."""
     sensor = fixture.make()
     sample = sensor.read()
     require(isinstance(sample, TorqueSample), "read returns a TorqueSample from the beginning")
@@ -34,7 +34,7 @@ def sensor_refuses_disorder(fixture: SensorFixture) -> None:
 
 
 def sensor_facts_are_complete(fixture: SensorFixture) -> None:
-    """See that what `configure` returns can be stored."""
+    """`configure` returns facts that can be stored."""
     sensor = fixture.make()
     try:
         sensor.connect()
@@ -44,7 +44,7 @@ def sensor_facts_are_complete(fixture: SensorFixture) -> None:
 
 
 def sensor_samples_flow(fixture: SensorFixture) -> None:
-    """Finite samples without a cause arrive, with new stamps."""
+    """Finite samples without a cause and with new time stamps arrive."""
     sensor = _sampling(fixture)
     try:
         first = sensor.read()
@@ -60,7 +60,7 @@ def sensor_samples_flow(fixture: SensorFixture) -> None:
 
 
 def sensor_read_never_waits(fixture: SensorFixture) -> None:
-    """`read` is quick whether samples arrive or not."""
+    """`read` never waits, whether samples arrive or not."""
     sensor = _sampling(fixture)
     try:
         check_quick(sensor.read, fixture.longest_read_s, fixture.tick_s, "while samples arrive")
@@ -72,14 +72,14 @@ def sensor_read_never_waits(fixture: SensorFixture) -> None:
             again = sensor.read()
             require(
                 again.time_s == last.time_s or again.cause != Cause.NONE,
-                "a sensor that is silent repeats its last sample, or names a cause",
+                "a sensor that is silent repeats its last sample, or reports a cause",
             )
     finally:
         sensor.close()
 
 
 def sensor_counts(fixture: SensorFixture) -> None:
-    """See that the counts have their names and go up only."""
+    """Check that the counts have the required names and never decrease."""
     sensor = _sampling(fixture)
 
     def use() -> None:
@@ -94,7 +94,7 @@ def sensor_counts(fixture: SensorFixture) -> None:
 
 
 def sensor_closes_twice(fixture: SensorFixture) -> None:
-    """`close` may come at any time, and again; `read` does not raise after it."""
+    """`close` works at any time and when repeated; `read` does not raise afterwards."""
     fixture.make().close()
     sensor = fixture.make()
     sensor.connect()
@@ -108,7 +108,7 @@ def sensor_closes_twice(fixture: SensorFixture) -> None:
 
 
 def sensor_connects_again(fixture: SensorFixture) -> None:
-    """See that a second driver takes over where the first has closed."""
+    """Check that a second driver can connect after the first was closed."""
     for _ in range(2):
         sensor = _sampling(fixture)
         sensor.close()
