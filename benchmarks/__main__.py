@@ -65,7 +65,7 @@ def main() -> None:
     lines = [
         "# Benchmarks",
         "",
-        f"Medians of {REPEATS} runs, ours and the reference in turn, Python "
+        f"Medians of {REPEATS} runs, alternating ours and the reference, Python "
         f"{platform.python_version()} on {platform.machine()}. Written by `make bench`.",
         "",
         "| what / reference | ours | reference | ratio |",

@@ -117,9 +117,9 @@ def pooled_bias(n: int) -> list[str]:
         if excluded:
             rows.append([f"{sd} N·m: {excluded} of {n} epochs touched the limit", "", "", ""])
     return [
-        "## A subject who pushes",
+        "## Voluntary torque",
         "",
-        "Voluntary torque of the given SD, 0.3 to 4 Hz. Error of J, B and K in %, ± one standard "
+        "Voluntary torque of the given SD, 0.3 to 4 Hz. Errors of J, B and K in %, ± one standard "
         "error.",
         "",
         *table(["voluntary torque, method", "J", "B", "K"], rows),
@@ -131,10 +131,10 @@ def efficiency(n: int) -> list[str]:
     out = [
         "## Scatter, bias and coverage of single epochs",
         "",
-        f"Sessions of {SESSION} epochs of 20 s. SD over the Cramér–Rao bound within the "
+        f"Sessions of {SESSION} epochs of 20 s. SD relative to the Cramér–Rao bound within the "
         f"band of iv, {EstimationSettings().band_high_closed_loop_hz:g} Hz (`rigidimeter design` "
-        "prints that over all frequencies); bias in SDs of an "
-        "epoch; share of 95 % intervals that hold the truth, in %. Each for J, B, K.",
+        "prints the bound over all frequencies); bias in SDs of an "
+        "epoch; coverage of 95 % intervals in %. Each for J, B, K.",
         "",
     ]
     for title, sd, methods, draws in (
@@ -207,10 +207,11 @@ def delay(n: int) -> list[str]:
     return [
         "## Delay of the torque",
         "",
-        f"Found from five epochs, {max(n // 5, 1)} times; errors in ms.",
+        f"Estimated from five epochs, {max(n // 5, 1)} times; errors in ms.",
         "",
         *table(
-            ["rates, voluntary torque, injected", "mean error", "SD", "claimed", "largest"], rows
+            ["rates, voluntary torque, injected", "mean error", "SD", "standard error", "largest"],
+            rows,
         ),
     ]
 
@@ -282,9 +283,9 @@ def section_3_4(n: int) -> list[str]:
             ["", "mean error", "in standard errors", "SD", "bound", "paper: mean", "paper: SD"],
             rows,
         ),
-        f"The bound's SDs of J, B and K are as {ratio}, whatever the level of a white torque "
-        f"noise; the paper's are as {printed}. No white torque noise gives the paper's three "
-        "numbers at once, so they cannot be matched.",
+        f"The bound's SDs of J, B and K have the ratio {ratio} for any level of white torque "
+        f"noise; the paper's have {printed}. No white torque noise reproduces the paper's three "
+        "numbers at once.",
         "",
     ]
 
