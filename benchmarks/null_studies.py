@@ -40,14 +40,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.dynamics import draw_joint
+from rigidimeter.dynamics import SubjectTorque, draw_joint
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import score_epoch
 from rigidimeter.estimation.closedloop.closed_loop_fit import fit_closed_loop
 from rigidimeter.estimation.closedloop.perturbation_methods import CLOSED_LOOP
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.scores import angular_impulse_nm_s, loop_area_j, scoring_cycles
-from rigidimeter.paper.imposed import imposed_epoch
+from rigidimeter.paper.score_rows import imposed_epoch
 from rigidimeter.records import Epoch
 from rigidimeter.settings import Settings, SubjectSettings, parse_settings
 from rigidimeter.statistics import day_difference, difference, exact_ranksum, fit_mixed, ranksum
@@ -122,11 +122,15 @@ class Scorer:
         return cycles.torque_nm[::EVERY]
 
     def _noise(self, base: Sequence[float], nominal: Array, rng: np.random.Generator) -> Array:
-        joint = JointDynamics(*base)
-        return (
-            self._torque(imposed_epoch(joint, self.settings, subject=self.subject, rng=rng))
-            - nominal
-        )
+        """Return what the subject's own torque and the noise of the sensor add to the torque."""
+        epoch, rig = imposed_epoch(JointDynamics(*base), self.settings), self.settings.rig
+        ticks = round(self.settings.sinusoid.duration_s * rig.tick_rate_hz)
+        voluntary = SubjectTorque(self.subject, rig.tick_rate_hz, rng).block(ticks)
+        torque = epoch.channels["torque_nm"]
+        noisy = torque.values - voluntary[:: round(rig.tick_rate_hz / rig.torque.rate_hz)]
+        noisy = noisy + rig.torque.noise_sd_nm * rng.standard_normal(noisy.size)
+        channels = {**epoch.channels, "torque_nm": replace(torque, values=noisy)}
+        return self._torque(replace(epoch, channels=channels)) - nominal
 
     def scores(self, joint: JointDynamics, noise: Array) -> tuple[float, float]:
         """Return impulse in N·m·s and work in J, a cycle."""

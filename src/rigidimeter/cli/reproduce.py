@@ -37,7 +37,7 @@ def reproduce(
       rigidimeter reproduce --out paper --only fig-6b --only eq-8-largest
     """
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.paper import Workshop, chosen, make_rows, tally, write_ledger
+    from rigidimeter.paper import Context, chosen, make_rows, tally, write_ledger
 
     names = [name for text in only or [] for name in text.split(",") if name]
     wanted = chosen(names)
@@ -55,8 +55,8 @@ def reproduce(
             done["rows"] += 1.0
             meter.reach(sum(done.values()))
 
-        workshop = Workshop(seed, folder=out / "virtual-study", progress=studied)
-        rows = make_rows(workshop, wanted, progress=made)
+        context = Context(seed, folder=out / "virtual-study", progress=studied)
+        rows = make_rows(context, wanted, progress=made)
     try:
         page = write_ledger(rows, out, seed)
     except OSError as error:

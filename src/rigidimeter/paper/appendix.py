@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from functools import partial
 
 from rigidimeter.experiment import APPENDIX_A, Corner, corners
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import (
-    AGREES,
-    DIFFERS,
-    Picture,
-    Row,
-    near,
-    rounded,
-    within_percent,
-)
-from rigidimeter.paper.context import Workshop
-from rigidimeter.paper.figures import arm_bode
+from rigidimeter.paper.comparison_table import Row, near, rounded, within_percent
+from rigidimeter.paper.context import Context
+from rigidimeter.paper.paper_figures import arm_bode
+from rigidimeter.reporting.contents import Figure
 from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.style import svg_text
 
-__all__ = ["ROWS"]
+__all__ = [
+    "bandwidth",
+    "equation_8",
+    "figure_3a",
+    "forearm_inertia",
+    "largest_bandwidth",
+    "total_damping",
+    "total_inertia",
+]
 
 BANDWIDTH_PERCENT = 5.0
 """How far a bandwidth may be from a printed one."""
@@ -29,13 +29,12 @@ BANDWIDTH_PERCENT = 5.0
 _FOREARM_M = 0.150
 
 
-def forearm_inertia(workshop: Workshop) -> Row:
-    """Make the row: the forearm as a rod about its end, m l²/3."""
+def forearm_inertia(context: Context) -> Row:
+    """Compare the forearm as a rod about its end, m l²/3."""
     mass_kg = printed.APP_A_FOREARM_SHARE * printed.APP_A_BODY_MASS_KG
     length_m = math.sqrt(3.0 * printed.APP_A_FOREARM_INERTIA / mass_kg)
     ours = mass_kg * _FOREARM_M**2 / 3.0
     return Row(
-        id="app-a-forearm",
         source="App. A",
         paper="1.5 % of 7.7 kg; m l²/3 = 8.6625e-4 (no length, no unit)",
         ours=f"m = {number(mass_kg)} kg; the printed inertia asks for l = {number(length_m)} m, "
@@ -46,57 +45,46 @@ def forearm_inertia(workshop: Workshop) -> Row:
                 "Forearm inertia at l = 0.150 m", "kg·m²", printed.APP_A_FOREARM_INERTIA, ours, 1e-8
             ),
         ),
-        because={
-            AGREES: "The length is not printed, but a round 150 mm gives all five digits.",
-        },
+        agrees="The length is not printed, but a round 150 mm gives all five digits.",
     )
 
 
-def total_inertia(workshop: Workshop) -> Row:
-    """Make the row: the sum of forearm, robot and controller."""
-    parts = (
-        printed.APP_A_FOREARM_INERTIA,
-        printed.APP_A_ROBOT_INERTIA,
-        printed.APP_A_CONTROLLER_INERTIA,
+def total_inertia(context: Context) -> Row:
+    """Compare the sum of forearm, robot and controller."""
+    total = (
+        printed.APP_A_FOREARM_INERTIA
+        + printed.APP_A_ROBOT_INERTIA
+        + printed.APP_A_CONTROLLER_INERTIA
     )
     estimated = printed.FIG_4.inertia_kg_m2 + printed.APP_A_CONTROLLER_INERTIA
     return Row(
-        id="app-a-inertia",
         source="App. A",
         paper="8.6625e-4 + 4e-3 + 0.0008 → 0.0052 kg·m²/rad",
-        ours=f"{number(sum(parts))} kg·m²",
+        ours=f"{number(total)} kg·m²",
         reading="0.0052 is kept as the nominal value, because Eq. 8 is half of it. (The median "
         f"inertia of Sec. 3.5 plus the controller's would be {number(estimated)}.)",
-        checks=(
-            rounded("Total inertia", "kg·m²", printed.APP_A_INERTIA_TOTAL, sum(parts), 0.0001),
-        ),
-        because={
-            DIFFERS: "The printed parts do not add up to the printed total; no two of them do "
-            "either.",
-        },
+        checks=(rounded("Total inertia", "kg·m²", printed.APP_A_INERTIA_TOTAL, total, 0.0001),),
+        differs="The printed parts do not add up to the printed total; no two of them do either.",
     )
 
 
-def total_damping(workshop: Workshop) -> Row:
-    """Make the row: the sum of elbow and controller."""
+def total_damping(context: Context) -> Row:
+    """Compare the sum of elbow and controller."""
     total = printed.APP_A_ELBOW_DAMPING + printed.APP_A_CONTROLLER_DAMPING
     return Row(
-        id="app-a-damping",
         source="App. A",
         paper="0.06 + 0.028 → 0.0088 N·m·s/rad",
         ours=f"{number(total)} N·m·s/rad",
         reading="0.088: Eq. 8 has half of that.",
         checks=(rounded("Total damping", "N·m·s/rad", printed.APP_A_DAMPING_TOTAL, total, 0.0001),),
-        because={DIFFERS: "A zero too many: 0.088 is the sum, and what Eq. 8 uses."},
+        differs="A zero too many: 0.088 is the sum, and what Eq. 8 uses.",
     )
 
 
-def equation_8(workshop: Workshop) -> Row:
-    """Make the row: Eq. 8 is the arm of App. A less 50 % of everything."""
-    corner = corners().equation_8
-    ours, paper = corner.joint, printed.EQUATION_8
+def equation_8(context: Context) -> Row:
+    """Compare Eq. 8 with the arm of App. A less 50 % of everything."""
+    ours, paper = corners().equation_8.joint, printed.EQUATION_8
     return Row(
-        id="eq-8",
         source="Eq. 8",
         paper="1/(0.0026 s² + 0.044 s + 0.75)",
         ours=f"1/({ours.inertia_kg_m2:.4f} s² + {ours.damping_nm_s_rad:.3f} s + "
@@ -109,108 +97,85 @@ def equation_8(workshop: Workshop) -> Row:
             rounded("s", "N·m·s/rad", paper.damping_nm_s_rad, ours.damping_nm_s_rad, 0.001),
             rounded("1", "N·m/rad", paper.stiffness_nm_rad, ours.stiffness_nm_rad, 0.01),
         ),
-        because={AGREES: "It follows from App. A, once its damping is taken for 0.088."},
+        agrees="It follows from App. A, once its damping is taken for 0.088.",
     )
 
 
-def bandwidth(workshop: Workshop) -> Row:
-    """Make the row: the −3 dB frequency of Eq. 8."""
+def bandwidth(context: Context) -> Row:
+    """Compare the −3 dB frequency of Eq. 8."""
     ours = printed.EQUATION_8.bandwidth_hz()
     return Row(
-        id="sec-2.4.3-bandwidth",
         source="Sec. 2.4.3, App. A",
         paper=f"maximum (worst-case) cutoff frequency {printed.BANDWIDTH_HZ:g} Hz",
         ours=f"−3 dB of Eq. 8 at {number(ours, 3)} Hz",
         reading="Cutoff is where |θ/M| is 3 dB below its value at rest.",
         checks=(
-            within_percent(
-                "−3 dB of Eq. 8", "Hz", printed.BANDWIDTH_HZ, ours, BANDWIDTH_PERCENT
-            ),
+            within_percent("−3 dB of Eq. 8", "Hz", printed.BANDWIDTH_HZ, ours, BANDWIDTH_PERCENT),
         ),
-        because={AGREES: "The number belongs to Eq. 8; whether Eq. 8 is the worst case is "
-                 "another row."},
-    )  # fmt: skip
+        agrees="The number belongs to Eq. 8; whether Eq. 8 is the worst case is another row.",
+    )
 
 
-def largest_bandwidth(workshop: Workshop) -> Row:
-    """Make the row: Eq. 8 is not the corner with the largest bandwidth."""
+def largest_bandwidth(context: Context) -> Row:
+    """Compare the bandwidth of Eq. 8 with that of all corners."""
     table = corners()
-    eight = table.equation_8.bandwidth_hz
+    eight, widest, nominal = table.equation_8, table.widest, table.nominal
     listed = "; ".join(f"({_signs(c)}) {number(c.bandwidth_hz, 3)} Hz" for c in table.corners)
-    same = abs(eight / table.nominal.bandwidth_hz - 1.0) < 1e-9
     return Row(
-        id="eq-8-largest",
         source="App. A, Fig. 3(a)",
         paper='Eq. 8 is "the transfer function with the largest bandwidth" within ±50 %: '
         f"{printed.BANDWIDTH_HZ:g} Hz",
-        ours=f"largest: {number(table.widest.bandwidth_hz, 3)} Hz at ({_signs(table.widest)}); "
-        f"corners of (J, B, K): {listed}; nominal arm {number(table.nominal.bandwidth_hz, 3)} Hz",
+        ours=f"largest: {number(widest.bandwidth_hz, 3)} Hz at ({_signs(widest)}); "
+        f"corners of (J, B, K): {listed}; nominal arm {number(nominal.bandwidth_hz, 3)} Hz",
         reading=f"Both are reported; the perturbation reaches {printed.BAND_HZ[1]:g} Hz and covers "
         "both.",
         checks=(
             within_percent(
                 "Largest −3 dB frequency within ±50 %",
                 "Hz",
-                eight,
-                table.widest.bandwidth_hz,
+                eight.bandwidth_hz,
+                widest.bandwidth_hz,
                 BANDWIDTH_PERCENT,
             ),
         ),
-        because={
-            DIFFERS: f"With the stiffness at +50 % the arm answers up to "
-            f"{number(table.widest.bandwidth_hz / eight, 2)} times the frequency. "
-            + (
-                "Eq. 8 has the very bandwidth of the nominal arm, since one factor on all three "
-                "leaves the shape as it is."
-                if same
-                else "Eq. 8 does not have the bandwidth of the nominal arm."
-            ),
-        },
+        differs="With the stiffness at +50 % the arm answers up to "
+        f"{number(widest.bandwidth_hz / eight.bandwidth_hz, 2)} times the frequency. "
+        "Eq. 8 has the very bandwidth of the nominal arm, since one factor on all three "
+        "leaves the shape as it is.",
     )
 
 
-def figure_3a(workshop: Workshop) -> Row:
-    """Make the row: the Bode plot of Eq. 8, nominal arm and widest corner beside it."""
-    table = corners()
+def figure_3a(context: Context) -> Row:
+    """Compare the Bode plot of Eq. 8, with the nominal arm and the widest corner beside it."""
+    arm = printed.EQUATION_8
     curves = {
-        "Eq. 8 (−50 %, −50 %, −50 %)": printed.EQUATION_8,
+        "Eq. 8 (−50 %, −50 %, −50 %)": arm,
         "nominal arm": APPENDIX_A,
-        "K +50 %, J and B −50 %": table.widest.joint,
+        "K +50 %, J and B −50 %": corners().widest.joint,
     }
-    picture = Picture(
-        "fig-3a",
-        svg_text(arm_bode(curves)),
-        "Bode plot of the arm of App. A: magnitude and phase over frequency for three corners.",
-        "Fig. 3(a) computed: Eq. 8 with its −3 dB frequency, the nominal arm, and the corner "
-        "within ±50 % that answers fastest.",
-    )
     at_corner = 20.0 * math.log10(
-        abs(printed.EQUATION_8.compliance_rad_nm(printed.BANDWIDTH_HZ))
-        * printed.EQUATION_8.stiffness_nm_rad
+        abs(arm.compliance_rad_nm(printed.BANDWIDTH_HZ)) * arm.stiffness_nm_rad
     )
     return Row(
-        id="fig-3a",
         source="Fig. 3(a)",
         paper="Bode plot of Eq. 8, cutoff 3.5 Hz",
         ours=f"|θ/M| of Eq. 8 at 3.5 Hz is {number(at_corner, 3)} dB against rest",
         reading="Drawn from Eq. 8 as printed.",
         checks=(near("|θ/M| at 3.5 Hz against rest", "dB", -3.0, at_corner, 0.5),),
-        because={AGREES: "The curve is determined by Eq. 8. That it is the one with the highest "
-                 "bandwidth, as the caption says, is denied by row eq-8-largest."},
-        pictures=(picture,),
-    )  # fmt: skip
+        agrees="The curve is determined by Eq. 8. It is not the one with the highest bandwidth, as "
+        "the caption says: see row eq-8-largest.",
+        figures=(
+            Figure(
+                "fig-3a",
+                "Fig. 3(a) computed: Eq. 8 with its −3 dB frequency, the nominal arm, and the "
+                "corner within ±50 % that answers fastest.",
+                "Bode plot of the arm of App. A: magnitude and phase over frequency for three "
+                "corners.",
+                partial(arm_bode, curves),
+            ),
+        ),
+    )
 
 
 def _signs(corner: Corner) -> str:
     return ", ".join({-1: "−", 0: "0", 1: "+"}[sign] for sign in corner.signs)
-
-
-ROWS: Mapping[str, Callable[[Workshop], Row]] = {
-    "app-a-forearm": forearm_inertia,
-    "app-a-inertia": total_inertia,
-    "app-a-damping": total_damping,
-    "eq-8": equation_8,
-    "sec-2.4.3-bandwidth": bandwidth,
-    "eq-8-largest": largest_bandwidth,
-    "fig-3a": figure_3a,
-}

@@ -1,22 +1,22 @@
-"""A row of the ledger: what the paper prints, what the product computes, and who is right by rule.
+"""A row of the comparison: what the paper prints, what we compute, and the verdict.
 
-A row rests on checks. A check holds one computed number against an interval of acceptance
-[low, high] that is stated beside it. The verdict follows:
+A check holds one computed number against an interval of acceptance [low, high] that is stated
+beside it. The verdict of a row follows from its checks:
 
     needs data that were never published   ->  cannot be computed from what was published
     every check inside its interval        ->  agrees
     one of them outside                    ->  differs
 
-Nobody types a verdict: change a number and it turns.
+No verdict is typed in: it changes with the numbers.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple, TypeAlias
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
 
+from rigidimeter.reporting.contents import Figure
 from rigidimeter.reporting.numbers import number
 
 __all__ = [
@@ -25,7 +25,6 @@ __all__ = [
     "UNPUBLISHED",
     "VERDICTS",
     "Check",
-    "Picture",
     "Row",
     "Verdict",
     "bounded",
@@ -84,9 +83,10 @@ class Check:
             "what": self.what,
             "unit": self.unit,
             "paper": self.paper,
-            "ours": _finite(self.ours),
-            "low": _finite(self.low),
-            "high": _finite(self.high),
+            **{
+                name: value if math.isfinite(value) else None
+                for name, value in (("ours", self.ours), ("low", self.low), ("high", self.high))
+            },
             "within": self.within,
         }
 
@@ -114,38 +114,29 @@ def bounded(
     return Check(what, unit, None, ours, low, high)
 
 
-class Picture(NamedTuple):
-    """A figure as it is stored: file name without suffix, SVG, alternative text, caption."""
-
-    name: str
-    svg: str
-    alt: str
-    caption: str
-
-
 @dataclass(frozen=True)
 class Row:
-    """One equation, figure, table or statement of the paper beside what the product makes of it.
+    """One equation, figure, table or statement of the paper beside what we compute.
 
     Attributes
     ----------
-    id : str
-        For example ``eq-8``.
     source : str
         Where in the paper.
     paper, ours : str
         What it prints, and what we compute, in words and numbers.
     reading : str
-        How we take it.
+        Which of several possible meanings we use.
     checks : tuple of Check
-        What decides. May be empty only where `unpublished` says what is missing.
-    because : mapping of verdict to str
-        The reason for each verdict that can be foreseen; for another one the checks speak.
+        They decide. May be empty only where `unpublished` says what is missing.
+    agrees, differs : str
+        The reason for either verdict; where there is none, the checks say it.
     unpublished : str
         What would be needed and was not published; empty where nothing is.
-    pictures : tuple of Picture
+    figures : tuple of Figure
     virtual : bool
-        Whether `ours` or the pictures come from a virtual study.
+        Whether `ours` or the figures come from a virtual study.
+    id : str
+        For example ``eq-8``: the key of the row in `rows.SECTIONS`.
 
     Raises
     ------
@@ -153,20 +144,21 @@ class Row:
         If nothing can decide.
     """
 
-    id: str
     source: str
     paper: str
     ours: str
     reading: str
-    checks: tuple[Check, ...]
-    because: Mapping[Verdict, str] = field(default_factory=dict)
+    checks: tuple[Check, ...] = ()
+    agrees: str = ""
+    differs: str = ""
     unpublished: str = ""
-    pictures: tuple[Picture, ...] = ()
+    figures: tuple[Figure, ...] = ()
     virtual: bool = False
+    id: str = ""
 
     def __post_init__(self) -> None:
         if not self.checks and not self.unpublished:
-            raise ValueError(f"row {self.id} has neither a check nor anything that is missing")
+            raise ValueError(f"the row of {self.source} has neither a check nor missing data")
 
     @property
     def verdict(self) -> Verdict:
@@ -177,15 +169,13 @@ class Row:
 
     @property
     def reason(self) -> str:
-        """Why: the sentence foreseen for this verdict, else what the checks found."""
+        """Why: the sentence written for this verdict, else what the checks found."""
         if self.unpublished:
             return self.unpublished
-        return self.because.get(self.verdict) or self._from_checks()
-
-    def _from_checks(self) -> str:
+        written = self.agrees if self.verdict == AGREES else self.differs
         outside = [check for check in self.checks if not check.within]
-        if not outside:
-            return "Every number is within its stated tolerance."
+        if written or not outside:
+            return written or "Every number is within its stated tolerance."
         return " ".join(
             f"{check.what}: {number(check.ours)} {check.unit}".rstrip()
             + f" is outside what would agree ({check.allowed})."
@@ -204,9 +194,5 @@ class Row:
             "reading": self.reading,
             "virtual": self.virtual,
             "checks": [check.as_dict() for check in self.checks],
-            "figures": [f"figures/{picture.name}.svg" for picture in self.pictures],
+            "figures": [f"figures/{figure.name}.svg" for figure in self.figures],
         }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -1,4 +1,8 @@
-"""What several rows share, made when the first of them asks for it."""
+"""What several rows share, made when the first of them asks for it.
+
+The recordings of the animal were never published. What needs them is shown with a virtual study of
+the paper's design and sizes instead, and says so.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +11,26 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 
-from rigidimeter.paper.virtual_data import VirtualStudy, counts_of, virtual_study
-from rigidimeter.records import Analysis
+from rigidimeter.documents import read_json, write_json
+from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings
-from rigidimeter.statistics import DayDifference, day_difference
-from rigidimeter.study import MEASURES, Comparison, analyse, compare_analysis
+from rigidimeter.study import StudyResult, analyse, compare_measures, read_study
+from rigidimeter.study.comparison import day_tests, gathered
+from rigidimeter.study.ratings_model import rated
+from rigidimeter.version import __version__
 from rigidimeter.virtual.study_design import PAPER, StudyDesign
 from rigidimeter.virtual.study_plan import plan_study
-from rigidimeter.virtual.virtual_study import study_length_s
+from rigidimeter.virtual.virtual_study import study_length_s, write_virtual_study
 
-__all__ = ["DEFAULT_SEED", "Workshop"]
+__all__ = ["DEFAULT_SEED", "Context"]
 
 DEFAULT_SEED = 2023
 
+MADE = "made.json"
+"""Says which design, seed and version a virtual study was made of."""
 
-class Workshop:
+
+class Context:
     """The seed, the sizes, and the virtual study with its analysis.
 
     Parameters
@@ -36,7 +45,7 @@ class Workshop:
         Of the virtual study.
     folder : Path, optional
         Where the virtual study is written and kept, or read if it is there. Without one it goes to
-        a temporary folder that is removed with the workshop.
+        a temporary folder that is removed once it was analysed.
     processes : int
         Sessions of the study that run side by side.
     progress : callable
@@ -70,48 +79,72 @@ class Workshop:
     @property
     def counts(self) -> Mapping[str, Mapping[str, int]]:
         """Epochs by task, and ratings, of the virtual study, by condition."""
-        return counts_of(plan_study(self.design, self.seed))
+        counted: dict[str, dict[str, int]] = {"ratings": {}, "sinusoid": {}, "prbs": {}}
+        for plan in plan_study(self.design, self.seed):
+            made = [("ratings", len(plan.ratings))]
+            made += [(block.task, block.epochs) for block in plan.settings.protocol.blocks]
+            for task, count in made:
+                counted[task][plan.condition] = counted[task].get(plan.condition, 0) + count
+        return counted
 
     @cached_property
-    def study(self) -> VirtualStudy:
-        """The virtual study, from its folder."""
-        length_s = study_length_s(plan_study(self.design, self.seed))
+    def study(self) -> StudyResult:
+        """The virtual study: estimates, rank-sum tests, tests by days, and ratings.
 
-        def reach(time_s: float) -> None:
-            self._progress(time_s / length_s)
-
+        Raises
+        ------
+        UserError
+            If the folder holds another seed, design or version, or an unfinished study.
+        """
         if self._folder is not None:
-            return self._study_in(self._folder, reach)
+            return self._study_in(self._folder)
         with tempfile.TemporaryDirectory() as place:
-            return self._study_in(Path(place) / "virtual-study", reach)
+            return self._study_in(Path(place) / "virtual-study")
 
-    def _study_in(self, folder: Path, progress: Callable[[float], None]) -> VirtualStudy:
-        return virtual_study(
-            folder, self.design, self.seed, processes=self._processes, progress=progress
+    def _study_in(self, folder: Path) -> StudyResult:
+        wanted = {"design": self.design.name, "seed": self.seed, "rigidimeter": __version__}
+        made = folder / MADE
+        if made.is_file():
+            found = read_json(made)
+            if found != wanted:
+                raise UserError(
+                    f"{folder}: is the virtual study {_named(found)}, not {_named(wanted)}; name "
+                    "another folder"
+                )
+        else:
+            length_s = study_length_s(plan_study(self.design, self.seed))
+            write_virtual_study(
+                folder,
+                self.design,
+                self.seed,
+                processes=self._processes,
+                progress=lambda time_s: self._progress(time_s / length_s),
+            )
+            write_json(made, wanted)
+        read = read_study(folder)
+        analysis = analyse(read.epochs, read.settings)
+        sessions = {session.entry.source: session.entry for session in read.gathered.sessions}
+        pair = read.names.pair
+        comparisons, _ = compare_measures(gathered(analysis, pair, sessions), resamples=0)
+        one_offset = read.folder.about.analysis.one_offset_a_day
+        ratings, _ = rated(read.folder, read.names)
+        return StudyResult(
+            title=read.folder.about.title,
+            reference=pair[0],
+            other=pair[1],
+            comparisons=day_tests(comparisons, one_offset=one_offset),
+            resamples=0,
+            analysis=analysis,
+            epochs=read.epochs,
+            settings=read.settings,
+            sessions=tuple(sessions.values()),
+            virtual=True,
+            ratings=ratings,
         )
 
-    @cached_property
-    def analysis(self) -> Analysis:
-        """Its epochs, estimated in two stages by the default method and scored."""
-        return analyse(self.study.epochs, self.study.settings)
 
-    @cached_property
-    def _comparisons(self) -> Mapping[str, Comparison]:
-        found = compare_analysis(self.analysis, "OFF", "DBS", resamples=0)
-        return {each.measure.name: each for each in found.comparisons}
-
-    def comparison(self, measure: str) -> Comparison:
-        """Return one measure of the virtual study in OFF and DBS."""
-        return self._comparisons[measure]
-
-    def day_test(self, measure: str) -> DayDifference:
-        """Return the test in which days count, OFF − DBS, of one measure."""
-        results = next(m for m in MEASURES if m.name == measure).results(self.analysis)
-        samples: dict[str, tuple[list[float], list[str]]] = {"OFF": ([], []), "DBS": ([], [])}
-        for result in results:
-            if result.outcome.included:
-                values, days = samples[result.condition]
-                values.append(float(getattr(result, measure)))
-                days.append(self.study.days[result.source])
-        (x, x_days), (y, y_days) = samples["OFF"], samples["DBS"]
-        return day_difference(x, y, x_days, y_days, one_offset=True)  # so the study is made
+def _named(made: Mapping[str, object]) -> str:
+    return (
+        f"of design {made.get('design')}, seed {made.get('seed')}, "
+        f"version {made.get('rigidimeter')}"
+    )

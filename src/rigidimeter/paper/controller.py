@@ -1,4 +1,4 @@
-"""The admittance controller: in what unit its two numbers are, and Eq. 4 and 5.
+"""The arm (Eq. 3), and the admittance controller: the unit of its two numbers, Eq. 4 and 5.
 
 Sec. 2.4.2 prints J_c and B_c per degree, App. A the same two numbers per radian: 57.3 times apart.
 Only the motion can tell. In the ideal loop
@@ -11,20 +11,34 @@ each reading has its position SD, and the paper reports about 4 deg.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
-from rigidimeter.dynamics import Loop, closed_loop_motion, loop_margins
+from rigidimeter.dynamics import (
+    JointDynamics,
+    Loop,
+    arm_response,
+    closed_loop_motion,
+    loop_margins,
+)
 from rigidimeter.experiment import ideal_response, prbs_nm
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import AGREES, DIFFERS, Check, Row, bounded, within_percent
-from rigidimeter.paper.context import Workshop
+from rigidimeter.paper.comparison_table import Row, bounded, within_percent
+from rigidimeter.paper.context import Context
 from rigidimeter.reporting.numbers import number
 from rigidimeter.settings import ControllerSettings, PrbsSettings, Settings
 from rigidimeter.units import deg_from_rad, per_rad_from_per_deg
 
-__all__ = ["CLOCKS_HZ", "READINGS", "ROWS", "position_sd_deg"]
+__all__ = [
+    "CLOCKS_HZ",
+    "READINGS",
+    "equation_3",
+    "equation_4",
+    "equation_5",
+    "position_sd_deg",
+    "units",
+]
 
 CLOCKS_HZ = (20.0, 22.6)
 """Clocks of a 7-bit sequence that reach 10 Hz: by the band of Sec. 2.4.3, and by half power."""
@@ -49,154 +63,129 @@ LOOP_PERCENT = 10.0
 _FAST_HZ = 400.0
 """Of torque filter and drive, in the loop that comes close to the ideal one."""
 
+_SINE_HZ, _CYCLES, _RATE_HZ = 2.0, 20, 1000.0
+"""The torque that moves the arm of Eq. 3."""
+
+
+def equation_3(context: Context) -> Row:
+    """Compare the arm under a sinusoidal torque with the compliance of Eq. 3."""
+    joint = printed.SEC_34
+    count = round(_CYCLES * _RATE_HZ / _SINE_HZ)
+    phase = 2.0 * math.pi * _SINE_HZ * np.arange(count) / _RATE_HZ
+    angles, _ = arm_response(joint, np.sin(phase), 1.0 / _RATE_HZ)
+    last = slice(count // 2, None)  # the beginning has died out by then
+    found = 2.0 * float(abs(np.mean(angles[last] * np.exp(-1j * phase[last]))))
+    wanted = float(abs(joint.compliance_rad_nm(_SINE_HZ)))
+    return Row(
+        source="Eq. 3",
+        paper="J_p θ″ + B_p θ′ + K_p θ = M_meas",
+        ours=f"|θ/M| at {_SINE_HZ:g} Hz {number(found)} rad/N·m stepped through time, "
+        f"{number(wanted)} rad/N·m from the transfer function",
+        reading="M is the torque applied to the arm, positive with θ.",
+        checks=(within_percent("|θ/M| at 2 Hz", "rad/N·m", wanted, found, 0.5),),
+        agrees="The simulated arm is Eq. 3.",
+    )
+
 
 def position_sd_deg(reading: str, clock_hz: float) -> float:
     """Return the SD of the angle in the ideal loop with the joint of Sec. 3.4, in deg."""
     rate_hz = Settings().rig.tick_rate_hz
-    angle, _ = ideal_response(
-        prbs_nm(PrbsSettings(clock_hz=clock_hz), rate_hz),
-        READINGS[reading],
-        printed.SEC_34,
-        rate_hz,
-    )
+    perturbation = prbs_nm(PrbsSettings(clock_hz=clock_hz), rate_hz)
+    angle, _ = ideal_response(perturbation, READINGS[reading], printed.SEC_34, rate_hz)
     return deg_from_rad(float(np.std(angle)))
 
 
-def _sd_checks(reading: str) -> tuple[Check, ...]:
-    return tuple(
-        within_percent(
-            f"Position SD read {reading}, clock {clock_hz:g} Hz",
-            "deg",
-            printed.POSITION_SD_DEG,
-            position_sd_deg(reading, clock_hz),
-            ABOUT_PERCENT,
-        )
-        for clock_hz in CLOCKS_HZ
+def units(reading: str, source: str, context: Context) -> Row:
+    """Compare J_c and B_c, read per degree or per radian, with the motion of the paper."""
+    sds = {each: [position_sd_deg(each, clock) for clock in CLOCKS_HZ] for each in READINGS}
+    nearest = min(
+        READINGS,
+        key=lambda each: sum(abs(math.log(sd / printed.POSITION_SD_DEG)) for sd in sds[each]),
     )
-
-
-def _stability(reading: str) -> str:
-    settings = Settings(controller=READINGS[reading])
+    controller, unit = READINGS[reading], "deg" if reading == "per degree" else "rad"
+    settings = Settings(controller=controller)
     margins = loop_margins(settings, printed.SEC_34)
-    word = "stable" if margins.stable else "unstable"
-    return (
-        f"the loop with the 20 Hz filter and a {settings.rig.drive_bandwidth_hz:g} Hz drive is "
-        f"{word} (gain margin {number(margins.gain_margin_db, 3)} dB)"
-    )
-
-
-def _in_si(reading: str) -> str:
-    controller = READINGS[reading]
-    return (
-        f"J_c = {number(controller.inertia_kg_m2)} kg·m²/rad, "
-        f"B_c = {number(controller.damping_nm_s_rad)} N·m·s/rad"
-    )
-
-
-def nearest_reading() -> str:
-    """Return the reading whose position SD is nearest to the paper's, by ratio."""
-
-    def distance(reading: str) -> float:
-        return sum(
-            abs(math.log(position_sd_deg(reading, clock) / printed.POSITION_SD_DEG))
-            for clock in CLOCKS_HZ
-        )
-
-    return min(READINGS, key=distance)
-
-
-def _units_row(workshop: Workshop, row_id: str, source: str, reading: str, text: str) -> Row:
-    checks = _sd_checks(reading)
-    chosen = nearest_reading()
-    spread = " and ".join(number(check.ours, 3) for check in checks)
-    same = " (the ideal loop with a 7-bit PRBS at 20 and 22.6 Hz)"
     return Row(
-        id=row_id,
         source=source,
-        paper=f"{text}; position SD approximately {printed.POSITION_SD_DEG:g} deg",
-        ours=f"{_in_si(reading)}: position SD {spread} deg{same}; {_stability(reading)}",
-        reading=f"Read {chosen}: of the two readings its position SD is nearest to the paper's.",
-        checks=checks,
-        because={
-            AGREES: f"Read {reading}, the arm moves as far as the paper says it did.",
-            DIFFERS: f"Read {reading}, the arm does not move as far as the paper says it did; "
-            f"J_c would be {number(_share_of_arm(reading), 2)} times the arm's own inertia.",
-        },
+        paper=f"J_c = {printed.CONTROLLER_INERTIA:.4f} kg·m²/{unit}, "
+        f"B_c = {printed.CONTROLLER_DAMPING:.3f} N·m·s/{unit}; "
+        f"position SD approximately {printed.POSITION_SD_DEG:g} deg",
+        ours=f"J_c = {number(controller.inertia_kg_m2)} kg·m²/rad, "
+        f"B_c = {number(controller.damping_nm_s_rad)} N·m·s/rad: position SD "
+        f"{' and '.join(number(sd, 3) for sd in sds[reading])} deg (the ideal loop with a 7-bit "
+        f"PRBS at 20 and 22.6 Hz); the loop with the 20 Hz filter and a "
+        f"{settings.rig.drive_bandwidth_hz:g} Hz drive is "
+        f"{'stable' if margins.stable else 'unstable'} "
+        f"(gain margin {number(margins.gain_margin_db, 3)} dB)",
+        reading=f"Read {nearest}: of the two readings its position SD is nearest to the paper's.",
+        checks=tuple(
+            within_percent(
+                f"Position SD read {reading}, clock {clock_hz:g} Hz",
+                "deg",
+                printed.POSITION_SD_DEG,
+                sd,
+                ABOUT_PERCENT,
+            )
+            for clock_hz, sd in zip(CLOCKS_HZ, sds[reading], strict=True)
+        ),
+        agrees=f"Read {reading}, the arm moves as far as the paper says it did.",
+        differs=f"Read {reading}, the arm does not move as far as the paper says it did; J_c would "
+        f"be {number(controller.inertia_kg_m2 / printed.SEC_34.inertia_kg_m2, 2)} times the arm's "
+        "own inertia.",
     )
 
 
-def _share_of_arm(reading: str) -> float:
-    return READINGS[reading].inertia_kg_m2 / printed.SEC_34.inertia_kg_m2
-
-
-def units_per_degree(workshop: Workshop) -> Row:
-    """Make the row: J_c and B_c as Sec. 2.4.2 prints them."""
-    text = "J_c = 0.0008 kg·m²/deg, B_c = 0.028 N·m·s/deg"
-    return _units_row(workshop, "sec-2.4.2-units", "Sec. 2.4.2", "per degree", text)
-
-
-def units_per_radian(workshop: Workshop) -> Row:
-    """Make the row: J_c and B_c as App. A prints them."""
-    text = "J_c = 0.0008 kg·m²/rad, B_c = 0.028 N·m·s/rad"
-    return _units_row(workshop, "app-a-units", "App. A", "per radian", text)
-
-
-def equation_4(workshop: Workshop) -> Row:
-    """Make the row: voluntary torque moves arm and controller as one."""
-    controller, joint = workshop.settings.controller, printed.SEC_34
+def equation_4(context: Context) -> Row:
+    """Compare the motion under voluntary torque with that of arm and controller together."""
+    controller, joint = context.settings.controller, printed.SEC_34
     frequency_hz = np.array([0.3, 1.0, 4.0])
-    loop = Loop(controller, workshop.settings.rig).at_frequency(frequency_hz)
+    loop = Loop(controller, context.settings.rig).at_frequency(frequency_hz)
     # M_sub is subtracted from the measured torque.
     found = -loop.motion_per_torque(joint.parameters)[2]
-    s = 2j * np.pi * frequency_hz
-    J = joint.inertia_kg_m2 + controller.inertia_kg_m2
-    B = joint.damping_nm_s_rad + controller.damping_nm_s_rad
-    wanted = 1.0 / (J * s**2 + B * s + joint.stiffness_nm_rad)
-    off_percent = 100.0 * np.abs(np.abs(found / wanted) - 1.0)
-    per_hz = ", ".join(
-        f"{number(float(off), 2)} % at {hz:g} Hz"
-        for off, hz in zip(off_percent, frequency_hz, strict=True)
+    together = JointDynamics(
+        joint.inertia_kg_m2 + controller.inertia_kg_m2,
+        joint.damping_nm_s_rad + controller.damping_nm_s_rad,
+        joint.stiffness_nm_rad,
     )
+    ratio = np.abs(found / together.compliance_rad_nm(frequency_hz))
+    off_percent = {
+        float(hz): 100.0 * abs(float(each) - 1.0)
+        for hz, each in zip(frequency_hz, ratio, strict=True)
+    }
+    per_hz = ", ".join(f"{number(off, 2)} % at {hz:g} Hz" for hz, off in off_percent.items())
     return Row(
-        id="eq-4",
         source="Eq. 4",
         paper="[J_p θ″ + B_p θ′ + K_p θ] + [J_c θ″ + B_c θ′] = M_sub",
         ours=f"|θ/M_sub| of the loop with sensor, 20 Hz filter and drive is off by {per_hz}",
         reading="Without perturbation. In the band of voluntary movement, 0.3 to 4 Hz; above it "
         "filter and drive count.",
         checks=tuple(
-            bounded(f"|θ/M_sub| at {hz:g} Hz against Eq. 4", "%", float(off), high=LOOP_PERCENT)
-            for off, hz in zip(off_percent, frequency_hz, strict=True)
+            bounded(f"|θ/M_sub| at {hz:g} Hz against Eq. 4", "%", off, high=LOOP_PERCENT)
+            for hz, off in off_percent.items()
         ),
-        because={AGREES: "Controller and arm add up as printed."},
+        agrees="Controller and arm add up as printed.",
     )
 
 
-def equation_5(workshop: Workshop) -> Row:
-    """Make the row: measured torque against perturbation less controller."""
-    settings = workshop.settings
-    off = {
-        "fast": _equation_5_percent(_fast(settings)),
-        "paper": _equation_5_percent(settings),
-    }
+def equation_5(context: Context) -> Row:
+    """Compare the measured torque with the perturbation less the controller."""
+    settings = context.settings
+    fast, paper = _equation_5_percent(_fast(settings)), _equation_5_percent(settings)
     return Row(
-        id="eq-5",
         source="Eq. 5",
         paper="M_meas = [J_p θ″ + B_p θ′ + K_p θ] − M_sub = M_PRBS − [J_v θ″ + B_v θ′]",
         ours="within 0.15 to 10 Hz the two sides differ by "
-        f"{number(off['fast'], 3)} % of M_PRBS with a torque filter and a drive of "
-        f"{_FAST_HZ:g} Hz, and by {number(off['paper'], 3)} % with the 20 Hz filter and a "
+        f"{number(fast, 3)} % of M_PRBS with a torque filter and a drive of "
+        f"{_FAST_HZ:g} Hz, and by {number(paper, 3)} % with the 20 Hz filter and a "
         f"{settings.rig.drive_bandwidth_hz:g} Hz drive",
         reading="J_v and B_v are J_c and B_c of Eq. 4; M_meas is the torque that drives the arm, "
         "so its sign is that of the perturbation.",
         checks=(
-            bounded("The two sides in a fast loop, of M_PRBS", "%", off["fast"], high=LOOP_PERCENT),
+            bounded("The two sides in a fast loop, of M_PRBS", "%", fast, high=LOOP_PERCENT),
         ),
-        because={
-            AGREES: "In a loop faster than the motion it holds; what filter and drive add is why "
-            "the torque is measured and not computed from the right side."
-        },
-    )
+        agrees="In a loop faster than the motion it holds; what filter and drive add is why "
+        "the torque is measured and not computed from the right side.",
+    )  # fmt: skip
 
 
 def _fast(settings: Settings) -> Settings:
@@ -212,29 +201,18 @@ def _fast(settings: Settings) -> Settings:
 
 def _equation_5_percent(settings: Settings) -> float:
     """Return what is left of Eq. 5 within the band of the perturbation, in % of M_PRBS."""
-    rate_hz = settings.rig.tick_rate_hz
+    rate_hz, controller = settings.rig.tick_rate_hz, settings.controller
     perturbation = prbs_nm(settings.prbs, rate_hz)
     motion = closed_loop_motion(perturbation, settings, printed.SEC_34)
-    controller = settings.controller
-    torque = printed.SEC_34.torque_nm(
-        motion.angle_rad, motion.velocity_rad_s, motion.acceleration_rad_s2
-    )
-    left = torque - (
+    acceleration, velocity = motion.acceleration_rad_s2, motion.velocity_rad_s
+    left = printed.SEC_34.torque_nm(motion.angle_rad, velocity, acceleration) - (
         perturbation
-        - controller.inertia_kg_m2 * motion.acceleration_rad_s2
-        - controller.damping_nm_s_rad * motion.velocity_rad_s
+        - controller.inertia_kg_m2 * acceleration
+        - controller.damping_nm_s_rad * velocity
     )
-    frequency_hz = np.fft.rfftfreq(torque.size, 1.0 / rate_hz)
+    frequency_hz = np.fft.rfftfreq(left.size, 1.0 / rate_hz)
     inside = (frequency_hz >= printed.BAND_HZ[0]) & (frequency_hz <= printed.BAND_HZ[1])
     rest, whole = (
         float(np.sum(np.abs(np.fft.rfft(values)[inside]) ** 2)) for values in (left, perturbation)
     )
     return 100.0 * math.sqrt(rest / whole)
-
-
-ROWS: Mapping[str, Callable[[Workshop], Row]] = {
-    "sec-2.4.2-units": units_per_degree,
-    "app-a-units": units_per_radian,
-    "eq-4": equation_4,
-    "eq-5": equation_5,
-}

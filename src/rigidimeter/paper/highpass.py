@@ -7,32 +7,70 @@ at 0.20 Hz and nothing else. In the ideal closed loop, without noise, what that 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import signal
 
 from rigidimeter.estimation import Signals, fit_inertia_damping_stiffness
 from rigidimeter.experiment import ideal_response, prbs_nm
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import AGREES, DIFFERS, Check, Row, bounded
-from rigidimeter.paper.context import Workshop
+from rigidimeter.paper.comparison_table import Check, Row, bounded
+from rigidimeter.paper.context import Context
 from rigidimeter.paper.controller import READINGS
-from rigidimeter.paper.truth import Array, Triple, errors_percent, signed
+from rigidimeter.paper.simulated_epochs import Triple, errors_percent, signed
 from rigidimeter.settings import Settings
 
-__all__ = ["FILTERS", "ROWS", "highpass_errors_percent"]
-
-Filter = Callable[[Array], Array]
+__all__ = ["FILTERS", "equation_6", "highpass", "highpass_errors_percent"]
 
 FILTERS = ("causal", "zero phase")
 """The paper does not say which way its filter runs, nor its order; second order here."""
 
-
 UNBIASED_PERCENT = 1.0
 """What counts as no bias in a loop without noise."""
+
+
+def highpass_errors_percent(reading: str, way: str, *, alike: bool) -> Triple:
+    """Return the errors of J, B and K in the noise-free loop, in percent.
+
+    Parameters
+    ----------
+    reading : str
+        A key of `controller.READINGS`.
+    way : str
+        One of `FILTERS`.
+    alike : bool
+        Whether all four signals go through the filter, or the position alone.
+    """
+    settings = Settings()
+    estimation, rate_hz = settings.estimation, settings.rig.tick_rate_hz
+    sections = signal.butter(
+        estimation.published_highpass_order,
+        estimation.published_highpass_hz,
+        "highpass",
+        fs=rate_hz,
+        output="sos",
+    )
+    high_pass = signal.sosfilt if way == "causal" else signal.sosfiltfilt
+    raw = _ideal_signals(reading, settings)
+    trim = round(estimation.trim_s * rate_hz)
+    kept = slice(trim, raw.time_s.size - trim)
+
+    def treated(values: NDArray[np.float64], *, filtered: bool) -> NDArray[np.float64]:
+        passed = high_pass(sections, values) if filtered else values
+        return np.asarray(passed[kept], dtype=np.float64)
+
+    cut = replace(
+        raw,
+        time_s=raw.time_s[kept],
+        torque_nm=treated(raw.torque_nm, filtered=alike),
+        acceleration_rad_s2=treated(raw.acceleration_rad_s2, filtered=alike),
+        velocity_rad_s=treated(raw.velocity_rad_s, filtered=alike),
+        angle_rad=treated(raw.angle_rad, filtered=True),
+    )
+    white = estimation.model_copy(update={"intervals": "white"})
+    return errors_percent(fit_inertia_damping_stiffness(cut, settings=white).value)
 
 
 def _ideal_signals(reading: str, settings: Settings) -> Signals:
@@ -54,78 +92,30 @@ def _ideal_signals(reading: str, settings: Settings) -> Signals:
     )
 
 
-def _filter(way: str, settings: Settings) -> Filter:
-    estimation = settings.estimation
-    sections = signal.butter(
-        estimation.published_highpass_order,
-        estimation.published_highpass_hz,
-        "highpass",
-        fs=settings.rig.tick_rate_hz,
-        output="sos",
+def equation_6(context: Context) -> Row:
+    """Compare least squares on signals that were all treated alike with the joint."""
+    worst = max(
+        abs(error)
+        for way in FILTERS
+        for error in highpass_errors_percent("per degree", way, alike=True)
     )
-    if way == "causal":
-        return lambda values: np.asarray(signal.sosfilt(sections, values), dtype=np.float64)
-    return lambda values: np.asarray(signal.sosfiltfilt(sections, values), dtype=np.float64)
-
-
-@lru_cache(maxsize=16)
-def _highpassed(reading: str, way: str, alike: bool) -> Triple:
-    settings = Settings()
-    raw = _ideal_signals(reading, settings)
-    high_pass = _filter(way, settings)
-    others: Filter = high_pass if alike else lambda values: values
-    trim = round(settings.estimation.trim_s * raw.rate_hz)
-    kept = slice(trim, raw.time_s.size - trim)
-    cut = replace(
-        raw,
-        time_s=raw.time_s[kept],
-        torque_nm=others(raw.torque_nm)[kept],
-        acceleration_rad_s2=others(raw.acceleration_rad_s2)[kept],
-        velocity_rad_s=others(raw.velocity_rad_s)[kept],
-        angle_rad=high_pass(raw.angle_rad)[kept],
-    )
-    white = settings.estimation.model_copy(update={"intervals": "white"})
-    J, B, K = fit_inertia_damping_stiffness(cut, settings=white).value.tolist()
-    return J, B, K
-
-
-def highpass_errors_percent(reading: str, way: str, *, alike: bool) -> Triple:
-    """Return the errors of J, B and K in the noise-free loop, in percent.
-
-    Parameters
-    ----------
-    reading : str
-        A key of `controller.READINGS`.
-    way : str
-        One of `FILTERS`.
-    alike : bool
-        Whether all four signals go through the filter, or the position alone.
-    """
-    return errors_percent(_highpassed(reading, way, alike))
-
-
-def equation_6(workshop: Workshop) -> Row:
-    """Make the row: least squares on signals that were all treated alike gives the joint back."""
-    errors = {way: highpass_errors_percent("per degree", way, alike=True) for way in FILTERS}
-    worst = max(abs(error) for triple in errors.values() for error in triple)
     return Row(
-        id="eq-6",
         source="Eq. 6",
         paper="x̂ = (AᵀA)⁻¹Aᵀb from θ″, θ′, θ and M_meas",
         ours="noise-free loop, all four signals high-passed alike: J, B and K within "
         f"{worst:.2f} %",
         reading="Solved by singular values of scaled columns; AᵀA is not formed.",
         checks=(bounded("Largest error of J, B, K", "%", worst, high=UNBIASED_PERCENT),),
-        because={AGREES: "A filter on every term leaves Eq. 3 as it is."},
+        agrees="A filter on every term leaves Eq. 3 as it is.",
     )
 
 
-def _highpass_row(row_id: str, reading: str, source: str, reason: str) -> Row:
+def highpass(reading: str, source: str, differs: str, context: Context) -> Row:
+    """Compare the high-pass on the position alone, with the controller read either way."""
     errors = {way: highpass_errors_percent(reading, way, alike=False)[2] for way in FILTERS}
     text = ", ".join(f"{signed(error, 0)} % {way}" for way, error in errors.items())
     alike = max(abs(highpass_errors_percent(reading, way, alike=True)[2]) for way in FILTERS)
     return Row(
-        id=row_id,
         source=source,
         paper="position, and only it, high-passed at 0.20 Hz; mean error of K −1.9e-7 (Sec. 3.4)",
         ours=f"error of K without any noise, controller read {reading}: {text}; all four signals "
@@ -133,40 +123,8 @@ def _highpass_row(row_id: str, reading: str, source: str, reason: str) -> Row:
         reading="Second-order Butterworth; order and direction are not printed. We filter all "
         "signals alike and keep the printed way as the method published.",
         checks=tuple(
-            Check(
-                f"Error of K, {way}", "%", 0.0, error, -UNBIASED_PERCENT, UNBIASED_PERCENT
-            )
+            Check(f"Error of K, {way}", "%", 0.0, error, -UNBIASED_PERCENT, UNBIASED_PERCENT)
             for way, error in errors.items()
         ),
-        because={DIFFERS: reason},
-    )  # fmt: skip
-
-
-def highpass(workshop: Workshop) -> Row:
-    """Make the row: the high-pass on the position alone, controller per degree."""
-    return _highpass_row(
-        "eq-6-highpass",
-        "per degree",
-        "Sec. 2.4.4",
-        "The slow pole of the loop lies near 0.16 Hz, beside the corner of the filter, which takes "
-        "from the position what the torque still holds. No such filter can have been in the "
-        "simulations of Sec. 3.4.",
+        differs=differs,
     )
-
-
-def highpass_per_radian(workshop: Workshop) -> Row:
-    """Make the row: the same with the controller read per radian."""
-    return _highpass_row(
-        "eq-6-highpass-per-radian",
-        "per radian",
-        "Sec. 2.4.4 with App. A",
-        "Read per radian the loop is faster than the filter and the same step costs little; the "
-        "motion then is not the paper's (row app-a-units).",
-    )
-
-
-ROWS: Mapping[str, Callable[[Workshop], Row]] = {
-    "eq-6": equation_6,
-    "eq-6-highpass": highpass,
-    "eq-6-highpass-per-radian": highpass_per_radian,
-}

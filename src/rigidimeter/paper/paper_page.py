@@ -1,10 +1,9 @@
-"""The ledger as files: a page that needs nothing beside it, ``ledger.json`` and the figures."""
+"""The rows as files: a page that needs nothing beside it, ``ledger.json`` and the figures."""
 
 from __future__ import annotations
 
-import base64
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -15,9 +14,11 @@ from rigidimeter.documents import json_text, write_text
 from rigidimeter.paper.comparison_table import AGREES, DIFFERS, UNPUBLISHED, VERDICTS, Row, Verdict
 from rigidimeter.paper.rows import SECTIONS
 from rigidimeter.reporting.numbers import number
+from rigidimeter.reporting.page import data_uri
+from rigidimeter.reporting.style import svg_text
 from rigidimeter.version import __version__
 
-__all__ = ["ledger_text", "render_page", "tally", "write_ledger"]
+__all__ = ["drawn", "ledger_text", "render_page", "tally", "write_ledger"]
 
 _SHORT = {AGREES: "agrees", DIFFERS: "differs", UNPUBLISHED: "unpublished"}
 """As names of CSS classes."""
@@ -34,33 +35,35 @@ def ledger_text(rows: Sequence[Row]) -> str:
     return json_text([row.as_dict() for row in rows])
 
 
-def render_page(rows: Sequence[Row], seed: int) -> str:
-    """Return the page as text, with its style and its figures inside."""
-    css = [
-        (resources.files(room) / name).read_text(encoding="utf-8")
-        for room, name in (
-            ("rigidimeter.reporting", "page.css"),
-            ("rigidimeter.paper", "page.css"),
-        )
-    ]
+def drawn(rows: Sequence[Row]) -> dict[str, str]:
+    """Return every figure as SVG by its name; those of virtual data are marked."""
+    return {
+        figure.name: svg_text(figure.draw(), "virtual data" if row.virtual else "")
+        for row in rows
+        for figure in row.figures
+    }
+
+
+def render_page(rows: Sequence[Row], svg: Mapping[str, str], seed: int) -> str:
+    """Return the page as text, with its style inside, and the figures that `svg` has by name."""
+    own, report = resources.files("rigidimeter.paper"), resources.files("rigidimeter.reporting")
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["data_uri"] = _data_uri
     environment.globals["number"] = number
     environment.globals["short"] = _SHORT
+    template = environment.from_string((own / "page.html").read_text(encoding="utf-8"))
+    css = [(room / "page.css").read_text(encoding="utf-8") for room in (report, own)]
     by_id = {row.id: row for row in rows}
-    template = environment.from_string(
-        (resources.files("rigidimeter.paper") / "page.html").read_text(encoding="utf-8")
-    )
     return template.render(
         # The styles are this package's own files, so they may stand as they are.
         css=Markup("\n".join(css)),
         sections=[
             (title, kept)
-            for title, ids in SECTIONS.items()
-            if (kept := [by_id[row_id] for row_id in ids if row_id in by_id])
+            for title, makers in SECTIONS.items()
+            if (kept := [by_id[row_id] for row_id in makers if row_id in by_id])
         ],
+        images={name: data_uri(text) for name, text in svg.items()},
         tally=tally(rows),
         virtual=any(row.virtual for row in rows),
         seed=seed,
@@ -80,14 +83,10 @@ def write_ledger(rows: Sequence[Row], out: Path, seed: int) -> Path:
         As the page states it.
     """
     (out / "figures").mkdir(parents=True, exist_ok=True)
-    for row in rows:
-        for picture in row.pictures:
-            write_text(out / "figures" / f"{picture.name}.svg", picture.svg)
+    svg = drawn(rows)
+    for name, text in svg.items():
+        write_text(out / "figures" / f"{name}.svg", text)
     write_text(out / "ledger.json", ledger_text(rows))
     page = out / "paper.html"
-    write_text(page, render_page(rows, seed))
+    write_text(page, render_page(rows, svg, seed))
     return page
-
-
-def _data_uri(svg: str) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode("ascii")

@@ -89,21 +89,25 @@ COUNTS = {
 
 
 class Measured(NamedTuple):
-    """A line of Table 2, with the p-values printed elsewhere and how many values were compared."""
+    """A line of Table 2, with what Table 1 counts of it and the p-value printed elsewhere."""
 
-    name: str
     title: str
-    n: int
+    counted: str
     p_table: float
     r: float
     p_text: float
     place: str
 
+    @property
+    def n(self) -> int:
+        """How many values were compared."""
+        return sum(COUNTS[self.counted].values())
 
-MEASURED = (
-    Measured("mupdrs", "Corrected mUPDRS score", 39, 0.04, 0.18, 0.020, "Sec. 3.1"),
-    Measured("impulse", "Angular impulse score", 138, 4.3e-4, 0.30, 4.3e-4, "Sec. 3.3"),
-    Measured("work", "Work score", 138, 2.8e-4, 0.31, 5.6e-4, "Sec. 3.3"),
-    Measured("viscosity", "Viscosity", 101, 4.0e-4, 0.35, 5.0e-4, "Sec. 3.5 and Fig. 8"),
-    Measured("stiffness", "Stiffness", 101, 1.8e-3, 0.37, 1.8e-4, "Sec. 3.5 and Fig. 8"),
-)
+
+MEASURED = {
+    "mupdrs": Measured("Corrected mUPDRS score", "ratings", 0.04, 0.18, 0.020, "Sec. 3.1"),
+    "impulse": Measured("Angular impulse score", "sinusoid", 4.3e-4, 0.30, 4.3e-4, "Sec. 3.3"),
+    "work": Measured("Work score", "sinusoid", 2.8e-4, 0.31, 5.6e-4, "Sec. 3.3"),
+    "viscosity": Measured("Viscosity", "prbs", 4.0e-4, 0.35, 5.0e-4, "Sec. 3.5 and Fig. 8"),
+    "stiffness": Measured("Stiffness", "prbs", 1.8e-3, 0.37, 1.8e-4, "Sec. 3.5 and Fig. 8"),
+}

@@ -9,46 +9,31 @@ model without intercept tests "both means are zero" unless it is given the contr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 
 import numpy as np
 from scipy.stats import norm
 
-from rigidimeter.paper.comparison_table import (
-    AGREES,
-    DIFFERS,
-    Check,
-    Row,
-    bounded,
-    rounded,
-    within_percent,
-)
-from rigidimeter.paper.context import Workshop
+from rigidimeter.paper.comparison_table import Check, Row, bounded, rounded, within_percent
+from rigidimeter.paper.context import Context
 from rigidimeter.paper.printed import COUNTS, MEASURED, Measured
-from rigidimeter.paper.virtual_data import Rating
 from rigidimeter.reporting.numbers import number, p_value
-from rigidimeter.statistics import (
-    Mixed,
-    PublishedEffect,
-    compare_published,
-    difference,
-    effect_from_p,
-    fit_mixed,
-    joint_test,
-)
+from rigidimeter.statistics import PublishedEffect, compare_published, effect_from_p, joint_test
+from rigidimeter.study import RatingsFound
 
-__all__ = ["ROWS", "n_from", "p_from", "r_from", "rating_model"]
+__all__ = [
+    "better_than_work",
+    "f_test",
+    "line_of_table_2",
+    "n_from",
+    "order_of_effects",
+    "p_from",
+    "p_of_text",
+    "r_from",
+    "ratings_of",
+]
 
 P_PERCENT = 5.0
 """How far two prints of one p may be apart."""
-
-_TASKS = {
-    "mupdrs": "ratings",
-    "impulse": "sinusoid",
-    "work": "sinusoid",
-    "viscosity": "prbs",
-    "stiffness": "prbs",
-}
 
 
 def r_from(p: float, n: int) -> float:
@@ -66,11 +51,6 @@ def n_from(p: float, r: float) -> float:
     return (float(norm.isf(p / 2.0)) / r) ** 2
 
 
-def _effect(measured: Measured, p: float) -> PublishedEffect:
-    sizes = COUNTS[_TASKS[measured.name]]
-    return effect_from_p(p, sizes["OFF"], sizes["DBS"])
-
-
 def _better_p(measured: Measured) -> float:
     """Return the printed p from which the printed r follows more nearly."""
     return min(
@@ -78,87 +58,90 @@ def _better_p(measured: Measured) -> float:
     )
 
 
-def _table_row(measured: Measured) -> Row:
+def _effects() -> dict[str, PublishedEffect]:
+    return {
+        name: effect_from_p(_better_p(m), COUNTS[m.counted]["OFF"], COUNTS[m.counted]["DBS"])
+        for name, m in MEASURED.items()
+    }
+
+
+def line_of_table_2(name: str, context: Context) -> Row:
+    """Compare p, r and N of one line of Table 2 with each other."""
+    measured = MEASURED[name]
     n, p, r = measured.n, measured.p_table, measured.r
     found, other = r_from(p, n), r_from(measured.p_text, n)
     fits = abs(other - r) <= 0.005
+    same = measured.p_text == p
     other_text = (
-        f"The p of {measured.place} ({p_value(measured.p_text)}) gives {other:.3f}, which "
+        f" The p of {measured.place} ({p_value(measured.p_text)}) gives {other:.3f}, which "
         f"{'fits' if fits else 'does not fit'}."
     )
-    same = measured.p_text == p
     return Row(
-        id=f"table-2-{measured.name}",
         source="Table 2, Table 1",
         paper=f"{measured.title}: p = {p_value(p)}, r = {r:.2f}, N = {n}",
         ours=f"p and N give r = {found:.3f}; r and N give p = {p_value(p_from(r, n))}; p and r "
         f"give N = {n_from(p, r):.0f}",
-        reading=f"r = z/√N with the N of Table 1; z of the two-sided p. {_reading(measured)}",
+        reading=f"r = z/√N with the N of Table 1; z of the two-sided p. {_reading(name)}",
         checks=(rounded("r from p and N", "1", r, found, 0.01),),
-        because={
-            AGREES: "p, r and N belong together." + ("" if same else f" {other_text}"),
-            DIFFERS: "p, r and N do not belong together."
-            + (" No other p is printed." if same else f" {other_text}"),
-        },
+        agrees="p, r and N belong together." + ("" if same else other_text),
+        differs="p, r and N do not belong together."
+        + (" No other p is printed." if same else other_text),
     )
 
 
-def _reading(measured: Measured) -> str:
+def _reading(name: str) -> str:
+    measured = MEASURED[name]
     if measured.p_text == measured.p_table:
         return "The text prints the same p."
+    if name == "mupdrs":
+        return "Its p is that of an F-test, from which the paper gives no z."
     best = _better_p(measured)
     where = "the table's" if best == measured.p_table else f"that of {measured.place}"
-    if measured.name == "mupdrs":
-        return "Its p is that of an F-test, from which the paper gives no z."
     return f"Of the two printed p, {where} is nearer to r."
 
 
-def _text_row(measured: Measured) -> Row:
-    ratio = measured.p_text / measured.p_table
+def p_of_text(name: str, context: Context) -> Row:
+    """Compare the p of the text with that of Table 2."""
+    measured = MEASURED[name]
+    table, text = measured.p_table, measured.p_text
+    ratio = text / table
+    differs = "One test cannot have two p."
+    if ratio in (2.0, 0.5):
+        differs += " One is exactly twice the other: one-sided and two-sided?"
+    if math.isclose(abs(math.log10(ratio)), 1.0):
+        differs += " The digits are the same, the exponent is not."
     return Row(
-        id=f"p-{measured.name}",
         source=f"{measured.place} against Table 2",
-        paper=f"p = {p_value(measured.p_text)} in {measured.place}, "
-        f"{p_value(measured.p_table)} in Table 2",
-        ours=f"a factor of {number(ratio, 3)}; r from the text's p "
-        f"{r_from(measured.p_text, measured.n):.3f}, from the table's "
-        f"{r_from(measured.p_table, measured.n):.3f}, printed {measured.r:.2f}",
-        reading=_reading(measured),
-        checks=(
-            within_percent("p of the text", "1", measured.p_table, measured.p_text, P_PERCENT),
-        ),
-        because={
-            AGREES: "Text and table print one p.",
-            DIFFERS: "One test cannot have two p."
-            + (" One is exactly twice the other: one-sided and two-sided?"
-               if ratio in (2.0, 0.5) else "")
-            + (" The digits are the same, the exponent is not."
-               if math.isclose(abs(math.log10(ratio)), 1.0) else ""),
-        },
-    )  # fmt: skip
+        paper=f"p = {p_value(text)} in {measured.place}, {p_value(table)} in Table 2",
+        ours=f"a factor of {number(ratio, 3)}; r from the text's p {r_from(text, measured.n):.3f}, "
+        f"from the table's {r_from(table, measured.n):.3f}, printed {measured.r:.2f}",
+        reading=_reading(name),
+        checks=(within_percent("p of the text", "1", table, text, P_PERCENT),),
+        agrees="Text and table print one p.",
+        differs=differs,
+    )
 
 
-def order_of_effects(workshop: Workshop) -> Row:
-    """Make the row: viscosity and stiffness have the largest effects."""
-    deltas = {m.name: _effect(m, _better_p(m)).rank_biserial for m in MEASURED}
+def order_of_effects(context: Context) -> Row:
+    """Compare the sizes of all effects."""
+    deltas = {name: effect.rank_biserial for name, effect in _effects().items()}
     least = min(deltas["viscosity"], deltas["stiffness"])
     most = max(deltas["impulse"], deltas["work"], deltas["mupdrs"])
     text = ", ".join(f"{name} {delta:.2f}" for name, delta in deltas.items())
     return Row(
-        id="sec-3.6-order",
         source="Sec. 3.6, Sec. 4, Table 2",
         paper="viscosity and stiffness have the largest effect sizes",
         ours=f"rank-biserial correlation from the printed p: {text}",
         reading="r depends on how unequal the groups are, 92/46 against 78/23; the rank-biserial "
         "correlation does not. For each measure the p that fits r.",
         checks=(bounded("Least of B and K less the largest other", "1", least - most, low=0.0),),
-        because={AGREES: "The order holds in either measure of effect."},
+        agrees="The order holds in either measure of effect.",
     )
 
 
-def better_than_work(workshop: Workshop) -> Row:
-    """Make the row: whether the difference between the effects can be told from nothing."""
-    effects = {m.name: _effect(m, _better_p(m)) for m in MEASURED}
+def better_than_work(context: Context) -> Row:
+    """Compare the effects of viscosity and stiffness with that of the work."""
+    effects = _effects()
     found = {
         name: compare_published(effects[name], effects["work"])
         for name in ("viscosity", "stiffness")
@@ -168,7 +151,6 @@ def better_than_work(workshop: Workshop) -> Row:
         for name, d in found.items()
     ).replace("-", "−")
     return Row(
-        id="sec-4-better",
         source="Sec. 4, abstract",
         paper="parameter estimation is better at differentiating OFF and DBS than the scores",
         ours=f"difference of the rank-biserial correlations with 95 % interval: {text}",
@@ -177,66 +159,46 @@ def better_than_work(workshop: Workshop) -> Row:
             bounded(f"Lower end, {name} less work", "1", d.low, low=0.0)
             for name, d in found.items()
         ),
-        because={
-            DIFFERS: "The effects are larger, but so few epochs cannot tell that from chance."
-        },
+        differs="The effects are larger, but so few epochs cannot distinguish that from chance.",
     )
 
 
-def rating_model(ratings: tuple[Rating, ...], *, days: bool = False) -> Mixed:
-    """Fit the model of Sec. 2.2: a mean for each condition, no intercept, examiners at random.
+def ratings_of(context: Context) -> RatingsFound:
+    """Return the ratings of the virtual study with the model of Sec. 2.2.
 
-    With `days`, each day has an offset as well: its scores are of one state of the subject.
+    A mean for each condition, no intercept, and a random offset for each examiner.
     """
-    groups = {"examiner": [rating.examiner for rating in ratings]}
-    if days:
-        groups["day"] = [rating.day for rating in ratings]
-    return fit_mixed(
-        [rating.score for rating in ratings],
-        [rating.condition for rating in ratings],
-        groups,
-    )
+    ratings = context.study.ratings
+    assert ratings is not None  # every virtual study is rated
+    return ratings
 
 
-def f_test(workshop: Workshop) -> Row:
-    """Make the row: what the F-test of a model without intercept tests."""
-    fit = rating_model(workshop.study.ratings)
+def f_test(context: Context) -> Row:
+    """Compare the F-test of all fixed effects with that of the contrast."""
+    ratings = ratings_of(context)
+    fit, contrast = ratings.fit, ratings.contrast
     both_zero = joint_test(fit, np.eye(len(fit.conditions)))
-    contrast = difference(fit, "OFF", "DBS")
-    off, dbs = fit.means
+    means = " and ".join(number(mean, 3) for mean in fit.means.tolist())
     return Row(
-        id="sec-3.1-f-test",
         source="Sec. 2.2, Sec. 3.1",
         paper="y = β_off x_off + β_dbs x_dbs + Σ b z, no intercept; F-test of DBS against OFF, "
         "p = 0.020",
-        ours=f"virtual ratings, means {number(float(off), 3)} and {number(float(dbs), 3)}: "
+        ours=f"virtual ratings, means {means}: "
         f"F of all fixed effects {number(both_zero.f, 3)}, p = {p_value(both_zero.p_residual)}; "
         f"contrast OFF − DBS F {number(contrast.f, 3)}, p = {p_value(contrast.p_residual)}",
         reading="The contrast OFF − DBS, residual degrees of freedom.",
         checks=(
-            _same_p(both_zero.p_residual, contrast.p_residual),
+            Check(
+                "p of all fixed effects, no intercept, against the contrast's",
+                "1",
+                contrast.p_residual,
+                both_zero.p_residual,
+                0.5 * contrast.p_residual,
+                2.0 * contrast.p_residual,
+            ),
         ),
-        because={DIFFERS: "Without an intercept the F-test of the fixed effects asks whether both "
-                 "means are zero, which no one doubts; only the contrast compares OFF and DBS. "
-                 "Which of the two the printed p belongs to cannot be told without the ratings."},
+        differs="Without an intercept the F-test of the fixed effects asks whether both means are "
+        "zero, which no one doubts; only the contrast compares OFF and DBS. Which of the two the "
+        "printed p belongs to cannot be said without the ratings.",
         virtual=True,
-    )  # fmt: skip
-
-
-def _same_p(joint: float, contrast: float) -> Check:
-    """Hold the two p against each other, within a factor of two."""
-    return Check("p of all fixed effects, no intercept, against the contrast's", "1", contrast,
-                 joint, 0.5 * contrast, 2.0 * contrast)  # fmt: skip
-
-
-def _bound(function: Callable[[Measured], Row], measured: Measured) -> Callable[[Workshop], Row]:
-    return lambda _workshop: function(measured)
-
-
-ROWS: Mapping[str, Callable[[Workshop], Row]] = {
-    **{f"table-2-{m.name}": _bound(_table_row, m) for m in MEASURED},
-    **{f"p-{m.name}": _bound(_text_row, m) for m in MEASURED if m.p_text != m.p_table},
-    "sec-3.6-order": order_of_effects,
-    "sec-4-better": better_than_work,
-    "sec-3.1-f-test": f_test,
-}
+    )

@@ -1,6 +1,7 @@
-"""The scores of Sec. 2.3 under an imposed sinusoid: Eq. 1, Eq. 2 and Fig. 6.
+"""The scores of Sec. 2.3 under an imposed sinusoid: Eq. 1, Eq. 2 and their closed forms.
 
-For θ = A sin ωt and Eq. 3 the torque is a sinusoid of amplitude A √((K − Jω²)² + (Bω)²), so that
+For θ = A sin ωt, imposed without the controller (Sec. 2.6), the torque of Eq. 3 is a sinusoid of
+amplitude A √((K − Jω²)² + (Bω)²), so that
 
     impulse per cycle = 4 A √((K − Jω²)² + (Bω)²) / ω,      work per cycle = π B ω A²
 
@@ -14,26 +15,28 @@ summed from one side, it seems to:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import score_epoch
 from rigidimeter.estimation.scores import loop_area_j
+from rigidimeter.experiment import sinusoid
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import AGREES, DIFFERS, Row, within_percent
-from rigidimeter.paper.context import Workshop
-from rigidimeter.paper.imposed import imposed_epoch, pure_cycles
-from rigidimeter.records import Score
+from rigidimeter.paper.comparison_table import Row, within_percent
+from rigidimeter.paper.context import Context
+from rigidimeter.records import Channel, Epoch, Motion, Score
 from rigidimeter.reporting.numbers import number
 from rigidimeter.settings import Settings
 from rigidimeter.units import rad_from_deg
 
 __all__ = [
-    "ROWS",
-    "impulse_closed_form_nm_s",
+    "equation_1",
+    "equation_2",
+    "imposed_epoch",
     "scaled",
     "scored",
     "work_change_percent",
@@ -42,6 +45,36 @@ __all__ = [
 
 SCORE_PERCENT = 0.5
 """How far a score may be from its closed form; the band-pass remembers the start of the motion."""
+
+Array = NDArray[np.float64]
+
+
+def imposed_epoch(joint: JointDynamics, settings: Settings) -> Epoch:
+    """Return an epoch of the sinusoid as it would be recorded, without noise.
+
+    The drive imposes θ(t) and Eq. 3 gives the torque. The rates of the sensors must divide that of
+    the ticks.
+    """
+    rig, sine, tick_hz = settings.rig, settings.sinusoid, settings.rig.tick_rate_hz
+    angle, velocity = sinusoid(sine, tick_hz)
+    time_s = np.arange(angle.size) / tick_hz
+    torque = joint.torque_nm(angle, velocity, CubicSpline(time_s, velocity).derivative()(time_s))
+    channels = {}
+    for name, values, rate_hz in (
+        ("torque_nm", torque, rig.torque.rate_hz),
+        ("angle_rad", angle, rig.motion.rate_hz),
+        ("velocity_rad_s", velocity, rig.motion.rate_hz),
+    ):
+        sampled = slice(None, None, round(tick_hz / rate_hz))
+        channels[name] = Channel(name, time_s[sampled], values[sampled])
+    return Epoch(
+        source="virtual sinusoid",
+        label="1",
+        channels=channels,
+        task="sinusoid",
+        motion=Motion(sine.frequency_hz, 0.0, sine.motion_s),
+        virtual=True,
+    )
 
 
 def scaled(joint: JointDynamics, damping: float = 1.0, stiffness: float = 1.0) -> JointDynamics:
@@ -53,34 +86,24 @@ def scaled(joint: JointDynamics, damping: float = 1.0, stiffness: float = 1.0) -
     )
 
 
+def scored(joint: JointDynamics, settings: Settings) -> Score:
+    """Return the product's scores of a joint under the sinusoid, without noise."""
+    return score_epoch(imposed_epoch(joint, settings), settings.scores, settings.estimation)
+
+
+def _parts(joint: JointDynamics, settings: Settings) -> tuple[float, float, float, float]:
+    """Return A in rad, ω in rad/s, K − Jω² and Bω."""
+    omega = 2.0 * math.pi * settings.sinusoid.frequency_hz
+    elastic = joint.stiffness_nm_rad - joint.inertia_kg_m2 * omega**2
+    amplitude = rad_from_deg(settings.sinusoid.amplitude_deg)
+    return amplitude, omega, elastic, joint.damping_nm_s_rad * omega
+
+
 def work_closed_form_j(joint: JointDynamics, settings: Settings, delay_s: float = 0.0) -> float:
     """Return the work per cycle, π A² (B ω cos ωτ − (K − J ω²) sin ωτ), in J."""
-    omega = 2.0 * math.pi * settings.sinusoid.frequency_hz
-    amplitude = rad_from_deg(settings.sinusoid.amplitude_deg)
-    elastic = joint.stiffness_nm_rad - joint.inertia_kg_m2 * omega**2
-    viscous = joint.damping_nm_s_rad * omega
+    amplitude, omega, elastic, viscous = _parts(joint, settings)
     phase = omega * delay_s
     return math.pi * amplitude**2 * (viscous * math.cos(phase) - elastic * math.sin(phase))
-
-
-def impulse_closed_form_nm_s(joint: JointDynamics, settings: Settings) -> float:
-    """Return the angular impulse per cycle, in N·m·s."""
-    omega = 2.0 * math.pi * settings.sinusoid.frequency_hz
-    amplitude = rad_from_deg(settings.sinusoid.amplitude_deg)
-    elastic = joint.stiffness_nm_rad - joint.inertia_kg_m2 * omega**2
-    return 4.0 * amplitude * math.hypot(elastic, joint.damping_nm_s_rad * omega) / omega
-
-
-def _work_j(
-    joint: JointDynamics, settings: Settings, rate_hz: float, rule: str, delay_s: float
-) -> float:
-    """Return the loop area per cycle by one rule, ``left`` or ``trapezoid``, in J."""
-    cycles = pure_cycles(joint, settings, rate_hz, delay_s)
-    if rule == "left":
-        total = float(np.sum(cycles.torque_nm[:-1] * np.diff(cycles.angle_rad)))
-    else:
-        total = loop_area_j(cycles.torque_nm, cycles.angle_rad)
-    return total / settings.scores.cycles
 
 
 def work_change_percent(
@@ -91,46 +114,62 @@ def work_change_percent(
     *,
     damping: float = 1.0,
     stiffness: float = 1.0,
-    joint: JointDynamics = printed.FIG_6,
 ) -> float:
-    """Return by how much the work changes when damping and stiffness change by a factor, in %."""
-    before = _work_j(joint, settings, rate_hz, rule, delay_s)
-    after = _work_j(scaled(joint, damping, stiffness), settings, rate_hz, rule, delay_s)
-    return 100.0 * (after / before - 1.0)
+    """Return by how much the work changes when damping and stiffness change by a factor, in %.
+
+    From bare samples of Eq. 3 with the joint of Fig. 6; `rule` is ``left`` or ``trapezoid``.
+    """
+
+    def work(joint: JointDynamics) -> float:
+        torque, angle = _pure_cycles(joint, settings, rate_hz, delay_s)
+        if rule == "left":
+            return float(np.sum(torque[:-1] * np.diff(angle)))
+        return loop_area_j(torque, angle)
+
+    return 100.0 * (work(scaled(printed.FIG_6, damping, stiffness)) / work(printed.FIG_6) - 1.0)
 
 
-def scored(joint: JointDynamics, settings: Settings) -> Score:
-    """Return the product's scores of a joint under the sinusoid, without noise."""
-    return score_epoch(imposed_epoch(joint, settings), settings.scores, settings.estimation)
+def _pure_cycles(
+    joint: JointDynamics, settings: Settings, rate_hz: float, delay_s: float = 0.0
+) -> tuple[Array, Array]:
+    """Return torque and angle of the cycles that are scored, unfiltered, end point included."""
+    amplitude, omega, _, _ = _parts(joint, settings)
+    count = round(settings.scores.cycles * rate_hz / settings.sinusoid.frequency_hz)
+    time_s = np.arange(count + 1) / rate_hz
+    late = omega * (time_s - delay_s)
+    torque = joint.torque_nm(
+        amplitude * np.sin(late),
+        amplitude * omega * np.cos(late),
+        -amplitude * omega**2 * np.sin(late),
+    )
+    return torque, amplitude * np.sin(omega * time_s)
 
 
-def equation_1(workshop: Workshop) -> Row:
-    """Make the row: the angular impulse against its closed form."""
-    settings = workshop.settings
-    ours = scored(printed.FIG_6, settings).impulse_nm_s
-    wanted = impulse_closed_form_nm_s(printed.FIG_6, settings)
+def equation_1(context: Context) -> Row:
+    """Compare the angular impulse with its closed form."""
+    ours = scored(printed.FIG_6, context.settings).impulse_nm_s
+    amplitude, omega, elastic, viscous = _parts(printed.FIG_6, context.settings)
+    wanted = 4.0 * amplitude * math.hypot(elastic, viscous) / omega
     return Row(
-        id="eq-1",
         source="Eq. 1",
         paper="A = Σ|M_meas|Δt / n, n = 8 cycles",
         ours=f"{number(ours, 5)} N·m·s a cycle for the joint of Fig. 6; the integral is "
         f"{number(wanted, 5)}",
         reading="Of the band-passed torque over whole cycles.",
         checks=(within_percent("Impulse per cycle", "N·m·s", wanted, ours, SCORE_PERCENT),),
-        because={AGREES: "As printed it is the integral 4A√((K − Jω²)² + (Bω)²)/ω of a sinusoid."},
+        agrees="As printed it is the integral 4A√((K − Jω²)² + (Bω)²)/ω of a sinusoid.",
     )
 
 
-def equation_2(workshop: Workshop) -> Row:
-    """Make the row: Eq. 2 with and without the displacement increment."""
-    settings = workshop.settings
+def equation_2(context: Context) -> Row:
+    """Compare Eq. 2 with and without the displacement increment."""
+    settings = context.settings
     area = scored(printed.FIG_6, settings).work_j
     wanted = work_closed_form_j(printed.FIG_6, settings)
-    cycles = pure_cycles(printed.FIG_6, settings, settings.rig.tick_rate_hz)
-    as_printed = float(np.sum(cycles.torque_nm[:-1])) / settings.scores.cycles
-    as_printed = round(as_printed, 9) + 0.0  # what is left of nothing after rounding
+    torque, _ = _pure_cycles(printed.FIG_6, settings, settings.rig.tick_rate_hz)
+    # Without the rounding that is left of a sum of nothing.
+    as_printed = round(float(np.sum(torque[:-1])) / settings.scores.cycles, 9) + 0.0
     return Row(
-        id="eq-2",
         source="Eq. 2",
         paper='W = Σ M_meas / n; "the area within the hysteresis loop"',
         ours=f"as printed {abs(as_printed):.4f} N·m; with the increment, Σ M Δθ / n, "
@@ -140,14 +179,6 @@ def equation_2(workshop: Workshop) -> Row:
             within_percent("Σ M / n as printed", "", wanted, as_printed, SCORE_PERCENT),
             within_percent("Σ M Δθ / n", "J", wanted, area, SCORE_PERCENT),
         ),
-        because={
-            DIFFERS: "The printed sum lacks Δθ: over whole cycles the torque sums to nothing, and "
-            "its unit is no work. With Δθ it is the area of the text."
-        },
+        differs="The printed sum lacks Δθ: over whole cycles the torque sums to nothing, and "
+        "its unit is no work. With Δθ it is the area of the text.",
     )
-
-
-ROWS: Mapping[str, Callable[[Workshop], Row]] = {
-    "eq-1": equation_1,
-    "eq-2": equation_2,
-}

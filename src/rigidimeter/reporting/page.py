@@ -23,7 +23,7 @@ from rigidimeter.reporting.verdict_text import verdict_sentence
 from rigidimeter.study import StudyResult
 from rigidimeter.version import __version__
 
-__all__ = ["contents", "render_page", "tables", "write_report"]
+__all__ = ["contents", "data_uri", "render_page", "tables", "write_report"]
 
 Contents = Sequence[tuple[Section, Sequence[Block]]]
 """The sections of a result, each with its text, tables and figures."""
@@ -127,14 +127,15 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
         # The style is this package's own file and needs no escaping.
         css=Markup((folder / "page.css").read_text(encoding="utf-8")),
         contents=made,
-        images={name: _data_uri(text) for name, text in svg.items()},
+        images={name: data_uri(text) for name, text in svg.items()},
         verdict=verdict_sentence(result),
         virtual=sum(epoch.virtual for epoch in result.epochs),
         version=__version__,
     )
 
 
-def _data_uri(svg: str) -> str:
+def data_uri(svg: str) -> str:
+    """Return an SVG document as the source of an image."""
     return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode("ascii")
 
 

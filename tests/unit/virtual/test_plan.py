@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.paper import Context
 from rigidimeter.paper.printed import COUNTS
-from rigidimeter.paper.virtual_data import counts_of
 from rigidimeter.virtual.study_design import DESIGNS, NULL, PAPER, PUSHING
 from rigidimeter.virtual.study_plan import draw_ratings, plan_study, spread_evenly
 
 
 @pytest.mark.parametrize("name", list(DESIGNS))
 def test_counts_are_those_of_table_1(name: str) -> None:
-    assert counts_of(plan_study(DESIGNS[name], 5)) == COUNTS
+    assert Context(5, design=DESIGNS[name]).counts == COUNTS
 
 
 def test_off_on_nine_days_and_dbs_on_four_of_them_in_turns() -> None:

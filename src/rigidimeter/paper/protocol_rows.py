@@ -1,0 +1,216 @@
+"""The perturbation (Fig. 3b and 4a), and what can be counted: cycles, minutes, epochs.
+
+Register and clock of the perturbation are not printed. Seven bits at 20 Hz are the shortest maximal
+sequence whose lines, 20/127 Hz apart, begin at 0.157 Hz and whose envelope still has more than a
+third of its power density at 10 Hz.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from rigidimeter.estimation import scoring_cycles
+from rigidimeter.experiment import check_band, plan, power_spectrum, prbs_nm
+from rigidimeter.paper import printed
+from rigidimeter.paper.comparison_table import Row, bounded, near, within_percent
+from rigidimeter.paper.context import Context
+from rigidimeter.paper.score_rows import imposed_epoch
+from rigidimeter.records import Channel
+from rigidimeter.reporting.contents import Figure
+from rigidimeter.reporting.numbers import number
+from rigidimeter.reporting.sections.perturbation_figure import perturbation, spectrum
+from rigidimeter.settings import BlockSettings
+
+__all__ = [
+    "cycles_counted",
+    "cycles_of_epoch",
+    "cycles_of_motion",
+    "figure_3b",
+    "figure_4a",
+    "one_stiffness",
+    "session_length",
+    "table_1",
+]
+
+EDGE_DB = -6.0
+"""Down to where the envelope counts as exciting."""
+
+_CYCLES = 8
+_DAYS = {"OFF": 9, "DBS": 4}
+_EXAMINERS = 3
+
+
+def _perturbation(context: Context) -> Channel:
+    rate_hz = context.settings.rig.tick_rate_hz
+    values = prbs_nm(context.settings.prbs, rate_hz)
+    return Channel("perturbation_nm", np.arange(values.size) / rate_hz, values)
+
+
+def figure_3b(context: Context) -> Row:
+    """Compare the power spectral density of the perturbation."""
+    prbs, rate_hz = context.settings.prbs, context.settings.rig.tick_rate_hz
+    low_hz, high_hz = printed.BAND_HZ
+    band = check_band(prbs, rate_hz)
+    channel = _perturbation(context)
+    share = power_spectrum(channel.values, rate_hz).share(low_hz, high_hz)
+    return Row(
+        source="Fig. 3(b), Sec. 2.4.3",
+        paper=f"effective band {low_hz:g}–{high_hz:g} Hz",
+        ours=f"7 bits at {prbs.clock_hz:g} Hz: lines from {number(band.line_spacing_hz)} "
+        f"Hz on, {number(band.power_high_db, 3)} dB at {high_hz:g} Hz, half power at "
+        f"{number(band.half_power_hz, 3)} Hz, {number(100 * share, 3)} % of the power in the band",
+        reading="Register and clock are not printed; 7 bits at 20 Hz give this band (22.6 Hz puts "
+        "half power at 10 Hz).",
+        checks=(
+            near("Lowest line", "Hz", low_hz, band.line_spacing_hz, 0.01),
+            bounded("Envelope at 10 Hz", "dB", band.power_high_db, low=EDGE_DB),
+            bounded("Power within the band", "%", 100 * share, low=50.0),
+        ),
+        agrees="The sequence we had to choose excites the printed band.",
+        figures=(
+            Figure(
+                "fig-3b",
+                "Fig. 3(b) computed for a 7-bit sequence at 20 Hz; shaded: the band the paper "
+                "names.",
+                "Power spectral density of the perturbation with the band 0.15 to 10 Hz marked.",
+                partial(spectrum, channel, printed.BAND_HZ),
+            ),
+        ),
+    )
+
+
+def figure_4a(context: Context) -> Row:
+    """Compare the perturbation over time."""
+    prbs = context.settings.prbs
+    channel = _perturbation(context)
+    levels = np.unique(channel.values)
+    mean = round(float(channel.values.mean()), 9) + 0.0  # free of the rounding of the sum
+    duration_s = channel.values.size / context.settings.rig.tick_rate_hz
+    return Row(
+        source="Fig. 4(a), Sec. 2.4.3",
+        paper="zero mean, ±1 N·m, 20 s, the same sequence in every epoch",
+        ours=f"mean {number(mean)} N·m, "
+        f"{len(levels)} levels {' and '.join(number(float(v), 3) for v in levels)} N·m, "
+        f"{duration_s:g} s, from one register start",
+        reading=f"{prbs.register_bits} bits at {prbs.clock_hz:g} Hz, starting from all ones; the "
+        "levels are shifted alike so that the mean is zero.",
+        checks=(
+            near("Mean", "N·m", 0.0, mean, 1e-6),
+            near("Upper level", "N·m", 1.0, float(levels[-1]), 0.05),
+            near("Lower level", "N·m", -1.0, float(levels[0]), 0.05),
+            near("Duration", "s", 20.0, duration_s, 0.0),
+        ),
+        agrees="What is said of the sequence holds for ours; the sequence itself was not "
+        "published, so the order of its steps cannot be compared.",
+        figures=(
+            Figure(
+                "fig-4a",
+                "Fig. 4(a) with our sequence.",
+                "The two-level torque perturbation over 20 s, its first seconds enlarged.",
+                partial(perturbation, channel, 0.0),
+            ),
+        ),
+    )
+
+
+def cycles_counted(context: Context, motion_s: float) -> int:
+    """Return how many cycles are scored when the 20 s epoch holds so much motion."""
+    settings = context.settings
+    sinusoid = settings.sinusoid.model_copy(update={"motion_s": motion_s})
+    scores = settings.scores.model_copy(update={"cycles": 1000})  # as many as there are
+    changed = settings.model_copy(update={"sinusoid": sinusoid})
+    return scoring_cycles(imposed_epoch(printed.FIG_6, changed), scores).n_cycles
+
+
+def cycles_of_motion(context: Context) -> Row:
+    """Compare how many cycles 10 s of motion less two seconds hold."""
+    count = cycles_counted(context, 10.0)
+    return Row(
+        source="Sec. 2.3, Eq. 1 and 2",
+        paper="10 s of movement at 1.0 Hz, first and last second discarded, eight cycles",
+        ours=f"{count} cycles",
+        reading="The robot moves for 10 s of the 20 s epoch; the seconds are those of the motion.",
+        checks=(near("Cycles of 10 s of motion", "1", _CYCLES, count, 0.0),),
+        agrees="10 s − 2 s at 1 Hz are the eight cycles of the text.",
+    )
+
+
+def cycles_of_epoch(context: Context) -> Row:
+    """Compare how many cycles 20 s of motion would hold."""
+    count = cycles_counted(context, 20.0)
+    return Row(
+        source="Sec. 2.3",
+        paper='"20 s epochs", "the first and last second of each epoch were discarded", eight '
+        "cycles",
+        ours=f"{count} cycles",
+        reading="Not this one: see sec-2.3-cycles-motion.",
+        checks=(near("Cycles of 20 s of motion", "1", _CYCLES, count, 0.0),),
+        differs="An epoch of 20 s in motion less two seconds holds far more than eight.",
+    )
+
+
+def session_length(context: Context) -> Row:
+    """Compare how long fifteen epochs take with their rests."""
+    settings = context.settings
+    block = BlockSettings(task="sinusoid", condition="OFF", epochs=printed.EPOCHS_A_CONDITION)
+    protocol = settings.protocol.model_copy(update={"blocks": [block]})
+    total_min = plan(protocol, settings.prbs, settings.sinusoid, settings.seed).total_s / 60.0
+    return Row(
+        source="Sec. 2.3",
+        paper="15 epochs of 20 s with 10 or 20 s of rest last around 10 min",
+        ours=f"{number(total_min, 3)} min, rests drawn at random",
+        reading="A condition at a time.",
+        checks=(within_percent("15 epochs", "min", printed.SESSION_MIN, total_min, 25.0),),
+        agrees="20 s of epoch and 15 s of rest on average, fifteen times.",
+    )
+
+
+def table_1(context: Context) -> Row:
+    """Compare the counts with days, examiners and epochs a day."""
+    ratings, sines = printed.COUNTS["ratings"], printed.COUNTS["sinusoid"]
+    rated = {name: days * _EXAMINERS for name, days in _DAYS.items()}
+    planned = {name: days * printed.EPOCHS_A_CONDITION for name, days in _DAYS.items()}
+    listed = "; ".join(
+        f"{task} {numbers['OFF']}/{numbers['DBS']}" for task, numbers in context.counts.items()
+    )
+    return Row(
+        source="Table 1",
+        paper="mUPDRS 27 OFF, 12 DBS; impulse 92, 46; viscosity and stiffness 78, 23",
+        ours=f"9 and 4 days times 3 examiners: {rated['OFF']} and "
+        f"{rated['DBS']} ratings; 15 epochs a day would be {planned['OFF']} and "
+        f"{planned['DBS']} sinusoids; our virtual study has {listed}",
+        reading="One rating an examiner and day; fewer epochs were scored than 15 a day would "
+        "give; work has the counts of the impulse.",
+        checks=(
+            *(near(f"Ratings {name}", "1", ratings[name], rated[name], 0.0) for name in _DAYS),
+            *(
+                bounded(f"Sinusoids {name} not scored", "1", planned[name] - sines[name], low=0.0)
+                for name in _DAYS
+            ),
+        ),
+        agrees="The counts fit the days, the examiners and the epochs of the text.",
+    )
+
+
+def one_stiffness(context: Context) -> Row:
+    """Compare the three values of the median stiffness."""
+    values = {
+        "Sec. 3.4": printed.SEC_34.stiffness_nm_rad,
+        "Sec. 3.5": printed.FIG_4.stiffness_nm_rad,
+        "Fig. 6": printed.FIG_6.stiffness_nm_rad,
+    }
+    spread_percent = 100.0 * (max(values.values()) / min(values.values()) - 1.0)
+    text = ", ".join(f"{value:.3f} ({place})" for place, value in values.items())
+    return Row(
+        source=", ".join(values),
+        paper=f"K estimated from the experiments: {text} N·m/rad",
+        ours=f"largest over smallest +{number(spread_percent, 3)} %; 1.130 is 1.310 with two "
+        "digits exchanged",
+        reading="Each is used where it is printed: 1.751 in the closed loop, 1.130 in Fig. 6, "
+        "1.310 in Fig. 4.",
+        checks=(bounded("Spread of K", "%", spread_percent, high=0.5),),
+        differs="One median cannot have three values; J (0.0045, 0.0044) and B (0.1368, 0.1300) "
+        "go with two of them.",
+    )

@@ -1,0 +1,304 @@
+"""Figures and results that need the recordings of the animal, drawn from the virtual study.
+
+The recordings were never published, so the verdict of these rows is that they cannot be computed.
+They show the same figure, with the same axes, of data whose origin stands in the figure itself.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.dynamics import JointDynamics, closed_loop_motion
+from rigidimeter.estimation import epoch_signals, scoring_cycles
+from rigidimeter.estimation.bandlimited import zero_phase_band
+from rigidimeter.paper import printed
+from rigidimeter.paper.comparison_table import Row, within_percent
+from rigidimeter.paper.context import Context
+from rigidimeter.paper.paper_figures import torque_traces
+from rigidimeter.paper.printed_effects import ratings_of
+from rigidimeter.reporting.contents import Figure
+from rigidimeter.reporting.numbers import number, p_value
+from rigidimeter.reporting.representative import (
+    analysed_epoch,
+    representative_fits,
+    representatives,
+)
+from rigidimeter.reporting.sections.distribution import distribution
+from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits
+from rigidimeter.reporting.style import condition_colours
+from rigidimeter.statistics import difference, fit_mixed, summarise
+from rigidimeter.study import Comparison
+
+__all__ = [
+    "equation_7",
+    "figure_5a",
+    "figure_7",
+    "measure_figure",
+    "table_2",
+    "torque_figure",
+]
+
+Array = NDArray[np.float64]
+Part = Literal["torque", "stiffness", "damping"]
+
+_COLOURS = condition_colours(("OFF", "DBS"))
+_MISSING = "The recordings of the animal were not published; "
+_VIRTUAL_STUDY = f"{_MISSING}a virtual study of the same design "
+_WINDOW_S = (2.0, 12.0)
+
+
+def torque_figure(
+    name: str,
+    source: str,
+    part: Part,
+    paper: str,
+    shows: str,
+    context: Context,
+) -> Row:
+    """Compare measured, estimated and simulated torque of an OFF epoch, or one part of it.
+
+    Estimated is J, B and K times the measured motion; simulated is the motion that the perturbation
+    alone causes in the closed loop, and its torque. All go through one band.
+    """
+    study = context.study
+    fit = next(fit for fit in representative_fits(study) if fit.condition == "OFF")
+    joint = JointDynamics(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad)
+    epoch = analysed_epoch(study, fit)
+    assert epoch is not None  # a fit of the study is of one of its epochs
+    measured = epoch_signals(epoch, "bandlimited", study.settings.estimation)
+    perturbation = epoch.channels["perturbation_nm"]
+    motion = closed_loop_motion(perturbation.values, study.settings, joint)
+
+    def as_measured(values: Array) -> Array:
+        rate_hz = study.settings.rig.tick_rate_hz
+        filtered = zero_phase_band(values, rate_hz, measured.band_hz)
+        return np.asarray(np.interp(measured.time_s, perturbation.time_s, filtered))
+
+    drawn = {
+        "estimated": _torque(
+            joint, part, measured.angle_rad, measured.velocity_rad_s, measured.acceleration_rad_s2
+        ),
+        "simulated": as_measured(
+            _torque(
+                joint, part, motion.angle_rad, motion.velocity_rad_s, motion.acceleration_rad_s2
+            )
+        ),
+    }
+    estimated, simulated = drawn.values()
+    text = f"simulated misses estimated by {_missed_percent(simulated, estimated)} % (SD)"
+    if part == "torque":
+        drawn = {"measured": measured.torque_nm, **drawn}
+        missed = _missed_percent(estimated, measured.torque_nm)
+        text = f"estimated misses measured by {missed} % (SD), {text}"
+    time_s = measured.time_s - float(perturbation.time_s[0])  # the session has begun earlier
+    inside = (time_s >= _WINDOW_S[0]) & (time_s <= _WINDOW_S[1])
+    shown = f"{source} from virtual data: {shows}"
+    return Row(
+        source=f"{source}, Sec. 3.5",
+        paper=paper,
+        ours=f"virtual OFF epoch of median fit (J {number(joint.inertia_kg_m2)}, "
+        f"B {number(joint.damping_nm_s_rad)}, K {number(joint.stiffness_nm_rad)}): {text}",
+        reading="Estimated: parameters times measured motion; simulated: the motion by integration "
+        "of the perturbation alone; all in one band.",
+        unpublished=f"{_MISSING}an epoch of the virtual study stands in.",
+        figures=(
+            Figure(
+                name,
+                shown,
+                f"{shown} over ten seconds.",
+                partial(
+                    torque_traces,
+                    time_s[inside],
+                    {name: values[inside] for name, values in drawn.items()},
+                    float(np.max(np.abs(measured.torque_nm[inside]))),  # one scale for all three
+                    "OFF",
+                ),
+            ),
+        ),
+        virtual=True,
+    )
+
+
+def _torque(
+    joint: JointDynamics, part: Part, angle: Array, velocity: Array, acceleration: Array
+) -> Array:
+    if part == "stiffness":
+        return joint.stiffness_nm_rad * angle
+    if part == "damping":
+        return joint.damping_nm_s_rad * velocity
+    return joint.torque_nm(angle, velocity, acceleration)
+
+
+def _missed_percent(values: Array, wanted: Array) -> str:
+    return number(100.0 * float(np.std(wanted - values) / np.std(wanted)), 3)
+
+
+def measure_figure(name: str, source: str, measure: str, paper: str, context: Context) -> Row:
+    """Compare one measure in OFF and DBS."""
+    compared = _comparison(context, measure)
+    p, r, by_day = _tests(compared)
+    medians = " and ".join(
+        f"{number(summary.median)} ({condition}, n = {summary.n})"
+        for condition, summary in compared.summaries.items()
+    )
+    label = compared.measure.label
+    return Row(
+        source=source,
+        paper=f"median and interquartile range; {paper}",
+        ours=f"virtual study: medians {medians} {compared.measure.unit}; p = {p}, "
+        f"r = {r}; when days count, not epochs, p = {by_day}",
+        reading="Two-sided rank-sum test with tie and continuity correction; every epoch a point. "
+        "Beside it a mixed model with an offset for every day.",
+        unpublished=f"{_VIRTUAL_STUDY}stands in for them, with a subject that we chose.",
+        figures=(
+            Figure(
+                name,
+                f"{source} from virtual data: epochs, median and quartiles.",
+                f"{label} of every virtual epoch in OFF and DBS, with median and quartiles.",
+                partial(
+                    distribution,
+                    label,
+                    compared.values,
+                    _COLOURS,
+                    f"p = {p} (epochs), {by_day} (days)",
+                ),
+                "small",
+            ),
+        ),
+        virtual=True,
+    )  # fmt: skip
+
+
+def _comparison(context: Context, measure: str) -> Comparison:
+    compared = context.study.comparison(measure)
+    assert compared is not None  # every virtual study has both tasks
+    return compared
+
+
+def _tests(compared: Comparison) -> tuple[str, str, str]:
+    """Return p and r of the rank-sum test and p by days in words; dashes for too few epochs."""
+    by_day = "–" if compared.days is None else p_value(compared.days.p)
+    if compared.test is None:
+        return "–", "–", by_day
+    return p_value(compared.test.p), f"{compared.test.r:.2f}".replace("-", "−"), by_day
+
+
+def figure_5a(context: Context) -> Row:
+    """Compare the ratings, corrected for the examiners."""
+    ratings = ratings_of(context)
+    fit, contrast = ratings.fit, ratings.contrast
+    conditions, examiners, _, days, scores = zip(*ratings.rows, strict=True)
+    with_days = fit_mixed(scores, conditions, {"examiner": examiners, "day": days})
+    p_days = p_value(difference(with_days, "OFF", "DBS").p_kenward_roger)
+    corrected = list(zip(conditions, fit.corrected.tolist(), strict=True))
+    values = {
+        name: [score for condition, score in corrected if condition == name] for name in _COLOURS
+    }
+    medians = " and ".join(
+        f"{number(summarise(v).median, 3)} ({name}, n = {len(v)})" for name, v in values.items()
+    )
+    offsets = ", ".join(f"{name} {b:+.2f}" for name, b in fit.offsets["examiner"].items())
+    p_paper = p_value(contrast.p_residual)
+    return Row(
+        source="Fig. 5(a), Sec. 3.1",
+        paper="median and interquartile range of corrected scores; lower in DBS, p = 0.020",
+        ours=f"virtual ratings: medians {medians}; offsets of the examiners "
+        f"{offsets.replace('-', '−')}; contrast OFF − DBS {number(contrast.estimate, 3)}, "
+        f"p = {p_paper}; with an offset for every day p = {p_days}",
+        reading="Score less the examiner's predicted offset; F-test of the contrast. The scores of "
+        "one day share its state, so the model with days is the one that holds.",
+        unpublished="The ratings were not published; virtual ones of the same number stand in.",
+        figures=(
+            Figure(
+                "fig-5a",
+                "Fig. 5(a) from virtual ratings: each rating, median and quartiles.",
+                "Corrected virtual ratings in OFF and DBS, with median and quartiles.",
+                partial(
+                    distribution,
+                    "Corrected mUPDRS score",
+                    values,
+                    _COLOURS,
+                    f"p = {p_paper} (paper's model), {p_days} (days)",
+                ),
+                "small",
+            ),
+        ),
+        virtual=True,
+    )
+
+
+def figure_7(context: Context) -> Row:
+    """Compare torque against angle in the epoch of median work of each condition."""
+    study = context.study
+    chosen = representatives(study, study.analysis.scores, lambda score: score.work_j)
+    epochs = [epoch for score in chosen if (epoch := analysed_epoch(study, score)) is not None]
+    cycles = [scoring_cycles(epoch, study.settings.scores) for epoch in epochs]
+    works = " and ".join(f"{number(s.work_j, 3)} J ({s.condition})" for s in chosen)
+    return Row(
+        source="Fig. 7, Sec. 3.3",
+        paper="sample traces of torque against angle; asymmetric at full flexion and extension",
+        ours=f"virtual epochs of median work: {works}; symmetric, since the virtual arm is linear",
+        reading="Torque and angle pass the same zero-phase band.",
+        unpublished=f"{_VIRTUAL_STUDY}has no asymmetry: Eq. 3 is linear.",
+        figures=tuple(
+            Figure(
+                f"fig-7-{score.condition.lower()}",
+                f"Fig. 7 from virtual data, {score.condition}: the epoch of median work, eight "
+                f"cycles, {number(score.work_j, 3)} J a cycle.",
+                f"Torque against angle in {score.condition}: eight loops of a virtual epoch.",
+                partial(
+                    loop, one, _COLOURS[score.condition], loop_limits(cycles), score.condition
+                ),
+                "small",
+            )
+            for score, one in zip(chosen, cycles, strict=True)
+        ),
+        virtual=True,
+    )  # fmt: skip
+
+
+def equation_7(context: Context) -> Row:
+    """Compare the two stages: J at the median of all epochs, then B and K alone."""
+    analysis = context.study.analysis
+    counted = [fit for fit in analysis.fixed_inertia if fit.outcome.included]
+    damping = float(np.median([fit.damping_nm_s_rad for fit in counted]))
+    stiffness = float(np.median([fit.stiffness_nm_rad for fit in counted]))
+    return Row(
+        source="Eq. 7, Sec. 2.4.4, Fig. 8",
+        paper="J fixed at the median of all epochs of all conditions, 0.0045 kg·m²",
+        ours=f"median J of {len(analysis.fits)} virtual epochs {number(analysis.inertia_kg_m2)} "
+        f"kg·m²; with it held, all epochs together give B {number(damping)} N·m·s/rad and "
+        f"K {number(stiffness)} N·m/rad (medians)",
+        reading="The virtual arm has 0.0045 kg·m² as its median; epochs that do not count in the "
+        "first stage do not in the second.",
+        checks=(
+            within_percent("Median J", "kg·m²", printed.FIG_8_INERTIA, analysis.inertia_kg_m2, 5.0),
+        ),
+        agrees="The two stages return the inertia that was put in.",
+        virtual=True,
+    )
+
+
+def table_2(context: Context) -> Row:
+    """Compare the tests of Table 2 with those of the virtual study."""
+    parts = [f"mUPDRS p = {p_value(ratings_of(context).contrast.p_residual)} (contrast)"]
+    for measure in (
+        "impulse_nm_s", "work_j", "inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"
+    ):  # fmt: skip
+        compared = _comparison(context, measure)
+        p, r, by_day = _tests(compared)
+        parts.append(f"{compared.measure.title} p = {p}, r = {r} ({by_day})")
+    return Row(
+        source="Table 2",
+        paper="mUPDRS .04, .18; impulse 4.3e-4, .30; work 2.8e-4, .31; viscosity 4.0e-4, .35; "
+        "stiffness 1.8e-3, .37 (p, r)",
+        ours="virtual study, in parentheses p when days count: " + "; ".join(parts),
+        reading="Whether the printed p, r and N belong together is in the rows table-2-….",
+        unpublished=f"{_VIRTUAL_STUDY}shows that the chain from epochs to tests runs, not what DBS "
+        "does.",
+        virtual=True,
+    )
