@@ -1,4 +1,4 @@
-"""`rigidimeter emulate`: a rig without hardware, on true wires, that misbehaves when told to."""
+"""`rigidimeter emulate`: an emulated rig that uses real communication and can misbehave."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["emulate"]
 
 def emulate(
     drive: Annotated[
-        str, typer.Option("--drive", metavar="cia402|ascii", help="Which kind of drive.")
+        str, typer.Option("--drive", metavar="cia402|ascii", help="Type of drive.")
     ] = "cia402",
     joint: Annotated[
         tuple[float, float, float],
@@ -22,28 +22,27 @@ def emulate(
     ] = (0.0045, 0.1368, 1.751),
     rig_out: Annotated[
         Path | None,
-        typer.Option(
-            "--rig-out", metavar="FILE", help="Where to write the rig file that reaches it."
-        ),
+        typer.Option("--rig-out", metavar="FILE", help="Write a rig file for it."),
     ] = None,
     voluntary: Annotated[
-        float, typer.Option("--voluntary", metavar="NM", help="The subject pushes by this SD.")
+        float,
+        typer.Option("--voluntary", metavar="NM", help="SD of the subject's voluntary torque."),
     ] = 0.0,
     torque_rate: Annotated[
         float, typer.Option("--torque-rate-hz", metavar="HZ", help="Torque samples per second.")
     ] = 1000.0,
     noise: Annotated[
-        float, typer.Option("--noise-nm", metavar="NM", help="Noise of the torque, SD.")
+        float, typer.Option("--noise-nm", metavar="NM", help="SD of the torque noise.")
     ] = 0.005,
     bandwidth: Annotated[
         float, typer.Option("--bandwidth-hz", metavar="HZ", help="Bandwidth of the drive.")
     ] = 50.0,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of everything random.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")] = 1,
 ) -> None:
-    """Host an emulated rig: an arm with a torque sensor (UDP) and a drive (CANopen or ASCII).
+    """Emulate a rig: an arm with a torque sensor (UDP) and a drive (CANopen or ASCII).
 
-    Prints one line of JSON when it is ready, then takes one command a line and answers each with
-    one line of JSON; `help` lists them. The end of the input ends it.
+    Prints one line of JSON when ready, then reads commands, one per line, and answers each with a
+    line of JSON; the command `help` lists them. It ends with the end of its input.
 
     \b
     For example:
@@ -82,7 +81,7 @@ def emulate(
 
 
 def _check_target(rig_out: Path) -> None:
-    """Refuse to write over anything but the rig file of an earlier emulation."""
+    """Refuse to overwrite anything but a rig file of an emulated rig."""
     from rigidimeter.devices.rigfile import load_rig
 
     if not rig_out.parent.is_dir():
@@ -95,8 +94,8 @@ def _check_target(rig_out: Path) -> None:
         emulated = False
     if not emulated:
         raise UserError(
-            f"--rig-out {rig_out}: is there already and is no rig file of an emulated rig; name "
-            "another file, nothing is written over"
+            f"--rig-out {rig_out}: already exists and is not the rig file of an emulated rig; name "
+            "another file, this one is left as it is"
         )
 
 

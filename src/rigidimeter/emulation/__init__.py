@@ -1,4 +1,4 @@
-"""Wire emulators: a sensor and drives that answer on a true wire, and misbehave when told to."""
+"""Emulated sensors and drives that use real communication and can be made to misbehave."""
 
 from rigidimeter.emulation.emulated_arm import EmulatedArm
 

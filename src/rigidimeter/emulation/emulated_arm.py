@@ -1,8 +1,8 @@
-"""The plant behind the wire emulators: one drive, one arm, whatever the time.
+"""The arm and drive behind the emulators, at any time.
 
-Peers answer when they are asked, not at fixed ticks, so the state is advanced to the moment of each
-question, exactly, under the command that was in force since the last one. The equations are those
-of `rigidimeter.dynamics.velocity_drive` and `joint`.
+Emulators are read at any time, not at fixed ticks. At each call the state is advanced exactly to
+the present time, under the command in force since the last call. The equations are those of
+`rigidimeter.dynamics.velocity_drive` and `joint`.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ LONGEST_STEP_S = 0.5
 
 
 class EmulatedArm:
-    """A joint on a velocity drive that several emulators share; safe to use from several threads.
+    """A joint on a velocity drive, shared by several emulators; thread-safe.
 
     Parameters
     ----------
     joint : JointDynamics
-        What an estimate should give back.
+        The true joint, which an estimate should recover.
     bandwidth_hz, damping_ratio : float
         Of the drive.
     noise_sd_nm : float
-        Of each torque reading.
+        Standard deviation of each torque reading.
     voluntary_nm : callable
-        M_sub in N·m at a time in s since the start.
+        Voluntary torque in N·m as a function of the time in s since the start.
     seed : int
         Of the noise.
     now : callable
@@ -65,23 +65,23 @@ class EmulatedArm:
         self._lock = threading.RLock()
 
     def command(self, velocity_rad_s: float, ramp_rad_s2: float = np.inf) -> None:
-        """Follow a velocity from now on, changing toward it by at most `ramp_rad_s2`."""
+        """Set the target velocity; the command changes toward it at `ramp_rad_s2` at most."""
         with self._lock:
             self._advance()
             self._target_rad_s, self._ramp_rad_s2 = velocity_rad_s, ramp_rad_s2
 
     def release(self) -> None:
-        """Cut the power: the arm is held by its brake within one bandwidth of the drive."""
+        """Remove the power: the brake stops the arm as fast as the drive's bandwidth allows."""
         self.command(0.0)
 
     def motion(self) -> tuple[float, float]:
-        """Return angle in rad and velocity in rad/s now."""
+        """Return the present angle in rad and velocity in rad/s."""
         with self._lock:
             self._advance()
             return self._state.angle_rad, self._state.velocity_rad_s
 
     def torque_nm(self) -> float:
-        """Return the torque that the drive applies to the joint now, with the sensor's noise."""
+        """Return the present torque from the drive on the joint, plus sensor noise, in N·m."""
         with self._lock:
             self._advance()
             joint = self.joint
@@ -95,7 +95,7 @@ class EmulatedArm:
             return torque_nm + self._noise_sd_nm * float(self._rng.standard_normal())
 
     def place(self, angle_rad: float) -> None:
-        """Put the arm at an angle, at rest, as by hand."""
+        """Put the arm at an angle, at rest, as if moved by hand."""
         with self._lock:
             self._advance()
             self._state = DriveState(angle_rad)
@@ -105,7 +105,7 @@ class EmulatedArm:
         now_s = self._now()
         elapsed_s = min(now_s - self._at_s, LONGEST_STEP_S)
         self._at_s = now_s
-        # A ramp changes the command within the step; short pieces follow it closely enough.
+        # A ramp changes the command during the step, so it is divided into short steps.
         while elapsed_s > 1e-9:
             ramping = self._command_rad_s != self._target_rad_s
             step_s = min(elapsed_s, 1e-3) if ramping else elapsed_s

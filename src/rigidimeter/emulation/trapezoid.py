@@ -1,6 +1,6 @@
 """The trajectory generator of a serial servo: a velocity, or a trapezoid to a target.
 
-It runs in steps whoever is there to see. Lengths are in counts of the encoder.
+It advances in time steps. Positions are in encoder counts.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ class Ramps:
 
 @dataclass
 class Trapezoid:
-    """Where the generator is, and where it heads for.
+    """Position, speed and target of the generator.
 
     Parameters
     ----------
     place, target : float
-        In counts.
+        Present and target position, in counts.
     speed, limit : float
-        In counts/s; of the move, the largest.
+        Present speed and largest speed of the move, in counts/s.
     aborting : bool
-        Whether it brakes to rest, whatever the target.
+        Whether it is braking to rest regardless of the target.
     """
 
     place: float
@@ -40,16 +40,16 @@ class Trapezoid:
     aborting: bool = True
 
     def rest(self, place: float) -> None:
-        """Stand still at a place."""
+        """Stop at a position."""
         self.place = self.target = place
         self.speed, self.aborting = 0.0, True
 
     def move(self, target: float, limit: float) -> None:
-        """Begin an absolute move."""
+        """Start an absolute move."""
         self.target, self.limit, self.aborting = target, limit, False
 
     def wanted(self, ramps: Ramps) -> float:
-        """Return the velocity in counts/s that the move heads for."""
+        """Return the target velocity of the move, in counts/s."""
         if self.aborting:
             return 0.0
         left = self.target - self.place
@@ -57,14 +57,14 @@ class Trapezoid:
         return math.copysign(min(self.limit, braking), left) if left else 0.0
 
     def change(self, wanted: float, ramps: Ramps, step_s: float) -> float:
-        """Bring the speed nearer to what is wanted; return the largest change there may be."""
+        """Change the speed toward the wanted one; return the largest change allowed."""
         speeding_up = wanted * self.speed >= 0.0 and abs(wanted) > abs(self.speed)
         most = (ramps.up if speeding_up else ramps.down) * step_s
         self.speed += max(-most, min(most, wanted - self.speed))
         return most
 
     def step(self, ramps: Ramps, step_s: float) -> None:
-        """Go on with the move for a while."""
+        """Advance the move by a time step."""
         most = self.change(self.wanted(ramps), ramps, step_s)
         left, way = self.target - self.place, self.speed * step_s
         arrives = not self.aborting and abs(self.speed) <= 2.0 * most
@@ -74,6 +74,6 @@ class Trapezoid:
             self.place += way
 
     def run(self, velocity: float, ramps: Ramps, step_s: float) -> None:
-        """Go on at a velocity for a while."""
+        """Advance at a velocity by a time step."""
         self.change(velocity, ramps, step_s)
         self.place += self.speed * step_s

@@ -64,7 +64,7 @@ def test_an_emulation_writes_over_no_rig_file_of_hardware(tmp_path):
     _check_target(path)
     path.write_text(HARDWARE)
     with pytest.raises(
-        UserError, match=r"RIG\.toml: is there already and is no rig file of an emu"
+        UserError, match=r"RIG\.toml: already exists and is not the rig file of an emu"
     ):
         _check_target(path)
     path.write_text(

@@ -1,1 +1,1 @@
-"""A CiA 402 drive node on a CAN bus."""
+"""An emulated CiA 402 drive on a CAN bus."""

@@ -1,12 +1,13 @@
-"""A servo on a CAN bus that speaks CANopen, profile CiA 402, and misbehaves when told to.
+"""An emulated CANopen servo drive, profile CiA 402, that can be made to misbehave.
 
-It answers to any master: questions (SDO), commands and SYNC by whatever mapping the master made,
-network management, heartbeats both ways. Left alone while it moves, it stops itself: when the
-master's heartbeat (0x1016) or the command message's deadline (0x1400:05) runs out it sends an
-emergency, 0x8130 or 0x8250, and does what 0x6007 says, as a rule a quick stop along 0x6085.
+It works with any master: SDO, commands and SYNC with the mapping that the master wrote, network
+management, heartbeats in both directions. If the master goes silent while the drive moves, the
+drive stops by itself: when the master's heartbeat (0x1016) or the command deadline (0x1400:05)
+expires, it sends an emergency, 0x8130 or 0x8250, and acts as set in 0x6007, usually by a quick stop
+along 0x6085.
 
-Two threads act on it: python-can's, which receives, and one that looks at the deadlines about every
-millisecond. A lock makes them take turns.
+Two threads use it under a lock: python-can's receiver, and one that checks the deadlines about
+every millisecond.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class Cia402Emulator:
     Parameters
     ----------
     arm : EmulatedArm
-        What it moves.
+        The arm it moves.
     interface, channel : str
         Of python-can.
     node_id : int
@@ -59,7 +60,7 @@ class Cia402Emulator:
     now : callable
         Monotonic time in s.
     options : Any
-        More for python-can, as `port`.
+        Further arguments of python-can, such as `port`.
     """
 
     def __init__(
@@ -87,7 +88,7 @@ class Cia402Emulator:
         self._servo = Servo(arm, self, self._units_per_rad, now)
         self._later: list[tuple[float, bytes]] = []
         self.log: list[tuple[float, str]] = []
-        """What happened, with its time."""
+        """Events with their times."""
         self._forget()
         self._bus = can.Bus(interface=interface, channel=channel, ignore_config=True, **options)
         self._network = network = canopen.Network(self._bus)
@@ -95,7 +96,7 @@ class Cia402Emulator:
         objects = dictionary(canopen.objectdictionary, node_id)
         self._node = node = network.create_node(canopen.LocalNode(node_id, objects))
         network.unsubscribe(0x600 + node_id, node.sdo.on_request)
-        network.subscribe(0x600 + node_id, self._on_question)
+        network.subscribe(0x600 + node_id, self._on_sdo_request)
         node.add_read_callback(self._on_read)
         node.add_write_callback(self._on_write)
         node.nmt.send_command(0x81)
@@ -107,7 +108,7 @@ class Cia402Emulator:
         self._watch.start()
 
     def misbehave(self, name: str, value: Any = None) -> None:
-        """Do wrong what `MISBEHAVIOURS` says of this name, from now on."""
+        """Start the misbehaviour of this name in `MISBEHAVIOURS`."""
         if name not in MISBEHAVIOURS:
             raise ValueError(f"{name!r} is none of {', '.join(MISBEHAVIOURS)}")
         with self._lock:
@@ -129,7 +130,7 @@ class Cia402Emulator:
             self._servo.move()
 
     def behave(self) -> None:
-        """Do everything right again, as a repaired drive; its state stays as it is."""
+        """End all misbehaviours, like a repaired drive; its state is unchanged."""
         with self._lock:
             self.note("behaves")
             self._servo.wrong.clear()
@@ -137,7 +138,7 @@ class Cia402Emulator:
             self._servo.move()
 
     def state(self) -> dict[str, Any]:
-        """Return where the arm is and how the drive is."""
+        """Return the state of the arm and of the drive."""
         with self._lock:
             angle_rad, velocity_rad_s = self._arm.motion()
             return {
@@ -162,10 +163,10 @@ class Cia402Emulator:
         self._notifier.stop()
         self._bus.shutdown()
 
-    # What the node remembers
+    # State of the node
 
     def _forget(self) -> None:
-        self._heartbeat_s: float | None = None  # None: not watched yet, or not any more
+        self._heartbeat_s: float | None = None  # None: not monitored
         self._command_s: float | None = None
         self._syncs = 0
 
@@ -177,7 +178,7 @@ class Cia402Emulator:
         self._node.nmt.send_command(0x81)
         self._node.nmt.send_command(0x80)
 
-    # What the servo sees of the node
+    # Functions that the servo uses
 
     def value(self, index: int, subindex: int = 0) -> int:
         """Return an object's value."""
@@ -193,19 +194,19 @@ class Cia402Emulator:
         self._node.emcy.send(code, register)
 
     def changed(self) -> None:
-        """Send the messages that tell of a change, not of a SYNC."""
+        """Send the PDOs that are triggered by a change instead of SYNC."""
         if self._operational():
             for index in MEASUREMENT_MESSAGES:
                 if self.value(index, 2) >= 254:
                     self._send_measurements(index)
 
     def note(self, event: str) -> None:
-        """Write down what happened."""
+        """Log an event."""
         self.log.append((self._now(), event))
 
-    # What the master asks and sets
+    # SDO requests
 
-    def _on_question(self, _identifier: int, data: bytearray, _time: float) -> None:
+    def _on_sdo_request(self, _identifier: int, data: bytearray, _time: float) -> None:
         with self._lock:
             if "die" in self._servo.wrong:
                 return
@@ -236,11 +237,11 @@ class Cia402Emulator:
         if index == 0x6040:
             self._servo.control(int.from_bytes(data, "little"))
         if index in (0x6040, 0x60FF):
-            # The value itself is stored after this, so what follows from it is done then.
+            # canopen stores the value after this callback; the servo needs it now.
             self._node.data_store.setdefault(index, {})[0] = bytes(data)
             self._servo.move()
 
-    # What comes and goes without a question
+    # Other frames
 
     def _operational(self) -> bool:
         return bool(self._node.nmt.state == "OPERATIONAL")
@@ -271,7 +272,7 @@ class Cia402Emulator:
             self._heartbeat_s = self._now()
 
     def _mapping(self, index: int) -> Iterator[tuple[int, int, int]]:
-        """Yield index, subindex and bytes of what a message carries."""
+        """Yield index, subindex and size in bytes of the objects mapped to a PDO."""
         for k in range(1, self.value(index + 0x200) + 1):
             entry = self.value(index + 0x200, k)
             yield entry >> 16, entry >> 8 & 0xFF, (entry & 0xFF) // 8
@@ -286,7 +287,7 @@ class Cia402Emulator:
         for entry, subindex, size in mapped:
             parts.append((entry, subindex, data[at : at + size]))
             at += size
-        # The controlword last: a state is entered with the target that came along.
+        # The controlword is last, so that a new state starts with the new target.
         for entry, subindex, part in sorted(parts, key=lambda part: part[0] == 0x6040):
             self._node.set_data(entry, subindex, part)
 
@@ -315,7 +316,7 @@ class Cia402Emulator:
         except can.CanError as error:
             self.note(f"not sent: {error}")
 
-    # What it looks at by itself
+    # Deadlines
 
     def _watching(self) -> None:
         while not self._ended.wait(WATCH_S):

@@ -1,7 +1,7 @@
-"""The object dictionary of the emulated servo: what a master may ask and set.
+"""The object dictionary of the emulated servo.
 
-As the predefined connection set has it: one command message (0x1400), two messages of measurements
-(0x1800, 0x1801), with mappings that a master may change.
+As in the predefined connection set, there is one command PDO (0x1400) and there are two measurement
+PDOs (0x1800, 0x1801), with mappings that the master may change.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def _message(index: int, identifier: int, mapped: tuple[int, ...]) -> tuple[Entr
 
 def dictionary(objectdictionary: Any, node_id: int) -> Any:
     """Return the object dictionary, made with `canopen.objectdictionary`."""
-    whole = objectdictionary.ObjectDictionary()
+    made = objectdictionary.ObjectDictionary()
     entries = _entries(node_id)
     several = {entry.index for entry in entries if entry.subindex}
     for entry in entries:
@@ -95,9 +95,9 @@ def dictionary(objectdictionary: Any, node_id: int) -> Any:
         variable.data_type, variable.access_type = entry.kind, entry.access
         variable.default = entry.default
         if entry.index not in several:
-            whole.add_object(variable)
+            made.add_object(variable)
             continue
-        if entry.index not in whole:
-            whole.add_object(objectdictionary.ODRecord(f"object 0x{entry.index:04X}", entry.index))
-        whole[entry.index].add_member(variable)
-    return whole
+        if entry.index not in made:
+            made.add_object(objectdictionary.ODRecord(f"object 0x{entry.index:04X}", entry.index))
+        made[entry.index].add_member(variable)
+    return made

@@ -1,6 +1,10 @@
-"""The servo behind the wire: its state, what it makes the arm do, and what it does wrong.
+"""The emulated servo: its state machine, its commands to the arm, and its misbehaviours.
 
-It knows its objects by their numbers, and nothing of messages.
+States and transitions are those of CiA 402. Bits 0 (switch on), 1 (enable voltage), 2 (not quick
+stop), 3 (enable operation) of the controlword and the rising edge of bit 7 (fault reset) decide the
+next state. Numbers in comments are those of the transitions in the standard.
+
+This module reads objects by their index; messages are handled in `cia402_emulator`.
 """
 
 from __future__ import annotations
@@ -26,26 +30,26 @@ __all__ = [
 ]
 
 MISBEHAVIOURS = {
-    "fault": "brakes, reports a fault (value: its code), and cannot be reset",
-    "emergency": "sends an emergency message (value: its code) but goes on moving",
-    "leave operation": "takes its own power away, as when its hardware enable opens",
-    "change mode": "is in another mode of operation (value: which)",
-    "stop measurements": "answers no SYNC any more",
-    "stop heartbeat": "sends no heartbeat any more",
-    "die": "hears and says nothing any more; its own watchdogs go on",
+    "fault": "brakes, reports a fault (value: its code) and cannot be reset",
+    "emergency": "sends an emergency message (value: its code) but keeps moving",
+    "leave operation": "removes its own power, as if its hardware enable opened",
+    "change mode": "reports another mode of operation (value: which)",
+    "stop measurements": "stops answering SYNC",
+    "stop heartbeat": "stops sending its heartbeat",
+    "die": "stops receiving and sending; its own watchdogs still work",
     "reboot": "restarts: no power, no settings, no watchdog",
     "refuse enable": "does not go beyond switched on",
     "stale target": "keeps an old target velocity (value: in rad/s) whatever is written",
-    "does not follow": "takes commands and stands still",
+    "does not follow": "accepts commands and does not move",
     "runs away": "moves at a velocity of its own (value: in rad/s) while it has power",
-    "encoder frozen": "reports the position and velocity of this moment for ever",
-    "encoder jump": "reports a position that is off (value: by how many rad)",
+    "encoder frozen": "keeps reporting the present position and velocity",
+    "encoder jump": "reports a position with an error (value: in rad)",
     "encoder sign": "reports position and velocity with the wrong sign",
-    "slow answers": "answers questions late (value: by how many s)",
-    "wrong watchdog": "takes the heartbeat watchdog but keeps another (value: of how many ms)",
-    "ignores quick stop": "goes on when told to stop quickly",
+    "slow answers": "answers SDO requests late (value: by how many s)",
+    "wrong watchdog": "accepts the heartbeat watchdog but uses another (value: in ms)",
+    "ignores quick stop": "keeps moving after a quick-stop command",
 }
-"""What it can be told to do wrong."""
+"""Misbehaviours by name."""
 
 DEFAULTS = {
     "fault": 0x2310,
@@ -61,7 +65,7 @@ DEFAULTS = {
 AT_REST_RAD_S = 0.01
 GENERIC_ERROR, COMMUNICATION_ERROR = 0x01, 0x11
 QUICK_STOP_HOLDS = 5
-"""From this quick-stop option on, the motor keeps its power at rest."""
+"""From this quick-stop option on, the motor keeps its power after stopping."""
 
 
 class Phase(Enum):
@@ -112,7 +116,7 @@ def after_control(phase: Phase, control: int, before: int) -> Phase:
 
 
 class LastStop(NamedTuple):
-    """How the arm last came to rest under a quick stop."""
+    """Reason and times of the last quick stop."""
 
     reason: str = ""
     began_s: float = math.nan
@@ -120,7 +124,7 @@ class LastStop(NamedTuple):
 
 
 class Objects(Protocol):
-    """What the servo uses of the node around it."""
+    """The functions of the node that the servo uses."""
 
     def value(self, index: int, subindex: int = 0) -> int:
         """Return an object's value."""
@@ -129,14 +133,14 @@ class Objects(Protocol):
         """Send an emergency message."""
 
     def changed(self) -> None:
-        """Tell that the state is another."""
+        """Report a change of state."""
 
     def note(self, event: str) -> None:
-        """Write down what happened."""
+        """Log an event."""
 
 
 class Servo:
-    """A drive and its state; whoever calls it takes turns.
+    """A drive and its state; the caller serialises the calls.
 
     Parameters
     ----------
@@ -156,23 +160,23 @@ class Servo:
         self._control = 0
         self.phase = Phase.SWITCH_ON_DISABLED
         self.wrong: dict[str, Any] = {}
-        """What it does wrong, with the values."""
+        """Active misbehaviours and their values."""
         self.last_stop = LastStop()
 
     def restart(self) -> None:
-        """Be as after power-up."""
+        """Return to the state after power-up."""
         self.go(Phase.SWITCH_ON_DISABLED, "restart")
         self._control = 0
 
     def target(self) -> float:
-        """Return the target velocity in force, in its units."""
+        """Return the present target velocity, in drive units."""
         if "stale target" in self.wrong:
             return float(self.wrong["stale target"]) * self._units_per_rad
         most = self._node.value(0x607F)
         return max(-most, min(most, self._node.value(0x60FF)))
 
     def measured(self) -> tuple[int, int]:
-        """Return the position and velocity it reports, in its units."""
+        """Return the reported position and velocity, in drive units."""
         if isinstance(frozen := self.wrong.get("encoder frozen"), tuple):
             return frozen
         angle_rad, velocity_rad_s = self._arm.motion()
@@ -182,7 +186,7 @@ class Servo:
         return round(angle_rad * units), round(velocity_rad_s * units)
 
     def control(self, control: int) -> None:
-        """Take a controlword."""
+        """Execute a controlword."""
         before, self._control = self._control, control
         if control & 0x06 == 0x02 and "ignores quick stop" in self.wrong:
             return
@@ -194,7 +198,7 @@ class Servo:
         self.go(phase, f"controlword 0x{control:02X}")
 
     def go(self, phase: Phase, why: str) -> None:
-        """Be in a state."""
+        """Change to a state."""
         if phase is self.phase:
             return
         before, self.phase = self.phase, phase
@@ -205,7 +209,7 @@ class Servo:
         self._node.changed()
 
     def move(self) -> None:
-        """Tell the arm what follows from state and target."""
+        """Command the arm according to state and target."""
         if self.phase not in POWERED:
             self._arm.release()
         elif "runs away" in self.wrong:
@@ -221,12 +225,12 @@ class Servo:
             self._arm.command(wanted_rad_s, ramp)
 
     def fault(self, code: int, why: str) -> None:
-        """Brake, then be in fault."""
+        """Brake, then enter the fault state."""
         self._node.emergency(code, GENERIC_ERROR)
         self.go(Phase.FAULT_REACTION if self.phase in POWERED else Phase.FAULT, why)
 
     def connection_lost(self, code: int, why: str) -> None:
-        """Do what is set for a master that fell silent."""
+        """React to a silent master as configured in 0x6007."""
         self._node.emergency(code, COMMUNICATION_ERROR)
         if self.phase is not Phase.OPERATION_ENABLED:
             return
@@ -239,7 +243,7 @@ class Servo:
             self.go(Phase.QUICK_STOP_ACTIVE, why)
 
     def watch_rest(self, now_s: float) -> None:
-        """Go on from a quick stop once the arm rests."""
+        """Leave the quick stop once the arm is at rest."""
         if self.phase not in (Phase.QUICK_STOP_ACTIVE, Phase.FAULT_REACTION):
             return
         if abs(self._arm.motion()[1]) > AT_REST_RAD_S:

@@ -1,1 +1,1 @@
-"""An ATI network sensor on loopback."""
+"""An emulated ATI Net F/T sensor."""

@@ -1,12 +1,12 @@
-"""An ATI Net F/T on a true wire: RDT records over UDP, the XML page over HTTP.
+"""An emulated ATI Net F/T: RDT records over UDP, the XML page over HTTP.
 
-Requests and records are those of the Net F/T manual (9620-05-NET FT). As the real one, the emulator
-serves the client that asked last, numbers the records of each stream from 1, and counts its own
+Requests and records are those of the Net F/T manual (9620-05-NET FT). Like the real sensor, it
+serves the client of the last request, numbers the records of each stream from 1, and counts its own
 samples at their own rate.
 
-The sensor is thought mounted on the drive with the arm on its tool side, so Tz is what the arm does
-to the drive: minus the torque that the drive applies to the joint, Tz = −M. The other axes carry
-noise alone.
+The sensor is mounted on the drive with the arm on its tool side, so Tz is the torque of the arm on
+the drive, the opposite of the torque from the drive on the joint: Tz = −M. The other axes contain
+only noise.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _REQUEST = struct.Struct(">HHI")
 
 
 class RdtEmulator:
-    """One sensor on an arm; several threads of its own.
+    """One sensor on an arm, with its own threads.
 
     Parameters
     ----------
@@ -51,11 +51,11 @@ class RdtEmulator:
         Records per second, at most 7000.
     address : str
     port, http_port : int
-        0 takes free ones; after `start` the attributes of these names say which.
+        0 selects free ports; after `start` the attributes hold the numbers.
     counts_per_n, counts_per_nm : float
-        Counts for one newton and one newton metre, whatever the units of the page.
+        Counts for 1 N and 1 N·m, whatever the units of the page.
     force_unit, torque_unit : str
-        As the page spells them: N, lbf; Nm, Nmm, lbf-in, lbf-ft and others.
+        As spelled in the page: N, lbf; Nm, Nmm, lbf-in, lbf-ft and others.
     serial : str
     calibration : int
     noise_counts : float
@@ -68,10 +68,9 @@ class RdtEmulator:
     Attributes
     ----------
     sent : deque
-        The RDT sequence and the torque in N·m of the newest records; with it what arrives can be
-        compared exactly.
+        RDT sequence and torque in N·m of the latest records, to compare with what arrives.
     requests : deque
-        The commands that were heard.
+        The commands received.
     """
 
     def __init__(
@@ -121,7 +120,7 @@ class RdtEmulator:
         self._threads: list[threading.Thread] = []
 
     def start(self) -> None:
-        """Open both ports and listen."""
+        """Open both ports and start the threads."""
         if self._threads:
             return
         self._ending.clear()
@@ -145,14 +144,14 @@ class RdtEmulator:
             thread.start()
 
     def stop(self) -> None:
-        """Fall silent and close both ports; safe to call twice."""
+        """Stop sending and close both ports; safe when repeated."""
         if not self._threads:
             return
         self._ending.set()
         self._http.shutdown()
         self._stranger.sendto(b"", (self.address, self.port))  # wakes the listener
         self._threads[0].join()
-        self._streaming.set()  # wakes the sender, now that no request can put it to sleep again
+        self._streaming.set()  # wakes the sender; no request can pause it any more
         for thread in self._threads:
             thread.join()
         self._threads = []
@@ -169,27 +168,27 @@ class RdtEmulator:
         self.stop()
 
     def misbehave(self, name: str, value: float | None = None) -> None:
-        """Do something wrong from now on, beside what is done wrong already.
+        """Start a misbehaviour in addition to those already active.
 
         Parameters
         ----------
         name : str
             A key of `MISBEHAVIOURS`.
         value : float, optional
-            What its sentence calls `value`.
+            The `value` in its description.
         """
         if name not in MISBEHAVIOURS:
             raise ValueError(f"{name!r} is no misbehaviour; known: {', '.join(MISBEHAVIOURS)}")
-        with self._lock:  # always replaced, never changed: who reads needs no lock
+        with self._lock:  # replaced, never changed, so readers need no lock
             self._faults = {**self._faults, name: value}
 
     def behave(self) -> None:
-        """Do everything right again."""
+        """End all misbehaviours."""
         with self._lock:
             self._faults = {}
 
     def fault(self, name: str, default: float) -> float | None:
-        """Return the value of a misbehaviour that is on, None if it is off."""
+        """Return the value of an active misbehaviour, None if it is not active."""
         return fault_value(self._faults, name, default)
 
     def _page_now(self) -> bytes:
@@ -237,7 +236,7 @@ class RdtEmulator:
         self._held_since_s = time.monotonic()
 
     def _step(self) -> None:
-        """Take one sample and send it, or do with it what it was told."""
+        """Take one sample and send it, or apply the active misbehaviours."""
         faults = self._faults
         if not faults:
             self._flush()

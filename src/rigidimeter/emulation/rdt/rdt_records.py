@@ -1,4 +1,4 @@
-"""The samples of the sensor's wire emulator, packed as records; no socket."""
+"""The records of the emulated sensor and the list of its misbehaviours; no socket."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ __all__ = [
 
 RECORD = struct.Struct(">IIIiiiiii")
 SAMPLE_RATE_HZ = 7000.0
-"""At which the sensor samples, whatever the rate of its records."""
+"""The sensor's own sampling rate, whatever the rate of its records."""
 
 MISBEHAVIOURS = {
-    "silent": "No record is sent any more.",
+    "silent": "No more records are sent.",
     "deaf": "Requests to start are ignored.",
-    "frozen_sequence": "The RDT sequence stands still; the values flow.",
-    "frozen_ft_sequence": "The FT sequence stands still; all else flows.",
-    "frozen_values": "The six counts stand still; the sequences flow.",
-    "frozen_record": "One and the same record is sent again and again.",
+    "frozen_sequence": "The RDT sequence stays the same; the values change.",
+    "frozen_ft_sequence": "The FT sequence stays the same; everything else changes.",
+    "frozen_values": "The six counts stay the same; the sequences advance.",
+    "frozen_record": "The same record is sent again and again.",
     "saturated": "The saturation bit is set and the torque clipped.",
     "serious_status": "The status bits `value` are set (the supply of the analog board too low).",
-    "one_bad_status": "One record alone carries the status bits `value`.",
+    "one_bad_status": "A single record has the status bits `value`.",
     "warning": "A monitored condition is latched: a warning.",
     "lose": "Every `value`-th record (10) is not sent.",
     "lose_once": "`value` records (1) are not sent, once.",
@@ -43,36 +43,36 @@ MISBEHAVIOURS = {
     "short": "Every `value`-th record (10) ends after 20 bytes.",
     "long": "Every `value`-th record (10) has 4 bytes too many.",
     "garbage": "Every `value`-th record (10) is 36 random bytes.",
-    "backlog": "Records are held for `value` s (0.05), then sent all at once, again and again.",
+    "backlog": "Records are held for `value` s (0.05), then sent all at once, repeatedly.",
     "flood": "Every record is sent `value` times (50).",
-    "restart": "The sensor restarts, once: both sequences begin at 1 again.",
+    "restart": "The sensor restarts once: both sequences start at 1 again.",
     "foreign": "Another sender sends records with wrong torques to the client.",
-    "bias": "The torque is off by `value` N·m (1), as after a bias under load.",
+    "bias": "The torque has an error of `value` N·m (1), as after zeroing under load.",
     "spike": "Every `value`-th record (100) shows 50 N·m more.",
-    "changed_units": "The page says lbf-in.",
-    "unknown_units": "The page says a torque unit that nobody knows.",
-    "changed_calibration": "The page says another transducer with twice the counts.",
-    "changed_bias": "The page says another software bias.",
-    "rdt_disabled": "The page says that RDT is disabled.",
-    "page_status": "The page says the status bits `value` (the supply too low).",
-    "http_silent": "The web server takes requests and does not answer.",
+    "changed_units": "The page shows lbf-in.",
+    "unknown_units": "The page shows an unknown torque unit.",
+    "changed_calibration": "The page shows another transducer with twice the counts.",
+    "changed_bias": "The page shows another software bias.",
+    "rdt_disabled": "The page shows RDT disabled.",
+    "page_status": "The page shows the status bits `value` (the supply too low).",
+    "http_silent": "The web server accepts requests and does not answer.",
     "http_slow": "The web server answers after `value` s (0.5).",
     "http_drip": "The web server sends the page a byte every `value` s (0.1).",
     "http_error": "The web server answers 500.",
-    "http_garbage": "The web server answers with something else than the page.",
+    "http_garbage": "The web server answers with another page.",
 }
-"""What a emulator can be told to do wrong, by name."""
+"""Misbehaviours by name."""
 
 SUPPLY_LOW = 0x80000020
 STATUS = {"saturated": 0x80020000, "warning": 0x80010000}
 ONCE = {"lose_once", "duplicate_once", "reorder_once", "restart", "one_bad_status"}
 
 Faults = dict[str, float | None]
-"""What is done wrong now, with its value; None stands for the one in the sentence."""
+"""Active misbehaviours and their values; None means the default in the description."""
 
 
 def fault_value(faults: Faults, name: str, default: float) -> float | None:
-    """Return the value of a misbehaviour that is on, None if it is off."""
+    """Return the value of an active misbehaviour, None if it is not active."""
     if name not in faults:
         return None
     value = faults[name]
@@ -80,7 +80,7 @@ def fault_value(faults: Faults, name: str, default: float) -> float | None:
 
 
 class RecordSource:
-    """Sample an arm and pack what is found.
+    """Samples of an arm, packed as records.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class RecordSource:
         Records per second.
     counts_per_nm : float
     noise_counts : float
-        SD of the noise on the five axes that do not see the arm.
+        SD of the noise on the other five axes.
     seed : int
     """
 
@@ -105,13 +105,13 @@ class RecordSource:
         self._counts_per_nm = counts_per_nm
         self._samples_a_record = max(round(SAMPLE_RATE_HZ / rate_hz), 1)
         rng = random.Random(seed)
-        # Drawn beforehand: at 7 kHz every microsecond counts.
+        # Drawn in advance to save time at 7 kHz.
         self._noise = [[round(rng.gauss(0.0, noise_counts)) for _ in range(5)] for _ in range(4096)]
         self.sent: deque[tuple[int, float]] = deque(maxlen=20000)
         self.restart(1)
 
     def restart(self, sequence: int) -> None:
-        """Begin a new stream of records."""
+        """Start a new stream of records."""
         self.taken = 0
         self.sequence = sequence
         self._ft_sequence = 0

@@ -1,4 +1,4 @@
-"""The web server of the sensor's wire emulator: /netftapi2.xml, and how not to serve it."""
+"""The web server of the emulated sensor: /netftapi2.xml, with its misbehaviours."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _NEWTON_METRES = {
 
 @dataclass(frozen=True)
 class PageFacts:
-    """What the page says; counts per N and per N·m, whatever its units."""
+    """Contents of the page; counts per N and per N·m, whatever its units."""
 
     counts_per_n: float
     counts_per_nm: float
@@ -70,7 +70,7 @@ def page_text(page: PageFacts) -> bytes:
 
 
 def page_with_faults(page: PageFacts, faults: Faults) -> PageFacts:
-    """Return the page as a sensor with these misbehaviours has it."""
+    """Return the page with these misbehaviours applied."""
     page = replace(page, status=int(fault_value(faults, "page_status", SUPPLY_LOW) or 0))
     if "changed_units" in faults:
         page = replace(page, torque_unit="lbf-in")
@@ -88,21 +88,21 @@ def page_with_faults(page: PageFacts, faults: Faults) -> PageFacts:
 
 
 class PageServer(socketserver.ThreadingTCPServer):
-    """Answers every request with the page, or as badly as it is told.
+    """Answers every request with the page, or as the misbehaviours say.
 
     Parameters
     ----------
     address : tuple
     page : callable
-        Returns the page as it is now.
+        Returns the present page.
     fault : callable
-        Returns the value of a misbehaviour, None if it is off.
+        Returns the value of a misbehaviour, None if it is not active.
     ending : threading.Event
-        Ends whatever a handler waits for.
+        Ends the waiting of handlers.
     """
 
     allow_reuse_address = True
-    daemon_threads = False  # so that closing waits for them
+    daemon_threads = False  # closing waits for them
 
     def __init__(
         self,
@@ -120,7 +120,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = 2.0
 
     def do_GET(self) -> None:
-        """Answer."""
+        """Answer a request."""
         fault, wait = self.server.fault, self.server.ending.wait
         if fault("http_silent", 1) is not None:
             wait(30.0)
@@ -149,7 +149,7 @@ class _Handler(BaseHTTPRequestHandler):
                 if wait(drip_s):
                     return
         except OSError:
-            self.close_connection = True  # the client lost patience
+            self.close_connection = True  # the client closed the connection
 
     def log_message(self, format: str, *args: object) -> None:
-        """Say nothing: the tests' output is not the server's."""
+        """Print nothing."""
