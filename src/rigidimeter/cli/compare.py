@@ -8,12 +8,25 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.comparison_text import comparison_lines
-from rigidimeter.cli.inputs import analyse_inputs, keep_inputs, say, status
-from rigidimeter.cli.options import Recordings, reads_recordings
-from rigidimeter.cli.study_input import KeyOption, analysed_study, study_files, study_of
+from rigidimeter.cli.inputs import (
+    analyse_recordings,
+    analyse_study_folder,
+    keep_inputs,
+    say,
+    study_files,
+    study_of,
+)
+from rigidimeter.cli.options import (
+    CsvOption,
+    JsonOption,
+    KeyOption,
+    Recordings,
+    reads_recordings,
+)
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
+    from rigidimeter.records import Analysis
     from rigidimeter.study import StudyResult
 
 __all__ = ["compare"]
@@ -24,39 +37,44 @@ def compare(
     recordings: Recordings,
     reference: Annotated[
         str | None,
-        typer.Option("--reference", metavar="NAME", help="Condition to compare with."),
+        typer.Option(
+            "--reference",
+            metavar="NAME",
+            help="The first condition: differences are reference minus other. Default: OFF if "
+            "there is one, else the first.",
+        ),
     ] = None,
     other: Annotated[
-        str | None, typer.Option("--other", metavar="NAME", help="Condition that is compared.")
+        str | None, typer.Option("--other", metavar="NAME", help="The second condition.")
     ] = None,
-    json_out: Annotated[
-        Path | None, typer.Option("--json", metavar="OUT", help="Write the numbers as JSON.")
-    ] = None,
-    csv_out: Annotated[
-        Path | None, typer.Option("--csv", metavar="OUT", help="Write the table as CSV.")
-    ] = None,
+    json_out: JsonOption = None,
+    csv_out: CsvOption = None,
     value: Annotated[
         list[str] | None,
         typer.Option(
             "--value",
             metavar="COLUMN",
-            help="Compare this column of one table instead; repeat for several.",
+            help="Compare this column of a table; repeat for several.",
         ),
     ] = None,
     by: Annotated[
-        str, typer.Option("--by", metavar="COLUMN", help="The table's column of groups.")
+        str,
+        typer.Option("--by", metavar="COLUMN", help="With --value: the column of conditions."),
     ] = "condition",
     session: Annotated[
         str | None,
         typer.Option(
             "--session",
             metavar="COLUMN",
-            help="Column whose labels the bootstrap resamples; by default each row.",
+            help="With --value: the bootstrap resamples the labels of this column. Default: rows.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, metavar="N", help="Of the bootstrap.")] = 1,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, metavar="N", help="Seed of the bootstrap.")
+    ] = 1,
     resamples: Annotated[
-        int, typer.Option("--resamples", min=100, metavar="N", help="Of the bootstrap.")
+        int,
+        typer.Option("--resamples", min=100, metavar="N", help="Resamples of the bootstrap."),
     ] = 9999,
     key: KeyOption = None,
 ) -> None:
@@ -82,56 +100,43 @@ def compare(
       rigidimeter compare ratings.csv --value score --by condition --json comparison.json
     """
     from rigidimeter import study as studies
-    from rigidimeter.study.compare_input import chosen_pair
 
-    pair = (reference, other)
     outputs = (json_out, csv_out)
     paths = recordings.paths
-    if value:
-        if len(paths) != 1:
-            raise UserError(f"--value takes one table, but {len(paths)} inputs were given")
-        keep_inputs(outputs, paths)
-        found = studies.compare(
-            paths[0],
-            other,
-            reference=reference,
-            value=value,
-            by=by,
-            session=session,
-            seed=seed,
-            resamples=resamples,
-        )
-        say(found.notices)
-        _write(found, *outputs)
-        typer.echo("\n".join(comparison_lines(found)))
-        return
-    if (folder := study_of(recordings, key)) is not None:
+    is_json = any(path.suffix.lower() == ".json" for path in paths)
+    if value and len(paths) != 1:
+        raise UserError(f"--value takes one table, but {len(paths)} inputs were given")
+    if not value and (folder := study_of(recordings, key)) is not None:
         keep_inputs(outputs, study_files(folder, key))
-        analysed = analysed_study(
-            folder, recordings, key, pair=pair, seed=seed, resamples=resamples
+        analysed = analyse_study_folder(
+            folder, recordings, key, pair=(reference, other), seed=seed, resamples=resamples
         )
         _write(analysed.result, *outputs, str(folder))
         typer.echo("\n".join(comparison_lines(analysed.result)))
         _say_changes(analysed.result, folder, analysed.kept)
         raise typer.Exit(analysed.status)
     keep_inputs(outputs, paths)
-    exit_status = 0
-    if any(path.suffix.lower() == ".json" for path in paths):
+    compared: Path | Analysis = paths[0]
+    status = 0
+    if not value and is_json:
         if len(paths) > 1:
             raise UserError("compare takes one JSON file of estimates, or recordings, not both")
-        found = studies.compare(
-            paths[0], other, reference=reference, seed=seed, resamples=resamples
-        )
-    else:
-        read = recordings.read()
-        say(read.notices)
-        analysis = analyse_inputs(read, recordings.method)
-        exit_status = status(read, analysis)
-        chosen = chosen_pair(studies.conditions(analysis), *pair)
-        found = studies.compare_analysis(analysis, *chosen, seed=seed, resamples=resamples)
+    elif not value:
+        _, compared, status = analyse_recordings(recordings)
+    found = studies.compare(
+        compared,
+        other,
+        reference=reference,
+        value=value,
+        by=by,
+        session=session,
+        seed=seed,
+        resamples=resamples,
+    )
+    say(found.notices)
     _write(found, *outputs)
     typer.echo("\n".join(comparison_lines(found)))
-    raise typer.Exit(exit_status)
+    raise typer.Exit(status)
 
 
 def _write(

@@ -1,4 +1,4 @@
-"""`rigidimeter design`: what will be commanded, and what will come of it, before any hardware."""
+"""`rigidimeter design`: what will be commanded, and what to expect of it, before any hardware."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ from typing import Annotated
 import typer
 
 from rigidimeter.cli.inputs import keep_inputs
+from rigidimeter.cli.options import JsonOption, SettingsOption
 
 __all__ = ["design"]
 
 
 def design(
-    settings: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Settings in TOML; what is left out has its default."),
-    ] = None,
+    settings: SettingsOption = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -24,46 +22,51 @@ def design(
             help="Folder for prbs.csv, sinusoid.csv, protocol.csv, bode.svg and design.json.",
         ),
     ] = None,
-    json_out: Annotated[
-        Path | None,
-        typer.Option("--json", metavar="FILE", help="File for the numbers, as JSON."),
-    ] = None,
+    json_out: JsonOption = None,
     detect: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=AMOUNT",
-            help="Epochs needed to detect a difference of inertia, damping or stiffness, for "
-            "example damping=20% or stiffness=0.3; repeat as needed.",
+            help="Number of epochs needed to detect a difference in inertia, damping or "
+            "stiffness, such as damping=20% or stiffness=0.3; repeat as needed.",
         ),
     ] = None,
-    power: Annotated[float, typer.Option(help="Wanted power of --detect.")] = 0.8,
-    alpha: Annotated[float, typer.Option(help="Level of the test of --detect.")] = 0.05,
+    power: Annotated[
+        float, typer.Option("--power", metavar="P", help="Power of the test for --detect.")
+    ] = 0.8,
+    alpha: Annotated[
+        float,
+        typer.Option("--alpha", metavar="P", help="Significance level of the test for --detect."),
+    ] = 0.05,
     optimise: Annotated[
         bool,
         typer.Option(
-            "--optimise", help="Search clock, bits and amplitude of the PRBS within the guard."
+            "--optimise",
+            help="Search for the most precise PRBS (clock, bits, amplitude) within the guard's "
+            "limits.",
         ),
     ] = False,
     criterion: Annotated[
         str,
         typer.Option(
             metavar="NAME",
-            help="Of --optimise: minimax (the largest relative error), A (their root mean square) "
-            "or D (their volume).",
+            help="What --optimise minimises: minimax (the largest relative error), A (their root "
+            "mean square) or D (the volume of the confidence region).",
         ),
     ] = "minimax",
     multisine: Annotated[
         bool,
         typer.Option(
-            "--multisine", help="Compare with a multisine; with --out also writes multisine.csv."
+            "--multisine",
+            help="Compare the PRBS with a multisine; with --out also write multisine.csv.",
         ),
     ] = False,
 ) -> None:
-    """Show what will be commanded and what will come of it, before anyone is perturbed.
+    """Predict stability, standard errors and the number of epochs needed, before anything moves.
 
-    Nothing moves. Shown are perturbations and their band, the session, the stability of the loop,
-    and the standard errors to expect. A loop that is unstable, or nearly so, with the joint of a
-    condition is refused.
+    Shows the perturbations and their band, the session, the stability of the loop, and the standard
+    errors to expect. The exit status is 1 if the loop is unstable, or nearly so, with the joint of
+    a condition.
 
     \b
     For example:

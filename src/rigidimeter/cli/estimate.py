@@ -4,39 +4,37 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from collections.abc import Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING
 
 import typer
 
-from rigidimeter.cli.inputs import analyse_inputs, keep_inputs, say, status
-from rigidimeter.cli.options import Recordings, reads_recordings
+from rigidimeter.cli.inputs import analyse_recordings, keep_inputs
+from rigidimeter.cli.options import CsvOption, JsonOption, Recordings, reads_recordings
+from rigidimeter.cli.text_table import text_table
 
 if TYPE_CHECKING:
-    from rigidimeter.records import Analysis, Fit, Outcome, Score
+    from rigidimeter.records import Analysis, Fit, Score
 
-__all__ = ["estimate"]
+__all__ = ["estimate", "estimate_lines"]
 
-_R = TypeVar("_R", "Fit", "Score")
+_FIT_HEADING = ("epoch", "condition", "J kg·m²", "B N·m·s/rad", "K N·m/rad", "R²", "VAF %", "")
+_SCORE_HEADING = ("epoch", "condition", "impulse N·m·s", "work J", "")
 
 
 @reads_recordings
 def estimate(
     recordings: Recordings,
-    json_out: Annotated[
-        Path | None, typer.Option("--json", metavar="OUT", help="Write everything as JSON.")
-    ] = None,
-    csv_out: Annotated[
-        Path | None, typer.Option("--csv", metavar="OUT", help="Write the epoch table as CSV.")
-    ] = None,
+    json_out: JsonOption = None,
+    csv_out: CsvOption = None,
 ) -> None:
     """Estimate inertia J, damping B and stiffness K of each epoch, and score the sinusoids.
 
     A file holds time_s, torque_nm, at least one of velocity_rad_s and angle_rad, and optionally
     velocity_command_rad_s, perturbation_nm, epoch, condition and task. Torque is positive when it
-    drives the joint toward positive angle. The exit status is 1 if any input was bad; the rest is
-    analysed all the same.
+    drives the joint toward positive angles. The exit status is 1 if any input was bad; the others
+    are still analysed.
 
     \b
     For example:
@@ -48,53 +46,32 @@ def estimate(
     from rigidimeter.recording import write_estimates_csv, write_estimates_json
 
     keep_inputs((json_out, csv_out), recordings.paths)
-    read = recordings.read()
-    say(read.notices)
-    analysis = analyse_inputs(read, recordings.method)
+    _, analysis, status = analyse_recordings(recordings)
     if json_out is not None:
         write_estimates_json(json_out, analysis)
     if csv_out is not None:
         write_estimates_csv(csv_out, analysis)
-    typer.echo("\n".join(_lines(analysis)))
-    raise typer.Exit(status(read, analysis))
+    typer.echo("\n".join(estimate_lines(analysis)))
+    raise typer.Exit(status)
 
 
-def _lines(analysis: Analysis) -> list[str]:
-    lines: list[str] = []
-    if analysis.method_reason:
-        lines += [*_wrapped(f"Method {analysis.method}: {analysis.method_reason}."), ""]
-    lines += _delay_lines(analysis)
-    if analysis.fits:
-        lines += [
-            f"J, B, K of each epoch ± one standard error, {analysis.method}{_band(analysis)}",
-            *_by_source(analysis.fits, _FIT_HEADING, _fit_line),
-            "",
-        ]
-        if any(fit.outcome.included for fit in analysis.fits):
-            lines += [
-                f"B, K with the inertia held at the median, {analysis.inertia_kg_m2:.5g} kg·m²",
-                *_by_source(analysis.fixed_inertia, _FIT_HEADING, _fit_line),
-            ]
-        else:
-            lines.append("No epoch could be included, so there is no median inertia to hold.")
-        if analysis.pooled:
-            lines += ["", "J, B, K of all epochs together, 95 % intervals"]
-            lines += [line for fit in analysis.pooled for line in _pooled_lines(fit)]
-        lines += _finding_lines(analysis)
-    if analysis.scores:
-        lines += [
-            *([""] if lines else []),
-            "Scores of each sinusoidal epoch, per cycle",
-            *_by_source(analysis.scores, _SCORE_HEADING, _score_line),
-        ]
-    return lines
+def estimate_lines(analysis: Analysis) -> list[str]:
+    """Return everything that was estimated, with an empty line between blocks."""
+    blocks = (_method, _delays, _fits, _fixed_inertia, _pooled, _findings, _scores)
+    return [line for block in blocks if (lines := block(analysis)) for line in (*lines, "")][:-1]
 
 
 def _wrapped(text: str, indent: str = "") -> list[str]:
     return textwrap.wrap(text, 100, subsequent_indent=indent + "  ", initial_indent=indent)
 
 
-def _delay_lines(analysis: Analysis) -> list[str]:
+def _method(analysis: Analysis) -> list[str]:
+    if not analysis.method_reason:
+        return []
+    return _wrapped(f"Method {analysis.method}: {analysis.method_reason}.")
+
+
+def _delays(analysis: Analysis) -> list[str]:
     """Say how late the torque is in each source, where that is known."""
     lines = []
     for delay in analysis.delays:
@@ -108,21 +85,49 @@ def _delay_lines(analysis: Analysis) -> list[str]:
             lines += _wrapped(text)
         elif delay.remark and any(fit.source == delay.source for fit in analysis.fits):
             lines += _wrapped(f"{delay.source}: {delay.remark}.")
-    return [*lines, ""] if lines else []
+    return lines
 
 
-def _pooled_lines(fit: Fit) -> list[str]:
-    from rigidimeter.records import PARAMETERS
+def _fits(analysis: Analysis) -> list[str]:
+    if not analysis.fits:
+        return []
+    bands = sorted({fit.band_hz for fit in analysis.fits if fit.n_samples})
+    band = "".join(f", {low:.4g} to {high:.4g} Hz" for low, high in bands[:1])
+    heading = f"J, B, K of each epoch ± one standard error, {analysis.method}{band}"
+    return [heading, *_fit_table(analysis.fits)]
 
-    name = (fit.condition or "all")[:10]
+
+def _fixed_inertia(analysis: Analysis) -> list[str]:
+    if not analysis.fits:
+        return []
+    if not any(fit.outcome.included for fit in analysis.fits):
+        return ["No epoch could be included, so there is no median inertia to hold."]
+    inertia = f"{analysis.inertia_kg_m2:.5g} kg·m²"
     return [
-        f"{'' if i else name:>10} {parameter.symbol} {fit.value[i]:11.5g}  "
-        f"[{fit.low[i]:.5g}, {fit.high[i]:.5g}] {parameter.unit}"
-        for i, parameter in enumerate(PARAMETERS)
+        f"B, K with the inertia held at the median, {inertia}",
+        *_fit_table(analysis.fixed_inertia),
     ]
 
 
-def _finding_lines(analysis: Analysis) -> list[str]:
+def _pooled(analysis: Analysis) -> list[str]:
+    from rigidimeter.records import PARAMETERS
+
+    rows = [
+        (
+            "" if i else fit.condition or "all",
+            parameter.symbol,
+            f"{fit.value[i]:.5g}",
+            f"[{fit.low[i]:.5g}, {fit.high[i]:.5g}]",
+            parameter.unit,
+        )
+        for fit in analysis.pooled
+        for i, parameter in enumerate(PARAMETERS)
+    ]
+    heading = "J, B, K of all epochs together, 95 % intervals"
+    return [heading, *text_table(rows, "<<>><", "  ")] if rows else []
+
+
+def _findings(analysis: Analysis) -> list[str]:
     """Return each kind of finding once: in which epochs, the first in full, and what to do."""
     lines = []
     for first, found_in in analysis.findings:
@@ -135,49 +140,50 @@ def _finding_lines(analysis: Analysis) -> list[str]:
             f"{first.text}. Remedy: {first.remedy}.",
             indent=" ",
         )
-    return ["", "What the checks found (all of it is in the JSON)", *lines] if lines else []
+    return ["What the checks found (the JSON file has all of it)", *lines] if lines else []
 
 
-def _band(analysis: Analysis) -> str:
-    bands = {fit.band_hz for fit in analysis.fits if fit.n_samples}
-    return "".join(f", {low:.4g} to {high:.4g} Hz" for low, high in sorted(bands)[:1])
+def _fit_table(fits: Sequence[Fit]) -> list[str]:
+    rows = [
+        (
+            fit.epoch,
+            fit.condition,
+            f"{fit.inertia_kg_m2:.5g} ±{fit.inertia_kg_m2_se:8.2g}",
+            f"{fit.damping_nm_s_rad:.4g} ±{fit.damping_nm_s_rad_se:8.2g}",
+            f"{fit.stiffness_nm_rad:.4g} ±{fit.stiffness_nm_rad_se:8.2g}",
+            f"{fit.r_squared:.4f}",
+            f"{fit.vaf_percent:.2f}",
+        )
+        for fit in fits
+    ]
+    return _by_source(fits, [_FIT_HEADING, *rows], "<<>>>>><")
 
 
-_FIT_HEADING = (
-    f"{'epoch':>10} {'condition':>10} {'J kg·m²':>21} {'B N·m·s/rad':>19} {'K N·m/rad':>19} "
-    f"{'R²':>8} {'VAF %':>7}"
-)
-_SCORE_HEADING = f"{'epoch':>10} {'condition':>10} {'impulse N·m·s':>14} {'work J':>10}"
+def _scores(analysis: Analysis) -> list[str]:
+    rows = [
+        (score.epoch, score.condition, f"{score.impulse_nm_s:.5g}", f"{score.work_j:.5g}")
+        for score in analysis.scores
+    ]
+    if not rows:
+        return []
+    lines = _by_source(analysis.scores, [_SCORE_HEADING, *rows], "<<>><")
+    return ["Scores of each sinusoidal epoch, per cycle", *lines]
 
 
-def _by_source(results: Sequence[_R], heading: str, line: Callable[[_R], str]) -> list[str]:
-    """Return a table with a line for each result, under the name of its source."""
-    lines = [heading]
-    source = None
-    for result in results:
-        if result.source != source:
-            source = result.source
-            lines.append(f" {source}")
-        lines.append(line(result))
-    return lines
-
-
-def _fit_line(fit: Fit) -> str:
-    return (
-        f"{fit.epoch[-10:]:>10} {fit.condition[:10]:>10} "
-        f"{fit.inertia_kg_m2:11.5g} ±{fit.inertia_kg_m2_se:8.2g} "
-        f"{fit.damping_nm_s_rad:9.4g} ±{fit.damping_nm_s_rad_se:8.2g} "
-        f"{fit.stiffness_nm_rad:9.4g} ±{fit.stiffness_nm_rad_se:8.2g} "
-        f"{fit.r_squared:8.4f} {fit.vaf_percent:7.2f}{_remark(fit.outcome)}"
+def _by_source(
+    results: Sequence[Fit | Score], rows: Sequence[tuple[str, ...]], align: str
+) -> list[str]:
+    """Return a table of results by source; the last column says why one does not count."""
+    outcomes = [result.outcome for result in results]
+    remarks = ["" if o.included else f"{o.kind}: {o.reason}" for o in outcomes]
+    heading, *lines = text_table(
+        [rows[0], *((*row, remark) for row, remark in zip(rows[1:], remarks, strict=True))],
+        align,
+        "  ",
     )
-
-
-def _score_line(score: Score) -> str:
-    return (
-        f"{score.epoch[-10:]:>10} {score.condition[:10]:>10} {score.impulse_nm_s:14.5g} "
-        f"{score.work_j:10.5g}{_remark(score.outcome)}"
-    )
-
-
-def _remark(outcome: Outcome) -> str:
-    return "" if outcome.included else f"  {outcome.kind}: {outcome.reason}"
+    shown = [heading]
+    for source, of_source in groupby(
+        zip(results, lines, strict=True), key=lambda each: each[0].source
+    ):
+        shown += [f" {source}", *(line for _, line in of_source)]
+    return shown

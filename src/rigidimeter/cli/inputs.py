@@ -1,47 +1,66 @@
-"""What commands do with their inputs: analyse them, protect them, report what was wrong."""
+"""What commands do with their inputs: read and analyse them, protect them, say what was wrong."""
 
 from __future__ import annotations
 
 import shlex
 import sys
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
+from rigidimeter.cli.options import Recordings
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.recording import Recording
     from rigidimeter.records import Analysis, Fit, Notice, Score
+    from rigidimeter.study import StudyResult
 
 __all__ = [
-    "analyse_inputs",
+    "AnalysedStudy",
+    "analyse_recordings",
+    "analyse_study_folder",
     "command_line",
     "keep_inputs",
     "say",
-    "status",
+    "study_files",
+    "study_of",
 ]
 
+_OF_RECORDINGS = ("column", "rate_hz", "reaction", "epoch_length_s", "condition", "task")
+"""Options that say how to read a single recording."""
 
-def analyse_inputs(recording: Recording, method: str) -> Analysis:
-    """Fit and score with progress.
+
+def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysis, int]:
+    """Read, fit and score recordings with progress, and say what is wrong with them.
+
+    Returns
+    -------
+    tuple of (Recording, Analysis, int)
+        The exit status is 1 if an input was bad or an epoch failed, else 0.
 
     Raises
     ------
     UserError
-        If there is no such method.
+        If there is no such method, an option is wrong, or no input can be read.
     """
     from rigidimeter.cli.progress import Meter
     from rigidimeter.estimation import method_names
-    from rigidimeter.study import estimate
+    from rigidimeter.study import analysis_warnings, estimate
 
-    if method not in method_names():
+    read = recordings.read()
+    say(read.notices)
+    if recordings.method not in method_names():
         known = ", ".join(method_names())
-        raise UserError(f"--method {method}: there is no such method; known: {known}")
+        raise UserError(f"--method {recordings.method}: there is no such method; known: {known}")
     with Meter("estimate", 1.0) as meter:
-        return estimate(recording, method, progress=meter.advance)
+        analysis = estimate(read, recordings.method, progress=meter.advance)
+    say(analysis_warnings(analysis))
+    failed = _say_failed(analysis)
+    return read, analysis, int(read.failed or failed)
 
 
 def command_line() -> str:
@@ -73,23 +92,117 @@ def keep_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:
         kept.add(place)
 
 
-def say(notices: tuple[Notice, ...]) -> None:
+def say(notices: Iterable[Notice]) -> None:
     """Print notices to the standard error, one sentence a line."""
     for notice in notices:
         typer.echo(f"{notice.level}: {notice.text}", err=True)
 
 
-def status(recording: Recording, analysis: Analysis) -> int:
-    """Say what failed or looks wrong; return 1 if an input was bad or an epoch failed, else 0."""
-    from rigidimeter.study import analysis_warnings
-
-    say(analysis_warnings(analysis))
-    bad = recording.failed
+def _say_failed(analysis: Analysis) -> bool:
+    """Say which epochs failed, and why; return whether any did."""
     results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
-    for result in results:
-        if result.outcome.kind == "failed":
-            bad = True
-            typer.echo(
-                f"error: {result.source}, epoch {result.epoch}: {result.outcome.reason}", err=True
+    failed = [result for result in results if result.outcome.kind == "failed"]
+    for result in failed:
+        typer.echo(
+            f"error: {result.source}, epoch {result.epoch}: {result.outcome.reason}", err=True
+        )
+    return bool(failed)
+
+
+@dataclass(frozen=True)
+class AnalysedStudy:
+    """An analysed study, whether it was kept, and the exit status: 1 with a bad input."""
+
+    result: StudyResult
+    kept: bool
+    status: int
+
+
+def study_of(recordings: Recordings, key: Path | None) -> Path | None:
+    """Return the study folder among the inputs; None if there is none.
+
+    Raises
+    ------
+    UserError
+        If a study folder is named beside other inputs, or an option does not go with what is named.
+    """
+    from rigidimeter.recording.study_folder import is_study
+    from rigidimeter.recording.study_toml import STUDY_FILE
+
+    studies = [path for path in recordings.paths if is_study(path)]
+    if not studies:
+        if key is not None:
+            raise UserError(
+                f"--key {key}: goes with a study folder, but {recordings.paths[0]} is none: it "
+                f"has no {STUDY_FILE}"
             )
-    return int(bad)
+        return None
+    if len(recordings.paths) > 1:
+        raise UserError(
+            f"{studies[0]}: is a study folder and names its own recordings; give it alone, or add "
+            "the other recordings to its sessions.csv"
+        )
+    for name in _OF_RECORDINGS:
+        if getattr(recordings, name):
+            raise UserError(
+                f"--{name.replace('_', '-')}: is for single recordings; those of a study folder "
+                "are session folders, or files with the standard names"
+            )
+    return studies[0]
+
+
+def study_files(folder: Path, key: Path | None) -> tuple[Path, ...]:
+    """Return the study's own files, which no other output may be written over."""
+    from rigidimeter.recording.study_folder import read_study_folder
+
+    tables = read_study_folder(folder, key).files.values()
+    return folder, *tables, *(folder / "analysis").glob("*")
+
+
+def analyse_study_folder(
+    folder: Path,
+    recordings: Recordings,
+    key: Path | None = None,
+    *,
+    pair: tuple[str | None, str | None] = (None, None),
+    seed: int = 1,
+    resamples: int = 9999,
+) -> AnalysedStudy:
+    """Read and analyse a study folder, keep the analysis in it, and say what is wrong or new.
+
+    Raises
+    ------
+    UserError
+        If there is nothing to analyse.
+    """
+    from rigidimeter.cli.progress import Meter
+    from rigidimeter.settings import load_settings
+    from rigidimeter.study import analyse_study, keep, provenance, read_study
+
+    chosen = load_settings(recordings.settings) if recordings.settings is not None else None
+    with Meter("read", 1.0) as meter:
+        read = read_study(
+            folder,
+            key=key,
+            settings=chosen,
+            method=recordings.method,
+            pair=pair,
+            progress=meter.advance,
+        )
+    read = replace(read, settings=recordings.adjust(read.settings))
+    with Meter("study", 1.0) as meter:
+        result = analyse_study(read, seed=seed, resamples=resamples, progress=meter.advance)
+    say(result.notices)
+    bad = any(notice.level == "error" for notice in result.notices)
+    bad |= _say_failed(result.analysis)
+    changes, kept = [], True
+    try:
+        changes = keep(read, result)
+    except UserError as error:
+        typer.echo(f"error: the analysis is not kept: {error}", err=True)
+        kept = False
+    sessions = (folder / session.path for session in result.sessions)
+    tables = (path for name, path in read.folder.files.items() if name != "key")
+    facts = provenance((*tables, *sessions), result.settings, command_line())
+    result = replace(result, changes=tuple(changes), provenance=facts)
+    return AnalysedStudy(result, kept, int(bad or not kept))

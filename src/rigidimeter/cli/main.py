@@ -18,19 +18,17 @@ import typer
 
 from rigidimeter.cli.commission import commission
 from rigidimeter.cli.compare import compare
-from rigidimeter.cli.demo import demo
 from rigidimeter.cli.design import design
 from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
 from rigidimeter.cli.model import model
 from rigidimeter.cli.options import RegistryCommand
 from rigidimeter.cli.ratings import ratings
-from rigidimeter.cli.recover import recover
 from rigidimeter.cli.report import report
 from rigidimeter.cli.reproduce import reproduce
-from rigidimeter.cli.run import run
+from rigidimeter.cli.run import recover, run
 from rigidimeter.cli.simulate import simulate
-from rigidimeter.cli.study import study
+from rigidimeter.cli.study import demo, study
 from rigidimeter.errors import UserError
 from rigidimeter.version import __version__
 
@@ -53,13 +51,13 @@ def _print_version(wanted: bool) -> None:
 
 
 def _load(paths: list[Path] | None) -> None:
-    """Run files of Python that add to the package, such as an estimator, in their order."""
+    """Run Python files that add to the package, such as an estimator, in their order."""
     for path in paths or ():
         if not path.is_file():
             raise UserError(f"--load {path}: there is no such file")
         spec = importlib.util.spec_from_file_location(path.stem, path)
         if spec is None or spec.loader is None:
-            raise UserError(f"--load {path}: is not a file of Python; its name must end in .py")
+            raise UserError(f"--load {path}: is not a Python file; its name must end in .py")
         module = importlib.util.module_from_spec(spec)
         sys.modules.setdefault(path.stem, module)
         try:
@@ -77,7 +75,7 @@ def _root(
             metavar="FILE",
             callback=_load,
             is_eager=True,
-            help="First run a file of Python that adds an estimator, a file format, a term or a "
+            help="First run a Python file that adds an estimator, a file format, a term or a "
             "check; repeat as needed.",
         ),
     ] = None,
@@ -86,13 +84,13 @@ def _root(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    """Measure joint rigidity: perturbation, virtual rig, recording, J-B-K estimates, report.
+    """Measure joint rigidity: plan, run or simulate, estimate J, B and K, compare, report.
 
     \b
     A first look:   rigidimeter demo --out demo-study
     Your own data:  rigidimeter estimate recording.csv --epoch-length-s 20
 
-    rigidimeter is research software and no medical device.
+    rigidimeter is research software, not a medical device.
     """
 
 
@@ -120,7 +118,7 @@ def _terminated(_signal: int, _frame: FrameType | None) -> None:
 
 
 def main() -> None:
-    """Run the command line; what a user did wrong ends with one sentence and status 1."""
+    """Run the command line; a mistake of the user ends with one sentence and status 1."""
     signal.signal(signal.SIGTERM, _terminated)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
-from rigidimeter.cli.options import Recordings, reads_recordings
+from rigidimeter.cli.options import JsonOption, Recordings, reads_recordings
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -42,9 +41,7 @@ def model(
             "recommend one. With one --terms, each of its further terms is tried by itself.",
         ),
     ] = False,
-    json_out: Annotated[
-        Path | None, typer.Option("--json", metavar="OUT", help="Write everything as JSON.")
-    ] = None,
+    json_out: JsonOption = None,
 ) -> None:
     """Fit the torque as a sum of terms by name, and find which terms it needs.
 

@@ -1,6 +1,7 @@
-"""Options that several commands share: how to read recordings and how to fit them.
+"""Options that several commands share, each declared once.
 
-`reads_recordings` gives them to a command, which takes a `Recordings` as its first parameter.
+`reads_recordings` gives a command the options that say how to read recordings and how to fit them;
+the command takes a `Recordings` as its first parameter.
 """
 
 from __future__ import annotations
@@ -22,7 +23,19 @@ if TYPE_CHECKING:
     from rigidimeter.records import Task
     from rigidimeter.settings import Settings
 
-__all__ = ["Recordings", "RegistryCommand", "SettingsOption", "adjusted", "reads_recordings"]
+__all__ = [
+    "CsvOption",
+    "JsonOption",
+    "KeyOption",
+    "NewSessionOption",
+    "NewStudyOption",
+    "Recordings",
+    "RegistryCommand",
+    "SeedOption",
+    "SettingsOption",
+    "StudySeedOption",
+    "reads_recordings",
+]
 
 
 class RegistryCommand(TyperCommand):
@@ -56,7 +69,41 @@ class RegistryCommand(TyperCommand):
 SettingsOption = Annotated[
     Path | None,
     typer.Option(
-        "--settings", metavar="FILE", help="Settings in TOML, such as examples/settings/study.toml."
+        "--settings",
+        metavar="FILE",
+        help="Settings in TOML, such as examples/settings/study.toml. A value that the file does "
+        "not give has its default.",
+    ),
+]
+JsonOption = Annotated[
+    Path | None, typer.Option("--json", metavar="FILE", help="Write all results to a JSON file.")
+]
+CsvOption = Annotated[
+    Path | None, typer.Option("--csv", metavar="FILE", help="Write the table to a CSV file.")
+]
+NewSessionOption = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="New folder for the session.")
+]
+NewStudyOption = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="New folder for the study.")
+]
+SeedOption = Annotated[
+    int | None,
+    typer.Option(
+        "--seed", metavar="N", help="Seed of all random numbers. Default: that of the settings."
+    ),
+]
+StudySeedOption = Annotated[
+    int,
+    typer.Option("--seed", metavar="N", min=0, max=2**31, help="Seed of all random numbers."),
+]
+KeyOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--key",
+        metavar="FILE",
+        help="Blinding key of a study folder (columns code and condition), if it is kept "
+        "elsewhere.",
     ),
 ]
 
@@ -159,7 +206,37 @@ class Recordings:
             task=cast("Task | None", self.task),
             settings=self.settings,
         )
-        return replace(recording, settings=adjusted(recording.settings, self))
+        return replace(recording, settings=self.adjust(recording.settings))
+
+    def adjust(self, settings: Settings) -> Settings:
+        """Return settings with the band and the controller of the options.
+
+        Raises
+        ------
+        UserError
+            If a value is out of its range.
+        """
+        from rigidimeter.settings import changed_settings
+
+        if self.band_hz is not None:
+            low, high = self.band_hz
+            band = {
+                "band_low_hz": low,
+                "band_high_hz": high,
+                "band_high_unknown_hz": high,
+                "band_high_closed_loop_hz": high,
+            }
+            settings = changed_settings(
+                settings, {"estimation": band}, f"--band-hz {low:g} {high:g}"
+            )
+        if self.controller is not None:
+            inertia, damping = self.controller
+            settings = changed_settings(
+                settings,
+                {"controller": {"inertia_kg_m2": inertia, "damping_nm_s_rad": damping}},
+                f"--controller {inertia:g} {damping:g}",
+            )
+        return settings
 
 
 def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:
@@ -185,34 +262,6 @@ def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:
     with_options.__annotations__ = {**hints, "return": None}
     del with_options.__wrapped__
     return with_options
-
-
-def adjusted(settings: Settings, wanted: Recordings) -> Settings:
-    """Return the settings with the band and the controller that options give.
-
-    Raises
-    ------
-    UserError
-        If one is out of its range.
-    """
-    from rigidimeter.settings import dump_settings, parse_settings
-
-    if wanted.band_hz is not None:
-        low, high = wanted.band_hz
-        values = dump_settings(settings)
-        values["estimation"] |= {
-            "band_low_hz": low,
-            "band_high_hz": high,
-            "band_high_unknown_hz": high,
-            "band_high_closed_loop_hz": high,
-        }
-        settings = parse_settings(values, source=f"--band-hz {low:g} {high:g}")
-    if wanted.controller is not None:
-        inertia, damping = wanted.controller
-        values = dump_settings(settings)
-        values["controller"] |= {"inertia_kg_m2": inertia, "damping_nm_s_rad": damping}
-        settings = parse_settings(values, source=f"--controller {inertia:g} {damping:g}")
-    return settings
 
 
 def _columns(pairs: list[str]) -> dict[str, str]:

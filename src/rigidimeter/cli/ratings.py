@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
+from rigidimeter.cli.options import JsonOption
+from rigidimeter.cli.text_table import text_table
 
 if TYPE_CHECKING:
     from rigidimeter.study.rating_contrasts import RatingsModel
@@ -19,11 +21,10 @@ __all__ = ["ratings"]
 
 def ratings(
     table: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A table as CSV.", show_default=False)
+        Path,
+        typer.Argument(metavar="FILE", help="CSV file with one rating a row.", show_default=False),
     ],
-    json_out: Annotated[
-        Path | None, typer.Option("--json", metavar="OUT", help="Write the numbers as JSON.")
-    ] = None,
+    json_out: JsonOption = None,
     condition: Annotated[
         str, typer.Option("--condition", metavar="COLUMN", help="Column of the condition.")
     ] = "condition",
@@ -38,22 +39,22 @@ def ratings(
     ] = "subject",
     day: Annotated[
         str,
-        typer.Option("--day", metavar="COLUMN", help="Column of the day; one label is one day."),
+        typer.Option("--day", metavar="COLUMN", help="Column of the day."),
     ] = "day",
     random: Annotated[
         list[str] | None,
         typer.Option(
             "--random",
             metavar="examiner|subject|subject/day",
-            help="What has a random offset; default: examiner. Repeat for several.",
+            help="What has a random offset. Default: examiner. Repeat for several.",
         ),
     ] = None,
     scale: Annotated[
         tuple[float, float],
-        typer.Option("--scale", metavar="LOW HIGH", help="Lowest and highest rating there is."),
+        typer.Option("--scale", metavar="LOW HIGH", help="Lowest and highest rating."),
     ] = (0.0, 3.0),
     step: Annotated[
-        float, typer.Option("--step", metavar="STEP", help="Steps of the scale; 0 for none.")
+        float, typer.Option("--step", metavar="STEP", help="Step of the scale; 0 for none.")
     ] = 0.5,
     contrast: Annotated[
         tuple[str, str] | None,
@@ -111,17 +112,17 @@ def _lines(found: RatingsModel) -> Iterator[str]:
     offsets = " + ".join(f"offset of {name}" for name in fit.variances)
     yield f"{found.source}: {fit.n} ratings in {len(fit.conditions)} conditions"
     yield f"score = mean of condition + {offsets} + error, fitted by REML"
-    yield from ("", f"{'condition':>12}  {'n':>4}  {'mean':>8}  {'SE':>8}")
-    for name, mean, variance in zip(
-        fit.conditions, fit.means, fit.covariance.diagonal(), strict=True
-    ):
-        se = math.sqrt(variance)
-        yield f"{name:>12}  {found.counts[name]:4d}  {mean:8.4f}  {se:8.4f}"
+    rows = [
+        (name, f"{found.counts[name]}", f"{mean:.4f}", f"{math.sqrt(variance):.4f}")
+        for name, mean, variance in zip(
+            fit.conditions, fit.means, fit.covariance.diagonal(), strict=True
+        )
+    ]
+    yield from ("", *text_table([("condition", "n", "mean", "SE"), *rows], "<>>>", "  "))
     for group, offsets_of in fit.offsets.items():
         counts = found.counts_of(group)
-        yield from ("", f"{group:>12}  {'n':>4}  {'offset':>8}")
-        for name, offset in offsets_of.items():
-            yield f"{name:>12}  {counts[name]:4d}  {offset:8.4f}"
+        groups = [(name, f"{counts[name]}", f"{value:.4f}") for name, value in offsets_of.items()]
+        yield from ("", *text_table([(group, "n", "offset"), *groups], "<>>", "  "))
         variance = fit.variances[group]
         yield f"Variance of {group}: {variance:.4g} (SD {math.sqrt(variance):.4g})."
     residual = fit.variance_residual

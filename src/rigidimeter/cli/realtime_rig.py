@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["run_loop"]
 
 HOME_TOLERANCE_RAD = 0.05
-"""A session is gone on with from where it began, within 3 deg."""
+"""A session is continued from where it began, within 3 deg."""
 
 
 def run_loop(
@@ -37,7 +37,7 @@ def run_loop(
     rig_path : Path or None
         RIG.toml; the virtual rig if not given.
     home_rad : float or None
-        Where the joint stood, on the drive's scale, when the session began that this goes on with.
+        Where the joint stood, on the drive's scale, when the session began that this one continues.
     side : LoopSide
         Rings, shared status and what prepares the process.
     """

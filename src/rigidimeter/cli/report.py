@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rigidimeter.cli.inputs import analyse_inputs, command_line, say, status
-from rigidimeter.cli.options import Recordings, reads_recordings
-from rigidimeter.cli.study_input import KeyOption, analysed_study, study_of
+from rigidimeter.cli.inputs import (
+    analyse_recordings,
+    analyse_study_folder,
+    command_line,
+    study_of,
+)
+from rigidimeter.cli.options import KeyOption, Recordings, reads_recordings
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -54,18 +58,15 @@ def report(
                 f"--out {out}: is the study or its kept analysis; name another folder, such as "
                 f"{folder / 'report'}"
             )
-        found = analysed_study(folder, recordings, key)
-        result, exit_status = found.result, found.status
+        found = analyse_study_folder(folder, recordings, key)
+        result, status = found.result, found.status
     else:
-        read = recordings.read()
-        say(read.notices)
-        analysis = analyse_inputs(read, recordings.method)
-        exit_status = status(read, analysis)
+        read, analysis, status = analyse_recordings(recordings)
         result = recording_result(read, analysis, command_line())
     page = write_page(result, out, title)
     write_estimates_json(out / "estimates.json", result.analysis)
     typer.echo(str(page))
-    raise typer.Exit(exit_status)
+    raise typer.Exit(status)
 
 
 def write_page(result: StudyResult, out: Path, title: str | None = None) -> Path:

@@ -1,4 +1,4 @@
-"""`rigidimeter run`: a session in real time, on the virtual rig or on hardware."""
+"""`rigidimeter run` and `rigidimeter recover`: a session in real time, and closing a broken one."""
 
 from __future__ import annotations
 
@@ -10,45 +10,60 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rigidimeter.cli.options import NewSessionOption, SeedOption
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.experiment import Protocol
     from rigidimeter.settings import Settings
 
-__all__ = ["run"]
+__all__ = ["recover", "run"]
 
 
 def run(
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder for the session.")],
+    out: NewSessionOption,
     protocol: Annotated[
-        Path | None, typer.Argument(metavar="[PROTOCOL.toml]", help="Settings of the session.")
+        Path | None,
+        typer.Argument(metavar="[PROTOCOL.toml]", help="Settings with the protocol."),
     ] = None,
     rig: Annotated[
         Path | None,
-        typer.Option("--rig", metavar="RIG.toml", help="The devices; the virtual rig if absent."),
+        typer.Option("--rig", metavar="RIG.toml", help="The rig file. Default: the virtual rig."),
     ] = None,
     resume: Annotated[
         Path | None,
-        typer.Option("--resume", metavar="DIR", help="Go on with what is left of this session."),
+        typer.Option(
+            "--resume", metavar="DIR", help="Continue this session: run the epochs that are left."
+        ),
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option("--seed", help="Seed of everything random; recorded.")
-    ] = None,
+    seed: SeedOption = None,
     unattended: Annotated[
-        bool, typer.Option("--unattended", help="No operator: what would pause the rig ends it.")
+        bool,
+        typer.Option(
+            "--unattended",
+            help="Run without an operator: what would pause the session ends it instead.",
+        ),
     ] = False,
     priority: Annotated[
-        int, typer.Option("--priority", min=0, max=99, help="Of SCHED_FIFO; 0 asks for none.")
+        int,
+        typer.Option(
+            "--priority",
+            metavar="N",
+            min=0,
+            max=99,
+            help="Real-time priority (SCHED_FIFO) of the loop; 0 for none.",
+        ),
     ] = 80,
     cpu: Annotated[
-        int | None, typer.Option("--cpu", help="Processor of the loop; the last one if absent.")
+        int | None,
+        typer.Option("--cpu", metavar="N", help="Processor of the loop. Default: the last one."),
     ] = None,
 ) -> None:
-    """Run a protocol in real time: loop, recorder and live estimate in processes of their own.
+    """Run a protocol in real time, on the virtual rig or on hardware.
 
-    Without --rig on the virtual rig. On hardware the rig must have been commissioned
-    (`rigidimeter commission`). Mechanical stops and a hardware enable come before this program.
+    Loop, recorder and live estimate run in separate processes. With --rig, the rig must have been
+    commissioned (`rigidimeter commission`). Fit mechanical stops and a hardware enable before you
+    rely on this program.
 
     \b
     For example:
@@ -92,7 +107,7 @@ def run(
     good, of = _counted(out)
     typer.echo(f"{good} of {of} epochs ended with success; session in {out}")
     if ended.outcome != "success":
-        again = f"; go on with `{_going_on(out, rig)}`" if good < of else ""
+        again = f"; continue it with `{_resume_command(out, rig)}`" if good < of else ""
         raise UserError(
             f"{out}: the session ended with {ended.outcome or 'no outcome'}: {ended.reason}{again}"
         )
@@ -104,18 +119,17 @@ def _planned(
     """Return settings, the epochs to run, and what they continue."""
     from rigidimeter.experiment import Protocol, plan
     from rigidimeter.recording.resume import rest_of
-    from rigidimeter.settings import dump_settings, load_settings, parse_settings
+    from rigidimeter.settings import changed_settings, load_settings
 
     if resume is None:
         settings = load_settings(path)
         if seed is not None:
-            values = dump_settings(settings) | {"seed": seed}
-            settings = parse_settings(values, source="the options")
+            settings = changed_settings(settings, {"seed": seed}, "the options")
         planned = plan(settings.protocol, settings.prbs, settings.sinusoid, settings.seed)
         return settings, planned, {}
     if path is not None or seed is not None:
         raise UserError(
-            "--resume goes on with the settings and the seed of the session; leave out "
+            "--resume uses the settings and the seed of that session; leave out "
             + (f"{path}" if path is not None else "--seed")
         )
     _ended(resume)
@@ -124,9 +138,10 @@ def _planned(
         raise UserError(
             f"{resume}: was recorded on "
             + (
-                "the virtual rig and goes on only there; leave out --rig"
+                "the virtual rig and can only be continued there; leave out --rig"
                 if rest.virtual
-                else "hardware and goes on only there; name its rig file with --rig RIG.toml"
+                else "hardware and can only be continued there; name its rig file with --rig "
+                "RIG.toml"
             )
         )
     if not rest.epochs:
@@ -145,12 +160,12 @@ def _ended(session: Path) -> None:
     with events.open("rb") as file:
         if not lock(file):
             raise UserError(
-                f"{session}: is still being recorded; end that session first, then go on with it"
+                f"{session}: is still being recorded; end that session first, then continue it"
             )
 
 
 def _offer(out: Path) -> None:
-    """Say how to go on where the folder holds a session that was interrupted."""
+    """Say how to continue if the folder holds a session that was interrupted."""
     from rigidimeter.recording import is_session
     from rigidimeter.recording.resume import rest_of
 
@@ -159,13 +174,13 @@ def _offer(out: Path) -> None:
     rest = rest_of(out)
     if rest.epochs:
         raise UserError(
-            f"{out}: holds a session of which {len(rest.epochs)} epochs are left; go on with "
-            f"`{_going_on(out, None if rest.virtual else 'RIG.toml')}`, or name a new folder"
+            f"{out}: holds a session of which {len(rest.epochs)} epochs are left; continue it with "
+            f"`{_resume_command(out, None if rest.virtual else 'RIG.toml')}`, or name a new folder"
         )
 
 
-def _going_on(out: Path, rig: Path | str | None) -> str:
-    """Return the command that goes on with a session."""
+def _resume_command(out: Path, rig: Path | str | None) -> str:
+    """Return the command that continues a session."""
     return " ".join(
         ["rigidimeter run --resume", str(out), *(["--rig", str(rig)] if rig else []), "--out NEW"]
     )
@@ -179,3 +194,32 @@ def _counted(folder: Path) -> tuple[int, int]:
     events, _ = read_events(folder / EVENTS)
     good = sum(e.get("event") == "epoch_ended" and e["outcome"] == "success" for e in events)
     return good, len(read_manifest(folder)["protocol"])
+
+
+def recover(
+    session: Annotated[
+        Path, typer.Argument(metavar="SESSION", help="Session folder.", show_default=False)
+    ],
+    reason: Annotated[
+        str, typer.Option("--reason", metavar="TEXT", help="Why it ended, if you know.")
+    ] = "the recording process ended without closing the session",
+) -> None:
+    """Close an interrupted session, keeping everything that was written.
+
+    Open epochs end with `fail` and the reason. A session that is closed already does not change.
+
+    \b
+    For example:
+      rigidimeter recover session
+      rigidimeter recover session --reason "power cut"
+    """
+    from rigidimeter.recording import recover as close_session
+
+    found = close_session(session, reason)
+    extent = f"{found.n_samples} samples up to {found.last_time_s:.3f} s"
+    if found.already_closed:
+        typer.echo(f"{session} was closed already: {extent}")
+        return
+    epochs = ", ".join(found.epochs_closed) or "none"
+    torn = f"; {found.torn_bytes} torn bytes kept in samples.torn" if found.torn_bytes else ""
+    typer.echo(f"{session} is closed: {extent}; open epochs closed as failed: {epochs}{torn}")

@@ -1,15 +1,22 @@
-"""`rigidimeter study`: make a study folder, empty or virtual; `compare` and `report` read it."""
+"""`rigidimeter study` and `rigidimeter demo`: make a study folder, empty or virtual."""
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.inputs import analyse_study_folder
+from rigidimeter.cli.options import NewStudyOption, Recordings, StudySeedOption
 from rigidimeter.errors import UserError
 
-__all__ = ["study"]
+if TYPE_CHECKING:
+    from rigidimeter.virtual.study_design import StudyDesign
+    from rigidimeter.virtual.study_plan import DayPlan
+
+__all__ = ["demo", "study"]
 
 study = typer.Typer(
     name="study",
@@ -26,9 +33,9 @@ def new(
 ) -> None:
     """Make a study folder: study.toml and its tables, with comments and no rows.
 
-    Write a row in sessions.csv for each session folder or recording, then compare and report.
+    Write a row in sessions.csv for each session folder or recording, then run compare and report.
 
-    \\b
+    \b
     For example:
       rigidimeter study new study --title "Elbow, winter"
       rigidimeter compare study
@@ -42,20 +49,22 @@ def new(
 
 @study.command()
 def simulate(
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder for the study.")],
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, max=2**31, help="Seed of everything random.")
-    ] = 2023,
+    out: NewStudyOption,
+    seed: StudySeedOption = 2023,
     design: Annotated[
         str,
         typer.Option(
             "--design",
             metavar="paper|pushing|null",
-            help="As in the paper; equal joints but a subject who pushes; no difference at all.",
+            help="paper: the conditions differ as in the paper. pushing: equal joints, and a "
+            "subject who pushes. null: the conditions do not differ.",
         ),
     ] = "paper",
     processes: Annotated[
-        int, typer.Option("--processes", min=1, max=64, help="Sessions that run side by side.")
+        int,
+        typer.Option(
+            "--processes", metavar="N", min=1, max=64, help="Sessions to simulate in parallel."
+        ),
     ] = 2,
 ) -> None:
     """Make a virtual study: sessions of nine days, ratings, and the tables that describe them.
@@ -69,23 +78,95 @@ def simulate(
       rigidimeter compare study
       rigidimeter study simulate --out pushing --design pushing --seed 7
     """
-    from rigidimeter.cli.progress import Meter
     from rigidimeter.virtual.study_design import DESIGNS
-    from rigidimeter.virtual.study_plan import plan_study
-    from rigidimeter.virtual.virtual_study import study_length_s, write_virtual_study
 
     if design not in DESIGNS:
         raise UserError(f"--design {design}: there is no such design; known: {', '.join(DESIGNS)}")
     chosen = DESIGNS[design]
-    length_s = study_length_s(plan_study(chosen, seed))
-    with Meter("simulate", length_s) as meter:
-        plans = write_virtual_study(out, chosen, seed, processes=processes, progress=meter.reach)
-    epochs = {
-        condition.name: f"{condition.prbs_epochs} PRBS and {condition.sinusoid_epochs} sinusoidal"
-        for condition in chosen.conditions
-    }
+    plans = _simulated(out, chosen, seed, processes)
     typer.echo(f"{chosen.title}, seed {seed}: {len(plans)} sessions on the virtual rig")
-    for name, counted in epochs.items():
-        ratings = sum(len(plan.ratings) for plan in plans if plan.condition == name)
-        typer.echo(f"  {name}: {counted} epochs, {ratings} ratings")
+    for condition in chosen.conditions:
+        ratings = sum(len(plan.ratings) for plan in plans if plan.condition == condition.name)
+        typer.echo(
+            f"  {condition.name}: {condition.prbs_epochs} PRBS and {condition.sinusoid_epochs} "
+            f"sinusoidal epochs, {ratings} ratings"
+        )
     typer.echo(f"{out}: read it with: rigidimeter compare {out}")
+
+
+def demo(
+    out: NewStudyOption = Path("demo-study"),
+    prbs_epochs: Annotated[
+        int,
+        typer.Option(
+            "--prbs-epochs",
+            metavar="N",
+            min=1,
+            max=500,
+            help="PRBS epochs for each condition and day.",
+        ),
+    ] = 10,
+    sinusoid_epochs: Annotated[
+        int,
+        typer.Option(
+            "--sinusoid-epochs",
+            metavar="N",
+            min=1,
+            max=500,
+            help="Sinusoidal epochs for each condition and day.",
+        ),
+    ] = 8,
+    seed: StudySeedOption = 2023,
+) -> None:
+    """Make a virtual study folder of two days, compare its conditions, and write its report.
+
+    Each day has PRBS and sinusoidal epochs in OFF and DBS on the virtual rig, 40 and 32 in all, and
+    ratings. The same as study simulate, compare and report, for a smaller study. An earlier demo in
+    the same folder is moved aside, not overwritten.
+
+    \b
+    For example:
+      rigidimeter demo
+      rigidimeter demo --out small --prbs-epochs 3 --sinusoid-epochs 3
+    """
+    from rigidimeter.cli.report import write_page
+    from rigidimeter.virtual.study_design import two_day_design
+
+    start_s = time.monotonic()
+    _move_aside(out)
+    typer.echo(
+        f"A virtual subject, 2 days, OFF and DBS: {4 * prbs_epochs} PRBS and "
+        f"{4 * sinusoid_epochs} sinusoidal epochs of 20 s with their rests"
+    )
+    _simulated(out, two_day_design(prbs_epochs, sinusoid_epochs), seed)
+    found = analyse_study_folder(out, Recordings([out]))
+    page = write_page(found.result, out / "report")
+    typer.echo(f"Done in {time.monotonic() - start_s:.0f} s. Open the report in a browser:")
+    typer.echo(str(page.resolve()))
+    raise typer.Exit(found.status)
+
+
+def _simulated(out: Path, design: StudyDesign, seed: int, processes: int = 2) -> list[DayPlan]:
+    """Write a virtual study with progress; return its sessions."""
+    from rigidimeter.cli.progress import Meter
+    from rigidimeter.virtual.study_plan import plan_study
+    from rigidimeter.virtual.virtual_study import study_length_s, write_virtual_study
+
+    with Meter("simulate", study_length_s(plan_study(design, seed))) as meter:
+        return write_virtual_study(out, design, seed, processes=processes, progress=meter.reach)
+
+
+def _move_aside(out: Path) -> None:
+    """Give an earlier study another name, so that nothing is written over."""
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return
+    if not (out / "sessions").is_dir():
+        raise UserError(f"--out {out}: is there already and is no earlier demo; name a new folder")
+    number = 1
+    while (aside := out.with_name(f"{out.name}-{number}")).exists():
+        number += 1
+    try:
+        out.rename(aside)
+    except OSError as error:
+        raise UserError(f"{out}: cannot be moved aside ({error.strerror or error})") from None
+    typer.echo(f"{out} was there already and is now {aside}")

@@ -18,7 +18,13 @@ from rigidimeter.settings.experiment_settings import (
     ProtocolSettings,
     SinusoidSettings,
 )
-from rigidimeter.settings.load import dump_settings, load_settings, parse_settings, settings_from
+from rigidimeter.settings.load import (
+    changed_settings,
+    dump_settings,
+    load_settings,
+    parse_settings,
+    settings_from,
+)
 from rigidimeter.settings.loop_settings import (
     GAP_S,
     ControllerSettings,
@@ -59,6 +65,7 @@ __all__ = [
     "SubjectSettings",
     "TorqueSensorSettings",
     "ZeroingSettings",
+    "changed_settings",
     "dump_settings",
     "load_settings",
     "parse_settings",

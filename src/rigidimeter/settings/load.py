@@ -13,7 +13,13 @@ from rigidimeter.errors import UserError
 from rigidimeter.settings.messages import sentence
 from rigidimeter.settings.models import Settings
 
-__all__ = ["dump_settings", "load_settings", "parse_settings", "settings_from"]
+__all__ = [
+    "changed_settings",
+    "dump_settings",
+    "load_settings",
+    "parse_settings",
+    "settings_from",
+]
 
 
 def parse_settings(values: Mapping[str, Any], *, source: str = "settings") -> Settings:
@@ -73,7 +79,20 @@ def settings_from(
         settings = source
     else:
         settings = load_settings(None if source is None else Path(source))
-    return parse_settings(_merged(dump_settings(settings), changes)) if changes else settings
+    return changed_settings(settings, changes) if changes else settings
+
+
+def changed_settings(
+    settings: Settings, changes: Mapping[str, Any], source: str = "settings"
+) -> Settings:
+    """Return the settings with the values of `changes` in their place, validated again.
+
+    Raises
+    ------
+    UserError
+        As `parse_settings`; the sentence begins with `source`.
+    """
+    return parse_settings(_merged(dump_settings(settings), changes), source=source)
 
 
 def _merged(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

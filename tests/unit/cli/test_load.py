@@ -104,7 +104,7 @@ def test_a_term_of_the_torque_is_one_entry(rigidimeter, recording, tmp_path):
         ("absent.py", None, "absent.py: there is no such file"),
         ("bad.py", "1 / 0", "bad.py: ZeroDivisionError: division by zero"),
         ("bad.py", "def", "bad.py: SyntaxError: invalid syntax"),
-        ("notes.txt", "text", "is not a file of Python; its name must end in .py"),
+        ("notes.txt", "text", "is not a Python file; its name must end in .py"),
     ],
 )
 def test_a_file_that_cannot_be_loaded_is_named(rigidimeter, tmp_path, name, text, words):

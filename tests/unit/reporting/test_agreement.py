@@ -12,7 +12,7 @@ from tests.unit.reporting.cohorts import Design, made_study
 from tests.unit.reporting.parsed_page import ParsedPage
 
 from rigidimeter.cli.comparison_text import comparison_lines
-from rigidimeter.cli.estimate import _lines as estimate_lines
+from rigidimeter.cli.estimate import estimate_lines
 from rigidimeter.documents import read_json, write_json
 from rigidimeter.recording import estimates_document
 from rigidimeter.reporting import SECTIONS

@@ -1,0 +1,35 @@
+"""Tables for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+__all__ = ["text_table"]
+
+
+def text_table(rows: Iterable[Sequence[str]], align: str, indent: str = "") -> list[str]:
+    """Return rows of cells as lines with aligned columns, two spaces apart.
+
+    Parameters
+    ----------
+    rows : iterable of sequences of str
+        The headings are the first row. All rows have the same number of cells.
+    align : str
+        For each column ``<`` (left) or ``>`` (right).
+    indent : str
+        What every line begins with.
+
+    Examples
+    --------
+    >>> text_table([("name", "n"), ("a", "10")], "<>")
+    ['name   n', 'a     10']
+    """
+    cells = [tuple(row) for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return [
+        indent
+        + "  ".join(
+            f"{cell:{side}{width}}" for cell, side, width in zip(row, align, widths, strict=True)
+        ).rstrip()
+        for row in cells
+    ]
