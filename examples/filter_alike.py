@@ -1,10 +1,9 @@
-"""Show what a high-pass on the position alone does to J, B and K.
+"""Show the bias of J, B and K from a high-pass on the position alone.
 
     rigidimeter simulate --out session --task prbs --epochs 10
     python examples/filter_alike.py session
 
-The joint of a virtual session is known, so each row is an error in percent of the truth: the
-median over the epochs.
+The joint of a virtual session is known. Each row is the median error over the epochs, in percent.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ Array = NDArray[np.float64]
 Filter = Callable[[Array], Array]
 
 TRUTH = np.array([0.0045, 0.1368, 1.751])
-"""J, B, K of subject OFF as the settings have it by default."""
+"""J, B, K of subject OFF in the default settings."""
 
 HIGHPASS_HZ = 0.2
 
@@ -43,12 +42,12 @@ def measured(epoch: Epoch) -> Signals:
 
 
 def position_only(raw: Signals, high_pass: Filter) -> Signals:
-    """Filter the position and leave the rest."""
+    """Filter only the position."""
     return replace(raw, angle_rad=high_pass(raw.angle_rad))
 
 
 def all_alike(raw: Signals, high_pass: Filter) -> Signals:
-    """Filter torque, acceleration, velocity and position alike."""
+    """Apply the same filter to torque, acceleration, velocity and position."""
     return replace(
         raw,
         torque_nm=high_pass(raw.torque_nm),
@@ -59,12 +58,12 @@ def all_alike(raw: Signals, high_pass: Filter) -> Signals:
 
 
 def main(folder: Path) -> None:
-    """Print one row for each way to filter."""
+    """Print one row for each kind of filtering."""
     order = session_settings(folder).estimation.published_highpass_order
     raw = [measured(epoch) for epoch in read_session(folder)[0] if epoch.task == "prbs"]
     sos = butter(order, HIGHPASS_HZ, "highpass", fs=raw[0].rate_hz, output="sos")
     causal: Filter = lambda values: sosfilt(sos, values)  # noqa: E731
-    memory = round(raw[0].rate_hz / HIGHPASS_HZ)  # continued at both ends by its mirror image
+    memory = round(raw[0].rate_hz / HIGHPASS_HZ)  # mirror-image extension at both ends
     zero_phase: Filter = lambda values: sosfiltfilt(  # noqa: E731
         sos, values, padtype="even", padlen=memory
     )

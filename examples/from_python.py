@@ -1,9 +1,9 @@
-"""The whole way from Python: simulate, estimate, compare, report.
+"""A complete experiment from Python: design, simulate, estimate, compare, report.
 
     python examples/from_python.py OUT
 
-OUT is a new folder. The subject is virtual, so the true J, B and K are known: those of
-`[subject.OFF]` and `[subject.DBS]` in the settings.
+OUT is a new folder. The subject is virtual, with the J, B and K of the settings below and the
+defaults.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ def main(out: Path) -> None:
     """Run the example in a new folder."""
     out.mkdir(parents=True)
 
-    # Before anybody is moved: is the loop stable, and how precise will J, B and K be?
+    # Stability of the loop and predicted standard errors of J, B and K.
     plan = rm.design(SETTINGS)
     print(plan.table())
 
-    # A session on the virtual rig, read back as epochs.
+    # Run a session on the virtual rig and read its epochs.
     recording = rm.simulate(SETTINGS, out / "session")
 
-    # One epoch from plain arrays: what any other recording would give.
+    # Estimate one epoch from plain arrays.
     epoch = recording.epochs[0]
     channels = {name: channel.values for name, channel in epoch.channels.items()}
     fit = rm.identify(
@@ -49,7 +49,7 @@ def main(out: Path) -> None:
     )
     print(f"K = {fit.stiffness_nm_rad:.4f} ± {fit.stiffness_nm_rad_se:.4f} N·m/rad")
 
-    # Every epoch, with checks; then the two conditions, and a page.
+    # Estimate every epoch, compare the two conditions, and write a report.
     estimates = rm.estimate(recording)
     print(estimates.table()[["condition", "damping_nm_s_rad", "stiffness_nm_rad"]])
     print(rm.compare(estimates).table().T)
