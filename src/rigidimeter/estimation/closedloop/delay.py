@@ -83,11 +83,9 @@ def estimate_delay(
     """
     problems = linearise(observations, start)
     delays = np.linspace(-longest_s, longest_s, 2 * max(round(longest_s / SCAN_STEP_S), 1) + 1)
-    left = [_unexplained(observations, problems, delay_s) for delay_s in delays]
+    left = _unexplained(observations, problems, delays)
     # The valleys of the scan, the deepest first, and none: the subject may have dug the deepest.
-    inner = (
-        np.r_[True, np.array(left[1:]) < left[:-1]] & np.r_[np.array(left[:-1]) < left[1:], True]
-    )
+    inner = np.r_[True, left[1:] < left[:-1]] & np.r_[left[:-1] < left[1:], True]
     valleys = sorted(np.flatnonzero(inner), key=lambda i: left[i])[:MOST_VALLEYS]
     best: LineFit | None = None
     for near_s in dict.fromkeys([*(float(delays[i]) for i in valleys), 0.0]):
@@ -129,16 +127,16 @@ def _solved(
 
 
 def _unexplained(
-    observations: Sequence[Observation], problems: Sequence[Problem], delay_s: float
-) -> float:
-    """Return the torque's power up to `SCAN_HIGH_HZ` that the instruments leave, at a delay."""
-    left = 0.0
+    observations: Sequence[Observation], problems: Sequence[Problem], delays_s: Array
+) -> Array:
+    """Return the torque's power up to `SCAN_HIGH_HZ` that the instruments leave, at each delay."""
+    left = np.zeros(delays_s.size)
     for observation, problem in zip(observations, problems, strict=True):
         omega = observation.lines.grid.omega_rad_s
         low = omega < 2 * np.pi * SCAN_HIGH_HZ
-        target = (problem.target * np.exp(1j * omega * delay_s))[low]
-        rows = problem.instruments[low]
-        rows, target = np.vstack([rows.real, rows.imag]), np.hstack([target.real, target.imag])
-        _, residual, _, _ = np.linalg.lstsq(rows / np.linalg.norm(rows, axis=0), target)
-        left += float(residual.sum())
+        turn = np.exp(1j * omega[low, None] * delays_s)
+        turned, rows = problem.target[low, None] * turn, problem.instruments[low]
+        both = np.vstack([turned.real, turned.imag])
+        basis, _ = np.linalg.qr(np.vstack([rows.real, rows.imag]))
+        left += np.sum(both**2, axis=0) - np.sum((basis.T @ both) ** 2, axis=0)
     return left

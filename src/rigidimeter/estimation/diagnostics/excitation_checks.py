@@ -71,10 +71,10 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
     """
     cause = perturbation_nm(epoch.channels["perturbation_nm"], signals.time_s)
     length = max(2 * signals.time_s.size // (SEGMENTS + 1), 8)
-    values = {}
-    for name, effect in (("torque", signals.torque_nm), ("velocity", signals.velocity_rad_s)):
-        frequency, shared = signal.coherence(cause, effect, signals.rate_hz, nperseg=length)
-        values[name] = float(np.median(shared[lines_inside(frequency, signals.band_hz)]))
+    effects = np.stack([signals.torque_nm, signals.velocity_rad_s])
+    frequency, shared = signal.coherence(cause, effects, signals.rate_hz, nperseg=length)
+    medians = np.median(shared[:, lines_inside(frequency, signals.band_hz)], axis=1)
+    values = dict(zip(("torque", "velocity"), medians.tolist(), strict=True))
     weaker = min(values, key=lambda name: values[name])
     value, least = values[weaker], settings.coherence_least
     return at_least(
