@@ -1,10 +1,10 @@
-"""The emulated rig in a process of its own, told what to do through its lines.
+"""The emulated rig in its own process, controlled by command lines.
 
-    with RigProcess(tmp_path / "RIG.toml") as bench:
-        bench.misbehave("torque", "silent")
-        bench.state()["velocity_rad_s"]
+    with RigProcess(tmp_path / "RIG.toml") as rig:
+        rig.misbehave("torque", "silent")
+        rig.state()["velocity_rad_s"]
 
-A bench that dies or hangs fails the test with what it said; none outlives its context.
+A process that dies or hangs fails the test with its output; none outlives its context.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ START_S = 30.0
 
 
 class RigProcessError(AssertionError):
-    """The bench refused a command, died or did not answer."""
+    """The emulated rig refused a command, died or did not answer."""
 
 
 class RigProcess:
@@ -51,7 +51,7 @@ class RigProcess:
         self.ready: dict[str, Any] = {}
 
     def __enter__(self) -> Self:
-        # A file, not a pipe: nobody has to read it for the bench to go on.
+        # A file, not a pipe, so that unread output cannot block the process.
         self._errors = tempfile.TemporaryFile()
         self._process = subprocess.Popen(
             self._command,
@@ -87,7 +87,7 @@ class RigProcess:
             process.stdin.write(line.encode() + b"\n")
         except OSError as error:
             raise RigProcessError(
-                f"{line!r}: the bench is gone ({error}): {self._said()}"
+                f"{line!r}: the emulated rig is gone ({error}): {self._said()}"
             ) from error
         answer = self._answer(line, ANSWER_S)
         if answer["ok"] is refused:
@@ -95,7 +95,7 @@ class RigProcess:
         return answer
 
     def misbehave(self, role: str, name: str, value: float | None = None) -> dict[str, Any]:
-        """Let the torque or drive emulator do wrong what its help says."""
+        """Start a misbehaviour of the torque or drive emulator."""
         return self.command(f"misbehave {role} {name}" + ("" if value is None else f" {value!r}"))
 
     def behave(self) -> None:
@@ -118,7 +118,7 @@ class RigProcess:
         return state
 
     def close(self) -> None:
-        """End the bench: by the end of its input, and by force where it does not heed that."""
+        """End the process by closing its input, and kill it if that does not end it."""
         process, self._process = self._process, None
         if process is None:
             return
@@ -146,7 +146,7 @@ class RigProcess:
                 raise RigProcessError(f"{line!r}: no answer in {timeout_s:g} s: {self._said()}")
             chunk = process.stdout.read(65536)
             if not chunk:
-                raise RigProcessError(f"{line!r}: the bench ended: {self._said()}")
+                raise RigProcessError(f"{line!r}: the emulated rig ended: {self._said()}")
             self._heard += chunk
         first, _, self._heard = self._heard.partition(b"\n")
         answer: dict[str, Any] = json.loads(first)

@@ -27,7 +27,7 @@ DECELERATION_DEG_S2 = 500.0
 
 
 class Wire:
-    """A emulator, its arm, and as many drivers as a test wants, one after the other."""
+    """An emulator, its arm, and as many drivers as a test wants, one after the other."""
 
     def __init__(self) -> None:
         self.arm = EmulatedArm(JointDynamics(0.08, 0.5, 2.0))

@@ -43,7 +43,7 @@ def _port() -> int:
 
 
 class Wire:
-    """A emulator and, on the same bus, as many drivers as a test wants."""
+    """An emulator and, on the same bus, as many drivers as a test wants."""
 
     def __init__(self) -> None:
         self.channel = f"cia402-{next(_channels)}"

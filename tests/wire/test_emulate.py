@@ -22,32 +22,32 @@ _module = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(_module)
 
 
-def test_the_bench_answers_every_line_and_ends_in_order(tmp_path: Path) -> None:
-    with _module.RigProcess(tmp_path / "RIG.toml", "ascii") as bench:
-        assert load_rig(bench.rig).name == "emulated rig"
-        assert bench.command("place 12")["ok"]
-        state = bench.state()
+def test_the_rig_answers_every_line_and_ends_in_order(tmp_path: Path) -> None:
+    with _module.RigProcess(tmp_path / "RIG.toml", "ascii") as rig:
+        assert load_rig(rig.rig).name == "emulated rig"
+        assert rig.command("place 12")["ok"]
+        state = rig.state()
         assert state["angle_rad"] == pytest.approx(0.2094, abs=1e-3)
         assert state["power"] is False
-        assert bench.misbehave("drive", "runs away", 2.0)["misbehaves"] == "runs_away"
-        assert bench.misbehave("torque", "lose", 3)["value"] == 3.0
+        assert rig.misbehave("drive", "runs away", 2.0)["misbehaves"] == "runs_away"
+        assert rig.misbehave("torque", "lose", 3)["value"] == 3.0
         for line in ("nonsense", "misbehave", "misbehave drive nonsense", "place", "joint -1 0 0"):
-            assert "error" in bench.command(line, refused=True)
-        bench.command("press")
-        assert bench.state()["pressed"] is True
-        bench.behave()
-        assert bench.state()["pressed"] is True  # a repaired rig is not a released button
-        bench.command("release")
-        assert bench.state()["pressed"] is False
-        assert set(bench.command("help")) >= {"torque", "drive", "commands"}
-        assert isinstance(bench.log(), list)
-        process = bench._process
-        os.kill(bench.pid, signal.SIGINT)
+            assert "error" in rig.command(line, refused=True)
+        rig.command("press")
+        assert rig.state()["pressed"] is True
+        rig.behave()
+        assert rig.state()["pressed"] is True  # a repaired rig is not a released button
+        rig.command("release")
+        assert rig.state()["pressed"] is False
+        assert set(rig.command("help")) >= {"torque", "drive", "commands"}
+        assert isinstance(rig.log(), list)
+        process = rig._process
+        os.kill(rig.pid, signal.SIGINT)
         assert process.wait(10.0) == 0
-    assert bench._process is None
+    assert rig._process is None
 
 
-def test_a_bench_that_cannot_start_says_why(tmp_path: Path) -> None:
+def test_a_rig_that_cannot_start_says_why(tmp_path: Path) -> None:
     with (
         pytest.raises(AssertionError, match=r"torque-rate-hz|rate_hz"),
         _module.RigProcess(tmp_path / "RIG.toml", "ascii", "--torque-rate-hz", "-1"),

@@ -35,7 +35,7 @@ def emulator(arm):
 
 @pytest.fixture
 def sensor_of():
-    """Make a driver of a emulator; all are closed in the end."""
+    """Make a driver of an emulator; all are closed in the end."""
     made = []
 
     def make(emulator, now=time.monotonic, **settings):

@@ -104,10 +104,10 @@ class ComposedRig:
         """
         facts = {"torque_sensor": self._sensor.configure(), "drive": self._drive.configure()}
         for role, found in facts.items():
-            self._fast_enough(role, found)
+            self._check_rate(role, found)
         return {role: asdict(found) for role, found in facts.items()}
 
-    def _fast_enough(self, role: str, facts: DeviceFacts) -> None:
+    def _check_rate(self, role: str, facts: DeviceFacts) -> None:
         if facts.fastest_tick_rate_hz < self._tick_rate_hz:
             raise DeviceError(
                 f"{role} ({facts.model or 'unknown model'}): keeps up with "

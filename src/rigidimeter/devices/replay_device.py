@@ -50,8 +50,7 @@ class _Player:
         for name, array in arrays.items():
             if array.shape != (length,) or length == 0:
                 raise DeviceError(
-                    f"replay: column {name!r} has shape {array.shape}; "
-                    f"({max(length, 1)},) would be right"
+                    f"replay: column {name!r} has shape {array.shape}; expected ({max(length, 1)},)"
                 )
         self._values: dict[str, list[Any]] = {}
         for name, array in arrays.items():

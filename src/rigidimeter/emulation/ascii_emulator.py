@@ -93,8 +93,8 @@ class AsciiEmulator:
         self._registers = {0x24: OFF, 0x2F: 0, 0x36: 1000, 0x37: 1000, 0x90: POWER_UP_BAUD}
         self._registers |= dict.fromkeys((0xA4, 0xC8, 0xCA, 0xCB), 0)
         self._registers |= dict.fromkeys((0xCC, 0xCD, 0xCF), 10_000)
-        place = self._counts()[0]
-        self._generator = Trapezoid(place, place)
+        position = self._counts()[0]
+        self._generator = Trapezoid(position, position)
         self._generated_s = time.monotonic()
         self._frozen: tuple[int, int] | None = None
         self._running = True
@@ -153,10 +153,10 @@ class AsciiEmulator:
         os.close(self._master)
         os.close(self._slave)
 
-    # -- the wire -----------------------------------------------------------------------------
+    # -- serial line --------------------------------------------------------------------------
 
     def _run(self) -> None:
-        heard = bytearray()
+        received = bytearray()
         arrived_s = 0.0
         while self._running:
             ready, _, _ = select.select([self._master], [], [], STEP_S)
@@ -165,17 +165,17 @@ class AsciiEmulator:
             if not ready:
                 continue
             chunk = os.read(self._master, 4096)
-            if not heard:
+            if not received:
                 arrived_s = time.monotonic()
             rate = SPEEDS.get(termios.tcgetattr(self._slave)[4])
             if rate != self._registers[0x90]:
                 self.log.append((time.monotonic(), "(noise)", ""))
-                heard.clear()
+                received.clear()
                 continue
-            heard += chunk
-            while b"\r" in heard:
-                line, _, rest = bytes(heard).partition(b"\r")
-                heard = bytearray(rest)
+            received += chunk
+            while b"\r" in received:
+                line, _, rest = bytes(received).partition(b"\r")
+                received = bytearray(rest)
                 arrived_s += (len(line) + 1) * self._character_s()
                 self._until(arrived_s + self._thinking_s)
                 self._answer(line.decode("ascii", "replace").strip(), arrived_s + self._thinking_s)
@@ -292,7 +292,7 @@ class AsciiEmulator:
             return "e 22"
         generator, target = self._generator, float(self._registers[0xCA])
         if self._registers[0xC8] == 256:
-            target += generator.place if generator.aborting else generator.target
+            target += generator.position if generator.aborting else generator.target
         elif self._registers[0xC8] != 0:
             return "e 22"
         generator.move(target, 0.1 * self._registers[0xCB])
@@ -325,14 +325,14 @@ class AsciiEmulator:
             self._arm.command(0.0)
         else:
             generator, moves = self._generator, self._registers[0x24] == MOVES
-            error = generator.place - self._counts()[0] if moves else 0.0
+            error = generator.position - self._counts()[0] if moves else 0.0
             self._arm.command((generator.speed + LOOP_GAIN_S * error) / self._per_rad)
 
     def _step(self, step_s: float) -> None:
         generator = self._generator
         if not self._powered():
             # The target of the last move is kept, as in a real drive.
-            generator.place, generator.speed = self._counts()[0], 0.0
+            generator.position, generator.speed = self._counts()[0], 0.0
         elif self._registers[0x24] == VELOCITY:
             generator.run(0.1 * self._registers[0x2F], self._ramps(), step_s)
         else:

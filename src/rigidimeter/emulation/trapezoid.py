@@ -25,7 +25,7 @@ class Trapezoid:
 
     Parameters
     ----------
-    place, target : float
+    position, target : float
         Present and target position, in counts.
     speed, limit : float
         Present speed and largest speed of the move, in counts/s.
@@ -33,15 +33,15 @@ class Trapezoid:
         Whether it is braking to rest regardless of the target.
     """
 
-    place: float
+    position: float
     target: float
     speed: float = 0.0
     limit: float = 0.0
     aborting: bool = True
 
-    def rest(self, place: float) -> None:
+    def rest(self, position: float) -> None:
         """Stop at a position."""
-        self.place = self.target = place
+        self.position = self.target = position
         self.speed, self.aborting = 0.0, True
 
     def move(self, target: float, limit: float) -> None:
@@ -52,7 +52,7 @@ class Trapezoid:
         """Return the target velocity of the move, in counts/s."""
         if self.aborting:
             return 0.0
-        left = self.target - self.place
+        left = self.target - self.position
         braking = math.sqrt(2.0 * ramps.down * abs(left))
         return math.copysign(min(self.limit, braking), left) if left else 0.0
 
@@ -66,14 +66,14 @@ class Trapezoid:
     def step(self, ramps: Ramps, step_s: float) -> None:
         """Advance the move by a time step."""
         most = self.change(self.wanted(ramps), ramps, step_s)
-        left, way = self.target - self.place, self.speed * step_s
+        left, step = self.target - self.position, self.speed * step_s
         arrives = not self.aborting and abs(self.speed) <= 2.0 * most
-        if arrives and abs(left) <= max(1.0, abs(way)):
-            self.place, self.speed = self.target, 0.0
+        if arrives and abs(left) <= max(1.0, abs(step)):
+            self.position, self.speed = self.target, 0.0
         else:
-            self.place += way
+            self.position += step
 
     def run(self, velocity: float, ramps: Ramps, step_s: float) -> None:
         """Advance at a velocity by a time step."""
         self.change(velocity, ramps, step_s)
-        self.place += self.speed * step_s
+        self.position += self.speed * step_s

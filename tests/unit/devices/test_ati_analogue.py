@@ -140,7 +140,7 @@ def test_a_table_in_toml_is_a_calibration_too(tmp_path):
 
 def test_the_calibration_of_another_sensor_is_refused(made):
     sensor, _, _ = made(serial="FT99999")
-    with pytest.raises(DeviceError, match="FT00001; that of FT99999 would be right"):
+    with pytest.raises(DeviceError, match="FT00001; expected that of FT99999"):
         sensor.configure()
 
 

@@ -13,7 +13,7 @@ RAMPS = Ramps(up=2000.0, down=1000.0)
 def moving(generator: Trapezoid) -> list[float]:
     """Step until it stands; return the speeds."""
     speeds = []
-    while generator.place != generator.target:
+    while generator.position != generator.target:
         generator.step(RAMPS, STEP_S)
         speeds.append(generator.speed)
     return speeds
@@ -35,11 +35,11 @@ def test_an_abort_brakes_and_stays() -> None:
     generator.move(1e6, 200.0)
     for _ in range(1000):
         generator.step(RAMPS, STEP_S)
-    place, generator.aborting = generator.place, True
+    position, generator.aborting = generator.position, True
     for _ in range(1000):
         generator.step(RAMPS, STEP_S)
     assert generator.speed == 0.0
-    assert generator.place - place == pytest.approx(200.0**2 / (2.0 * RAMPS.down), rel=0.01)
+    assert generator.position - position == pytest.approx(200.0**2 / (2.0 * RAMPS.down), rel=0.01)
 
 
 def test_a_velocity_has_no_end() -> None:
@@ -47,4 +47,4 @@ def test_a_velocity_has_no_end() -> None:
     for _ in range(2000):
         generator.run(-300.0, RAMPS, STEP_S)
     assert generator.speed == -300.0
-    assert generator.place == pytest.approx(-300.0 * (1.0 - 0.15 / 2.0), rel=0.01)
+    assert generator.position == pytest.approx(-300.0 * (1.0 - 0.15 / 2.0), rel=0.01)

@@ -79,9 +79,9 @@ class AsciiDrive:
         self._commanded_s = -math.inf
         self._cycle = 0
         self._asked_why = False
-        self._heard = Feedback(settings.baud, self._jump, self._fastest, self._state_on)
+        self._feedback = Feedback(settings.baud, self._jump, self._fastest, self._state_on)
 
-    # -- life ---------------------------------------------------------------------------------
+    # -- set-up -------------------------------------------------------------------------------
 
     def connect(self) -> None:
         """Open the port at the power-up baud rate; nothing is sent.
@@ -173,26 +173,26 @@ class AsciiDrive:
 
     def read(self) -> MotionSample:
         """Return the newest sample without waiting; the previous one if there is no new one."""
-        line, heard = self._line, self._heard
+        line, feedback = self._line, self._feedback
         if line is not None and self._configured:
             while (exchange := line.take()) is not None:
-                heard.hear(exchange, commanding=self._commanding)
+                feedback.take(exchange, commanding=self._commanding)
             now_s = self._now()
-            if line.busy and now_s - heard.heard_s > self._settings.lost_s + self._cycle_s:
-                heard.latch(Cause.DRIVE_LOST)
+            if line.busy and now_s - feedback.reply_s > self._settings.lost_s + self._cycle_s:
+                feedback.latch(Cause.DRIVE_LOST)
             self._check_horizon(now_s)
             if not self._commanding and not line.busy:
                 self._send()
-        if heard.sequence < 0:
+        if feedback.sequence < 0:
             return MotionSample(math.nan, math.nan, -math.inf, cause=int(Cause.DRIVE_LOST))
         return MotionSample(
-            heard.position / self._per_rad + self._offset_rad,
-            0.1 * heard.speed / self._per_rad,
-            heard.position_s,
-            heard.sequence,
-            (heard.position, heard.speed),
-            heard.status,
-            int(heard.cause),
+            feedback.position / self._per_rad + self._offset_rad,
+            0.1 * feedback.speed / self._per_rad,
+            feedback.position_s,
+            feedback.sequence,
+            (feedback.position, feedback.speed),
+            feedback.status,
+            int(feedback.cause),
         )
 
     def write(self, velocity_rad_s: float) -> float:
@@ -201,23 +201,23 @@ class AsciiDrive:
         It is limited to `max_velocity_deg_s`. A value that is not finite is sent as zero and
         latched. After a fault, or a pause in which the drive stopped by itself, zero is sent.
         """
-        line, heard = self._line, self._heard
+        line, feedback = self._line, self._feedback
         if line is None or not self._commanding:
             return 0.0
         self._check_horizon(self._now())
         if not math.isfinite(velocity_rad_s):
-            heard.latch(Cause.COMMAND_NOT_FINITE)
+            feedback.latch(Cause.COMMAND_NOT_FINITE)
             velocity_rad_s = 0.0
-        if heard.cause not in (Cause.NONE, Cause.COMMAND_NOT_FINITE):
+        if feedback.cause not in (Cause.NONE, Cause.COMMAND_NOT_FINITE):
             # The arm must not start again when power or replies come back, and a target needs a
             # known position. The present move ends.
             velocity_rad_s = 0.0
         if line.busy:
-            heard.counts["skipped"] += 1
-        elif heard.refused and heard.cause is Cause.NONE:
+            feedback.counts["skipped"] += 1
+        elif feedback.refused and feedback.cause is Cause.NONE:
             # A drive without power refuses to move, and so does a faulty one: read which it is.
             if self._asked_why:
-                heard.latch(Cause.DRIVE_FAULT)
+                feedback.latch(Cause.DRIVE_FAULT)
             self._asked_why = True
             self._send(ask_all=True)
         else:
@@ -230,7 +230,7 @@ class AsciiDrive:
     @property
     def counts(self) -> Mapping[str, int]:
         """Replies received, lost, damaged, refused (``e``), and commands skipped on a busy line."""
-        return dict(self._heard.counts)
+        return dict(self._feedback.counts)
 
     # -- the end ------------------------------------------------------------------------------
 
@@ -264,11 +264,11 @@ class AsciiDrive:
             return (set_(0x2F, round(10.0 * counts_s)),)
         if counts_s == 0.0:
             return ("t 0",)
-        heard = self._heard
-        moving = max(-self._fastest, min(self._fastest, 0.1 * heard.speed))
-        age_s = min(max(self._now() - heard.position_s, 0.0), 2.0 * self._cycle_s)
+        feedback = self._feedback
+        moving = max(-self._fastest, min(self._fastest, 0.1 * feedback.speed))
+        age_s = min(max(self._now() - feedback.position_s, 0.0), 2.0 * self._cycle_s)
         target = move_target(
-            heard.position + moving * age_s,
+            feedback.position + moving * age_s,
             moving,
             counts_s,
             self._deceleration,
@@ -279,7 +279,7 @@ class AsciiDrive:
     def _send(self, *commands: str, ask_all: bool = False) -> None:
         line = self._line
         if line is not None:
-            self._heard.heard_s = self._now()
+            self._feedback.reply_s = self._now()
             self._cycle += 1
             turns = (0xA0, 0x24) if ask_all else ((0x24,) if self._cycle % 2 else (0xA0,))
             line.submit(*commands, *map(get, (0x32, 0x18, *turns)))
@@ -290,14 +290,14 @@ class AsciiDrive:
         if not self._commanding or self._settings.mode != "moves" or line is None or line.busy:
             return
         if now_s - self._commanded_s > self._settings.horizon_s:
-            self._heard.latch(Cause.DRIVE_STATE)
+            self._feedback.latch(Cause.DRIVE_STATE)
 
     def _start_sampling(self) -> None:
         """Start again from a fresh sample, without the causes of the previous run."""
         self._asked_why = False
         talk = self._talking()
         position, speed, status = (talk.value(register) for register in (0x32, 0x18, 0xA0))
-        self._heard.begin(position, speed, status, self._now())
+        self._feedback.begin(position, speed, status, self._now())
 
     def _talking(self) -> AsciiTalk:
         if self._line is None:
@@ -309,4 +309,4 @@ class AsciiDrive:
         if self._line is not None and self._speaking:
             text = self._line.ask(request, PATIENCE * self._settings.lost_s)
             if text != "ok":
-                self._heard.latch(Cause.DRIVE_LOST)
+                self._feedback.latch(Cause.DRIVE_LOST)

@@ -184,7 +184,7 @@ class Feedback:
         self.position_s = -math.inf
         self.sequence = -1
         self.cause = Cause.NONE
-        self.heard_s = 0.0
+        self.reply_s = 0.0
         self.refused = False
         """Whether a move was refused once; the following replies tell why."""
         self.counts = dict.fromkeys(("received", "lost", "damaged", "refused", "skipped"), 0)
@@ -201,17 +201,17 @@ class Feedback:
         self.refused = False
         self._damaged_in_a_row = 0
         self.position, self.position_s, self.sequence = position, now_s, 0
-        self.speed, self.heard_s = speed, now_s
+        self.speed, self.reply_s = speed, now_s
         self._take_status(status, commanding=False)
 
-    def hear(self, exchange: Exchange, *, commanding: bool) -> None:
+    def take(self, exchange: Exchange, *, commanding: bool) -> None:
         """Process one reply; an error is latched as a cause."""
         request, text, at_s = exchange
         if text is None:
             self.counts["lost"] += 1
             self.latch(Cause.DRIVE_LOST)
             return
-        self.heard_s = at_s
+        self.reply_s = at_s
         reply = parse(text)
         if reply.kind == "e":
             self.counts["refused"] += 1
@@ -227,9 +227,9 @@ class Feedback:
         else:
             self.counts["received"] += 1
             self._damaged_in_a_row = 0
-            self._take(request, reply, at_s - seconds(len(text) + 1, self._baud), commanding)
+            self._take_value(request, reply, at_s - seconds(len(text) + 1, self._baud), commanding)
 
-    def _take(self, request: str, reply: Reply, asked_s: float, commanding: bool) -> None:
+    def _take_value(self, request: str, reply: Reply, asked_s: float, commanding: bool) -> None:
         if request == get(0x32):
             reach = self._jump + self._fastest * max(0.0, asked_s - self.position_s)
             if abs(reply.value - self.position) > reach:

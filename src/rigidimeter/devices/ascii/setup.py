@@ -120,7 +120,7 @@ class AsciiTalk:
         reply = self.answer(get(register))
         if reply is None or reply.kind != "v":
             raise DeviceError(
-                f"drive: register 0x{register:02x} gave {_found(reply)}; a value would be right"
+                f"drive: register 0x{register:02x} gave {_found(reply)}; expected a value"
             )
         return reply.value
 
@@ -139,7 +139,7 @@ class AsciiTalk:
         """
         reply = self.answer(request)
         if reply is None or reply.kind != "ok":
-            raise DeviceError(f"drive: {request!r} gave {_found(reply)}; ok would be right")
+            raise DeviceError(f"drive: {request!r} gave {_found(reply)}; expected ok")
 
     def set(self, register: int, value: int) -> None:
         """Set a register and read it back.
@@ -185,7 +185,7 @@ class AsciiTalk:
         if found is None or found.value != baud:
             raise DeviceError(
                 f"drive: the baud rate is {'unknown' if found is None else found.value} "
-                f"after it was set; {baud} would be right"
+                f"after it was set; expected {baud}"
             )
 
     def clear_faults(self) -> int:
@@ -203,7 +203,7 @@ class AsciiTalk:
         if status & STATUS_FAULTS:
             raise DeviceError(
                 f"drive: event status 0x{status:x} has a fault that does not clear "
-                f"({named_bits(status, FAULT_BITS)}); remove its reason and configure again"
+                f"({named_bits(status, FAULT_BITS)}); remove its cause and configure again"
             )
         return latched
 
@@ -246,7 +246,7 @@ class AsciiTalk:
         """
         state = self.value(0x24)
         if state != OFF:
-            raise DeviceError(f"drive: desired state is {state} before enable; 0 would be right")
+            raise DeviceError(f"drive: desired state is {state} before enable; expected 0")
         self.set(0x2F, 0)
         self.set(0xCB, 0)
         before = self.value(0x32)
@@ -257,7 +257,7 @@ class AsciiTalk:
             why = named_bits(status, FAULT_BITS | DISABLED_BITS) or "no reason given"
             raise DeviceError(
                 f"drive: desired state {state}, event status 0x{status:x} after enable ({why}); "
-                f"state {state_on} without these bits would be right"
+                f"expected state {state_on} without these bits"
             )
         moved = self.value(0x32) - before
         if abs(moved) > most_counts:

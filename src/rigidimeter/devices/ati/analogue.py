@@ -134,13 +134,13 @@ class AtiAnalogue:
         if s.saturation_v >= s.range_v:
             raise DeviceError(
                 f"torque sensor: saturation_v = {s.saturation_v:g} is never reached in a range of "
-                f"±{s.range_v:g} V; less than range_v would be right"
+                f"±{s.range_v:g} V; it must be less than range_v"
             )
         calibration = read_calibration(Path(s.calibration))
         if s.serial and calibration.serial != s.serial:
             raise DeviceError(
                 f"torque sensor: {s.calibration} is the calibration of "
-                f"{calibration.serial or 'no named sensor'}; that of {s.serial} would be right"
+                f"{calibration.serial or 'no named sensor'}; expected that of {s.serial}"
             )
         self._row = torque_row(calibration, s.weights, s.sign)
         try:

@@ -114,7 +114,7 @@ def _from_xml(path: Path, text: bytes) -> Calibration:
     if set(rows) != set(AXES):
         raise DeviceError(
             f"torque sensor: {path} has UserAxis rows {', '.join(rows) or 'none'}; "
-            f"{', '.join(AXES)} would be right (ask ATI for a newer file)"
+            f"{', '.join(AXES)} expected (ask ATI for a newer file)"
         )
     return _calibration(
         path,

@@ -255,7 +255,7 @@ def refuse_unexpected(settings: AtiRdtSettings, page: SensorPage, device: str) -
         words = ", ".join(status_words(page.status))
         raise DeviceError(
             f"{device}: its status is {page.status:#010x} ({words}); it must be without "
-            "error, so put that right and power the sensor off and on"
+            "error, so remove the cause and power the sensor off and on"
         )
     for name, found, wanted, any_will_do in (
         ("serial", page.serial, settings.expected_serial, ""),
@@ -267,5 +267,5 @@ def refuse_unexpected(settings: AtiRdtSettings, page: SensorPage, device: str) -
         if wanted not in (any_will_do, found):
             raise DeviceError(
                 f"{device}: its {name} is {found!r} where expected_{name} is {wanted!r}; "
-                "set the sensor, or the settings, right"
+                "correct the sensor or the settings"
             )

@@ -143,7 +143,7 @@ class NodeBus:
             self._beaten_s = now_s
         return sent
 
-    def insist(self, control: Control) -> None:
+    def send_both_ways(self, control: Control) -> None:
         """Send a controlword in the command frame and as an SDO write, which needs no mapping."""
         self.ask(control, 0)
         self._send(self._message(self._ids.sdo_request, sdo_write_bytes(0x6040, 0, control, 2)))

@@ -254,13 +254,13 @@ class Cia402Drive:
         """Brake along the drive's quick-stop ramp; only `enable` starts it again."""
         if self._wire.is_open and self._control is not Control.DISABLE_VOLTAGE:
             self._halt(Control.QUICK_STOP)
-            self._wire.insist(Control.QUICK_STOP)
+            self._wire.send_both_ways(Control.QUICK_STOP)
 
     def disable(self) -> None:
         """Remove the power at once."""
         if self._wire.is_open:
             self._halt(Control.DISABLE_VOLTAGE)
-            self._wire.insist(Control.DISABLE_VOLTAGE)
+            self._wire.send_both_ways(Control.DISABLE_VOLTAGE)
 
     def close(self) -> None:
         """Remove the power, make the drive pre-operational, close the bus."""

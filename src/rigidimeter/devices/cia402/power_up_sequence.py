@@ -33,8 +33,8 @@ def power_up(wire: NodeBus, now: Now, timeout_s: float, who: str) -> None:
         if state in FAULTS or wire.alarmed or wire.booted:
             what = "restarted" if wire.booted else state.words
             raise DeviceError(
-                f"{who}: {what}, emergency code 0x{wire.emergency:04X}; its reason must be "
-                "removed, and a fault reset by hand"
+                f"{who}: {what}, emergency code 0x{wire.emergency:04X}; remove its cause; "
+                "a fault must be reset by hand"
             )
         if off and state is State.OPERATION_ENABLED:
             return
@@ -72,7 +72,7 @@ def reset_fault(wire: NodeBus, now: Now, timeout_s: float, who: str) -> None:
     _step(wire, now, Control.DISABLE_VOLTAGE)
     raise DeviceError(
         f"{who}: in {wire.state.words} still, after a fault reset (emergency code "
-        f"0x{wire.emergency:04X}); its reason must be removed first, see the drive's manual"
+        f"0x{wire.emergency:04X}); remove its cause first, see the drive's manual"
     )
 
 

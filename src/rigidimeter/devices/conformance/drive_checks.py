@@ -10,13 +10,13 @@ from collections.abc import Callable
 from rigidimeter.devices.base import MotionSample, VelocityDrive
 from rigidimeter.devices.conformance.fixture import (
     DriveFixture,
-    await_,
     check_counts,
     check_facts,
     check_quick,
     check_stamp,
-    refuses,
     require,
+    require_error,
+    wait_for,
 )
 from rigidimeter.guard import Cause
 
@@ -34,10 +34,10 @@ def drive_refuses_disorder(fixture: DriveFixture) -> None:
     try:
         require(isinstance(drive.read(), MotionSample), "read returns a MotionSample always")
         require(drive.write(fixture.speed_rad_s) == 0.0, "write before connect returns 0")
-        refuses(drive.enable, "enable before connect raises DeviceError")
-        refuses(drive.configure, "configure before connect raises DeviceError")
+        require_error(drive.enable, "enable before connect raises DeviceError")
+        require_error(drive.configure, "configure before connect raises DeviceError")
         drive.connect()
-        refuses(drive.enable, "enable before configure raises DeviceError")
+        require_error(drive.enable, "enable before configure raises DeviceError")
         _unpowered(fixture, "after a refused enable")
     finally:
         drive.close()
@@ -84,7 +84,7 @@ def drive_samples_flow(fixture: DriveFixture) -> None:
             drive.write(0.0)
             return drive.read().time_s > first.time_s
 
-        await_(newer, fixture, "a new sample arrives")
+        wait_for(newer, fixture, "a new sample arrives")
         sample = drive.read()
         require(
             sample.cause == Cause.NONE, f"a good sample has no cause; {Cause(sample.cause).name}"
@@ -145,7 +145,7 @@ def drive_read_never_waits(fixture: DriveFixture) -> None:
         if fixture.silence is not None:
             fixture.silence()
             check_quick(tick, 2 * fixture.longest_read_s, fixture.tick_s, "when it does not")
-            await_(
+            wait_for(
                 lambda: drive.read().cause != Cause.NONE,
                 fixture,
                 "a drive that is silent is reported with a cause",
@@ -170,7 +170,7 @@ def drive_stops(fixture: DriveFixture) -> None:
         _run(drive, fixture, fixture.speed_rad_s, math.ceil(fixture.settle_s / fixture.tick_s))
         drive.stop()
         drive.stop()
-        await_(lambda: _rests(fixture), fixture, "the joint is at rest after stop")
+        wait_for(lambda: _rests(fixture), fixture, "the joint is at rest after stop")
         sent = _run(drive, fixture, fixture.speed_rad_s, 10)
         require(sent == 0.0, f"write after stop sends 0; it returned {sent:g}")
         _at_rest(fixture, "after stop, whatever is written")
@@ -205,7 +205,9 @@ def drive_stops_by_itself(fixture: DriveFixture) -> None:
         drive.enable()
         _run(drive, fixture, fixture.speed_rad_s, math.ceil(fixture.settle_s / fixture.tick_s))
         time.sleep(watchdog_s)
-        await_(lambda: _rests(fixture), fixture, f"at rest {watchdog_s:g} s after the last command")
+        wait_for(
+            lambda: _rests(fixture), fixture, f"at rest {watchdog_s:g} s after the last command"
+        )
     finally:
         drive.close()
 
@@ -217,7 +219,7 @@ def drive_restarts_at_rest(fixture: DriveFixture) -> None:
         _run(drive, fixture, fixture.speed_rad_s, 20)
     finally:
         drive.close()
-    await_(lambda: _rests(fixture), fixture, "the joint is at rest after close")
+    wait_for(lambda: _rests(fixture), fixture, "the joint is at rest after close")
     drive_enables_at_rest(fixture)
 
 

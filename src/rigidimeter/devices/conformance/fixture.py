@@ -22,13 +22,13 @@ __all__ = [
     "DriveFixture",
     "OtherEnd",
     "SensorFixture",
-    "await_",
     "check_counts",
     "check_facts",
     "check_quick",
     "check_stamp",
-    "refuses",
     "require",
+    "require_error",
+    "wait_for",
 ]
 
 MANY_READS = 100
@@ -107,7 +107,7 @@ def require(condition: bool, requirement: str) -> None:
         raise ConformanceError(requirement)
 
 
-def refuses(action: Callable[[], object], requirement: str) -> None:
+def require_error(action: Callable[[], object], requirement: str) -> None:
     """Raise `ConformanceError` unless the action raises `DeviceError`."""
     try:
         action()
@@ -165,7 +165,7 @@ def check_quick(read: Callable[[], object], longest_s: float, tick_s: float, whe
     )
 
 
-def await_(
+def wait_for(
     condition: Callable[[], bool], fixture: SensorFixture | DriveFixture, requirement: str
 ) -> None:
     """Wait until a condition holds; raise `ConformanceError` on timeout."""

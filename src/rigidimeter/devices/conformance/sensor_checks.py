@@ -9,13 +9,13 @@ from collections.abc import Callable
 from rigidimeter.devices.base import TorqueSample, TorqueSensor
 from rigidimeter.devices.conformance.fixture import (
     SensorFixture,
-    await_,
     check_counts,
     check_facts,
     check_quick,
     check_stamp,
-    refuses,
     require,
+    require_error,
+    wait_for,
 )
 from rigidimeter.guard import Cause
 
@@ -29,7 +29,7 @@ def sensor_refuses_disorder(fixture: SensorFixture) -> None:
     sensor = fixture.make()
     sample = sensor.read()
     require(isinstance(sample, TorqueSample), "read returns a TorqueSample from the beginning")
-    refuses(sensor.configure, "configure before connect raises DeviceError")
+    require_error(sensor.configure, "configure before connect raises DeviceError")
     sensor.close()
 
 
@@ -48,7 +48,7 @@ def sensor_samples_flow(fixture: SensorFixture) -> None:
     sensor = _sampling(fixture)
     try:
         first = sensor.read()
-        await_(lambda: sensor.read().time_s > first.time_s, fixture, "a new sample arrives")
+        wait_for(lambda: sensor.read().time_s > first.time_s, fixture, "a new sample arrives")
         sample = sensor.read()
         require(
             sample.cause == Cause.NONE, f"a good sample has no cause; {Cause(sample.cause).name}"
@@ -119,7 +119,7 @@ def _sampling(fixture: SensorFixture) -> TorqueSensor:
     try:
         sensor.connect()
         sensor.configure()
-        await_(lambda: math.isfinite(sensor.read().torque_nm), fixture, "a first sample arrives")
+        wait_for(lambda: math.isfinite(sensor.read().torque_nm), fixture, "a first sample arrives")
     except BaseException:
         sensor.close()
         raise

@@ -127,7 +127,7 @@ class RdtEmulator:
         self._wire = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._wire.bind((self.address, self.port))
         self.port = self._wire.getsockname()[1]
-        self._stranger = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._foreign = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._http = PageServer(
             (self.address, self.http_port), self._page_now, self.fault, self._ending
         )
@@ -149,7 +149,7 @@ class RdtEmulator:
             return
         self._ending.set()
         self._http.shutdown()
-        self._stranger.sendto(b"", (self.address, self.port))  # wakes the listener
+        self._foreign.sendto(b"", (self.address, self.port))  # wakes the listener
         self._threads[0].join()
         self._streaming.set()  # wakes the sender; no request can pause it any more
         for thread in self._threads:
@@ -157,7 +157,7 @@ class RdtEmulator:
         self._threads = []
         self._streaming.clear()
         self._http.server_close()
-        self._stranger.close()
+        self._foreign.close()
         self._wire.close()
 
     def __enter__(self) -> Self:
@@ -264,7 +264,7 @@ class RdtEmulator:
         if "foreign" in faults:
             fields = list(RECORD.unpack(self._records.last))
             fields[8] += 10_000_000
-            self._stranger.sendto(RECORD.pack(*fields), self._client or (self.address, self.port))
+            self._foreign.sendto(RECORD.pack(*fields), self._client or (self.address, self.port))
         if self._due(faults, "reorder") or "reorder_once" in faults:
             self._late = data
             return
