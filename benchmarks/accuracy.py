@@ -27,7 +27,7 @@ from rigidimeter.estimation.prepared import PreparedEpoch, Source, prepare
 from rigidimeter.records import Channel, Epoch, Fit
 from rigidimeter.settings import EstimationSettings, Settings, parse_settings
 from rigidimeter.virtual.batch import simulate_chunks
-from rigidimeter.virtual.paper_rates import PAPER_RATES
+from rigidimeter.virtual.study_design import PAPER_RATES
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "accuracy.md"
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")

@@ -52,8 +52,7 @@ from rigidimeter.records import Epoch
 from rigidimeter.settings import Settings, SubjectSettings, parse_settings
 from rigidimeter.statistics import day_difference, difference, exact_ranksum, fit_mixed, ranksum
 from rigidimeter.virtual.batch import simulate_epochs
-from rigidimeter.virtual.paper_rates import PAPER_RATES
-from rigidimeter.virtual.study_design import NULL, PAPER, StudyDesign
+from rigidimeter.virtual.study_design import NULL, PAPER, PAPER_RATES, StudyDesign
 from rigidimeter.virtual.study_plan import DayPlan, day_factors, day_joint, draw_ratings, plan_study
 
 Array = NDArray[np.float64]
@@ -362,9 +361,9 @@ def rated(design: StudyDesign, seed: int, *, scatter: bool) -> tuple[bool, ...]:
             names.append(condition.name)
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(RATINGS,)))
     rows = [
-        (name, day, rating.examiner, rating.score)
+        (name, day, examiner, score)
         for name, day, ratings in zip(names, days, draw_ratings(design, joints, rng), strict=True)
-        for rating in ratings
+        for examiner, score in ratings.items()
     ]
     conditions, of_day, examiners, scores = (list(column) for column in zip(*rows, strict=True))
     without = difference(fit_mixed(scores, conditions, {"examiner": examiners}), "OFF", "DBS")

@@ -6,7 +6,7 @@ import pytest
 from rigidimeter.estimation import fit_epoch
 from rigidimeter.recording import read_session
 from rigidimeter.settings import Settings
-from rigidimeter.virtual.paper_rates import PAPER_RATES
+from rigidimeter.virtual.study_design import PAPER_RATES
 
 TRUTH = np.array([0.0045, 0.1368, 1.751])
 SEEDS = range(12)

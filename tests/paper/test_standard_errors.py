@@ -6,7 +6,7 @@ import pytest
 from rigidimeter.estimation import fit_epoch
 from rigidimeter.recording import read_session
 from rigidimeter.settings import Settings
-from rigidimeter.virtual.paper_rates import PAPER_RATES
+from rigidimeter.virtual.study_design import PAPER_RATES
 
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 

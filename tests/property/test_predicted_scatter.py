@@ -18,7 +18,7 @@ from rigidimeter.records import Epoch, Fit
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.statistics import ranksum
 from rigidimeter.virtual.batch import simulate_chunks
-from rigidimeter.virtual.paper_rates import PAPER_RATES
+from rigidimeter.virtual.study_design import PAPER_RATES
 
 SESSION = 25
 """Epochs that are fitted together."""

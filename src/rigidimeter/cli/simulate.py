@@ -54,7 +54,7 @@ def simulate(
     """
     from rigidimeter.cli.progress import Meter
     from rigidimeter.settings import changed_settings, load_settings
-    from rigidimeter.virtual.paper_rates import PAPER_RATES
+    from rigidimeter.virtual.study_design import PAPER_RATES
     from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s
 
     if task not in (None, "prbs", "sinusoid"):

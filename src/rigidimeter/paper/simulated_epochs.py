@@ -26,7 +26,7 @@ from rigidimeter.records import Fit
 from rigidimeter.reporting.numbers import number
 from rigidimeter.settings import Settings, SubjectSettings, parse_settings
 from rigidimeter.virtual.batch import simulate_epochs
-from rigidimeter.virtual.paper_rates import PAPER_RATES
+from rigidimeter.virtual.study_design import PAPER_RATES
 
 __all__ = [
     "NoiseRuns",

@@ -37,41 +37,20 @@ _NOTHING = 1e-10
 
 
 @dataclass(frozen=True)
-class Contrast:
-    """A weighted sum of condition means against zero.
+class JointTest:
+    """Several contrasts at once against zero: F, its degrees of freedom and p, by choice.
 
     Attributes
     ----------
-    weights : tuple of float
-        One for each condition of the model.
-    estimate, se : float
-        In the unit of the scores.
     f : float
-        (estimate/se)², with one degree of freedom above.
+    df_numerator : int
+        How many contrasts.
     df_residual, p_residual : float
         n − p, the choice of the paper's software.
     df_satterthwaite, p_satterthwaite : float
-    se_kenward_roger, f_kenward_roger, df_kenward_roger, p_kenward_roger : float
-        With the enlarged standard error.
+    f_kenward_roger, df_kenward_roger, p_kenward_roger : float
+        With the enlarged covariance.
     """
-
-    weights: tuple[float, ...]
-    estimate: float
-    se: float
-    f: float
-    df_residual: float
-    p_residual: float
-    df_satterthwaite: float
-    p_satterthwaite: float
-    se_kenward_roger: float
-    f_kenward_roger: float
-    df_kenward_roger: float
-    p_kenward_roger: float
-
-
-@dataclass(frozen=True)
-class JointTest:
-    """Several contrasts at once against zero: F, its degrees of freedom and p, by choice."""
 
     f: float
     df_numerator: int
@@ -82,6 +61,26 @@ class JointTest:
     f_kenward_roger: float
     df_kenward_roger: float
     p_kenward_roger: float
+
+
+@dataclass(frozen=True)
+class Contrast(JointTest):
+    """A weighted sum of condition means against zero: its estimate, beside the test of it.
+
+    Attributes
+    ----------
+    weights : tuple of float
+        One for each condition of the model.
+    estimate, se : float
+        In the unit of the scores; f is (estimate/se)².
+    se_kenward_roger : float
+        The enlarged standard error.
+    """
+
+    weights: tuple[float, ...]
+    estimate: float
+    se: float
+    se_kenward_roger: float
 
 
 def difference(fit: Mixed, first: str, second: str) -> Contrast:
@@ -129,21 +128,12 @@ def contrast(fit: Mixed, weights: ArrayLike) -> Contrast:
         If the weights have another length or are all zero.
     """
     row = np.asarray(weights, dtype=np.float64)
-    test = joint_test(fit, row[None, :])
-    enlarged = _enlarged(fit)[0]
     return Contrast(
+        **vars(joint_test(fit, row[None, :])),
         weights=tuple(row.tolist()),
         estimate=float(row @ fit.means),
         se=math.sqrt(row @ fit.covariance @ row),
-        f=test.f,
-        df_residual=test.df_residual,
-        p_residual=test.p_residual,
-        df_satterthwaite=test.df_satterthwaite,
-        p_satterthwaite=test.p_satterthwaite,
-        se_kenward_roger=math.sqrt(row @ enlarged @ row),
-        f_kenward_roger=test.f_kenward_roger,
-        df_kenward_roger=test.df_kenward_roger,
-        p_kenward_roger=test.p_kenward_roger,
+        se_kenward_roger=math.sqrt(row @ _enlarged(fit)[0] @ row),
     )
 
 

@@ -23,6 +23,7 @@ from scipy.stats import rankdata
 
 from rigidimeter.statistics.contrasts import difference, interval_of
 from rigidimeter.statistics.mixed import fit_mixed, nested
+from rigidimeter.statistics.summary import checked_sample
 
 __all__ = ["DayDifference", "day_difference", "day_medians", "exact_ranksum"]
 
@@ -139,7 +140,7 @@ def day_difference(
     """
     if not 0 < confidence < 1:
         raise ValueError(f"confidence must be between 0 and 1, got {confidence}")
-    samples = [_sample(_X, x), _sample(_Y, y)]
+    samples = [checked_sample(_X, x), checked_sample(_Y, y)]
     days = [list(map(str, x_days)), list(map(str, y_days))]
     subjects = [
         [""] * sample.size if given is None else list(map(str, given))
@@ -269,10 +270,3 @@ def _check_apart(name: str, labels: Sequence[str], conditions: Sequence[str]) ->
 def _same(first: Sequence[str], second: Sequence[str]) -> bool:
     pairs = {*zip(first, second, strict=True)}
     return len(pairs) == len(set(first)) == len(set(second))
-
-
-def _sample(name: str, values: ArrayLike) -> Array:
-    sample = np.asarray(values, dtype=np.float64)
-    if sample.ndim != 1 or sample.size == 0 or not np.all(np.isfinite(sample)):
-        raise ValueError(f"{name} must be a finite sequence of at least one value")
-    return sample

@@ -20,6 +20,7 @@ from scipy.stats import rankdata, tiecorrect
 from rigidimeter.statistics.bootstrap import bootstrap
 from rigidimeter.statistics.effect_from_p import rank_biserial_interval
 from rigidimeter.statistics.ranksum import RankSum, ranksum
+from rigidimeter.statistics.summary import checked_sample
 
 __all__ = [
     "EffectDifference",
@@ -116,9 +117,7 @@ def two_groups(
     """
     values, labels = [], []
     for name, sample, units in (("x", x, x_units), ("y", y, y_units)):
-        array = np.asarray(sample, dtype=np.float64)
-        if array.ndim != 1 or array.size == 0 or not np.all(np.isfinite(array)):
-            raise ValueError(f"{name} must be a finite sequence of at least one value")
+        array = checked_sample(name, sample)
         own = tuple(map(str, range(array.size))) if units is None else tuple(units)
         if len(own) != array.size:
             raise ValueError(f"{name} has {array.size} values and {len(own)} units")

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
 from rigidimeter.statistics.profiled_likelihood import Point, Products, minimise, products
+from rigidimeter.statistics.summary import checked_sample
 
 __all__ = ["LikelihoodRatio", "Mixed", "fit_mixed", "likelihood_ratio", "nested"]
 
@@ -45,8 +46,8 @@ class Mixed:
         For each grouping the predicted b of each group (BLUP), which shrinks to 0 with σ_g².
     corrected : ndarray, shape (n,)
         The scores less the offsets of their groups, in the order given.
-    deviance, log_likelihood : float
-        −2 log L and log L, restricted.
+    deviance : float
+        −2 log L, restricted.
     n, df_residual : int
         Number of scores, and n − p.
     at_zero : tuple of str
@@ -67,7 +68,6 @@ class Mixed:
     offsets: Mapping[str, Mapping[str, float]]
     corrected: Array
     deviance: float
-    log_likelihood: float
     n: int
     df_residual: int
     at_zero: tuple[str, ...]
@@ -138,9 +138,7 @@ def fit_mixed(
     >>> fit.means.round(3).tolist()
     [2.0, 1.375]
     """
-    y = np.asarray(scores, dtype=np.float64)
-    if y.ndim != 1 or not np.all(np.isfinite(y)):
-        raise ValueError("the scores must be a finite sequence")
+    y = checked_sample("the sequence of scores", scores, fewest=0)
     for name, labels in {"conditions": conditions, **groups}.items():
         if len(labels) != y.size:
             raise ValueError(f"{name} has {len(labels)} labels for {y.size} scores")
@@ -269,7 +267,6 @@ def _model(
         offsets=offsets,
         corrected=corrected,
         deviance=point.deviance,
-        log_likelihood=-point.deviance / 2,
         n=data.n,
         df_residual=df,
         at_zero=tuple(name for name in kept if variances[name] == 0),

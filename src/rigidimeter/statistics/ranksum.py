@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import mannwhitneyu, norm
 
+from rigidimeter.statistics.summary import checked_sample
+
 __all__ = ["RankSum", "ranksum"]
 
 
@@ -110,7 +112,7 @@ def ranksum(x: ArrayLike, y: ArrayLike, *, confidence: float = 0.95) -> RankSum:
     >>> test.shift
     3.0
     """
-    sample_x, sample_y = _sample("x", x), _sample("y", y)
+    sample_x, sample_y = checked_sample("x", x), checked_sample("y", y)
     if not 0 < confidence < 1:
         raise ValueError(f"confidence must be between 0 and 1, got {confidence}")
     differences = np.sort(np.subtract.outer(sample_x, sample_y), axis=None)
@@ -142,17 +144,6 @@ def ranksum(x: ArrayLike, y: ArrayLike, *, confidence: float = 0.95) -> RankSum:
         u=u,
         shift_bounded=bounded,
     )
-
-
-def _sample(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    sample = np.asarray(values, dtype=np.float64)
-    if sample.ndim != 1:
-        raise ValueError(f"{name} must be one-dimensional, got shape {sample.shape}")
-    if sample.size == 0:
-        raise ValueError(f"{name} is empty; a rank-sum test needs at least one value in each")
-    if not np.all(np.isfinite(sample)):
-        raise ValueError(f"{name} must be finite; leave out what could not be measured")
-    return sample
 
 
 def _tie_term(values: NDArray[np.float64]) -> float:

@@ -1,13 +1,13 @@
-"""Median and quartiles of a sample."""
+"""A sample, checked; its median and quartiles."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Summary", "summarise"]
+__all__ = ["Summary", "checked_sample", "summarise"]
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,26 @@ def summarise(values: ArrayLike) -> Summary:
     ValueError
         If a value is not finite or the sample is not one-dimensional.
     """
-    sample = np.asarray(values, dtype=np.float64)
-    if sample.ndim != 1:
-        raise ValueError(f"expected a one-dimensional sample, got shape {sample.shape}")
-    if not np.all(np.isfinite(sample)):
-        raise ValueError("a sample must be finite; leave out what could not be measured")
+    sample = checked_sample("a sample", values, fewest=0)
     if sample.size == 0:
         return Summary(0, float("nan"), float("nan"), float("nan"))
     q1, median, q3 = np.quantile(sample, [0.25, 0.5, 0.75])
     return Summary(int(sample.size), float(median), float(q1), float(q3))
+
+
+def checked_sample(name: str, values: ArrayLike, *, fewest: int = 1) -> NDArray[np.float64]:
+    """Return values as an array; `name` is what a message calls them.
+
+    Raises
+    ------
+    ValueError
+        If they are not one-dimensional, not finite, or fewer than `fewest`.
+    """
+    sample = np.asarray(values, dtype=np.float64)
+    if sample.ndim != 1:
+        raise ValueError(f"{name} must be one-dimensional, got shape {sample.shape}")
+    if sample.size < fewest:
+        raise ValueError(f"{name} is empty; at least {fewest} value is needed")
+    if not np.all(np.isfinite(sample)):
+        raise ValueError(f"{name} must be finite; leave out what could not be measured")
+    return sample

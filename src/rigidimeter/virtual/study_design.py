@@ -32,17 +32,23 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rigidimeter.settings import Settings, SubjectSettings
-from rigidimeter.virtual.paper_rates import PAPER_RATES
 
 __all__ = [
     "DESIGNS",
     "NULL",
     "PAPER",
+    "PAPER_RATES",
     "PUSHING",
     "ConditionDesign",
     "StudyDesign",
     "two_day_design",
 ]
+
+PAPER_RATES: Mapping[str, Any] = {
+    "torque": {"rate_hz": 100.0},
+    "motion": {"rate_hz": 50.0, "jitter_s": 0.005},
+}
+"""Sec. 2.2: torque at 100 samples/s, angle and velocity at 50 with sporadic jitter."""
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ session i has the seed of child (2, i), the examiners draw from child (3).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import date, timedelta
 
 import numpy as np
@@ -19,7 +19,6 @@ from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
 
 __all__ = [
     "DayPlan",
-    "Rating",
     "day_factors",
     "day_joint",
     "draw_ratings",
@@ -28,14 +27,6 @@ __all__ = [
 ]
 
 _DAY, _SESSION, _EXAMINERS = 1, 2, 3
-
-
-@dataclass(frozen=True)
-class Rating:
-    """One score of one examiner."""
-
-    examiner: str
-    score: float
 
 
 @dataclass(frozen=True)
@@ -57,7 +48,8 @@ class DayPlan:
         Medians of the epochs of this session.
     settings : Settings
         Of the session, its seed and its protocol among them.
-    ratings : tuple of Rating
+    ratings : mapping of str to float
+        The score of each examiner.
     """
 
     folder: str
@@ -67,7 +59,7 @@ class DayPlan:
     note: str
     joint: JointDynamics
     settings: Settings
-    ratings: tuple[Rating, ...]
+    ratings: Mapping[str, float]
 
 
 def plan_study(design: StudyDesign, seed: int) -> list[DayPlan]:
@@ -110,14 +102,11 @@ def plan_study(design: StudyDesign, seed: int) -> list[DayPlan]:
                     note=_note(condition, there, place),
                     joint=joint,
                     settings=_settings(design, condition, joint, prbs, sinusoids, seed, len(plans)),
-                    ratings=(),
+                    ratings={},
                 )
             )
     scores = draw_ratings(design, [plan.joint for plan in plans], _rng(seed, _EXAMINERS))
-    return [
-        DayPlan(**{**vars(plan), "ratings": ratings})
-        for plan, ratings in zip(plans, scores, strict=True)
-    ]
+    return [replace(plan, ratings=given) for plan, given in zip(plans, scores, strict=True)]
 
 
 def spread_evenly(total: int, days: int) -> list[int]:
@@ -143,8 +132,8 @@ def day_joint(
 
 def draw_ratings(
     design: StudyDesign, joints: Sequence[JointDynamics], rng: np.random.Generator
-) -> list[tuple[Rating, ...]]:
-    """Return what the examiners say of each joint; see `design` for how they come to it."""
+) -> list[dict[str, float]]:
+    """Return the examiners' scores of each joint; see `study_design` for how they are made."""
     nominal = design.conditions[0]
     biases = design.examiner_sd * rng.standard_normal(len(design.examiners))
     lowest, highest = design.rating_scale
@@ -162,12 +151,7 @@ def draw_ratings(
         )
         steps = np.round((felt - lowest) / design.rating_step)
         scores = np.clip(lowest + design.rating_step * steps, lowest, highest)
-        found.append(
-            tuple(
-                Rating(examiner, float(score))
-                for examiner, score in zip(design.examiners, scores, strict=True)
-            )
-        )
+        found.append(dict(zip(design.examiners, scores.tolist(), strict=True)))
     return found
 
 

@@ -17,13 +17,12 @@ from typing import Any
 
 from rigidimeter.documents import csv_text, write_text
 from rigidimeter.errors import UserError
+from rigidimeter.recording.study_toml import STUDY_SCHEMA
 from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
 from rigidimeter.virtual.study_plan import DayPlan, plan_study
 from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s
 
-__all__ = ["SCHEMA", "study_length_s", "write_virtual_study"]
-
-SCHEMA = "rigidimeter.study/1"
+__all__ = ["study_length_s", "write_virtual_study"]
 
 _POLL_S = 0.1
 
@@ -140,9 +139,9 @@ def _sessions(plans: Sequence[DayPlan], subject: str) -> str:
 
 def _ratings(plans: Sequence[DayPlan], subject: str) -> str:
     rows = [
-        (subject, plan.day, plan.condition, rating.examiner, f"{rating.score:g}")
+        (subject, plan.day, plan.condition, examiner, f"{score:g}")
         for plan in plans
-        for rating in plan.ratings
+        for examiner, score in plan.ratings.items()
     ]
     return csv_text(("subject", "day", "condition", "examiner", "score"), rows)
 
@@ -156,7 +155,7 @@ def _study_toml(design: StudyDesign, seed: int) -> str:
         f"# Design {design.name}, seed {seed}. Its assumptions:",
         *(f"#   {name} = {value}" for name, value in _assumed(design)),
         "",
-        f'schema = "{SCHEMA}"',
+        f'schema = "{STUDY_SCHEMA}"',
         f'title = "{design.title}"',
         f'reference = "{reference}"',
         f'other = "{other}"',

@@ -9,7 +9,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.experiment import prbs_nm, predicted_precision
 from rigidimeter.experiment.predicted_record import expected_record
 from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.virtual.paper_rates import PAPER_RATES
+from rigidimeter.virtual.study_design import PAPER_RATES
 
 RATE_HZ = 1000.0
 

@@ -23,7 +23,7 @@ from rigidimeter.settings import (
     parse_settings,
 )
 from rigidimeter.virtual.batch import simulate_epochs
-from rigidimeter.virtual.paper_rates import PAPER_RATES
+from rigidimeter.virtual.study_design import PAPER_RATES
 
 PUSHING = SubjectSettings(voluntary_sd_nm=0.2, tremor_amplitude_nm=0.1)
 

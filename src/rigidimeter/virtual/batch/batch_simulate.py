@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import prbs_nm
 from rigidimeter.settings import Settings, SubjectSettings
-from rigidimeter.virtual.batch.batch_rig import Bench, EpochInputs, bench, draw_inputs
+from rigidimeter.virtual.batch.batch_rig import bench, draw_inputs
 from rigidimeter.virtual.batch.batch_run import (
     Batch,
     batch_of,
@@ -39,33 +39,9 @@ def epoch_generator(seed: int, number: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
 
 
-def simulate_epochs(
-    settings: Settings,
-    n_epochs: int,
-    *,
-    perturbation_nm: ArrayLike | None = None,
-    joints: Sequence[JointDynamics] | None = None,
-    conditions: str | Sequence[str] | None = None,
-    subjects: Sequence[SubjectSettings] | None = None,
-    seed: int | None = None,
-    first: int = 0,
-    workers: int = 1,
-    progress: Progress = lambda _: None,
-) -> Batch:
-    """Simulate PRBS epochs and return them together; see `simulate_chunks`."""
-    (batch,) = simulate_chunks(
-        settings,
-        n_epochs,
-        chunk=n_epochs,
-        perturbation_nm=perturbation_nm,
-        joints=joints,
-        conditions=conditions,
-        subjects=subjects,
-        seed=seed,
-        first=first,
-        workers=workers,
-        progress=progress,
-    )
+def simulate_epochs(settings: Settings, n_epochs: int, **options: Any) -> Batch:
+    """Simulate PRBS epochs and return them together; the options are those of `simulate_chunks`."""
+    (batch,) = simulate_chunks(settings, n_epochs, chunk=n_epochs, **options)
     return batch
 
 
@@ -119,96 +95,58 @@ def simulate_chunks(
     ValueError
         If a count is below 1 or what is given has not one entry for each epoch.
     """
-    work = _work(settings, n_epochs, perturbation_nm, joints, conditions, subjects, seed, first)
-    if chunk < 1 or workers < 1:
-        raise ValueError(f"chunk and workers must be at least 1, got {chunk} and {workers}")
-    return _chunks(work, n_epochs, chunk, workers, progress)
-
-
-@dataclass(frozen=True)
-class _Work:
-    bench: Bench
-    seed: int
-    first: int
-    perturbation_nm: NDArray[np.float64]
-    joints: Sequence[JointDynamics] | None
-    conditions: Sequence[str]
-    subjects: Sequence[SubjectSettings]
-
-    def inputs(self, i: int) -> EpochInputs:
-        joint = self.joints[i] if self.joints is not None else None
-        rng = epoch_generator(self.seed, self.first + i)
-        return draw_inputs(self.bench, self.subjects[i], rng, joint)
-
-
-def _work(
-    settings: Settings,
-    n_epochs: int,
-    perturbation_nm: ArrayLike | None,
-    joints: Sequence[JointDynamics] | None,
-    conditions: str | Sequence[str] | None,
-    subjects: Sequence[SubjectSettings] | None,
-    seed: int | None,
-    first: int,
-) -> _Work:
-    """Check what is to be done and fill in what was not given."""
     if n_epochs < 1 or first < 0:
         raise ValueError(f"need at least 1 epoch from number 0 on, got {n_epochs} from {first}")
-    if perturbation_nm is None:
-        perturbation_nm = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
+    if chunk < 1 or workers < 1:
+        raise ValueError(f"chunk and workers must be at least 1, got {chunk} and {workers}")
     if conditions is None:
         conditions = next(iter(settings.subject))
     names = [conditions] * n_epochs if isinstance(conditions, str) else conditions
     for what, given in (("joints", joints), ("conditions", names), ("subjects", subjects)):
         if given is not None and len(given) != n_epochs:
             raise ValueError(f"{n_epochs} epochs need as many {what}, got {len(given)}")
-    if subjects is None:
-        for name in names:
-            if name not in settings.subject:
-                known = ", ".join(sorted(settings.subject))
-                raise UserError(f"there is no [subject.{name}]; known conditions: {known}")
-        subjects = [settings.subject[name] for name in names]
-    rows = perturbation_rows(perturbation_nm, n_epochs)
-    return _Work(
-        bench(settings, rows.shape[1]),
-        settings.seed if seed is None else seed,
-        first,
-        rows,
-        joints,
-        names,
-        subjects,
-    )
+    whose = _subjects(settings, names) if subjects is None else subjects
+    if perturbation_nm is None:
+        perturbation_nm = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
+    perturbation = perturbation_rows(perturbation_nm, n_epochs)
+    rig = bench(settings, perturbation.shape[1])
+    root = settings.seed if seed is None else seed
+
+    def run_chunk(start: int, stop: int, pool: ThreadPoolExecutor) -> Batch:
+        """Run the epochs of one chunk; each is a row that no other thread writes."""
+        rows = empty_rows(stop - start, rig)
+
+        def run(i: int) -> JointDynamics:
+            joint = None if joints is None else joints[i]
+            inputs = draw_inputs(rig, whose[i], epoch_generator(root, first + i), joint)
+            run_row(rows, i - start, rig, perturbation[i], inputs)
+            return inputs.joint
+
+        found = []
+        for done, joint in enumerate(pool.map(run, range(start, stop)), start=start + 1):
+            found.append(joint)
+            progress(done)
+        return batch_of(
+            rows,
+            rig,
+            perturbation[start:stop],
+            found,
+            names[start:stop],
+            source=f"batch of seed {root}",
+            first=first + start,
+        )
+
+    def chunks() -> Iterator[Batch]:
+        with ThreadPoolExecutor(workers) as pool:
+            for start in range(0, n_epochs, chunk):
+                yield run_chunk(start, min(start + chunk, n_epochs), pool)
+
+    return chunks()
 
 
-def _chunks(
-    work: _Work, n_epochs: int, chunk: int, workers: int, progress: Progress
-) -> Iterator[Batch]:
-    with ThreadPoolExecutor(workers) as pool:
-        for start in range(0, n_epochs, chunk):
-            yield _chunk(work, start, min(start + chunk, n_epochs), pool, progress)
-
-
-def _chunk(
-    work: _Work, start: int, stop: int, pool: ThreadPoolExecutor, progress: Progress
-) -> Batch:
-    """Run the epochs of one chunk; each is a row that no other thread writes."""
-    rows = empty_rows(stop - start, work.bench)
-
-    def run(i: int) -> JointDynamics:
-        inputs = work.inputs(i)
-        run_row(rows, i - start, work.bench, work.perturbation_nm[i], inputs)
-        return inputs.joint
-
-    joints = []
-    for done, joint in enumerate(pool.map(run, range(start, stop)), start=start + 1):
-        joints.append(joint)
-        progress(done)
-    return batch_of(
-        rows,
-        work.bench,
-        work.perturbation_nm[start:stop],
-        joints,
-        work.conditions[start:stop],
-        source=f"batch of seed {work.seed}",
-        first=work.first + start,
-    )
+def _subjects(settings: Settings, conditions: Sequence[str]) -> list[SubjectSettings]:
+    for name in conditions:
+        if name not in settings.subject:
+            known = ", ".join(sorted(settings.subject))
+            raise UserError(f"there is no [subject.{name}]; known conditions: {known}")
+    return [settings.subject[name] for name in conditions]

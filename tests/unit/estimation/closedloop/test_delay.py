@@ -7,7 +7,7 @@ from rigidimeter.estimation import aligned, estimate_delays
 from rigidimeter.estimation.closedloop.observation import period_s
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Channel
-from rigidimeter.virtual.paper_rates import PAPER_RATES
+from rigidimeter.virtual.study_design import PAPER_RATES
 
 
 def late(epoch, delay_s):

@@ -6,7 +6,7 @@ import pytest
 from rigidimeter.estimation import choose_method, fit_epochs
 from rigidimeter.records import Channel, Outcome
 from rigidimeter.settings import ControllerSettings
-from rigidimeter.virtual.paper_rates import PAPER_RATES
+from rigidimeter.virtual.study_design import PAPER_RATES
 
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 
