@@ -14,7 +14,7 @@ from rigidimeter.cli.options import JsonOption
 from rigidimeter.cli.text_table import text_table
 
 if TYPE_CHECKING:
-    from rigidimeter.study.rating_contrasts import RatingsModel
+    from rigidimeter.study import RatingsFound
 
 __all__ = ["ratings"]
 
@@ -82,7 +82,8 @@ def ratings(
     from rigidimeter.documents import write_json
     from rigidimeter.recording.formats import read_text_table
     from rigidimeter.records import Notice
-    from rigidimeter.study.rating_contrasts import model_ratings, ratings_document
+    from rigidimeter.study.ratings_found import ratings_document
+    from rigidimeter.study.ratings_model import model_ratings
 
     keep_inputs((json_out,), (table,))
     columns = {
@@ -106,7 +107,7 @@ def ratings(
     typer.echo("\n".join(_lines(found)))
 
 
-def _lines(found: RatingsModel) -> Iterator[str]:
+def _lines(found: RatingsFound) -> Iterator[str]:
     """Yield the table and its sentences."""
     fit = found.fit
     offsets = " + ".join(f"offset of {name}" for name in fit.variances)
@@ -148,13 +149,12 @@ def _lines(found: RatingsModel) -> Iterator[str]:
         yield from ("", "Note:", *(f"  - {text}" for text in found.model_notices))
 
 
-def _contrast_lines(found: RatingsModel) -> Iterator[str]:
-    first, second = found.pair
-    c = found.contrast
+def _contrast_lines(found: RatingsFound) -> Iterator[str]:
+    first, second = found.reference, found.other
+    c, (low, high) = found.contrast, found.interval
     way = "higher" if c.estimate > 0 else "lower" if c.estimate < 0 else "neither higher nor lower"
     yield (
-        f"{first} minus {second}: {c.estimate:.4g} [{found.low:.4g} to {found.high:.4g}, 95 %], "
-        f"SE {c.se:.4g}"
+        f"{first} minus {second}: {c.estimate:.4g} [{low:.4g} to {high:.4g}, 95 %], SE {c.se:.4g}"
     )
     for f, df, p, name in (
         (c.f, c.df_residual, c.p_residual, "residual degrees of freedom, n − p"),

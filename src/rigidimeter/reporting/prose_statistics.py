@@ -25,7 +25,7 @@ def rating_sentences(result: StudyResult, cite: Cited) -> list[str]:
     found = result.ratings
     if found is None:
         return []
-    examiners = len({row[1] for row in found.rows})
+    examiners = len({row.examiner for row in found.rows})
     estimated = tuple(name for name in found.fit.offsets if name not in found.fit.inseparable)
     offsets = f" and a random intercept for {offsets_text(estimated)}" if estimated else ""
     sentences = [

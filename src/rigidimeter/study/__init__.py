@@ -16,6 +16,7 @@ from rigidimeter.study.comparison import (
 )
 from rigidimeter.study.measures import MEASURES, RATING, Measure, Observation
 from rigidimeter.study.provenance import provenance
+from rigidimeter.study.ratings_found import RatingMean, RatingsFound
 from rigidimeter.study.results import (
     Comparison,
     Condition,
@@ -23,8 +24,6 @@ from rigidimeter.study.results import (
     EffectPair,
     Exclusion,
     LeftOut,
-    RatingMean,
-    RatingsFound,
     SensitivityRow,
     SessionEntry,
     StudyResult,

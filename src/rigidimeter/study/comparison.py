@@ -264,8 +264,8 @@ def day_test(
         return no_days(*days, str(error), confidence)
 
 
-def no_days(days_x: int, days_y: int, remark: str, confidence: float = 0.95) -> DayDifference:
-    """Return the test by days that could not be made, for the reason given."""
+def no_days(days_x: int, days_y: int, remark: str = "", confidence: float = 0.95) -> DayDifference:
+    """Return a test by days without its numbers, for the reason given."""
     nan = math.nan
     return DayDifference(
         nan, nan, nan, nan, nan, nan, days_x, days_y, nan, nan, (), confidence, remark

@@ -1,33 +1,28 @@
-"""The examiners' ratings of a study: score = mean of condition + offset of examiner + error.
+"""Examiners' ratings of a study, or of any table, and the mixed model of them.
 
-As Sec. 2.2 of the paper; with several subjects each has an offset too. Beside it the same contrast
-with an offset for every day, since all scores of one day are of one arm on that day.
+Of a study as in Sec. 2.2 of the paper: score = mean of condition + offset of examiner + error. With
+several subjects each has an offset too. Beside it the same contrast with an offset for every day,
+since all scores of one day are of one arm on that day.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.formats import TextTable
 from rigidimeter.recording.study_folder import StudyFolder
 from rigidimeter.records import Notice
-from rigidimeter.statistics import (
-    Contrast,
-    DayDifference,
-    Mixed,
-    contrast,
-    difference,
-    fit_mixed,
-    interval_of,
-)
+from rigidimeter.statistics import Contrast, DayDifference, difference, fit_mixed, interval_of
 from rigidimeter.study.blinding import Naming
 from rigidimeter.study.comparison import measured, no_days
 from rigidimeter.study.measures import RATING, Observation
-from rigidimeter.study.rating_table import Rating, groupings, oddities
-from rigidimeter.study.results import Comparison, RatingMean, RatingsFound
+from rigidimeter.study.rating_table import RANDOM, Rating, groupings, oddities, ratings_of
+from rigidimeter.study.ratings_found import RatingsFound, fit_ratings
+from rigidimeter.study.results import Comparison
 
-__all__ = ["means_of", "rated", "ratings_comparison", "ratings_days", "variance_notices"]
+__all__ = ["model_ratings", "rated", "ratings_comparison", "ratings_days"]
 
 FEWEST = 3
 
@@ -52,28 +47,14 @@ def rated(read: StudyFolder, names: Naming) -> tuple[RatingsFound | None, list[N
             f"there are {told}"
         )
         return None, [*notices, Notice("error", text)]
-    random = _random(rows)
-    odd = oddities(source, rows, random, read.about.rating.scale[0], read.about.rating.step,
-                   with_day=True)  # fmt: skip
-    odd += _lone_examiners(rows)
-    labels = groupings(rows, random)
-    scores, conditions = [row.score for row in rows], [row.condition for row in rows]
+    random = ("examiner", "subject") if len({row.subject for row in rows}) > 1 else ("examiner",)
+    low, step = read.about.rating.scale[0], read.about.rating.step
+    odd = oddities(source, rows, random, low, step, with_day=True)
     try:
-        fit = fit_mixed(scores, conditions, labels)
+        found = fit_ratings(source, rows, random, (first, second), odd)
     except (ValueError, ArithmeticError) as error:
         return None, [*notices, Notice("error", f"{source}: {error}")]
-    odd += variance_notices(fit)
-    notices += [Notice("warning", text) for text in odd]
-    found = RatingsFound(
-        source=source,
-        rows=tuple((r.condition, r.examiner, r.subject, r.day, r.score) for r in rows),
-        fit=fit,
-        means=means_of(fit),
-        contrast=difference(fit, first, second),
-        reference=first,
-        other=second,
-        notices=tuple(odd),
-    )
+    notices += [Notice("warning", text) for text in (*odd, *found.model_notices)]
     return replace(found, contrast_days=_with_days(rows, random, names.pair)), notices
 
 
@@ -113,32 +94,6 @@ def _rows(read: StudyFolder, names: Naming) -> tuple[list[Rating], list[Notice]]
     return rows, notices
 
 
-def _random(rows: list[Rating]) -> tuple[str, ...]:
-    return ("examiner", "subject") if len({row.subject for row in rows}) > 1 else ("examiner",)
-
-
-def _lone_examiners(rows: list[Rating]) -> list[str]:
-    """Name examiners of one rating where `oddities` does not: when all have only one."""
-    counts = {row.examiner: 0 for row in rows}
-    for row in rows:
-        counts[row.examiner] += 1
-    if counts and all(count == 1 for count in counts.values()):
-        return ["every examiner gave one rating, so offsets cannot be distinguished from chance"]
-    return []
-
-
-def variance_notices(fit: Mixed) -> list[str]:
-    """Say in words where a variance is at its boundary or cannot be estimated."""
-    said = [
-        f"the variance of {name} is estimated as zero, its boundary: they differ no more than the "
-        "residual explains, so all their offsets are zero and no score is corrected for them"
-        for name in fit.at_zero
-    ]
-    for name, reason in fit.inseparable.items():
-        said.append(f"{name} was left out of the model: {reason}; its offsets are zero")
-    return said
-
-
 def _with_days(
     rows: list[Rating], random: tuple[str, ...], pair: tuple[str, str]
 ) -> Contrast | None:
@@ -158,21 +113,17 @@ def _with_days(
     return difference(fit, *pair)
 
 
-def means_of(fit: Mixed) -> tuple[RatingMean, ...]:
-    """Return the mean of each condition with its interval by Kenward and Roger."""
-    means = []
-    for condition in fit.conditions:
-        one = contrast(fit, [float(name == condition) for name in fit.conditions])
-        low, high = interval_of(one.estimate, one.se_kenward_roger, one.df_kenward_roger)
-        means.append(RatingMean(condition, one.estimate, low, high))
-    return tuple(means)
-
-
 def ratings_comparison(found: RatingsFound) -> Comparison:
     """Return the corrected scores as a measure; a rating without a day is a day of its own."""
     observations = [
-        Observation(score, condition, subject, day, unit=f"{subject}/{day or f'row {number}'}")
-        for number, ((condition, _, subject, day, _), score) in enumerate(
+        Observation(
+            score,
+            row.condition,
+            row.subject,
+            row.day,
+            unit=f"{row.subject}/{row.day or f'row {number}'}",
+        )
+        for number, (row, score) in enumerate(
             zip(found.rows, found.fit.corrected.tolist(), strict=True), start=1
         )
     ]
@@ -182,7 +133,7 @@ def ratings_comparison(found: RatingsFound) -> Comparison:
 def ratings_days(found: RatingsFound) -> DayDifference:
     """Return the contrast with an offset for every day as a test by days."""
     days_x, days_y = (
-        len({row[2:4] for row in found.rows if row[0] == condition})
+        len({(row.subject, row.day) for row in found.rows if row.condition == condition})
         for condition in (found.reference, found.other)
     )
     c = found.contrast_days
@@ -190,16 +141,66 @@ def ratings_days(found: RatingsFound) -> DayDifference:
         return no_days(days_x, days_y, "the ratings cannot separate days from the residual")
     se, df = c.se_kenward_roger, c.df_kenward_roger
     low, high = interval_of(c.estimate, se, df)
-    return DayDifference(
-        c.estimate,
-        se,
-        low,
-        high,
-        c.p_kenward_roger,
-        df,
-        days_x,
-        days_y,
-        math.nan,
-        math.nan,
-        (),
-    )
+    none = no_days(days_x, days_y)
+    return replace(none, estimate=c.estimate, se=se, low=low, high=high, p=c.p_kenward_roger, df=df)
+
+
+def model_ratings(
+    table: TextTable,
+    columns: Mapping[str, str],
+    random: Sequence[str] = ("examiner",),
+    *,
+    scale: tuple[float, float] = (0.0, 3.0),
+    step: float = 0.5,
+    pair: tuple[str, str] | None = None,
+) -> RatingsFound:
+    """Fit a mean for each condition and a random offset for each label of the groupings.
+
+    Parameters
+    ----------
+    table : TextTable
+    columns : mapping of str to str
+        What the table calls condition, score, examiner, subject and day.
+    random : sequence of str
+        Names out of `RANDOM`.
+    scale : tuple of float
+        Lowest and highest rating there is.
+    step : float
+        Of the scale; 0 for none.
+    pair : (str, str), optional
+        The contrast; by default the first two conditions, ``OFF`` first where it occurs.
+
+    Raises
+    ------
+    UserError
+        If an option is wrong, or the table holds no ratings that can be modelled.
+    """
+    chosen = tuple(dict.fromkeys(random))
+    for name in chosen:
+        if name not in RANDOM:
+            raise UserError(f"--random {name}: must be one of {', '.join(RANDOM)}")
+    if not (scale[0] < scale[1] and step >= 0 and abs(sum(scale)) < float("inf")):
+        raise UserError(
+            f"--scale {scale[0]:g} {scale[1]:g} --step {step:g}: write the lowest and then the "
+            "highest rating, and a step of 0 or more"
+        )
+    found = ratings_of(table, columns, chosen, scale, step)
+    conditions = [row.condition for row in found.rows]
+    first, second = pair or _first_two(conditions)
+    for name in (first, second):
+        if name not in conditions:
+            known = ", ".join(dict.fromkeys(conditions))
+            raise UserError(f"--contrast {name}: there is no such condition; rated are: {known}")
+    if first == second:
+        raise UserError(f"--contrast {first} {second}: name two different conditions")
+    try:
+        return fit_ratings(
+            table.source, found.rows, chosen, (first, second), found.notices, found.left_out
+        )
+    except (ValueError, ArithmeticError) as error:
+        raise UserError(f"{table.source}: {error}") from None
+
+
+def _first_two(conditions: Sequence[str]) -> tuple[str, str]:
+    first, second, *_ = sorted(dict.fromkeys(conditions), key=lambda name: name != "OFF")
+    return first, second

@@ -12,15 +12,14 @@ from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score
 from rigidimeter.settings import Settings
 from rigidimeter.statistics import (
-    Contrast,
     DayDifference,
     EffectDifference,
     Effects,
-    Mixed,
     RankSum,
     Summary,
 )
 from rigidimeter.study.measures import Measure, Observation
+from rigidimeter.study.ratings_found import RatingsFound
 from rigidimeter.study.tables import comparison_rows
 
 if TYPE_CHECKING:
@@ -33,8 +32,6 @@ __all__ = [
     "EffectPair",
     "Exclusion",
     "LeftOut",
-    "RatingMean",
-    "RatingsFound",
     "SensitivityRow",
     "SessionEntry",
     "StudyResult",
@@ -164,36 +161,6 @@ class SessionEntry:
     code: str
     path: str
     source: str
-
-
-@dataclass(frozen=True)
-class RatingMean:
-    """The model's mean rating in one condition, with its 95 % interval by Kenward and Roger."""
-
-    condition: str
-    mean: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class RatingsFound:
-    """What the examiners' scores say: `fit` by condition and examiner, and the contrast.
-
-    `rows` are (condition, examiner, subject, day, score) in the order of the table; the corrected
-    scores in `fit` go with them. `contrast_days` is the same contrast with an offset for every day
-    too, None where the data cannot separate days.
-    """
-
-    source: str
-    rows: tuple[tuple[str, str, str, str, float], ...]
-    fit: Mixed
-    means: tuple[RatingMean, ...]
-    contrast: Contrast
-    reference: str
-    other: str
-    notices: tuple[str, ...] = ()
-    contrast_days: Contrast | None = None
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 from rigidimeter.documents import csv_text, plain_values
 from rigidimeter.recording import estimates_document
 from rigidimeter.statistics import RankSum
-from rigidimeter.study.rating_rows import (
+from rigidimeter.study.ratings_found import (
     rating_contrast,
     rating_offsets,
     rating_rows,
-    ratings_values,
+    ratings_document,
 )
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
         "comparisons": [_comparison(comparison) for comparison in result.comparisons],
         "days": tables["days"],
         "effect_differences": tables["effect_differences"],
-        "ratings": None if result.ratings is None else ratings_values(result.ratings),
+        "ratings": None if result.ratings is None else ratings_document(result.ratings),
         "sensitivity": tables["sensitivity"],
         "exclusions": tables["excluded_epochs"],
         "notices": [

@@ -31,7 +31,9 @@ from rigidimeter.study import (
     compare_measures,
 )
 from rigidimeter.study.comparison import day_tests, gathered, no_days
-from rigidimeter.study.ratings_model import means_of, ratings_comparison, ratings_days
+from rigidimeter.study.rating_table import Rating
+from rigidimeter.study.ratings_found import fit_ratings
+from rigidimeter.study.ratings_model import ratings_comparison, ratings_days
 
 JOINT = {"inertia_kg_m2": 0.0045, "damping_nm_s_rad": 0.137, "stiffness_nm_rad": 1.75}
 LOWER = {"inertia_kg_m2": 1.0, "damping_nm_s_rad": 0.84, "stiffness_nm_rad": 0.81}
@@ -239,39 +241,32 @@ def _ratings(
         level = 1.9 - 0.5 * design.effect * (s.condition == design.names[1])
         for examiner in design.examiners:
             score = level + bias[examiner] + 0.3 * float(rng.standard_normal())
-            rows.append(
-                (
-                    s.condition,
-                    examiner,
-                    s.subject,
-                    s.day,
-                    min(max(round(2 * score) / 2, 0.0), 3.0),
-                )
-            )
+            rows.append((s.condition, examiner, s.subject, s.day, _rounded(score)))
     return ratings_found(tuple(rows), design.names)
+
+
+def _rounded(score: float) -> float:
+    return min(max(round(2 * score) / 2, 0.0), 3.0)
 
 
 def ratings_found(
     rows: tuple[tuple[str, str, str, str, float], ...], names: tuple[str, str]
 ) -> RatingsFound:
     """Return the mixed model of ratings (condition, examiner, subject, day, score)."""
-    fit = fit_mixed(
-        [row[4] for row in rows], [row[0] for row in rows], {"examiner": [row[1] for row in rows]}
-    )
+    ratings = [
+        Rating(line, condition, score, examiner, subject, day)
+        for line, (condition, examiner, subject, day, score) in enumerate(rows, start=2)
+    ]
     with_days = fit_mixed(
-        [row[4] for row in rows],
-        [row[0] for row in rows],
-        {"examiner": [row[1] for row in rows], "day": [f"{row[2]}/{row[3]}" for row in rows]},
+        [r.score for r in ratings],
+        [r.condition for r in ratings],
+        {
+            "examiner": [r.examiner for r in ratings],
+            "day": [f"{r.subject}/{r.day}" for r in ratings],
+        },
     )
-    return RatingsFound(
-        "ratings.csv",
-        rows,
-        fit,
-        means_of(fit),
-        difference(fit, *names),
-        *names,
-        contrast_days=difference(with_days, *names),
-    )
+    found = fit_ratings("ratings.csv", ratings, ["examiner"], names)
+    return replace(found, contrast_days=difference(with_days, *names))
 
 
 PULL = {

@@ -169,7 +169,7 @@ def test_ratings(study, json, folder: Path, page: ParsedPage) -> None:
     begin = next(k for k, line in enumerate(lines) if line.startswith("Examiners' ratings"))
     assert_shows(lines[begin + 2].rpartition("Kenward-Roger p")[2], [float(rows[2]["p"])], 2)
     for row in rows_of(folder, "rating_offsets"):
-        assert float(row["offset"]) == found["offsets"][row["grouping"]][row["name"]]
+        assert float(row["offset"]) == found["offsets_by"][row["grouping"]][row["name"]]
     means = page.words("ratings").partition("intervals: ")[2]
     expected = []
     for name in ("OFF", "DBS"):

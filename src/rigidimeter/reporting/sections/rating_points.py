@@ -86,7 +86,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         ),
         tables["rating_offsets"],
     )
-    for text in found.notices:
+    for text in (*found.notices, *found.model_notices):
         yield paragraph(f"{text}.", "remark")
     yield Table(
         "ratings",
@@ -114,12 +114,12 @@ def ratings(found: RatingsFound, order: Sequence[str]) -> Drawing:
     """
     colours = condition_colours(order)
     means = {condition_name(mean.condition): mean for mean in found.means}
-    examiners = list(dict.fromkeys(row[1] for row in found.rows))
-    named = [(condition_name(row[0]), row[1]) for row in found.rows]
+    examiners = list(dict.fromkeys(row.examiner for row in found.rows))
+    named = [(condition_name(row.condition), row.examiner) for row in found.rows]
     with styled():
         figure = Drawing(figsize=(7.4, 3.3))
         raw, corrected = figure.subplots(1, 2, sharey=True)
-        scores = np.array([row[4] for row in found.rows])
+        scores = np.array([row.score for row in found.rows])
         for axes, values in ((raw, scores), (corrected, np.asarray(found.fit.corrected))):
             for place, condition in enumerate(means):
                 for lane, examiner in enumerate(examiners):
