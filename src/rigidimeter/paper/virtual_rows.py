@@ -32,6 +32,7 @@ from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits
 from rigidimeter.reporting.style import condition_colours
 from rigidimeter.statistics import difference, fit_mixed, summarise
 from rigidimeter.study import Comparison
+from rigidimeter.study.rating_table import groupings
 
 __all__ = [
     "equation_7",
@@ -191,8 +192,9 @@ def figure_5a(context: Context) -> Row:
     """Compare the ratings, corrected for the examiners."""
     ratings = ratings_of(context)
     fit, contrast = ratings.fit, ratings.contrast
-    conditions, examiners, _, days, scores = zip(*ratings.rows, strict=True)
-    with_days = fit_mixed(scores, conditions, {"examiner": examiners, "day": days})
+    conditions = [row.condition for row in ratings.rows]
+    offsets_of = groupings(ratings.rows, ["examiner", "day"])
+    with_days = fit_mixed([row.score for row in ratings.rows], conditions, offsets_of)
     p_days = p_value(difference(with_days, "OFF", "DBS").p_kenward_roger)
     corrected = list(zip(conditions, fit.corrected.tolist(), strict=True))
     values = {
