@@ -127,7 +127,9 @@ class ControllerRun:
             self.change_state(Run(State.PAUSED, stop_next=self.run.stop_next))
             return True
         cause = self.loop.cause
-        self.fail(cause, f"the guard held the rig and nobody was there to go on: {cause.sentence}")
+        self.fail(
+            cause, f"the guard held the rig and no operator was there to continue: {cause.sentence}"
+        )
         return False
 
     def conclude(self, left: int) -> None:

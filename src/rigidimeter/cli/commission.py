@@ -1,4 +1,4 @@
-"""`rigidimeter commission`: try a rig before anyone is put into it."""
+"""`rigidimeter commission`: check a rig before a person is attached."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.options import SettingsOption
+from rigidimeter.cli.text_table import text_table
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -28,14 +29,17 @@ def commission(
     rig: Annotated[Path, typer.Option("--rig", metavar="RIG.toml", help="The rig file.")],
     settings: SettingsOption = None,
     signed_by: Annotated[
-        str, typer.Option("--signed-by", metavar="NAME", help="Who answers for it; recorded.")
+        str,
+        typer.Option(
+            "--signed-by", metavar="NAME", help="Who is responsible for the rig; recorded."
+        ),
     ] = "",
     yes: Annotated[
         bool,
         typer.Option(
             "--yes",
-            help="Consent to every motion beforehand. What only a person can tell is not tried, so "
-            "the record is good for an emulated rig only.",
+            help="Consent to every motion in advance. Checks that need a person are skipped, so "
+            "the record is valid for an emulated rig only.",
         ),
     ] = False,
     known_torque: Annotated[
@@ -43,7 +47,7 @@ def commission(
         typer.Option(
             "--known-torque-nm",
             metavar="NM",
-            help="A torque that you put on the joint by hand or weight, toward positive angles.",
+            help="A known torque that you apply by hand or with a weight, toward positive angles.",
         ),
     ] = None,
     known_angle: Annotated[
@@ -51,22 +55,22 @@ def commission(
         typer.Option(
             "--known-angle-deg",
             metavar="DEG",
-            help="An angle by which you turn the joint by hand, without power.",
+            help="A known angle by which you turn the joint by hand, with the drive off.",
         ),
     ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="FILE", help="The record; beside the rig file unless told otherwise."
+            "--out", metavar="FILE", help="The record. Default: a file next to the rig file."
         ),
     ] = None,
 ) -> None:
-    """Try a rig, without anyone in it, and write a record that later runs ask for.
+    """Check a rig with nobody in it, and write the record that `run` requires.
 
-    First without power: what the devices say, rates, noise, lateness, mechanical stops. Then, with
-    your consent, by a small slow motion: directions, units, delays, stability of the protocol's
-    controller, watchdog and emergency stop. Fasten a spring or a weight like a relaxed arm's to the
-    joint. On hardware a person must be there, and sign.
+    First without power: device settings, rates, noise, timing, mechanical stops. Then, with your
+    consent, with small slow motions: directions, units, delays, stability of the protocol's
+    controller, watchdog and emergency stop. Attach a spring or a weight similar to a relaxed arm to
+    the joint. On hardware a person must be present, and sign.
 
     \b
     For example:
@@ -87,10 +91,12 @@ def commission(
     path = out or record_path(rig)
     _check_before(path, {"--known-torque-nm": known_torque, "--known-angle-deg": known_angle})
     if not yes and not sys.stdin.isatty():
-        raise UserError("nobody is there to answer; use a terminal, or --yes on an emulated rig")
+        raise UserError(
+            "nobody can answer the questions; use a terminal, or --yes on an emulated rig"
+        )
     if not rigfile.emulated and not signed_by.strip():
         raise UserError(
-            f"{rig}: is a rig of hardware; say who answers for it with --signed-by NAME"
+            f"{rig}: is real hardware; name the person responsible for it with --signed-by NAME"
         )
     operator = Operator(
         ask=(lambda _: True) if yes else _ask,
@@ -121,7 +127,7 @@ def commission(
         typer.echo(f"Not tried: {', '.join(found.not_tried)}.")
     what = "this emulated rig, with nobody in it" if found.emulated else "this rig"
     typer.echo(
-        f"Good for {what}, its devices and this controller, for "
+        f"Valid for {what}, its devices and this controller, for "
         f"{chosen.commissioning.validity_days:g} days."
     )
 
@@ -154,11 +160,11 @@ def _interrupted_once(record: Path) -> Iterator[None]:
 
 
 def _check_before(record: Path, known: Mapping[str, float | None]) -> None:
-    """Refuse what would only be found wrong once everything was tried."""
+    """Refuse mistakes that would otherwise be found only after every check was made."""
     if not record.parent.is_dir() or not os.access(record.parent, os.W_OK):
         raise UserError(
-            f"{record}: the record cannot be written, for {record.parent} is no folder that can "
-            "be written to; name another with --out FILE"
+            f"{record}: the record cannot be written, because {record.parent} is not a folder or "
+            "not writable; name another file with --out FILE"
         )
     if record.is_dir():
         raise UserError(f"{record}: is a folder; name a file for the record with --out FILE")
@@ -169,14 +175,22 @@ def _check_before(record: Path, known: Mapping[str, float | None]) -> None:
 
 def table(record: CommissioningRecord) -> str:
     """Return the checks as lines, each with its remedy below where it has one."""
-    lines = [f"      {'check':<40}  {'found':<28}  must be"]
-    for check in record.checks:
-        mark = {"passed": "ok  ", "failed": "FAIL"}.get(check.outcome, "–   ")
-        words = "" if check.value is None else check.words
-        lines.append(f"{mark}  {check.name:<40}  {words:<28}  {check.limit}")
-        if check.remedy:
-            lines.append(f"      {check.remedy}")
-    return "\n".join(lines)
+    marks = {"passed": "ok", "failed": "FAIL"}
+    rows = [("", "check", "found", "must be")]
+    rows += [
+        (
+            marks.get(check.outcome, "–"),
+            check.name,
+            "" if check.value is None else check.words,
+            check.limit,
+        )
+        for check in record.checks
+    ]
+    heading, *lines = text_table(rows, "<<<<")
+    shown = [heading]
+    for check, line in zip(record.checks, lines, strict=True):
+        shown += [line, f"      {check.remedy}"] if check.remedy else [line]
+    return "\n".join(shown)
 
 
 def _ask(question: str) -> bool:

@@ -75,7 +75,7 @@ def design(
       rigidimeter design --settings rig.toml --detect damping=20% --power 0.8
       rigidimeter design --settings rig.toml --optimise --multisine
     """
-    from rigidimeter.cli.design_text import design_lines, write_folder
+    from rigidimeter.cli.design_text import design_lines
     from rigidimeter.documents import write_json
     from rigidimeter.dynamics import refuse_unstable
     from rigidimeter.experiment import check_criterion, design_document
@@ -93,7 +93,9 @@ def design(
     )
     typer.echo("\n".join(design_lines(designed, power, alpha)))
     if out is not None:
-        typer.echo(f"\nWritten to {out}: {', '.join(write_folder(out, designed))}")
+        from rigidimeter.reporting.design_folder import write_design_folder
+
+        typer.echo(f"\nWritten to {out}: {', '.join(write_design_folder(out, designed))}")
     if json_out is not None:
         write_json(json_out, design_document(designed))
     refuse_unstable(designed.settings, designed.stability)

@@ -1,28 +1,26 @@
-"""The text and the files of `rigidimeter design`."""
+"""A design as lines for a terminal."""
 
 from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
 
-from rigidimeter.documents import csv_text, write_json, write_text
+from rigidimeter.cli.text_table import Rows, text_table
 from rigidimeter.dynamics import Margins
-from rigidimeter.errors import UserError
 from rigidimeter.experiment import (
     Candidate,
     Design,
     Detection,
     MultisineComparison,
     chip_count,
-    design_document,
     period_s,
+    prbs_toml,
     time_constant_s,
 )
 from rigidimeter.units import deg_from_rad, rad_from_deg
 
-__all__ = ["design_lines", "write_folder"]
+__all__ = ["design_lines"]
 
 _SHOWN = 8
 _HEADS = ("J kg·m²", "B N·m·s/rad", "K N·m/rad")
@@ -50,60 +48,9 @@ def design_lines(design: Design, power: float, alpha: float) -> Iterator[str]:
         yield from section
         yield ""
     if not design.warnings:
-        yield "All of it stays within the guard's limits."
+        yield "Everything stays within the guard's limits."
     for warning in (*design.warnings, *design.stability.warnings):
         yield from _wrapped(f"Warning: {warning}.", indent="")
-
-
-def write_folder(folder: Path, design: Design) -> list[str]:
-    """Write what will be commanded and what is predicted; return the names of the files.
-
-    Raises
-    ------
-    UserError
-        If the folder cannot be made or a file cannot be written.
-    """
-    from rigidimeter.reporting.open_loop import bode
-    from rigidimeter.reporting.style import svg_text
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"{folder}: cannot be made a folder ({error.strerror or error})") from None
-    motion = (design.angle_rad.tolist(), design.velocity_rad_s.tolist())
-    epochs = [vars(epoch) for epoch in design.protocol.epochs]
-    texts = {
-        "prbs.csv": _columns(design, ["perturbation_nm"], [design.perturbation_nm.tolist()]),
-        "sinusoid.csv": _columns(design, ["angle_rad", "velocity_rad_s"], motion),
-        "protocol.csv": csv_text(list(epochs[0]), epochs),
-        "bode.svg": svg_text(
-            bode(design.settings, design.stability.conditions, design.stability.worst)
-        ),
-    }
-    if design.multisine is not None:
-        torque = [design.multisine.torque_nm.tolist()]
-        texts["multisine.csv"] = _columns(design, ["perturbation_nm"], torque)
-    if design.ranked is not None:
-        texts["optimised.toml"] = _snippet(design.ranked[0])
-    for name, text in texts.items():
-        write_text(folder / name, text)
-    write_json(folder / "design.json", design_document(design))
-    return [*texts, "design.json"]
-
-
-def _columns(design: Design, names: list[str], columns: Sequence[list[float]]) -> str:
-    rate_hz = design.settings.rig.tick_rate_hz
-    times_s = [tick / rate_hz for tick in range(len(columns[0]))]
-    return csv_text(["time_s", *names], zip(times_s, *columns, strict=True))
-
-
-def _snippet(best: Candidate) -> str:
-    """Return a sequence as settings."""
-    prbs = best.prbs
-    return (
-        f"[prbs]\nregister_bits = {prbs.register_bits}\nclock_hz = {prbs.clock_hz!r}\n"
-        f"amplitude_nm = {prbs.amplitude_nm!r}\n"
-    )
 
 
 def _wrapped(text: str, indent: str = "  ") -> list[str]:
@@ -130,13 +77,19 @@ def _prbs(design: Design) -> Iterator[str]:
         "power"
     )
     yield from _wrapped(band.verdict)
-    yield "  predicted in the ideal loop   angle SD    peak angle    peak speed"
+    rows: Rows = [
+        ("predicted in the ideal loop", "angle SD deg", "peak angle deg", "peak speed deg/s")
+    ]
     for name, needs in design.prbs_demand.items():
-        yield (
-            f"    {name:<22} {deg_from_rad(needs.angle_sd_rad):9.2f} deg"
-            f" {deg_from_rad(needs.peak_angle_rad):9.2f} deg"
-            f" {deg_from_rad(needs.peak_speed_rad_s):7.1f} deg/s"
+        angles = (needs.angle_sd_rad, needs.peak_angle_rad)
+        rows.append(
+            (
+                f"  {name}",
+                *(f"{deg_from_rad(angle):.2f}" for angle in angles),
+                f"{deg_from_rad(needs.peak_speed_rad_s):.1f}",
+            )
         )
+    yield from text_table(rows, "<>>>", "  ")
 
 
 def _sinusoid(design: Design) -> Iterator[str]:
@@ -176,15 +129,20 @@ def _controller(design: Design) -> Iterator[str]:
 def _bandwidth(design: Design) -> Iterator[str]:
     table = design.bandwidth
     yield f"Bandwidth (−3 dB) of the arm of App. A, J, B, K ±{table.uncertainty_percent:g} %"
-    yield "  corner     J kg·m²  B N·m·s/rad  K N·m/rad      Hz"
-    for corner in (table.nominal, *table.corners):
-        name = "nominal" if not any(corner.signs) else "".join("−0+"[s + 1] for s in corner.signs)
-        notes = {table.equation_8.signs: "  Eq. 8", table.widest.signs: "  widest"}
-        yield (
-            f"  {name:<9} {corner.joint.inertia_kg_m2:8.4f} {corner.joint.damping_nm_s_rad:12.3f}"
-            f" {corner.joint.stiffness_nm_rad:10.2f} {corner.bandwidth_hz:7.2f}"
-            f"{notes.get(corner.signs, '')}"
+    notes = {table.equation_8.signs: "Eq. 8", table.widest.signs: "widest"}
+    rows: Rows = [("corner", "J kg·m²", "B N·m·s/rad", "K N·m/rad", "Hz", "")]
+    rows += [
+        (
+            "".join("−0+"[sign + 1] for sign in corner.signs) if any(corner.signs) else "nominal",
+            f"{corner.joint.inertia_kg_m2:.4f}",
+            f"{corner.joint.damping_nm_s_rad:.3f}",
+            f"{corner.joint.stiffness_nm_rad:.2f}",
+            f"{corner.bandwidth_hz:.2f}",
+            notes.get(corner.signs, ""),
         )
+        for corner in (table.nominal, *table.corners)
+    ]
+    yield from text_table(rows, "<>>>><", "  ")
 
 
 def _protocol(design: Design) -> Iterator[str]:
@@ -199,33 +157,28 @@ def _stability(design: Design) -> Iterator[str]:
     """Yield the margins of the loop."""
     ours = design.settings.margins
     yield "Stability of the admittance on the arm"
-    yield "                           gain margin   phase margin   delay margin   modulus   verdict"
+    rows: Rows = [("", "gain margin", "phase margin", "delay margin", "modulus", "verdict")]
     for name, margins in design.stability.conditions.items():
-        yield _margins(f"subject {name}", margins)
-        yield _margins("  worst joint around it", design.stability.worst[name])
+        rows.append((f"subject {name}", *_margins(margins)))
+        rows.append(("  worst joint around it", *_margins(design.stability.worst[name])))
+    yield from text_table(rows, "<>>>><", "  ")
     yield (
         f"  worst: each of J, B, K from {ours.joint_factor_low:g} to {ours.joint_factor_high:g} "
         "times its value"
     )
 
 
-def _margins(name: str, found: Margins) -> str:
-    columns = (
-        ("never", 9) if math.isinf(found.gain_margin_db) else (f"{found.gain_margin_db:.1f} dB", 9),
-        (
-            ("never", 12)
-            if math.isinf(found.phase_margin_deg)
-            else (f"{found.phase_margin_deg:.1f} deg", 12)
-        ),
-        (
-            ("never", 12)
-            if math.isinf(found.delay_margin_s)
-            else (f"{1000.0 * found.delay_margin_s:.4g} ms", 12)
-        ),
-        (f"{found.modulus_margin:.2f}", 7),
+def _margins(found: Margins) -> tuple[str, ...]:
+    margins = (
+        (found.gain_margin_db, f"{found.gain_margin_db:.1f} dB"),
+        (found.phase_margin_deg, f"{found.phase_margin_deg:.1f} deg"),
+        (found.delay_margin_s, f"{1000.0 * found.delay_margin_s:.4g} ms"),
     )
-    text = "   ".join(value.rjust(width) for value, width in columns)
-    return f"  {name:<24}  {text}   {'stable' if found.stable else 'UNSTABLE'}"
+    return (
+        *("never" if math.isinf(value) else text for value, text in margins),
+        f"{found.modulus_margin:.2f}",
+        "stable" if found.stable else "UNSTABLE",
+    )
 
 
 def _precision(design: Design) -> Iterator[str]:
@@ -233,8 +186,7 @@ def _precision(design: Design) -> Iterator[str]:
     counts = design.planned_epochs
     yield "Predicted standard errors of one epoch"
     for name, found in design.precision.items():
-        yield f"  subject {name}".ljust(44) + "".join(head.rjust(21) for head in _HEADS)
-        rows = [
+        errors = [
             ("bound, every frequency", found.bound.free),
             (f"iv, {_band(found.iv_band_hz)}", found.iv.free),
             (
@@ -243,13 +195,10 @@ def _precision(design: Design) -> Iterator[str]:
             ),
         ]
         if counts[name] > 1:
-            pooled = math.sqrt(counts[name])
-            J, B, K = (error / pooled for error in found.iv.free)
-            rows.insert(2, (f"iv, {counts[name]} epochs pooled", (J, B, K)))
-        for what, errors in rows:
-            yield f"    {what:<40}" + "".join(
-                _error(error, value) for error, value in zip(errors, found.values, strict=True)
-            )
+            errors.insert(2, (f"iv, {counts[name]} epochs pooled", found.iv_pooled(counts[name])))
+        rows: Rows = [(f"subject {name}", *_HEADS)]
+        rows += [(f"  {what}", *map(_error, values, found.values)) for what, values in errors]
+        yield from text_table(rows, "<>>>", "  ")
         if any(found.least_squares_bias):
             off = ", ".join(
                 f"{symbol} by {100.0 * bias / value:+.0f} %"
@@ -269,8 +218,7 @@ def _band(band_hz: tuple[float, float]) -> str:
 
 
 def _error(error: float, value: float) -> str:
-    percent = f"({100.0 * error / value:.3g} %)" if value else ""
-    return f"{error:.3g} {percent}".rjust(21)
+    return f"{error:.3g} ({100.0 * error / value:.3g} %)" if value else f"{error:.3g}"
 
 
 def _ranking(design: Design, ranked: tuple[Candidate, ...]) -> Iterator[str]:
@@ -279,31 +227,39 @@ def _ranking(design: Design, ranked: tuple[Candidate, ...]) -> Iterator[str]:
     yield (
         f"Search for a PRBS ({len(ranked)} sequences, criterion {design.criterion}, iv, one epoch)"
     )
-    yield (
-        "           bits  clock Hz  ±N·m      cost %   J %      B %      K %      angle SD   peak "
-        "angle"
-    )
-    rows = [(f"{k}", found) for k, found in enumerate(ranked[:_SHOWN], start=1)]
-    for label, found in [*rows, *([("present", now)] if now else [])]:
-        J, B, K = (max(values) for values in zip(*found.errors_percent.values(), strict=True))
-        yield (
-            f"  {label:<8}{found.prbs.register_bits:5d} {found.prbs.clock_hz:9.4g}"
-            f" {found.prbs.amplitude_nm:6.3g} {found.cost_percent:10.3g}   "
-            f"{J:<8.3g} {B:<8.3g} {K:<8.3g} {deg_from_rad(found.angle_sd_rad):5.1f} deg"
-            f" {deg_from_rad(found.peak_angle_rad):8.1f} deg"
-            f"{'' if found.covered else '  misses the band'}"
+    rows: Rows = [("", "bits", "clock Hz", "±N·m", "cost %", "J %", "B %", "K %", "angle SD deg",
+             "peak angle deg", "")]  # fmt: skip
+    best = [(f"{k}", found) for k, found in enumerate(ranked[:_SHOWN], start=1)]
+    for label, found in [*best, *([("present", now)] if now else [])]:
+        largest = (max(values) for values in zip(*found.errors_percent.values(), strict=True))
+        rows.append(
+            (
+                label,
+                f"{found.prbs.register_bits}",
+                f"{found.prbs.clock_hz:.4g}",
+                f"{found.prbs.amplitude_nm:.3g}",
+                f"{found.cost_percent:.3g}",
+                *(f"{percent:.3g}" for percent in largest),
+                f"{deg_from_rad(found.angle_sd_rad):.1f}",
+                f"{deg_from_rad(found.peak_angle_rad):.1f}",
+                "" if found.covered else "misses the band",
+            )
         )
+    yield from text_table(rows, "<>>>>>>>>><", "  ")
     yield "  the best one, as settings:"
-    yield from (f"    {line}" for line in _snippet(ranked[0]).splitlines())
+    yield from (f"    {line}" for line in prbs_toml(ranked[0].prbs).splitlines())
 
 
 def _multisine(found: MultisineComparison) -> Iterator[str]:
     """Yield the standard errors of the multisine beside those of the PRBS."""
     yield f"Multisine (crest factor {found.crest_factor:.3g}), standard errors of iv, one epoch"
     for name, errors in found.errors.items():
-        yield f"  subject {name}".ljust(32) + "".join(head.rjust(14) for head in _HEADS)
-        for what, values in errors.items():
-            yield f"    {_EQUAL[what]:<28}" + "".join(f"{value:14.3g}" for value in values)
+        rows: Rows = [(f"subject {name}", *_HEADS)]
+        rows += [
+            (f"  {_EQUAL[what]}", *(f"{value:.3g}" for value in values))
+            for what, values in errors.items()
+        ]
+        yield from text_table(rows, "<>>>", "  ")
 
 
 def _detection(found: Detection, power: float, alpha: float) -> Iterator[str]:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-__all__ = ["text_table"]
+__all__ = ["Rows", "text_table"]
+
+Rows = list[tuple[str, ...]]
+"""Rows of cells, the headings first."""
 
 
 def text_table(rows: Iterable[Sequence[str]], align: str, indent: str = "") -> list[str]:

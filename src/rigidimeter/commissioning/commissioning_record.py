@@ -174,7 +174,7 @@ def read_record(path: Path) -> CommissioningRecord:
         raise UserError(f"{path}: is no commissioning record of the schema {SCHEMA}")
     if values.pop("digest", None) != _digest(values):
         raise UserError(
-            f"{path}: was changed since it was written, for its digest is another; commission again"
+            f"{path}: was changed since it was written (its digest differs); commission again"
         )
     try:
         values.pop("passed")

@@ -203,6 +203,6 @@ def _overrun(setup: Setup, watchdog_s: float) -> Check:
     _reset(rig)
     back = smooth_motion(-after, 0.5 * speed_rad_s, 1.0 / rate_hz)
     trial(setup, hold(SETTLE_S), follow(back, rate_hz))
-    remedy = "the drive goes on when the computer is dead: set its watchdog and try again"
+    remedy = "the drive keeps moving when the computer stops: set its watchdog and try again"
     most_s += setup.settings.guard.reaction_time_s
     return below(WATCHDOG, went_on_s, "s", most_s, remedy)

@@ -44,7 +44,7 @@ SAME_S, SAME_SHARE = 3e-4, 0.1
 """Delays from two bands that differ by less than this, or by three standard errors, are one."""
 
 SIGNIFICANT = 3.0
-"""A delay within this many standard errors of zero is not told from none."""
+"""A delay within this many standard errors of zero is not corrected."""
 
 LEAST_S = 1e-4
 """Nor is a delay below this worth a shift: it changes B by less than 1e-4 K seconds."""
@@ -113,7 +113,7 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
                 "who pushes, looks like a delay",
             )
         if abs(total_s) < max(SIGNIFICANT * error_s, LEAST_S):
-            return replace(found, remark="not corrected: not told from zero")
+            return replace(found, remark="not corrected: not significantly different from zero")
         half_s, half_error_s = _settled([_in_half_the_band(one) for one in used], perturbed=True)
     except ValueError as error:
         return Delay(source, remark=f"the delay of the torque was not estimated: {error}")

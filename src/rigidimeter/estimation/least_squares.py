@@ -1,7 +1,7 @@
 """J, B and K from torque and motion by linear least squares (Eq. 6 and 7).
 
 The regressors are scaled to unit length and factorised by singular values; AᵀA is never formed, so
-the condition number is not squared, and a motion that cannot tell the parameters apart shows as a
+the condition number is not squared, and a motion that cannot distinguish the parameters shows as a
 large condition number instead of as a confident wrong answer.
 
 Residuals are coloured: by the subject, by drift, and by the band itself. Standard errors and
@@ -94,7 +94,7 @@ def fit_inertia_damping_stiffness(
     Raises
     ------
     ValueError
-        If the regressors are rank deficient: the motion cannot tell the parameters apart.
+        If the regressors are rank deficient: the motion cannot distinguish the parameters.
     """
     settings = settings or EstimationSettings()
     motion = [signals.acceleration_rad_s2, signals.velocity_rad_s, signals.angle_rad]
@@ -242,7 +242,7 @@ def _solve(regressors: Array, target: Array) -> _Solved:
     left, singular, right = np.linalg.svd(regressors / lengths, full_matrices=False)
     if singular[-1] < singular[0] * regressors.shape[0] * np.finfo(np.float64).eps:
         raise ValueError(
-            "the motion cannot tell J, B and K apart: its regressors are linearly dependent"
+            "the motion cannot distinguish J, B and K: its regressors are linearly dependent"
         )
     inverse = right.T / singular
     values = (inverse @ (left.T @ target)) / lengths

@@ -11,7 +11,7 @@ from rigidimeter.settings import USABLE_FRACTION_OF_RATE, EstimationSettings
 __all__ = ["after_fit", "before_fit", "unusable"]
 
 LEAST_BAND_RATIO = 4.0
-"""A band narrower than two octaves cannot tell three parameters apart."""
+"""A band narrower than two octaves cannot distinguish three parameters."""
 
 LARGEST_VALUE = 1e9
 """No joint has a torque, an angle or a velocity beyond this, in SI units."""
@@ -87,7 +87,7 @@ def after_fit(
     if condition_number > LARGEST_CONDITION_NUMBER:
         return Outcome(
             "excluded",
-            f"the motion cannot tell J, B and K apart (condition number {condition_number:.3g}, "
+            f"the motion cannot distinguish J, B and K (condition number {condition_number:.3g}, "
             f"limit {LARGEST_CONDITION_NUMBER:g}); a perturbation with more frequencies is needed",
         )
     return Outcome()

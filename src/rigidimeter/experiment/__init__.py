@@ -12,7 +12,7 @@ from rigidimeter.experiment.epochs_needed import (
 )
 from rigidimeter.experiment.joint_bandwidth import APPENDIX_A, Corner, corners
 from rigidimeter.experiment.multisine import MultisineComparison, compare_multisine, multisine_nm
-from rigidimeter.experiment.optimise import Candidate, check_criterion, optimise
+from rigidimeter.experiment.optimise import Candidate, check_criterion, optimise, prbs_toml
 from rigidimeter.experiment.overview import Design, design
 from rigidimeter.experiment.perturbation_band import check_band, power_spectrum
 from rigidimeter.experiment.perturbations import (
@@ -55,6 +55,7 @@ __all__ = [
     "power_spectrum",
     "prbs_levels",
     "prbs_nm",
+    "prbs_toml",
     "predicted_precision",
     "ranksum_power",
     "sample_size",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
@@ -127,7 +126,7 @@ def _errors(errors: Errors) -> dict[str, Any]:
 
 
 def _precision(found: Precision, epochs: int) -> dict[str, Any]:
-    pooled = _named([error / math.sqrt(epochs) for error in found.iv.free]) if epochs else None
+    pooled = _named(found.iv_pooled(epochs)) if epochs else None
     return {
         "joint": vars(found.joint),
         "iv_band_hz": found.iv_band_hz,

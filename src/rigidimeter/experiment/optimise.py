@@ -89,6 +89,14 @@ CRITERIA: Mapping[str, Callable[[Array], float]] = {
 """From the covariance of the relative errors to one number in %; the default comes first."""
 
 
+def prbs_toml(prbs: PrbsSettings) -> str:
+    """Return the values that a search varies as a table of settings, in TOML."""
+    return (
+        f"[prbs]\nregister_bits = {prbs.register_bits}\nclock_hz = {prbs.clock_hz!r}\n"
+        f"amplitude_nm = {prbs.amplitude_nm!r}\n"
+    )
+
+
 def check_criterion(criterion: str) -> None:
     """Refuse a criterion that is not one of `CRITERIA`.
 
@@ -123,7 +131,7 @@ def optimise(settings: Settings, criterion: str = "minimax") -> tuple[Candidate,
     for name, subject in settings.subject.items():
         if 0.0 in (subject.damping_nm_s_rad, subject.stiffness_nm_rad):
             raise UserError(
-                f"subject.{name} has a damping or stiffness of 0, of which no error is a "
+                f"subject.{name} has a damping or stiffness of 0, so no error can be a "
                 "percentage; give both a value greater than 0"
             )
     moved = {

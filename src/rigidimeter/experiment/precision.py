@@ -32,6 +32,7 @@ T. Söderström and P. Stoica, "Instrumental Variable Methods for System Identif
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -118,6 +119,11 @@ class Precision:
         """J, B and K of the joint."""
         return self.joint.parameters
 
+    def iv_pooled(self, epochs: int) -> tuple[float, float, float]:
+        """Return the standard errors of J, B and K by `iv` over so many epochs."""
+        J, B, K = (error / math.sqrt(epochs) for error in self.iv.free)
+        return J, B, K
+
 
 def predicted_precision(
     perturbation_nm: Array, settings: Settings, subject: SubjectSettings
@@ -184,7 +190,7 @@ def _sandwich(A: Array, Q: Array) -> Array:
     scaled = A * np.outer(scale, scale)
     if np.linalg.cond(scaled) > _MOST_CONDITION:
         raise UserError(
-            "the predicted motion cannot tell J, B and K apart; the perturbation needs more lines "
+            "the predicted motion cannot distinguish J, B and K; the perturbation needs more lines "
             "in the band"
         )
     half = np.linalg.solve(scaled, Q * np.outer(scale, scale))

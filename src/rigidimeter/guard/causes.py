@@ -80,7 +80,7 @@ _SENTENCES = {
     Cause.POSITION_LIMIT_EXCEEDED: "the angle was beyond the position limit",
     Cause.MOTION_STALE: "no new angle reading arrived in time",
     Cause.TORQUE_STALE: "no new torque reading arrived in time",
-    Cause.TORQUE_FROZEN: "the torque sensor kept sending one and the same sample",
+    Cause.TORQUE_FROZEN: "the torque sensor kept sending the same sample",
     Cause.TORQUE_SATURATED: "the torque sensor was saturated",
     Cause.TORQUE_STATUS: "the torque sensor reported an error of its own",
     Cause.TORQUE_PACKETS: "too many packets of the torque sensor were lost, repeated or damaged",

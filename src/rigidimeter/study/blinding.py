@@ -98,7 +98,7 @@ def naming(read: StudyFolder) -> tuple[Naming, list[Notice]]:
         notices.append(
             Notice(
                 "warning",
-                f"{read.folder}: blinded, for there is no key: the conditions are the codes "
+                f"{read.folder}: blinded, because there is no key: the conditions are the codes "
                 f"{', '.join(known)}, and differences are {first} − {second}",
             )
         )

@@ -41,7 +41,7 @@ def _different_inertia(analysis: Analysis) -> tuple[Notice, ...]:
         f"the median J of {high} ({medians[high]:.4g} kg·m²) is "
         f"{100 * (medians[high] / medians[low] - 1):.0f} % above that of {low} "
         f"({medians[low]:.4g} kg·m²); B and K at one median J are then wrong for both. Analyse "
-        "different joints or subjects apart"
+        "different joints or subjects separately"
     )
     return (Notice("warning", text),)
 
@@ -63,15 +63,16 @@ def _wrong_sign(analysis: Analysis) -> tuple[Notice, ...]:
     massless = [fit for fit in included if fit.inertia_kg_m2 <= 0]
     if massless:
         text = (
-            f"J is not greater than zero in {len(massless)} {of_all}, which no joint can be: the "
-            "channels are too slow, too noisy or late against each other for an inertia this small"
+            f"J is not greater than zero in {len(massless)} {of_all}, which is impossible: the "
+            "channels are too slow, too noisy or delayed relative to each other for an inertia "
+            "this small"
         )
         return (Notice("warning", text),)
     negative = [fit for fit in included if min(fit.damping_nm_s_rad, fit.stiffness_nm_rad) < 0]
     if negative:
         text = (
             f"B or K is negative in {len(negative)} {of_all}: the subject may have pushed, or the "
-            "channels are late against each other; look at R² before using them"
+            "channels are delayed relative to each other; look at R² before using them"
         )
         return (Notice("warning", text),)
     return ()

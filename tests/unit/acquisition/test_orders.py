@@ -131,7 +131,7 @@ def test_a_hold_is_a_pause_for_an_operator_and_the_end_without_one(tmp_path):
     alone = Desk(causes={150: Cause.TORQUE_HIGH}, attended=False)
     result, events, _ = run(tmp_path / "alone", alone)
     assert ended(events) == [(1, "fail")]
-    assert "nobody was there to go on" in result.reason
+    assert "no operator was there to continue" in result.reason
 
 
 def test_a_stop_is_never_weakened_by_an_operator(tmp_path):

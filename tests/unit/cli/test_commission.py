@@ -25,7 +25,7 @@ channel = "can0"
 def test_a_record_that_could_not_be_written_is_said_before_the_trials(tmp_path):
     _check_before(tmp_path / "record.json", {"--known-torque-nm": None})
     with pytest.raises(
-        UserError, match=r"the record cannot be written, for .*nowhere is no folder"
+        UserError, match=r"the record cannot be written, because .*nowhere is not a folder"
     ):
         _check_before(tmp_path / "nowhere" / "record.json", {})
     (tmp_path / "record.json").mkdir()

@@ -76,7 +76,10 @@ def test_a_session_is_modelled(rigidimeter, simulate):
         (["--terms", "inertia,magic"], "there is no term 'magic'; known: inertia"),
         (["--terms", "reflex-slow"], "followed by + or - for the direction"),
         (["--terms", "inertia,offset"], "offset is constant and does not pass a band"),
-        (["--terms", "damping,directional-damping"], "cannot tell damping, damping+ and damping-"),
+        (
+            ["--terms", "damping,directional-damping"],
+            "cannot distinguish damping, damping+ and damping-",
+        ),
         (["--method", "published"], "--method published: terms are fitted only with bandlimited"),
         (["--band-hz", "0", "-1"], "--band-hz 0 -1: the upper edge must be above 0 Hz"),
     ],

@@ -116,4 +116,4 @@ def test_a_single_frequency_is_excluded_with_the_reason():
     }
     fit = fit_epoch(Epoch("file", "1", channels), "bandlimited", SETTINGS)
     assert fit.outcome.kind == "excluded"
-    assert "cannot tell J, B and K apart" in fit.outcome.reason
+    assert "cannot distinguish J, B and K" in fit.outcome.reason

@@ -326,5 +326,5 @@ def _inverse(matrix: Array) -> Array:
         raise ValueError("the perturbation did not move the joint")
     scaled = matrix / np.outer(scale, scale)
     if np.linalg.cond(scaled) > 1e10:
-        raise ValueError("the motion that the perturbation causes cannot tell J, B and K apart")
+        raise ValueError("the motion that the perturbation causes cannot distinguish J, B and K")
     return np.asarray(np.linalg.inv(scaled) / np.outer(scale, scale), dtype=np.float64)

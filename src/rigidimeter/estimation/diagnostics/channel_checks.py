@@ -164,7 +164,7 @@ def velocity_delay(fitted: tuple[float, float], settings: DiagnosticsSettings) -
         value,
         most,
         not abs(value) <= most,
-        f"velocity_rad_s is {value:.2g} ms late against angle_rad (at most {most:g} ms)",
+        f"velocity_rad_s lags angle_rad by {value:.2g} ms (at most {most:g} ms)",
     )
 
 

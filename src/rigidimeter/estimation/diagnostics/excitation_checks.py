@@ -57,7 +57,7 @@ def conditioning(signals: Signals, settings: DiagnosticsSettings) -> Look:
         most,
         f"the condition number of the motion is {value:.3g} (at most {most:g})",
         meaning=(
-            f"this epoch cannot tell {PARAMETERS[first].symbol} from "
+            f"this epoch cannot distinguish {PARAMETERS[first].symbol} from "
             f"{PARAMETERS[second].symbol}, because {MIDDLE_PERCENT:g} % of the velocity's power "
             f"lies between {low_hz:.2g} and {high_hz:.2g} Hz"
         ),
@@ -178,7 +178,7 @@ EXCITATION_CHECKS = (
         "conditioning",
         (),
         lambda c: conditioning(c.signals, c.settings),
-        "the motion cannot tell J, B and K apart",
+        "the motion cannot distinguish J, B and K",
         "use a perturbation with more frequencies, or hold J at the median of other epochs",
         of_fit=False,
     ),

@@ -205,7 +205,7 @@ PARAMETER_CHECKS = (
         "negative_parameters",
         (),
         lambda c: negative_parameters(c.parameters),
-        "the subject may have pushed, or the channels are late against each other",
+        "the subject may have pushed, or the channels are delayed relative to each other",
         "check the stamps of torque and motion, and see the voluntary torque",
     ),
     Check(

@@ -40,7 +40,7 @@ def solve(columns: Array, target: Array, names: Sequence[str]) -> Linear:
     Raises
     ------
     ValueError
-        If a column is zero, or the data cannot tell columns apart; the text names them.
+        If a column is zero, or the data cannot distinguish columns; the text names them.
     """
     lengths, left, singular, right = _factors(columns, names)
     values = (right.T @ ((left.T @ target) / singular)) / lengths
@@ -117,7 +117,7 @@ def _factors(columns: Array, names: Sequence[str]) -> tuple[Array, Array, Array,
         share = np.abs(right[-1])
         alike = [name for name, one in zip(names, share, strict=True) if one > 0.2 * share.max()]
         raise ValueError(
-            f"the motion cannot tell {', '.join(alike[:-1])} and {alike[-1]} apart; leave one of "
+            f"the motion cannot distinguish {', '.join(alike[:-1])} and {alike[-1]}; leave one of "
             "them out"
         )
     return lengths, left, singular, right

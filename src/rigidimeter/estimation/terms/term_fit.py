@@ -116,7 +116,7 @@ def fit_terms(
     UserError
         If a name is unknown.
     ValueError
-        If the data cannot tell terms apart, or the band cannot carry a term.
+        If the data cannot distinguish terms, or the band cannot carry a term.
     """
     terms = parse_terms(names)
     if "offset" in terms and band_hz[0] > 0:
@@ -238,7 +238,7 @@ def _parameters(
         if gain.value < 0:
             remarks.append(
                 f"{term}: the gain is negative, {gain.value:.3g} N·m·s/rad; a reflex resists "
-                "stretch, so this stands for something else"
+                "stretch, so this term explains something else"
             )
         column += len(one.columns)
         for name, unit, bottom, top in zip(

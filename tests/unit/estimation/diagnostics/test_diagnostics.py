@@ -165,7 +165,7 @@ def narrow(low_hz, high_hz):
 
 def test_a_narrow_motion_cannot_tell_inertia_from_stiffness():
     finding = conditioning(narrow(1.95, 2.05), SETTINGS)
-    assert_failed(finding, "cannot tell J from K", "90 % of the velocity's power", "Hz")
+    assert_failed(finding, "cannot distinguish J from K", "90 % of the velocity's power", "Hz")
     low, high = (float(part) for part in finding.text.split("between ")[1][:-3].split(" and "))
     assert 1.8 < low < 2.0 < high < 2.2
     assert passed(conditioning(narrow(0.2, 8.0), SETTINGS))
@@ -174,7 +174,7 @@ def test_a_narrow_motion_cannot_tell_inertia_from_stiffness():
 def test_a_push_in_one_direction_cannot_tell_damping_from_stiffness():
     signals = narrow(0.2, 8.0)
     away = replace(signals, velocity_rad_s=np.exp(T / 5), angle_rad=5 * np.exp(T / 5) + 1e-3 * T)
-    assert_failed(conditioning(away, SETTINGS), "cannot tell B from K")
+    assert_failed(conditioning(away, SETTINGS), "cannot distinguish B from K")
 
 
 def test_a_joint_that_did_not_move_is_told(sound):

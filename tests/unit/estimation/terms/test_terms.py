@@ -241,7 +241,7 @@ def test_a_wrong_name_is_one_sentence(names, words):
 
 
 def test_what_the_data_cannot_tell_apart_is_named(exact):
-    with pytest.raises(ValueError, match=r"cannot tell damping, damping\+ and damping- apart"):
+    with pytest.raises(ValueError, match=r"cannot distinguish damping, damping\+ and damping-"):
         fit_terms(
             driven(exact, exact.velocity_rad_s), "inertia,damping,directional-damping", BAND_HZ
         )

@@ -1,0 +1,145 @@
+"""Torque models of the epochs of a recording: fits, comparison, and their JSON document."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rigidimeter.errors import UserError
+from rigidimeter.estimation.terms import EpochModels, TermsFit, model_epoch
+from rigidimeter.recording import Recording
+from rigidimeter.records import Epoch
+from rigidimeter.study.analysis import Preparation
+
+__all__ = ["MODEL_SCHEMA", "ModelledEpoch", "model_document", "model_recording"]
+
+MODEL_SCHEMA = "rigidimeter.model/1"
+
+
+@dataclass(frozen=True)
+class ModelledEpoch:
+    """An epoch and its models.
+
+    Attributes
+    ----------
+    epoch : Epoch
+    models : EpochModels or None
+        None where the epoch cannot be used.
+    problem : str
+        Why it cannot be used.
+    compared : bool
+        Whether the models were compared, or each was asked for by its terms.
+    """
+
+    epoch: Epoch
+    models: EpochModels | None
+    problem: str
+    compared: bool
+
+    @property
+    def unfitted(self) -> tuple[str, ...]:
+        """For each model that could not be fitted, why."""
+        rows = self.models.compared.rows if self.models is not None else ()
+        return tuple(row.problem for row in rows if row.fit is None)
+
+    @property
+    def failed(self) -> bool:
+        """Whether nothing could be fitted, or not everything that was asked for by its terms."""
+        if self.models is None:
+            return True
+        n_unfitted = len(self.unfitted)
+        return n_unfitted == len(self.models.compared.rows) or (
+            n_unfitted > 0 and not self.compared
+        )
+
+
+def model_recording(
+    recording: Recording,
+    models: Sequence[Sequence[str]],
+    *,
+    compare: bool = False,
+    high_hz: float | None = None,
+) -> tuple[ModelledEpoch, ...]:
+    """Fit models to each perturbed epoch of a recording, or compare them.
+
+    Parameters
+    ----------
+    recording : Recording
+    models : sequence of sequences of str
+        The terms of each.
+    compare, high_hz
+        As for `model_epoch`.
+
+    Raises
+    ------
+    UserError
+        If every epoch is an imposed sinusoid.
+    """
+    found = []
+    for prepared in Preparation(recording.epochs, recording.settings).perturbed():
+        epoch = prepared.epoch
+        try:
+            fits = model_epoch(epoch, models, recording.settings, compare=compare, high_hz=high_hz)
+        except ValueError as error:
+            found.append(ModelledEpoch(epoch, None, str(error), compare))
+        else:
+            found.append(ModelledEpoch(epoch, fits, "", compare))
+    if not found:
+        raise UserError("every epoch is an imposed sinusoid; a model needs a perturbed one")
+    return tuple(found)
+
+
+def model_document(found: Sequence[ModelledEpoch]) -> dict[str, Any]:
+    """Return all models as one document, units in the names."""
+    return {
+        "schema": MODEL_SCHEMA,
+        "compared": any(each.compared for each in found),
+        "epochs": [_epoch_values(each) for each in found],
+    }
+
+
+def _epoch_values(found: ModelledEpoch) -> dict[str, Any]:
+    epoch = found.epoch
+    values: dict[str, Any] = {
+        "source": epoch.source,
+        "epoch": epoch.label,
+        "condition": epoch.condition,
+    }
+    if found.models is None:
+        return values | {"outcome": "failed", "reason": found.problem, "models": []}
+    compared = found.models.compared
+    values |= {
+        "outcome": epoch.closed.kind,
+        "reason": epoch.closed.reason,
+        "band_hz": list(found.models.band_hz),
+    }
+    if found.compared:
+        chosen = compared.recommended
+        values |= {"recommended": chosen and list(chosen.terms), "why": compared.reason}
+    values["models"] = [
+        {
+            "terms": list(row.terms),
+            "problem": row.problem,
+            "held_out_vaf_percent": row.held_out_vaf_percent,
+            **(_fit_values(row.fit) if row.fit is not None else {}),
+        }
+        for row in compared.rows
+    ]
+    return values
+
+
+def _fit_values(fit: TermsFit) -> dict[str, Any]:
+    return {
+        "parameters": [vars(one) for one in fit.parameters],
+        "n_parameters": fit.n_parameters,
+        "vaf_percent": fit.vaf_percent,
+        "aic": fit.aic,
+        "bic": fit.bic,
+        "independent_samples": fit.independent_samples,
+        "condition_number": fit.condition_number,
+        "ljung_box_p": fit.test.ljung_box_p,
+        "input_correlation": fit.test.input_correlation,
+        "input_p": fit.test.input_p,
+        "remarks": list(fit.remarks),
+    }
