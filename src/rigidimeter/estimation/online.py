@@ -56,7 +56,7 @@ STATE_SIZE = 38
 """A state is this many numbers, zero at first: a list, or an array for the compiled step."""
 
 UNDETERMINED = 1e-9
-"""A diagonal of R below this part of its column: the motion so far cannot distinguish the parameters."""
+"""With a diagonal of R below this part of its column, the motion so far cannot distinguish them."""
 
 
 class OnlineDesign(NamedTuple):

@@ -221,8 +221,8 @@ def _recommend(rows: Sequence[ModelRow]) -> tuple[ModelRow | None, str]:
     reason = f"{named}: predicts {chosen.held_out_vaf_percent:.2f} % of the part it has not seen"
     if chosen is not best:
         reason += (
-            f", and {'+'.join(best.terms)} with {best.held_out_vaf_percent:.2f} % does not justify its "
-            "additional parameters"
+            f", and {'+'.join(best.terms)} with {best.held_out_vaf_percent:.2f} % does not "
+            "justify its additional parameters"
         )
     elif len(fitted) > 1:
         second = max(row.held_out_vaf_percent for row, _ in fitted if row is not chosen)
