@@ -73,7 +73,7 @@ def check_of(row: Row, what: str) -> Check:
 
 def row_with(*checks: Check, **changes: object) -> Row:
     return replace(
-        Row("Sec. 0", "p", "o", "as printed", (near("x", "m", 1.0, 1.0, 0.1),)),
+        Row("o", (near("x", "m", 1.0, 1.0, 0.1),)),
         checks=checks,
         **changes,
     )
@@ -109,7 +109,7 @@ def test_rounding_allows_half_of_the_last_digit() -> None:
 
 def test_a_row_needs_something_that_decides() -> None:
     with pytest.raises(ValueError, match="neither a check"):
-        Row("s", "p", "o", "reading")
+        Row("o")
 
 
 def test_another_paper_would_get_another_verdict(
@@ -144,7 +144,7 @@ def test_another_paper_would_get_another_verdict(
 
 def test_every_row_has_its_place_on_the_page() -> None:
     listed = [row_id for makers in SECTIONS.values() for row_id in makers]
-    assert listed == list(MAKERS)  # none of them twice
+    assert sorted(listed) == sorted(MAKERS)
     wanted = {f"eq-{n}" for n in range(1, 9)} | {"table-1", "table-2"}
     wanted |= {"fig-3a", "fig-3b", "fig-6a", "fig-6b", "fig-7"}
     wanted |= {f"fig-4{part}" for part in "abcd"}

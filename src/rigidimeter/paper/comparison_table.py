@@ -118,25 +118,28 @@ def bounded(
 class Row:
     """One equation, figure, table or statement of the paper beside what we compute.
 
+    The words that do not depend on our numbers are in ``statements.toml``; `rows.make_rows` adds
+    them.
+
     Attributes
     ----------
-    source : str
-        Where in the paper.
-    paper, ours : str
-        What it prints, and what we compute, in words and numbers.
-    reading : str
-        Which of several possible meanings we use.
+    ours : str
+        What we compute, in words and numbers.
     checks : tuple of Check
         They decide. May be empty only where `unpublished` says what is missing.
-    agrees, differs : str
-        The reason for either verdict; where there is none, the checks say it.
+    figures : tuple of Figure
     unpublished : str
         What would be needed and was not published; empty where nothing is.
-    figures : tuple of Figure
     virtual : bool
         Whether `ours` or the figures come from a virtual study.
     id : str
-        For example ``eq-8``: the key of the row in `rows.SECTIONS`.
+        For example ``eq-8``.
+    source, paper : str
+        Where in the paper, and what it prints.
+    reading : str
+        Which of several possible meanings we use.
+    agrees, differs : str
+        The reason for either verdict; where there is none, the checks say it.
 
     Raises
     ------
@@ -144,21 +147,21 @@ class Row:
         If nothing can decide.
     """
 
-    source: str
-    paper: str
     ours: str
-    reading: str
     checks: tuple[Check, ...] = ()
-    agrees: str = ""
-    differs: str = ""
-    unpublished: str = ""
     figures: tuple[Figure, ...] = ()
+    unpublished: str = ""
     virtual: bool = False
     id: str = ""
+    source: str = ""
+    paper: str = ""
+    reading: str = ""
+    agrees: str = ""
+    differs: str = ""
 
     def __post_init__(self) -> None:
         if not self.checks and not self.unpublished:
-            raise ValueError(f"the row of {self.source} has neither a check nor missing data")
+            raise ValueError(f"a row has neither a check nor missing data: {self.ours}")
 
     @property
     def verdict(self) -> Verdict:

@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
+from typing import Any, TypeVar
 
 from rigidimeter.documents import read_json, write_json
 from rigidimeter.errors import UserError
@@ -25,6 +26,8 @@ from rigidimeter.virtual.virtual_study import study_length_s, write_virtual_stud
 __all__ = ["DEFAULT_SEED", "Context"]
 
 DEFAULT_SEED = 2023
+
+T = TypeVar("T")
 
 MADE = "made.json"
 """Says which design, seed and version a virtual study was made of."""
@@ -70,6 +73,14 @@ class Context:
         self._folder = folder
         self._processes = processes
         self._progress = progress
+        self._made: dict[Callable[[Context], Any], Any] = {}
+
+    def once(self, make: Callable[[Context], T]) -> T:
+        """Return what `make` gives for this context; it is made for the first row that asks."""
+        if make not in self._made:
+            self._made[make] = make(self)
+        found: T = self._made[make]
+        return found
 
     @cached_property
     def settings(self) -> Settings:

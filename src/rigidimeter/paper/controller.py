@@ -77,13 +77,9 @@ def equation_3(context: Context) -> Row:
     found = 2.0 * float(abs(np.mean(angles[last] * np.exp(-1j * phase[last]))))
     wanted = float(abs(joint.compliance_rad_nm(_SINE_HZ)))
     return Row(
-        source="Eq. 3",
-        paper="J_p θ″ + B_p θ′ + K_p θ = M_meas",
         ours=f"|θ/M| at {_SINE_HZ:g} Hz {number(found)} rad/N·m stepped through time, "
         f"{number(wanted)} rad/N·m from the transfer function",
-        reading="M is the torque applied to the arm, positive with θ.",
         checks=(within_percent("|θ/M| at 2 Hz", "rad/N·m", wanted, found, 0.5),),
-        agrees="The simulated arm is Eq. 3.",
     )
 
 
@@ -95,21 +91,17 @@ def position_sd_deg(reading: str, clock_hz: float) -> float:
     return deg_from_rad(float(np.std(angle)))
 
 
-def units(reading: str, source: str, context: Context) -> Row:
+def units(reading: str, context: Context) -> Row:
     """Compare J_c and B_c, read per degree or per radian, with the motion of the paper."""
     sds = {each: [position_sd_deg(each, clock) for clock in CLOCKS_HZ] for each in READINGS}
     nearest = min(
         READINGS,
         key=lambda each: sum(abs(math.log(sd / printed.POSITION_SD_DEG)) for sd in sds[each]),
     )
-    controller, unit = READINGS[reading], "deg" if reading == "per degree" else "rad"
+    controller = READINGS[reading]
     settings = Settings(controller=controller)
     margins = loop_margins(settings, printed.SEC_34)
     return Row(
-        source=source,
-        paper=f"J_c = {printed.CONTROLLER_INERTIA:.4f} kg·m²/{unit}, "
-        f"B_c = {printed.CONTROLLER_DAMPING:.3f} N·m·s/{unit}; "
-        f"position SD approximately {printed.POSITION_SD_DEG:g} deg",
         ours=f"J_c = {number(controller.inertia_kg_m2)} kg·m²/rad, "
         f"B_c = {number(controller.damping_nm_s_rad)} N·m·s/rad: position SD "
         f"{' and '.join(number(sd, 3) for sd in sds[reading])} deg (the ideal loop with a 7-bit "
@@ -154,16 +146,11 @@ def equation_4(context: Context) -> Row:
     }
     per_hz = ", ".join(f"{number(off, 2)} % at {hz:g} Hz" for hz, off in off_percent.items())
     return Row(
-        source="Eq. 4",
-        paper="[J_p θ″ + B_p θ′ + K_p θ] + [J_c θ″ + B_c θ′] = M_sub",
         ours=f"|θ/M_sub| of the loop with sensor, 20 Hz filter and drive is off by {per_hz}",
-        reading="Without perturbation. In the band of voluntary movement, 0.3 to 4 Hz; above it "
-        "filter and drive count.",
         checks=tuple(
             bounded(f"|θ/M_sub| at {hz:g} Hz against Eq. 4", "%", off, high=LOOP_PERCENT)
             for hz, off in off_percent.items()
         ),
-        agrees="Controller and arm add up as printed.",
     )
 
 
@@ -172,19 +159,13 @@ def equation_5(context: Context) -> Row:
     settings = context.settings
     fast, paper = _equation_5_percent(_fast(settings)), _equation_5_percent(settings)
     return Row(
-        source="Eq. 5",
-        paper="M_meas = [J_p θ″ + B_p θ′ + K_p θ] − M_sub = M_PRBS − [J_v θ″ + B_v θ′]",
         ours="within 0.15 to 10 Hz the two sides differ by "
         f"{number(fast, 3)} % of M_PRBS with a torque filter and a drive of "
         f"{_FAST_HZ:g} Hz, and by {number(paper, 3)} % with the 20 Hz filter and a "
         f"{settings.rig.drive_bandwidth_hz:g} Hz drive",
-        reading="J_v and B_v are J_c and B_c of Eq. 4; M_meas is the torque that drives the arm, "
-        "so its sign is that of the perturbation.",
         checks=(
             bounded("The two sides in a fast loop, of M_PRBS", "%", fast, high=LOOP_PERCENT),
         ),
-        agrees="In a loop faster than the motion it holds; what filter and drive add is why "
-        "the torque is measured and not computed from the right side.",
     )  # fmt: skip
 
 

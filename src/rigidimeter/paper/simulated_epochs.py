@@ -11,7 +11,6 @@ as an instrument does not (Sec. 1).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -102,12 +101,12 @@ class NoiseRuns(NamedTuple):
 
 def noise_runs(context: Context) -> NoiseRuns:
     """Return the simulations of Sec. 3.4: closed loop, white sensor noise, one joint."""
-    return _noise_runs(context.seed, context.runs)
+    return context.once(_noise_runs)
 
 
-@lru_cache(maxsize=4)
-def _noise_runs(seed: int, runs: int) -> NoiseRuns:
-    settings = parse_settings({"seed": seed, "rig": dict(PAPER_RATES)}, source="Sec. 3.4")
+def _noise_runs(context: Context) -> NoiseRuns:
+    runs = context.runs
+    settings = parse_settings({"seed": context.seed, "rig": dict(PAPER_RATES)}, source="Sec. 3.4")
     batch = simulate_epochs(settings, runs, joints=[printed.SEC_34] * runs, conditions="OFF")
     fits, _ = fit_epochs([batch.epoch(i) for i in range(runs)], "iv", settings)
     errors = np.array([_fitted(fit) for fit in fits]) - TRUTH
@@ -129,14 +128,11 @@ def mean_errors(context: Context) -> Row:
     found = noise_runs(context)
     percent = errors_percent(TRUTH + found.mean)
     return Row(
-        source="Sec. 3.4",
-        paper=f"mean errors of 100 runs {_numbers(printed.SEC_34_MEAN)}: next to none",
         ours=f"{context.runs} runs: {_numbers(found.mean)}, that is "
         f"{', '.join(signed(p, 3) for p in percent)} % of J, B, K",
         reading=f"Closed loop at the paper's rates, sensor noise {found.noise_sd_nm:g} N·m, "
         "estimated by instrumental variables.",
         checks=_unbiased(percent, UNBIASED_PERCENT),
-        agrees="Sensor noise alone biases neither theirs nor ours.",
     )
 
 
@@ -147,21 +143,15 @@ def spread_of_errors(context: Context) -> Row:
     wanted = found.bound / found.bound[2]
     efficiency = ", ".join(f"{v:.2f}" for v in found.sd / found.bound)
     return Row(
-        source="Sec. 3.4",
-        paper="SD of the errors of J, B, K 9.6e-7, 1.05e-6, 1.4e-6, that is "
-        + " : ".join(f"{value:.2f}" for value in ratio),
         ours=f"{_numbers(found.sd)} ({context.runs} runs), "
         f"{_numbers(found.sd / found.sd[2], ' : ')}; Cramér–Rao {_numbers(wanted, ' : ')}; "
         f"ours over the bound {efficiency}",
-        reading="We report ours against the Cramér–Rao bound.",
         checks=tuple(
             within_percent(
                 f"SD({name})/SD(K)", "", float(ratio[i]), float(wanted[i]), SAME_RATIO_PERCENT
             )
             for i, name in enumerate("JB")
         ),
-        differs="The ratio of the three SDs is set by the motion, not by the size of the noise; no "
-        "white torque noise gives the printed one.",
     )
 
 
@@ -170,8 +160,6 @@ def implied_noise(context: Context) -> Row:
     found = noise_runs(context)
     implied_nm = found.noise_sd_nm * printed.SEC_34_SD[2] / float(found.bound[2])
     return Row(
-        source="Sec. 3.4, Sec. 2.6",
-        paper="noise as of the torque transducer at rest",
         ours=f"the printed SD of K needs a noise of {number(implied_nm, 2)} N·m at "
         f"{found.rate_hz:g} samples/s",
         reading=f"A resolution of {found.resolution_nm:g} N·m, the finest of such a transducer; "
@@ -194,11 +182,10 @@ def voluntary_errors_percent(context: Context) -> Mapping[str, Triple]:
 
     ``expected`` is what the loop predicts for least squares, without any simulation.
     """
-    return _voluntary(context.seed, context.pooled_epochs)
+    return context.once(_voluntary)
 
 
-@lru_cache(maxsize=4)
-def _voluntary(seed: int, count: int) -> Mapping[str, Triple]:
+def _voluntary(context: Context) -> Mapping[str, Triple]:
     J, B, K = printed.SEC_34.parameters
     subject = SubjectSettings(
         inertia_kg_m2=J,
@@ -206,13 +193,13 @@ def _voluntary(seed: int, count: int) -> Mapping[str, Triple]:
         stiffness_nm_rad=K,
         voluntary_sd_nm=VOLUNTARY_SD_NM,
     )
-    settings = Settings(seed=seed, subject={"OFF": subject})
+    settings = Settings(seed=context.seed, subject={"OFF": subject})
     white = settings.estimation.model_copy(update={"intervals": "white"})
     settings = settings.model_copy(update={"estimation": white})
     perturbation = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
     bias = predicted_precision(perturbation, settings, subject).least_squares_bias
-    batch = simulate_epochs(settings, count)
-    epochs = [batch.epoch(i) for i in range(count)]
+    batch = simulate_epochs(settings, context.pooled_epochs)
+    epochs = [batch.epoch(i) for i in range(len(batch))]
     found = {"expected": errors_percent(TRUTH + np.array(bias))}
     for method in ("bandlimited", "iv"):
         _, (pooled,) = fit_epochs(epochs, method, settings)
@@ -226,16 +213,10 @@ def voluntary_least_squares(context: Context) -> Row:
     J, B, K = found["bandlimited"]
     expected = ", ".join(f"{signed(error, 0)} %" for error in found["expected"])
     return Row(
-        source="Sec. 1, Sec. 4, Eq. 6",
-        paper="free motion allows to separate the known perturbation from the subject's "
-        "voluntary torque; least squares",
         ours=f"{context.pooled_epochs} epochs with {VOLUNTARY_SD_NM:g} N·m (SD, 0.3–4 Hz) of "
         f"voluntary torque, least squares: J {signed(J, 0)} %, B {signed(B, 0)} %, "
         f"K {signed(K, 0)} % (expected of this loop: {expected})",
-        reading="Least squares is kept for what it is; it is not the default in a closed loop.",
         checks=_unbiased((J, B, K), POOLED_PERCENT),
-        differs="The push moves the arm through the controller, and least squares drifts "
-        "toward −(J_c, B_c, 0): a subject who pushes looks less rigid.",
     )
 
 
@@ -243,12 +224,7 @@ def voluntary_instruments(context: Context) -> Row:
     """Compare instrumental variables under voluntary torque with the joint."""
     J, B, K = voluntary_errors_percent(context)["iv"]
     return Row(
-        source="Sec. 1, Sec. 4",
-        paper="free motion allows to separate the known perturbation from the subject's "
-        "voluntary torque",
         ours="the same epochs by instrumental variables from the perturbation: "
         f"J {signed(J, 1)} %, B {signed(B, 1)} %, K {signed(K, 1)} %",
-        reading="The perturbation is the instrument: it does not depend on the subject.",
         checks=_unbiased((J, B, K), POOLED_PERCENT),
-        agrees="The claim holds if the known perturbation is used as an instrument.",
     )

@@ -7,13 +7,12 @@ They show the same figure, with the same axes, of data whose origin stands in th
 from __future__ import annotations
 
 from functools import partial
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.dynamics import JointDynamics, closed_loop_motion
-from rigidimeter.estimation import epoch_signals, scoring_cycles
+from rigidimeter.dynamics import ClosedLoopMotion, JointDynamics, closed_loop_motion
+from rigidimeter.estimation import Signals, epoch_signals, scoring_cycles
 from rigidimeter.estimation.bandlimited import zero_phase_band
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Row, within_percent
@@ -44,27 +43,27 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Part = Literal["torque", "stiffness", "damping"]
 
 _COLOURS = condition_colours(("OFF", "DBS"))
 _MISSING = "The recordings of the animal were not published; "
 _VIRTUAL_STUDY = f"{_MISSING}a virtual study of the same design "
 _WINDOW_S = (2.0, 12.0)
 
+_PARTS = {
+    "fig-4b": ("torque", "measured, estimated and simulated torque"),
+    "fig-4c": ("stiffness", "the part of the stiffness, Kθ"),
+    "fig-4d": ("damping", "the part of the damping, Bθ′"),
+}
+"""What of the torque each figure shows."""
 
-def torque_figure(
-    name: str,
-    source: str,
-    part: Part,
-    paper: str,
-    shows: str,
-    context: Context,
-) -> Row:
+
+def torque_figure(name: str, context: Context) -> Row:
     """Compare measured, estimated and simulated torque of an OFF epoch, or one part of it.
 
     Estimated is J, B and K times the measured motion; simulated is the motion that the perturbation
     alone causes in the closed loop, and its torque. All go through one band.
     """
+    part, shows = _PARTS[name]
     study = context.study
     fit = next(fit for fit in representative_fits(study) if fit.condition == "OFF")
     joint = JointDynamics(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad)
@@ -79,17 +78,9 @@ def torque_figure(
         filtered = zero_phase_band(values, rate_hz, measured.band_hz)
         return np.asarray(np.interp(measured.time_s, perturbation.time_s, filtered))
 
-    drawn = {
-        "estimated": _torque(
-            joint, part, measured.angle_rad, measured.velocity_rad_s, measured.acceleration_rad_s2
-        ),
-        "simulated": as_measured(
-            _torque(
-                joint, part, motion.angle_rad, motion.velocity_rad_s, motion.acceleration_rad_s2
-            )
-        ),
-    }
-    estimated, simulated = drawn.values()
+    estimated = _torque(joint, part, measured)
+    simulated = as_measured(_torque(joint, part, motion))
+    drawn = {"estimated": estimated, "simulated": simulated}
     text = f"simulated misses estimated by {_missed_percent(simulated, estimated)} % (SD)"
     if part == "torque":
         drawn = {"measured": measured.torque_nm, **drawn}
@@ -97,10 +88,8 @@ def torque_figure(
         text = f"estimated misses measured by {missed} % (SD), {text}"
     time_s = measured.time_s - float(perturbation.time_s[0])  # the session has begun earlier
     inside = (time_s >= _WINDOW_S[0]) & (time_s <= _WINDOW_S[1])
-    shown = f"{source} from virtual data: {shows}"
+    shown = f"{_place(name)} from virtual data: {shows}"
     return Row(
-        source=f"{source}, Sec. 3.5",
-        paper=paper,
         ours=f"virtual OFF epoch of median fit (J {number(joint.inertia_kg_m2)}, "
         f"B {number(joint.damping_nm_s_rad)}, K {number(joint.stiffness_nm_rad)}): {text}",
         reading="Estimated: parameters times measured motion; simulated: the motion by integration "
@@ -124,21 +113,24 @@ def torque_figure(
     )
 
 
-def _torque(
-    joint: JointDynamics, part: Part, angle: Array, velocity: Array, acceleration: Array
-) -> Array:
+def _torque(joint: JointDynamics, part: str, motion: Signals | ClosedLoopMotion) -> Array:
     if part == "stiffness":
-        return joint.stiffness_nm_rad * angle
+        return joint.stiffness_nm_rad * motion.angle_rad
     if part == "damping":
-        return joint.damping_nm_s_rad * velocity
-    return joint.torque_nm(angle, velocity, acceleration)
+        return joint.damping_nm_s_rad * motion.velocity_rad_s
+    return joint.torque_nm(motion.angle_rad, motion.velocity_rad_s, motion.acceleration_rad_s2)
+
+
+def _place(name: str) -> str:
+    """Return ``Fig. 4(b)`` of ``fig-4b``."""
+    return f"Fig. {name[-2]}({name[-1]})"
 
 
 def _missed_percent(values: Array, wanted: Array) -> str:
     return number(100.0 * float(np.std(wanted - values) / np.std(wanted)), 3)
 
 
-def measure_figure(name: str, source: str, measure: str, paper: str, context: Context) -> Row:
+def measure_figure(name: str, measure: str, context: Context) -> Row:
     """Compare one measure in OFF and DBS."""
     compared = _comparison(context, measure)
     p, r, by_day = _tests(compared)
@@ -148,8 +140,6 @@ def measure_figure(name: str, source: str, measure: str, paper: str, context: Co
     )
     label = compared.measure.label
     return Row(
-        source=source,
-        paper=f"median and interquartile range; {paper}",
         ours=f"virtual study: medians {medians} {compared.measure.unit}; p = {p}, "
         f"r = {r}; when days count, not epochs, p = {by_day}",
         reading="Two-sided rank-sum test with tie and continuity correction; every epoch a point. "
@@ -158,7 +148,7 @@ def measure_figure(name: str, source: str, measure: str, paper: str, context: Co
         figures=(
             Figure(
                 name,
-                f"{source} from virtual data: epochs, median and quartiles.",
+                f"{_place(name)} from virtual data: epochs, median and quartiles.",
                 f"{label} of every virtual epoch in OFF and DBS, with median and quartiles.",
                 partial(
                     distribution,
@@ -206,13 +196,9 @@ def figure_5a(context: Context) -> Row:
     offsets = ", ".join(f"{name} {b:+.2f}" for name, b in fit.offsets["examiner"].items())
     p_paper = p_value(contrast.p_residual)
     return Row(
-        source="Fig. 5(a), Sec. 3.1",
-        paper="median and interquartile range of corrected scores; lower in DBS, p = 0.020",
         ours=f"virtual ratings: medians {medians}; offsets of the examiners "
         f"{offsets.replace('-', '−')}; contrast OFF − DBS {number(contrast.estimate, 3)}, "
         f"p = {p_paper}; with an offset for every day p = {p_days}",
-        reading="Score less the examiner's predicted offset; F-test of the contrast. The scores of "
-        "one day share its state, so the model with days is the one that holds.",
         unpublished="The ratings were not published; virtual ones of the same number stand in.",
         figures=(
             Figure(
@@ -241,10 +227,7 @@ def figure_7(context: Context) -> Row:
     cycles = [scoring_cycles(epoch, study.settings.scores) for epoch in epochs]
     works = " and ".join(f"{number(s.work_j, 3)} J ({s.condition})" for s in chosen)
     return Row(
-        source="Fig. 7, Sec. 3.3",
-        paper="sample traces of torque against angle; asymmetric at full flexion and extension",
         ours=f"virtual epochs of median work: {works}; symmetric, since the virtual arm is linear",
-        reading="Torque and angle pass the same zero-phase band.",
         unpublished=f"{_VIRTUAL_STUDY}has no asymmetry: Eq. 3 is linear.",
         figures=tuple(
             Figure(
@@ -270,17 +253,12 @@ def equation_7(context: Context) -> Row:
     damping = float(np.median([fit.damping_nm_s_rad for fit in counted]))
     stiffness = float(np.median([fit.stiffness_nm_rad for fit in counted]))
     return Row(
-        source="Eq. 7, Sec. 2.4.4, Fig. 8",
-        paper="J fixed at the median of all epochs of all conditions, 0.0045 kg·m²",
         ours=f"median J of {len(analysis.fits)} virtual epochs {number(analysis.inertia_kg_m2)} "
         f"kg·m²; with it held, all epochs together give B {number(damping)} N·m·s/rad and "
         f"K {number(stiffness)} N·m/rad (medians)",
-        reading="The virtual arm has 0.0045 kg·m² as its median; epochs that do not count in the "
-        "first stage do not in the second.",
         checks=(
             within_percent("Median J", "kg·m²", printed.FIG_8_INERTIA, analysis.inertia_kg_m2, 5.0),
         ),
-        agrees="The two stages return the inertia that was put in.",
         virtual=True,
     )
 
@@ -295,11 +273,7 @@ def table_2(context: Context) -> Row:
         p, r, by_day = _tests(compared)
         parts.append(f"{compared.measure.title} p = {p}, r = {r} ({by_day})")
     return Row(
-        source="Table 2",
-        paper="mUPDRS .04, .18; impulse 4.3e-4, .30; work 2.8e-4, .31; viscosity 4.0e-4, .35; "
-        "stiffness 1.8e-3, .37 (p, r)",
         ours="virtual study, in parentheses p when days count: " + "; ".join(parts),
-        reading="Whether the printed p, r and N belong together is in the rows table-2-….",
         unpublished=f"{_VIRTUAL_STUDY}shows that the chain from epochs to tests runs, not what DBS "
         "does.",
         virtual=True,
