@@ -307,8 +307,7 @@ class Bench:
         """Whether the drive has power: its own word, not the driver's."""
         if self.virtual:
             return bool(self.rig.powered)
-        state = self.drive_emulator.state()
-        return bool(state["power"] if "power" in state else state["powered"])
+        return bool(self.drive_emulator.state()["power"])
 
     def trace(self) -> Any:
         """Return time on the loop's clock, angle and velocity of the arm itself."""

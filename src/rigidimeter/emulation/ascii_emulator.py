@@ -49,6 +49,9 @@ MISBEHAVIOURS = {
 
 OFF, VELOCITY, MOVES = 0, 11, 21
 POWER_UP_BAUD = 9600
+THINKING_S = 0.0002
+"""From the end of a request to the start of its reply."""
+
 STEP_S = 0.001
 GENERATOR_STEP_S = 0.0005
 LOOP_GAIN_S = 60.0
@@ -64,26 +67,18 @@ class AsciiEmulator:
     Parameters
     ----------
     arm : EmulatedArm
-    baud : int
-        The highest rate it can be set to.
     counts_per_turn : float
         Encoder counts for one turn of the joint.
-    thinking_s : float
-        From the end of a request to the start of its reply.
     """
 
     def __init__(
         self,
         arm: EmulatedArm,
         *,
-        baud: int = 115200,
         counts_per_turn: float = 360_000.0,
-        thinking_s: float = 0.0002,
     ) -> None:
         self._arm = arm
-        self._highest_baud = baud
         self._per_rad = counts_per_turn / (2.0 * math.pi)
-        self._thinking_s = thinking_s
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
@@ -177,8 +172,8 @@ class AsciiEmulator:
                 line, _, rest = bytes(received).partition(b"\r")
                 received = bytearray(rest)
                 arrived_s += (len(line) + 1) * self._character_s()
-                self._until(arrived_s + self._thinking_s)
-                self._answer(line.decode("ascii", "replace").strip(), arrived_s + self._thinking_s)
+                self._until(arrived_s + THINKING_S)
+                self._answer(line.decode("ascii", "replace").strip(), arrived_s + THINKING_S)
                 arrived_s = time.monotonic()
 
     def _answer(self, request: str, begun_s: float) -> None:
@@ -238,7 +233,7 @@ class AsciiEmulator:
             return "e 33"
         if register not in self._registers or register in READ_ONLY:
             return "e 15"
-        if register == 0x90 and (value not in SPEEDS.values() or value > self._highest_baud):
+        if register == 0x90 and value not in SPEEDS.values():
             return "e 33"
         if register == 0x2F and "stale_target" in self._faults:
             return "ok"

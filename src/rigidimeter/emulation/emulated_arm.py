@@ -19,6 +19,8 @@ from rigidimeter.dynamics.joint import JointDynamics
 __all__ = ["EmulatedArm"]
 
 LONGEST_STEP_S = 0.5
+DAMPING_RATIO = 0.7071
+"""Of the drive."""
 
 
 class EmulatedArm:
@@ -28,7 +30,7 @@ class EmulatedArm:
     ----------
     joint : JointDynamics
         The true joint, which an estimate should recover.
-    bandwidth_hz, damping_ratio : float
+    bandwidth_hz : float
         Of the drive.
     noise_sd_nm : float
         Standard deviation of each torque reading.
@@ -45,7 +47,6 @@ class EmulatedArm:
         joint: JointDynamics,
         *,
         bandwidth_hz: float = 50.0,
-        damping_ratio: float = 0.7071,
         noise_sd_nm: float = 0.005,
         voluntary_nm: Callable[[float], float] = lambda _: 0.0,
         seed: int = 1,
@@ -53,7 +54,7 @@ class EmulatedArm:
     ) -> None:
         self.joint = joint
         self.voluntary_nm = voluntary_nm
-        self._bandwidth_hz, self._damping_ratio = bandwidth_hz, damping_ratio
+        self._bandwidth_hz = bandwidth_hz
         self._noise_sd_nm = noise_sd_nm
         self._rng = np.random.default_rng(seed)
         self._now = now
@@ -113,6 +114,6 @@ class EmulatedArm:
                 change = self._ramp_rad_s2 * step_s
                 missing = self._target_rad_s - self._command_rad_s
                 self._command_rad_s += max(-change, min(change, missing))
-            coefficients = drive(self._bandwidth_hz, self._damping_ratio, step_s)
+            coefficients = drive(self._bandwidth_hz, DAMPING_RATIO, step_s)
             self._state = drive_step(coefficients, self._state, self._command_rad_s)
             elapsed_s -= step_s

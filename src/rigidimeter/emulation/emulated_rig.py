@@ -31,7 +31,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import IO, Any, Literal
+from typing import Any, Literal
 
 from rigidimeter.documents import plain_values
 from rigidimeter.dynamics.joint import JointDynamics
@@ -191,8 +191,7 @@ class EmulatedRig:
     def _state(self) -> dict[str, Any]:
         now_s = time.monotonic()
         found = self.drive.state()
-        power = found.pop("power", found.pop("powered", None))
-        return {"time_s": now_s, "power": power, "pressed": self._pressed, **found}
+        return {"time_s": now_s, "power": found.pop("power"), "pressed": self._pressed, **found}
 
     def _misbehave(self, role: str, *words: str) -> dict[str, Any]:
         if role not in ("torque", "drive"):
@@ -279,29 +278,23 @@ class EmulatedRig:
         }
 
 
-def serve(
-    rig: EmulatedRig,
-    rig_out: Path | None = None,
-    lines: IO[str] = sys.stdin,
-    out: IO[str] = sys.stdout,
-) -> None:
+def serve(rig: EmulatedRig, rig_out: Path | None = None) -> None:
     """Write the rig file, report that the rig is ready, then answer commands to the input's end."""
     if rig_out is not None:
         rig_out.write_text(rig.rig_toml(), encoding="utf-8")
     sys.setswitchinterval(SWITCH_S)
-    _say(out, rig.ready() | {"rig": None if rig_out is None else str(rig_out)})
-    while line := lines.readline():
+    _say(rig.ready() | {"rig": None if rig_out is None else str(rig_out)})
+    while line := sys.stdin.readline():
         if not line.strip():
             continue
         if line.strip() == "quit":
-            _say(out, {"ok": True})
+            _say({"ok": True})
             return
-        _say(out, rig.answer(line))
+        _say(rig.answer(line))
 
 
-def _say(out: IO[str], answer: dict[str, Any]) -> None:
-    out.write(json.dumps(plain_values(answer)) + "\n")
-    out.flush()
+def _say(answer: dict[str, Any]) -> None:
+    print(json.dumps(plain_values(answer)), flush=True)
 
 
 def _number(word: str) -> float | None:

@@ -178,7 +178,10 @@ class AsciiDrive:
             while (exchange := line.take()) is not None:
                 feedback.take(exchange, commanding=self._commanding)
             now_s = self._now()
-            if line.busy and now_s - feedback.reply_s > self._settings.lost_s + self._cycle_s:
+            if (
+                line.busy
+                and now_s - feedback.silent_since_s > self._settings.lost_s + self._cycle_s
+            ):
                 feedback.latch(Cause.DRIVE_LOST)
             self._check_horizon(now_s)
             if not self._commanding and not line.busy:
@@ -279,7 +282,7 @@ class AsciiDrive:
     def _send(self, *commands: str, ask_all: bool = False) -> None:
         line = self._line
         if line is not None:
-            self._feedback.reply_s = self._now()
+            self._feedback.silent_since_s = self._now()
             self._cycle += 1
             turns = (0xA0, 0x24) if ask_all else ((0x24,) if self._cycle % 2 else (0xA0,))
             line.submit(*commands, *map(get, (0x32, 0x18, *turns)))

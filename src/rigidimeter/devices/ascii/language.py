@@ -184,7 +184,8 @@ class Feedback:
         self.position_s = -math.inf
         self.sequence = -1
         self.cause = Cause.NONE
-        self.reply_s = 0.0
+        self.silent_since_s = 0.0
+        """When the last request was sent or the last reply arrived."""
         self.refused = False
         """Whether a move was refused once; the following replies tell why."""
         self.counts = dict.fromkeys(("received", "lost", "damaged", "refused", "skipped"), 0)
@@ -201,7 +202,7 @@ class Feedback:
         self.refused = False
         self._damaged_in_a_row = 0
         self.position, self.position_s, self.sequence = position, now_s, 0
-        self.speed, self.reply_s = speed, now_s
+        self.speed, self.silent_since_s = speed, now_s
         self._take_status(status, commanding=False)
 
     def take(self, exchange: Exchange, *, commanding: bool) -> None:
@@ -211,7 +212,7 @@ class Feedback:
             self.counts["lost"] += 1
             self.latch(Cause.DRIVE_LOST)
             return
-        self.reply_s = at_s
+        self.silent_since_s = at_s
         reply = parse(text)
         if reply.kind == "e":
             self.counts["refused"] += 1

@@ -13,10 +13,9 @@ every millisecond.
 from __future__ import annotations
 
 import importlib
-import math
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from rigidimeter.emulation.cia402.object_dictionary import (
@@ -31,6 +30,7 @@ from rigidimeter.emulation.cia402.servo import (
     GENERIC_ERROR,
     MISBEHAVIOURS,
     POWERED,
+    UNITS_PER_RAD,
     Phase,
     Servo,
     statusword,
@@ -55,10 +55,6 @@ class Cia402Emulator:
     interface, channel : str
         Of python-can.
     node_id : int
-    counts_per_rev : float
-        Position, velocity and acceleration units per turn of the joint, per s and per s².
-    now : callable
-        Monotonic time in s.
     options : Any
         Further arguments of python-can, such as `port`.
     """
@@ -70,8 +66,6 @@ class Cia402Emulator:
         interface: str,
         channel: str,
         node_id: int = 1,
-        counts_per_rev: float = 819_200.0,
-        now: Callable[[], float] = time.monotonic,
         **options: Any,
     ) -> None:
         try:
@@ -82,10 +76,9 @@ class Cia402Emulator:
                 "pip install 'rigidimeter[canopen]'"
             ) from None
         self._can, self._abort = can, canopen.SdoAbortedError
-        self._arm, self._now, self._node_id = arm, now, node_id
-        self._units_per_rad = counts_per_rev / (2 * math.pi)
+        self._arm, self._node_id = arm, node_id
         self._lock = threading.RLock()
-        self._servo = Servo(arm, self, self._units_per_rad, now)
+        self._servo = Servo(arm, self)
         self._later: list[tuple[float, bytes]] = []
         self.log: list[tuple[float, str]] = []
         """Events with their times."""
@@ -147,7 +140,7 @@ class Cia402Emulator:
                 "power": self._servo.phase in POWERED,
                 "state": self._servo.phase.name,
                 "network": self._node.nmt.state,
-                "target_rad_s": self._servo.target() / self._units_per_rad,
+                "target_rad_s": self._servo.target() / UNITS_PER_RAD,
                 "stop_reason": self._servo.last_stop.reason,
                 "stop_began_s": self._servo.last_stop.began_s,
                 "stop_rest_s": self._servo.last_stop.rest_s,
@@ -202,7 +195,7 @@ class Cia402Emulator:
 
     def note(self, event: str) -> None:
         """Log an event."""
-        self.log.append((self._now(), event))
+        self.log.append((time.monotonic(), event))
 
     # SDO requests
 
@@ -211,7 +204,9 @@ class Cia402Emulator:
             if "die" in self._servo.wrong:
                 return
             if "slow answers" in self._servo.wrong:
-                self._later.append((self._now() + self._servo.wrong["slow answers"], bytes(data)))
+                self._later.append(
+                    (time.monotonic() + self._servo.wrong["slow answers"], bytes(data))
+                )
                 return
             self._node.sdo.on_request(0, data, 0.0)
 
@@ -269,7 +264,7 @@ class Cia402Emulator:
         if node_id == watched >> 16 and watched & 0xFFFF:
             if self._heartbeat_s is None:
                 self.note("watches the master's heartbeat")
-            self._heartbeat_s = self._now()
+            self._heartbeat_s = time.monotonic()
 
     def _mapping(self, index: int) -> Iterator[tuple[int, int, int]]:
         """Yield index, subindex and size in bytes of the objects mapped to a PDO."""
@@ -282,7 +277,7 @@ class Cia402Emulator:
         mapped = list(self._mapping(index))
         if len(data) < sum(size for _, _, size in mapped):
             return
-        self._command_s = self._now()
+        self._command_s = time.monotonic()
         parts = []
         for entry, subindex, size in mapped:
             parts.append((entry, subindex, data[at : at + size]))
@@ -321,7 +316,7 @@ class Cia402Emulator:
     def _watching(self) -> None:
         while not self._ended.wait(WATCH_S):
             with self._lock:
-                now_s = self._now()
+                now_s = time.monotonic()
                 self._watch_connection(now_s)
                 self._servo.watch_rest(now_s)
                 due = [data for at_s, data in self._later if at_s <= now_s]

@@ -10,7 +10,7 @@ This module reads objects by their index; messages are handled in `cia402_emulat
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import time
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
@@ -22,6 +22,7 @@ __all__ = [
     "GENERIC_ERROR",
     "MISBEHAVIOURS",
     "POWERED",
+    "UNITS_PER_RAD",
     "LastStop",
     "Phase",
     "Servo",
@@ -61,6 +62,9 @@ DEFAULTS = {
     "slow answers": 0.5,
     "wrong watchdog": 0,
 }
+
+UNITS_PER_RAD = 819_200.0 / (2 * math.pi)
+"""Drive units of position, velocity and acceleration: 819,200 counts in a turn of the joint."""
 
 AT_REST_RAD_S = 0.01
 GENERIC_ERROR, COMMUNICATION_ERROR = 0x01, 0x11
@@ -146,17 +150,10 @@ class Servo:
     ----------
     arm : EmulatedArm
     node : Objects
-    units_per_rad : float
-        Of position, velocity and acceleration.
-    now : callable
-        Monotonic time in s.
     """
 
-    def __init__(
-        self, arm: EmulatedArm, node: Objects, units_per_rad: float, now: Callable[[], float]
-    ) -> None:
-        self._arm, self._node, self._now = arm, node, now
-        self._units_per_rad = units_per_rad
+    def __init__(self, arm: EmulatedArm, node: Objects) -> None:
+        self._arm, self._node = arm, node
         self._control = 0
         self.phase = Phase.SWITCH_ON_DISABLED
         self.wrong: dict[str, Any] = {}
@@ -171,7 +168,7 @@ class Servo:
     def target(self) -> float:
         """Return the present target velocity, in drive units."""
         if "stale target" in self.wrong:
-            return float(self.wrong["stale target"]) * self._units_per_rad
+            return float(self.wrong["stale target"]) * UNITS_PER_RAD
         most = self._node.value(0x607F)
         return max(-most, min(most, self._node.value(0x60FF)))
 
@@ -182,7 +179,7 @@ class Servo:
         angle_rad, velocity_rad_s = self._arm.motion()
         angle_rad += self.wrong.get("encoder jump", 0.0)
         sign = -1 if "encoder sign" in self.wrong else 1
-        units = sign * self._units_per_rad
+        units = sign * UNITS_PER_RAD
         return round(angle_rad * units), round(velocity_rad_s * units)
 
     def control(self, control: int) -> None:
@@ -204,7 +201,7 @@ class Servo:
         before, self.phase = self.phase, phase
         self._node.note(f"{before.name} -> {phase.name}: {why}")
         if phase in (Phase.QUICK_STOP_ACTIVE, Phase.FAULT_REACTION):
-            self.last_stop = LastStop(why, self._now())
+            self.last_stop = LastStop(why, time.monotonic())
         self.move()
         self._node.changed()
 
@@ -215,13 +212,13 @@ class Servo:
         elif "runs away" in self.wrong:
             self._arm.command(self.wrong["runs away"])
         elif self.phase is not Phase.OPERATION_ENABLED:
-            self._arm.command(0.0, self._node.value(0x6085) / self._units_per_rad)
+            self._arm.command(0.0, self._node.value(0x6085) / UNITS_PER_RAD)
         elif "does not follow" in self.wrong:
             self._arm.command(0.0)
         else:
-            wanted_rad_s = self.target() / self._units_per_rad
+            wanted_rad_s = self.target() / UNITS_PER_RAD
             speeds_up = abs(wanted_rad_s) > abs(self._arm.motion()[1])
-            ramp = self._node.value(0x6083 if speeds_up else 0x6084) / self._units_per_rad
+            ramp = self._node.value(0x6083 if speeds_up else 0x6084) / UNITS_PER_RAD
             self._arm.command(wanted_rad_s, ramp)
 
     def fault(self, code: int, why: str) -> None:

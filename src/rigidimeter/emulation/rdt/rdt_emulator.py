@@ -49,17 +49,8 @@ class RdtEmulator:
     arm : EmulatedArm
     rate_hz : float
         Records per second, at most 7000.
-    address : str
-    port, http_port : int
-        0 selects free ports; after `start` the attributes hold the numbers.
-    counts_per_n, counts_per_nm : float
-        Counts for 1 N and 1 N·m, whatever the units of the page.
     force_unit, torque_unit : str
         As spelled in the page: N, lbf; Nm, Nmm, lbf-in, lbf-ft and others.
-    serial : str
-    calibration : int
-    noise_counts : float
-        SD of the noise on the other axes.
     first_sequence : int
         The RDT sequence of a stream's first record.
     seed : int
@@ -67,6 +58,8 @@ class RdtEmulator:
 
     Attributes
     ----------
+    address, port, http_port
+        Where it can be reached; the ports are free ones chosen by `start`.
     sent : deque
         RDT sequence and torque in N·m of the latest records, to compare with what arrives.
     requests : deque
@@ -78,36 +71,20 @@ class RdtEmulator:
         arm: EmulatedArm,
         *,
         rate_hz: float = 1000.0,
-        address: str = "127.0.0.1",
-        port: int = 0,
-        http_port: int = 0,
-        counts_per_n: float = 1e6,
-        counts_per_nm: float = 1e6,
         force_unit: str = "N",
         torque_unit: str = "Nm",
-        serial: str = "FT00001",
-        calibration: int = 0,
-        noise_counts: float = 500.0,
         first_sequence: int = 1,
         seed: int = 1,
     ) -> None:
         if not 0.0 < rate_hz <= SAMPLE_RATE_HZ:
             raise ValueError(f"rate_hz is {rate_hz:g}; it must be above 0 and at most 7000 Hz")
         self.arm = arm
-        self.address, self.port, self.http_port = address, port, http_port
+        self.address, self.port, self.http_port = "127.0.0.1", 0, 0
         self.rate_hz = rate_hz
         self.requests: deque[int] = deque(maxlen=100)
-        self._page = PageFacts(
-            counts_per_n=counts_per_n,
-            counts_per_nm=counts_per_nm,
-            force_unit=force_unit,
-            torque_unit=torque_unit,
-            serial=serial,
-            calibration=calibration,
-            rate_hz=rate_hz,
-        )
+        self._page = PageFacts(force_unit, torque_unit, rate_hz)
         self._first_sequence = first_sequence
-        self._records = RecordSource(arm, rate_hz, counts_per_nm, noise_counts, seed)
+        self._records = RecordSource(arm, rate_hz, seed)
         self.sent = self._records.sent
         self._random = random.Random(seed)
         self._faults: Faults = {}

@@ -9,6 +9,7 @@ from collections import deque
 from rigidimeter.emulation.emulated_arm import EmulatedArm
 
 __all__ = [
+    "COUNTS_PER_UNIT",
     "MISBEHAVIOURS",
     "ONCE",
     "RECORD",
@@ -22,6 +23,12 @@ __all__ = [
 RECORD = struct.Struct(">IIIiiiiii")
 SAMPLE_RATE_HZ = 7000.0
 """The sensor's own sampling rate, whatever the rate of its records."""
+
+COUNTS_PER_UNIT = 1e6
+"""Counts for 1 N and for 1 N·m, whatever the units of the page."""
+
+NOISE_COUNTS = 500.0
+"""SD of the noise on the five axes that do not measure the arm."""
 
 MISBEHAVIOURS = {
     "silent": "No more records are sent.",
@@ -87,26 +94,15 @@ class RecordSource:
     arm : EmulatedArm
     rate_hz : float
         Records per second.
-    counts_per_nm : float
-    noise_counts : float
-        SD of the noise on the other five axes.
     seed : int
     """
 
-    def __init__(
-        self,
-        arm: EmulatedArm,
-        rate_hz: float,
-        counts_per_nm: float,
-        noise_counts: float,
-        seed: int,
-    ) -> None:
+    def __init__(self, arm: EmulatedArm, rate_hz: float, seed: int) -> None:
         self._arm = arm
-        self._counts_per_nm = counts_per_nm
         self._samples_a_record = max(round(SAMPLE_RATE_HZ / rate_hz), 1)
         rng = random.Random(seed)
         # Drawn in advance to save time at 7 kHz.
-        self._noise = [[round(rng.gauss(0.0, noise_counts)) for _ in range(5)] for _ in range(4096)]
+        self._noise = [[round(rng.gauss(0.0, NOISE_COUNTS)) for _ in range(5)] for _ in range(4096)]
         self.sent: deque[tuple[int, float]] = deque(maxlen=20000)
         self.restart(1)
 
@@ -144,7 +140,7 @@ class RecordSource:
                 status |= STATUS[name]
             for name in ("serious_status", "one_bad_status"):
                 status |= int(fault_value(faults, name, SUPPLY_LOW) or 0)
-        tz = max(-(2**31), min(2**31 - 1, round(-torque_nm * self._counts_per_nm)))
+        tz = max(-(2**31), min(2**31 - 1, round(-torque_nm * COUNTS_PER_UNIT)))
         counts: tuple[int, ...] = (*self._noise[self.taken % 4096], tz)
         if "frozen_values" in faults and self._before:
             counts = self._before

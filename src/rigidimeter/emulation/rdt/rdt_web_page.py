@@ -8,7 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from http.server import BaseHTTPRequestHandler
 
-from rigidimeter.emulation.rdt.rdt_records import SUPPLY_LOW, Faults, fault_value
+from rigidimeter.emulation.rdt.rdt_records import (
+    COUNTS_PER_UNIT,
+    SUPPLY_LOW,
+    Faults,
+    fault_value,
+)
 
 __all__ = ["PageFacts", "PageServer", "page_text", "page_with_faults"]
 
@@ -27,15 +32,14 @@ _NEWTON_METRES = {
 
 @dataclass(frozen=True)
 class PageFacts:
-    """Contents of the page; counts per N and per N·m, whatever its units."""
+    """Contents of the page; counts per N·m whatever its units."""
 
-    counts_per_n: float
-    counts_per_nm: float
     force_unit: str
     torque_unit: str
-    serial: str
-    calibration: int
     rate_hz: float
+    counts_per_nm: float = COUNTS_PER_UNIT
+    serial: str = "FT00001"
+    calibration: int = 0
     bias: int = 0
     rdt: str = "Enabled"
     status: int = 0
@@ -55,7 +59,7 @@ def page_text(page: PageFacts) -> bytes:
         "cfgnam": "elbow",
         "cfgcalsel": page.calibration,
         "cfgcalsn": page.serial,
-        "cfgcpf": f"{page.counts_per_n * force_n:.12g}",
+        "cfgcpf": f"{COUNTS_PER_UNIT * force_n:.12g}",
         "cfgcpt": f"{page.counts_per_nm * torque_nm:.12g}",
         "scfgfu": page.force_unit,
         "scfgtu": page.torque_unit,
