@@ -8,7 +8,8 @@ a change of the code has changed no result; they do not tell that a result is ri
     python -m benchmarks.same_numbers --full                # the slow groups too
     python -m benchmarks.same_numbers --write FILE --full   # keep those of this code
 
-The status is 1 if any number differs.
+Numbers that differ for a reason in `benchmarks.numbers.explained` are listed with that reason. The
+status is 1 if any other number differs.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from typing import Any
 
 from benchmarks.numbers.difference import Compared, compare
 from benchmarks.numbers.documents import Numbers
+from benchmarks.numbers.explained import EXPLANATIONS, explanation
 from benchmarks.numbers.groups import GROUPS, Absent
 from benchmarks.numbers.inputs import ROOT, Workspace
 
@@ -82,16 +84,24 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _say(name: str, found: Compared, passed_s: float) -> bool:
-    """Print how a group compares, and return whether it is the same."""
+    """Print how a group compares, and return whether all that differs is explained."""
     worst = "all equal to the bit" if found.worst is None else f"worst {found.worst}"
     print(f"{name}: {found.values} values, {passed_s:.0f} s, {worst}")
-    for one in found.differing:
+    reasons = [(one, explanation(name, one)) for one in found.differing]
+    for reason in EXPLANATIONS:
+        explained = [one for one, of in reasons if of is reason]
+        if explained:
+            furthest = max(explained, key=lambda one: one.relative)
+            print(f"  explained  {len(explained)} of {reason.name}: {reason.reason}")
+            print(f"             worst {furthest}")
+    unexplained = [one for one, of in reasons if of is None]
+    for one in unexplained:
         print(f"  differs  {one}")
     for missing in found.missing:
         print(f"  missing  {missing}")
     for new in found.new:
         print(f"  new      {new}")
-    return not found.differing and not found.missing
+    return not unexplained and not found.missing
 
 
 def _count(numbers: Numbers) -> int:

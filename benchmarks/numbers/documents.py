@@ -63,6 +63,23 @@ EFFECTS = (
     *("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high"),
     *("p_holm",),
 )
+RATING = "rating"
+"""The examiners' ratings among the measures of a study."""
+
+_TESTED = ("shift", "shift_low", "shift_high", "confidence", "u", "z", "p", "r")
+RESULTS = (
+    *(f"{key}_{side}" for side in ("reference", "other")
+      for key in ("n", "excluded", "median", "q1", "q3")),
+    *(*_TESTED, "z_uncorrected", "p_uncorrected"),
+)  # fmt: skip
+SIZES = ("n_x", "n_y", *_TESTED, *EFFECTS)
+BY_DAYS = (
+    *("estimate", "low", "high", "p", "df", "days_reference", "days_other", "p_days", "day_share"),
+    *("confidence", "p_holm"),
+)
+"""Columns of `comparisons.csv`, which is kept as three tables."""
+RENAMED = {"days": "day_medians"}
+"""Other tables that are kept by another name."""
 CONTRAST = (
     *("estimate", "se", "f", "df_residual", "p_residual", "df_satterthwaite", "p_satterthwaite"),
     *("se_kenward_roger", "f_kenward_roger", "df_kenward_roger", "p_kenward_roger"),
@@ -124,7 +141,7 @@ def estimates_numbers(document: Row, keys: Sequence[str] = FIT) -> Numbers:
 
 def comparisons_numbers(document: Row) -> Numbers:
     """Return the tests by epochs of `compare RECORDINGS --json`."""
-    rows = [_test(row) for row in document["comparisons"]]
+    rows = [_test(row) for row in document["comparisons"] if row["measure"] != RATING]
     excluded = ("of_reference.excluded", "of_other.excluded")
     return {
         "method": document["method"],
@@ -136,14 +153,20 @@ def table_comparison_numbers(document: Row) -> Numbers:
     """Return the tests and effect sizes of `compare TABLE --value COLUMN --json`."""
     rows = [_test(row) for row in document["comparisons"]]
     return {
-        **_columns("columns", rows, ("value",), (*TEST, *EFFECTS)),
+        **_columns("columns", rows, ("measure",), (*TEST, *EFFECTS)),
         **_differences(document["effect_differences"]),
     }
 
 
 def study_numbers(document: Row) -> Numbers:
     """Return every conclusion of `compare STUDY --json`."""
-    effects = [_effect(row) for row in document["effects"]]
+    rows = document["comparisons"]
+    tested = [row for row in rows if row["p"] is not None]
+    by_days = [
+        {**row["days"], "measure": row["measure"]}
+        for row in rows
+        if row["days"] is not None and row["measure"] != RATING
+    ]
     return {
         **comparisons_numbers(document),
         "inertia_kg_m2": document["inertia_kg_m2"],
@@ -157,12 +180,12 @@ def study_numbers(document: Row) -> Numbers:
         ),
         **_columns(
             "day_tests",
-            document["day_tests"],
+            by_days,
             ("measure",),
             ("estimate", "low", "high", "p", "df", "days_reference", "days_other", "p_days",
              "day_share"),
         ),
-        **_columns("effects", effects, ("measure",), ("p", "r", *EFFECTS)),
+        **_columns("effects", tested, ("measure",), ("p", "r", *EFFECTS)),
         **_differences(document["effect_differences"]),
         **_columns(
             "sensitivity",
@@ -252,11 +275,32 @@ def tables_numbers(folder: Path, left_out: Iterable[str] = ()) -> Numbers:
             continue
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
-        for name in rows[0] if rows else ():
-            values = [_read(row[name]) for row in rows]
-            if {type(value) for value in values} - {type(None)} == {float}:
-                found[f"{path.stem}/{name}"] = values
+        for table, part in _tables(path.stem, rows).items():
+            for name in part[0] if part else ():
+                values = [_read(row[name]) for row in part]
+                if {type(value) for value in values} - {type(None)} == {float}:
+                    found[f"{table}/{name}"] = values
     return found
+
+
+def _tables(name: str, rows: Sequence[Row]) -> dict[str, Sequence[Row]]:
+    """Return a table of a report under the names that its numbers are kept by."""
+    if name == "comparisons":
+        by_epochs = [row for row in rows if row["measure"] != RATING]
+        return {
+            "results": [{key: row[key] for key in RESULTS} for row in by_epochs],
+            "effects": [{key: row[key] for key in SIZES} for row in rows],
+            "day_tests": [
+                {key: row[key if key.startswith("days_") else f"days_{key}"] for key in BY_DAYS}
+                for row in rows
+            ],
+        }
+    if name == "effect_differences":
+        keys = {"estimate": "difference"}
+        return {name: [{keys.get(key, key): cell for key, cell in row.items()} for row in rows]}
+    if name == "summaries":
+        return {name: [row for row in rows if row["measure"] != RATING]}
+    return {RENAMED.get(name, name): rows}
 
 
 def _test(row: Row) -> dict[str, Any]:
@@ -264,11 +308,6 @@ def _test(row: Row) -> dict[str, Any]:
     groups = row["groups"]
     sides = {f"of_{side}": groups.get(row[side]) for side in ("reference", "other")}
     return {**row, **_flat(sides)}
-
-
-def _effect(row: Row) -> dict[str, Any]:
-    sizes = row["effects"]
-    return {**sizes, "p": sizes["test"]["p"], "measure": row["measure"], "p_holm": row["p_holm"]}
 
 
 def _differences(rows: Sequence[Row]) -> Numbers:

@@ -41,7 +41,7 @@ ANKLE = (
     *("--column", "angle_rad=position_rad", "--column", "torque_nm=torque_Nm"),
     *("--rate-hz", 1000, "--reaction"),
 )
-LEFT_OUT = ("provenance", "settings", "fits", "fixed_inertia")
+LEFT_OUT = ("provenance", "settings", "estimates")
 """Tables of a report: where and with what it was made, and what the estimates hold already."""
 
 
