@@ -70,12 +70,13 @@ def design(work: Workspace) -> Numbers:
     """Return what is foreseen of a protocol, and what a search finds."""
     relaxed = work.settings("design-relaxed", PLANNED.format(voluntary=0.0))
     pushing = work.settings("design-pushing", PLANNED.format(voluntary=0.1))
-    options = ("--detect", "damping=20%", "--detect", "stiffness=0.3", "--multisine")
-    options = ("--settings", relaxed, *options)
+    wanted = ("--detect", "damping=20%", "--detect", "stiffness=0.3", "--multisine")
     searched = ("--settings", pushing, "--optimise")
     return _named(
         {
-            "plain": design_numbers(work.document("design", "design", *options)),
+            "plain": design_numbers(
+                work.document("design", "design", "--settings", relaxed, *wanted)
+            ),
             "searched": design_numbers(work.document("design-searched", "design", *searched)),
         }
     )
