@@ -33,8 +33,8 @@ class Explanation(NamedTuple):
 
 
 LOOP = "a torque sensor slower than the loop is the mean over its phases (CHANGELOG)"
-"""With the pure delay that was there before, J, B and K, their standard errors and the p of tests by
-epochs agree to 1e-9, other numbers as the reasons below say."""
+"""With the pure delay that was there before, J, B and K, their standard errors and the p of tests
+by epochs agree to 1e-9, other numbers as the reasons below say."""
 STREAM = "each column is resampled with random numbers of its own (CHANGELOG)"
 RANK = f"one pair of J changes order, U is 927 for 928: {LOOP}"
 FFT = "rounding in the FFT of the loop, which holds to 2e-8 of the largest value"

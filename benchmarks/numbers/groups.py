@@ -71,12 +71,11 @@ def design(work: Workspace) -> Numbers:
     relaxed = work.settings("design-relaxed", PLANNED.format(voluntary=0.0))
     pushing = work.settings("design-pushing", PLANNED.format(voluntary=0.1))
     wanted = ("--detect", "damping=20%", "--detect", "stiffness=0.3", "--multisine")
+    planned = ("--settings", relaxed, *wanted)
     searched = ("--settings", pushing, "--optimise")
     return _named(
         {
-            "plain": design_numbers(
-                work.document("design", "design", "--settings", relaxed, *wanted)
-            ),
+            "plain": design_numbers(work.document("design", "design", *planned)),
             "searched": design_numbers(work.document("design-searched", "design", *searched)),
         }
     )
