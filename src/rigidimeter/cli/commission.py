@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import os
 import signal
 import sys
 import threading
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.text_table import text_table
 from rigidimeter.errors import UserError
@@ -89,7 +89,8 @@ def commission(
 
     rigfile, chosen = load_rig(rig), load_settings(settings)
     path = out or record_path(rig)
-    _check_before(path, {"--known-torque-nm": known_torque, "--known-angle-deg": known_angle})
+    keep_inputs((path,), (rig, settings) if settings is not None else (rig,))
+    _check_known({"--known-torque-nm": known_torque, "--known-angle-deg": known_angle})
     if not yes and not sys.stdin.isatty():
         raise UserError(
             "nobody can answer the questions; use a terminal, or --yes on an emulated rig"
@@ -159,15 +160,8 @@ def _interrupted_once(record: Path) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _check_before(record: Path, known: Mapping[str, float | None]) -> None:
-    """Refuse mistakes that would otherwise be found only after every check was made."""
-    if not record.parent.is_dir() or not os.access(record.parent, os.W_OK):
-        raise UserError(
-            f"{record}: the record cannot be written, because {record.parent} is not a folder or "
-            "not writable; name another file with --out FILE"
-        )
-    if record.is_dir():
-        raise UserError(f"{record}: is a folder; name a file for the record with --out FILE")
+def _check_known(known: Mapping[str, float | None]) -> None:
+    """Refuse a known value with which nothing can be compared."""
     for option, value in known.items():
         if value is not None and not (math.isfinite(value) and value != 0):
             raise UserError(f"{option} {value:g}: must be a number other than 0")

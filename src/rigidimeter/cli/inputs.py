@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from collections.abc import Iterable
@@ -85,6 +86,8 @@ def keep_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:
             raise UserError(f"{output}: cannot be written (it is a folder)")
         if not place.parent.is_dir():
             raise UserError(f"{output}: cannot be written (there is no folder {output.parent})")
+        if not os.access(place.parent, os.W_OK):
+            raise UserError(f"{output}: cannot be written ({output.parent} is not writable)")
         if place in kept:
             raise UserError(f"{output}: is read or written already; name another file to write")
         if (place.parent / "manifest.json").exists():

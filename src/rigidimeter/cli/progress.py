@@ -8,16 +8,16 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn
-
 __all__ = ["Meter"]
 
 QUIET_S = 2.0
 """Nothing is shown before this."""
 
 LINE_EVERY_S = 5.0
-"""How often a line is written where there is no terminal to draw on."""
+"""How often a line is written to a file or a pipe."""
+
+TERMINAL_EVERY_S = 0.2
+"""How often the line on a terminal is replaced."""
 
 LEAST_SHARE = 0.1
 """No time left is shown before this share of the work is done: it would be a guess."""
@@ -26,8 +26,8 @@ LEAST_SHARE = 0.1
 class Meter:
     """Show how much of a task is done, on the standard error.
 
-    A bar with the time left on a terminal, a line now and then elsewhere, and nothing at all for
-    a task that is done within two seconds.
+    On a terminal one line is replaced; in a file or a pipe a line is written now and then. A task
+    that is done within two seconds shows nothing.
 
     Parameters
     ----------
@@ -48,8 +48,7 @@ class Meter:
         self._clock = clock
         self._start_s = clock()
         self._line_s: float | None = None
-        self._bar: Progress | None = None
-        self._task: TaskID | None = None
+        self._replaces = sys.stderr.isatty()
 
     def __enter__(self) -> Self:
         return self
@@ -60,8 +59,8 @@ class Meter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+        if self._replaces and self._line_s is not None:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
     @property
     def share(self) -> float:
@@ -83,30 +82,13 @@ class Meter:
         """Set what is done."""
         self._done = min(done, self._total)
         now_s = self._clock()
-        if now_s - self._start_s < QUIET_S:
+        every_s = TERMINAL_EVERY_S if self._replaces else LINE_EVERY_S
+        if now_s - self._start_s < QUIET_S or (
+            self._line_s is not None and now_s - self._line_s < every_s
+        ):
             return
-        if sys.stderr.isatty():
-            self._draw()
-        elif self._line_s is None or now_s - self._line_s >= LINE_EVERY_S:
-            self._line_s = now_s
-            print(f"{self._title}: {100 * self.share:.0f} %{self._left()}", file=sys.stderr)
-            sys.stderr.flush()
-
-    def _left(self) -> str:
-        left_s = self.left_s
-        return "" if left_s is None else f", about {left_s:.0f} s left"
-
-    def _draw(self) -> None:
-        if self._bar is None:
-            self._bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TaskProgressColumn(),
-                TextColumn("{task.fields[left]}"),
-                console=Console(stderr=True),
-                transient=True,
-            )
-            self._bar.start()
-            self._task = self._bar.add_task(self._title, total=self._total, left="")
-        if self._task is not None:
-            self._bar.update(self._task, completed=self._done, left=self._left().lstrip(", "))
+        self._line_s = now_s
+        left = "" if self.left_s is None else f", about {self.left_s:.0f} s left"
+        line = f"{self._title}: {100 * self.share:.0f} %{left}"
+        start, end = ("\r\x1b[K", "") if self._replaces else ("", "\n")
+        print(f"{start}{line}", end=end, file=sys.stderr, flush=True)

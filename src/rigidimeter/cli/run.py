@@ -77,6 +77,7 @@ def run(
     from rigidimeter.commissioning import check_record
     from rigidimeter.console import Terminal
     from rigidimeter.devices.rigfile import load_rig
+    from rigidimeter.recording.resume import count_epochs
 
     settings, planned, continues = _planned(protocol, resume, seed, virtual=rig is None)
     home_rad = continues.get("origin_rad") if rig is not None else None
@@ -104,7 +105,7 @@ def run(
     )
     for remark in ended.remarks:
         typer.echo(remark, err=True)
-    good, of = _counted(out)
+    good, of = count_epochs(out)
     typer.echo(f"{good} of {of} epochs ended with success; session in {out}")
     if ended.outcome != "success":
         again = f"; continue it with `{_resume_command(out, rig)}`" if good < of else ""
@@ -132,7 +133,6 @@ def _planned(
             "--resume uses the settings and the seed of that session; leave out "
             + (f"{path}" if path is not None else "--seed")
         )
-    _ended(resume)
     rest = rest_of(resume)
     if rest.virtual != virtual:
         raise UserError(
@@ -148,20 +148,6 @@ def _planned(
         raise UserError(f"{resume}: nothing is left to run, all {rest.done} epochs are done")
     typer.echo(f"{rest.done} epochs are done; {len(rest.epochs)} are left")
     return rest.settings, Protocol(rest.settings.seed, rest.epochs), dict(rest.continues)
-
-
-def _ended(session: Path) -> None:
-    """Refuse a session that is still being recorded: what is left of it is not known yet."""
-    from rigidimeter.recording.session_folder import EVENTS, lock
-
-    events = session / EVENTS
-    if not events.is_file():
-        return
-    with events.open("rb") as file:
-        if not lock(file):
-            raise UserError(
-                f"{session}: is still being recorded; end that session first, then continue it"
-            )
 
 
 def _offer(out: Path) -> None:
@@ -184,16 +170,6 @@ def _resume_command(out: Path, rig: Path | str | None) -> str:
     return " ".join(
         ["rigidimeter run --resume", str(out), *(["--rig", str(rig)] if rig else []), "--out NEW"]
     )
-
-
-def _counted(folder: Path) -> tuple[int, int]:
-    """Return how many epochs ended with success, and how many were planned."""
-    from rigidimeter.recording.sample_log import read_events
-    from rigidimeter.recording.session_folder import EVENTS, read_manifest
-
-    events, _ = read_events(folder / EVENTS)
-    good = sum(e.get("event") == "epoch_ended" and e["outcome"] == "success" for e in events)
-    return good, len(read_manifest(folder)["protocol"])
 
 
 def recover(

@@ -10,10 +10,10 @@ from rigidimeter.errors import UserError
 from rigidimeter.experiment import PlannedEpoch
 from rigidimeter.recording.sample_log import read_events
 from rigidimeter.recording.session_epochs import session_settings
-from rigidimeter.recording.session_folder import EVENTS, read_manifest
+from rigidimeter.recording.session_folder import EVENTS, lock, read_manifest
 from rigidimeter.settings import Settings
 
-__all__ = ["Rest", "rest_of"]
+__all__ = ["Rest", "count_epochs", "rest_of"]
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,11 @@ def rest_of(folder: Path) -> Rest:
     Raises
     ------
     UserError
-        If the folder is no session folder, or was recorded without a protocol.
+        If the folder is no session folder, was recorded without a protocol, or is still being
+        recorded.
     """
     manifest = read_manifest(folder)
-    events, _ = read_events(folder / EVENTS) if (folder / EVENTS).is_file() else ([], False)
+    events = _events(folder)
     planned: list[PlannedEpoch] = []
     for entry in manifest["protocol"]:
         try:
@@ -81,6 +82,27 @@ def rest_of(folder: Path) -> Rest:
         manifest["virtual"],
         {"folder": folder.name, "created_utc": manifest["created_utc"], **origin},
     )
+
+
+def count_epochs(folder: Path) -> tuple[int, int]:
+    """Return how many epochs of a session ended with success, and how many were planned."""
+    events, _ = read_events(folder / EVENTS)
+    good = sum(e.get("event") == "epoch_ended" and e["outcome"] == "success" for e in events)
+    return good, len(read_manifest(folder)["protocol"])
+
+
+def _events(folder: Path) -> list[dict[str, Any]]:
+    """Return the events of a session that nobody is recording any more."""
+    path = folder / EVENTS
+    if not path.is_file():
+        return []
+    with path.open("rb") as file:
+        if not lock(file):
+            raise UserError(
+                f"{folder}: is still being recorded; end that session first, then continue it"
+            )
+    events, _ = read_events(path)
+    return events
 
 
 def _went_on(events: list[dict[str, Any]], last: dict[str, Any]) -> bool:

@@ -7,7 +7,7 @@ import signal
 
 import pytest
 
-from rigidimeter.cli.commission import _check_before, _interrupted_once
+from rigidimeter.cli.commission import _check_known, _interrupted_once
 from rigidimeter.cli.emulate import _check_target
 from rigidimeter.errors import UserError
 
@@ -22,21 +22,25 @@ channel = "can0"
 """
 
 
-def test_a_record_that_could_not_be_written_is_said_before_the_trials(tmp_path):
-    _check_before(tmp_path / "record.json", {"--known-torque-nm": None})
-    with pytest.raises(
-        UserError, match=r"the record cannot be written, because .*nowhere is not a folder"
+def test_a_record_that_cannot_be_written_is_refused_before_the_trials(rigidimeter, tmp_path):
+    rig = tmp_path / "RIG.toml"
+    rig.write_text(HARDWARE)
+    (tmp_path / "folder").mkdir()
+    for out, words in (
+        (tmp_path / "nowhere" / "record.json", "cannot be written (there is no folder"),
+        (tmp_path / "folder", "cannot be written (it is a folder)"),
+        (rig, "is read or written already"),
     ):
-        _check_before(tmp_path / "nowhere" / "record.json", {})
-    (tmp_path / "record.json").mkdir()
-    with pytest.raises(UserError, match="is a folder; name a file"):
-        _check_before(tmp_path / "record.json", {})
+        ran = rigidimeter("commission", "--rig", rig, "--out", out, "--yes")
+        assert ran.status == 1
+        assert words in ran.err
+    assert rig.read_text() == HARDWARE
 
 
 @pytest.mark.parametrize("value", [0.0, float("nan"), float("inf")])
-def test_a_known_torque_that_tells_nothing_is_refused(tmp_path, value):
+def test_a_known_torque_that_tells_nothing_is_refused(value):
     with pytest.raises(UserError, match=r"--known-torque-nm \S+: must be a number other than 0"):
-        _check_before(tmp_path / "record.json", {"--known-torque-nm": value})
+        _check_known({"--known-torque-nm": value})
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -88,7 +88,7 @@ def test_a_virtual_session_does_not_go_on_on_a_real_rig(session, rigidimeter, tm
     rig = tmp_path / "rig.toml"
     ran = rigidimeter("run", "--resume", folder, "--rig", rig, "--out", tmp_path / "n")
     assert ran.status != 0
-    assert f"{folder}: was recorded on the virtual rig and goes on only there" in ran.err
+    assert f"{folder}: was recorded on the virtual rig and can only be continued there" in ran.err
     assert not (tmp_path / "n").exists()
 
 
@@ -97,7 +97,7 @@ def test_a_real_session_does_not_go_on_on_the_virtual_rig(session, rigidimeter, 
     folder = session("s", virtual=False)
     ran = rigidimeter("run", "--resume", folder, "--out", tmp_path / "n")
     assert ran.status != 0
-    assert "was recorded on hardware and goes on only there; name its rig file" in ran.err
+    assert "was recorded on hardware and can only be continued there; name its rig file" in ran.err
     assert not (tmp_path / "n").exists()
 
 
