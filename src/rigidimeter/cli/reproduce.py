@@ -21,14 +21,14 @@ def reproduce(
     ] = 2023,
     only: Annotated[
         list[str] | None,
-        typer.Option("--only", metavar="ID", help="Make this row alone; repeat for several."),
+        typer.Option("--only", metavar="ID", help="Only this row; repeat for several."),
     ] = None,
 ) -> None:
-    """Recompute the paper: every equation, figure and table beside what it prints.
+    """Recompute every equation, figure and table of the paper, next to the printed values.
 
     Writes one self-contained page, paper.html, with a verdict for each row, ledger.json with the
-    same rows, and the figures. What needs the recordings of the animal, which were never published,
-    comes from a virtual study of the same design and says so. That study is kept in
+    same rows, and the figures. The recordings of the animal were never published; rows that need
+    them use a virtual study of the same design and say so. That study is kept in
     DIR/virtual-study, where the other commands can read it.
 
     \b
@@ -43,24 +43,27 @@ def reproduce(
     wanted = chosen(names)
     if out.exists() and not out.is_dir():
         raise UserError(f"--out {out}: is a file; name a folder")
-    # The virtual study takes about as long as all rows together: it is half of the work.
-    done = {"rows": 0.0, "study": 0.0}
-    with Meter("reproduce", 2.0 * len(wanted)) as meter:
+    # The virtual study takes about as long as all rows together, and figures a quarter of a row.
+    done = {"study": 0.0, "rows": 0.0, "figures": 0.0}
+    with Meter("reproduce", 2.25 * len(wanted)) as meter:
 
-        def studied(share: float) -> None:
-            done["study"] = share * len(wanted)
+        def reach(part: str, amount: float) -> None:
+            done[part] = amount
             meter.reach(sum(done.values()))
 
-        def made(_: str) -> None:
-            done["rows"] += 1.0
-            meter.reach(sum(done.values()))
-
-        context = Context(seed, folder=out / "virtual-study", progress=studied)
-        rows = make_rows(context, wanted, progress=made)
-    try:
-        page = write_ledger(rows, out, seed)
-    except OSError as error:
-        raise UserError(f"--out {out}: cannot be written ({error.strerror or error})") from None
+        context = Context(
+            seed,
+            folder=out / "virtual-study",
+            progress=lambda share: reach("study", share * len(wanted)),
+        )
+        rows = make_rows(context, wanted, progress=lambda _: reach("rows", done["rows"] + 1.0))
+        try:
+            page = write_ledger(
+                rows, out, seed, progress=lambda _: reach("figures", done["figures"] + 0.25)
+            )
+        except OSError as error:
+            reason = error.strerror or error
+            raise UserError(f"--out {out}: cannot be written ({reason})") from None
     width = max(len(row.id) for row in rows)
     for row in rows:
         typer.echo(f"{row.id:{width}}  {row.verdict}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -35,13 +35,14 @@ def ledger_text(rows: Sequence[Row]) -> str:
     return json_text([row.as_dict() for row in rows])
 
 
-def drawn(rows: Sequence[Row]) -> dict[str, str]:
+def drawn(rows: Sequence[Row], progress: Callable[[str], None] = lambda _: None) -> dict[str, str]:
     """Return every figure as SVG by its name; those of virtual data are marked."""
-    return {
-        figure.name: svg_text(figure.draw(), "virtual data" if row.virtual else "")
-        for row in rows
-        for figure in row.figures
-    }
+    svg = {}
+    for row in rows:
+        for figure in row.figures:
+            svg[figure.name] = svg_text(figure.draw(), "virtual data" if row.virtual else "")
+        progress(row.id)
+    return svg
 
 
 def render_page(rows: Sequence[Row], svg: Mapping[str, str], seed: int) -> str:
@@ -71,7 +72,9 @@ def render_page(rows: Sequence[Row], svg: Mapping[str, str], seed: int) -> str:
     )
 
 
-def write_ledger(rows: Sequence[Row], out: Path, seed: int) -> Path:
+def write_ledger(
+    rows: Sequence[Row], out: Path, seed: int, progress: Callable[[str], None] = lambda _: None
+) -> Path:
     """Write page, ledger and figures into a folder; return the page's path.
 
     Parameters
@@ -81,9 +84,11 @@ def write_ledger(rows: Sequence[Row], out: Path, seed: int) -> Path:
         Made if it does not exist. Files of the same names are replaced.
     seed : int
         As the page states it.
+    progress : callable
+        Called with the id of each row once its figures are drawn.
     """
     (out / "figures").mkdir(parents=True, exist_ok=True)
-    svg = drawn(rows)
+    svg = drawn(rows, progress)
     for name, text in svg.items():
         write_text(out / "figures" / f"{name}.svg", text)
     write_text(out / "ledger.json", ledger_text(rows))
