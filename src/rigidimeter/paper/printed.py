@@ -59,13 +59,17 @@ APP_A_INERTIA_TOTAL = 0.0052
 APP_A_ELBOW_DAMPING = 0.06
 APP_A_CONTROLLER_DAMPING = 0.028
 APP_A_DAMPING_TOTAL = 0.0088
+"""App. A: mass in kg and share of it, inertia in kg·m², damping in N·m·s/rad."""
 
 EQUATION_8 = JointDynamics(0.0026, 0.044, 0.75)
+"""App. A: "the transfer function with the largest bandwidth"."""
 
 SEC_34 = JointDynamics(0.0045, 0.1368, 1.751)
+"""Sec. 3.4: the joint of the simulations."""
+
 SEC_34_MEAN = (-1.9e-7, -2.6e-7, -1.9e-7)
 SEC_34_SD = (9.6e-7, 1.05e-6, 1.4e-6)
-"""Of 100 simulations: mean and standard deviation of the errors of J, B and K."""
+"""Sec. 3.4, of 100 simulations: mean and standard deviation of the errors of J, B and K."""
 
 FIG_4 = JointDynamics(0.0044, 0.1300, 1.310)
 """Sec. 3.5, "median values"."""
@@ -76,9 +80,8 @@ FIG_6 = JointDynamics(0.0044, 0.1300, 1.130)
 FIG_8_INERTIA = 0.0045
 """Caption of Fig. 8: the inertia that was held fixed, the median of all epochs (Sec. 2.4.4)."""
 
-EPOCHS_A_CONDITION = 15
-SESSION_MIN = 10.0
-"""Sec. 2.3."""
+EPOCHS_A_CONDITION, SESSION_MIN = 15, 10.0
+"""Sec. 2.3: epochs of a condition, and how long they last."""
 
 COUNTS = {
     "ratings": {"OFF": 27, "DBS": 12},
