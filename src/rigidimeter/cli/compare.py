@@ -82,12 +82,12 @@ def compare(
 
     Median and quartiles, the two-sided Wilcoxon rank-sum test (asymptotic, ties and continuity
     corrected), effect size r = z/√N, and the Hodges-Lehmann shift with its 95 % interval. Effect
-    sizes have bootstrap intervals, and every two measures are compared in how well they separate
-    the conditions. Inputs are session folders, recordings, or one JSON file that
-    `rigidimeter estimate` wrote.
+    sizes have bootstrap intervals, and each pair of measures is compared in how well it separates
+    the conditions. Inputs are session folders, recordings, or one JSON file from
+    `rigidimeter estimate`.
 
-    A study folder (with a study.toml) adds tests in which days count, the examiners' ratings, other
-    methods and every exclusion, and keeps the analysis in its folder analysis.
+    A study folder (with a study.toml) also has tests by days, the examiners' ratings, other methods
+    and every exclusion; its analysis is kept in its folder `analysis`.
 
     With --value the input is one table as CSV.
 

@@ -60,17 +60,15 @@ def _epochs(c: Comparison, several: bool) -> Iterator[str]:
     for name in c.pair:
         s = c.summaries[name]
         excluded = f", excluded {c.excluded[name]:2d}" if c.measure.counted == "epochs" else ""
-        yield f"  {name:>10}: n {s.n:3d}{excluded}, median {s.median:.4g} " + (
-            f"[{s.q1:.4g} to {s.q3:.4g}]"
-        )
+        yield f"  {name:>10}: n {s.n:3d}{excluded}, median {_interval(s.median, s.q1, s.q3)}"
     if c.test is None:
         yield f"  no test: {c.remark}"
         return
     t = c.test
     adjusted = f" (by Holm {c.p_holm:.2g})" if several else ""
     yield (
-        f"  {c.reference} − {c.other}: shift {t.shift:.4g} [{t.shift_low:.4g} to "
-        f"{t.shift_high:.4g}]{'' if t.shift_bounded else ' †'}, z {t.z:.3f}, "
+        f"  {c.reference} − {c.other}: shift {_interval(t.shift, t.shift_low, t.shift_high)}"
+        f"{'' if t.shift_bounded else ' †'}, z {t.z:.3f}, "
         f"p {t.p:.2g}{adjusted}, r {t.r:.3f}"
     )
 
@@ -89,7 +87,7 @@ def _days(found: StudyResult) -> Iterator[str]:
             continue
         medians = "" if math.isnan(d.p_days) else f", rank-sum of day medians p {_p(d.p_days)}"
         yield (
-            f"  {c.reference} − {c.other}: {d.estimate:.4g} [{d.low:.4g} to {d.high:.4g}], "
+            f"  {c.reference} − {c.other}: {_interval(d.estimate, d.low, d.high)}, "
             f"p {_p(d.p)} (by Holm {_p(c.days_p_holm)}; {d.df:.1f} df){medians}"
         )
         if not math.isnan(d.day_share):
@@ -104,25 +102,21 @@ def _effects(found: StudyResult) -> Iterator[str]:
     yield ""
     yield f"Effect sizes, 95 % intervals by resampling {resampled}"
     for measure, e in sized:
-        yield (
-            f"  {measure.title}: r {e.r:.3f} [{e.r_low:.3f} to {e.r_high:.3f}], rank-biserial "
-            f"{e.rank_biserial:.3f} [{e.rank_biserial_low:.3f} to {e.rank_biserial_high:.3f}] "
-            f"({e.method})"
-        )
+        r = _interval(e.r, e.r_low, e.r_high, ".3f")
+        biserial = _interval(e.rank_biserial, e.rank_biserial_low, e.rank_biserial_high, ".3f")
+        yield f"  {measure.title}: r {r}, rank-biserial {biserial} ({e.method})"
     titles = {measure.name: measure.title for measure, _ in sized}
     if found.differences:
         yield "Which separates the conditions better (difference of rank-biserial correlations):"
     for each in found.differences:
         d = each.difference
         how = "paired" if d.paired else "independent"
-        pair = f"  {titles[each.first]} − {titles[each.second]}: {d.estimate:.3f}"
+        pair = f"  {titles[each.first]} − {titles[each.second]}"
         if math.isnan(d.p):
-            yield f"{pair}, without an interval: resampling changes nothing ({how})"
+            yield f"{pair}: {d.estimate:.3f}, no interval: every resample gives the same ({how})"
         else:
-            yield (
-                f"{pair} [{d.low:.3f} to {d.high:.3f}], p {_p(d.p)}, by Holm {_p(each.p_holm)} "
-                f"({how})"
-            )
+            size = _interval(d.estimate, d.low, d.high, ".3f")
+            yield f"{pair}: {size}, p {_p(d.p)}, by Holm {_p(each.p_holm)} ({how})"
 
 
 def _ratings(found: RatingsFound) -> Iterator[str]:
@@ -154,6 +148,10 @@ def _exclusions(found: StudyResult) -> Iterator[str]:
         yield f"  {count:3d} {BY[by]}: {reason}"
     for out in found.left_out:
         yield f"Left out: {out.path}: {out.reason}"
+
+
+def _interval(value: float, low: float, high: float, digits: str = ".4g") -> str:
+    return f"{value:{digits}} [{low:{digits}} to {high:{digits}}]"
 
 
 def _p(value: float) -> str:

@@ -136,7 +136,9 @@ class Recordings:
     reaction: Annotated[
         bool,
         typer.Option(
-            "--reaction", help="The torque is the joint's reaction, the negative of what drives it."
+            "--reaction",
+            help="The file holds the reaction torque of the joint, the negative of the torque that "
+            "drives it.",
         ),
     ] = False
     epoch_length_s: Annotated[
@@ -161,7 +163,7 @@ class Recordings:
         typer.Option(
             "--task",
             metavar="prbs|sinusoid",
-            help="Fit J, B, K (prbs) or score (sinusoid); by default the motion decides.",
+            help="Fit J, B and K (prbs) or score (sinusoid). Default: found from the motion.",
         ),
     ] = None
     band_hz: Annotated[
@@ -181,7 +183,7 @@ class Recordings:
             metavar="J_C B_C",
             help="Inertia in kg·m² and damping in N·m·s/rad of the admittance, for files without "
             "a manifest. Default: those of the settings, else the paper's. A wrong value makes iv "
-            "less precise, not wrong.",
+            "less precise but does not bias it.",
         ),
     ] = None
     settings: SettingsOption = None

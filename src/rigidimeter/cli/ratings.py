@@ -71,7 +71,7 @@ def ratings(
     A linear mixed model by restricted maximum likelihood (Sec. 2.2 of the paper): condition means
     without intercept, random offsets. The contrast of two conditions is tested with residual
     degrees of freedom (n − p, as the paper's software does), with Satterthwaite's and with Kenward
-    and Roger's. Corrected scores are the scores less the offsets.
+    and Roger's. Corrected scores are the scores minus the offsets.
 
     \b
     For example:
@@ -144,7 +144,7 @@ def _lines(found: RatingsFound) -> Iterator[str]:
             f"p = {j.p_residual:.3g}; Satterthwaite F({j.df_numerator}, {j.df_satterthwaite:.4g}), "
             f"p = {j.p_satterthwaite:.3g}"
         )
-    yield from ("", "Corrected score = score less the offsets of its groups.")
+    yield from ("", "Corrected score = score minus the offsets of its groups.")
     if found.model_notices:
         yield from ("", "Note:", *(f"  - {text}" for text in found.model_notices))
 

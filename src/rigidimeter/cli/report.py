@@ -1,4 +1,4 @@
-"""`rigidimeter report`: one page from recordings."""
+"""`rigidimeter report`: one page from recordings or from a study folder."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ def report(
         typer.Option(
             "--title",
             metavar="TEXT",
-            help="Title of the page. Default: that of the study, else Joint rigidity.",
+            help="Title of the page. Default: the title of the study, or Joint rigidity.",
         ),
     ] = None,
     key: KeyOption = None,
 ) -> None:
     """Analyse recordings and write one self-contained HTML page, with its tables and figures.
 
-    For a study folder (with a study.toml) the page also shows days, effect sizes, ratings, other
-    methods and every exclusion.
+    For a study folder (with a study.toml) the page also shows tests by days, effect sizes, ratings,
+    other methods and every exclusion.
 
     \b
     For example:
