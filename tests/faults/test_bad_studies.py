@@ -325,7 +325,7 @@ def test_an_option_of_recordings(compared) -> None:
 def test_a_key_without_a_study(rigidimeter, study) -> None:
     ran = rigidimeter("compare", study / "sessions/1-OFF", "--key", study / "key.csv")
     assert ran.status == 1
-    assert "goes with a study folder" in ran.err
+    assert "is for a study folder" in ran.err
 
 
 def test_a_folder_that_cannot_be_written_loses_no_result(compared, study) -> None:

@@ -136,7 +136,7 @@ def study_of(recordings: Recordings, key: Path | None) -> Path | None:
     if not studies:
         if key is not None:
             raise UserError(
-                f"--key {key}: goes with a study folder, but {recordings.paths[0]} is none: it "
+                f"--key {key}: is for a study folder, but {recordings.paths[0]} is not one: it "
                 f"has no {STUDY_FILE}"
             )
         return None

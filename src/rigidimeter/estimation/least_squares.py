@@ -58,7 +58,7 @@ POOLED_TEXT = (
 def intervals_text(settings: EstimationSettings) -> str:
     """Return what the intervals of least squares hold for."""
     return (
-        f"Intervals hold for {_RESIDUALS[settings.intervals]}, and know nothing of bias: a "
+        f"Intervals hold for {_RESIDUALS[settings.intervals]}, and do not include bias: a "
         "subject who pushes in a closed loop pulls least squares away from the joint"
     )
 

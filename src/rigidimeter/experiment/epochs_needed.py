@@ -191,8 +191,8 @@ def detect(
     difference = value * wanted.amount / 100.0 if wanted.percent else wanted.amount
     if value - difference <= 0.0:
         raise UserError(
-            f"a {wanted.parameter} lower by {difference:.4g} leaves nothing of subject.{condition}."
-            f"{key} = {value:.4g}; name a smaller difference"
+            f"a {wanted.parameter} lower by {difference:.4g} is not above 0, since subject."
+            f"{condition}.{key} = {value:.4g}; name a smaller difference"
         )
     cv_percent = float(getattr(subject, key.split("_", maxsplit=1)[0] + "_cv_percent"))
     spreads = []

@@ -230,7 +230,7 @@ def _descend(data: Products, point: Point, restricted: bool) -> Point:
         point = moved
         if change < _PRECISION:
             return point
-    raise ArithmeticError("the likelihood of the variances has no minimum that could be reached")
+    raise ArithmeticError("the search for the variances did not reach a minimum of the likelihood")
 
 
 def _shortened(data: Products, point: Point, step: Array, restricted: bool) -> Point | None:

@@ -126,7 +126,7 @@ def rival():
 def test_other_programs_in_real_time_are_named(rival):
     last = max(os.sched_getaffinity(0))
     (sentence,) = realtime._beside([last], 80, 0.95)
-    assert sentence.startswith(f"On processor {last} there run in real time, too: ")
+    assert sentence.startswith(f"Other real-time programs on processor {last}: ")
     assert f"({rival}) at priority 7" in sentence
     assert "One of 80 or more delays the loop" in sentence
     assert "all stand still once they were busy for 95 % of a second" in sentence

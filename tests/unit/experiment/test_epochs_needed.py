@@ -185,8 +185,8 @@ def test_the_inertia_has_the_error_of_the_whole_fit() -> None:
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
-        ("damping=100%", {}, "leaves nothing of subject.OFF.damping_nm_s_rad = 0.1368"),
-        ("stiffness=2", {}, "leaves nothing of subject.OFF.stiffness_nm_rad = 1.751"),
+        ("damping=100%", {}, "is not above 0, since subject.OFF.damping_nm_s_rad = 0.1368"),
+        ("stiffness=2", {}, "is not above 0, since subject.OFF.stiffness_nm_rad = 1.751"),
         ("damping=5%", {"power": 1.0}, "--power 1 and --alpha 0.05 must both be between 0 and 1"),
         ("damping=5%", {"alpha": 0.0}, "--power 0.8 and --alpha 0 must both"),
     ],

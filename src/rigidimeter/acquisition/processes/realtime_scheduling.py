@@ -203,9 +203,9 @@ def _beside(processors: Collection[int], priority: int, share: float | None) -> 
         return []
     still = ""
     if share is not None and share < 1:
-        still = f", and all stand still once they were busy for {100 * share:.3g} % of a second"
+        still = f", and all are paused once they were busy for {100 * share:.3g} % of a second"
     return [
-        f"On processor {', '.join(map(str, sorted(processors)))} there run in real time, too: "
+        f"Other real-time programs on processor {', '.join(map(str, sorted(processors)))}: "
         f"{', '.join(found)}. One of {priority} or more delays the loop while it is busy{still}; "
         "end them, or give the loop another processor."
     ]

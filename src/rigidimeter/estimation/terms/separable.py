@@ -107,7 +107,7 @@ def _factors(columns: Array, names: Sequence[str]) -> tuple[Array, Array, Array,
     lengths = np.linalg.norm(columns, axis=0)
     for name, length in zip(names, lengths, strict=True):
         if not length > 0:
-            raise ValueError(f"{name} is zero throughout: this motion says nothing of it")
+            raise ValueError(f"{name} is zero throughout: this motion holds no information on it")
     if columns.shape[0] <= columns.shape[1]:
         raise ValueError(
             f"{columns.shape[0]} independent samples are too few for {columns.shape[1]} parameters"
