@@ -129,7 +129,7 @@ def test_other_programs_in_real_time_are_named(rival):
     assert sentence.startswith(f"Other real-time programs on processor {last}: ")
     assert f"({rival}) at priority 7" in sentence
     assert "One of 80 or more delays the loop" in sentence
-    assert "all stand still once they were busy for 95 % of a second" in sentence
+    assert "all are paused once they were busy for 95 % of a second" in sentence
     (sentence,) = realtime._beside([last], 80, 1.0)
     assert "stand still" not in sentence
     assert f"({rival})" not in " ".join(realtime._beside([last + 1], 80, 0.95))

@@ -191,8 +191,8 @@ def _voluntary_torque(epoch: Epoch, settings: Settings) -> str:
         return ""
     return (
         f"{look.value:.2g} % of the torque's variance is the subject's own, which the loop puts "
-        "into the motion too; a term that fits it predicts it in both halves and says nothing about "
-        "the joint"
+        "into the motion too; a term that fits it predicts it in both halves and says nothing "
+        "about the joint"
     )
 
 
