@@ -6,15 +6,13 @@ installed.
 
 from rigidimeter.study.analysis import Preparation, analyse, estimate, task_of
 from rigidimeter.study.archive import UNCHANGED, keep
-from rigidimeter.study.columns import compare_columns
 from rigidimeter.study.compare_input import compare
 from rigidimeter.study.comparison import (
     compare_analysis,
     compare_measures,
-    conditions,
     split_pooled,
 )
-from rigidimeter.study.measures import MEASURES, RATING, Measure, Observation
+from rigidimeter.study.measures import MEASURES, RATING, Measure, Observation, conditions
 from rigidimeter.study.provenance import provenance
 from rigidimeter.study.ratings_found import RatingMean, RatingsFound
 from rigidimeter.study.results import (
@@ -28,9 +26,8 @@ from rigidimeter.study.results import (
     SessionEntry,
     StudyResult,
 )
-from rigidimeter.study.study_analysis import StudyRead, analyse_study, read_study
+from rigidimeter.study.study_analysis import analyse_study, read_study
 from rigidimeter.study.tables import (
-    COMPARISON_SCHEMA,
     TEST,
     comparison_document,
     result_tables,
@@ -40,7 +37,6 @@ from rigidimeter.study.verdict import Dependence, Leader, Verdict, dependences, 
 from rigidimeter.study.warnings import analysis_warnings
 
 __all__ = [
-    "COMPARISON_SCHEMA",
     "MEASURES",
     "RATING",
     "TEST",
@@ -60,7 +56,6 @@ __all__ = [
     "RatingsFound",
     "SensitivityRow",
     "SessionEntry",
-    "StudyRead",
     "StudyResult",
     "Verdict",
     "analyse",
@@ -68,7 +63,6 @@ __all__ = [
     "analysis_warnings",
     "compare",
     "compare_analysis",
-    "compare_columns",
     "compare_measures",
     "comparison_document",
     "conditions",

@@ -9,14 +9,13 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import TextTable
 from rigidimeter.records import Notice
 from rigidimeter.study.comparison import compare_measures, measured
-from rigidimeter.study.measures import Measure, Observation
+from rigidimeter.study.measures import Measure, Observation, chosen_pair
 from rigidimeter.study.results import Comparison, StudyResult
 
 __all__ = ["compare_columns"]
 
 _ALPHA = 0.05
 _FEW_SESSIONS = 10
-_SHOWN = 8
 
 
 def compare_columns(
@@ -54,7 +53,14 @@ def compare_columns(
     for name in values:
         table.column(name, "--value")
     units = table.column(session, "--session") if session is not None else None
-    names = _pair(table.source, by, labels, pair)
+    known = sorted((name for name in dict.fromkeys(labels) if name), key=lambda n: n != "OFF")
+    names = chosen_pair(
+        known,
+        pair,
+        where=f"{table.source}: ",
+        holder=f"column {by} has only",
+        remedy="name another column with --by",
+    )
     rows, notices = _kept(table, labels, names, by)
     comparisons = []
     for name in dict.fromkeys(values):
@@ -75,31 +81,6 @@ def compare_columns(
         source=table.source,
         by=by,
     )
-
-
-def _pair(
-    source: str, by: str, labels: Sequence[str], wanted: tuple[str | None, str | None]
-) -> tuple[str, str]:
-    known = sorted((name for name in dict.fromkeys(labels) if name), key=lambda n: n != "OFF")
-    listed = ", ".join(known[:_SHOWN]) + (", ..." if len(known) > _SHOWN else "")
-    for option, name in zip(("--reference", "--other"), wanted, strict=True):
-        if name is not None and name not in known:
-            raise UserError(f"{option} {name}: column {by} of {source} has only {listed}")
-    if wanted[0] is not None and wanted[0] == wanted[1]:
-        raise UserError(f"--reference and --other are both {wanted[0]}; name two groups")
-    if len(known) < 2:
-        raise UserError(
-            f"{source}: a comparison needs two groups, but column {by} has "
-            f"{f'only {listed}' if known else 'none'}; name another column with --by"
-        )
-    if len(known) > 2 and None in wanted:
-        raise UserError(
-            f"{source}: column {by} has {len(known)} groups ({listed}); choose two with "
-            "--reference and --other"
-        )
-    first, second = wanted
-    first = first or next(name for name in known if name != second)
-    return first, second or next(name for name in known if name != first)
 
 
 def _kept(

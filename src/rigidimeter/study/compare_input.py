@@ -15,14 +15,15 @@ from rigidimeter.recording.study_folder import is_study
 from rigidimeter.records import Analysis
 from rigidimeter.settings import Settings
 from rigidimeter.study.columns import compare_columns
-from rigidimeter.study.comparison import compare_analysis, conditions
+from rigidimeter.study.comparison import compare_analysis
+from rigidimeter.study.measures import chosen_pair, conditions
 from rigidimeter.study.results import StudyResult
 from rigidimeter.study.study_analysis import analyse_study, read_study
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["chosen_pair", "compare"]
+__all__ = ["compare"]
 
 
 def compare(
@@ -72,55 +73,20 @@ def compare(
     UserError
         If there is nothing to compare, or a name is unknown.
     """
-    if isinstance(x, Analysis):
-        pair = chosen_pair(conditions(x), reference, other)
-        return compare_analysis(x, *pair, seed=seed, resamples=resamples)
+    wanted = (reference, other)
     path = Path(x) if isinstance(x, (str, PathLike)) else None
-    if path is None or value is not None:
+    if value is not None or not (isinstance(x, Analysis) or path):
         table = _as_text(x) if path is None else read_text_table(path)
-        wanted = (reference, other)
         return compare_columns(
             table, _names(value), by, wanted, session=session, seed=seed, resamples=resamples
         )
-    if is_study(path):
-        read = read_study(
-            path, key=None if key is None else Path(key), settings=settings, method=method,
-            pair=(reference, other),
-        )  # fmt: skip
+    if path is not None and is_study(path):
+        secret = None if key is None else Path(key)
+        read = read_study(path, key=secret, settings=settings, method=method, pair=wanted)
         return analyse_study(read, seed=seed, resamples=resamples, progress=progress)
-    analysis = read_estimates(path)
-    pair = chosen_pair(conditions(analysis), reference, other)
+    analysis = x if isinstance(x, Analysis) else read_estimates(Path(x))
+    pair = chosen_pair(conditions(analysis), wanted)
     return compare_analysis(analysis, *pair, seed=seed, resamples=resamples)
-
-
-def chosen_pair(
-    known: Sequence[str], reference: str | None, other: str | None
-) -> tuple[str | None, str | None]:
-    """Return the conditions to compare if the names are good.
-
-    Raises
-    ------
-    UserError
-        If a name is unknown, both are one, or it is not clear which two are meant.
-    """
-    for option, name in (("--reference", reference), ("--other", other)):
-        if name is not None and name not in known:
-            listed = ", ".join(known) or "none"
-            raise UserError(f"{option} {name}: there is no such condition; recorded are: {listed}")
-    if reference is not None and reference == other:
-        raise UserError(f"--reference and --other are both {reference}; name two conditions")
-    if len(known) > 2 and (reference is None or other is None):
-        raise UserError(
-            f"there are {len(known)} conditions ({', '.join(known)}); choose two with "
-            "--reference and --other"
-        )
-    if len(known) < 2:
-        listed = known[0] if known else "none is named"
-        raise UserError(
-            f"a comparison needs two conditions, but the recordings hold one ({listed}); name them "
-            "in a condition column, or give --condition once for each file in their order"
-        )
-    return reference, other
 
 
 def _names(value: str | Sequence[str] | None) -> list[str]:

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigidimeter.records import Analysis, Fit, Notice, Score
+from rigidimeter.records import Analysis, Fit, Score
 from rigidimeter.statistics import (
     DayDifference,
     TwoGroups,
@@ -25,18 +25,16 @@ from rigidimeter.statistics import (
     summarise,
     two_groups,
 )
-from rigidimeter.study.measures import MEASURES, Measure, Observation
+from rigidimeter.study.measures import MEASURES, Measure, Observation, conditions
 from rigidimeter.study.results import Comparison, DayMedian, EffectPair, SessionEntry, StudyResult
 
 __all__ = [
     "FEWEST_FOR_TEST",
     "compare_analysis",
     "compare_measures",
-    "conditions",
     "day_test",
     "day_tests",
     "gathered",
-    "lacking",
     "measured",
     "no_days",
     "observed",
@@ -46,13 +44,6 @@ __all__ = [
 
 FEWEST_FOR_TEST = 3
 """Below this many values in a condition there is no rank-sum test."""
-
-
-def conditions(analysis: Analysis) -> tuple[str, ...]:
-    """Return the named conditions in order of appearance, ``OFF`` first where it occurs."""
-    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
-    seen = dict.fromkeys(result.condition for result in results if result.condition)
-    return tuple(sorted(seen, key=lambda condition: condition != "OFF"))
 
 
 def compare_analysis(
@@ -298,32 +289,6 @@ def split_pooled(analysis: Analysis) -> tuple[dict[str, Fit], Fit | None]:
         else:
             by_condition[fit.condition] = fit
     return by_condition, overall
-
-
-def lacking(comparisons: Sequence[Comparison], pair: tuple[str, str]) -> list[Notice]:
-    """Say once what keeps the measures of recordings from being tested."""
-    if not comparisons:
-        return [Notice("error", "no epoch could be fitted or scored, so nothing is compared")]
-    recorded = {
-        name: sum(c.summaries[name].n + c.excluded[name] for c in comparisons if name in c.pair)
-        for name in pair
-    }
-    absent = [name or "a second condition" for name, count in recorded.items() if not count]
-    if absent:
-        present = [name for name, count in recorded.items() if count]
-        text = (
-            f"there is no session in {' or '.join(absent)}, only in "
-            f"{present[0] if present else 'other conditions'}, so nothing is compared"
-        )
-        return [Notice("error", text)]
-    why: dict[str, list[str]] = {}
-    for c in comparisons:
-        if c.paired and c.test is None:
-            why.setdefault(c.remark, []).append(c.measure.title)
-    return [
-        Notice("error", f"no test of {', '.join(titles)}: {remark}")
-        for remark, titles in why.items()
-    ]
 
 
 def _groups(comparison: Comparison) -> TwoGroups:

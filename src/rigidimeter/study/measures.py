@@ -1,4 +1,4 @@
-"""What is compared: each measure described once, and the values that count."""
+"""What is compared: the measures, the values that count, and the choice of two conditions."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from rigidimeter.errors import UserError
 from rigidimeter.records import Analysis, Fit, Score
 
-__all__ = ["MEASURES", "RATING", "Measure", "Observation"]
+__all__ = ["MEASURES", "RATING", "Measure", "Observation", "chosen_pair", "conditions"]
+
+_SHOWN = 8
 
 
 @dataclass(frozen=True)
@@ -86,3 +89,57 @@ class Observation:
     unit: str = ""
     low: float = math.nan
     high: float = math.nan
+
+
+def conditions(analysis: Analysis) -> tuple[str, ...]:
+    """Return the named conditions in order of appearance, ``OFF`` first where it occurs."""
+    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
+    seen = dict.fromkeys(result.condition for result in results if result.condition)
+    return tuple(sorted(seen, key=lambda condition: condition != "OFF"))
+
+
+def chosen_pair(
+    known: Sequence[str],
+    wanted: tuple[str | None, str | None],
+    *,
+    where: str = "",
+    holder: str = "recorded are:",
+    remedy: str = "name them in a condition column, or give --condition once for each file in "
+    "their order",
+) -> tuple[str, str]:
+    """Return the two conditions to compare: what is wanted, else the first of those known.
+
+    Parameters
+    ----------
+    known : sequence of str
+    wanted : (str or None, str or None)
+        Reference and other, None where not given.
+    where, holder, remedy : str
+        For messages: where the conditions were found, what to say before a list of them, and what
+        to do if there are not two.
+
+    Raises
+    ------
+    UserError
+        If a name is unknown, both are one, or it is not clear which two are meant.
+    """
+    listed = ", ".join(known[:_SHOWN]) + (", ..." if len(known) > _SHOWN else "")
+    for option, name in zip(("--reference", "--other"), wanted, strict=True):
+        if name is not None and name not in known:
+            raise UserError(
+                f"{where}{option} {name}: there is no such condition; {holder} {listed or 'none'}"
+            )
+    first, second = wanted
+    if first is not None and first == second:
+        raise UserError(f"--reference and --other are both {first}; name two conditions")
+    if len(known) < 2:
+        raise UserError(
+            f"{where}a comparison needs two conditions; {holder} {listed or 'none'}; {remedy}"
+        )
+    if len(known) > 2 and None in wanted:
+        raise UserError(
+            f"{where}there are {len(known)} conditions ({listed}); choose two with --reference and "
+            "--other"
+        )
+    first = first or next(name for name in known if name != second)
+    return first, second or next(name for name in known if name != first)

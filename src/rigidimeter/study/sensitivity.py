@@ -93,18 +93,14 @@ def _row(
     p_day: float,
     chosen: bool,
 ) -> SensitivityRow:
-    test = found.test
+    numbers = ("shift", "shift_low", "shift_high", "p", "r")
     return SensitivityRow(
         measure=found.measure,
         method=method,
         inertia=inertia,
         n_reference=found.summaries[found.reference].n,
         n_other=found.summaries[found.other].n,
-        shift=test.shift if test else math.nan,
-        shift_low=test.shift_low if test else math.nan,
-        shift_high=test.shift_high if test else math.nan,
-        p=test.p if test else math.nan,
-        r=test.r if test else math.nan,
+        **{name: getattr(found.test, name, math.nan) for name in numbers},
         p_day=p_day,
         chosen=chosen,
     )

@@ -7,10 +7,13 @@ twice, disagrees with the table about its condition, or was commanded otherwise 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
+from typing import Any
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import ReadOptions, is_session, read_recording, session_settings
@@ -19,13 +22,18 @@ from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES
 from rigidimeter.recording.study_folder import Row, StudyFolder
 from rigidimeter.recording.study_toml import is_outside
 from rigidimeter.records import Epoch, Notice
-from rigidimeter.settings import Settings
+from rigidimeter.settings import Settings, dump_settings
 from rigidimeter.study.analysis import task_of
 from rigidimeter.study.blinding import Naming
-from rigidimeter.study.protocol_check import commanded_otherwise
 from rigidimeter.study.results import LeftOut, SessionEntry
 
 __all__ = ["Gathered", "Session", "gather", "place_of", "source_of"]
+
+_COMMANDED: Mapping[str, tuple[str, ...]] = {
+    "prbs": ("controller", "prbs"),
+    "sinusoid": ("controller", "sinusoid"),
+}
+"""By task, the tables of the settings that say what the rig was commanded."""
 
 
 @dataclass(frozen=True)
@@ -121,8 +129,8 @@ def gather(
             sessions.append(session)
             notices += said
         progress(1.0 / len(read.sessions))
-    for find in (_twice, commanded_otherwise):
-        for row, reason in find([(s.row, s.entry, s.epochs, s.settings) for s in sessions]):
+    for find in (_twice, _commanded_otherwise):
+        for row, reason in find(sessions):
             leave_out(row, reason)
             sessions = [session for session in sessions if session.row is not row]
     notices += _other_settings(sessions)
@@ -216,15 +224,13 @@ def _agrees(
     return said
 
 
-_Read = tuple[Row, SessionEntry, tuple[Epoch, ...], Settings | None]
-
-
-def _twice(sessions: Sequence[_Read]) -> list[tuple[Row, str]]:
+def _twice(sessions: Sequence[Session]) -> list[tuple[Row, str]]:
     """Find a day of a subject that is there twice with the same condition, task and part."""
     seen: dict[tuple[str, ...], Row] = {}
     found = []
-    for row, entry, epochs, _ in sessions:
-        for task in dict.fromkeys(epoch.task or "" for epoch in epochs):
+    for session in sessions:
+        row, entry = session.row, session.entry
+        for task in dict.fromkeys(epoch.task or "" for epoch in session.epochs):
             key = (entry.subject, entry.day, entry.condition, task, row["part"])
             if key in seen:
                 part = f", part {row['part']}" if row["part"] else ""
@@ -239,6 +245,49 @@ def _twice(sessions: Sequence[_Read]) -> list[tuple[Row, str]]:
                 break
             seen[key] = row
     return found
+
+
+def _commanded_otherwise(sessions: Sequence[Session]) -> list[tuple[Row, str]]:
+    """Return the sessions that were commanded otherwise than most of their task, and in what.
+
+    Epochs of two versions of a protocol are two measurements, and must not be pooled.
+    Where no version has more sessions than any other, the one that comes first in the table stays.
+    """
+    found: list[tuple[Row, str]] = []
+    for task, tables in _COMMANDED.items():
+        versions = [
+            (session, _values(session.settings, tables))
+            for session in sessions
+            if session.settings is not None
+            and any(epoch.task == task for epoch in session.epochs)
+            and not any(session.row is other for other, _ in found)
+        ]
+        counts = Counter(json.dumps(values, sort_keys=True) for _, values in versions)
+        if len(counts) < 2:
+            continue
+        most = counts.most_common(1)[0][0]
+        usual = json.loads(most)
+        example = next(s.entry for s, v in versions if json.dumps(v, sort_keys=True) == most)
+        for session, values in versions:
+            differing = [name for name in usual if usual[name] != values.get(name)]
+            if not differing:
+                continue
+            told = "; ".join(f"{name} = {values.get(name)}" for name in differing)
+            wanted = "; ".join(f"{name} = {usual[name]}" for name in differing)
+            found.append(
+                (
+                    session.row,
+                    f"{session.entry.path} is of another version of the protocol: it was recorded "
+                    f"with {told}, but {counts[most]} of {len(versions)} sessions, such as "
+                    f"{example.path}, with {wanted}",
+                )
+            )
+    return found
+
+
+def _values(settings: Settings, tables: Sequence[str]) -> dict[str, Any]:
+    dumped = dump_settings(settings)
+    return {f"{table}.{name}": value for table in tables for name, value in dumped[table].items()}
 
 
 def _other_settings(sessions: Sequence[Session]) -> list[Notice]:

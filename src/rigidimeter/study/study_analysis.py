@@ -21,14 +21,14 @@ from rigidimeter.records import Analysis, Epoch, Notice
 from rigidimeter.settings import Settings
 from rigidimeter.study.analysis import Preparation, analyse_prepared
 from rigidimeter.study.blinding import Naming, naming
-from rigidimeter.study.comparison import compare_measures, day_tests, gathered, lacking
+from rigidimeter.study.comparison import compare_measures, day_tests, gathered
 from rigidimeter.study.exclusions import exclusions_of, operators_exclusions
-from rigidimeter.study.measures import MEASURES, RATING
+from rigidimeter.study.measures import MEASURES, RATING, chosen_pair
 from rigidimeter.study.ratings_model import rated, ratings_comparison, ratings_days
 from rigidimeter.study.results import SensitivityRow, SessionEntry, StudyResult
 from rigidimeter.study.sensitivity import sensitivity_methods, sensitivity_rows
 from rigidimeter.study.sessions import Gathered, gather
-from rigidimeter.study.warnings import analysis_warnings
+from rigidimeter.study.warnings import analysis_warnings, lacking
 
 __all__ = ["StudyRead", "analyse_study", "read_study"]
 
@@ -107,7 +107,10 @@ def read_study(
             f"{', '.join(known)})"
         )
     names, said = naming(read)
-    names = replace(names, pair=_pair(names, pair))
+    if pair != (None, None):
+        wanted = pair[0] or names.pair[0], pair[1] or names.pair[1]
+        holder = "the study has"
+        names = replace(names, pair=chosen_pair(names.known, wanted, holder=holder))
     gathered = gather(read, names, progress=progress)
     epochs, operator, excluded = operators_exclusions(read, gathered)
     return StudyRead(
@@ -202,22 +205,6 @@ def analyse_study(
         exclusions=tuple(exclusions_of(read.epochs, main, sessions, read.operator)),
         left_out=read.gathered.left_out,
     )
-
-
-def _pair(names: Naming, wanted: tuple[str | None, str | None]) -> tuple[str, str]:
-    found = list(names.pair)
-    for place, (option, name) in enumerate(zip(("--reference", "--other"), wanted, strict=True)):
-        if name is None:
-            continue
-        if name not in names.known:
-            raise UserError(
-                f"{option} {name}: there is no such condition in the study; there are: "
-                f"{', '.join(names.known)}"
-            )
-        found[place] = name
-    if found[0] == found[1]:
-        raise UserError(f"--reference and --other are both {found[0]}; name two conditions")
-    return found[0], found[1]
 
 
 def _by_subject(

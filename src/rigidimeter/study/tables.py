@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rigidimeter.documents import csv_text, plain_values
 from rigidimeter.recording import estimates_document
 from rigidimeter.statistics import RankSum
+from rigidimeter.study.measures import Measure
 from rigidimeter.study.ratings_found import (
     rating_contrast,
     rating_offsets,
@@ -51,30 +52,19 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
     """
     analysis = result.analysis
     tables = result_tables(result)
+    of_result = ("title", "source", "by", "reference", "other", "seed", "resamples", "blinded",
+                 "virtual")  # fmt: skip
+    of_analysis = ("method", "method_reason", "inertia_kg_m2")
+    as_tables = ("conditions", "sessions", "left_out", "days", "effect_differences", "sensitivity")
     document = {
         "schema": COMPARISON_SCHEMA,
-        "title": result.title,
-        "source": result.source,
-        "by": result.by,
-        "reference": result.reference,
-        "other": result.other,
-        "seed": result.seed,
-        "resamples": result.resamples,
-        "blinded": result.blinded,
-        "virtual": result.virtual,
-        "conditions": tables["conditions"],
-        "sessions": tables["sessions"],
-        "left_out": tables["left_out"],
-        "method": analysis.method,
-        "method_reason": analysis.method_reason,
-        "inertia_kg_m2": analysis.inertia_kg_m2,
+        **{name: getattr(result, name) for name in of_result},
+        **{name: getattr(analysis, name) for name in of_analysis},
         "inertia_by_subject": result.several_subjects,
         "comparisons": [_comparison(comparison) for comparison in result.comparisons],
-        "days": tables["days"],
-        "effect_differences": tables["effect_differences"],
-        "ratings": None if result.ratings is None else ratings_document(result.ratings),
-        "sensitivity": tables["sensitivity"],
+        **{name: tables[name] for name in as_tables},
         "exclusions": tables["excluded_epochs"],
+        "ratings": None if result.ratings is None else ratings_document(result.ratings),
         "notices": [
             {"level": notice.level, "text": notice.text.replace(f"{place}/", "")}
             if place
@@ -101,10 +91,12 @@ def _comparison(c: Comparison) -> dict[str, Any]:
     }
 
 
-def _names(c: Comparison) -> dict[str, Any]:
-    m = c.measure
-    return {"measure": m.name, "title": m.title, "unit": m.unit, "reference": c.reference,
-            "other": c.other}  # fmt: skip
+def _measure(measure: Measure) -> dict[str, str]:
+    return {"measure": measure.name, "title": measure.title, "unit": measure.unit}
+
+
+def _names(c: Comparison) -> dict[str, str]:
+    return _measure(c.measure) | {"reference": c.reference, "other": c.other}
 
 
 def _tested(c: Comparison) -> dict[str, Any]:
@@ -126,7 +118,7 @@ def comparison_rows(comparisons: Iterable[Comparison]) -> list[dict[str, Any]]:
     """Return the comparisons as a table, one row for each measure."""
     rows = []
     for c in comparisons:
-        row = _names(c)
+        row: dict[str, Any] = dict(_names(c))
         for side, name in zip(("reference", "other"), (c.reference, c.other), strict=True):
             known = name in c.pair
             numbers = asdict(c.summaries[name]) if known else dict.fromkeys(("n", *_QUARTILES))
@@ -163,12 +155,8 @@ def result_tables(result: StudyResult) -> dict[str, Rows]:
                 "second": pair.second,
                 "first_title": titles[pair.first],
                 "second_title": titles[pair.second],
-                "estimate": pair.difference.estimate,
-                "low": pair.difference.low,
-                "high": pair.difference.high,
-                "p": pair.difference.p,
+                **asdict(pair.difference),
                 "p_holm": pair.p_holm,
-                "paired": pair.difference.paired,
             }
             for pair in result.differences
         ],
@@ -176,10 +164,8 @@ def result_tables(result: StudyResult) -> dict[str, Rows]:
         "rating_offsets": [] if ratings is None else list(rating_offsets(ratings)),
         "rating_contrast": [] if ratings is None else list(rating_contrast(ratings)),
         "sensitivity": [
-            {"measure": m.name, "title": m.title, "unit": m.unit}
-            | {name: value for name, value in vars(row).items() if name != "measure"}
+            _measure(row.measure) | vars(row) | {"measure": row.measure.name}
             for row in result.sensitivity
-            for m in [row.measure]
         ],
         "conditions": list(_conditions(result)),
         "sessions": [asdict(session) for session in result.sessions],
@@ -195,17 +181,8 @@ def _summaries(comparisons: Iterable[Comparison]) -> Iterator[dict[str, Any]]:
     for c in comparisons:
         for name, summary in c.summaries.items():
             if summary.n or c.excluded[name]:
-                yield {
-                    "measure": c.measure.name,
-                    "title": c.measure.title,
-                    "unit": c.measure.unit,
-                    "condition": name,
-                    "n": summary.n,
-                    "excluded": c.excluded[name],
-                    "median": summary.median,
-                    "q1": summary.q1,
-                    "q3": summary.q3,
-                }
+                counts = {"condition": name, "n": summary.n, "excluded": c.excluded[name]}
+                yield _measure(c.measure) | counts | asdict(summary)
 
 
 def _conditions(result: StudyResult) -> Iterator[dict[str, Any]]:

@@ -1,12 +1,15 @@
-"""What looks wrong with an analysis in general, and what to do about it."""
+"""What looks wrong with an analysis, and what keeps its measures from being tested."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from rigidimeter.records import Analysis, Notice
+from rigidimeter.study.results import Comparison
 
-__all__ = ["analysis_warnings"]
+__all__ = ["analysis_warnings", "lacking"]
 
 DIFFERENT_INERTIA = 0.15
 """Sources whose median J differ by more than this hardly are one joint."""
@@ -76,3 +79,29 @@ def _wrong_sign(analysis: Analysis) -> tuple[Notice, ...]:
         )
         return (Notice("warning", text),)
     return ()
+
+
+def lacking(comparisons: Sequence[Comparison], pair: tuple[str, str]) -> list[Notice]:
+    """Say once what keeps the measures of recordings from being tested."""
+    if not comparisons:
+        return [Notice("error", "no epoch could be fitted or scored, so nothing is compared")]
+    recorded = {
+        name: sum(c.summaries[name].n + c.excluded[name] for c in comparisons if name in c.pair)
+        for name in pair
+    }
+    absent = [name or "a second condition" for name, count in recorded.items() if not count]
+    if absent:
+        present = [name for name, count in recorded.items() if count]
+        text = (
+            f"there is no session in {' or '.join(absent)}, only in "
+            f"{present[0] if present else 'other conditions'}, so nothing is compared"
+        )
+        return [Notice("error", text)]
+    why: dict[str, list[str]] = {}
+    for c in comparisons:
+        if c.paired and c.test is None:
+            why.setdefault(c.remark, []).append(c.measure.title)
+    return [
+        Notice("error", f"no test of {', '.join(titles)}: {remark}")
+        for remark, titles in why.items()
+    ]

@@ -167,6 +167,6 @@ def test_one_group_and_two_tables_are_refused(rigidimeter, tmp_path) -> None:
     ran = rigidimeter("compare", path, path, "--value", "a")
     assert "--value takes one table, but 2 inputs" in ran.err
     path.write_text("condition,a\nOFF,1\nOFF,2\n")
-    assert "needs two groups" in rigidimeter("compare", path, "--value", "a").err
+    assert "needs two conditions" in rigidimeter("compare", path, "--value", "a").err
     path.write_text("condition,a\nOFF,1\nDBS,\n")
     assert "a has no value in DBS" in rigidimeter("compare", path, "--value", "a").err
