@@ -191,7 +191,6 @@ def compare_effects(
     *,
     paired: bool,
     resamples: int = 9999,
-    confidence: float = 0.95,
 ) -> EffectDifference:
     """Ask whether the first measure separates the two conditions better than the second.
 
@@ -226,7 +225,7 @@ def compare_effects(
         return ahead[0] * _weighted(one, *a) - ahead[1] * _weighted(two, *b)
 
     sizes = [len(one[1]), len(one[2])] + ([] if paired else [len(two[1]), len(two[2])])
-    found = bootstrap(difference, sizes, rng, resamples=resamples, confidence=confidence)
+    found = bootstrap(difference, sizes, rng, resamples=resamples)
     return EffectDifference(found.estimate, found.low, found.high, found.p, paired)
 
 

@@ -71,25 +71,21 @@ def naming(read: StudyFolder) -> tuple[Naming, list[Notice]]:
     for row in read.key or ():
         code, condition = row["code"], row["condition"]
         if condition not in defined:
-            text = (
-                f"{row.where}: code {code} stands for {condition}, which study.toml does not know "
+            wrong = (
+                f"stands for {condition}, which study.toml does not know "
                 f"(conditions: {', '.join(defined)}); the code is not used"
             )
-            notices.append(Notice("error", text))
         elif codes.get(code, condition) != condition:
-            text = (
-                f"{row.where}: code {code} stands for {condition} here and for {codes[code]} above;"
-                " the first counts"
-            )
-            notices.append(Notice("error", text))
+            wrong = f"stands for {condition} here and for {codes[code]} above; the first counts"
         elif code in defined and code != condition:
-            text = (
-                f"{row.where}: code {code} is itself a condition of study.toml, but stands for "
-                f"{condition}; the code is not used"
+            wrong = (
+                f"is itself a condition of study.toml, but stands for {condition}; the code is "
+                "not used"
             )
-            notices.append(Notice("error", text))
         else:
             codes[code] = condition
+            continue
+        notices.append(Notice("error", f"{row.where}: code {code} {wrong}"))
     names = list(dict.fromkeys(row["condition"] for row in read.sessions))
     folded = {name.casefold() for name in defined}
     if read.key is None and not any(name.casefold() in folded for name in names):

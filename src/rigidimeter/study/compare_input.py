@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
@@ -12,18 +13,20 @@ from rigidimeter.estimation.method_record import Progress
 from rigidimeter.recording import read_estimates
 from rigidimeter.recording.formats import TextTable, read_text_table
 from rigidimeter.recording.study_folder import is_study
-from rigidimeter.records import Analysis
+from rigidimeter.records import Analysis, Notice
 from rigidimeter.settings import Settings
-from rigidimeter.study.columns import compare_columns
-from rigidimeter.study.comparison import compare_analysis
-from rigidimeter.study.measures import chosen_pair, conditions
-from rigidimeter.study.results import StudyResult
+from rigidimeter.study.comparison import compare_analysis, compare_measures, measured
+from rigidimeter.study.measures import Measure, Observation, chosen_pair, conditions
+from rigidimeter.study.results import Comparison, StudyResult
 from rigidimeter.study.study_analysis import analyse_study, read_study
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["compare"]
+
+_ALPHA = 0.05
+_FEW_SESSIONS = 10
 
 
 def compare(
@@ -77,7 +80,7 @@ def compare(
     path = Path(x) if isinstance(x, (str, PathLike)) else None
     if value is not None or not (isinstance(x, Analysis) or path):
         table = _as_text(x) if path is None else read_text_table(path)
-        return compare_columns(
+        return _compare_columns(
             table, _names(value), by, wanted, session=session, seed=seed, resamples=resamples
         )
     if path is not None and is_study(path):
@@ -103,3 +106,144 @@ def _as_text(table: Any) -> TextTable:
         for name in table.columns
     }  # fmt: skip
     return TextTable("the table", columns, tuple(range(2, len(table) + 2)))
+
+
+def _compare_columns(
+    table: TextTable,
+    values: Sequence[str],
+    by: str,
+    pair: tuple[str | None, str | None] = (None, None),
+    *,
+    session: str | None = None,
+    seed: int = 1,
+    resamples: int = 9999,
+) -> StudyResult:
+    """Compare two groups of a table in one column or several.
+
+    Parameters
+    ----------
+    table : TextTable
+    values : sequence of str
+        Columns of numbers.
+    by : str
+        The column that names the group.
+    pair : tuple of str or None
+        Reference and other group; the first two where not given, ``OFF`` first where it occurs.
+    session : str, optional
+        A column whose labels are resampled as units; else each row is one.
+    seed, resamples : int
+        Of the bootstrap.
+
+    Raises
+    ------
+    UserError
+        If a column or a group is not there, or a cell is no number.
+    """
+    labels = table.column(by, "--by")
+    for name in values:
+        table.column(name, "--value")
+    units = table.column(session, "--session") if session is not None else None
+    known = sorted((name for name in dict.fromkeys(labels) if name), key=lambda n: n != "OFF")
+    names = chosen_pair(
+        known,
+        pair,
+        where=f"{table.source}: ",
+        holder=f"column {by} has only",
+        remedy="name another column with --by",
+    )
+    rows, notices = _kept(table, labels, names, by)
+    comparisons = []
+    for name in dict.fromkeys(values):
+        one, said = _column(table, name, labels, units, names, rows)
+        comparisons.append(one)
+        notices += said
+    tested, differences = compare_measures(comparisons, seed=seed, resamples=resamples)
+    for each in tested:
+        notices += _cautions(table.source, each, units is not None)
+    return StudyResult(
+        "",
+        *names,
+        tested,
+        differences,
+        tuple(Notice("warning", text) for text in notices),
+        seed,
+        resamples,
+        source=table.source,
+        by=by,
+    )
+
+
+def _kept(
+    table: TextTable, labels: Sequence[str], names: Sequence[str], by: str
+) -> tuple[list[int], list[str]]:
+    """Return the rows of both groups, without those that an analysis has excluded."""
+    rows = [k for k, label in enumerate(labels) if label in names]
+    notices = []
+    nameless = [table.lines[k] for k, label in enumerate(labels) if not label]
+    if nameless:
+        notices.append(f"{table.source}: no {by} in {_lines(nameless)}; left out")
+    outcomes = table.columns.get("outcome")
+    if outcomes is not None and set(outcomes) <= {"included", "excluded", "failed"}:
+        out = [table.lines[k] for k in rows if outcomes[k] != "included"]
+        rows = [k for k in rows if outcomes[k] == "included"]
+        if out:
+            notices.append(
+                f"{table.source}: outcome is excluded or failed in {_lines(out)}; left out"
+            )
+    return rows, notices
+
+
+def _column(
+    table: TextTable,
+    name: str,
+    labels: Sequence[str],
+    units: Sequence[str] | None,
+    names: tuple[str, str],
+    rows: Sequence[int],
+) -> tuple[Comparison, list[str]]:
+    observations, missing = [], []
+    for row in rows:
+        line = table.lines[row]
+        value = table.number(name, row)
+        unit = units[row] if units is not None else f"line {line}"
+        if value is None or not unit:
+            missing.append(line)
+        else:
+            observations.append(Observation(value, labels[row], epoch=f"line {line}", unit=unit))
+    found = measured(Measure(name, name, "", "column"), observations, names)
+    for group in names:
+        if not found.summaries[group].n:
+            raise UserError(
+                f"{table.source}: {name} has no value in {group}, so there is nothing to compare"
+            )
+    notices = [f"{table.source}: no {name} in {_lines(missing)}; left out"] if missing else []
+    return found, notices
+
+
+def _cautions(source: str, found: Comparison, by_session: bool) -> list[str]:
+    """Say where a test could not find a difference, or an interval comes out too narrow."""
+    name = found.measure.name
+    if found.test is None:
+        return [f"{source}: {name}: {found.remark}. Medians and quartiles are given without one"]
+    sizes = [found.summaries[group].n for group in found.pair]
+    counts = " and ".join(f"{n} in {group}" for n, group in zip(sizes, found.pair, strict=True))
+    said = []
+    least = 2 / math.comb(sum(sizes), sizes[0])
+    if least > _ALPHA:
+        said.append(
+            f"{source}: {name} has {counts}; even groups that do not overlap have an exact p of "
+            f"{least:.2g}, so this test cannot show a difference"
+        )
+    sessions = min(len({o.unit for o in found.of(group)}) for group in found.pair)
+    if by_session and sessions < _FEW_SESSIONS:
+        said.append(
+            f"{source}: {name} has {sessions} sessions in one group; so few make a bootstrap "
+            "interval too narrow"
+        )
+    return said
+
+
+def _lines(lines: Sequence[int]) -> str:
+    shown = ", ".join(map(str, lines[:5]))
+    more = f" and {len(lines) - 5} more" if len(lines) > 5 else ""
+    return f"line{'' if len(lines) == 1 else 's'} {shown}{more}"

@@ -229,9 +229,7 @@ def day_tests(
     return tuple(done)
 
 
-def day_test(
-    comparison: Comparison, *, one_offset: bool = False, confidence: float = 0.95
-) -> DayDifference:
+def day_test(comparison: Comparison, *, one_offset: bool = False) -> DayDifference:
     """Compare the two conditions by days; where that cannot be done, a remark says why.
 
     With `one_offset` a day is taken to affect both its conditions alike.
@@ -239,7 +237,7 @@ def day_test(
     x, y = (comparison.of(name) for name in comparison.pair)
     days = len({o.unit for o in x}), len({o.unit for o in y})
     if min(len(x), len(y)) < FEWEST_FOR_TEST:
-        return no_days(*days, comparison.remark, confidence)
+        return no_days(*days, comparison.remark)
     try:
         return day_difference(
             [o.value for o in x],
@@ -249,18 +247,15 @@ def day_test(
             x_subjects=[o.subject for o in x],
             y_subjects=[o.subject for o in y],
             one_offset=one_offset,
-            confidence=confidence,
         )
     except (ValueError, ArithmeticError) as error:
-        return no_days(*days, str(error), confidence)
+        return no_days(*days, str(error))
 
 
-def no_days(days_x: int, days_y: int, remark: str = "", confidence: float = 0.95) -> DayDifference:
+def no_days(days_x: int, days_y: int, remark: str = "") -> DayDifference:
     """Return a test by days without its numbers, for the reason given."""
-    nan = math.nan
-    return DayDifference(
-        nan, nan, nan, nan, nan, nan, days_x, days_y, nan, nan, (), confidence, remark
-    )
+    numbers = (math.nan,) * 6
+    return DayDifference(*numbers, days_x, days_y, math.nan, math.nan, (), remark=remark)
 
 
 def _day_medians(comparison: Comparison) -> tuple[DayMedian, ...]:

@@ -75,10 +75,6 @@ def plan_study(design: StudyDesign, seed: int) -> list[DayPlan]:
     ValueError
         If the seed is negative.
     """
-    places: dict[str, dict[int, int]] = {
-        condition.name: {day: index for index, day in enumerate(condition.days)}
-        for condition in design.conditions
-    }
     days = sorted({day for condition in design.conditions for day in condition.days})
     plans: list[DayPlan] = []
     turned = False
@@ -90,7 +86,7 @@ def plan_study(design: StudyDesign, seed: int) -> list[DayPlan]:
         for place, condition in enumerate(there):
             joint = day_joint(design, condition, factors)
             prbs, sinusoids = (
-                spread_evenly(total, len(condition.days))[places[condition.name][day]]
+                spread_evenly(total, len(condition.days))[condition.days.index(day)]
                 for total in (condition.prbs_epochs, condition.sinusoid_epochs)
             )
             plans.append(
