@@ -15,11 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import rankdata, tiecorrect
 
 from rigidimeter.statistics.bootstrap import bootstrap
 from rigidimeter.statistics.effect_from_p import rank_biserial_interval
-from rigidimeter.statistics.ranksum import RankSum, ranksum
+from rigidimeter.statistics.ranksum import RankSum, ranksum, u_sigma
 from rigidimeter.statistics.summary import checked_sample
 
 __all__ = [
@@ -274,9 +273,8 @@ def _weighted(counted: tuple[Array, Array, Array], x: Array, y: Array) -> Array:
 def _r(delta: float, groups: TwoGroups) -> float:
     """Return r of another rank-biserial correlation at the sizes and ties of these groups."""
     m, n = groups.x.size, groups.y.size
-    ties = float(tiecorrect(rankdata(np.concatenate([groups.x, groups.y]))))
-    if ties == 0:
+    sigma = u_sigma(groups.x, groups.y)
+    if sigma == 0:
         return 0.0
-    sigma = math.sqrt(m * n * (m + n + 1) / 12 * ties)
     size = max(abs(delta) * m * n / 2 - 0.5, 0.0)
     return math.copysign(size / sigma / math.sqrt(m + n), delta)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
-from rigidimeter.statistics.profiled_likelihood import Point, Products, minimise, products
+from rigidimeter.statistics.profiled_likelihood import Point, minimise, products
 from rigidimeter.statistics.summary import checked_sample
 
 __all__ = ["LikelihoodRatio", "Mixed", "fit_mixed", "likelihood_ratio", "nested"]
@@ -156,7 +156,35 @@ def fit_mixed(
         )
     data = products(y, x, z)
     point = minimise(data)
-    return _model(y, names, kept, members, inseparable, data, point)
+    df = data.n - data.p
+    variance = point.squares / df
+    variances, offsets = {}, {}
+    corrected = y.copy()
+    for name, (levels, columns) in members.items():
+        blups = np.zeros(len(levels))
+        variances[name] = 0.0
+        if name in kept:
+            index = kept.index(name)
+            variances[name] = float(point.ratios[index]) * variance
+            blups = point.ratios[index] * point.zpy[data.blocks[index]] + 0.0  # never −0
+        corrected -= columns @ blups
+        offsets[name] = dict(zip(levels, blups.tolist(), strict=True))
+    return Mixed(
+        conditions=names,
+        means=data.ols + point.shift,
+        covariance=variance * point.unscaled,
+        variances=variances,
+        variance_residual=variance,
+        offsets=offsets,
+        corrected=corrected,
+        deviance=point.deviance,
+        n=data.n,
+        df_residual=df,
+        at_zero=tuple(name for name in kept if variances[name] == 0),
+        inseparable=inseparable,
+        point=point,
+        blocks=data.blocks,
+    )
 
 
 def likelihood_ratio(
@@ -234,43 +262,3 @@ def _dependent(rests: Sequence[Array], free: int) -> bool:
             gram[i, j] = np.sum((first.T @ second) ** 2)
     scale = np.sqrt(np.diag(gram))
     return bool(np.linalg.eigvalsh(gram / np.outer(scale, scale))[0] < _NOTHING)
-
-
-def _model(
-    y: Array,
-    names: tuple[str, ...],
-    kept: Sequence[str],
-    members: Mapping[str, tuple[tuple[str, ...], Array]],
-    inseparable: Mapping[str, str],
-    data: Products,
-    point: Point,
-) -> Mixed:
-    df = data.n - data.p
-    variance = point.squares / df
-    variances, offsets = {}, {}
-    corrected = y.copy()
-    for name, (levels, columns) in members.items():
-        blups = np.zeros(len(levels))
-        variances[name] = 0.0
-        if name in kept:
-            index = kept.index(name)
-            variances[name] = float(point.ratios[index]) * variance
-            blups = point.ratios[index] * point.zpy[data.blocks[index]] + 0.0  # never −0
-        corrected -= columns @ blups
-        offsets[name] = dict(zip(levels, blups.tolist(), strict=True))
-    return Mixed(
-        conditions=names,
-        means=data.ols + point.shift,
-        covariance=variance * point.unscaled,
-        variances=variances,
-        variance_residual=variance,
-        offsets=offsets,
-        corrected=corrected,
-        deviance=point.deviance,
-        n=data.n,
-        df_residual=df,
-        at_zero=tuple(name for name in kept if variances[name] == 0),
-        inseparable=dict(inseparable),
-        point=point,
-        blocks=data.blocks,
-    )

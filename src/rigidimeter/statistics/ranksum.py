@@ -18,7 +18,7 @@ from scipy.stats import mannwhitneyu, norm
 
 from rigidimeter.statistics.summary import checked_sample
 
-__all__ = ["RankSum", "ranksum"]
+__all__ = ["RankSum", "ranksum", "u_sigma"]
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def ranksum(x: ArrayLike, y: ArrayLike, *, confidence: float = 0.95) -> RankSum:
     if not 0 < confidence < 1:
         raise ValueError(f"confidence must be between 0 and 1, got {confidence}")
     differences = np.sort(np.subtract.outer(sample_x, sample_y), axis=None)
-    sigma = _sigma(sample_x.size, sample_y.size, np.concatenate([sample_x, sample_y]))
+    sigma = u_sigma(sample_x, sample_y)
     u, p, p_uncorrected = differences.size / 2, 1.0, 1.0
     if sigma > 0:
         corrected, plain = (
@@ -157,10 +157,12 @@ def _sigma_from_ties(m: int, n: int, tie_term: float) -> float:
     return math.sqrt(max(variance, 0.0))
 
 
-def _sigma(m: int, n: int, pooled: NDArray[np.float64]) -> float:
+def u_sigma(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Return the standard deviation of U with the ties of these samples, 0 where all are equal."""
+    pooled = np.concatenate([x, y])
     if pooled.min() == pooled.max():
         return 0.0
-    return _sigma_from_ties(m, n, _tie_term(pooled))
+    return _sigma_from_ties(x.size, y.size, _tie_term(pooled))
 
 
 def _z(excess: float, sigma: float, correction: float) -> float:
