@@ -2,7 +2,7 @@
 
 Many virtual studies of the paper's design (`rigidimeter.virtual`): nine days in OFF, on four of
 them in DBS too, the counts of Table 1. Every PRBS epoch runs on the compiled batch and is fitted as
-`analyse` does it: instrumental variables, then again with J held at its median. Ticks are 200 a
+`estimate` does it: instrumental variables, then again with J held at its median. Ticks are 200 a
 second here, the sensors keep the paper's rates: the loop is the same, at a third of the time.
 
 Impulse and work come from the recorded sinusoid of Eq. 3. That motion is imposed, so the torque,
@@ -188,7 +188,7 @@ def _estimates(
     seed: int,
     inertia_kg_m2: float,
 ) -> dict[str, Array]:
-    """Simulate the epochs of conditions together, and estimate them as `analyse` does.
+    """Simulate the epochs of conditions together, and estimate them as `estimate` does.
 
     J is held at its median over these epochs if it is not given.
     """

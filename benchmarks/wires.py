@@ -30,7 +30,7 @@ from rigidimeter.devices.rigfile import load_rig
 from rigidimeter.experiment import Protocol, plan
 from rigidimeter.recording import read_session
 from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.study import analyse
+from rigidimeter.study import estimate
 
 TRUTH = (0.0045, 0.1368, 1.751)
 
@@ -114,7 +114,7 @@ def paper_protocol(epochs: int) -> None:
         epochs_read, notices = read_session(folder)
         for notice in notices:
             print(notice.text)
-        analysis = analyse(epochs_read, settings)
+        analysis = estimate(epochs_read, settings=settings)
     fits = [fit for fit in analysis.fits if fit.outcome.kind == "included"]
     found = np.array(
         [[fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad] for fit in fits]

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from rigidimeter.documents import read_json, write_json
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings
-from rigidimeter.study import StudyResult, analyse, compare_measures, read_study
+from rigidimeter.study import StudyResult, compare_measures, estimate, read_study
 from rigidimeter.study.comparison import day_tests, gathered
 from rigidimeter.study.ratings_model import rated
 from rigidimeter.version import __version__
@@ -133,7 +133,7 @@ class Context:
             )
             write_json(made, wanted)
         read = read_study(folder)
-        analysis = analyse(read.epochs, read.settings)
+        analysis = estimate(read.epochs, settings=read.settings)
         sessions = {session.entry.source: session.entry for session in read.gathered.sessions}
         pair = read.names.pair
         comparisons, _ = compare_measures(gathered(analysis, pair, sessions), resamples=0)

@@ -12,7 +12,7 @@ from rigidimeter.recording import Recording, read
 from rigidimeter.recording.study_folder import is_study
 from rigidimeter.records import Analysis
 from rigidimeter.reporting.page import write_report
-from rigidimeter.study import StudyResult, analyse, compare, compare_analysis, provenance
+from rigidimeter.study import StudyResult, compare, compare_analysis, estimate, provenance
 
 __all__ = ["recording_result", "report"]
 
@@ -70,7 +70,7 @@ def _result(
     if isinstance(result, Analysis):
         return compare_analysis(result, resamples=0)
     if isinstance(result, Recording):
-        return recording_result(result, analyse(result.epochs, result.settings))
+        return recording_result(result, estimate(result.epochs, settings=result.settings))
     paths = [Path(result)] if isinstance(result, (str, PathLike)) else [Path(one) for one in result]
     if len(paths) == 1 and is_study(paths[0]):
         return compare(paths[0])

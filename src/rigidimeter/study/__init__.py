@@ -4,7 +4,7 @@ Acquisition and study meet only in recorded files, so a laboratory can analyse w
 installed.
 """
 
-from rigidimeter.study.analysis import Preparation, analyse, estimate, task_of
+from rigidimeter.study.analysis import Preparation, estimate, task_of
 from rigidimeter.study.archive import UNCHANGED, keep
 from rigidimeter.study.compare_input import compare
 from rigidimeter.study.comparison import (
@@ -58,7 +58,6 @@ __all__ = [
     "SessionEntry",
     "StudyResult",
     "Verdict",
-    "analyse",
     "analyse_study",
     "analysis_warnings",
     "compare",

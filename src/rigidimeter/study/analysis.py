@@ -26,7 +26,7 @@ from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Delay, Epoch, Fit, Task
 from rigidimeter.settings import Settings
 
-__all__ = ["Preparation", "analyse", "analyse_prepared", "estimate", "task_of"]
+__all__ = ["Preparation", "analyse_prepared", "estimate", "task_of"]
 
 
 class StepCosts(NamedTuple):
@@ -133,19 +133,6 @@ class Preparation:
             if id(prepared) not in self._aligned:
                 self._aligned[id(prepared)] = aligned_prepared(prepared, delays)
         return [self._aligned[id(prepared)] for prepared in epochs]
-
-
-def analyse(
-    epochs: Iterable[Epoch],
-    settings: Settings,
-    method: str = "auto",
-    *,
-    progress: Progress = lambda _: None,
-) -> Analysis:
-    """Analyse epochs by one method; see `analyse_prepared`. `progress` gets shares of the work."""
-    preparation = Preparation(epochs, settings)
-    work = preparation.work([method]) or 1.0
-    return analyse_prepared(preparation, method, progress=lambda done: progress(done / work))
 
 
 def analyse_prepared(
@@ -274,4 +261,6 @@ def estimate(
         settings = settings or recording.settings
     else:
         epochs = recording
-    return analyse(epochs, settings or Settings(), method, progress=progress)
+    preparation = Preparation(epochs, settings or Settings())
+    work = preparation.work([method]) or 1.0
+    return analyse_prepared(preparation, method, progress=lambda done: progress(done / work))

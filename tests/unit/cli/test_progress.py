@@ -9,7 +9,7 @@ from rigidimeter.cli.progress import LEAST_SHARE, Meter
 from rigidimeter.records import Epoch
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.study import Preparation
-from rigidimeter.study.analysis import analyse, analyse_prepared
+from rigidimeter.study.analysis import analyse_prepared, estimate
 from rigidimeter.virtual.batch import simulate_epochs
 
 
@@ -78,7 +78,7 @@ def simulated(delay_s: float) -> tuple[list[Epoch], Settings]:
 def test_the_time_left_of_an_analysis_is_never_off_by_more_than_three(delay_s: float) -> None:
     """On the processor's clock, so that a busy machine changes nothing."""
     epochs, settings = simulated(delay_s)
-    analyse(epochs[:2], settings)  # what is loaded once does not count
+    estimate(epochs[:2], settings=settings)  # what is loaded once does not count
     preparation = Preparation(epochs, settings)
     clock, start_s = Clock(), time.process_time()
     clock.now_s = start_s

@@ -11,7 +11,7 @@ from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.experiment import prbs_levels
 from rigidimeter.records import Analysis, Channel, Epoch, Fit, Motion, Notice, Outcome, Score
 from rigidimeter.settings import Settings
-from rigidimeter.study import StudyResult, analyse, compare_analysis
+from rigidimeter.study import StudyResult, compare_analysis, estimate
 
 RATE_HZ = 250.0
 OFF = JointDynamics(0.0045, 0.1368, 1.751)
@@ -124,7 +124,7 @@ def make_study() -> MakeStudy:
 
     def make(epochs: list[Epoch], **parts: object) -> StudyResult:
         settings = Settings()
-        analysis = parts.pop("analysis", None) or analyse(epochs, settings)
+        analysis = parts.pop("analysis", None) or estimate(epochs, settings=settings)
         fields = {
             "settings": settings,
             "epochs": tuple(epochs),

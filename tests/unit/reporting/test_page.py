@@ -14,7 +14,7 @@ import pytest
 from rigidimeter.records import Epoch, Finding, Notice, Outcome
 from rigidimeter.reporting.numbers import interval, number
 from rigidimeter.reporting.page import contents, tables, write_report
-from rigidimeter.study import StudyResult, analyse
+from rigidimeter.study import StudyResult, estimate
 
 NASTY = "<script>alert('x')</script>&amp;\"$_$"
 VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -189,7 +189,7 @@ def test_page_tells_what_the_estimates_know(page: Page, study: StudyResult) -> N
 
 def test_a_method_asked_for_by_name_says_so(study: StudyResult, make_study, tmp_path: Path) -> None:
     epochs = [study.epochs[1]]
-    made = make_study(epochs, analysis=analyse(epochs, study.settings, "published"))
+    made = make_study(epochs, analysis=estimate(epochs, "published", settings=study.settings))
     text = " ".join(page_of(made, tmp_path).text.split())
     assert (
         "Method: published (least squares as the paper prints it). It was requested by name."

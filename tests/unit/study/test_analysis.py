@@ -7,7 +7,6 @@ from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Channel, Epoch, Fit, Outcome, Score
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.study import (
-    analyse,
     analysis_warnings,
     compare_analysis,
     conditions,
@@ -49,16 +48,16 @@ def test_a_recording_is_estimated_with_its_settings():
     epochs = tuple(epochs_with_inertia([0.004, 0.005]))
     settings = parse_settings({"estimation": {"band_high_unknown_hz": 12.0}})
     found = estimate(Recording(epochs, (), settings, ()), "bandlimited")
-    assert found == analyse(epochs, settings, "bandlimited")
+    assert found == estimate(epochs, "bandlimited", settings=settings)
     assert found.fits[0].band_hz == (0.15, 12.0)
-    assert estimate(epochs, "bandlimited") == analyse(epochs, Settings(), "bandlimited")
+    assert estimate(epochs, "bandlimited") == estimate(epochs, "bandlimited", settings=Settings())
     with pytest.raises(ValueError, match="no such method"):
         estimate(epochs, "magic")
 
 
 def test_the_second_stage_holds_the_median_inertia_of_the_included():
     epochs = epochs_with_inertia([0.004, 0.005, 0.009, 0.02], {3: Outcome("excluded", "limit")})
-    found = analyse(epochs, Settings())
+    found = estimate(epochs, settings=Settings())
     assert found.inertia_kg_m2 == pytest.approx(0.005, rel=1e-3)
     assert {f.inertia_kg_m2 for f in found.fixed_inertia} == {found.inertia_kg_m2}
     assert found.fixed_inertia[1].damping_nm_s_rad == pytest.approx(0.14, rel=1e-3)
@@ -67,7 +66,7 @@ def test_the_second_stage_holds_the_median_inertia_of_the_included():
 
 def test_without_an_included_epoch_there_is_no_second_stage():
     epochs = epochs_with_inertia([0.004], {0: Outcome("excluded", "limit")})
-    found = analyse(epochs, Settings())
+    found = estimate(epochs, settings=Settings())
     assert math.isnan(found.inertia_kg_m2)
     assert math.isnan(found.fixed_inertia[0].damping_nm_s_rad)
     assert found.fits[0].damping_nm_s_rad == pytest.approx(0.14, rel=1e-3)
@@ -78,7 +77,7 @@ def test_a_bad_epoch_does_not_stop_the_good_ones():
     t = np.arange(100) / 100.0
     bad = Epoch("s", "bad", {"torque_nm": Channel("torque_nm", t, t),
                              "angle_rad": Channel("angle_rad", t, t)})  # fmt: skip
-    found = analyse([bad, good], Settings())
+    found = estimate([bad, good], settings=Settings())
     assert [f.outcome.kind for f in found.fits] == ["failed", "included"]
 
 

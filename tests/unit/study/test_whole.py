@@ -19,10 +19,10 @@ from rigidimeter.statistics import day_difference, difference, fit_mixed, holm, 
 from rigidimeter.study import (
     RATING,
     StudyResult,
-    analyse,
     analyse_study,
     compare,
     compare_analysis,
+    estimate,
     read_study,
 )
 
@@ -43,7 +43,7 @@ def test_the_analysis_is_that_of_its_sessions(fitted_study: Path, whole: StudyRe
     for condition in DAYS:
         for day in DAYS[condition]:
             epochs += read_session(fitted_study / f"sessions/{day}-{condition}")[0]
-    by_hand = analyse(epochs, whole.settings)
+    by_hand = estimate(epochs, settings=whole.settings)
     values = [fit.stiffness_nm_rad for fit in by_hand.fixed_inertia]
     assert [fit.stiffness_nm_rad for fit in whole.analysis.fixed_inertia] == values
     expected = compare_analysis(by_hand, "OFF", "DBS").comparisons

@@ -12,7 +12,7 @@ from tests.unit.virtual.tiny import SHORT, tiny
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read_session, session_settings
-from rigidimeter.study import analyse, compare_analysis
+from rigidimeter.study import compare_analysis, estimate
 from rigidimeter.virtual.study_design import PAPER, PUSHING
 from rigidimeter.virtual.study_plan import plan_study
 from rigidimeter.virtual.virtual_study import study_length_s, write_virtual_study
@@ -81,7 +81,7 @@ def test_its_sessions_are_estimated_and_compared(folder: Path) -> None:
     epochs = [epoch for path in paths for epoch in read_session(path)[0]]
     found = {
         c.measure.name: c
-        for c in compare_analysis(analyse(epochs, session_settings(paths[0]))).comparisons
+        for c in compare_analysis(estimate(epochs, settings=session_settings(paths[0]))).comparisons
     }
     assert all(len(values) == 2 for c in found.values() for values in c.values.values())
     assert found["inertia_kg_m2"].summaries["OFF"].median == pytest.approx(0.0045, rel=0.15)
@@ -120,7 +120,9 @@ def test_pushing_moves_the_published_estimate_and_not_the_instrumental_one(
     for method in ("published", "iv"):
         found = {
             c.measure.name: c
-            for c in compare_analysis(analyse(epochs, plans[0].settings, method)).comparisons
+            for c in compare_analysis(
+                estimate(epochs, method, settings=plans[0].settings)
+            ).comparisons
         }
         damping = found["damping_nm_s_rad"].summaries
         shift_percent[method] = 100 * (damping["DBS"].median / damping["OFF"].median - 1)
