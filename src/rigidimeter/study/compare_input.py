@@ -147,8 +147,8 @@ def _compare_columns(
     names = chosen_pair(
         known,
         pair,
-        where=f"{table.source}: ",
-        holder=f"column {by} has only",
+        where=f"column {by} of {table.source}: ",
+        holder="it has only",
         remedy="name another column with --by",
     )
     rows, notices = _kept(table, labels, names, by)

@@ -126,7 +126,8 @@ def test_more_groups_are_chosen_by_name(compared, tmp_path) -> None:
     path, _ = table(tmp_path / "t.csv")
     ran, _ = compared(path, "--value", "a", "--by", "day")
     assert ran.status == 1
-    assert "has 10 groups" in ran.err
+    assert "column day of" in ran.err
+    assert "there are 10 conditions" in ran.err
     ran, found = compared(
         path, "--value", "a", "--by", "day", "--reference", "OFF1", "--other", "OFF0"
     )
