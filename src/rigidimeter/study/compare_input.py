@@ -147,8 +147,7 @@ def _compare_columns(
     names = chosen_pair(
         known,
         pair,
-        where=f"column {by} of {table.source}: ",
-        holder="it has only",
+        holder=f"column {by} of {table.source} has",
         remedy="name another column with --by",
     )
     rows, notices = _kept(table, labels, names, by)

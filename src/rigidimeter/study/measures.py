@@ -102,7 +102,6 @@ def chosen_pair(
     known: Sequence[str],
     wanted: tuple[str | None, str | None],
     *,
-    where: str = "",
     holder: str = "recorded are:",
     remedy: str = "name them in a condition column, or give --condition once for each file in "
     "their order",
@@ -114,9 +113,9 @@ def chosen_pair(
     known : sequence of str
     wanted : (str or None, str or None)
         Reference and other, None where not given.
-    where, holder, remedy : str
-        For messages: where the conditions were found, what to say before a list of them, and what
-        to do if there are not two.
+    holder, remedy : str
+        For messages: what to say before the list of conditions, and what to do if there are not
+        two.
 
     Raises
     ------
@@ -127,19 +126,16 @@ def chosen_pair(
     for option, name in zip(("--reference", "--other"), wanted, strict=True):
         if name is not None and name not in known:
             raise UserError(
-                f"{where}{option} {name}: there is no such condition; {holder} {listed or 'none'}"
+                f"{option} {name}: there is no such condition; {holder} {listed or 'none'}"
             )
     first, second = wanted
     if first is not None and first == second:
         raise UserError(f"--reference and --other are both {first}; name two conditions")
     if len(known) < 2:
-        raise UserError(
-            f"{where}a comparison needs two conditions; {holder} {listed or 'none'}; {remedy}"
-        )
+        raise UserError(f"a comparison needs two conditions; {holder} {listed or 'none'}; {remedy}")
     if len(known) > 2 and None in wanted:
         raise UserError(
-            f"{where}there are {len(known)} conditions ({listed}); choose two with --reference and "
-            "--other"
+            f"choose two of {len(known)} conditions with --reference and --other; {holder} {listed}"
         )
     first = first or next(name for name in known if name != second)
     return first, second or next(name for name in known if name != first)
