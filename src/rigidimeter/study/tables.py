@@ -54,17 +54,20 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
     tables = result_tables(result)
     of_result = ("title", "source", "by", "reference", "other", "seed", "resamples", "blinded",
                  "virtual")  # fmt: skip
-    of_analysis = ("method", "method_reason", "inertia_kg_m2")
-    as_tables = ("conditions", "sessions", "left_out", "days", "effect_differences", "sensitivity")
     document = {
         "schema": COMPARISON_SCHEMA,
         **{name: getattr(result, name) for name in of_result},
-        **{name: getattr(analysis, name) for name in of_analysis},
+        **{name: tables[name] for name in ("conditions", "sessions", "left_out")},
+        "method": analysis.method,
+        "method_reason": analysis.method_reason,
+        "inertia_kg_m2": analysis.inertia_kg_m2,
         "inertia_by_subject": result.several_subjects,
         "comparisons": [_comparison(comparison) for comparison in result.comparisons],
-        **{name: tables[name] for name in as_tables},
-        "exclusions": tables["excluded_epochs"],
+        "days": tables["days"],
+        "effect_differences": tables["effect_differences"],
         "ratings": None if result.ratings is None else ratings_document(result.ratings),
+        "sensitivity": tables["sensitivity"],
+        "exclusions": tables["excluded_epochs"],
         "notices": [
             {"level": notice.level, "text": notice.text.replace(f"{place}/", "")}
             if place
