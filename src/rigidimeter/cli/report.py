@@ -50,8 +50,10 @@ def report(
     from rigidimeter.recording import is_session, write_estimates_json
     from rigidimeter.reporting import recording_result
 
-    if is_session(out):
-        raise UserError(f"--out {out}: is a session folder; name another folder for the report")
+    if any(is_session(folder) for folder in (out, *out.resolve().parents)):
+        raise UserError(
+            f"--out {out}: is or lies in a session folder; name another folder for the report"
+        )
     if (folder := study_of(recordings, key)) is not None:
         if out.resolve() in (folder.resolve(), (folder / "analysis").resolve()):
             raise UserError(

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from numbers import Real
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +17,7 @@ from rigidimeter.estimation.methods import choose_method, method_named
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel, Epoch, Fit, readonly
-from rigidimeter.settings import Settings
+from rigidimeter.settings import Settings, settings_from
 
 __all__ = ["identify"]
 
@@ -28,7 +32,7 @@ def identify(
     rate_hz: float | None = None,
     time_s: ArrayLike | None = None,
     method: str = "auto",
-    settings: Settings | None = None,
+    settings: Settings | str | Path | Mapping[str, Any] | None = None,
 ) -> Fit:
     """Estimate inertia J, damping B and stiffness K from one stretch of recording.
 
@@ -51,7 +55,7 @@ def identify(
         When the samples were taken, increasing; instead of `rate_hz`.
     method : str
         The name of an estimator, or ``auto``: ``iv`` with the perturbation, else ``bandlimited``.
-    settings : Settings, optional
+    settings : Settings, path or mapping, optional
 
     Returns
     -------
@@ -76,7 +80,7 @@ def identify(
     >>> f"K = {fit.stiffness_nm_rad:.2f} N·m/rad"
     'K = 1.80 N·m/rad'
     """
-    settings = settings or Settings()
+    settings = settings_from(settings)
     given = {
         "torque_nm": torque_nm,
         "angle_rad": angle_rad,
@@ -85,6 +89,8 @@ def identify(
         "perturbation_nm": perturbation_nm,
     }
     arrays = {name: _array(name, values) for name, values in given.items() if values is not None}
+    if "torque_nm" not in arrays:
+        raise ValueError("torque_nm is None; the measured torque is needed")
     size = arrays["torque_nm"].size
     for name, values in arrays.items():
         if values.size != size:
@@ -106,7 +112,12 @@ def identify(
 
 
 def _array(name: str, values: ArrayLike) -> Array:
-    array = readonly(values)
+    if np.iscomplexobj(values) or np.ma.is_masked(values):
+        raise ValueError(f"{name} has complex or masked samples; samples must be finite numbers")
+    try:
+        array = readonly(values)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} is not an array of numbers ({error})") from None
     if array.ndim != 1:
         raise ValueError(f"{name} must have one dimension, not the shape {array.shape}")
     if not np.all(np.isfinite(array)):
@@ -125,7 +136,6 @@ def _stamps(size: int, rate_hz: float | None, time_s: ArrayLike | None) -> Array
         if np.any(np.diff(stamps) <= 0):
             raise ValueError("time_s must increase from sample to sample")
         return stamps
-    assert rate_hz is not None
-    if not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise ValueError(f"rate_hz must be a number greater than 0, got {rate_hz:g}")
+    if not (isinstance(rate_hz, Real) and math.isfinite(rate_hz) and rate_hz > 0):
+        raise ValueError(f"rate_hz must be a number greater than 0, got {rate_hz!r}")
     return readonly(np.arange(size) / rate_hz)

@@ -40,12 +40,14 @@ def method_named(name: str) -> Method:
     Raises
     ------
     ValueError
-        If there is none; the text names those there are.
+        If there is none, with the names of those there are; or if two have the name.
     """
-    for method in METHODS:
-        if method.name == name:
-            return method
-    raise ValueError(f"there is no such method; known: {', '.join(method_names())}")
+    found = [method for method in METHODS if method.name == name]
+    if not found:
+        raise ValueError(f"there is no such method; known: {', '.join(method_names())}")
+    if len(found) > 1:
+        raise ValueError(f"two methods have the name {name}; rename the one that was added")
+    return found[0]
 
 
 def choose_method(epochs: Sequence[Epoch]) -> tuple[str, str]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import ReadOptions, read_recording, reader_of
 from rigidimeter.records import Epoch, Notice, Task
-from rigidimeter.settings import Settings, load_settings
+from rigidimeter.settings import Settings, load_settings, settings_from
 
 __all__ = ["Recording", "read"]
 
@@ -53,7 +55,7 @@ def read(
     epoch_length_s: float | None = None,
     condition: str | Sequence[str] | None = None,
     task: Task | None = None,
-    settings: Settings | str | Path | None = None,
+    settings: Settings | str | Path | Mapping[str, Any] | None = None,
 ) -> Recording:
     """Read session folders and files into one recording.
 
@@ -75,7 +77,7 @@ def read(
         Condition of files without a condition column: one for all, or one for each path.
     task : {"prbs", "sinusoid"}, optional
         Task of files without a task column.
-    settings : Settings or path, optional
+    settings : Settings, path or mapping, optional
         Settings for the analysis, or a TOML file of them. Default: those with which the first
         session folder was recorded, else the built-in ones.
 
@@ -88,12 +90,10 @@ def read(
     UserError
         If an argument is wrong, or if nothing could be read.
     """
-    asked = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
+    asked = _paths(paths)
     conditions = _conditions(condition, len(asked))
-    options = ReadOptions(dict(column or {}), rate_hz, reaction, epoch_length_s, task=task)
-    chosen = settings if isinstance(settings, Settings) else None
-    if isinstance(settings, str | Path):
-        chosen = load_settings(Path(settings))
+    options = ReadOptions(_columns(column), rate_hz, reaction, epoch_length_s, task=task)
+    chosen = None if settings is None else settings_from(settings)
     compared = _RECORDED_WITH if chosen is not None else (*_RECORDED_WITH, *_ANALYSED_WITH)
     first: Settings | None = None
     epochs: list[Epoch] = []
@@ -134,7 +134,28 @@ def _about_settings(
     return [Notice("warning", text)]
 
 
+def _paths(paths: object) -> list[Path]:
+    several = [paths] if isinstance(paths, str | PathLike) else paths
+    given: list[Any] = [*several] if isinstance(several, Iterable) else [several]
+    for one in given:
+        if not isinstance(one, str | PathLike):
+            raise UserError(f"what to read is a path or a list of paths, not {one!r}")
+    return [Path(one) for one in given]
+
+
+def _columns(column: object) -> dict[str, str]:
+    given = {} if column is None else column
+    if not isinstance(given, Mapping) or not all(isinstance(n, str) for n in given.values()):
+        raise UserError(
+            "column maps standard names to the names in the file, as in {'torque_nm': 'Fz'}; "
+            f"got {column!r}"
+        )
+    return dict(given)
+
+
 def _conditions(condition: str | Sequence[str] | None, n_paths: int) -> list[str]:
+    if not isinstance(condition, str | Sequence | None):
+        raise UserError(f"condition is a name, or one for each path, not {condition!r}")
     names = [condition or ""] if condition is None or isinstance(condition, str) else [*condition]
     if len(names) == 1:
         return names * n_paths

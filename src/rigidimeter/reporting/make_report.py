@@ -71,6 +71,11 @@ def _result(
         return compare_analysis(result, resamples=0)
     if isinstance(result, Recording):
         return recording_result(result, estimate(result.epochs, settings=result.settings))
+    if not isinstance(result, (str, PathLike, Sequence)):
+        raise UserError(
+            "report takes what compare, estimate or read returned, or paths; not something of type "
+            f"{type(result).__name__}"
+        )
     paths = [Path(result)] if isinstance(result, (str, PathLike)) else [Path(one) for one in result]
     if len(paths) == 1 and is_study(paths[0]):
         return compare(paths[0])

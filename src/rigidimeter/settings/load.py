@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -77,8 +78,13 @@ def settings_from(
         settings = parse_settings(source)
     elif isinstance(source, Settings):
         settings = source
-    else:
+    elif source is None or isinstance(source, (str, PathLike)):
         settings = load_settings(None if source is None else Path(source))
+    else:
+        raise UserError(
+            "settings are a Settings object, a TOML file or a mapping, not of type "
+            f"{type(source).__name__}"
+        )
     return changed_settings(settings, changes) if changes else settings
 
 

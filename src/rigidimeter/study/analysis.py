@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from rigidimeter.errors import UserError
 from rigidimeter.estimation import (
     choose_method,
     estimate_delays,
@@ -24,7 +26,7 @@ from rigidimeter.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Delay, Epoch, Fit, Task
-from rigidimeter.settings import Settings
+from rigidimeter.settings import Settings, settings_from
 
 __all__ = ["Preparation", "analyse_prepared", "estimate", "task_of"]
 
@@ -230,7 +232,7 @@ def estimate(
     recording: Recording | Iterable[Epoch],
     method: str = "auto",
     *,
-    settings: Settings | None = None,
+    settings: Settings | str | Path | Mapping[str, Any] | None = None,
     progress: Progress = lambda _: None,
 ) -> Analysis:
     """Estimate J, B and K of every epoch, and score the imposed sinusoids.
@@ -240,7 +242,7 @@ def estimate(
     recording : Recording or iterable of Epoch
     method : str
         The name of an estimator; ``auto`` chooses by what was recorded.
-    settings : Settings, optional
+    settings : Settings, path or mapping, optional
         Instead of those of the recording.
     progress : callable
         Called with the share of the work that was done since, 1 in all.
@@ -255,12 +257,18 @@ def estimate(
     ------
     ValueError
         If there is no such method.
+    UserError
+        If `recording` is neither, such as a path; the settings are wrong.
     """
     if isinstance(recording, Recording):
-        epochs: Iterable[Epoch] = recording.epochs
-        settings = settings or recording.settings
+        epochs: tuple[Any, ...] = recording.epochs
+        settings = recording.settings if settings is None else settings
     else:
-        epochs = recording
-    preparation = Preparation(epochs, settings or Settings())
+        epochs = tuple(recording) if isinstance(recording, Iterable) else (None,)
+    if not all(isinstance(epoch, Epoch) for epoch in epochs):
+        raise UserError(
+            "estimate takes a Recording or a list of its epochs; read a path with rigidimeter.read"
+        )
+    preparation = Preparation(epochs, settings_from(settings))
     work = preparation.work([method]) or 1.0
     return analyse_prepared(preparation, method, progress=lambda done: progress(done / work))

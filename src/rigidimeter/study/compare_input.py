@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from rigidimeter.errors import UserError
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.recording import read_estimates
-from rigidimeter.recording.formats import TextTable, read_text_table
+from rigidimeter.recording.formats import READERS, TextTable, read_text_table
 from rigidimeter.recording.study_folder import is_study
 from rigidimeter.records import Analysis, Notice
-from rigidimeter.settings import Settings
+from rigidimeter.settings import Settings, settings_from
 from rigidimeter.study.comparison import compare_analysis, compare_measures, measured
 from rigidimeter.study.measures import Measure, Observation, chosen_pair, conditions
 from rigidimeter.study.results import Comparison, StudyResult
@@ -38,7 +38,7 @@ def compare(
     by: str = "condition",
     session: str | None = None,
     key: str | PathLike[str] | None = None,
-    settings: Settings | None = None,
+    settings: Settings | str | Path | Mapping[str, Any] | None = None,
     method: str = "auto",
     seed: int = 1,
     resamples: int = 9999,
@@ -62,7 +62,7 @@ def compare(
         The table's column whose labels the bootstrap resamples; by default each row.
     key : path, optional
         The blinding key of a study folder that is kept elsewhere.
-    settings : Settings, optional
+    settings : Settings, path or mapping, optional
         Of a study folder, instead of those that its first session was recorded with.
     method : str
         Of a study folder: the estimator, instead of that of its ``study.toml``.
@@ -78,6 +78,11 @@ def compare(
     """
     wanted = (reference, other)
     path = Path(x) if isinstance(x, (str, PathLike)) else None
+    if path is None and not (isinstance(x, Analysis) or hasattr(x, "columns")):
+        raise UserError(
+            "compare takes a study folder, estimates, their JSON file, or a table; not something "
+            f"of type {type(x).__name__}"
+        )
     if value is not None or not (isinstance(x, Analysis) or path):
         table = _as_text(x) if path is None else read_text_table(path)
         return _compare_columns(
@@ -85,21 +90,33 @@ def compare(
         )
     if path is not None and is_study(path):
         secret = None if key is None else Path(key)
-        read = read_study(path, key=secret, settings=settings, method=method, pair=wanted)
+        chosen = None if settings is None else settings_from(settings)
+        read = read_study(path, key=secret, settings=chosen, method=method, pair=wanted)
         return analyse_study(read, seed=seed, resamples=resamples, progress=progress)
+    if path is not None and (
+        path.is_dir() or any(path.suffix.lower() in reader.suffixes for reader in READERS)
+    ):
+        raise UserError(
+            f"{path} is neither a study folder nor a JSON file of estimates; for a recording give "
+            "what estimate returns, for a table also value=, the columns to compare"
+        )
     analysis = x if isinstance(x, Analysis) else read_estimates(Path(x))
     pair = chosen_pair(conditions(analysis), wanted)
     return compare_analysis(analysis, *pair, seed=seed, resamples=resamples)
 
 
 def _names(value: str | Sequence[str] | None) -> list[str]:
-    if value is None:
+    names = [value] if isinstance(value, str) else value
+    if not isinstance(names, Iterable) or not (listed := [str(name) for name in names]):
         raise UserError("a table needs value=, the column or columns to compare")
-    return [value] if isinstance(value, str) else list(value)
+    return listed
 
 
 def _as_text(table: Any) -> TextTable:
     """Return a table of pandas as text, its rows numbered as in a file with one header line."""
+    if not table.columns.is_unique:
+        twice = table.columns[table.columns.duplicated()][0]
+        raise UserError(f"the table has two columns with the name {twice}")
     columns = {
         str(name): tuple("" if missing else str(cell) for cell, missing in zip(
             table[name], table[name].isna(), strict=True))

@@ -1,10 +1,11 @@
 import doctest
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rigidimeter.estimation import fit_epoch, from_arrays, identify
+from rigidimeter.estimation import METHODS, fit_epoch, from_arrays, identify, methods
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.virtual.batch import simulate_epochs
@@ -67,12 +68,23 @@ def test_settings_are_used(arrays):
         ({"time_s": np.arange(5.0)}, "either rate_hz or time_s"),
         ({"rate_hz": None, "time_s": np.arange(5.0)}, "time_s has 5 samples, but torque_nm has"),
         ({"rate_hz": -1.0}, "rate_hz must be a number greater than 0"),
+        ({"rate_hz": "1000"}, "rate_hz must be a number greater than 0, got '1000'"),
         ({"torque_nm": "0.1"}, "one dimension"),
+        ({"torque_nm": None}, "torque_nm is None"),
+        ({"torque_nm": ["a", "b"]}, "torque_nm is not an array of numbers"),
+        ({"angle_rad": np.ones(10) * 1j}, "angle_rad has complex or masked samples"),
+        ({"angle_rad": np.ma.masked_less(np.arange(10.0), 5)}, "complex or masked samples"),
     ],
 )
 def test_what_cannot_be_used_is_refused(arrays, change, words):
     with pytest.raises(ValueError, match=words):
         identify(**{**arrays, "rate_hz": RATE_HZ, **change})
+
+
+def test_two_methods_of_one_name_are_refused(arrays, monkeypatch):
+    monkeypatch.setattr(methods, "METHODS", [*METHODS, replace(METHODS[0], name="iv")])
+    with pytest.raises(ValueError, match="two methods have the name iv"):
+        identify(**arrays, rate_hz=RATE_HZ)
 
 
 def test_the_example_of_the_docstring_runs():

@@ -67,11 +67,28 @@ def test_what_cannot_be_read_is_said_and_the_rest_is_read(tmp_path):
         ({"rate_hz": -1.0}, "--rate-hz -1: the sampling rate must be greater than 0 Hz"),
         ({"epoch_length_s": np.nan}, "--epoch-length-s nan: the length must be greater than 0 s"),
         ({"task": "walk"}, "--task walk: must be prbs or sinusoid"),
+        ({"rate_hz": "1000"}, "--rate-hz '1000': the sampling rate must be a number"),
+        ({"column": ["torque_nm=Fz"]}, "column maps standard names to the names in the file"),
+        ({"column": {"torque_nm": 1}}, "column maps standard names to the names in the file"),
+        ({"condition": 3}, "condition is a name, or one for each path, not 3"),
+        ({"settings": {"estimations": {}}}, "estimations is not a setting"),
+        ({"settings": 3}, "settings are a Settings object, a TOML file or a mapping"),
     ],
 )
 def test_wrong_options_are_refused(tmp_path, options, told):
     with pytest.raises(UserError, match=told):
         read(write(tmp_path / "a.csv"), **options)
+
+
+@pytest.mark.parametrize("paths", [None, 3, b"a.csv", [None]])
+def test_what_is_no_path_is_refused(paths):
+    with pytest.raises(UserError, match="what to read is a path or a list of paths, not"):
+        read(paths)
+
+
+def test_settings_of_a_mapping_are_used(tmp_path):
+    settings = {"estimation": {"band_low_hz": 0.3}}
+    assert read(write(tmp_path / "a.csv"), settings=settings).settings.estimation.band_low_hz == 0.3
 
 
 def test_settings_are_those_given_or_of_the_first_session(session, tmp_path):

@@ -1,8 +1,10 @@
 """`report` takes a result, estimates, a recording or its path, and gives one page."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from rigidimeter.errors import UserError
@@ -57,3 +59,9 @@ def test_a_folder_that_cannot_be_written_says_so(study: StudyResult, tmp_path: P
 def test_a_path_that_does_not_exist_says_so(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"nothing\.csv"):
         report(tmp_path / "nothing.csv", tmp_path / "out")
+
+
+def test_what_cannot_be_reported_is_refused(tmp_path: Path) -> None:
+    table: Any = pd.DataFrame({"damping": [1.0]})
+    with pytest.raises(UserError, match="report takes what compare, estimate or read returned"):
+        report(table, tmp_path / "out")

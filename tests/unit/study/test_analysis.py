@@ -1,13 +1,16 @@
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from rigidimeter.errors import UserError
 from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Channel, Epoch, Fit, Outcome, Score
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.study import (
     analysis_warnings,
+    compare,
     compare_analysis,
     conditions,
     estimate,
@@ -53,6 +56,33 @@ def test_a_recording_is_estimated_with_its_settings():
     assert estimate(epochs, "bandlimited") == estimate(epochs, "bandlimited", settings=Settings())
     with pytest.raises(ValueError, match="no such method"):
         estimate(epochs, "magic")
+
+
+@pytest.mark.parametrize("given", ["elbow.csv", None, ["elbow.csv"]])
+def test_only_a_recording_or_epochs_are_estimated(given):
+    with pytest.raises(UserError, match="takes a Recording or a list of its epochs"):
+        estimate(given)
+
+
+@pytest.mark.parametrize("given", [None, ["a"], {"a": [1]}])
+def test_what_cannot_be_compared_is_refused(given):
+    with pytest.raises(UserError, match="compare takes a study folder, estimates"):
+        compare(given, value="a")
+
+
+def test_a_recording_or_a_folder_is_no_file_of_estimates(tmp_path):
+    for path in (tmp_path, tmp_path / "elbow.csv"):
+        with pytest.raises(UserError, match="neither a study folder nor a JSON file of estimates"):
+            compare(path)
+
+
+def test_a_table_needs_columns_of_different_names():
+    table = pd.DataFrame({"a": [1.0, 2.0], "condition": ["X", "Y"]})
+    for value in (None, [], 0):
+        with pytest.raises(UserError, match="a table needs value="):
+            compare(table, value=value)
+    with pytest.raises(UserError, match="two columns with the name a"):
+        compare(pd.concat([table, table], axis=1), value="a")
 
 
 def test_the_second_stage_holds_the_median_inertia_of_the_included():

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any, cast, get_args
 
 import numpy as np
@@ -98,6 +99,8 @@ class ReadOptions:
             ("--epoch-length-s", self.epoch_length_s, "the length", "s"),
         )
         for option, value, what, unit in positive:
+            if value is not None and not isinstance(value, Real):
+                raise UserError(f"{option} {value!r}: {what} must be a number")
             if value is not None and not 0 < value < math.inf:
                 raise UserError(f"{option} {value:g}: {what} must be greater than 0 {unit}")
         if self.task not in (None, *get_args(Task)):
