@@ -222,9 +222,12 @@ def test_milliseconds_given_as_seconds_have_no_band_left(rigidimeter, tmp_path):
 
 def test_a_report_is_not_written_into_a_session(rigidimeter, simulate):
     folder = simulate()
-    ran = rigidimeter("report", folder, "--out", folder)
-    assert ran.status == 1
-    assert "is a session folder" in ran.err
+    before = sorted(folder.rglob("*"))
+    for out in (folder, folder / "report"):
+        ran = rigidimeter("report", folder, "--out", out)
+        assert ran.status == 1
+        assert "is or lies in a session folder" in ran.err
+    assert sorted(folder.rglob("*")) == before
 
 
 def test_a_session_without_a_good_epoch_fails(rigidimeter, tmp_path):
