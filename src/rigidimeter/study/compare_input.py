@@ -78,12 +78,13 @@ def compare(
     """
     wanted = (reference, other)
     path = Path(x) if isinstance(x, (str, PathLike)) else None
-    if path is None and not (isinstance(x, Analysis) or hasattr(x, "columns")):
+    tabled = value is not None or not (isinstance(x, Analysis) or path)
+    if tabled and path is None and not hasattr(x, "columns"):
         raise UserError(
             "compare takes a study folder, estimates, their JSON file, or a table; not something "
             f"of type {type(x).__name__}"
         )
-    if value is not None or not (isinstance(x, Analysis) or path):
+    if tabled:
         table = _as_text(x) if path is None else read_text_table(path)
         return _compare_columns(
             table, _names(value), by, wanted, session=session, seed=seed, resamples=resamples

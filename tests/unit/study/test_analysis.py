@@ -64,7 +64,7 @@ def test_only_a_recording_or_epochs_are_estimated(given):
         estimate(given)
 
 
-@pytest.mark.parametrize("given", [None, ["a"], {"a": [1]}])
+@pytest.mark.parametrize("given", [None, ["a"], {"a": [1]}, analysis([])])
 def test_what_cannot_be_compared_is_refused(given):
     with pytest.raises(UserError, match="compare takes a study folder, estimates"):
         compare(given, value="a")
