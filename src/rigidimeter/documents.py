@@ -13,19 +13,6 @@ import numpy as np
 
 from rigidimeter.errors import UserError
 
-__all__ = [
-    "csv_text",
-    "json_line",
-    "json_text",
-    "plain_values",
-    "read_json",
-    "read_toml",
-    "replace_file",
-    "text_bytes",
-    "write_json",
-    "write_text",
-]
-
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file in UTF-8, all of it or nothing.

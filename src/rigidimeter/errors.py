@@ -1,7 +1,5 @@
 """The one exception that is meant for the person at the keyboard."""
 
-__all__ = ["UserError"]
-
 
 class UserError(Exception):
     """Something the user can put right, said in one plain sentence.

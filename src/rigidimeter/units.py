@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["deg_from_rad", "per_rad_from_per_deg", "rad_from_deg"]
-
 _RAD_PER_DEG = math.pi / 180.0
 
 

@@ -9,8 +9,6 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-__all__ = ["Clock", "DeadlineClock", "SimulatedClock"]
-
 CLOCK_MONOTONIC, TIMER_ABSTIME = 1, 1
 
 Sleep = Callable[[int], None]

@@ -26,8 +26,6 @@ from rigidimeter.control import admittance_step, minimum_jerk, tracking_step
 from rigidimeter.devices.base import Reading
 from rigidimeter.settings import ControllerSettings
 
-__all__ = ["change_parameter", "follow", "hold", "perturb", "rest"]
-
 LARGEST_FACTOR = 10.0
 """A parameter may grow to so many times the protocol's value."""
 

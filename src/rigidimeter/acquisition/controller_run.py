@@ -19,8 +19,6 @@ from rigidimeter.guard import Cause, Reaction
 from rigidimeter.recording.session_folder import Ending
 from rigidimeter.settings import Settings
 
-__all__ = ["ControllerRun"]
-
 
 class ControllerRun:
     """The loop of a run, its state, and how it ended.

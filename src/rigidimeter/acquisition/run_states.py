@@ -14,8 +14,6 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
-__all__ = ["Command", "Order", "Run", "State", "after"]
-
 
 class State(IntEnum):
     """Where a run is."""

@@ -22,8 +22,6 @@ from rigidimeter.guard import Cause, Reaction, released, why_ended
 from rigidimeter.recording.session_folder import Ending
 from rigidimeter.settings import Settings, ZeroingSettings
 
-__all__ = ["SessionResult", "run_session"]
-
 BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
 
 LOOK_S = 0.1

@@ -8,8 +8,6 @@ from rigidimeter.acquisition.run_states import NOTHING, Order
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample
 
-__all__ = ["NoSupervision", "Sink", "Supervision"]
-
 
 class Supervision(Protocol):
     """Asked at every tick, so it answers within a microsecond or two and never waits."""

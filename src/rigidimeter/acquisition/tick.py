@@ -39,18 +39,6 @@ from rigidimeter.guard import (
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import Settings
 
-__all__ = [
-    "LONGEST_STEP",
-    "REST",
-    "ControlLoop",
-    "Controller",
-    "TickResult",
-    "ramp_to_rest",
-    "run_ticks",
-    "set_admittance",
-    "skip_passed_ticks",
-]
-
 REST = -1
 """The epoch number of samples between epochs."""
 

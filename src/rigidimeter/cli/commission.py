@@ -16,13 +16,11 @@ import typer
 
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
-from rigidimeter.cli.text_table import text_table
+from rigidimeter.cli.table_lines import text_table
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.commissioning import CommissioningRecord
-
-__all__ = ["commission"]
 
 
 def commission(

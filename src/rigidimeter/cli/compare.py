@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from rigidimeter.records import Analysis
     from rigidimeter.study import StudyResult
 
-__all__ = ["compare"]
-
 
 @reads_recordings
 def compare(

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rigidimeter.study import Comparison, RatingsFound, StudyResult
 
-__all__ = ["comparison_lines"]
-
 BY = {
     "protocol": "by the protocol",
     "check": "by a check",

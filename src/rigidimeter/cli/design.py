@@ -10,8 +10,6 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import JsonOption, SettingsOption
 
-__all__ = ["design"]
-
 
 def design(
     settings: SettingsOption = None,

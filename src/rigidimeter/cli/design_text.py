@@ -6,7 +6,7 @@ import math
 import textwrap
 from collections.abc import Iterator
 
-from rigidimeter.cli.text_table import Rows, text_table
+from rigidimeter.cli.table_lines import Rows, text_table
 from rigidimeter.dynamics import Margins
 from rigidimeter.experiment import (
     Candidate,
@@ -19,8 +19,6 @@ from rigidimeter.experiment import (
     time_constant_s,
 )
 from rigidimeter.units import deg_from_rad, rad_from_deg
-
-__all__ = ["design_lines"]
 
 _SHOWN = 8
 _HEADS = ("J kg·m²", "B N·m·s/rad", "K N·m/rad")

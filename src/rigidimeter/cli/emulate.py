@@ -9,8 +9,6 @@ import typer
 
 from rigidimeter.errors import UserError
 
-__all__ = ["emulate"]
-
 
 def emulate(
     drive: Annotated[

@@ -12,12 +12,10 @@ import typer
 
 from rigidimeter.cli.inputs import analyse_recordings, keep_inputs
 from rigidimeter.cli.options import CsvOption, JsonOption, Recordings, reads_recordings
-from rigidimeter.cli.text_table import text_table
+from rigidimeter.cli.table_lines import text_table
 
 if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Score
-
-__all__ = ["estimate", "estimate_lines"]
 
 _FIT_HEADING = ("epoch", "condition", "J kg·m²", "B N·m·s/rad", "K N·m/rad", "R²", "VAF %", "")
 _SCORE_HEADING = ("epoch", "condition", "impulse N·m·s", "work J", "")

@@ -20,17 +20,6 @@ if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Notice, Score
     from rigidimeter.study import StudyResult
 
-__all__ = [
-    "AnalysedStudy",
-    "analyse_recordings",
-    "analyse_study_folder",
-    "command_line",
-    "keep_inputs",
-    "say",
-    "study_files",
-    "study_of",
-]
-
 _OF_RECORDINGS = ("column", "rate_hz", "reaction", "epoch_length_s", "condition", "task")
 """Options that say how to read a single recording."""
 

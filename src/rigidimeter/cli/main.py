@@ -32,8 +32,6 @@ from rigidimeter.cli.study import demo, study
 from rigidimeter.errors import UserError
 from rigidimeter.version import __version__
 
-__all__ = ["main"]
-
 app = typer.Typer(
     name="rigidimeter",
     no_args_is_help=True,

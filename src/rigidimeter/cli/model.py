@@ -9,14 +9,12 @@ import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption, Recordings, reads_recordings
-from rigidimeter.cli.text_table import Rows, text_table
+from rigidimeter.cli.table_lines import Rows, text_table
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.estimation.terms import Comparison, ModelRow
     from rigidimeter.study.torque_models import ModelledEpoch
-
-__all__ = ["model"]
 
 USUAL = "inertia,damping,stiffness"
 COMPARED = f"{USUAL},reflex,cubic,directional-damping,coulomb"

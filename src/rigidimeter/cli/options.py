@@ -23,20 +23,6 @@ if TYPE_CHECKING:
     from rigidimeter.records import Task
     from rigidimeter.settings import Settings
 
-__all__ = [
-    "CsvOption",
-    "JsonOption",
-    "KeyOption",
-    "NewSessionOption",
-    "NewStudyOption",
-    "Recordings",
-    "RegistryCommand",
-    "SeedOption",
-    "SettingsOption",
-    "StudySeedOption",
-    "reads_recordings",
-]
-
 
 class RegistryCommand(TyperCommand):
     """A command whose help lists formats, estimators and terms, those of `--load` too."""

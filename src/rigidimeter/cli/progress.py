@@ -8,8 +8,6 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-__all__ = ["Meter"]
-
 QUIET_S = 2.0
 """Nothing is shown before this."""
 

@@ -11,12 +11,10 @@ import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption
-from rigidimeter.cli.text_table import text_table
+from rigidimeter.cli.table_lines import text_table
 
 if TYPE_CHECKING:
     from rigidimeter.study import RatingsFound
-
-__all__ = ["ratings"]
 
 
 def ratings(

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from rigidimeter.experiment import PlannedEpoch, Protocol
     from rigidimeter.settings import Settings
 
-__all__ = ["run_loop"]
-
 HOME_TOLERANCE_RAD = 0.05
 """A session is continued from where it began, within 3 deg."""
 

@@ -19,8 +19,6 @@ from rigidimeter.errors import UserError
 if TYPE_CHECKING:
     from rigidimeter.study import StudyResult
 
-__all__ = ["report", "write_page"]
-
 
 @reads_recordings
 def report(

@@ -9,8 +9,6 @@ import typer
 
 from rigidimeter.errors import UserError
 
-__all__ = ["reproduce"]
-
 
 def reproduce(
     out: Annotated[

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from rigidimeter.experiment import Protocol
     from rigidimeter.settings import Settings
 
-__all__ = ["recover", "run"]
-
 
 def run(
     out: NewSessionOption,
@@ -71,8 +69,9 @@ def run(
       rigidimeter run protocol.toml --rig rig.toml --out session
       rigidimeter run --resume session --rig rig.toml --out session-2
     """
+    from rigidimeter.acquisition.processes.loop_process import Realtime
     from rigidimeter.acquisition.processes.recorder import Recording
-    from rigidimeter.acquisition.processes.supervise import Realtime, supervise
+    from rigidimeter.acquisition.processes.supervise import supervise
     from rigidimeter.cli.realtime_rig import run_loop
     from rigidimeter.commissioning import check_record
     from rigidimeter.console import Terminal

@@ -9,8 +9,6 @@ import typer
 from rigidimeter.cli.options import NewSessionOption, SeedOption, SettingsOption
 from rigidimeter.errors import UserError
 
-__all__ = ["simulate"]
-
 
 def simulate(
     out: NewSessionOption,

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from rigidimeter.virtual.study_design import StudyDesign
     from rigidimeter.virtual.study_plan import DayPlan
 
-__all__ = ["demo", "study"]
-
 study = typer.Typer(
     name="study",
     no_args_is_help=True,

@@ -6,18 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = [
-    "Check",
-    "Outcome",
-    "above",
-    "below",
-    "impossible",
-    "number",
-    "untried",
-    "within",
-    "yes",
-]
-
 Outcome = Literal["passed", "failed", "not possible here", "not tried"]
 
 

@@ -21,16 +21,6 @@ from rigidimeter.commissioning.checks import Check
 from rigidimeter.documents import plain_values, write_json
 from rigidimeter.errors import UserError
 
-__all__ = [
-    "A_PERSON_TELLS",
-    "MUST_PASS",
-    "SCHEMA",
-    "CommissioningRecord",
-    "read_record",
-    "record_path",
-    "write_record",
-]
-
 SCHEMA = "rigidimeter.commissioning/1"
 
 MUST_PASS = (

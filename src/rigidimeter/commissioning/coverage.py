@@ -21,8 +21,6 @@ from rigidimeter.documents import plain_values
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings
 
-__all__ = ["EXACT", "LIMITS", "check_record", "covered", "kept_facts"]
-
 VOLATILE = {"status", "bias", "cycle_s", "latched_faults_before"}
 """Values that devices report and that change without meaning another calibration."""
 

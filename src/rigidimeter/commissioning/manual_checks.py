@@ -14,8 +14,6 @@ import numpy as np
 from rigidimeter.commissioning.checks import Check, impossible, untried, within, yes
 from rigidimeter.commissioning.trial import Operator, Setup, drop_old_samples, hold, listen, trial
 
-__all__ = ["ask_operator", "known_angle", "known_torque"]
-
 SETTLE_S = 0.5
 KNOWN_ANGLE_S = 1.0
 ANGLE, TORQUE = "known angle", "known torque"

@@ -8,8 +8,6 @@ from rigidimeter.commissioning.checks import Check, impossible, number, yes
 from rigidimeter.dynamics import Margins, loop_stability, near_instability
 from rigidimeter.settings import Settings
 
-__all__ = ["margin_checks", "on_measured_rig"]
-
 
 def on_measured_rig(settings: Settings, bandwidth_hz: float, delay_s: float) -> Settings:
     """Return the settings with the rig as it was measured.

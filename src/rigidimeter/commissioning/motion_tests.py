@@ -26,17 +26,6 @@ from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
 from rigidimeter.units import rad_from_deg
 
-__all__ = [
-    "ANGLE_PER_COMMAND",
-    "COMPLETED",
-    "small_move_check",
-    "smooth_motion",
-    "step_checks",
-    "steps",
-    "swing",
-    "swing_checks",
-]
-
 ANGLE_PER_COMMAND, COMPLETED = "angle per command", "motions were completed"
 SMALL_MOVE_PERCENT = 30.0
 EXPLAINED = 0.5

@@ -26,15 +26,6 @@ from scipy.optimize import minimize, nnls
 from rigidimeter.commissioning.trial import Array, Readings, new_samples
 from rigidimeter.dynamics import DriveModel
 
-__all__ = [
-    "ArmFit",
-    "Following",
-    "fit_arm",
-    "following",
-    "sent_angle_rad",
-    "velocity_scale",
-]
-
 GRID_HZ = 4000.0
 LONGEST_S = 0.4
 LONGEST_DRIVE_S = 0.2

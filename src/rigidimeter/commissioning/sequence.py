@@ -62,8 +62,6 @@ from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
 
-__all__ = ["commission"]
-
 SETTLE_S = 0.5
 
 

@@ -13,8 +13,6 @@ from rigidimeter.commissioning.trial import Array, Readings, new_samples
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
 
-__all__ = ["facts_checks", "lateness", "lost_check", "noise_checks", "rate_checks"]
-
 BAD_COUNTS = ("lost", "damaged", "short", "reordered", "repeated", "refused", "unsent")
 FEWEST_VALUES = 3
 BRAKING = "braking_rad_s2"

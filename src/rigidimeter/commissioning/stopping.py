@@ -29,8 +29,6 @@ from rigidimeter.devices.base import DeviceError, Rig
 from rigidimeter.guard import Cause
 from rigidimeter.units import rad_from_deg
 
-__all__ = ["emergency_stop_checks", "watchdog_checks"]
-
 SETTLE_S = 0.3
 STOPPED_S = 0.4
 MOST_DEG = 0.2

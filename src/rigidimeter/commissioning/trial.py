@@ -23,23 +23,6 @@ from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import Settings
 from rigidimeter.settings.commissioning_settings import CommissioningSettings
 
-__all__ = [
-    "Array",
-    "Operator",
-    "Readings",
-    "Setup",
-    "Stretch",
-    "Timebase",
-    "TrialResult",
-    "drop_old_samples",
-    "follow",
-    "hold",
-    "listen",
-    "new_samples",
-    "stopped_for",
-    "trial",
-]
-
 Array = NDArray[np.float64]
 Stretch = Callable[[ControlLoop], object]
 

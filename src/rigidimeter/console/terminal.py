@@ -24,8 +24,6 @@ from rigidimeter.acquisition.processes.shared_status import (
 from rigidimeter.acquisition.run_states import Command, Order, State
 from rigidimeter.guard import Cause
 
-__all__ = ["KEYS", "Terminal", "order_of", "status_line"]
-
 KEYS = {
     "p": Command.PAUSE,
     "n": Command.PAUSE_NOW,

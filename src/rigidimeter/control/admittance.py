@@ -17,8 +17,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-__all__ = ["Admittance", "admittance", "admittance_step"]
-
 
 class Admittance(NamedTuple):
     """Coefficients of one step: `decay` is a pure number, `gain` in rad/s per N·m."""

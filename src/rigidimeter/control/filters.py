@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-__all__ = ["Biquad", "BiquadState", "biquad_step", "butterworth_lowpass"]
-
 
 class Biquad(NamedTuple):
     """H(z) = (b0 + b1 z⁻¹ + b2 z⁻²) / (1 + a1 z⁻¹ + a2 z⁻²)."""

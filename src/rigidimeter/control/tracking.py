@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["minimum_jerk", "tracking_step"]
-
 
 def tracking_step(
     gain_per_s: float, target_rad: float, target_velocity_rad_s: float, angle_rad: float

@@ -21,18 +21,6 @@ from typing import Any, NamedTuple, Protocol
 from rigidimeter.errors import UserError
 from rigidimeter.guard import Cause
 
-__all__ = [
-    "DeviceError",
-    "DeviceFacts",
-    "MotionSample",
-    "Now",
-    "Reading",
-    "Rig",
-    "TorqueSample",
-    "TorqueSensor",
-    "VelocityDrive",
-]
-
 Now = Callable[[], float]
 """Seconds on the loop's clock, monotonic."""
 

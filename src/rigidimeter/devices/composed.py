@@ -25,8 +25,6 @@ from rigidimeter.devices.base import (
 from rigidimeter.devices.enable_line import EnableLine
 from rigidimeter.guard import REACTIONS, Cause
 
-__all__ = ["ComposedRig", "Home"]
-
 ATTEMPTS, ATTEMPT_S = 50, 0.002
 """How often, and at what interval, the first samples after enabling are polled."""
 

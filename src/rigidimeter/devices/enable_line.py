@@ -27,8 +27,6 @@ from typing import Any, ClassVar, Literal, Protocol
 from rigidimeter.devices.base import DeviceError, Now
 from rigidimeter.settings.section import Section
 
-__all__ = ["EnableLine", "SerialEnableLine", "SerialEnableLineSettings"]
-
 
 class EnableLine(Protocol):
     """A contact without which the drive has no power."""

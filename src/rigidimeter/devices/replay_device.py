@@ -21,8 +21,6 @@ from numpy.typing import ArrayLike
 
 from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, TorqueSample
 
-__all__ = ["ReplayDrive", "ReplaySensor"]
-
 TORQUE = ("torque_nm", "torque_time_s")
 MOTION = ("angle_rad", "velocity_rad_s", "motion_time_s")
 FASTEST_RAD_S = 100.0

@@ -36,8 +36,6 @@ from rigidimeter.documents import read_toml
 from rigidimeter.errors import UserError
 from rigidimeter.settings.messages import sentence
 
-__all__ = ["DRIVERS", "RigFile", "load_rig"]
-
 DRIVERS: Mapping[str, Mapping[str, str]] = {
     "torque_sensor": {
         "ati-rdt": "rigidimeter.devices.ati.rdt:AtiRdt",

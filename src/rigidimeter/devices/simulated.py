@@ -29,8 +29,6 @@ from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.settings import RigSettings, SubjectSettings
 from rigidimeter.units import rad_from_deg
 
-__all__ = ["SimulatedRig"]
-
 
 class SimulatedRig:
     """Drive, arm, subject and sensors, one tick for each `read`.

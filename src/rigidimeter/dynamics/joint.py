@@ -22,13 +22,6 @@ from numpy.typing import ArrayLike, NDArray
 from rigidimeter.dynamics.velocity_drive import held_response
 from rigidimeter.settings import SubjectSettings
 
-__all__ = [
-    "JointDynamics",
-    "arm_response",
-    "arm_torque_nm",
-    "median_joint",
-]
-
 
 @dataclass(frozen=True)
 class JointDynamics:

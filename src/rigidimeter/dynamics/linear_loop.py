@@ -47,19 +47,6 @@ from rigidimeter.dynamics.velocity_drive import (
 )
 from rigidimeter.settings import ControllerSettings, RigSettings, Settings, SubjectSettings
 
-__all__ = [
-    "Circle",
-    "ClosedLoopMotion",
-    "Loop",
-    "OpenLoop",
-    "Parameters",
-    "Reading",
-    "closed_loop_motion",
-    "on_circle",
-    "reading_pattern",
-    "voluntary_motion_sd",
-]
-
 Parameters = tuple[float, float, float]
 """J, B and K of the joint."""
 

@@ -22,8 +22,6 @@ from rigidimeter.dynamics.linear_loop import reading_pattern
 from rigidimeter.dynamics.velocity_drive import Array, drive_matrices
 from rigidimeter.settings import RigSettings, Settings
 
-__all__ = ["spectral_radius"]
-
 
 def spectral_radius(settings: Settings, joint: JointDynamics) -> float:
     """Return the largest modulus of the closed loop's eigenvalues, for one tick.

@@ -9,16 +9,6 @@ from numpy.typing import NDArray
 
 from rigidimeter.settings import TorqueSensorSettings
 
-__all__ = [
-    "SAME_TIME_S",
-    "between",
-    "moment",
-    "quantised",
-    "sample_time_blocks_s",
-    "sample_times_s",
-    "sensor_density",
-]
-
 SAME_TIME_S = 1e-9
 """Two times closer than this are the same: stamps are sums of rounded numbers."""
 

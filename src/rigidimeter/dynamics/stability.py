@@ -30,15 +30,6 @@ from rigidimeter.dynamics.velocity_drive import Array, Complex
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings
 
-__all__ = [
-    "Margins",
-    "Stability",
-    "loop_margins",
-    "loop_stability",
-    "near_instability",
-    "refuse_unstable",
-]
-
 _POINTS = 4000
 _LOWEST_HZ = 1e-3
 _REFINEMENTS = 4

@@ -22,15 +22,6 @@ from numpy.typing import ArrayLike, NDArray
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.settings import SubjectSettings
 
-__all__ = [
-    "BLOCK_TICKS",
-    "RigStreams",
-    "SubjectTorque",
-    "draw_joint",
-    "rig_streams",
-    "subject_density",
-]
-
 TREMOR_PHASE_DIFFUSION_RAD2_S = 1.0
 """How fast the tremor loses its phase: a line about 0.16 Hz wide, so that it is no pure tone."""
 

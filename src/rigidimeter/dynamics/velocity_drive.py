@@ -27,8 +27,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-__all__ = ["ArmMotion", "Drive", "DriveModel", "DriveState", "drive", "drive_step"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Time = TypeVar("Time", float, Array)

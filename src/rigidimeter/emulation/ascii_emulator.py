@@ -26,8 +26,6 @@ from typing import Any
 from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.emulation.trapezoid import Ramps, Trapezoid
 
-__all__ = ["MISBEHAVIOURS", "AsciiEmulator"]
-
 MISBEHAVIOURS = {
     "silent": "sends no replies",
     "error_replies": "refuses every request with this code",

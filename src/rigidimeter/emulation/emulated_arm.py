@@ -16,8 +16,6 @@ import numpy as np
 from rigidimeter.dynamics import DriveState, arm_torque_nm, drive, drive_step
 from rigidimeter.dynamics.joint import JointDynamics
 
-__all__ = ["EmulatedArm"]
-
 LONGEST_STEP_S = 0.5
 DAMPING_RATIO = 0.7071
 """Of the drive."""

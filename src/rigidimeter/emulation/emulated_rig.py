@@ -37,11 +37,11 @@ from rigidimeter.documents import plain_values
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.emulation import ascii_emulator
 from rigidimeter.emulation.cia402 import cia402_emulator as cia402
+from rigidimeter.emulation.cia402 import servo
 from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.emulation.rdt import rdt_emulator as rdt
+from rigidimeter.emulation.rdt import rdt_records
 from rigidimeter.errors import UserError
-
-__all__ = ["MULTICAST_GROUP", "EmulatedRig", "serve"]
 
 MULTICAST_GROUP = "239.74.163.2"
 """Of the emulated CAN bus; each rig uses its own port."""
@@ -219,8 +219,8 @@ class EmulatedRig:
 
     def _misbehaviours(self, role: str) -> Mapping[str, str]:
         if role == "torque":
-            return rdt.MISBEHAVIOURS
-        return cia402.MISBEHAVIOURS if self._kind == "cia402" else ascii_emulator.MISBEHAVIOURS
+            return rdt_records.MISBEHAVIOURS
+        return servo.MISBEHAVIOURS if self._kind == "cia402" else ascii_emulator.MISBEHAVIOURS
 
     def _tell_drive(self, name: str, value: float | None) -> None:
         # Emergency codes, modes and bits are whole numbers.

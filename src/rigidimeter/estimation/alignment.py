@@ -27,8 +27,6 @@ from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, torque_earlier
 from rigidimeter.records import Delay, Epoch
 
-__all__ = ["MOST_EPOCHS", "aligned", "aligned_prepared", "estimate_delays"]
-
 MOST_EPOCHS = 12
 """A delay is common to its source; from this many epochs it is known well enough."""
 

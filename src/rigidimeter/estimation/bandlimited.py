@@ -31,8 +31,6 @@ from rigidimeter.estimation.signals import (
 from rigidimeter.records import Epoch
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE, EstimationSettings
 
-__all__ = ["BANDLIMITED", "band_hz", "bandlimited_signals", "zero_phase_band"]
-
 EDGE_SAMPLES = 10
 """Samples of the slowest channel dropped at each end before filtering.
 

@@ -19,8 +19,6 @@ from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel, Epoch, Fit, readonly
 from rigidimeter.settings import Settings, settings_from
 
-__all__ = ["identify"]
-
 
 def identify(
     *,

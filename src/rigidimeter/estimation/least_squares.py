@@ -34,8 +34,6 @@ from rigidimeter.estimation.uncertainty import (
 from rigidimeter.records import Epoch, Fit, Outcome
 from rigidimeter.settings import EstimationSettings
 
-__all__ = ["POOLED_TEXT", "fit_inertia_damping_stiffness", "fit_least_squares", "intervals_text"]
-
 SignalsOf = Callable[[Epoch, EstimationSettings], Signals]
 
 BOOTSTRAP_SEED = 1

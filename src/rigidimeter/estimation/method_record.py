@@ -11,8 +11,6 @@ from rigidimeter.estimation.signals import Signals
 from rigidimeter.records import Epoch, Fit
 from rigidimeter.settings import EstimationSettings
 
-__all__ = ["FitEpochs", "Method", "Progress"]
-
 Progress = Callable[[float], None]
 """Called with the amount of work that was done since the last call."""
 

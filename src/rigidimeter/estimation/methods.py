@@ -15,16 +15,6 @@ from rigidimeter.estimation.signals import Signals
 from rigidimeter.records import Epoch, Fit
 from rigidimeter.settings import EstimationSettings, Settings
 
-__all__ = [
-    "METHODS",
-    "choose_method",
-    "epoch_signals",
-    "fit_epoch",
-    "fit_epochs",
-    "method_named",
-    "method_names",
-]
-
 METHODS: list[Method] = [PUBLISHED, BANDLIMITED, IV, SPECTRAL, ML]
 """Every estimator. Code from outside the package may append its own."""
 

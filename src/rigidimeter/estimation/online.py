@@ -29,16 +29,6 @@ from typing import Any, NamedTuple
 
 from rigidimeter.settings import OnlineSettings
 
-__all__ = [
-    "STATE_SIZE",
-    "OnlineDesign",
-    "OnlineEstimate",
-    "compiled_online_step",
-    "online_design",
-    "online_reading",
-    "online_step",
-]
-
 # Where things stand in the state.
 _STARTED = 0
 _FILTERS = 1  # torque, angle, velocity; three sections each; two states each

@@ -17,8 +17,6 @@ from rigidimeter.estimation.signals import Signals
 from rigidimeter.records import Channel, Epoch, Outcome
 from rigidimeter.settings import EstimationSettings, Settings
 
-__all__ = ["PreparedEpoch", "Source", "prepare", "torque_earlier"]
-
 MOST_TRIED = 5
 """So many epochs of a source may fail to show the drive before it is taken for unknown."""
 

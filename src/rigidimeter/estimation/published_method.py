@@ -24,8 +24,6 @@ from rigidimeter.estimation.signals import Array, Signals, kinematics, motion_ch
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import EstimationSettings
 
-__all__ = ["PUBLISHED", "published_signals"]
-
 
 def published_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
     """Return the regressors and the torque of Eq. 6, at the rate of the torque channel.

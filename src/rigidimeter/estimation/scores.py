@@ -31,8 +31,6 @@ from rigidimeter.estimation.signals import (
 from rigidimeter.records import Epoch, Motion, Outcome, Score
 from rigidimeter.settings import EstimationSettings, ScoreSettings
 
-__all__ = ["Cycles", "angular_impulse_nm_s", "loop_area_j", "score_epoch", "scoring_cycles"]
-
 POINTS_PER_CYCLE = 4096
 """Enough that the chords miss less than 4e-7 of the loop."""
 

@@ -8,8 +8,6 @@ from rigidimeter.estimation.signals import motion_channels
 from rigidimeter.records import Epoch, Outcome
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE, EstimationSettings
 
-__all__ = ["after_fit", "before_fit", "unusable"]
-
 LEAST_BAND_RATIO = 4.0
 """A band narrower than two octaves cannot distinguish three parameters."""
 

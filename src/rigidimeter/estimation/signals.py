@@ -16,8 +16,6 @@ from scipy.interpolate import CubicSpline
 
 from rigidimeter.records import Channel, Epoch
 
-__all__ = ["Signals", "grid_rate_hz", "kinematics", "uniform_grid"]
-
 Array = NDArray[np.float64]
 
 GRID_POINTS_PER_CYCLE = 20

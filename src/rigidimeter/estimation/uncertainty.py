@@ -26,17 +26,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, stats
 
-__all__ = [
-    "Bootstrap",
-    "Estimate",
-    "Scatter",
-    "block_bootstrap",
-    "correlation_samples",
-    "cramer_rao_coloured",
-    "hac_covariance",
-    "t_interval",
-]
-
 Array = NDArray[np.float64]
 
 COSINES = 0.8

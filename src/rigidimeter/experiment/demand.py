@@ -32,8 +32,6 @@ from rigidimeter.dynamics import JointDynamics, arm_response
 from rigidimeter.settings import GAP_S, ControllerSettings, GuardSettings
 from rigidimeter.units import deg_from_rad, rad_from_deg
 
-__all__ = ["Demand", "beyond_limits", "demand", "ideal_response", "time_constant_s"]
-
 
 @dataclass(frozen=True)
 class Demand:

@@ -17,8 +17,6 @@ from rigidimeter.experiment.perturbations import period_s
 from rigidimeter.experiment.precision import PARAMETERS, Errors, Precision
 from rigidimeter.units import rad_from_deg
 
-__all__ = ["SCHEMA", "design_document"]
-
 SCHEMA = "rigidimeter.design/1"
 
 

@@ -35,17 +35,6 @@ from rigidimeter.errors import UserError
 from rigidimeter.experiment.precision import PARAMETERS, predicted_precision
 from rigidimeter.settings import Settings
 
-__all__ = [
-    "Detection",
-    "Effect",
-    "Wanted",
-    "detect",
-    "epoch_sd",
-    "planned_epochs",
-    "ranksum_power",
-    "sample_size",
-]
-
 _MOST_EPOCHS = 5000
 """Where the search for a sample size ends."""
 

@@ -18,8 +18,6 @@ from dataclasses import dataclass
 
 from rigidimeter.dynamics.joint import JointDynamics
 
-__all__ = ["APPENDIX_A", "Corner", "Corners", "corners"]
-
 APPENDIX_A = JointDynamics(inertia_kg_m2=0.0052, damping_nm_s_rad=0.088, stiffness_nm_rad=1.5)
 """The nominal arm with robot and controller of App. A, of which Eq. 8 is half in each value.
 

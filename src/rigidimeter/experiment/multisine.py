@@ -29,14 +29,6 @@ from rigidimeter.experiment.precision import predicted_precision
 from rigidimeter.records import readonly
 from rigidimeter.settings import Settings
 
-__all__ = [
-    "MultisineComparison",
-    "compare_multisine",
-    "crest_factor",
-    "multisine_nm",
-    "multisine_phases_rad",
-]
-
 _POINTS_PER_CYCLE = 16
 _CLIP_AT = 0.9
 """Each step clips at this part of the peak, and at ever more of it."""

@@ -37,15 +37,6 @@ from rigidimeter.experiment.precision import Precision, predicted_precision
 from rigidimeter.settings import PrbsSettings, Settings
 from rigidimeter.units import rad_from_deg
 
-__all__ = [
-    "CRITERIA",
-    "Candidate",
-    "assess",
-    "check_criterion",
-    "optimise",
-    "strongest_amplitude_nm",
-]
-
 _VOLUNTARY_SDS = 3.0
 _HALVINGS = 30
 

@@ -33,8 +33,6 @@ from rigidimeter.settings import Settings, settings_from
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Design", "design"]
-
 
 @dataclass(frozen=True)
 class Design:

@@ -26,18 +26,6 @@ from rigidimeter.experiment.perturbations import chip_count, period_s, prbs_nm
 from rigidimeter.records import readonly
 from rigidimeter.settings import PrbsSettings
 
-__all__ = [
-    "HALF_POWER_DB",
-    "BandCheck",
-    "Spectrum",
-    "check_band",
-    "envelope_db",
-    "envelope_edge_hz",
-    "line_spacing_hz",
-    "plateau_n2m2_hz",
-    "power_spectrum",
-]
-
 DROP_DB = 6.0
 """How far below its plateau the perturbation may be at an edge of the wanted band."""
 

@@ -39,17 +39,6 @@ from rigidimeter.errors import UserError
 from rigidimeter.settings import PrbsSettings, SinusoidSettings
 from rigidimeter.units import rad_from_deg
 
-__all__ = [
-    "as_written",
-    "chip_count",
-    "period_s",
-    "prbs_levels",
-    "prbs_nm",
-    "sinusoid",
-    "tick_count",
-    "tick_times_s",
-]
-
 
 def as_written(value: float, name: str) -> Fraction:
     """Return the shortest decimal that reads back as this float, as an exact fraction.

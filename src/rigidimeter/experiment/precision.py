@@ -59,8 +59,6 @@ from rigidimeter.experiment.predicted_record import (
 from rigidimeter.records import readonly
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE, RigSettings, Settings, SubjectSettings
 
-__all__ = ["PARAMETERS", "Errors", "Precision", "predicted_precision"]
-
 _MOST_CONDITION = 1e12
 """Above this condition number of scaled regressors the errors are not worth printing."""
 

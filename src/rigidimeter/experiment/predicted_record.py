@@ -49,16 +49,6 @@ from rigidimeter.settings import (
     SubjectSettings,
 )
 
-__all__ = [
-    "Layout",
-    "Record",
-    "expected_record",
-    "layout",
-    "noise_covariance",
-    "noise_spectrum",
-    "weighted_products",
-]
-
 _MEMORY = 10.0
 """The autocovariance of the subject's torque has decayed after so many periods of its lowest
 frequency, or of 2 s for the tremor."""

@@ -15,8 +15,6 @@ import numpy as np
 from rigidimeter.records import Task
 from rigidimeter.settings import PrbsSettings, ProtocolSettings, SinusoidSettings
 
-__all__ = ["PlannedEpoch", "Protocol", "draw_rests_s", "plan", "rest_generator"]
-
 _REST_STREAM = 0x7265_7374
 """Sets the rests' random stream apart from others that start at the same recorded seed."""
 

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["REACTIONS", "Cause", "Reaction"]
-
 
 class Reaction(IntEnum):
     """What is done, from the weakest to the strongest.

@@ -12,8 +12,6 @@ from rigidimeter.guard.causes import Cause, Reaction
 from rigidimeter.settings import GAP_S, Settings
 from rigidimeter.units import rad_from_deg
 
-__all__ = ["GuardLimits", "GuardState", "guard_limits", "guard_state", "released"]
-
 OVERSPEED = 1.25
 """A joint this much above the speed limit is out of the drive's control."""
 

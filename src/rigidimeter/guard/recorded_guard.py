@@ -18,8 +18,6 @@ from rigidimeter.guard.causes import Cause, Reaction
 from rigidimeter.guard.limits import GuardLimits, GuardState, guard_state, released
 from rigidimeter.guard.step import guard_step
 
-__all__ = ["Replayed", "replay"]
-
 _INPUTS = (
     *("velocity_request_rad_s", "torque_nm", "angle_rad", "velocity_rad_s"),
     *("motion_time_s", "torque_time_s"),

@@ -39,8 +39,6 @@ from rigidimeter.guard.limits import GuardLimits, GuardState
 from rigidimeter.guard.watch import energy_after, found_wrong, outside
 from rigidimeter.settings import Settings
 
-__all__ = ["Limited", "guard_step", "why_ended"]
-
 
 class Limited(IntEnum):
     """Which limit changed the command of a tick; the gravest one is named."""

@@ -26,8 +26,6 @@ from numpy.typing import NDArray
 from rigidimeter.guard.causes import Cause
 from rigidimeter.guard.limits import GuardLimits
 
-__all__ = ["energy_after", "found_wrong", "outside"]
-
 
 def energy_after(energy_j: float, power_w: float, elapsed_s: float) -> float:
     """Return the energy that went to and fro, after a stretch at this power.

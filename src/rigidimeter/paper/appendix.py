@@ -13,16 +13,6 @@ from rigidimeter.paper.paper_figures import arm_bode
 from rigidimeter.reporting.contents import Figure
 from rigidimeter.reporting.numbers import number
 
-__all__ = [
-    "bandwidth",
-    "equation_8",
-    "figure_3a",
-    "forearm_inertia",
-    "largest_bandwidth",
-    "total_damping",
-    "total_inertia",
-]
-
 BANDWIDTH_PERCENT = 5.0
 """How far a bandwidth may be from a printed one."""
 

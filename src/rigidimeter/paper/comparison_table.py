@@ -19,20 +19,6 @@ from typing import Any, Literal, TypeAlias
 from rigidimeter.reporting.contents import Figure
 from rigidimeter.reporting.numbers import number
 
-__all__ = [
-    "AGREES",
-    "DIFFERS",
-    "UNPUBLISHED",
-    "VERDICTS",
-    "Check",
-    "Row",
-    "Verdict",
-    "bounded",
-    "near",
-    "rounded",
-    "within_percent",
-]
-
 Verdict: TypeAlias = Literal["agrees", "differs", "cannot be computed from what was published"]
 
 AGREES: Verdict = "agrees"

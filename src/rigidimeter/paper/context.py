@@ -23,8 +23,6 @@ from rigidimeter.virtual.study_design import PAPER, StudyDesign
 from rigidimeter.virtual.study_plan import plan_study
 from rigidimeter.virtual.virtual_study import study_length_s, write_virtual_study
 
-__all__ = ["DEFAULT_SEED", "Context"]
-
 DEFAULT_SEED = 2023
 
 T = TypeVar("T")

@@ -30,16 +30,6 @@ from rigidimeter.reporting.numbers import number
 from rigidimeter.settings import ControllerSettings, PrbsSettings, Settings
 from rigidimeter.units import deg_from_rad, per_rad_from_per_deg
 
-__all__ = [
-    "CLOCKS_HZ",
-    "READINGS",
-    "equation_3",
-    "equation_4",
-    "equation_5",
-    "position_sd_deg",
-    "units",
-]
-
 CLOCKS_HZ = (20.0, 22.6)
 """Clocks of a 7-bit sequence that reach 10 Hz: by the band of Sec. 2.4.3, and by half power."""
 

@@ -22,8 +22,6 @@ from rigidimeter.paper.controller import READINGS
 from rigidimeter.paper.simulated_epochs import Triple, errors_percent, signed
 from rigidimeter.settings import Settings
 
-__all__ = ["FILTERS", "equation_6", "highpass", "highpass_errors_percent"]
-
 FILTERS = ("causal", "zero phase")
 """The paper does not say which way its filter runs, nor its order; second order here."""
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.reporting.style import GREY, note, plain_ticks, styled
 
-__all__ = ["arm_bode", "sensitivity", "torque_traces"]
-
 _BODE = (("#222222", "-"), ("#0072B2", (0, (1, 1.5))), ("#D55E00", "--"), ("#009E73", "-."))
 """Colour and dashes of each arm."""
 

@@ -18,8 +18,6 @@ from rigidimeter.reporting.page import data_uri
 from rigidimeter.reporting.style import svg_text
 from rigidimeter.version import __version__
 
-__all__ = ["drawn", "ledger_text", "render_page", "tally", "write_ledger"]
-
 _SHORT = {AGREES: "agrees", DIFFERS: "differs", UNPUBLISHED: "unpublished"}
 """As names of CSS classes."""
 

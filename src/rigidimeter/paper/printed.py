@@ -10,35 +10,6 @@ from typing import NamedTuple
 
 from rigidimeter.dynamics.joint import JointDynamics
 
-__all__ = [
-    "APP_A_BODY_MASS_KG",
-    "APP_A_CONTROLLER_DAMPING",
-    "APP_A_CONTROLLER_INERTIA",
-    "APP_A_DAMPING_TOTAL",
-    "APP_A_ELBOW_DAMPING",
-    "APP_A_FOREARM_INERTIA",
-    "APP_A_FOREARM_SHARE",
-    "APP_A_INERTIA_TOTAL",
-    "APP_A_ROBOT_INERTIA",
-    "BANDWIDTH_HZ",
-    "BAND_HZ",
-    "CONTROLLER_DAMPING",
-    "CONTROLLER_INERTIA",
-    "COUNTS",
-    "EPOCHS_A_CONDITION",
-    "EQUATION_8",
-    "FIG_4",
-    "FIG_6",
-    "FIG_8_INERTIA",
-    "MEASURED",
-    "POSITION_SD_DEG",
-    "SEC_34",
-    "SEC_34_MEAN",
-    "SEC_34_SD",
-    "SESSION_MIN",
-    "Measured",
-]
-
 CONTROLLER_INERTIA, CONTROLLER_DAMPING = 0.0008, 0.028
 """J_c and B_c: per degree in Sec. 2.4.2, per radian in App. A."""
 

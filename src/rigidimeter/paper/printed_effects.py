@@ -20,18 +20,6 @@ from rigidimeter.reporting.numbers import number, p_value
 from rigidimeter.statistics import PublishedEffect, compare_published, effect_from_p, joint_test
 from rigidimeter.study import RatingsFound
 
-__all__ = [
-    "better_than_work",
-    "f_test",
-    "line_of_table_2",
-    "n_from",
-    "order_of_effects",
-    "p_from",
-    "p_of_text",
-    "r_from",
-    "ratings_of",
-]
-
 P_PERCENT = 5.0
 """How far two prints of one p may be apart."""
 

@@ -23,17 +23,6 @@ from rigidimeter.reporting.numbers import number
 from rigidimeter.reporting.sections.perturbation_figure import perturbation, spectrum
 from rigidimeter.settings import BlockSettings
 
-__all__ = [
-    "cycles_counted",
-    "cycles_of_epoch",
-    "cycles_of_motion",
-    "figure_3b",
-    "figure_4a",
-    "one_stiffness",
-    "session_length",
-    "table_1",
-]
-
 EDGE_DB = -6.0
 """Down to where the envelope counts as exciting."""
 

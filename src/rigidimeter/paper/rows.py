@@ -19,8 +19,6 @@ from rigidimeter.paper import virtual_rows as virtual
 from rigidimeter.paper.comparison_table import Row
 from rigidimeter.paper.context import Context
 
-__all__ = ["MAKERS", "SECTIONS", "chosen", "make_rows"]
-
 Maker = Callable[[Context], Row]
 
 SECTIONS: Mapping[str, Mapping[str, Mapping[str, Any]]] = tomllib.loads(

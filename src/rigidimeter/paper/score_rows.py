@@ -33,16 +33,6 @@ from rigidimeter.reporting.numbers import number
 from rigidimeter.settings import Settings
 from rigidimeter.units import rad_from_deg
 
-__all__ = [
-    "equation_1",
-    "equation_2",
-    "imposed_epoch",
-    "scaled",
-    "scored",
-    "work_change_percent",
-    "work_closed_form_j",
-]
-
 SCORE_PERCENT = 0.5
 """How far a score may be from its closed form; the band-pass remembers the start of the motion."""
 

@@ -20,8 +20,6 @@ from rigidimeter.reporting.contents import Figure
 from rigidimeter.reporting.numbers import number
 from rigidimeter.settings import Settings
 
-__all__ = ["cancelling", "delay", "figure_6a", "figure_6b", "left_sum"]
-
 PERCENTS = (25.0, 50.0, 100.0, 150.0, 175.0)
 """Values of one parameter in percent of the median, as in Fig. 6; 100 is the median itself."""
 

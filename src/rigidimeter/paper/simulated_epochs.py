@@ -27,20 +27,6 @@ from rigidimeter.settings import Settings, SubjectSettings, parse_settings
 from rigidimeter.virtual.batch import simulate_epochs
 from rigidimeter.virtual.study_design import PAPER_RATES
 
-__all__ = [
-    "NoiseRuns",
-    "Triple",
-    "errors_percent",
-    "implied_noise",
-    "mean_errors",
-    "noise_runs",
-    "signed",
-    "spread_of_errors",
-    "voluntary_errors_percent",
-    "voluntary_instruments",
-    "voluntary_least_squares",
-]
-
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 

@@ -33,15 +33,6 @@ from rigidimeter.statistics import difference, fit_mixed, summarise
 from rigidimeter.study import Comparison
 from rigidimeter.study.rating_table import groupings
 
-__all__ = [
-    "equation_7",
-    "figure_5a",
-    "figure_7",
-    "measure_figure",
-    "table_2",
-    "torque_figure",
-]
-
 Array = NDArray[np.float64]
 
 _COLOURS = condition_colours(("OFF", "DBS"))

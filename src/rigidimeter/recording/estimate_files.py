@@ -22,14 +22,6 @@ from rigidimeter.records import (
     readonly,
 )
 
-__all__ = [
-    "ESTIMATES_SCHEMA",
-    "estimates_document",
-    "read_estimates",
-    "write_estimates_csv",
-    "write_estimates_json",
-]
-
 ESTIMATES_SCHEMA = "rigidimeter.estimates/1"
 
 _PARAMETERS = tuple(parameter.name for parameter in PARAMETERS)

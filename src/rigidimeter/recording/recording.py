@@ -13,8 +13,6 @@ from rigidimeter.recording.formats import ReadOptions, read_recording, reader_of
 from rigidimeter.records import Epoch, Notice, Task
 from rigidimeter.settings import Settings, load_settings, settings_from
 
-__all__ = ["Recording", "read"]
-
 _RECORDED_WITH = ("controller", "guard", "prbs", "sinusoid", "rig")
 _ANALYSED_WITH = ("estimation", "scores")
 

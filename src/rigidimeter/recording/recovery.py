@@ -16,8 +16,6 @@ from rigidimeter.recording.sample_log import (
 )
 from rigidimeter.recording.session_folder import EVENTS, SAMPLES, lock, read_manifest
 
-__all__ = ["Recovery", "recover"]
-
 
 @dataclass(frozen=True)
 class Recovery:

@@ -13,8 +13,6 @@ from rigidimeter.recording.session_epochs import session_settings
 from rigidimeter.recording.session_folder import EVENTS, lock, read_manifest
 from rigidimeter.settings import Settings
 
-__all__ = ["Rest", "count_epochs", "rest_of"]
-
 
 @dataclass(frozen=True)
 class Rest:

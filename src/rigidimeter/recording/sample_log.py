@@ -20,19 +20,6 @@ from numpy.typing import NDArray
 from rigidimeter.documents import json_line
 from rigidimeter.errors import UserError
 
-__all__ = [
-    "BATCH_S",
-    "SAMPLE_UNITS",
-    "Sample",
-    "SampleLog",
-    "append_event",
-    "append_line",
-    "read_events",
-    "read_samples",
-    "sample_dtypes",
-    "stream_extent",
-]
-
 END_OF_STREAM = b"\xff\xff\xff\xff\x00\x00\x00\x00"
 
 BATCH_S = 0.1

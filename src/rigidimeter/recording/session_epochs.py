@@ -14,8 +14,6 @@ from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES, read
 from rigidimeter.records import Channel, Epoch, Motion, Notice, Outcome
 from rigidimeter.settings import Settings, parse_settings
 
-__all__ = ["is_session", "read_session", "session_settings"]
-
 MUCH_LIMITED = 0.01
 """Above this share of limited ticks there is a warning."""
 

@@ -32,17 +32,6 @@ from rigidimeter.recording.sample_log import (
 from rigidimeter.settings import Settings, dump_settings
 from rigidimeter.version import __version__
 
-__all__ = [
-    "EVENTS",
-    "MANIFEST",
-    "SAMPLES",
-    "SCHEMA",
-    "Ending",
-    "SessionWriter",
-    "lock",
-    "read_manifest",
-]
-
 MANIFEST, SAMPLES, EVENTS = "manifest.json", "samples.arrows", "events.jsonl"
 SCHEMA = "rigidimeter.session/1"
 

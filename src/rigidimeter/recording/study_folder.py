@@ -24,9 +24,6 @@ from rigidimeter.recording.formats.text_table import cell_number
 from rigidimeter.recording.study_toml import STUDY_FILE, StudyToml, read_study_toml
 from rigidimeter.records import Notice
 
-__all__ = ["TABLE_COLUMNS", "Row", "StudyFolder", "is_study", "read_study_folder"]
-
-
 TABLE_COLUMNS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "sessions": (("path", "subject", "day", "condition"), ("part", "note")),
     "ratings": (("subject", "day", "condition", "examiner", "score"), ("note",)),

@@ -17,17 +17,6 @@ from rigidimeter.errors import UserError
 from rigidimeter.settings.messages import sentence
 from rigidimeter.settings.section import Section
 
-__all__ = [
-    "STUDY_FILE",
-    "STUDY_SCHEMA",
-    "AnalysisTable",
-    "ConditionTable",
-    "RatingTable",
-    "StudyToml",
-    "is_outside",
-    "read_study_toml",
-]
-
 STUDY_FILE = "study.toml"
 STUDY_SCHEMA = "rigidimeter.study/1"
 

@@ -14,8 +14,6 @@ from rigidimeter.records.parameters import PARAMETERS
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Analysis", "Findings"]
-
 MOST_EPOCHS = 20
 """Epochs shown one by one; of more only the first are."""
 

@@ -11,18 +11,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "CHANNEL_UNITS",
-    "Channel",
-    "Epoch",
-    "Motion",
-    "Notice",
-    "Outcome",
-    "OutcomeKind",
-    "Task",
-    "readonly",
-]
-
 Task = Literal["prbs", "sinusoid"]
 OutcomeKind = Literal["included", "excluded", "failed"]
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from rigidimeter.records.epochs import Outcome, readonly
 from rigidimeter.records.parameters import PARAMETER_VECTORS, PARAMETERS
 
-__all__ = ["FIT_NUMBERS", "STATISTICS", "Delay", "Finding", "Fit", "Score"]
-
 STATISTICS = ("r_squared", "vaf_percent", "condition_number", "residual_sd_nm")
 """How well a fit explains the torque, beside its parameters."""
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["PARAMETERS", "PARAMETER_VECTORS", "Parameter"]
-
 
 class Parameter(NamedTuple):
     """A parameter of Eq. 3: its name with the unit in it, its symbol, its unit, and in words."""

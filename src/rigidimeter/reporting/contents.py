@@ -14,20 +14,6 @@ from matplotlib.figure import Figure as Drawing
 
 from rigidimeter.study import StudyResult
 
-__all__ = [
-    "INTERVAL",
-    "SESSION",
-    "Block",
-    "Column",
-    "Figure",
-    "Kind",
-    "Section",
-    "Table",
-    "bullets",
-    "from_study_folder",
-    "paragraph",
-]
-
 Kind = Literal[
     "text",
     "label",

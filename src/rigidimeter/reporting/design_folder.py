@@ -11,8 +11,6 @@ from rigidimeter.experiment import Design, design_document, prbs_toml
 from rigidimeter.reporting.open_loop import bode
 from rigidimeter.reporting.style import svg_text
 
-__all__ = ["write_design_folder"]
-
 
 def write_design_folder(folder: Path, design: Design) -> list[str]:
     """Write what will be commanded and what is predicted; return the names of the files.

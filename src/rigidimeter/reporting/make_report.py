@@ -14,8 +14,6 @@ from rigidimeter.records import Analysis
 from rigidimeter.reporting.page import write_report
 from rigidimeter.study import StudyResult, compare, compare_analysis, estimate, provenance
 
-__all__ = ["recording_result", "report"]
-
 TITLE = "Joint rigidity"
 
 AnyPath = str | PathLike[str]

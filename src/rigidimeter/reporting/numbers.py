@@ -6,17 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 from pathlib import PurePath
 
-__all__ = [
-    "condition_name",
-    "interval",
-    "number",
-    "p_and_r",
-    "p_value",
-    "plural",
-    "series",
-    "short_names",
-]
-
 SMALLEST_P = 1e-300
 """Below this a p-value has run out of floating point."""
 

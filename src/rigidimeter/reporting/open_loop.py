@@ -12,8 +12,6 @@ from rigidimeter.dynamics import Loop, Margins
 from rigidimeter.reporting.style import GREY, condition_colours, drawable, note, styled
 from rigidimeter.settings import Settings
 
-__all__ = ["bode"]
-
 _LOWEST_HZ = 0.01
 _FLOOR_DB = -80.0
 

@@ -23,8 +23,6 @@ from rigidimeter.reporting.verdict_text import verdict_sentence
 from rigidimeter.study import StudyResult
 from rigidimeter.version import __version__
 
-__all__ = ["contents", "data_uri", "render_page", "tables", "write_report"]
-
 Contents = Sequence[tuple[Section, Sequence[Block]]]
 """The sections of a result, each with its text, tables and figures."""
 

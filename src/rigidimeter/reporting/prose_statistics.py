@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 
-from rigidimeter.reporting.methods import method_title
+from rigidimeter.reporting.method_words import method_title
 from rigidimeter.reporting.numbers import condition_name, plural, series
 from rigidimeter.reporting.references import Cited
 from rigidimeter.study import StudyResult
-
-__all__ = ["OFFSETS", "offsets_text", "rating_sentences", "test_sentences"]
 
 OFFSETS = {"condition in day": "condition within a day", "subject/day": "day within a subject"}
 """How sentences call what has an offset of its own in a mixed model, where not by its name."""

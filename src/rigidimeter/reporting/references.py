@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["REFERENCES", "Cited", "Prose", "Reference"]
-
 
 class Reference(NamedTuple):
     """How a text names a source, and where it is to be found."""

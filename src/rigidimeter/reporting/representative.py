@@ -12,17 +12,6 @@ from rigidimeter.records import Epoch, Fit, Score
 from rigidimeter.reporting.numbers import short_names
 from rigidimeter.study import StudyResult
 
-__all__ = [
-    "analysed_epoch",
-    "origin_s",
-    "place",
-    "prepared_epochs",
-    "representative_fits",
-    "representatives",
-    "slug",
-]
-
-
 _Result = TypeVar("_Result", Fit, Score)
 
 

@@ -24,21 +24,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-__all__ = [
-    "GREY",
-    "MARKERS",
-    "condition_colours",
-    "condition_markers",
-    "drawable",
-    "listed",
-    "note",
-    "plain_ticks",
-    "spread",
-    "styled",
-    "svg_text",
-    "wrapped",
-]
-
 GREY = "#555555"
 WARN = "#8A3B00"
 _BY_NAME = {"OFF": "#D55E00", "DBS": "#0072B2"}

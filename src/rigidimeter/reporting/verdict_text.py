@@ -23,8 +23,6 @@ from rigidimeter.study import (
     verdict,
 )
 
-__all__ = ["dependence_sentences", "verdict_sentence"]
-
 
 def verdict_sentence(result: StudyResult) -> str:
     """Return which differences are shown, and which effect is the largest."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from rigidimeter.settings.section import Section, quantity
 
-__all__ = ["CommissioningSettings"]
-
 
 class CommissioningSettings(Section):
     """What is tried on a rig, and what it must come to.

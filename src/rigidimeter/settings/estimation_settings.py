@@ -8,17 +8,6 @@ from pydantic import model_validator
 
 from rigidimeter.settings.section import Section, quantity
 
-__all__ = [
-    "FEWEST_LINES",
-    "USABLE_FRACTION_OF_RATE",
-    "DiagnosticLevels",
-    "DiagnosticsSettings",
-    "EstimationSettings",
-    "Level",
-    "OnlineSettings",
-    "ScoreSettings",
-]
-
 USABLE_FRACTION_OF_RATE = 0.4
 """A channel carries information up to half its rate; interpolation is good to about 0.4 of it."""
 

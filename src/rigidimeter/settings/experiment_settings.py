@@ -8,16 +8,6 @@ from pydantic import Field, model_validator
 
 from rigidimeter.settings.section import Section, quantity
 
-__all__ = [
-    "BlockSettings",
-    "MarginsSettings",
-    "MultisineSettings",
-    "OptimiseSettings",
-    "PrbsSettings",
-    "ProtocolSettings",
-    "SinusoidSettings",
-]
-
 
 class PrbsSettings(Section):
     """The torque perturbation: a maximal-length pseudo-random binary sequence."""

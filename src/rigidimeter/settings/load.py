@@ -14,14 +14,6 @@ from rigidimeter.errors import UserError
 from rigidimeter.settings.messages import sentence
 from rigidimeter.settings.models import Settings
 
-__all__ = [
-    "changed_settings",
-    "dump_settings",
-    "load_settings",
-    "parse_settings",
-    "settings_from",
-]
-
 
 def parse_settings(values: Mapping[str, Any], *, source: str = "settings") -> Settings:
     """Validate a nested mapping.

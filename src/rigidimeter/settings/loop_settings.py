@@ -12,8 +12,6 @@ from pydantic import model_validator
 from rigidimeter.settings.section import Section, quantity
 from rigidimeter.units import per_rad_from_per_deg
 
-__all__ = ["GAP_S", "ControllerSettings", "GuardSettings", "LoopSettings", "ZeroingSettings"]
-
 GAP_S = 0.005
 """The position limit holds even when a step comes this late, or a tick late if ticks are longer.
 

@@ -12,8 +12,6 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-__all__ = ["sentence"]
-
 
 def sentence(root: type[BaseModel], values: Mapping[str, Any], detail: ErrorDetails) -> str:
     """Return one sentence for one error that pydantic reports about `values`."""

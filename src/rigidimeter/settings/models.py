@@ -42,8 +42,6 @@ from rigidimeter.settings.rig_settings import (
 )
 from rigidimeter.settings.section import Section
 
-__all__ = ["Settings"]
-
 
 class Settings(Section):
     """Everything that can be set, one table of the TOML file for each field."""

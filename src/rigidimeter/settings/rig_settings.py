@@ -6,8 +6,6 @@ from typing import ClassVar
 
 from rigidimeter.settings.section import Section, quantity
 
-__all__ = ["MotionSensorSettings", "RigSettings", "SubjectSettings", "TorqueSensorSettings"]
-
 
 class TorqueSensorSettings(Section):
     """The virtual torque sensor. `stamp_latency_s` is the part of the latency its stamps know."""

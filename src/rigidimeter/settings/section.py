@@ -6,8 +6,6 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Section", "quantity"]
-
 
 def quantity(default: float, unit: str, low: float, high: float, *, above: bool = False) -> Any:
     """Declare a number with its unit and range.

@@ -17,8 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-__all__ = ["Bootstrapped", "bootstrap"]
-
 Array = NDArray[np.float64]
 Statistic = Callable[..., Array]
 

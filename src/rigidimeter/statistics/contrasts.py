@@ -21,16 +21,6 @@ from scipy.stats import t as t_distribution
 
 from rigidimeter.statistics.mixed import Mixed
 
-__all__ = [
-    "Contrast",
-    "JointTest",
-    "contrast",
-    "difference",
-    "interval_of",
-    "joint_test",
-    "pairwise",
-]
-
 Array = NDArray[np.float64]
 
 _NOTHING = 1e-10

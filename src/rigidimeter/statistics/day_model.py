@@ -25,8 +25,6 @@ from rigidimeter.statistics.contrasts import difference, interval_of
 from rigidimeter.statistics.mixed import fit_mixed, nested
 from rigidimeter.statistics.summary import checked_sample
 
-__all__ = ["DayDifference", "day_difference", "day_medians", "exact_ranksum"]
-
 Array = NDArray[np.float64]
 
 _X, _Y = "x", "y"

@@ -16,15 +16,6 @@ from dataclasses import dataclass
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-__all__ = [
-    "PublishedDifference",
-    "PublishedEffect",
-    "compare_published",
-    "effect_from_p",
-    "largest_r",
-    "rank_biserial_interval",
-]
-
 
 @dataclass(frozen=True)
 class PublishedEffect:

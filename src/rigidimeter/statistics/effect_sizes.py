@@ -21,17 +21,6 @@ from rigidimeter.statistics.effect_from_p import rank_biserial_interval
 from rigidimeter.statistics.ranksum import RankSum, ranksum, u_sigma
 from rigidimeter.statistics.summary import checked_sample
 
-__all__ = [
-    "EffectDifference",
-    "Effects",
-    "TwoGroups",
-    "compare_effects",
-    "effect_sizes",
-    "holm",
-    "rank_biserial",
-    "two_groups",
-]
-
 Array = NDArray[np.float64]
 
 

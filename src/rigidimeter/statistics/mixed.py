@@ -19,8 +19,6 @@ from scipy.stats import chi2
 from rigidimeter.statistics.profiled_likelihood import Point, minimise, products
 from rigidimeter.statistics.summary import checked_sample
 
-__all__ = ["LikelihoodRatio", "Mixed", "fit_mixed", "likelihood_ratio", "nested"]
-
 Array = NDArray[np.float64]
 
 _NOTHING = 1e-10

@@ -19,8 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
-__all__ = ["Point", "Products", "evaluate", "minimise", "products"]
-
 Array = NDArray[np.float64]
 
 _STEPS = 200

@@ -18,8 +18,6 @@ from scipy.stats import mannwhitneyu, norm
 
 from rigidimeter.statistics.summary import checked_sample
 
-__all__ = ["RankSum", "ranksum", "u_sigma"]
-
 
 @dataclass(frozen=True)
 class RankSum:

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Summary", "checked_sample", "summarise"]
-
 
 @dataclass(frozen=True)
 class Summary:

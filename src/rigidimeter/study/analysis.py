@@ -28,8 +28,6 @@ from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Delay, Epoch, Fit, Task
 from rigidimeter.settings import Settings, settings_from
 
-__all__ = ["Preparation", "analyse_prepared", "estimate", "task_of"]
-
 
 class StepCosts(NamedTuple):
     """How long each step takes for one epoch, in ms or so: only proportions matter, to progress.

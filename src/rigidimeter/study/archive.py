@@ -31,8 +31,6 @@ from rigidimeter.study.study_analysis import StudyRead
 from rigidimeter.study.tables import comparison_document, result_tables, table_csv
 from rigidimeter.version import __version__
 
-__all__ = ["ANALYSIS", "INPUTS_SCHEMA", "UNCHANGED", "keep"]
-
 INPUTS_SCHEMA = "rigidimeter.study-inputs/1"
 ANALYSIS = "analysis"
 UNCHANGED = "nothing has changed since the last analysis"

@@ -16,8 +16,6 @@ from rigidimeter.recording.study_toml import ConditionTable
 from rigidimeter.records import Notice
 from rigidimeter.study.results import Condition
 
-__all__ = ["Naming", "naming"]
-
 
 @dataclass(frozen=True)
 class Naming:

@@ -23,8 +23,6 @@ from rigidimeter.study.study_analysis import analyse_study, read_study
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["compare"]
-
 _ALPHA = 0.05
 _FEW_SESSIONS = 10
 

@@ -28,20 +28,6 @@ from rigidimeter.statistics import (
 from rigidimeter.study.measures import MEASURES, Measure, Observation, conditions
 from rigidimeter.study.results import Comparison, DayMedian, EffectPair, SessionEntry, StudyResult
 
-__all__ = [
-    "FEWEST_FOR_TEST",
-    "compare_analysis",
-    "compare_measures",
-    "day_test",
-    "day_tests",
-    "gathered",
-    "measured",
-    "no_days",
-    "observed",
-    "rank_test",
-    "split_pooled",
-]
-
 FEWEST_FOR_TEST = 3
 """Below this many values in a condition there is no rank-sum test."""
 

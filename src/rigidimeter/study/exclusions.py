@@ -11,8 +11,6 @@ from rigidimeter.records import Analysis, Epoch, Fit, Notice, Outcome, Score
 from rigidimeter.study.results import Exclusion, SessionEntry
 from rigidimeter.study.sessions import Gathered, place_of, source_of
 
-__all__ = ["exclusions_of", "operators_exclusions"]
-
 
 def operators_exclusions(
     read: StudyFolder, gathered: Gathered

@@ -10,8 +10,6 @@ from typing import Literal
 from rigidimeter.errors import UserError
 from rigidimeter.records import Analysis, Fit, Score
 
-__all__ = ["MEASURES", "RATING", "Measure", "Observation", "chosen_pair", "conditions"]
-
 _SHOWN = 8
 
 

@@ -10,8 +10,6 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.study_folder import TABLE_COLUMNS
 from rigidimeter.recording.study_toml import STUDY_FILE
 
-__all__ = ["write_new_study"]
-
 SKELETON = """\
 schema = "rigidimeter.study/1"
 title = {title}

@@ -15,8 +15,6 @@ from rigidimeter.settings import Settings, dump_settings
 from rigidimeter.study.sessions import file_digest
 from rigidimeter.version import __version__
 
-__all__ = ["provenance"]
-
 
 def provenance(paths: Iterable[Path], settings: Settings, command: str = "") -> dict[str, str]:
     """Return the facts that let somebody else make the same result again."""

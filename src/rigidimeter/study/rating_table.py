@@ -9,8 +9,6 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import TextTable
 from rigidimeter.statistics import nested
 
-__all__ = ["RANDOM", "Rating", "Ratings", "groupings", "oddities", "ratings_of"]
-
 RANDOM = ("examiner", "subject", "subject/day")
 FEWEST = 3
 _SHOWN = 4

@@ -22,17 +22,6 @@ from rigidimeter.statistics import (
 )
 from rigidimeter.study.rating_table import Rating, groupings
 
-__all__ = [
-    "RatingMean",
-    "RatingsFound",
-    "RatingsPair",
-    "fit_ratings",
-    "rating_contrast",
-    "rating_offsets",
-    "rating_rows",
-    "ratings_document",
-]
-
 RATINGS_SCHEMA = "rigidimeter.ratings/1"
 
 

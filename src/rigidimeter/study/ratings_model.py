@@ -22,8 +22,6 @@ from rigidimeter.study.rating_table import RANDOM, Rating, groupings, oddities, 
 from rigidimeter.study.ratings_found import RatingsFound, fit_ratings
 from rigidimeter.study.results import Comparison
 
-__all__ = ["model_ratings", "rated", "ratings_comparison", "ratings_days"]
-
 FEWEST = 3
 
 

@@ -25,18 +25,6 @@ from rigidimeter.study.tables import comparison_rows
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "Comparison",
-    "Condition",
-    "DayMedian",
-    "EffectPair",
-    "Exclusion",
-    "LeftOut",
-    "SensitivityRow",
-    "SessionEntry",
-    "StudyResult",
-]
-
 
 @dataclass(frozen=True)
 class DayMedian:

@@ -12,8 +12,6 @@ from rigidimeter.study.comparison import FEWEST_FOR_TEST, day_test, observed, ra
 from rigidimeter.study.measures import MEASURES, Measure
 from rigidimeter.study.results import Comparison, SensitivityRow, SessionEntry
 
-__all__ = ["sensitivity_methods", "sensitivity_rows"]
-
 _INERTIA, _DAMPING, _STIFFNESS = MEASURES[:3]
 _STAGES: Mapping[Measure, tuple[Literal["fixed", "free"], ...]] = {
     _INERTIA: ("free",),

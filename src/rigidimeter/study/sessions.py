@@ -27,8 +27,6 @@ from rigidimeter.study.analysis import task_of
 from rigidimeter.study.blinding import Naming
 from rigidimeter.study.results import LeftOut, SessionEntry
 
-__all__ = ["Gathered", "Session", "gather", "place_of", "source_of"]
-
 _COMMANDED: Mapping[str, tuple[str, ...]] = {
     "prbs": ("controller", "prbs"),
     "sinusoid": ("controller", "sinusoid"),

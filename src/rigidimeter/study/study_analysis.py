@@ -30,8 +30,6 @@ from rigidimeter.study.sensitivity import sensitivity_methods, sensitivity_rows
 from rigidimeter.study.sessions import Gathered, gather
 from rigidimeter.study.warnings import analysis_warnings, lacking
 
-__all__ = ["StudyRead", "analyse_study", "read_study"]
-
 MEASURE_MS, RESAMPLE_MS = 50.0, 0.01
 """What the tests of a measure cost, beside the steps of `analysis.step_costs`."""
 

@@ -24,16 +24,6 @@ from rigidimeter.study.ratings_found import (
 if TYPE_CHECKING:
     from rigidimeter.study.results import Comparison, StudyResult
 
-__all__ = [
-    "COMPARISON_SCHEMA",
-    "TEST",
-    "Rows",
-    "comparison_document",
-    "comparison_rows",
-    "result_tables",
-    "table_csv",
-]
-
 COMPARISON_SCHEMA = "rigidimeter.comparison/2"
 TEST = "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected"
 

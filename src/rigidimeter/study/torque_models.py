@@ -12,8 +12,6 @@ from rigidimeter.recording import Recording
 from rigidimeter.records import Epoch
 from rigidimeter.study.analysis import Preparation
 
-__all__ = ["MODEL_SCHEMA", "ModelledEpoch", "model_document", "model_recording"]
-
 MODEL_SCHEMA = "rigidimeter.model/1"
 
 

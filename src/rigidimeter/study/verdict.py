@@ -16,8 +16,6 @@ from typing import Literal
 from rigidimeter.estimation import method_named
 from rigidimeter.study.results import Comparison, SensitivityRow, StudyResult
 
-__all__ = ["Dependence", "Leader", "Verdict", "dependences", "leader", "verdict"]
-
 LEVEL = 0.05
 SAME = 1e-12
 Reason = Literal[

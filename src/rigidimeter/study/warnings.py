@@ -9,8 +9,6 @@ import numpy as np
 from rigidimeter.records import Analysis, Notice
 from rigidimeter.study.results import Comparison
 
-__all__ = ["analysis_warnings", "lacking"]
-
 DIFFERENT_INERTIA = 0.15
 """Sources whose median J differ by more than this hardly are one joint."""
 

@@ -33,17 +33,6 @@ from typing import Any
 
 from rigidimeter.settings import Settings, SubjectSettings
 
-__all__ = [
-    "DESIGNS",
-    "NULL",
-    "PAPER",
-    "PAPER_RATES",
-    "PUSHING",
-    "ConditionDesign",
-    "StudyDesign",
-    "two_day_design",
-]
-
 PAPER_RATES: Mapping[str, Any] = {
     "torque": {"rate_hz": 100.0},
     "motion": {"rate_hz": 50.0, "jitter_s": 0.005},

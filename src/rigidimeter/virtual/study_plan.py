@@ -17,15 +17,6 @@ from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
 
-__all__ = [
-    "DayPlan",
-    "day_factors",
-    "day_joint",
-    "draw_ratings",
-    "plan_study",
-    "spread_evenly",
-]
-
 _DAY, _SESSION, _EXAMINERS = 1, 2, 3
 
 

@@ -20,8 +20,6 @@ from rigidimeter.experiment import PlannedEpoch, plan
 from rigidimeter.recording import Recording, SessionWriter, read
 from rigidimeter.settings import Settings, settings_from
 
-__all__ = ["run_virtual_session", "session_length_s", "simulate"]
-
 
 def session_length_s(settings: Settings) -> float:
     """Return how long the session of these settings lasts, in s."""

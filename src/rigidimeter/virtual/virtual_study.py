@@ -22,8 +22,6 @@ from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
 from rigidimeter.virtual.study_plan import DayPlan, plan_study
 from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s
 
-__all__ = ["study_length_s", "write_virtual_study"]
-
 _POLL_S = 0.1
 
 Progress = Callable[[float], None]

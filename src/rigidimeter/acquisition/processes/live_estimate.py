@@ -29,8 +29,6 @@ from rigidimeter.estimation.online import (
 )
 from rigidimeter.settings import OnlineSettings
 
-__all__ = ["Estimator", "estimator_main"]
-
 LOOK_S = 0.1
 
 

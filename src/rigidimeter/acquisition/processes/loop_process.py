@@ -24,8 +24,6 @@ from rigidimeter.acquisition.processes.sink import RingSink, SharedSupervision
 from rigidimeter.acquisition.processes.watchdog import WatchedProcess, leave_signals_to_the_console
 from rigidimeter.errors import UserError
 
-__all__ = ["LoopSide", "LoopTarget", "Realtime", "loop_main"]
-
 
 @dataclass(frozen=True)
 class Realtime:

@@ -26,8 +26,6 @@ from typing import Any
 
 from rigidimeter.acquisition.processes.shared_memory import ORDERED
 
-__all__ = ["Prepared", "prepare_loop_process"]
-
 MCL_CURRENT, MCL_FUTURE = 1, 2
 PR_SET_TIMERSLACK = 29
 KERNEL_THREAD = 0x00200000  # of the flags in /proc/PID/stat

@@ -21,8 +21,6 @@ from rigidimeter.recording.sample_log import BATCH_S
 from rigidimeter.recording.session_folder import SessionWriter
 from rigidimeter.settings import Settings
 
-__all__ = ["Patience", "Recorder", "Recording"]
-
 
 @dataclass(frozen=True)
 class Recording:

@@ -25,8 +25,6 @@ from rigidimeter.acquisition.processes.watchdog import WatchedProcess, leave_sig
 from rigidimeter.errors import UserError
 from rigidimeter.recording.session_folder import SessionWriter
 
-__all__ = ["recorder_main"]
-
 
 def recorder_main(
     recording: Recording, names: tuple[str, str, str], patience: Patience, console_pid: int

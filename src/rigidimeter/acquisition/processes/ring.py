@@ -31,8 +31,6 @@ from rigidimeter.acquisition.processes.shared_memory import Memory
 from rigidimeter.documents import json_line
 from rigidimeter.recording.sample_log import Sample, sample_dtypes
 
-__all__ = ["ROW", "Event", "EventRing", "Reader", "SampleReader", "SampleRing"]
-
 ROW: np.dtype[np.void] = np.dtype(
     [(name, "=i8" if kind.kind in "iu" else "=f8") for name, kind in sample_dtypes().items()]
 )

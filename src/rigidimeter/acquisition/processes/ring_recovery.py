@@ -33,8 +33,6 @@ from rigidimeter.recording.sample_log import (
 )
 from rigidimeter.recording.session_folder import EVENTS, SAMPLES, lock, read_manifest
 
-__all__ = ["Recovered", "complete", "recover_from_rings"]
-
 
 @dataclass(frozen=True)
 class Recovered:

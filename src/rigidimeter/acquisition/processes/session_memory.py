@@ -9,8 +9,6 @@ from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.shared_memory import Memory
 from rigidimeter.acquisition.processes.shared_status import SharedStatus
 
-__all__ = ["SessionMemory"]
-
 
 @dataclass(frozen=True)
 class SessionMemory:

@@ -22,8 +22,6 @@ from multiprocessing import resource_tracker
 from multiprocessing.shared_memory import SharedMemory
 from typing import cast
 
-__all__ = ["ORDERED", "Memory"]
-
 ORDERED = platform.machine().lower() in {"x86_64", "amd64"}
 """Whether writes of one processor are seen by the others in their order."""
 

@@ -24,8 +24,6 @@ from rigidimeter.acquisition.processes.shared_memory import Memory
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order
 from rigidimeter.guard import Cause
 
-__all__ = ["Condition", "Flag", "LiveEstimate", "LoopStatus", "Nanoseconds", "Role", "SharedStatus"]
-
 Nanoseconds = Callable[[], int]
 
 

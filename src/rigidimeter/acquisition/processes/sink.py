@@ -20,8 +20,6 @@ from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.recording.session_folder import Ending
 
-__all__ = ["RingSink", "SharedSupervision"]
-
 CLOCK_BOOTTIME = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
 """Goes on while the computer is suspended, where the system has such a clock."""
 

@@ -25,7 +25,7 @@ from multiprocessing.process import BaseProcess
 from types import FrameType
 from typing import Any
 
-from rigidimeter.acquisition.processes.loop_process import LoopSide, LoopTarget, Realtime, loop_main
+from rigidimeter.acquisition.processes.loop_process import LoopTarget, Realtime, loop_main
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.recorder_process import recorder_main
 from rigidimeter.acquisition.processes.ring_recovery import Recovered, complete
@@ -36,8 +36,6 @@ from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.errors import UserError
 from rigidimeter.recording.sample_log import read_events
 from rigidimeter.recording.session_folder import EVENTS
-
-__all__ = ["Ended", "LoopSide", "LoopTarget", "Realtime", "supervise"]
 
 RING_S = 60.0
 """For how long the recorder may write nothing before samples are lost."""

@@ -7,8 +7,6 @@ import select
 import signal
 from contextlib import suppress
 
-__all__ = ["WatchedProcess", "leave_signals_to_the_console"]
-
 
 class WatchedProcess:
     """A process that was alive when it was looked up; its number can not be taken for another's.

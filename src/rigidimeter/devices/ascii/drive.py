@@ -42,8 +42,6 @@ from rigidimeter.devices.ascii.setup import (
 from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, Now
 from rigidimeter.guard import Cause
 
-__all__ = ["AsciiDrive", "AsciiDriveSettings"]
-
 VELOCITY, MOVES = 11, 21
 CYCLES_IN_HORIZON = 3
 

@@ -33,21 +33,6 @@ from typing import NamedTuple
 from rigidimeter.devices.ascii.line import BITS_PER_CHARACTER, Exchange
 from rigidimeter.guard import Cause
 
-__all__ = [
-    "DISABLED_BITS",
-    "FAULT_BITS",
-    "STATUS_DISABLED",
-    "STATUS_FAULTS",
-    "Feedback",
-    "Reply",
-    "get",
-    "move_target",
-    "named_bits",
-    "parse",
-    "seconds",
-    "set_",
-]
-
 FAULT_BITS = {
     0: "short circuit",
     1: "drive too hot",

@@ -15,8 +15,6 @@ from typing import NamedTuple, Protocol
 
 from rigidimeter.devices.base import Now
 
-__all__ = ["BITS_PER_CHARACTER", "AsciiLine", "Exchange", "Port"]
-
 BITS_PER_CHARACTER = 10
 """One start bit, eight of data, one stop bit."""
 

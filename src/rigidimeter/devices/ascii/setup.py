@@ -23,8 +23,6 @@ from rigidimeter.devices.ascii.line import AsciiLine, Port
 from rigidimeter.devices.base import DeviceError, Now
 from rigidimeter.settings.section import Section, quantity
 
-__all__ = ["OFF", "PATIENCE", "AsciiDriveSettings", "AsciiTalk", "open_port"]
-
 OFF = 0
 POWER_UP_BAUD = 9600
 MEASURED_CYCLES = 7

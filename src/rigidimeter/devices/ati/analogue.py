@@ -34,8 +34,6 @@ from rigidimeter.devices.base import DeviceError, DeviceFacts, Now, TorqueSample
 from rigidimeter.guard import Cause
 from rigidimeter.settings.section import Section, quantity
 
-__all__ = ["AtiAnalogue", "AtiAnalogueSettings", "NiReader", "ReaderError", "VoltageReader"]
-
 Six = Annotated[list[float], Field(min_length=6, max_length=6)]
 BUFFER_S = 1.0
 

@@ -28,15 +28,6 @@ from numpy.typing import NDArray
 
 from rigidimeter.devices.base import DeviceError
 
-__all__ = [
-    "AXES",
-    "FORCE_UNITS_N",
-    "TORQUE_UNITS_NM",
-    "Calibration",
-    "read_calibration",
-    "unit_name",
-]
-
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 POUND_FORCE_N = 4.4482216152605

@@ -43,8 +43,6 @@ from rigidimeter.devices.ati.rdt_setup import (
 from rigidimeter.devices.base import DeviceError, DeviceFacts, Now, TorqueSample
 from rigidimeter.guard import Cause
 
-__all__ = ["AtiRdt", "AtiRdtSettings"]
-
 MOST_PACKETS_A_READ = 256
 """Limit of one read, well below a tick; further packets are left for the next read."""
 

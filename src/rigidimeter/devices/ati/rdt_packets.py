@@ -21,18 +21,6 @@ from collections import deque
 
 from rigidimeter.guard import Cause
 
-__all__ = [
-    "COUNTS",
-    "NAMES",
-    "RECORD",
-    "START_REALTIME",
-    "STOP",
-    "RdtStream",
-    "request",
-    "status_cause",
-    "status_words",
-]
-
 STOP = 0x0000
 START_REALTIME = 0x0002
 

@@ -19,15 +19,6 @@ from rigidimeter.devices.ati.rdt_packets import status_cause, status_words
 from rigidimeter.devices.base import DeviceError, Now
 from rigidimeter.settings.section import Section, quantity
 
-__all__ = [
-    "AtiRdtSettings",
-    "SensorPage",
-    "changes",
-    "fetch_page",
-    "parse_page",
-    "refuse_unexpected",
-]
-
 LARGEST_PAGE_BYTES = 65536
 
 

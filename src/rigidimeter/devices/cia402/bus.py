@@ -30,8 +30,6 @@ from rigidimeter.devices.cia402.state_words import (
     velocity_of,
 )
 
-__all__ = ["NodeBus"]
-
 QUIET_S = 0.01
 LONGEST_DRAIN_S = 0.5
 

@@ -40,8 +40,6 @@ from rigidimeter.devices.cia402.state_words import (
 )
 from rigidimeter.guard import Cause
 
-__all__ = ["Cia402Drive", "Cia402Settings"]
-
 MOST_FRAMES_A_READ = 64
 BRAKING = (0x6084, 0x6085)
 """Profile and quick-stop deceleration."""

@@ -10,8 +10,6 @@ from rigidimeter.devices.base import DeviceError, Now
 from rigidimeter.devices.cia402.bus import NodeBus
 from rigidimeter.devices.cia402.state_words import NEXT_CONTROL, Control, State
 
-__all__ = ["FAULTS", "power_up", "reset_fault"]
-
 STEP_S = 0.005
 FAULTS = (State.FAULT, State.FAULT_REACTION)
 

@@ -24,21 +24,6 @@ from rigidimeter.devices.base import DeviceError
 from rigidimeter.devices.cia402.state_words import PROFILE_VELOCITY, Frames, frames
 from rigidimeter.settings.section import Section, quantity
 
-__all__ = [
-    "DISPLAYED_MODE",
-    "IDENTITY",
-    "Cia402Settings",
-    "Object",
-    "Scale",
-    "get",
-    "library",
-    "objects",
-    "put",
-    "read_back",
-    "scale",
-    "text",
-]
-
 INVALID = 1 << 31
 NO_REMOTE_REQUEST = 1 << 30
 

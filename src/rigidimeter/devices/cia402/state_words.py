@@ -23,30 +23,6 @@ from collections.abc import Iterable
 from enum import IntEnum
 from typing import NamedTuple
 
-__all__ = [
-    "BOOTED",
-    "NEXT_CONTROL",
-    "OPERATIONAL",
-    "PRE_OPERATIONAL",
-    "PROFILE_VELOCITY",
-    "SYNC_ID",
-    "TICK_FRAMES",
-    "Control",
-    "Emergency",
-    "Frames",
-    "Nmt",
-    "State",
-    "command_bytes",
-    "emergency",
-    "fastest_tick_rate_hz",
-    "frame_bits",
-    "frames",
-    "position_of",
-    "sdo_write_bytes",
-    "state_of",
-    "velocity_of",
-]
-
 PROFILE_VELOCITY = 3
 """The mode of operation, 0x6060 and 0x6061."""
 

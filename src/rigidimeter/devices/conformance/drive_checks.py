@@ -20,8 +20,6 @@ from rigidimeter.devices.conformance.fixture import (
 )
 from rigidimeter.guard import Cause
 
-__all__ = ["DRIVE_CHECKS"]
-
 DRIVE_COUNTS = ("received", "lost", "damaged")
 POWER_OFF_S = 0.1
 AT_REST = 0.02

@@ -17,20 +17,6 @@ from rigidimeter.devices.base import (
     VelocityDrive,
 )
 
-__all__ = [
-    "ConformanceError",
-    "DriveFixture",
-    "OtherEnd",
-    "SensorFixture",
-    "check_counts",
-    "check_facts",
-    "check_quick",
-    "check_stamp",
-    "require",
-    "require_error",
-    "wait_for",
-]
-
 MANY_READS = 100
 
 

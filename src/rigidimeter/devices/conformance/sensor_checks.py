@@ -19,8 +19,6 @@ from rigidimeter.devices.conformance.fixture import (
 )
 from rigidimeter.guard import Cause
 
-__all__ = ["SENSOR_CHECKS"]
-
 SENSOR_COUNTS = ("received", "lost", "repeated", "reordered", "damaged")
 
 

@@ -38,8 +38,6 @@ from rigidimeter.emulation.cia402.servo import (
 from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.errors import UserError
 
-__all__ = ["MISBEHAVIOURS", "Cia402Emulator"]
-
 WATCH_S = 0.001
 HEARTBEAT_LOST, COMMAND_LOST = 0x8130, 0x8250
 WRONG_VALUE = 0x06090030

@@ -9,14 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = [
-    "COMMAND_MESSAGES",
-    "INVALID",
-    "MEASUREMENT_MESSAGES",
-    "PROFILE_VELOCITY",
-    "dictionary",
-]
-
 NAME = "emulated servo"
 COMMAND_MESSAGES = (0x1400,)
 MEASUREMENT_MESSAGES = (0x1800, 0x1801)
@@ -27,6 +19,8 @@ PROFILE_VELOCITY, PROFILE_VELOCITY_ONLY = 3, 0x04
 
 @dataclass(frozen=True)
 class Entry:
+    """One object: index, subindex, name, type, and what a master may do with it."""
+
     index: int
     subindex: int
     name: str

@@ -16,20 +16,6 @@ from typing import Any, NamedTuple, Protocol
 
 from rigidimeter.emulation.emulated_arm import EmulatedArm
 
-__all__ = [
-    "COMMUNICATION_ERROR",
-    "DEFAULTS",
-    "GENERIC_ERROR",
-    "MISBEHAVIOURS",
-    "POWERED",
-    "UNITS_PER_RAD",
-    "LastStop",
-    "Phase",
-    "Servo",
-    "after_control",
-    "statusword",
-]
-
 MISBEHAVIOURS = {
     "fault": "brakes, reports a fault (value: its code) and cannot be reset",
     "emergency": "sends an emergency message (value: its code) but keeps moving",

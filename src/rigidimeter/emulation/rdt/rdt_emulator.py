@@ -36,8 +36,6 @@ from rigidimeter.emulation.rdt.rdt_web_page import (
     page_with_faults,
 )
 
-__all__ = ["MISBEHAVIOURS", "RdtEmulator"]
-
 _REQUEST = struct.Struct(">HHI")
 
 

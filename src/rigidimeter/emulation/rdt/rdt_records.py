@@ -8,18 +8,6 @@ from collections import deque
 
 from rigidimeter.emulation.emulated_arm import EmulatedArm
 
-__all__ = [
-    "COUNTS_PER_UNIT",
-    "MISBEHAVIOURS",
-    "ONCE",
-    "RECORD",
-    "SAMPLE_RATE_HZ",
-    "SUPPLY_LOW",
-    "Faults",
-    "RecordSource",
-    "fault_value",
-]
-
 RECORD = struct.Struct(">IIIiiiiii")
 SAMPLE_RATE_HZ = 7000.0
 """The sensor's own sampling rate, whatever the rate of its records."""

@@ -15,8 +15,6 @@ from rigidimeter.emulation.rdt.rdt_records import (
     fault_value,
 )
 
-__all__ = ["PageFacts", "PageServer", "page_text", "page_with_faults"]
-
 _NEWTONS = {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kgf": 9.80665}
 _NEWTON_METRES = {
     "Nm": 1.0,

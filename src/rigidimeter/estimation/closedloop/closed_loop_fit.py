@@ -36,8 +36,6 @@ from rigidimeter.estimation.uncertainty import Estimate
 from rigidimeter.records import Epoch, Finding, Fit
 from rigidimeter.settings import Settings
 
-__all__ = ["LineMethod", "fit_closed_loop"]
-
 WORST_R_SQUARED = -10.0
 """A subject who pushes may turn R² negative; one far below says that a channel is wrong."""
 

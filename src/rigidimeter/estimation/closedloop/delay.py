@@ -30,8 +30,6 @@ MOST_VALLEYS = 3
 SCAN_HIGH_HZ = 20.0
 """And is made below this frequency."""
 
-__all__ = ["SCAN_STEP_S", "estimate_delay"]
-
 
 def delayed(linearise: Linearise) -> Linearise:
     """Return the problems with the delay as the last parameter."""

@@ -19,8 +19,6 @@ from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import Settings
 
-__all__ = ["driven", "fit_drive", "loop_of"]
-
 LARGEST_MISFIT = 0.005
 """Above this share of the velocity's standard deviation the drive is not of second order."""
 

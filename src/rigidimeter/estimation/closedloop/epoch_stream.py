@@ -28,8 +28,6 @@ from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Epoch
 from rigidimeter.settings import Settings
 
-__all__ = ["EpochStream"]
-
 Complex = NDArray[np.complex128]
 
 _CHANNELS = ("torque_nm", "angle_rad", "velocity_rad_s")

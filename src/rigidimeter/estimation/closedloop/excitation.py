@@ -26,8 +26,6 @@ from rigidimeter.estimation.closedloop.spectral_lines import SAME_TIME, Grid
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel
 
-__all__ = ["Excitation", "excitation"]
-
 Complex = NDArray[np.complex128]
 
 EVEN = 1e-6

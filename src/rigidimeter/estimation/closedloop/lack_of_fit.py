@@ -24,8 +24,6 @@ from rigidimeter.estimation.closedloop.refine import LineFit
 from rigidimeter.records import Finding
 from rigidimeter.settings import DiagnosticsSettings
 
-__all__ = ["Misfit", "misfits", "worst_misfit"]
-
 FEWEST_EPOCHS = 3
 SPLIT = (0.25, 0.5)
 """The band is tested in three parts, divided at these shares of its upper edge."""

@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 
 from rigidimeter.estimation.signals import Array
 
-__all__ = ["Smoother", "drawn_lines", "line_covariance"]
-
 Complex = NDArray[np.complex128]
 
 

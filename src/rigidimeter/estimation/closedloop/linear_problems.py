@@ -42,17 +42,6 @@ from rigidimeter.estimation.closedloop.excitation import Excitation
 from rigidimeter.estimation.closedloop.observation import Observation
 from rigidimeter.estimation.signals import Array
 
-__all__ = [
-    "Linearise",
-    "Problem",
-    "direct",
-    "holding",
-    "instrumental",
-    "least_squares_start",
-    "output_error",
-    "periodic",
-]
-
 Complex = NDArray[np.complex128]
 
 LEAST = np.array([1e-5, 1e-3, 1e-2])

@@ -20,16 +20,6 @@ from rigidimeter.estimation.signals import motion_channels
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE
 
-__all__ = [
-    "Observation",
-    "closed_loop_obstacle",
-    "observe",
-    "observe_motion",
-    "observe_periods",
-    "period_s",
-    "whole_periods",
-]
-
 REPEATS = 0.999
 """The correlation of a perturbation with itself one period later, at least."""
 

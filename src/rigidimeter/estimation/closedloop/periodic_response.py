@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 from rigidimeter.estimation.closedloop.observation import Observation
 from rigidimeter.estimation.signals import Array
 
-__all__ = ["Impedance", "impedance"]
-
 Complex = NDArray[np.complex128]
 
 

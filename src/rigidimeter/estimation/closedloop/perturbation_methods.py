@@ -15,8 +15,6 @@ from rigidimeter.estimation.closedloop.refine import ENOUGH_EPOCHS
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.settings import EstimationSettings
 
-__all__ = ["CLOSED_LOOP", "IV", "ML", "SPECTRAL"]
-
 CLOSED_LOOP: Mapping[str, LineMethod] = {
     "iv": LineMethod("iv", observe, instrumental),
     "spectral": LineMethod("spectral", observe_periods, periodic),

@@ -23,8 +23,6 @@ from rigidimeter.estimation.closedloop.observation import Observation
 from rigidimeter.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.estimation.signals import Array
 
-__all__ = ["LineFit", "Shape", "fit_pooled", "fit_single"]
-
 Complex = NDArray[np.complex128]
 
 ITERATIONS = 25

@@ -32,8 +32,6 @@ from rigidimeter.estimation.signals import Array, kinematics, motion_channels, s
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import FEWEST_LINES
 
-__all__ = ["Grid", "Lines", "epoch_grid", "epoch_lines", "response_lines"]
-
 Complex = NDArray[np.complex128]
 
 SAME_TIME = 0.01

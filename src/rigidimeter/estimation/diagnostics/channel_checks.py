@@ -27,8 +27,6 @@ from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings
 
-__all__ = ["CHANNEL_CHECKS"]
-
 FITTED = ("torque_nm", "angle_rad", "velocity_rad_s")
 FEWEST_AT_EXTREME = 3
 """An extreme reached by chance is not repeated three times in a row."""

@@ -14,8 +14,6 @@ from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.records import Epoch, Finding
 from rigidimeter.settings import DiagnosticsSettings
 
-__all__ = ["Case", "Check", "Look", "at_least", "at_most", "reconstructed_torque_nm"]
-
 
 @dataclass(frozen=True)
 class Case:

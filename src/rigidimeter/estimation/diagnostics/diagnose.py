@@ -18,8 +18,6 @@ from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Finding, Fit, Outcome
 from rigidimeter.units import rad_from_deg
 
-__all__ = ["CHECKS", "checked", "diagnose"]
-
 CHECKS: list[Check] = [
     *CHANNEL_CHECKS,
     *EXCITATION_CHECKS,

@@ -22,8 +22,6 @@ from rigidimeter.estimation.signals import Array, Signals, kinematics, spline
 from rigidimeter.records import PARAMETERS, Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings
 
-__all__ = ["EXCITATION_CHECKS", "lines_inside", "perturbation_nm", "power_lines"]
-
 MIDDLE_PERCENT = 90.0
 SEGMENTS = 8
 """Stretches, half overlapping, over which a coherence is averaged: 4 s each in an epoch of 18 s.

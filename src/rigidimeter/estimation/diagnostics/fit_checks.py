@@ -24,8 +24,6 @@ from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.records import Epoch
 from rigidimeter.settings import DiagnosticsSettings
 
-__all__ = ["PARAMETER_CHECKS", "RESIDUAL_CHECKS"]
-
 LINES_TOGETHER = 8
 LONGEST_LAG_S = 1.0
 

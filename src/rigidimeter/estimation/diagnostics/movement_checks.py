@@ -20,8 +20,6 @@ from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.records import Channel
 from rigidimeter.settings import DiagnosticsSettings
 
-__all__ = ["MOVEMENT_CHECKS", "voluntary_torque"]
-
 WINDOW_S = 1.0
 BASELINE_QUANTILE = 0.2
 """The quietest fifth of the envelope is rest: its upper end is the baseline."""

@@ -24,8 +24,6 @@ from rigidimeter.errors import UserError
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.estimation.terms.reflex import REFLEX_KINDS
 
-__all__ = ["GROUPS", "REFLEXES", "TERMS", "Term", "parse_terms", "term_named", "term_names"]
-
 
 @dataclass(frozen=True)
 class Term:

@@ -25,17 +25,6 @@ from rigidimeter.estimation.terms.wideband import wideband_signals
 from rigidimeter.records import Epoch
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE, Settings
 
-__all__ = [
-    "BASE",
-    "Comparison",
-    "EpochModels",
-    "ModelRow",
-    "candidates",
-    "compare_models",
-    "fit_model",
-    "model_epoch",
-]
-
 BASE = ("inertia", "damping", "stiffness")
 
 NEARLY_AS_GOOD = 1.05

@@ -29,8 +29,6 @@ from scipy import fft
 
 from rigidimeter.estimation.signals import Array, Signals
 
-__all__ = ["REFLEX_KINDS", "Kernel", "kernel", "pass_through", "stretch_velocity"]
-
 REFLEX_KINDS = ("reflex", "reflex-fir", "reflex-second-order")
 
 FIR_FIRST_S, FIR_LAST_S = 0.04, 0.44

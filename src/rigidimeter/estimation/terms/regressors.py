@@ -17,8 +17,6 @@ from rigidimeter.estimation.terms.reflex import Kernel, kernel, pass_through, st
 from rigidimeter.estimation.terms.separable import search
 from rigidimeter.estimation.terms.wideband import banded
 
-__all__ = ["Design"]
-
 SAMPLES_PER_CYCLE = 2.5
 """Of the highest frequency of the band, kept for the fit."""
 

@@ -19,8 +19,6 @@ from scipy import signal, stats
 
 from rigidimeter.estimation.signals import Array
 
-__all__ = ["ResidualTest", "residual_test"]
-
 LAGS = 20
 FLAT_PART = 0.8
 

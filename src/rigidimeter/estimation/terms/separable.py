@@ -16,8 +16,6 @@ from scipy import optimize
 
 from rigidimeter.estimation.signals import Array
 
-__all__ = ["Linear", "bread", "search", "solve"]
-
 LARGEST_CONDITION_NUMBER = 1e6
 """Beyond this the columns agree to six digits, more than any sensor knows."""
 

@@ -23,8 +23,6 @@ from rigidimeter.estimation.terms.residual_tests import ResidualTest, residual_t
 from rigidimeter.estimation.terms.separable import bread, solve
 from rigidimeter.estimation.uncertainty import hac_covariance
 
-__all__ = ["TermParameter", "TermsFit", "fit_terms", "predicted_vaf_percent"]
-
 NEAR_BOUND = 1e-3
 """A parameter this near to its bound, as a share of its range, was not found inside."""
 

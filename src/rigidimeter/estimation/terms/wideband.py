@@ -26,8 +26,6 @@ from rigidimeter.estimation.signals import (
 from rigidimeter.records import Epoch
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE
 
-__all__ = ["banded", "wideband_from_angle", "wideband_signals"]
-
 WIDE_OVER_BAND = 3.0
 """How far above the band the noise is cut before a term bends the signal."""
 

@@ -17,8 +17,6 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.table import MISSING, Table, alike, nearest
 from rigidimeter.records import CHANNEL_UNITS
 
-__all__ = ["LABELS", "MOTION", "RATE_NAMES", "find_columns", "numbers", "seconds", "time_stamps"]
-
 LABELS = ("epoch", "condition", "task")
 MOTION = ("velocity_rad_s", "angle_rad")
 STANDARD = ("time_s", *CHANNEL_UNITS, *LABELS)

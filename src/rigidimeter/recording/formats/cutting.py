@@ -18,8 +18,6 @@ from rigidimeter.recording.formats.gaps import Rows, longest_s
 from rigidimeter.recording.formats.table import Table, label_text
 from rigidimeter.records import Notice
 
-__all__ = ["Stretch", "by_label", "by_length", "constant_label", "lettered"]
-
 _COMPLETE = 0.95
 
 

@@ -16,19 +16,6 @@ from numpy.typing import NDArray
 from rigidimeter.recording.formats.columns import seconds
 from rigidimeter.records import Notice
 
-__all__ = [
-    "Break",
-    "Loss",
-    "Rows",
-    "Signal",
-    "about_breaks",
-    "about_losses",
-    "find_losses",
-    "kept_rows",
-    "longest_s",
-    "make_signal",
-]
-
 _LONGEST_STEPS = 3.0
 _LONGEST_S = 0.05
 _REGULAR = 1.5

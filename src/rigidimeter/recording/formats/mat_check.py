@@ -12,8 +12,6 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-__all__ = ["check_mat5"]
-
 _HEADER_BYTES = 128
 _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED, _UTF8 = 1, 5, 6, 14, 15, 16
 _NUMBERS = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13})

@@ -18,8 +18,6 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.mat_check import check_mat5
 from rigidimeter.recording.formats.table import Table, table_of_arrays
 
-__all__ = ["read_mat"]
-
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 

@@ -9,8 +9,6 @@ import numpy as np
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.table import Table, table_of_arrays
 
-__all__ = ["read_npz"]
-
 
 def read_npz(path: Path) -> Table:
     """Read a NumPy archive (``numpy.savez``), without unpickling anything.

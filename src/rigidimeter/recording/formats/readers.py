@@ -21,8 +21,6 @@ from rigidimeter.recording.session_epochs import is_session, read_session, sessi
 from rigidimeter.records import Epoch, Notice
 from rigidimeter.settings import Settings
 
-__all__ = ["READERS", "Reader", "formats_text", "read_recording", "read_table", "reader_of"]
-
 Epochs = tuple[list[Epoch], list[Notice]]
 
 

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
 
-__all__ = ["MISSING", "Table", "alike", "label_text", "nearest", "printable", "table_of_arrays"]
-
 MISSING = frozenset({"", "na", "n/a", "#n/a", "#na", "nan", "-nan", "null", "none", "<na>"})
 """Texts, in lower case, that mark a missing sample."""
 

@@ -46,8 +46,6 @@ from rigidimeter.recording.formats.gaps import (
 from rigidimeter.recording.formats.table import Table, nearest
 from rigidimeter.records import CHANNEL_UNITS, Channel, Epoch, Notice, Task
 
-__all__ = ["ReadOptions", "epochs_from_table"]
-
 _FEWEST = 2
 _DEGREES = "degrees: divide by 57.2958 to have rad"
 _PLAUSIBLE: Mapping[str, tuple[float, str]] = {

@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.table import Table, printable
 
-__all__ = ["TextTable", "cell_number", "is_missing", "read_text_recording", "read_text_table"]
-
 _DELIMITERS = ("\t", ";", ",")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 _DECIMAL_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")

@@ -14,13 +14,11 @@ from rigidimeter.reporting.contents import (
     from_study_folder,
     paragraph,
 )
-from rigidimeter.reporting.methods import interval_basis, pooled_basis
+from rigidimeter.reporting.method_words import interval_basis, pooled_basis
 from rigidimeter.reporting.numbers import condition_name, series
 from rigidimeter.reporting.prose_statistics import offsets_text
 from rigidimeter.reporting.sections.estimate_tables import pooled_table
 from rigidimeter.study import StudyResult, result_tables
-
-__all__ = ["ALL_EPOCHS", "COMPARISON", "RESULTS"]
 
 _EPOCHS_NOTE = Markup(
     "All differences are {pair}. Two-sided Wilcoxon rank-sum test, asymptotic (normal "

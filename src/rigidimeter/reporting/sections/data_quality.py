@@ -21,8 +21,6 @@ from rigidimeter.reporting.numbers import plural, short_names
 from rigidimeter.reporting.sections.estimate_tables import HOW, WHO
 from rigidimeter.study import StudyResult, result_tables
 
-__all__ = ["EXCLUSIONS", "FINDINGS", "STUDY_EXCLUSIONS"]
-
 GRAVEST_FIRST = ("exclude", "doubt", "note")
 
 MOST_LABELS = 24

@@ -31,8 +31,6 @@ from rigidimeter.reporting.style import (
 )
 from rigidimeter.study import Comparison, DayMedian, StudyResult, result_tables
 
-__all__ = ["SECTION", "Day", "days"]
-
 MOST_IN_A_ROW = 26
 """More days than this continue in another row of the same figure."""
 

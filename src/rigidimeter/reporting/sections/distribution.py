@@ -16,8 +16,6 @@ from rigidimeter.reporting.style import condition_colours, note, spread, styled,
 from rigidimeter.statistics import summarise
 from rigidimeter.study import Comparison, StudyResult
 
-__all__ = ["SECTION", "distribution"]
-
 _STRIP = 0.26
 """Half the width of a strip, in units of the distance between conditions."""
 _ASIDE = 0.15

@@ -10,12 +10,10 @@ from markupsafe import Markup
 
 from rigidimeter.records import PARAMETER_VECTORS, PARAMETERS, Delay, Fit
 from rigidimeter.reporting.contents import INTERVAL, Block, Column, Section, Table, paragraph
-from rigidimeter.reporting.methods import interval_basis, method_title
+from rigidimeter.reporting.method_words import interval_basis, method_title
 from rigidimeter.reporting.numbers import number
 from rigidimeter.reporting.sections.recordings import epoch_duration_s
 from rigidimeter.study import StudyResult, result_tables, split_pooled
-
-__all__ = ["ALL_CONDITIONS", "EPOCHS", "ESTIMATION", "HOW", "WHO", "pooled_table"]
 
 ALL_CONDITIONS = "(all)"
 """What the column of conditions holds for the fit to all epochs of all of them."""

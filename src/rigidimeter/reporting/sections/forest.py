@@ -23,8 +23,6 @@ from rigidimeter.reporting.style import GREY, styled, wrapped
 from rigidimeter.statistics import Effects, largest_r
 from rigidimeter.study import Comparison, StudyResult, result_tables
 
-__all__ = ["SECTION", "forest"]
-
 _INK = "#1C1C1C"
 COHEN = (0.1, 0.3, 0.5)
 """What is called a small, a medium and a large r."""

@@ -28,8 +28,6 @@ from rigidimeter.reporting.representative import prepared_epochs
 from rigidimeter.reporting.style import GREY, condition_colours, listed, plain_ticks, styled
 from rigidimeter.study import StudyResult, split_pooled
 
-__all__ = ["COHERENT", "SECTION", "Response", "impedance", "model_nm_rad", "same_lines"]
-
 Array = NDArray[np.float64]
 
 COHERENT = 0.5

@@ -27,8 +27,6 @@ from rigidimeter.reporting.style import GREY, drawable, styled, wrapped
 from rigidimeter.reporting.verdict_text import dependence_sentences
 from rigidimeter.study import SensitivityRow, StudyResult, result_tables
 
-__all__ = ["SECTION", "sensitivity"]
-
 _CHOSEN = "#1C1C1C"
 _OTHER = "#0072B2"
 MOST_BESIDE = 3

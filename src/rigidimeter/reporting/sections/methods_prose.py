@@ -15,14 +15,12 @@ from markupsafe import Markup
 
 from rigidimeter.records import Epoch, Fit
 from rigidimeter.reporting.contents import Block, Section, from_study_folder, paragraph
-from rigidimeter.reporting.methods import method_of
+from rigidimeter.reporting.method_words import method_of
 from rigidimeter.reporting.numbers import condition_name, number, plural, series
 from rigidimeter.reporting.prose_statistics import rating_sentences, test_sentences
 from rigidimeter.reporting.references import Cited, Prose
 from rigidimeter.study import Condition, StudyResult
 from rigidimeter.version import __version__
-
-__all__ = ["SECTION", "methods_prose"]
 
 
 def _blocks(result: StudyResult) -> Iterator[Block]:

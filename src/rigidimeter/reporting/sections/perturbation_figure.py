@@ -19,8 +19,6 @@ from rigidimeter.reporting.representative import analysed_epoch, origin_s, repre
 from rigidimeter.reporting.style import GREY, note, plain_ticks, styled
 from rigidimeter.study import StudyResult
 
-__all__ = ["SECTION", "changes", "drawable_perturbation", "perturbation", "spectrum"]
-
 _INK = "#222222"
 _BAND = "#009E73"
 

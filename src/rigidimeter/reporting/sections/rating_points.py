@@ -32,8 +32,6 @@ from rigidimeter.reporting.style import (
 )
 from rigidimeter.study import RatingMean, RatingsFound, StudyResult, result_tables
 
-__all__ = ["SECTION", "ratings"]
-
 _LANES = 0.66
 """The width of a condition that its examiners share."""
 _STEP = 0.9

@@ -18,8 +18,6 @@ from rigidimeter.settings import Settings
 from rigidimeter.study import StudyResult, result_tables
 from rigidimeter.units import rad_from_deg
 
-__all__ = ["ABOUT", "DESIGN", "NOTICES", "PROVENANCE", "epoch_duration_s"]
-
 _TASKS = {"prbs": "torque perturbation", "sinusoid": "imposed sinusoid", None: "not stated"}
 
 

@@ -19,8 +19,6 @@ from rigidimeter.reporting.contents import (
 from rigidimeter.reporting.numbers import condition_name, plural, series
 from rigidimeter.study import StudyResult, result_tables
 
-__all__ = ["CHANGES", "OVERVIEW"]
-
 _STIMULATION: tuple[tuple[str, str, Kind], ...] = (
     ("title", "Description", "text"),
     ("frequency_hz", "Frequency (Hz)", "setting"),

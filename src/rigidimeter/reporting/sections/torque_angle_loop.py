@@ -15,8 +15,6 @@ from rigidimeter.reporting.representative import analysed_epoch, place, represen
 from rigidimeter.reporting.style import condition_colours, note, styled
 from rigidimeter.study import StudyResult
 
-__all__ = ["SECTION", "loop", "loop_limits"]
-
 _POINTS = 2000
 """Enough for any number of cycles at the size of the figure."""
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rigidimeter.estimation import Signals, epoch_signals
 from rigidimeter.records import Channel, Fit
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
-from rigidimeter.reporting.methods import is_least_squares
+from rigidimeter.reporting.method_words import is_least_squares
 from rigidimeter.reporting.numbers import condition_name, number
 from rigidimeter.reporting.representative import (
     analysed_epoch,
@@ -25,8 +25,6 @@ from rigidimeter.reporting.representative import (
 from rigidimeter.reporting.sections.perturbation_figure import changes, drawable_perturbation
 from rigidimeter.reporting.style import GREY, condition_colours, note, styled
 from rigidimeter.study import StudyResult
-
-__all__ = ["SECTION", "torque_limit_nm", "torque_parts"]
 
 Array = NDArray[np.float64]
 

@@ -15,13 +15,11 @@ from scipy import signal
 from rigidimeter.estimation.bandlimited import bandlimited_signals
 from rigidimeter.estimation.diagnostics import reconstructed_torque_nm
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
-from rigidimeter.reporting.methods import is_least_squares
+from rigidimeter.reporting.method_words import is_least_squares
 from rigidimeter.reporting.numbers import condition_name, number
 from rigidimeter.reporting.representative import prepared_epochs
 from rigidimeter.reporting.style import condition_colours, listed, plain_ticks, styled
 from rigidimeter.study import StudyResult
-
-__all__ = ["SECTION", "density", "voluntary_spectrum"]
 
 Array = NDArray[np.float64]
 

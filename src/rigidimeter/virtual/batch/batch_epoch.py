@@ -32,8 +32,6 @@ from rigidimeter.dynamics import (
 )
 from rigidimeter.guard import GuardLimits, GuardState, Limited, guard_step
 
-__all__ = ["BEFORE", "NOW", "Coefficients", "Columns", "Joint", "Sampling", "moments", "run_epoch"]
-
 NOW, BEFORE = -1, -2
 """In `Sampling.part`: taken at this tick, at the tick before; else a row of `parts`."""
 

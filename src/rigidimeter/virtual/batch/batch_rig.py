@@ -37,8 +37,6 @@ from rigidimeter.units import rad_from_deg
 from rigidimeter.virtual.batch.batch_epoch import BEFORE, NOW, Coefficients, Sampling
 from rigidimeter.virtual.batch.compiled_steps import compiled
 
-__all__ = ["Bench", "EpochInputs", "bench", "draw_inputs"]
-
 
 @dataclass(frozen=True)
 class Bench:

@@ -19,16 +19,6 @@ from rigidimeter.virtual.batch.batch_epoch import Columns, Joint
 from rigidimeter.virtual.batch.batch_rig import Bench, EpochInputs
 from rigidimeter.virtual.batch.compiled_steps import compiled
 
-__all__ = [
-    "Batch",
-    "Rows",
-    "batch_of",
-    "empty_rows",
-    "perturbation_rows",
-    "run_row",
-    "simulate_inputs",
-]
-
 
 @dataclass(frozen=True)
 class Batch:

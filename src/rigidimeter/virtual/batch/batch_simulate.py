@@ -26,8 +26,6 @@ from rigidimeter.virtual.batch.batch_run import (
     run_row,
 )
 
-__all__ = ["epoch_generator", "simulate_chunks", "simulate_epochs"]
-
 CHUNK = 32
 """Epochs held at once: about 50 MB of 20 s epochs at 1 kHz."""
 

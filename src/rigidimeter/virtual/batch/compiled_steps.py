@@ -30,8 +30,6 @@ from rigidimeter.errors import UserError
 from rigidimeter.guard import Cause, step, watch
 from rigidimeter.virtual.batch import batch_epoch as epoch
 
-__all__ = ["Compiled", "compiled"]
-
 
 class Compiled(NamedTuple):
     """The two functions of `epoch`, compiled."""

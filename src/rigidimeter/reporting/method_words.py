@@ -5,8 +5,6 @@ from __future__ import annotations
 from rigidimeter.estimation import METHODS, Method
 from rigidimeter.settings import EstimationSettings
 
-__all__ = ["interval_basis", "is_least_squares", "method_of", "method_title", "pooled_basis"]
-
 
 def method_of(name: str) -> Method | None:
     """Return the estimator of that name; None for one of a file that is not known here."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-__all__ = ["Rows", "text_table"]
-
 Rows = list[tuple[str, ...]]
 """Rows of cells, the headings first."""
 
