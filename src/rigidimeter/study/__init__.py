@@ -7,6 +7,7 @@ installed.
 from rigidimeter.study.analysis import Preparation, estimate, task_of
 from rigidimeter.study.archive import UNCHANGED, keep
 from rigidimeter.study.compare_input import compare
+from rigidimeter.study.compared import TEST, Comparison, DayMedian
 from rigidimeter.study.comparison import (
     compare_analysis,
     compare_measures,
@@ -16,9 +17,7 @@ from rigidimeter.study.measures import MEASURES, RATING, Measure, Observation, c
 from rigidimeter.study.provenance import provenance
 from rigidimeter.study.ratings_found import RatingMean, RatingsFound
 from rigidimeter.study.results import (
-    Comparison,
     Condition,
-    DayMedian,
     EffectPair,
     Exclusion,
     LeftOut,
@@ -27,12 +26,7 @@ from rigidimeter.study.results import (
     StudyResult,
 )
 from rigidimeter.study.study_analysis import analyse_study, read_study
-from rigidimeter.study.tables import (
-    TEST,
-    comparison_document,
-    result_tables,
-    table_csv,
-)
+from rigidimeter.study.tables import comparison_document, result_tables, table_csv
 from rigidimeter.study.verdict import Dependence, Leader, Verdict, dependences, leader, verdict
 from rigidimeter.study.warnings import analysis_warnings
 

@@ -15,9 +15,10 @@ from rigidimeter.recording.formats import READERS, TextTable, read_text_table
 from rigidimeter.recording.study_folder import is_study
 from rigidimeter.records import Analysis, Notice
 from rigidimeter.settings import Settings, settings_from
+from rigidimeter.study.compared import Comparison
 from rigidimeter.study.comparison import compare_analysis, compare_measures, measured
 from rigidimeter.study.measures import Measure, Observation, chosen_pair, conditions
-from rigidimeter.study.results import Comparison, StudyResult
+from rigidimeter.study.results import StudyResult
 from rigidimeter.study.study_analysis import analyse_study, read_study
 
 if TYPE_CHECKING:

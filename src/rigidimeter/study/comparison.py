@@ -25,8 +25,9 @@ from rigidimeter.statistics import (
     summarise,
     two_groups,
 )
+from rigidimeter.study.compared import Comparison, DayMedian
 from rigidimeter.study.measures import MEASURES, Measure, Observation, conditions
-from rigidimeter.study.results import Comparison, DayMedian, EffectPair, SessionEntry, StudyResult
+from rigidimeter.study.results import EffectPair, SessionEntry, StudyResult
 
 FEWEST_FOR_TEST = 3
 """Below this many values in a condition there is no rank-sum test."""

@@ -16,11 +16,11 @@ from rigidimeter.recording.study_folder import StudyFolder
 from rigidimeter.records import Notice
 from rigidimeter.statistics import Contrast, DayDifference, difference, fit_mixed, interval_of
 from rigidimeter.study.blinding import Naming
+from rigidimeter.study.compared import Comparison
 from rigidimeter.study.comparison import measured, no_days
 from rigidimeter.study.measures import RATING, Observation
 from rigidimeter.study.rating_table import RANDOM, Rating, groupings, oddities, ratings_of
 from rigidimeter.study.ratings_found import RatingsFound, fit_ratings
-from rigidimeter.study.results import Comparison
 
 FEWEST = 3
 

@@ -12,97 +12,14 @@ from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.records import Analysis, Epoch, Fit, Notice, Score
 from rigidimeter.settings import Settings
 from rigidimeter.statistics import (
-    DayDifference,
     EffectDifference,
-    Effects,
-    RankSum,
-    Summary,
 )
-from rigidimeter.study.measures import Measure, Observation
+from rigidimeter.study.compared import Comparison, comparison_rows
+from rigidimeter.study.measures import Measure
 from rigidimeter.study.ratings_found import RatingsFound
-from rigidimeter.study.tables import comparison_rows
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-@dataclass(frozen=True)
-class DayMedian:
-    """The included values of one measure on one day of one subject, in one condition."""
-
-    subject: str
-    day: str
-    condition: str
-    n: int
-    median: float
-    q1: float
-    q3: float
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One measure in every condition, and what sets two of them apart.
-
-    Attributes
-    ----------
-    measure : Measure
-    reference, other : str
-        The two conditions that are compared; differences are reference − other. `other` is empty
-        where there is only one.
-    observations : tuple of Observation
-        The included values of all conditions, in the order of recording.
-    summaries : mapping of str to Summary
-        By condition; the compared ones first.
-    excluded : mapping of str to int
-        How many epochs of each condition have no included value.
-    pooled : mapping of str to Observation
-        The estimate from all epochs of a condition together, where there is one.
-    test : RankSum or None
-        None when a condition has too few values, for the reason in `remark`.
-    p_holm : float
-        p of `test`, adjusted by Holm's method for all measures that were tested.
-    effects : Effects or None
-        Effect sizes with bootstrap intervals.
-    days : DayDifference or None
-        The test in which days count, not epochs; None where days are not known.
-    days_p_holm : float
-        p of `days`, adjusted by Holm's method for all measures tested by days.
-    day_medians : tuple of DayMedian
-    """
-
-    measure: Measure
-    reference: str
-    other: str
-    observations: tuple[Observation, ...]
-    summaries: Mapping[str, Summary]
-    excluded: Mapping[str, int]
-    pooled: Mapping[str, Observation] = field(default_factory=dict)
-    test: RankSum | None = None
-    remark: str = ""
-    p_holm: float = math.nan
-    effects: Effects | None = None
-    days: DayDifference | None = None
-    days_p_holm: float = math.nan
-    day_medians: tuple[DayMedian, ...] = ()
-
-    @property
-    def pair(self) -> tuple[str, ...]:
-        """The conditions that are compared: two, or the only one."""
-        return (self.reference, self.other) if self.other else (self.reference,)
-
-    @property
-    def paired(self) -> bool:
-        """Whether there are two conditions to compare."""
-        return bool(self.other)
-
-    @property
-    def values(self) -> dict[str, tuple[float, ...]]:
-        """The included values by condition, in the order of recording."""
-        return {name: tuple(o.value for o in self.of(name)) for name in self.summaries}
-
-    def of(self, condition: str) -> tuple[Observation, ...]:
-        """Return the observations of one condition."""
-        return tuple(each for each in self.observations if each.condition == condition)
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from typing import Literal
 
 from rigidimeter.estimation import METHODS
 from rigidimeter.records import Analysis, Fit, Notice
+from rigidimeter.study.compared import Comparison
 from rigidimeter.study.comparison import FEWEST_FOR_TEST, day_test, observed, rank_test
 from rigidimeter.study.measures import MEASURES, Measure
-from rigidimeter.study.results import Comparison, SensitivityRow, SessionEntry
+from rigidimeter.study.results import SensitivityRow, SessionEntry
 
 _INERTIA, _DAMPING, _STIFFNESS = MEASURES[:3]
 _STAGES: Mapping[Measure, tuple[Literal["fixed", "free"], ...]] = {

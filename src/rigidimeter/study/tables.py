@@ -7,31 +7,24 @@ inputs give the same bytes: neither time nor place is written down.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, fields
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict
+from typing import Any
 
 from rigidimeter.documents import csv_text, plain_values
 from rigidimeter.recording import estimates_document
-from rigidimeter.statistics import RankSum
-from rigidimeter.study.measures import Measure
+from rigidimeter.study.compared import Comparison, comparison_rows, comparison_values, measure_names
 from rigidimeter.study.ratings_found import (
     rating_contrast,
     rating_offsets,
     rating_rows,
     ratings_document,
 )
-
-if TYPE_CHECKING:
-    from rigidimeter.study.results import Comparison, StudyResult
+from rigidimeter.study.results import StudyResult
 
 COMPARISON_SCHEMA = "rigidimeter.comparison/2"
-TEST = "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected"
 
 Rows = Sequence[Mapping[str, Any]]
 
-_TESTED = tuple(field.name for field in fields(RankSum))
-_SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
-_QUARTILES = ("median", "q1", "q3")
 _BY = ("protocol", "check", "estimate", "operator")
 
 
@@ -52,7 +45,7 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
         "method_reason": analysis.method_reason,
         "inertia_kg_m2": analysis.inertia_kg_m2,
         "inertia_by_subject": result.several_subjects,
-        "comparisons": [_comparison(comparison) for comparison in result.comparisons],
+        "comparisons": [comparison_values(comparison) for comparison in result.comparisons],
         "days": tables["days"],
         "effect_differences": tables["effect_differences"],
         "ratings": None if result.ratings is None else ratings_document(result.ratings),
@@ -68,66 +61,6 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
     plain = plain_values(document)
     assert isinstance(plain, dict)
     return plain
-
-
-def _comparison(c: Comparison) -> dict[str, Any]:
-    """Return one comparison; the keys of its test are flat, those by days are under `days`."""
-    return {
-        **_names(c),
-        "groups": {
-            name: asdict(c.summaries[name]) | {"excluded": c.excluded[name]} for name in c.pair
-        },
-        "test": TEST,
-        **_tested(c),
-        "remark": c.remark,
-        "days": None if c.days is None else _days(c),
-    }
-
-
-def _measure(measure: Measure) -> dict[str, str]:
-    return {"measure": measure.name, "title": measure.title, "unit": measure.unit}
-
-
-def _names(c: Comparison) -> dict[str, str]:
-    return _measure(c.measure) | {"reference": c.reference, "other": c.other}
-
-
-def _tested(c: Comparison) -> dict[str, Any]:
-    return {
-        **{name: getattr(c.test, name, None) for name in _TESTED},
-        "p_holm": c.p_holm,
-        **{name: getattr(c.effects, name, None) for name in _SIZES},
-        "interval_method": getattr(c.effects, "method", None),
-    }
-
-
-def _days(c: Comparison) -> dict[str, Any]:
-    row: dict[str, Any] = asdict(c.days) if c.days is not None else {}
-    row["days_reference"], row["days_other"] = row.pop("n_days_x"), row.pop("n_days_y")
-    return row | {"p_holm": c.days_p_holm}
-
-
-def comparison_rows(comparisons: Iterable[Comparison]) -> list[dict[str, Any]]:
-    """Return the comparisons as a table, one row for each measure."""
-    rows = []
-    for c in comparisons:
-        row: dict[str, Any] = dict(_names(c))
-        for side, name in zip(("reference", "other"), (c.reference, c.other), strict=True):
-            known = name in c.pair
-            numbers = asdict(c.summaries[name]) if known else dict.fromkeys(("n", *_QUARTILES))
-            row[f"n_{side}"] = numbers["n"]
-            row[f"excluded_{side}"] = c.excluded[name] if known else None
-            row |= {f"{quartile}_{side}": numbers[quartile] for quartile in _QUARTILES}
-        row |= _tested(c) | {"remark": c.remark}
-        if c.days is not None:
-            days = _days(c)
-            days["offsets"] = " + ".join(days["offsets"])
-            row |= {
-                name if name.startswith("days_") else f"days_{name}": value
-                for name, value in days.items()
-            }
-        rows.append(row)
-    return rows
 
 
 def result_tables(result: StudyResult) -> dict[str, Rows]:
@@ -157,7 +90,7 @@ def result_tables(result: StudyResult) -> dict[str, Rows]:
         "rating_offsets": [] if ratings is None else list(rating_offsets(ratings)),
         "rating_contrast": [] if ratings is None else list(rating_contrast(ratings)),
         "sensitivity": [
-            _measure(row.measure) | vars(row) | {"measure": row.measure.name}
+            measure_names(row.measure) | vars(row) | {"measure": row.measure.name}
             for row in result.sensitivity
         ],
         "conditions": list(_conditions(result)),
@@ -175,7 +108,7 @@ def _summaries(comparisons: Iterable[Comparison]) -> Iterator[dict[str, Any]]:
         for name, summary in c.summaries.items():
             if summary.n or c.excluded[name]:
                 counts = {"condition": name, "n": summary.n, "excluded": c.excluded[name]}
-                yield _measure(c.measure) | counts | asdict(summary)
+                yield measure_names(c.measure) | counts | asdict(summary)
 
 
 def _conditions(result: StudyResult) -> Iterator[dict[str, Any]]:

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rigidimeter.estimation import method_named
-from rigidimeter.study.results import Comparison, SensitivityRow, StudyResult
+from rigidimeter.study.compared import Comparison
+from rigidimeter.study.results import SensitivityRow, StudyResult
 
 LEVEL = 0.05
 SAME = 1e-12

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigidimeter.records import Analysis, Notice
-from rigidimeter.study.results import Comparison
+from rigidimeter.study.compared import Comparison
 
 DIFFERENT_INERTIA = 0.15
 """Sources whose median J differ by more than this hardly are one joint."""
