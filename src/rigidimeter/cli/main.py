@@ -32,6 +32,8 @@ from rigidimeter.cli.study import demo, study
 from rigidimeter.errors import UserError
 from rigidimeter.version import __version__
 
+_INTERRUPTED = 130
+
 app = typer.Typer(
     name="rigidimeter",
     no_args_is_help=True,
@@ -134,6 +136,7 @@ def main() -> None:
         what = f"{error.filename}: " if error.filename else ""
         typer.echo(f"rigidimeter: {what}{error.strerror or error}", err=True)
         sys.exit(1)
-    except KeyboardInterrupt:
-        typer.echo("rigidimeter: interrupted", err=True)
-        sys.exit(130)
+    except SystemExit as end:
+        if end.code == _INTERRUPTED:  # typer turns the interruption of a command into this
+            typer.echo("rigidimeter: interrupted", err=True)
+        raise

@@ -113,3 +113,10 @@ def test_a_file_that_cannot_be_loaded_is_named(rigidimeter, tmp_path, name, text
     ran = rigidimeter("--load", tmp_path / name, "estimate", "--help")
     assert ran.status == 1
     assert words in ran.err
+
+
+def test_an_interruption_is_one_line(rigidimeter, tmp_path):
+    path = tmp_path / "interrupts.py"
+    path.write_text("raise KeyboardInterrupt")
+    ran = rigidimeter("--load", path, "estimate", "--help")
+    assert (ran.status, ran.err.strip()) == (130, "rigidimeter: interrupted")
