@@ -76,7 +76,7 @@ def write_report(
     for table in tables(made).values():
         _write(out / "tables" / f"{table.name}.csv", _csv(table))
     for name, text in svg.items():
-        _write(out / "figures" / f"{name}.svg", text)
+        _write(out / "figures" / f"{name.replace('/', '_')}.svg", text)
     if result.sessions:
         _write(out / "methods.txt", methods_prose(result).text)
     page = out / "report.html"

@@ -11,7 +11,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording import read
 from rigidimeter.records import Epoch
 from rigidimeter.reporting import report
-from rigidimeter.study import StudyResult
+from rigidimeter.study import StudyResult, compare
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +65,10 @@ def test_what_cannot_be_reported_is_refused(tmp_path: Path) -> None:
     table: Any = pd.DataFrame({"damping": [1.0]})
     with pytest.raises(UserError, match="report takes what compare, estimate or read returned"):
         report(table, tmp_path / "out")
+
+
+def test_a_column_may_have_a_slash_in_its_name(tmp_path: Path) -> None:
+    table = pd.DataFrame({"K N·m/rad": [1.0, 2.0, 3.0, 5.0, 6.0, 7.0], "condition": [*"AAABBB"]})
+    result = compare(table, value="K N·m/rad", resamples=0)
+    report(result, tmp_path)
+    assert (tmp_path / "figures" / "distribution_K N·m_rad.svg").is_file()
