@@ -26,15 +26,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rigidimeter.acquisition.clock import DeadlineClock
+from rigidimeter.acquisition.processes.loop_process import LoopSide, LoopTarget, Realtime
 from rigidimeter.acquisition.processes.recorder import Recording
 from rigidimeter.acquisition.processes.shared_status import SharedStatus
-from rigidimeter.acquisition.processes.supervise import (
-    Ended,
-    LoopSide,
-    LoopTarget,
-    Realtime,
-    supervise,
-)
+from rigidimeter.acquisition.processes.supervise import Ended, supervise
 from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.devices import SimulatedRig

@@ -23,8 +23,9 @@ import numpy as np
 
 from benchmarks import loop
 from rigidimeter.acquisition.clock import DeadlineClock
+from rigidimeter.acquisition.processes.loop_process import LoopSide, LoopTarget, Realtime
 from rigidimeter.acquisition.processes.recorder import Recording
-from rigidimeter.acquisition.processes.supervise import LoopSide, LoopTarget, Realtime, supervise
+from rigidimeter.acquisition.processes.supervise import supervise
 from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.devices.rigfile import load_rig
 from rigidimeter.experiment import Protocol, plan

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.acquisition.clock import DeadlineClock
+from rigidimeter.acquisition.processes.loop_process import LoopSide, Realtime
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.shared_status import Condition, Role, SharedStatus
-from rigidimeter.acquisition.processes.supervise import LoopSide, Realtime, supervise
+from rigidimeter.acquisition.processes.supervise import supervise
 from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.devices.rigfile import load_rig
 from rigidimeter.experiment import plan

@@ -150,7 +150,8 @@ def test_a_report_of_a_foreign_recording(rigidimeter, tmp_path):
         (["simulate", "--out", "x", "--task", "dance"], "--task dance: must be prbs or sinusoid"),
         (["simulate", "--out", "x", "--task", "prbs", "--condition", "Z"], "condition 'Z'"),
         (["simulate", "--out", "x", "--task", "prbs", "--epochs", "0"], "at least 1"),
-        (["report", "{session}", "--out", "{session}/manifest.json"], "cannot be written"),
+        (["report", "{session}", "--out", "{session}/manifest.json"], "lies in a session folder"),
+        (["report", "{session}", "--out", "/dev/null/report"], "cannot be written"),
     ],
 )
 def test_what_a_user_did_wrong_is_one_sentence_and_a_status(
