@@ -44,18 +44,19 @@ class Still(LatenessProbe):
 
 
 @pytest.mark.parametrize(
-    ("body", "still", "passes", "runs"),
+    ("body", "still", "outcome", "runs"),
     [
-        ("assert True", 9, True, 1),  # it did not ask how late the machine was
-        ("assert PRESENT[0].worst_s(0.0) < 9", 2, True, 3),
-        ("assert PRESENT[0].worst_s(0.0) < 9", 9, False, ATTEMPTS),
-        ("assert False", 9, False, ATTEMPTS),
-        ("assert False", 0, False, 1),
+        ("assert True", 9, "passed", 1),  # it did not ask how late the machine was
+        ("assert PRESENT[0].worst_s(0.0) < 9", 2, "passed", 3),
+        ("assert PRESENT[0].worst_s(0.0) < 9", 9, "skipped", ATTEMPTS),
+        ("assert False", 9, "skipped", ATTEMPTS),
+        ("assert False", 0, "failed", 1),
     ],
 )
-def test_a_machine_that_stood_still_is_no_judge(pytester, monkeypatch, body, still, passes, runs):
+def test_a_machine_that_stood_still_is_no_judge(pytester, monkeypatch, body, still, outcome, runs):
     monkeypatch.setattr(lateness, "LatenessProbe", Still)
     monkeypatch.setattr(Still, "left", still)
+    monkeypatch.setattr(lateness, "PAUSE_S", 0.0)
     pytester.makeconftest(
         "from tests.lateness import run_beside_probe\n"
         "def pytest_runtest_protocol(item, nextitem):\n"
@@ -70,7 +71,7 @@ def test_a_machine_that_stood_still_is_no_judge(pytester, monkeypatch, body, sti
         "        file.write('x')\n"
         f"    {body}\n"
     )
-    ran = pytester.runpytest_inprocess("-p", "no:cacheprovider", "-W", "ignore")
-    ran.assert_outcomes(passed=int(passes), failed=int(not passes))
+    ran = pytester.runpytest_inprocess("-rs", "-p", "no:cacheprovider", "-W", "ignore")
+    ran.assert_outcomes(**{outcome: 1})
     assert (pytester.path / "ran").read_text() == "x" * runs
     assert ("too busy to judge" in ran.stdout.str()) == (runs == ATTEMPTS)
