@@ -28,8 +28,9 @@ from rigidimeter.recording import (
     read_manifest,
     read_recording,
 )
+from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.formats.columns import LABELS
-from rigidimeter.recording.sample_log import SAMPLE_UNITS, read_events
+from rigidimeter.recording.sample_log import SAMPLE_UNITS
 from rigidimeter.recording.study_toml import STUDY_SCHEMA, read_study_toml
 from rigidimeter.records import CHANNEL_UNITS, Analysis, Delay, Finding, Fit, Outcome, Score
 from rigidimeter.settings import Settings, load_settings, parse_settings

@@ -14,7 +14,8 @@ import pytest
 
 from rigidimeter.acquisition.processes.supervise import OF_THE_TERMINAL, _undisturbed
 from rigidimeter.guard import Cause
-from rigidimeter.recording.sample_log import read_events, read_samples
+from rigidimeter.recording.event_log import read_events
+from rigidimeter.recording.sample_log import read_samples
 
 SCRIPT = Path(__file__).with_name("realtime_session.py")
 

@@ -7,13 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.sample_log import (
-    END_OF_STREAM,
-    append_event,
-    read_events,
-    read_samples,
-    stream_extent,
-)
+from rigidimeter.recording.event_log import append_event, read_events
+from rigidimeter.recording.sample_log import END_OF_STREAM, read_samples, stream_extent
 from rigidimeter.recording.session_folder import EVENTS, SAMPLES, lock, read_manifest
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import PlannedEpoch
-from rigidimeter.recording.sample_log import read_events
+from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.session_epochs import session_settings
 from rigidimeter.recording.session_folder import EVENTS, lock, read_manifest
 from rigidimeter.settings import Settings

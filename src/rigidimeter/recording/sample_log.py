@@ -1,4 +1,4 @@
-"""The raw log: samples appended as an Arrow IPC stream, events as JSON lines.
+"""The raw log of samples, appended as an Arrow IPC stream.
 
 A stream needs no footer, so what was written before the process was killed can be read: every
 complete batch. One batch holds at most `BATCH_S` seconds.
@@ -7,7 +7,6 @@ complete batch. One batch holds at most `BATCH_S` seconds.
 from __future__ import annotations
 
 import io
-import json
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -17,7 +16,6 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from rigidimeter.documents import json_line
 from rigidimeter.errors import UserError
 
 END_OF_STREAM = b"\xff\xff\xff\xff\x00\x00\x00\x00"
@@ -77,14 +75,6 @@ SAMPLE_UNITS: Mapping[str, str] = {
     "cause": "number of the cause for which the guard latched, 0 none",
 }
 """The unit of every recorded column, as the manifest states them."""
-
-EVENT_TYPES: Mapping[str, Mapping[str, type | tuple[type, ...]]] = {
-    "session_started": {"time_s": (int, float)},
-    "epoch_started": {"epoch": int, "label": str, "task": str, "condition": str},
-    "epoch_ended": {"epoch": int, "time_s": (int, float), "outcome": str, "reason": str},
-    "session_ended": {"outcome": str, "reason": str},
-}
-"""What an event must hold to be read; others are kept and passed over."""
 
 _INTEGERS = {
     "tick": pa.int64(),
@@ -265,11 +255,6 @@ def stream_extent(path: Path) -> tuple[int, bool]:
     return end, closed
 
 
-def append_event(file: BinaryIO, event: Mapping[str, Any]) -> None:
-    """Write one event as one line, at once."""
-    append_line(file, json_line(event))
-
-
 def append_line(file: BinaryIO, line: bytes) -> None:
     """Write bytes at the end of an unbuffered file, all of them or none.
 
@@ -288,26 +273,3 @@ def append_line(file: BinaryIO, line: bytes) -> None:
         file.seek(start)
         file.truncate()
         raise
-
-
-def read_events(path: Path) -> tuple[list[dict[str, Any]], bool]:
-    """Return the events and whether the last line is torn (then it is left out).
-
-    Raises
-    ------
-    UserError
-        If a complete line is not a JSON object.
-    """
-    events: list[dict[str, Any]] = []
-    lines = path.read_bytes().split(b"\n")
-    for number, line in enumerate(lines[:-1], start=1):
-        try:
-            event = dict(json.loads(line))
-        except (ValueError, TypeError):
-            raise UserError(f"{path}: line {number} is not a JSON object") from None
-        kind = event.get("event")
-        for key, kinds in EVENT_TYPES.get(str(kind), {}).items():
-            if not isinstance(event.get(key), kinds):
-                raise UserError(f"{path}: line {number}, {kind}: {key} is missing or damaged")
-        events.append(event)
-    return events, lines[-1] != b""

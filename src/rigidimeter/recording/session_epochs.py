@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.sample_log import read_events, read_samples
+from rigidimeter.recording.event_log import read_events
+from rigidimeter.recording.sample_log import read_samples
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES, read_manifest
 from rigidimeter.records import Channel, Epoch, Motion, Notice, Outcome
 from rigidimeter.settings import Settings, parse_settings

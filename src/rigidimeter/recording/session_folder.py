@@ -22,13 +22,8 @@ from numpy.typing import NDArray
 
 from rigidimeter.documents import json_text, read_json, replace_file, text_bytes
 from rigidimeter.errors import UserError
-from rigidimeter.recording.sample_log import (
-    SAMPLE_UNITS,
-    Sample,
-    SampleLog,
-    append_event,
-    append_line,
-)
+from rigidimeter.recording.event_log import append_event
+from rigidimeter.recording.sample_log import SAMPLE_UNITS, Sample, SampleLog, append_line
 from rigidimeter.settings import Settings, dump_settings
 from rigidimeter.version import __version__
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import ReadOptions, is_session, read_recording, session_settings
-from rigidimeter.recording.sample_log import read_events
+from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES
 from rigidimeter.recording.study_folder import Row, StudyFolder
 from rigidimeter.recording.study_toml import is_outside

@@ -5,11 +5,11 @@ import pyarrow as pa
 import pytest
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.sample_log import (
     SAMPLE_UNITS,
     Sample,
     SampleLog,
-    read_events,
     read_samples,
     sample_dtypes,
     stream_extent,

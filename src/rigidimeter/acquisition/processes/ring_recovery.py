@@ -22,15 +22,9 @@ from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import Condition, Role
 from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 from rigidimeter.errors import UserError
+from rigidimeter.recording.event_log import append_event, read_events
 from rigidimeter.recording.recovery import recover
-from rigidimeter.recording.sample_log import (
-    BATCH_S,
-    SampleLog,
-    append_event,
-    append_line,
-    read_events,
-    read_samples,
-)
+from rigidimeter.recording.sample_log import BATCH_S, SampleLog, append_line, read_samples
 from rigidimeter.recording.session_folder import EVENTS, SAMPLES, lock, read_manifest
 
 

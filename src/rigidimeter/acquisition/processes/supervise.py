@@ -34,7 +34,7 @@ from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Rol
 from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.errors import UserError
-from rigidimeter.recording.sample_log import read_events
+from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.session_folder import EVENTS
 
 RING_S = 60.0
