@@ -30,6 +30,7 @@ FAULTS = [
     (CANOPEN, "fault", Cause.DRIVE_FAULT, 2),
     (CANOPEN, "emergency", Cause.DRIVE_FAULT, 2),
     (CANOPEN, "leave operation", Cause.DRIVE_STATE, 2),
+    (CANOPEN, "fall to switched on", Cause.DRIVE_STATE, 2),
     (CANOPEN, "change mode", Cause.DRIVE_STATE, 2),
     (CANOPEN, "reboot", Cause.DRIVE_FAULT, 2),
     (ASCII, "fault", Cause.DRIVE_FAULT, CYCLES),
@@ -87,6 +88,18 @@ def test_fault_08_drive_lost(rig, case, cause, within_s, tmp_path, measured):
             measured(8, rig, case, trial, bound_s, opened_s=opened_s)
         else:
             measured(8, rig, case, trial, bound_s)
+
+
+@pytest.mark.slow
+def test_fault_08_late_answers_while_enabling_are_the_drives():
+    """The torque sensor's samples pile up and are lost meanwhile: it is not to blame."""
+    with bench(CANOPEN) as made:
+        made.misbehave(Wrong("drive", "slow answers", 0.1))
+        with pytest.raises(DeviceError, match=r"drive: it took \d\.\d s to be enabled"):
+            made.rig.enable()
+        time.sleep(0.1)
+        assert not made.powered
+        assert not made.line.closed
 
 
 @pytest.mark.parametrize("rig", WIRES)

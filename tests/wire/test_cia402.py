@@ -173,6 +173,7 @@ CAUSES = {
     "emergency": Cause.DRIVE_FAULT,
     "reboot": Cause.DRIVE_FAULT,
     "leave operation": Cause.DRIVE_STATE,
+    "fall to switched on": Cause.DRIVE_STATE,
     "change mode": Cause.DRIVE_STATE,
     "stop measurements": Cause.DRIVE_LOST,
     "stop heartbeat": Cause.DRIVE_LOST,
@@ -205,7 +206,7 @@ def test_what_the_drive_does_wrong_is_named(wire, name):
     # The first cause stays, and nothing the driver sends brings the drive back.
     wire.emulator.behave()
     assert Cause(_run(drive, 0.5, for_s=0.2, until=lambda _: False).cause) is CAUSES[name]
-    if name in ("fault", "reboot", "leave operation"):
+    if name in ("fault", "reboot", "leave operation", "fall to switched on"):
         assert not wire.emulator.state()["power"]
         assert drive.write(0.5) == 0.0
 

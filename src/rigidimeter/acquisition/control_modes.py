@@ -50,7 +50,7 @@ def follow(
     def command(reading: Reading, _: float, k: int) -> tuple[float, float, float]:
         target = angle_rad[k]
         # The reading is compared with where the target was when it was taken.
-        then = angle_rad[max(k - _age_ticks(loop, reading), 0)]
+        then = angle_rad[min(max(k - _age_ticks(loop, reading), 0), len(angle_rad) - 1)]
         gain = loop.tracking_gain_per_s
         return tracking_step(gain, then, velocity_rad_s[k], reading.angle_rad), 0.0, target
 

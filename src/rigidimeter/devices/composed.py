@@ -29,6 +29,10 @@ ATTEMPTS, ATTEMPT_S = 50, 0.002
 """How often, and at what interval, the first samples after enabling are polled."""
 
 
+SAMPLES_KEPT_S = 1.0
+"""A sensor's samples of a longer time than this may not fit into the buffer of its connection."""
+
+
 class Home(NamedTuple):
     """Where the joint must be when it is enabled, on the drive's own scale.
 
@@ -127,19 +131,20 @@ class ComposedRig:
                 restart()
             if self._line is not None:
                 self._line.close_contact()
+            began_s = time.monotonic()
             self._drive.enable()
-            self._origin_rad = self._fresh_angle_rad()
+            self._origin_rad = self._fresh_angle_rad(time.monotonic() - began_s)
             if self._home is not None:
                 self._home.check(self._origin_rad)
         except BaseException:
             self.disable()
             raise
 
-    def _fresh_angle_rad(self) -> float:
+    def _fresh_angle_rad(self, took_s: float) -> float:
         """Return the first finite angle once the torque is fresh too.
 
         A drive may send its angle only in reply to a command. The sensor's samples piled up while
-        the drive was configured, so they are read until a new one arrives.
+        the drive was enabled, which took `took_s`, so they are read until a new one arrives.
         """
         newest_s = self._sensor.read().time_s
         fresh = False
@@ -152,6 +157,12 @@ class ComposedRig:
                 raise DeviceError(
                     f"drive: {Cause(motion.cause).sentence} as soon as it was enabled; put that "
                     "right first"
+                )
+            if torque.cause and took_s > SAMPLES_KEPT_S:
+                raise DeviceError(
+                    f"drive: it took {took_s:.1f} s to be enabled, so late are its answers, and "
+                    "the torque sensor's samples of that time were lost; it must take less than "
+                    f"{SAMPLES_KEPT_S:g} s, so find what keeps the drive or its bus busy"
                 )
             if fresh and math.isfinite(motion.angle_rad):
                 return motion.angle_rad

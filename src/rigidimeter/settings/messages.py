@@ -37,8 +37,9 @@ def sentence(root: type[BaseModel], values: Mapping[str, Any], detail: ErrorDeta
         return f"{key} = {shown} is not allowed: it must be a table{_header(where)}"
     if field is None:
         return f"{key} = {shown}: {detail['msg']}"
-    as_text = f', as in {key} = "{shown}"' if detail["type"] == "string_type" else ""
-    return f"{key} = {shown} is not allowed: it must be {_expected(field)}{as_text}"
+    expected = _expected(field)
+    as_text = f', as in {key} = "{shown}"' if expected.startswith("a text") else ""
+    return f"{key} = {shown} is not allowed: it must be {expected}{as_text}"
 
 
 def _header(where: Sequence[str | int]) -> str:
@@ -131,8 +132,11 @@ def _expected(field: FieldInfo) -> str:
     }
     if typing.get_origin(annotation) is typing.Literal:
         return "one of " + ", ".join(repr(choice) for choice in typing.get_args(annotation))
+    if annotation is bool:
+        return "true or false"
     if annotation is str:
-        return f"a text of {bounds['min_length']} to {bounds['max_length']} letters"
+        low, high = bounds.get("min_length", 0), bounds.get("max_length")
+        return "a text" if high is None else f"a text of {low} to {high} letters"
     if annotation not in (int, float):
         if _is_container(annotation):
             inner = typing.get_args(annotation)
@@ -141,6 +145,6 @@ def _expected(field: FieldInfo) -> str:
         return "a table"
     whole = annotation is int
     shown = {name: f"{bound:.0f}" if whole else f"{bound:g}" for name, bound in bounds.items()}
-    low = f"greater than {shown['gt']}" if "gt" in shown else f"at least {shown['ge']}"
-    kind = "a whole number" if whole else "a number"
-    return f"{kind} {low}{suffix} and at most {shown['le']}{suffix}"
+    words = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at most"}
+    limits = [f"{words[name]} {shown[name]}{suffix}" for name in words if name in shown]
+    return " ".join(("a whole number" if whole else "a number", " and ".join(limits))).rstrip()

@@ -161,3 +161,13 @@ def test_a_rig_without_power_does_not_move():
         reading = rig.read()
     assert isinstance(reading, Reading)
     assert reading.angle_rad == 0.0
+
+
+def test_a_stamp_ahead_of_its_tick_does_not_end_an_imposed_motion():
+    """A reading taken within a late tick may be younger than it: no later target is there."""
+    rig = SpoiledRig(lambda r: r._replace(motion_time_s=r.motion_time_s + 0.0016), from_tick=0)
+    loop = ControlLoop(SETTINGS, rig, SimulatedClock(), lambda _: None)
+    rig.enable()
+    target_rad = [1e-4 * k for k in range(50)]
+    ended = follow(loop, 1, target_rad, [0.1] * 50)
+    assert (loop.tick, ended.cause) == (50, 0)

@@ -10,6 +10,7 @@ import pytest
 from rigidimeter.devices.base import DeviceError, MotionSample, TorqueSample
 from rigidimeter.devices.composed import ComposedRig, Home
 from rigidimeter.devices.enable_line import SerialEnableLine
+from rigidimeter.guard import Cause
 
 ANGLE_RAD = 0.4
 
@@ -110,3 +111,17 @@ def test_a_joint_that_stands_elsewhere_loses_its_power(drive, line, port, home_r
     assert drive.asked == ["enable", "disable"]
     assert not port.rts
     assert set(drive.written) == {0.0}
+
+
+@pytest.mark.parametrize(("took_s", "named"), [(1.5, True), (0.5, False)])
+def test_a_drive_that_answers_so_late_that_samples_are_lost_is_named(drive, took_s, named):
+    class Flooded(Sensor):
+        def read(self) -> TorqueSample:
+            return super().read()._replace(cause=int(Cause.TORQUE_PACKETS))
+
+    rig = ComposedRig(Flooded(), drive, 100.0)
+    if named:
+        with pytest.raises(DeviceError, match=r"drive: it took 1\.5 s to be enabled"):
+            rig._fresh_angle_rad(took_s)
+    else:  # the loop names the sensor
+        assert rig._fresh_angle_rad(took_s) == ANGLE_RAD

@@ -165,3 +165,50 @@ def test_a_driver_that_names_no_module_is_refused(tmp_path, driver):
     )
     with pytest.raises(UserError, match=r"there is no driver .*; known are cia402, ascii"):
         load_rig(path)
+
+
+def can_rig(tmp_path, lines):
+    path = tmp_path / "rig.toml"
+    path.write_text(f'[torque_sensor]\ndriver = "ati-rdt"\n[drive]\ndriver = "cia402"\n{lines}\n')
+    return path
+
+
+@pytest.mark.parametrize(("channel", "is_"), [("0", 0), ('"can1"', "can1"), ('"0"', "0")])
+def test_a_channel_is_a_text_or_a_number(tmp_path, channel, is_):
+    rig = load_rig(can_rig(tmp_path, f'interface = "kvaser"\nchannel = {channel}'))
+    assert rig.devices["drive"][1].channel == is_
+    assert not rig.emulated
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ("interface = 5", r"interface = 5 is not allowed: it must be the name of a python-can int"),
+        ('interface = ""', r"interface = '' is not allowed: it must be the name of a python-can"),
+        ("channel = -1", r"channel: -1 names no channel; it must be a text such as \"can0\", or a"),
+        ("channel = true", r"channel: True names no channel"),
+        ('channel = ""', r"channel: '' names no channel"),
+        ("channel = [0]", r"channel: \[0\] names no channel"),
+    ],
+)
+def test_another_interface_or_channel_is_refused_with_a_sentence(tmp_path, lines, words):
+    path = can_rig(tmp_path, lines)
+    with pytest.raises(UserError, match=rf"rig\.toml, \[drive\]: {words}"):
+        load_rig(path)
+
+
+@pytest.mark.parametrize(
+    ("driver", "line", "words"),
+    [
+        ("ascii", "port = 5", r'port = 5 is not allowed: it must be a text, as in port = "5"'),
+        ("ascii", 'port = "/dev/x"\nexternal_watchdog = 1', r"must be true or false"),
+    ],
+)
+def test_a_value_of_another_kind_is_refused_with_a_sentence(tmp_path, driver, line, words):
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        f'[torque_sensor]\ndriver = "ati-rdt"\n[drive]\ndriver = "{driver}"\n'
+        f"counts_per_turn = 1000\n{line}\n"
+    )
+    with pytest.raises(UserError, match=words):
+        load_rig(path)

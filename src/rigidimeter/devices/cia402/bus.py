@@ -17,6 +17,7 @@ from rigidimeter.devices.cia402.setup import Cia402Settings, library
 from rigidimeter.devices.cia402.state_words import (
     BOOTED,
     OPERATIONAL,
+    PROFILE_VELOCITY,
     SYNC_ID,
     Control,
     Nmt,
@@ -70,6 +71,12 @@ class NodeBus:
         """The NMT state in that heartbeat."""
         self.booted = False
         """Whether the node restarted; reset by `configure`."""
+        self.left_operation = False
+        """Whether a measurement showed another state or mode; reset by `enable`.
+
+        The command that keeps a drive in operation also brings back one that fell to switched on,
+        so a later measurement may show nothing of it.
+        """
         self.alarmed = False
         """Whether an emergency message arrived; reset by `enable` and `reset_fault`."""
         self.emergency = 0
@@ -86,6 +93,11 @@ class NodeBus:
     def state(self) -> State:
         """The state that the drive last reported."""
         return state_of(self.statusword)
+
+    @property
+    def in_operation(self) -> bool:
+        """Whether the drive last reported that it is enabled, and in the right mode."""
+        return self.state is State.OPERATION_ENABLED and self.mode == PROFILE_VELOCITY
 
     def open(self) -> None:
         """Open the bus.
@@ -109,7 +121,7 @@ class NodeBus:
                 ignore_config=True,
                 **more,
             )
-        except (can.CanError, OSError, ValueError) as error:
+        except Exception as error:  # each interface raises what its vendor's library does
             raise DeviceError(
                 f"{self._who}: the bus does not open ({error}); check interface, channel and that "
                 "the operating system has brought the bus up"
@@ -129,13 +141,17 @@ class NodeBus:
         self._send(self._message(0, bytes([command, self._settings.node_id])))
 
     def ask(self, control: Control, target: int) -> bool:
-        """Send a command, a SYNC and, if due, our heartbeat; return if the command was sent."""
+        """Send a SYNC, a command and, if due, our heartbeat; return if the command was sent.
+
+        The SYNC comes first, so that the drive reports the state that it fell to by itself before
+        the command can bring it back.
+        """
         now_s = self._now()
-        self._command.data[:] = command_bytes(control, target)
-        sent = self._send(self._command)
         self._send(self._sync)
         self.sync_s = now_s
         self.asked_s = min(self.asked_s, now_s)
+        self._command.data[:] = command_bytes(control, target)
+        sent = self._send(self._command)
         if now_s - self._beaten_s >= self._settings.heartbeat_s:
             self._send(self._heartbeat)
             self._beaten_s = now_s
@@ -212,6 +228,7 @@ class NodeBus:
                 return False
             self.counts["lost"] += self._position is not None
             self.statusword, self.mode, self._position = report
+            self.left_operation = self.left_operation or not self.in_operation
         elif identifier == ids.velocity:
             self._velocity = velocity_of(data)
             if self._velocity is None:

@@ -1,7 +1,7 @@
 """A CiA 402 servo over CANopen in profile-velocity mode.
 
 Before the loop, SDO transfers write the settings and read them back. The loop uses neither SDOs nor
-threads: each `write` sends the command and a SYNC, the drive answers every SYNC with its state,
+threads: each `write` sends a SYNC and the command, the drive answers every SYNC with its state,
 position and velocity, and the next `read` receives them. `write` also sends the heartbeat that
 keeps the drive enabled. If the loop hangs, the heartbeat ends with it, and the drive stops by
 itself: by its heartbeat watchdog (0x1016), and sooner by its command deadline (0x1400:05) if it has
@@ -32,7 +32,6 @@ from rigidimeter.devices.cia402.setup import (
 )
 from rigidimeter.devices.cia402.state_words import (
     OPERATIONAL,
-    PROFILE_VELOCITY,
     Control,
     Nmt,
     State,
@@ -169,7 +168,7 @@ class Cia402Drive:
             raise
         self._control = Control.ENABLE_OPERATION
         self._sent = 0
-        wire.emergency = 0
+        wire.emergency, wire.left_operation = 0, False
         wire.heard_s, wire.network_state = self._now(), OPERATIONAL
 
     def read(self) -> MotionSample:
@@ -182,7 +181,7 @@ class Cia402Drive:
             wire.counts["backlog"] += 1
         now_s = self._now()
         found = self._find_cause(now_s)
-        if found in (Cause.DRIVE_FAULT, Cause.DRIVE_STATE) and not self._in_operation():
+        if found in (Cause.DRIVE_FAULT, Cause.DRIVE_STATE) and wire.left_operation:
             # Repeating "enable operation" would restart a drive that stopped by itself.
             self._halt(Control.QUICK_STOP)
         self._cause = self._cause or found
@@ -199,10 +198,6 @@ class Cia402Drive:
         status = wire.emergency << 16 | wire.statusword
         cause = self._cause if wire.sequence else Cause.DRIVE_LOST
         return self._sample._replace(status=status, cause=int(cause))
-
-    def _in_operation(self) -> bool:
-        wire = self._wire
-        return wire.state is State.OPERATION_ENABLED and wire.mode == PROFILE_VELOCITY
 
     def _check_watchdog(self, now_s: float) -> None:
         """Halt a drive that may be braking by itself: "enable operation" would restart it."""
@@ -223,7 +218,7 @@ class Cia402Drive:
         if wire.booted or wire.alarmed or wire.state in FAULTS:
             return Cause.DRIVE_FAULT
         if self._control is Control.ENABLE_OPERATION:
-            if not self._in_operation() or wire.network_state != OPERATIONAL:
+            if wire.left_operation or wire.network_state != OPERATIONAL:
                 return Cause.DRIVE_STATE
             if now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s:
                 return Cause.DRIVE_LOST

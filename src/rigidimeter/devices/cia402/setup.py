@@ -18,7 +18,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, Self
 
-from pydantic import model_validator
+from pydantic import Field, field_validator, model_validator
 
 from rigidimeter.devices.base import DeviceError
 from rigidimeter.devices.cia402.state_words import PROFILE_VELOCITY, Frames, frames
@@ -34,17 +34,21 @@ NOT_THERE = (0x06020000, 0x06090011)
 class Cia402Settings(Section):
     """A CANopen servo drive, profile CiA 402, in profile-velocity mode.
 
-    `interface` and `channel` are those of python-can. `bitrate` is that of the bus; with socketcan
-    the operating system sets it, and here it only limits the loop rate. `port` is used by
-    udp_multicast alone. `command_deadline_s` 0 means no command deadline; a drive without one still
-    has its heartbeat watchdog.
+    `interface` and `channel` are those of python-can; some interfaces number their channels.
+    `bitrate` is that of the bus; with socketcan the operating system sets it, and here it only
+    limits the loop rate. `port` is used by udp_multicast alone. `command_deadline_s` 0 means no
+    command deadline; a drive without one still has its heartbeat watchdog.
 
     The default decelerations are above the default `guard.acceleration_limit_deg_s2`, since the
     guard relies on a drive that brakes at least that fast; commissioning compares the two.
     """
 
-    interface: str = "socketcan"
-    channel: str = "can0"
+    interface: str = Field(
+        "socketcan",
+        min_length=1,
+        json_schema_extra={"meaning": 'the name of a python-can interface, such as "socketcan"'},
+    )
+    channel: str | int = "can0"
     bitrate: int = quantity(1_000_000, "bit/s", 10_000, 1_000_000)
     port: int = quantity(43113, "1", 1, 65535)
     node_id: int = quantity(1, "1", 1, 127)
@@ -72,8 +76,19 @@ class Cia402Settings(Section):
     def emulated(self) -> bool:
         """Whether the bus is virtual, with no hardware connected."""
         return self.interface in ("virtual", "udp_multicast") or (
-            self.interface == "socketcan" and self.channel.startswith("vcan")
+            self.interface == "socketcan" and str(self.channel).startswith("vcan")
         )
+
+    @field_validator("channel", mode="before")
+    @classmethod
+    def _text_or_number(cls, value: Any) -> Any:
+        text = isinstance(value, str) and value != ""
+        if not text and (isinstance(value, bool) or not isinstance(value, int) or value < 0):
+            raise ValueError(
+                f'{value!r} names no channel; it must be a text such as "can0", or a whole number '
+                "such as 0, as the interface has it"
+            )
+        return value
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

@@ -111,6 +111,9 @@ class Cia402Emulator:
                 self.emergency(self._servo.wrong[name], GENERIC_ERROR)
             elif name == "leave operation":
                 self._servo.go(Phase.SWITCH_ON_DISABLED, name)
+            elif name == "fall to switched on":
+                del self._servo.wrong[name]
+                self._servo.go(Phase.SWITCHED_ON, name)
             elif name == "encoder frozen":
                 self._servo.wrong[name] = self._servo.measured()
             elif name in ("stop heartbeat", "die"):

@@ -20,6 +20,7 @@ MISBEHAVIOURS = {
     "fault": "brakes, reports a fault (value: its code) and cannot be reset",
     "emergency": "sends an emergency message (value: its code) but keeps moving",
     "leave operation": "removes its own power, as if its hardware enable opened",
+    "fall to switched on": "disables its operation once; the next controlword can enable it again",
     "change mode": "reports another mode of operation (value: which)",
     "stop measurements": "stops answering SYNC",
     "stop heartbeat": "stops sending its heartbeat",
