@@ -185,7 +185,10 @@ REFUSED = {
     "slow answers": "no answer about",
     "wrong watchdog": "heartbeat watchdog .* reads back as 0",
 }
-PASSED_ON = {"does not follow", "runs away", "encoder frozen", "encoder jump", "encoder sign"}
+PASSED_ON = {
+    *("does not follow", "runs away", "drifts"),
+    *("encoder frozen", "encoder jump", "encoder sign"),
+}
 
 
 def test_every_misbehaviour_has_its_test():
@@ -246,6 +249,9 @@ def test_what_only_a_comparison_shows_is_passed_on_to_the_guard(wire, name):
         assert after.velocity_rad_s == pytest.approx(0.0, abs=0.01)
     elif name == "runs away":
         assert after.velocity_rad_s == pytest.approx(6.0, abs=0.1)
+    elif name == "drifts":
+        assert after.velocity_rad_s == pytest.approx(0.58, abs=0.01)
+        assert _run(drive, 0.0, for_s=0.2).velocity_rad_s == pytest.approx(0.08, abs=0.01)
     elif name == "encoder frozen":
         assert after.angle_rad - before.angle_rad < truth["angle_rad"] - before.angle_rad - 0.05
         assert _run(drive, 0.5, for_s=0.05).raw == after.raw

@@ -187,6 +187,8 @@ RUNNING = [
     ("foreign", None, Cause.NONE, "foreign"),
     ("bias", None, Cause.NONE, None),
     ("spike", 20, Cause.NONE, None),
+    ("gain", None, Cause.NONE, None),
+    ("other_axis", None, Cause.NONE, None),
     ("silent", None, Cause.NONE, None),
 ]
 
@@ -284,6 +286,17 @@ def test_a_bias_under_load_and_a_spike_pass_to_the_guard(emulator, sensor):
     emulator.misbehave("spike", 2)
     time.sleep(0.02)
     assert max(sample.torque_nm for sample in watch(sensor, 0.05)) > 45.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "gain"), [("gain", -1.0, -1.0), ("gain", 0.5, 0.5), ("other_axis", None, 0.0)]
+)
+def test_a_wrong_gain_and_another_axis_pass_unnoticed(emulator, sensor, name, value, gain):
+    emulator.misbehave(name, value)
+    time.sleep(0.02)
+    samples = watch(sensor, 0.02)
+    assert newest(samples) == pytest.approx(gain * TORQUE_NM, abs=10 * NOISE_NM)
+    assert len({sample.torque_nm for sample in samples}) > 1
 
 
 def test_the_sequence_wraps_around_without_loss(arm, sensor_of):

@@ -30,6 +30,7 @@ MISBEHAVIOURS = {
     "stale target": "keeps an old target velocity (value: in rad/s) whatever is written",
     "does not follow": "accepts commands and does not move",
     "runs away": "moves at a velocity of its own (value: in rad/s) while it has power",
+    "drifts": "adds a velocity of its own (value: in rad/s) to every command while it has power",
     "encoder frozen": "keeps reporting the present position and velocity",
     "encoder jump": "reports a position with an error (value: in rad)",
     "encoder sign": "reports position and velocity with the wrong sign",
@@ -45,6 +46,7 @@ DEFAULTS = {
     "change mode": 1,
     "stale target": 0.5,
     "runs away": 6.0,
+    "drifts": 0.08,
     "encoder jump": 1.0,
     "slow answers": 0.5,
     "wrong watchdog": 0,
@@ -206,7 +208,7 @@ class Servo:
             wanted_rad_s = self.target() / UNITS_PER_RAD
             speeds_up = abs(wanted_rad_s) > abs(self._arm.motion()[1])
             ramp = self._node.value(0x6083 if speeds_up else 0x6084) / UNITS_PER_RAD
-            self._arm.command(wanted_rad_s, ramp)
+            self._arm.command(wanted_rad_s + self.wrong.get("drifts", 0.0), ramp)
 
     def fault(self, code: int, why: str) -> None:
         """Brake, then enter the fault state."""

@@ -43,6 +43,8 @@ MISBEHAVIOURS = {
     "restart": "The sensor restarts once: both sequences start at 1 again.",
     "foreign": "Another sender sends records with wrong torques to the client.",
     "bias": "The torque has an error of `value` N·m (1), as after zeroing under load.",
+    "gain": "The torque is multiplied by `value` (-1); 0 gives a constant.",
+    "other_axis": "The torque is on another axis, and the measured one has only noise.",
     "spike": "Every `value`-th record (100) shows 50 N·m more.",
     "changed_units": "The page shows lbf-in.",
     "unknown_units": "The page shows an unknown torque unit.",
@@ -119,6 +121,8 @@ class RecordSource:
             if "frozen_record" in faults and self.last:
                 return self.last
             torque_nm += fault_value(faults, "bias", 1.0) or 0.0
+            gain = fault_value(faults, "gain", -1.0)
+            torque_nm *= 1.0 if gain is None else gain
             every = fault_value(faults, "spike", 100)
             if every is not None and self.taken % int(every) == 0:
                 torque_nm += 50.0
@@ -130,6 +134,8 @@ class RecordSource:
                 status |= int(fault_value(faults, name, SUPPLY_LOW) or 0)
         tz = max(-(2**31), min(2**31 - 1, round(-torque_nm * COUNTS_PER_UNIT)))
         counts: tuple[int, ...] = (*self._noise[self.taken % 4096], tz)
+        if "other_axis" in faults:
+            counts = (*counts[:4], tz, counts[4])
         if "frozen_values" in faults and self._before:
             counts = self._before
         self._before = counts
