@@ -21,6 +21,7 @@ from rigidimeter.experiment import PlannedEpoch, Protocol, prbs_nm, sinusoid
 from rigidimeter.guard import Cause, Reaction, released, why_ended
 from rigidimeter.recording.session_folder import Ending
 from rigidimeter.settings import Settings, ZeroingSettings
+from rigidimeter.units import deg_from_rad
 
 BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
 
@@ -247,6 +248,7 @@ def _zero_sensor(session: _Session) -> bool:
         if not _ready_for_epoch(session):
             return False
     bias_nm, noise_sd_nm, why = _bias_and_noise(readings, limits)
+    why = why or _moved(readings, session.settings)
     session.sink.event(
         "sensor_zeroed",
         time_s=run.loop.time_s,
@@ -288,6 +290,19 @@ def _bias_and_noise(
             "the sensor is noisy"
         )
     return bias_nm, noise_sd_nm, why
+
+
+def _moved(readings: Sequence[Reading], settings: Settings) -> str:
+    """Return why a torque is none at rest, if so: a joint in motion needs torque by itself."""
+    limit_deg = settings.zeroing.motion_limit_deg
+    angles_rad = [reading.angle_rad for reading in readings]
+    moved_deg = deg_from_rad(max(angles_rad) - min(angles_rad))
+    if moved_deg <= limit_deg + settings.rig.motion.angle_resolution_deg:
+        return ""
+    return (
+        f"the joint moved by {moved_deg:.3g} deg while the torque sensor was zeroed, more than "
+        f"zeroing.motion_limit_deg = {limit_deg:g} deg: the drive does not hold it still"
+    )
 
 
 def _close(session: _Session) -> None:

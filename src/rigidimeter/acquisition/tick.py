@@ -30,8 +30,11 @@ from rigidimeter.devices.base import Reading, Rig
 from rigidimeter.guard import (
     REACTIONS,
     Cause,
+    ConsistencyState,
     Limited,
     Reaction,
+    consistency_limits,
+    consistency_step,
     guard_limits,
     guard_state,
     guard_step,
@@ -115,12 +118,12 @@ class ControlLoop:
         self.stall_ticks = settings.loop.stall_s * self.rate_hz
         self.tracking_gain_per_s = controller.tracking_gain_per_s
         self.lowpass: Biquad = butterworth_lowpass(controller.torque_cutoff_hz, self.rate_hz)
-        self.limits = guard_limits(settings)
+        self.limits, self.agreement = guard_limits(settings), consistency_limits(settings)
         self.perturbation_scale = 1.0
         set_admittance(self, controller.inertia_kg_m2, controller.damping_nm_s_rad)
         # What a tick changes.
         self.filtered = BiquadState()
-        self.guard = guard_state(self.limits)
+        self.guard, self.consistency = guard_state(self.limits), ConsistencyState()
         self.tick = 0
         self.elapsed_ticks = 1
         self.late_in_a_row = 0
@@ -271,18 +274,19 @@ def _run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: 
         # would set the arm going again; one without brakes by its own ramp.
         loop.guard = loop.guard._replace(velocity_rad_s=0.0)
     was_cut = loop.guard.reaction
+    measured = torque_nm, angle, velocity, due_s - motion_s, due_s - torque_s
+    loop.consistency, apart = consistency_step(
+        loop.agreement, loop.consistency, loop.guard.velocity_rad_s, *measured, loop.elapsed_ticks
+    )
     loop.guard, allowed, limited = guard_step(
         loop.limits,
         loop.guard,
         request,
-        torque_nm,
-        angle,
-        velocity,
-        due_s - motion_s,
-        due_s - torque_s,
+        *measured,
         # A loop that stood still comes first: the drive's own watchdog follows from it.
         _stronger(_stronger(late, reading.cause), from_outside),
         loop.elapsed_ticks,
+        apart,
     )
     if loop.guard.reaction == CUT and was_cut != CUT:
         loop.rig.disable()

@@ -1,6 +1,12 @@
 """The last word before the wire: limits, plausibility, and a latch that keeps the first cause."""
 
 from rigidimeter.guard.causes import REACTIONS, Cause, Reaction
+from rigidimeter.guard.consistency import (
+    ConsistencyLimits,
+    ConsistencyState,
+    consistency_limits,
+    consistency_step,
+)
 from rigidimeter.guard.limits import GuardLimits, GuardState, guard_limits, guard_state, released
 from rigidimeter.guard.recorded_guard import Replayed, replay
 from rigidimeter.guard.step import Limited, guard_step, why_ended
@@ -8,11 +14,15 @@ from rigidimeter.guard.step import Limited, guard_step, why_ended
 __all__ = [
     "REACTIONS",
     "Cause",
+    "ConsistencyLimits",
+    "ConsistencyState",
     "GuardLimits",
     "GuardState",
     "Limited",
     "Reaction",
     "Replayed",
+    "consistency_limits",
+    "consistency_step",
     "guard_limits",
     "guard_state",
     "guard_step",

@@ -58,6 +58,11 @@ class Cause(IntEnum):
     SOFTWARE = 28
     SIGNAL = 29
     STAMP_AHEAD = 30
+    MOVED_AT_REST = 31
+    VELOCITY_WRONG = 32
+    TORQUE_SILENT = 33
+    TORQUE_SIGN = 34
+    SELDOM_FRESH = 35
 
     @property
     def sentence(self) -> str:
@@ -103,6 +108,11 @@ _SENTENCES = {
     Cause.SOFTWARE: "the program failed",
     Cause.SIGNAL: "the program was told to end",
     Cause.STAMP_AHEAD: "a reading bore the time of a moment still to come",
+    Cause.MOVED_AT_REST: "the joint moved while it was told to stand still",
+    Cause.VELOCITY_WRONG: "the velocity reading did not agree with the change of the angle",
+    Cause.TORQUE_SILENT: "the joint was accelerated and the torque sensor did not show it",
+    Cause.TORQUE_SIGN: "the torque sensor answered the perturbation with the wrong sign",
+    Cause.SELDOM_FRESH: "fresh readings came too seldom",
 }
 
 _HOLD = {Cause.TORQUE_HIGH, Cause.POWER_HIGH}

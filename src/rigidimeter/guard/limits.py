@@ -29,7 +29,8 @@ class GuardLimits(NamedTuple):
     stamp of a reading may be wrong. `gap_s` is how late a step may come without the position limit
     being crossed. `tolerance_rad` is how far beyond the position limit a reading may be before it
     counts as a fault: sensor noise at the limit is none. `stale_s` is how old a reading may be.
-    `following_rad` is how far the angle may be outside of where the commands can have brought it.
+    `following_rad` is how far the angle may be outside of where the commands can have brought it,
+    `drift_rad_s` how fast that place may follow the angle.
     """
 
     position_rad: float
@@ -46,6 +47,7 @@ class GuardLimits(NamedTuple):
     power_w: float = math.inf
     energy_j: float = math.inf
     following_rad: float = math.inf
+    drift_rad_s: float = 0.0
 
 
 class GuardState(NamedTuple):
@@ -95,6 +97,7 @@ def guard_limits(settings: Settings) -> GuardLimits:
         power_w=guard.power_limit_w,
         energy_j=guard.energy_limit_j,
         following_rad=rad_from_deg(following_deg),
+        drift_rad_s=rad_from_deg(guard.drift_limit_deg_s),
     )
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.guard.causes import Cause, Reaction
+from rigidimeter.guard.consistency import ConsistencyLimits, ConsistencyState, consistency_step
 from rigidimeter.guard.limits import GuardLimits, GuardState, guard_state, released
 from rigidimeter.guard.step import guard_step
 
@@ -28,8 +29,10 @@ _FOUND_HERE = {
     *(Cause.POSITION_LIMIT_EXCEEDED, Cause.MOTION_STALE, Cause.TORQUE_STALE, Cause.STAMP_AHEAD),
     *(Cause.OVERSPEED, Cause.NOT_FOLLOWING, Cause.TORQUE_TOO_HIGH, Cause.ENERGY_HIGH),
     *(Cause.TORQUE_HIGH, Cause.POWER_HIGH),
+    *(Cause.MOVED_AT_REST, Cause.VELOCITY_WRONG, Cause.SELDOM_FRESH),
 }
-"""What `watch` finds itself, so that other limits may find it elsewhere or not at all."""
+"""What `watch` and `consistency` find themselves, so that other limits may find it elsewhere or not
+at all."""
 
 
 class Replayed(NamedTuple):
@@ -42,7 +45,10 @@ class Replayed(NamedTuple):
 
 
 def replay(
-    limits: GuardLimits, tick_rate_hz: float, columns: Mapping[str, NDArray[Any]]
+    limits: GuardLimits,
+    tick_rate_hz: float,
+    columns: Mapping[str, NDArray[Any]],
+    agreement: ConsistencyLimits | None = None,
 ) -> Replayed:
     """Run the guard over the columns of a recorded session, from its first tick on.
 
@@ -59,7 +65,12 @@ def replay(
     columns : mapping
         As `recording.read_samples` gives them: tick, velocity_request_rad_s, torque_nm, angle_rad,
         velocity_rad_s, motion_time_s, torque_time_s and cause.
+    agreement : ConsistencyLimits, optional
+        For the session's tick: `consistency_limits(settings)`; without them nothing is found that
+        needs time to show.
     """
+    agreement = agreement or ConsistencyLimits(limits.interval_s)
+    agreed = ConsistencyState()
     ticks, recorded = columns["tick"].tolist(), columns["cause"].tolist()
     elapsed = np.diff(columns["tick"], prepend=columns["tick"][:1]).tolist()
     inputs = zip(*(columns[name].tolist() for name in _INPUTS), strict=True)
@@ -71,17 +82,16 @@ def replay(
         if cause == Cause.NONE != before and _is_held_at_rest(state):
             state = released(state)
         due_s = tick / tick_rate_hz
+        measured = torque_nm, angle, velocity, due_s - motion_s, due_s - torque_s
+        agreed, apart = consistency_step(agreement, agreed, state.velocity_rad_s, *measured, passed)
         state, said.velocity_command_rad_s[k], said.limited[k] = guard_step(
             limits,
             state,
             request,
-            torque_nm,
-            angle,
-            velocity,
-            due_s - motion_s,
-            due_s - torque_s,
+            *measured,
             int(Cause.NONE) if cause in _FOUND_HERE else cause,
             passed,
+            apart,
         )
         said.cause[k], said.reaction[k] = state.cause, state.reaction
         before = cause

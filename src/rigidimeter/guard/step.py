@@ -80,6 +80,7 @@ def guard_step(
     torque_age_s: float = 0.0,
     reported: int = _NO_CAUSE,
     elapsed_ticks: int = 1,
+    disagreement: int = _NO_CAUSE,
 ) -> tuple[GuardState, float, int]:
     """Limit one velocity command.
 
@@ -97,6 +98,8 @@ def guard_step(
         A `Cause` that a device or the loop reports.
     elapsed_ticks : int
         Ticks since the step before: more than one after a missed deadline.
+    disagreement : int
+        A `Cause` that `consistency` found; what this tick itself shows goes before it.
 
     Returns
     -------
@@ -127,8 +130,8 @@ def guard_step(
     energy = energy_after(energy, torque_now * speed_now, elapsed_s)
 
     # How far the angle is from the middle of where the commands can have brought it; only where
-    # that is much is it looked at more closely. The origin drifts after a joint that slowly goes
-    # astray, as with a drive whose zero is not quite zero.
+    # that is much is it looked at more closely. The origin follows a joint that goes astray, but no
+    # faster than a drive whose zero is not quite zero lets it: what is faster adds up.
     old_s = max(age, 0.0)
     ago = int(min((old_s + 0.5 * reaction_time_s) * ticks_per_s, oldest))
     told = float(ring[newest - ago])
@@ -139,7 +142,8 @@ def guard_step(
         first = int(min(max(age - reaction_time_s, 0.0) * ticks_per_s, oldest))
         last = math.ceil(min((old_s + reaction_time_s) * ticks_per_s, oldest))
         astray = outside(ring, newest, first, last, angle - origin)
-        origin += astray * min(elapsed_s / _FORGOTTEN_S, 1.0)
+        drift = limits.drift_rad_s * elapsed_s
+        origin += min(max(astray, -drift), drift)
 
     found = found_wrong(
         limits,
@@ -153,6 +157,8 @@ def guard_step(
         astray,
         energy,
     )
+    if REACTIONS[disagreement] > REACTIONS[found]:
+        found = disagreement
     # A device knows better why than what was found; most ticks name nothing.
     if reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found]:
         found = reported
@@ -198,9 +204,6 @@ def guard_step(
 
 LONGEST_BRAKING = 5
 """A late step brakes for at most so many ticks at once: a loop that is later has stalled."""
-
-_FORGOTTEN_S = 0.5
-"""How fast the expected angle follows the measured one."""
 
 
 def _farthest_in_flight(ring: NDArray[np.float64], newest: int, back: int, toward: float) -> float:

@@ -42,7 +42,10 @@ class GuardSettings(Section):
     Above `torque_limit_nm` or `power_limit_w` the rig holds still and the operator may go on. It
     stops, latched, above `torque_stop_nm`, when more than `energy_limit_j` goes to and fro between
     rig and joint within a second, when the angle is more than `following_limit_deg` from where the
-    commands should have brought it, and when a reading is older than `stale_s`.
+    commands should have brought it, and when a reading is older than `stale_s`. The place where the
+    commands should have brought it follows the angle by at most `drift_limit_deg_s`: so much may be
+    the zero offset of the drive. While zero is commanded the joint may move by at most
+    `hold_limit_deg`.
     """
 
     position_limit_deg: float = quantity(40.0, "deg", 1.0, 180.0)
@@ -51,6 +54,8 @@ class GuardSettings(Section):
     reaction_time_s: float = quantity(0.02, "s", 0.0, 0.2)
     stale_s: float = quantity(0.1, "s", 0.002, 0.5)
     following_limit_deg: float = quantity(2.0, "deg", 0.1, 45.0)
+    drift_limit_deg_s: float = quantity(0.02, "deg/s", 0.0, 1.0)
+    hold_limit_deg: float = quantity(1.0, "deg", 0.1, 45.0)
     torque_limit_nm: float = quantity(10.0, "N·m", 0.01, 200.0)
     torque_stop_nm: float = quantity(20.0, "N·m", 0.01, 400.0)
     power_limit_w: float = quantity(20.0, "W", 0.01, 1000.0)
@@ -82,9 +87,11 @@ class ZeroingSettings(Section):
 
     A mean above `bias_limit_nm` means that the sensor was zeroed under load or has another
     calibration; a standard deviation above `noise_limit_nm` that the subject moves or a wire is
-    loose. Either way the run does not begin.
+    loose; an angle that changes by more than `motion_limit_deg` that the joint did not stand still,
+    and its torque is not the sensor's zero. In each case the run does not begin.
     """
 
     duration_s: float = quantity(2.0, "s", 0.1, 60.0)
     bias_limit_nm: float = quantity(1.0, "N·m", 0.001, 100.0)
     noise_limit_nm: float = quantity(0.1, "N·m", 0.0001, 100.0)
+    motion_limit_deg: float = quantity(0.2, "deg", 0.001, 45.0)

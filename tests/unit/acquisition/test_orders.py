@@ -208,6 +208,33 @@ def test_a_run_does_not_begin_on_a_sensor_under_load(tmp_path, subject, bias_nm,
     assert labels(events) == []
 
 
+@pytest.mark.parametrize(
+    ("speed_deg_s", "words"),
+    [
+        (0.1, ""),  # 0.05 deg in the half second
+        (0.8, "moved by 0.39"),
+        (2.5, "told to stand still"),
+    ],
+)
+def test_a_zero_is_not_made_from_a_joint_that_moves(tmp_path, speed_deg_s, words):
+    """The zero offset of a drive: its torque at rest is that of damping and stiffness."""
+    settings = parse_settings({**VALUES, "zeroing": {"duration_s": 0.5}})
+    rig = SimulatedRig(settings.rig, settings.subject["OFF"], np.random.default_rng(1))
+    plain = rig.write
+    rig.write = lambda velocity: plain(velocity + math.radians(speed_deg_s)) and velocity
+    values = {
+        "zeroing": {"duration_s": 0.5},
+        "guard": {"hold_limit_deg": 0.5, "reaction_time_s": 0.03},
+    }
+    result, events, _ = run(tmp_path / "s", Desk(), rig=rig, values=values, zero_first=True)
+    zeroed = [e for e in events if e["event"] == "sensor_zeroed"]
+    if words:
+        assert (result.outcome, labels(events)) == ("fail", [])
+        assert words in result.reason
+    else:
+        assert zeroed[0]["refused"] == ""
+
+
 def test_an_epoch_after_a_pause_begins_where_epochs_begin(tmp_path):
     values = {"protocol": {**VALUES["protocol"], "blocks": [{"task": "sinusoid", "epochs": 1}]}}
     desk = Desk({300: Command.PAUSE_NOW, 310: Command.RESUME})

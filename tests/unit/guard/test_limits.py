@@ -17,6 +17,7 @@ SETTINGS = {
         "reaction_time_s": 0.05,
         "stale_s": 0.2,
         "following_limit_deg": 3.0,
+        "drift_limit_deg_s": 0.03,
         "torque_limit_nm": 11.0,
         "torque_stop_nm": 22.0,
         "power_limit_w": 33.0,
@@ -52,6 +53,7 @@ def test_each_limit_is_the_settings_in_si_units():
         "energy_j": 4.0,
         # the setting, one step of the encoder, a tenth of what full speed covers in 50 ms
         "following_rad": (3.0 + 0.25 + 0.5) * DEG,
+        "drift_rad_s": 0.03 * DEG,
     }
     assert limits._asdict() == pytest.approx(expected, rel=1e-12)
 
@@ -66,7 +68,7 @@ def test_what_is_not_given_does_not_limit():
     limits = GuardLimits(0.7, 3.0, 100.0, 0.02, 0.001)
     assert limits[5:] == (
         *(0.0, 0.01, math.inf, 0.5),
-        *(math.inf, math.inf, math.inf, math.inf, math.inf),
+        *(math.inf, math.inf, math.inf, math.inf, math.inf, 0.0),
     )
 
 

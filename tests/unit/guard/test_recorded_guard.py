@@ -20,6 +20,7 @@ from rigidimeter.guard import (
     GuardLimits,
     Limited,
     Reaction,
+    consistency_limits,
     guard_limits,
     guard_state,
     guard_step,
@@ -74,7 +75,8 @@ def recorded(settings, spoil=None, clock=None):
 
 
 def assert_replayed(columns, settings):
-    again = replay(guard_limits(settings), settings.rig.tick_rate_hz, columns)
+    agreement = consistency_limits(settings)
+    again = replay(guard_limits(settings), settings.rig.tick_rate_hz, columns, agreement)
     np.testing.assert_array_equal(
         again.velocity_command_rad_s.view(np.uint64),
         columns["velocity_command_rad_s"].view(np.uint64),
@@ -198,6 +200,7 @@ FOUND = {
     *("TORQUE_NOT_FINITE", "MOTION_NOT_FINITE", "COMMAND_NOT_FINITE", "POSITION_LIMIT_EXCEEDED"),
     *("MOTION_STALE", "TORQUE_STALE", "STAMP_AHEAD", "OVERSPEED", "NOT_FOLLOWING"),
     *("TORQUE_TOO_HIGH", "ENERGY_HIGH", "TORQUE_HIGH", "POWER_HIGH"),
+    *("MOVED_AT_REST", "VELOCITY_WRONG", "SELDOM_FRESH"),
 }
 
 

@@ -490,19 +490,33 @@ def test_a_jump_of_the_angle_is_found_at_once(sign):
     ("jump", "elapsed", "drift"),
     [
         (0.5, 1, 0.0),  # half the limit is looked at no closer
-        (0.5025, 1, 0.5025 * 0.25),
-        (0.75, 1, 0.75 * 0.25),
-        (0.75, 3, 0.75 * 0.75),
-        (-0.75, 2, -0.75 * 0.5),
-        (0.75, 7, 0.75),
+        (0.5625, 1, 0.03125),  # 0.25 rad/s, a tick of 0.125 s
+        (0.75, 1, 0.03125),
+        (0.75, 3, 0.09375),
+        (-0.75, 2, -0.0625),
+        (0.75, 100, 0.75),  # no farther than the joint itself
     ],
 )
 def test_the_origin_drifts_after_a_joint_that_goes_astray(jump, elapsed, drift):
-    # Half a second is forgotten by elapsed / 0.5 s at a time, at most by all of it.
-    state, _, _ = step(at(limits=BINARY), limits=BINARY, angle=3.0)
-    state, _, _ = step(state, limits=BINARY, angle=3.0 + jump, elapsed=elapsed)
-    assert state.origin_rad == pytest.approx(3.0 + drift, rel=1e-15)
+    limits = BINARY._replace(drift_rad_s=0.25)
+    state, _, _ = step(at(limits=limits), limits=limits, angle=3.0)
+    state, _, _ = step(state, limits=limits, angle=3.0 + jump, elapsed=elapsed)
+    assert state.origin_rad == 3.0 + drift
     assert state.cause == Cause.NONE
+
+
+@pytest.mark.parametrize(("speed", "found"), [(0.25, False), (0.5, True), (-0.5, True)])
+def test_a_joint_that_moves_uncommanded_is_found_unless_a_zero_offset_explains_it(speed, found):
+    # The first half of the limit passes at the joint's speed, the second at what is left of it.
+    limits = BINARY._replace(drift_rad_s=0.25)
+    state = at(limits=limits)
+    for k in range(200):
+        state, _, _ = step(state, limits=limits, angle=speed * 0.125 * k)
+        if state.cause != Cause.NONE:
+            break
+    assert (state.cause == Cause.NOT_FOLLOWING) is found
+    if found:
+        assert 0.125 * k == pytest.approx(0.5 / 0.5 + 0.5 / 0.25, abs=0.25)
 
 
 def test_the_middle_of_the_stretch_is_half_the_reaction_time_ago():

@@ -1,0 +1,253 @@
+"""Readings that agree, and that do not: closed-form cases of every law."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rigidimeter.guard import (
+    Cause,
+    ConsistencyLimits,
+    ConsistencyState,
+    consistency_limits,
+    consistency_step,
+)
+from rigidimeter.settings import parse_settings
+
+DT = 0.001
+NOTHING = ConsistencyLimits(DT)
+
+
+def run(limits, n, angle, velocity, *, sent=1.0, torque=0.0, ages=(0.0, 0.0), elapsed=1, start=0):
+    """Step through functions of the time; return the first tick with a cause, it, and the state."""
+    state = ConsistencyState()
+
+    def at(value, t):
+        return value(t) if callable(value) else value
+
+    for k in range(start, n):
+        t = k * elapsed * limits.interval_s
+        values = [at(value, t) for value in (sent, torque, angle, velocity, *ages)]
+        state, cause = consistency_step(limits, state, *values, elapsed)
+        if cause:
+            return k, Cause(cause), state
+    return n, Cause.NONE, state
+
+
+# --- rest
+
+
+REST = NOTHING._replace(settle_s=0.0405, hold_rad=0.2505)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_joint_told_to_rest_may_move_by_the_hold_limit(sign):
+    # 1 rad/s, held from 0.040 s on: 0.2505 rad are passed at 0.291 s, not at 0.290 s.
+    k, cause, _ = run(REST, 1000, lambda t: sign * t, sign, sent=0.0)
+    assert (k, cause) == (291, Cause.MOVED_AT_REST)
+    assert run(REST._replace(hold_rad=2.0), 1000, lambda t: sign * t, sign, sent=0.0)[0] == 1000
+
+
+def test_a_joint_may_settle_first_and_move_when_told():
+    assert run(REST, 1000, lambda t: min(100.0 * t, 3.0), 0.0, sent=0.0)[1] == Cause.NONE
+    assert run(REST, 3000, lambda t: t, 1.0, sent=1e-9)[1] == Cause.NONE
+
+    def now_and_then(t):
+        return 1.0 if round(t / DT) % 30 == 0 else 0.0
+
+    assert run(REST, 3000, lambda t: t, 1.0, sent=now_and_then)[1] == Cause.NONE
+
+
+def test_a_reading_from_before_the_joint_had_settled_is_no_place_to_hold():
+    late_s = 0.05
+
+    def late(t):  # comes to rest at 0.04 s, seen 50 ms later
+        return min(max(t - late_s, 0.0), 0.04) * 20.0
+
+    assert run(REST, 1000, late, 0.0, sent=0.0, ages=(late_s, 0.0))[1] == Cause.NONE
+    assert run(REST, 1000, late, 0.0, sent=0.0)[1] == Cause.MOVED_AT_REST
+
+
+# --- velocity
+
+
+VELOCITY = NOTHING._replace(unseen_rad=0.002)
+OMEGA = 2.0 * math.pi * 5.0
+
+
+def swing(gain=1.0, late_s=0.0):
+    """Return angle and reported velocity of a swing of 0.05 rad at 5 Hz, the velocity spoiled."""
+    return (
+        lambda t: 0.05 * math.sin(OMEGA * t),
+        lambda t: gain * 0.05 * OMEGA * math.cos(OMEGA * (t - late_s)),
+    )
+
+
+@pytest.mark.parametrize(
+    ("gain", "late_s"), [(1.0, 0.0), (1.0, 0.01), (1.0, -0.01), (0.6, 0.0), (1.5, 0.0)]
+)
+def test_a_velocity_that_is_somewhat_off_passes(gain, late_s):
+    assert run(VELOCITY, 3000, *swing(gain, late_s))[1] == Cause.NONE
+
+
+@pytest.mark.parametrize("gain", [0.0, -1.0, -0.2, 0.2, 5.0])
+def test_a_velocity_that_is_not_the_change_of_the_angle_is_found_within_a_memory(gain):
+    k, cause, _ = run(VELOCITY, 3000, *swing(gain))
+    assert cause == Cause.VELOCITY_WRONG
+    assert k < 300
+
+
+def test_the_squares_are_what_theory_says():
+    # p = θ high-passed at 1/W: |p| = 0.05 ωW/√(1 + ω²W²), and half its square in the mean.
+    p2 = 0.5 * (0.05 * OMEGA * 0.05) ** 2 / (1 + (OMEGA * 0.05) ** 2)
+    for gain, apart, both in ((1.0, 0.0, 2.0), (0.0, 1.0, 1.0), (-1.0, 4.0, 2.0)):
+        state = run(NOTHING, 5000, *swing(gain))[2]
+        assert state.both_rad2 == pytest.approx(both * p2, rel=0.15)
+        assert state.apart_rad2 == pytest.approx(apart * p2, rel=0.15, abs=1e-3 * p2)
+
+
+def test_what_resolution_explains_is_not_looked_at():
+    angle, velocity = swing(0.0)
+    assert run(VELOCITY._replace(unseen_rad=0.05), 3000, angle, velocity)[1] == Cause.NONE
+
+
+@pytest.mark.parametrize("every", [1, 3, 20])
+def test_samples_slower_than_the_loop_and_missed_ticks_make_no_difference(every):
+    angle, velocity = swing(0.0)
+
+    def held(value):
+        return lambda t: value(math.floor(t / DT / every + 1e-6) * every * DT)
+
+    def age(t):
+        return t - math.floor(t / DT / every + 1e-6) * every * DT
+
+    k, cause, _ = run(VELOCITY, 3000, held(angle), held(velocity), ages=(age, 0.0))
+    assert (k < 320, cause) == (True, Cause.VELOCITY_WRONG)
+    angle, velocity = swing()
+    assert run(VELOCITY, 3000, held(angle), held(velocity), ages=(age, 0.0))[1] == Cause.NONE
+    assert run(VELOCITY, 999 // every, angle, velocity, elapsed=every)[1] == Cause.NONE
+
+
+def test_a_drive_at_rest_and_a_reading_that_is_no_number_show_nothing():
+    assert run(VELOCITY, 2000, 0.5, 0.0)[1] == Cause.NONE
+    angle, velocity = swing()
+
+    def broken(t):
+        return math.nan if 0.5 < t < 0.6 else angle(t)
+
+    _, cause, _ = run(VELOCITY, 2000, broken, velocity, torque=math.nan)
+    assert cause == Cause.NONE
+
+
+# --- energy
+
+
+def test_the_energy_is_that_of_the_angle():
+    # 2 N·m in phase with 1.57 rad/s: half their product in the mean, less what smoothing takes,
+    # 1/(1 + ω²S²), and its lag; within a second 1 − e^(−1) of it is there.
+    angle, velocity = swing()
+    limits = NOTHING._replace(energy_j=10.0)
+    state = run(limits, 6000, angle, lambda _: 0.0, torque=lambda t: 2.0 * velocity(t) / 1.5708)[2]
+    lag = math.atan(OMEGA * 0.02)
+    product = math.sin(lag) + (0.5 * math.pi - lag) * math.cos(lag)  # of two sines, rectified
+    mean = 1.5708 * math.cos(lag) * 2.0 / math.pi * product
+    assert state.energy_j == pytest.approx(mean, rel=0.1)
+    limits = NOTHING._replace(energy_j=0.5 * mean)
+    k, cause, _ = run(limits, 6000, angle, 0.0, torque=lambda t: 2.0 * velocity(t) / 1.5708)
+    assert cause == Cause.ENERGY_HIGH
+    assert k * DT == pytest.approx(math.log(2.0), abs=0.1)
+
+
+# --- freshness
+
+
+FRESH = NOTHING._replace(torque_old_s=0.012, motion_old_s=0.012)
+
+
+def paused(pause_s, period_s):
+    """Return the age of a reading that comes not at all for so long in each period."""
+    return lambda t: max(math.fmod(t, period_s) - (period_s - pause_s), 0.0)
+
+
+@pytest.mark.parametrize("sensor", [0, 1])
+@pytest.mark.parametrize(
+    ("pause_s", "period_s", "within_s"), [(0.095, 0.1, 0.2), (0.03, 0.06, 0.6)]
+)
+def test_a_sensor_that_pauses_too_often_is_found(sensor, pause_s, period_s, within_s):
+    ages = [0.0, 0.0]
+    ages[sensor] = paused(pause_s, period_s)
+    k, cause, _ = run(FRESH, 3000, 0.0, 0.0, ages=ages)
+    assert cause == Cause.SELDOM_FRESH
+    assert k * DT < within_s
+
+
+@pytest.mark.parametrize("ages", [(0.012, 0.012), (paused(0.1, 5.0), paused(0.1, 5.0))])
+def test_a_slow_sensor_and_a_single_pause_are_none(ages):
+    assert run(FRESH, 5000, 0.0, 0.0, ages=ages)[1] == Cause.NONE
+
+
+def test_the_share_is_of_the_time_not_of_the_steps():
+    one = run(FRESH, 300, 0.0, 0.0, ages=(0.0, paused(0.05, 0.1)))[2].torque_old
+    three = run(FRESH, 100, 0.0, 0.0, ages=(0.0, paused(0.05, 0.1)), elapsed=3)[2].torque_old
+    assert three == pytest.approx(one, abs=0.02)
+
+
+# --- settings
+
+
+def test_each_limit_is_the_settings_in_si_units():
+    limits = consistency_limits(
+        parse_settings(
+            {
+                "guard": {"hold_limit_deg": 2.0, "reaction_time_s": 0.05, "stale_s": 0.2},
+                "rig": {
+                    "tick_rate_hz": 500.0,
+                    "torque": {"rate_hz": 100.0, "latency_s": 0.003, "jitter_s": 0.001},
+                    "motion": {
+                        "rate_hz": 400.0,
+                        "latency_s": 0.002,
+                        "angle_resolution_deg": 0.25,
+                        "velocity_resolution_deg_s": 2.0,
+                    },
+                },
+            }
+        )
+    )
+    assert limits._asdict() == pytest.approx(
+        {
+            "interval_s": 0.002,
+            "settle_s": 0.1,
+            "hold_rad": math.radians(2.25),
+            "summed_s": 0.05,
+            "unseen_rad": math.radians(0.1 + 2 * 0.25 + 0.05 * 2.0),
+            "energy_j": 5.0,
+            "torque_old_s": 0.003 + 3 * 0.011,
+            "motion_old_s": 0.002 + 0.012,
+            "old_memory_s": 1.0,
+        }
+    )
+
+
+def test_on_a_slow_line_the_sums_hold_three_samples():
+    rates = {"tick_rate_hz": 50.0, "torque": {"rate_hz": 50.0}, "motion": {"rate_hz": 40.0}}
+    tables = {"controller": {"torque_cutoff_hz": 10.0}, "guard": {"reaction_time_s": 0.1}}
+    limits = consistency_limits(parse_settings({"rig": rates, **tables}))
+    assert limits.summed_s == pytest.approx(0.075)
+    assert limits.motion_old_s == pytest.approx(0.001 + 0.075)
+
+
+def test_whatever_comes_the_state_stays_finite():
+    rng = np.random.default_rng(3)
+    state = ConsistencyState()
+    values = [math.nan, math.inf, -math.inf, 0.0, 1.0, -0.3, 0.02, 1e300]
+    for _ in range(3000):
+        drawn = rng.choice(values[:-1], 6).tolist()
+        state, cause = consistency_step(
+            consistency_limits(parse_settings({})), state, *drawn, int(rng.integers(-3, 200))
+        )
+        assert cause in set(Cause)
+        assert all(
+            math.isfinite(v)
+            for name, v in state._asdict().items()
+            if name != "held_rad" and name != "angle_rad"
+        )
