@@ -27,7 +27,7 @@ BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 FAULTS: dict[int, tuple[str, str, str]] = {
     1: ("NaN or Inf in torque, angle, parameter, perturbation or command",
         "guard, before the filter's state; settings and drivers refuse it", "S1"),
-    2: ("sensor packets stop", "guard: age of the torque above `stale_s`", "S1"),
+    2: ("sensor packets stop, or come late", "guard: age of the torque above `stale_s`", "S1"),
     3: ("packets flow, sequence or value frozen", "RDT driver: nothing fresh for `frozen_s`", "S1"),
     4: ("saturation bit or serious status", "RDT driver: the status word", "S1"),
     5: ("lost, repeated, reordered, short, damaged packets; backlog",

@@ -81,6 +81,22 @@ def test_fault_02_sensor_packets_stop(rig, tmp_path, measured):
         measured(2, rig, trial=trial, bound_s=stale_bound(made))
 
 
+@pytest.mark.parametrize(
+    ("rig", "rate"), [(CANOPEN, 0.5), (CANOPEN, 0.2), (CANOPEN, None), (ASCII, 0.5)]
+)
+def test_fault_02_sensor_packets_come_late(rig, rate, tmp_path, measured):
+    """Ever later without a gap, by a part of the time that passed, or all at once by 1 s."""
+    with bench(rig) as made:
+        wrong = Wrong("sensor", "delay") if rate is None else Wrong("sensor", "lag", rate)
+        trial = run(made, tmp_path / "s", wrong)
+        drift = 1e-6 * AtiRdt.Settings().clock_drift_ppm
+        growth = 1.0 if rate is None else rate - drift
+        bound_s = made.settings.guard.stale_s / growth + 1.0 / made.rate_hz
+        assert_stopped(trial, Cause.TORQUE_STALE, bound_s)
+        case = "late by 1 s at once" if rate is None else f"later by {rate:g} s each second"
+        measured(2, rig, case, trial, bound_s)
+
+
 FROZEN = ("frozen_values", "frozen_record", "frozen_sequence", "frozen_ft_sequence")
 
 

@@ -182,6 +182,8 @@ RUNNING = [
     ("garbage", None, Cause.TORQUE_PACKETS, "damaged"),
     ("garbage", 1, Cause.TORQUE_PACKETS, "damaged"),
     ("backlog", None, Cause.NONE, None),
+    ("delay", None, Cause.NONE, None),
+    ("lag", None, Cause.NONE, None),
     ("flood", None, Cause.TORQUE_PACKETS, "repeated"),
     ("restart", None, Cause.TORQUE_PACKETS, None),
     ("foreign", None, Cause.NONE, "foreign"),
@@ -260,13 +262,44 @@ def test_a_loop_held_up_loses_nothing_at_7_khz(arm, sensor_of):
         time.sleep(0.15)
         behind = sensor.read()
         assert behind.sequence > before.sequence
-        assert behind.time_s == before.time_s  # newer ones wait: its age is not known
+        # Newer ones wait: it is as old as its number says.
+        passed_s = (behind.sequence - before.sequence) / 7000.0
+        assert behind.time_s - before.time_s == pytest.approx(passed_s, abs=0.005)
         for _ in range(20):
             sensor.read()
         sample = sensor.read()
         assert sensor.counts["lost"] == 0
         assert sensor.counts["received"] > 500
         assert emulator.sent[-1][0] - sample.sequence < 200
+
+
+@pytest.mark.parametrize("rate", [0.5, 0.1])
+def test_samples_that_come_ever_later_are_as_old_as_they_are(emulator, sensor, lateness, rate):
+    """They arrive without a gap, each at its time, and none is lost: only their numbers tell."""
+    watch(sensor, 0.05)
+    began_s = time.monotonic()
+    emulator.misbehave("lag", rate)
+    samples = watch(sensor, 0.5)
+    passed_s = time.monotonic() - began_s
+    age_s = time.monotonic() - samples[-1].time_s
+    # A record that was on its way for d is one of those sent since the delay was d.
+    grown_s = rate * passed_s
+    within_s = 0.01 + lateness.worst_s(began_s)
+    assert age_s == pytest.approx(grown_s, abs=within_s)
+    assert bad_counts(sensor) == {}
+    assert all(sample.cause == Cause.NONE for sample in samples)
+
+
+def test_a_loop_that_stood_still_is_not_told_that_its_samples_are_old(emulator, sensor, lateness):
+    """The packets that waited are older each by what it waited, and the newest is fresh."""
+    watch(sensor, 0.1)
+    began_s = time.monotonic()
+    for pause_s in (0.15, 0.25):  # less, and more, than what the kernel's stamps are trusted for
+        time.sleep(pause_s)
+        assert time.monotonic() - sensor.read().time_s < 0.01 + lateness.worst_s(began_s)
+    times = [sample.time_s for sample in watch(sensor, 0.1)]
+    assert times == sorted(times)
+    assert time.monotonic() - times[-1] < 0.01 + lateness.worst_s(began_s)
 
 
 def test_a_read_ends_whatever_arrives(emulator, sensor):
@@ -321,6 +354,8 @@ def test_the_sequence_wraps_around_without_loss(arm, sensor_of):
         ("http_garbage", None, "not the page of a Net F/T"),
         ("deaf", None, "no sample from 127.0.0.1"),
         ("silent", None, "no sample from 127.0.0.1"),
+        ("delay", 0.15, r"the first sample came 0\.1\d s after each request, not .* within 0\.1 s"),
+        ("delay", 1.0, "no sample from 127.0.0.1"),
         ("short", 1, "no sample.*'short': [1-9]"),
         ("foreign", None, None),
         ("serious_status", None, "analog board supply too low"),
@@ -329,7 +364,7 @@ def test_the_sequence_wraps_around_without_loss(arm, sensor_of):
 )
 def test_a_sensor_that_cannot_be_used_is_refused(emulator, sensor_of, lateness, name, value, words):
     emulator.misbehave(name, value)
-    sensor = sensor_of(emulator, timeout_s=0.3)
+    sensor = sensor_of(emulator, timeout_s=0.8 if name == "delay" else 0.3)
     if words is None:
         sensor.configure()
         return

@@ -22,7 +22,7 @@ class Sensor:
     """Packets at 1 kHz into a stream, with the time they arrive at."""
 
     def __init__(self, tolerated=3, window_s=1.0, frozen_s=0.1, first=1):
-        self.stream = RdtStream(tolerated, window_s, frozen_s)
+        self.stream = RdtStream(tolerated, window_s, frozen_s, 0.0)
         self.sequence, self.ft, self.now_s = first, 7 * first, 100.0
         self.counts = (0, 0, 0, 0, 0, 0)
 
@@ -233,6 +233,7 @@ PAGE = {
     "cfgcpf": "1000000",
     "cfgcpt": "1000000",
     "comrdte": "Enabled",
+    "runrate": "7000",
     "comrdtrate": "1000",
     "setbias": "745;17;447;184;-596;-253",
 }
@@ -269,6 +270,15 @@ def test_so_does_a_count_of_force(unit, newtons):
     assert weight == pytest.approx(newtons / 1000, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("shown", "internal", "exact_hz"),
+    [("1000", "7000", 1000.0), ("2333", "7000", 7000 / 3), ("2000", "7000", 2000.0),
+     ("333", None, 333.0), ("1", "7000", 1.0)],
+)  # fmt: skip
+def test_a_rounded_rate_is_taken_as_the_sensor_divides_its_own(shown, internal, exact_hz):
+    assert page(comrdtrate=shown, runrate=internal).sample_rate_hz == pytest.approx(exact_hz)
+
+
 def test_known_units_are_positive_numbers():
     assert all(value > 0 for value in [*FORCE_UNITS_N.values(), *TORQUE_UNITS_NM.values()])
 
@@ -285,6 +295,7 @@ def test_known_units_are_positive_numbers():
         ("cfgcpf", "many"),
         ("cfgcpf", None),
         ("comrdtrate", None),
+        ("runrate", "0"),
         ("cfgcalsel", "two"),
         ("comrdte", "Disabled"),
     ],

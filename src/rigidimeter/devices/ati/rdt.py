@@ -55,6 +55,8 @@ SO_TIMESTAMPNS = 35
 TIMESPEC = struct.Struct("@qq")
 NOTE_BYTES = socket.CMSG_SPACE(TIMESPEC.size)
 LONGEST_WAIT_S = 0.2
+LONGEST_DELAY_S = 0.1
+"""From a request to the first sample: a sensor answers in some ms, and samples may be so old."""
 
 
 class AtiRdt:
@@ -83,7 +85,10 @@ class AtiRdt:
         self._gains = [math.nan] * 6
         self._buffer = bytearray(64)  # longer than a record, to detect longer packets
         self._stream = RdtStream(
-            settings.tolerated_packets, settings.packet_window_s, settings.frozen_s
+            settings.tolerated_packets,
+            settings.packet_window_s,
+            settings.frozen_s,
+            1e-6 * settings.clock_drift_ppm,
         )
         self._sample = TorqueSample(math.nan, -math.inf)
 
@@ -105,7 +110,7 @@ class AtiRdt:
                 f"{self._device}: the address cannot be found ({error}); "
                 "it must be the sensor's, such as 192.168.1.1"
             ) from error
-        self._open()
+        self._open(math.nan)
 
     def configure(self) -> DeviceFacts:
         """Read the calibration, compare it, start sampling and wait for the first sample.
@@ -126,9 +131,10 @@ class AtiRdt:
         self._gains = [
             weight * scale for weight, scale in zip(settings.weights, scales, strict=True)
         ]
-        self._start()
+        self._start(page)
         self._page, self._configured = page, True
         values = asdict(page)
+        del values["internal_rate_hz"]  # no more is known of the torque for it
         values |= {"sign": settings.sign, "weights": " ".join(f"{w:g}" for w in settings.weights)}
         values["receive_buffer_bytes"] = self._socket.getsockopt(*RECEIVE_BUFFER)
         return DeviceFacts(page.model, page.serial, page.rate_hz, None, values)
@@ -141,13 +147,12 @@ class AtiRdt:
         wire = self._socket
         if wire is None:
             return self._sample
-        # Taken before the packets: a sample may seem older than it is, never newer.
+        # Taken before the packets: one may seem to have arrived earlier than it did, never later.
         now_s, wall_ns = self._now(), time.time_ns()
         stream, buffers, sensor = self._stream, (self._buffer,), self._sensor
         buffer = self._buffer
         stream.begin()
-        touched = backlog = False
-        before_s = stream.sampled_s
+        touched = False
         try:
             for _ in range(MOST_PACKETS_A_READ):
                 size, notes, _, source = wire.recvmsg_into(buffers, NOTE_BYTES)
@@ -156,7 +161,6 @@ class AtiRdt:
                     stream.take(size, buffer, now_s - _waited_s(notes, wall_ns))
                 else:
                     stream.counts["foreign"] += 1
-            backlog = True
         except BlockingIOError:
             pass  # drained: the end of every ordinary read
         except OSError:
@@ -165,8 +169,6 @@ class AtiRdt:
             stream.damaged(now_s)
         if not touched:
             return self._sample
-        if backlog:
-            stream.sampled_s = before_s  # the age of what was read is unknown
         raw: tuple[int, ...] = ()
         torque_nm = math.nan
         if stream.packed:
@@ -197,9 +199,9 @@ class AtiRdt:
         DeviceError
             If no sample arrives, or the sensor was not configured since it was connected.
         """
-        if not self._configured:
+        if not self._configured or self._page is None:
             raise DeviceError(f"{self._device}: it is not configured; configure it first")
-        self._start()
+        self._start(self._page)
 
     def close(self) -> None:
         """Stop sampling and close the socket. Safe at any time and when repeated."""
@@ -215,14 +217,14 @@ class AtiRdt:
         finally:
             wire.close()
 
-    def _open(self) -> None:
+    def _open(self, rate_hz: float) -> None:
         wire = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         wire.setsockopt(*RECEIVE_BUFFER, RECEIVE_BUFFER_BYTES)
         if sys.platform.startswith("linux"):
             wire.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         wire.setblocking(False)
         self._socket = wire
-        self._stream.restart()
+        self._stream.restart(rate_hz)
         self._sample = TorqueSample(math.nan, -math.inf)
 
     def _fetch(self) -> SensorPage:
@@ -240,31 +242,45 @@ class AtiRdt:
                 "begin a new session"
             )
 
-    def _start(self) -> None:
-        """Request samples until the first one arrives."""
-        if self._socket is not None:
-            self._socket.close()  # packets still on their way go to the old port
-        self._open()
-        tries = 4
+    def _start(self, page: SensorPage) -> None:
+        """Request samples until the first one arrives, soon after a request.
+
+        A delay that all packets have alike shows in nothing but the answer to a request.
+        """
+        tries, answer = 4, "no sample"
         for _ in range(tries):  # a request may be lost
+            if self._socket is not None:
+                self._socket.close()  # packets still on their way go to the old port
+            self._open(page.sample_rate_hz)
+            asked_s = self._now()
             self._send(START_REALTIME)
-            until_s = self._now() + self._settings.timeout_s / tries
-            while self._wait(until_s):
-                sample = self.read()
-                if sample.sequence >= 0:
-                    if sample.cause:
-                        raise DeviceError(
-                            f"{self._device}: {Cause(sample.cause).sentence} "
-                            f"(status {sample.status:#010x}: "
-                            f"{', '.join(status_words(sample.status)) or 'none'}); "
-                            "the first sample must be good"
-                        )
-                    return
+            sample = self._first_sample(asked_s + self._settings.timeout_s / tries)
+            if sample is None:
+                continue
+            if sample.cause:
+                raise DeviceError(
+                    f"{self._device}: {Cause(sample.cause).sentence} "
+                    f"(status {sample.status:#010x}: "
+                    f"{', '.join(status_words(sample.status)) or 'none'}); "
+                    "the first sample must be good"
+                )
+            waited_s = sample.time_s - asked_s
+            if waited_s <= LONGEST_DELAY_S:
+                return
+            answer = f"the first sample came {waited_s:.2f} s after each request, not"
         host, port = self._sensor
+        limit_s = LONGEST_DELAY_S if answer != "no sample" else self._settings.timeout_s
         raise DeviceError(
-            f"{self._device}: no sample from {host}:{port} within {self._settings.timeout_s:g} s, "
+            f"{self._device}: {answer} from {host}:{port} within {limit_s:g} s, "
             f"packets counted: {self.counts}; check firewall, port and that RDT is enabled"
         )
+
+    def _first_sample(self, until_s: float) -> TorqueSample | None:
+        while self._wait(until_s):
+            sample = self.read()
+            if sample.sequence >= 0:
+                return sample
+        return None
 
     def _send(self, command: int) -> None:
         if self._socket is None:

@@ -19,6 +19,7 @@ import math
 import struct
 from collections import deque
 
+from rigidimeter.devices.ati.sample_clock import SampleClock
 from rigidimeter.guard import Cause
 
 STOP = 0x0000
@@ -127,6 +128,8 @@ class RdtStream:
         The window.
     frozen_s : float
         Longest time without a fresh packet while packets arrive.
+    drift : float
+        Of the sensor's clock against the computer's, see `SampleClock`.
 
     Attributes
     ----------
@@ -139,17 +142,23 @@ class RdtStream:
     sequence : int
         Its RDT sequence, -1 before the first.
     sampled_s : float
-        When the sensor's newest sample arrived; unchanged while the FT sequence is.
+        When the sensor's newest sample was taken, by its RDT sequence; unchanged while the FT
+        sequence is. It never goes back.
     """
 
-    def __init__(self, tolerated: int, window_s: float, frozen_s: float) -> None:
+    def __init__(self, tolerated: int, window_s: float, frozen_s: float, drift: float) -> None:
         self.counts = dict.fromkeys(NAMES, 0)
         self._window_s, self._frozen_s = window_s, frozen_s
         self._worst = tolerated + 1
+        self._clock = SampleClock(drift)
         self.restart()
 
-    def restart(self) -> None:
-        """Reset the stream but not the counts: the sensor starts a new stream."""
+    def restart(self, rate_hz: float = math.nan) -> None:
+        """Reset the stream but not the counts: the sensor starts a new one, of this many records/s.
+
+        While the rate is unknown, a sample is taken to be as old as its arrival.
+        """
+        self._clock.restart(rate_hz)
         # Times of the last bad packets; too many if it is full within the window.
         self._bad_s: deque[float] = deque(maxlen=self._worst)
         self._ft_sequence = -1
@@ -184,7 +193,7 @@ class RdtStream:
         sequence, ft_sequence, status, packed = RECORD.unpack_from(buffer)
         if self.sequence < 0:
             self._accept(sequence, ft_sequence, status, packed, now_s)
-            self.sampled_s = now_s
+            self.sampled_s = self._clock.taken_s(now_s, 0)
             return
         # Differences modulo 2^32, so that the wrap-around counts as one step.
         ahead = (sequence - self.sequence) & _U32
@@ -200,8 +209,9 @@ class RdtStream:
                 self._stuck_since_s = math.nan
             elif math.isnan(self._stuck_since_s):
                 self._stuck_since_s = now_s
+            taken_s = self._clock.taken_s(now_s, ahead)
             if ft_ahead:
-                self.sampled_s = now_s
+                self.sampled_s = max(self.sampled_s, taken_s)
             self._accept(sequence, ft_sequence, status, packed, now_s)
         elif ahead == 0:
             counts["repeated"] += 1

@@ -27,6 +27,10 @@ class AtiRdtSettings(Section):
 
     The expected values are compared with what the sensor reports; an empty text, 0, or -1 for the
     calibration index is not compared.
+
+    `clock_drift_ppm` is how fast the sensor's clock may part from the computer's. Samples that come
+    ever later, by more than that, are found to be old. Two crystals part by up to 200 ppm, and a
+    computer that sets its clock by the network's corrects it by up to 500 ppm.
     """
 
     address: str = Field("192.168.1.1", min_length=1, max_length=253)
@@ -48,6 +52,7 @@ class AtiRdtSettings(Section):
     tolerated_packets: int = quantity(5, "1", 0, 10000)
     packet_window_s: float = quantity(1.0, "s", 0.001, 60.0)
     frozen_s: float = quantity(0.05, "s", 0.001, 10.0)
+    clock_drift_ppm: float = quantity(700.0, "ppm", 1.0, 100_000.0)
 
     @property
     def emulated(self) -> bool:
@@ -82,6 +87,8 @@ class SensorPage:
     model, firmware : str
     status : int
         The sensor's status word.
+    internal_rate_hz : float
+        At which the sensor samples; 0 if not reported.
     """
 
     counts_per_force: float
@@ -98,6 +105,20 @@ class SensorPage:
     model: str = ""
     firmware: str = ""
     status: int = 0
+    internal_rate_hz: float = 0.0
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """The exact rate of the records.
+
+        A record is every so many samples, and the page rounds the rate: 7000/21 Hz is shown as 333.
+
+        >>> page = SensorPage(1.0, 1.0, "N", "Nm", 333.0, internal_rate_hz=7000.0)
+        >>> page.sample_rate_hz == 7000.0 / 21
+        True
+        """
+        exact_hz = self.internal_rate_hz / max(round(self.internal_rate_hz / self.rate_hz), 1)
+        return exact_hz if abs(exact_hz - self.rate_hz) <= 0.5 else self.rate_hz
 
     @property
     def newton_per_count(self) -> float:
@@ -193,6 +214,7 @@ def parse_page(text: bytes, device: str) -> SensorPage:
         model=found.get("prodname", "Net F/T"),
         firmware=found.get("mfgdigver", ""),
         status=max(integer("runstat", 16), 0),
+        internal_rate_hz=positive("runrate") if "runrate" in found else 0.0,
     )
 
 

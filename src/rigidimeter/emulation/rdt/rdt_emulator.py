@@ -11,6 +11,7 @@ only noise.
 
 from __future__ import annotations
 
+import math
 import random
 import socket
 import struct
@@ -37,6 +38,8 @@ from rigidimeter.emulation.rdt.rdt_web_page import (
 )
 
 _REQUEST = struct.Struct(">HHI")
+LONGEST_STALL_S = 2.0
+LARGEST_LAG_S = 1.0
 
 
 class RdtEmulator:
@@ -88,6 +91,8 @@ class RdtEmulator:
         self._faults: Faults = {}
         self._lock = threading.Lock()
         self._held: list[bytes] = []
+        self._on_the_way: deque[tuple[float, bytes]] = deque()
+        self._lag_since_s = math.nan
         self._client: tuple[str, int] | None = None
         self._streaming = threading.Event()
         self._ending = threading.Event()
@@ -161,6 +166,7 @@ class RdtEmulator:
         """End all misbehaviours."""
         with self._lock:
             self._faults = {}
+            self._lag_since_s = math.nan
 
     def fault(self, name: str, default: float) -> float | None:
         """Return the value of an active misbehaviour, None if it is not active."""
@@ -194,7 +200,8 @@ class RdtEmulator:
             if self._ending.is_set():
                 return
             late_s = time.monotonic() - began_s - k * interval_s
-            if late_s > 0.2 or self._new_stream.is_set():
+            # A sensor's clock never stops, so what a busy machine leaves undone is made up for.
+            if late_s > LONGEST_STALL_S or self._new_stream.is_set():
                 began_s, k = time.monotonic(), 0
             elif late_s < 0.0:
                 time.sleep(-late_s)
@@ -208,12 +215,14 @@ class RdtEmulator:
         self._records.restart(self._first_sequence)
         self._late = b""
         self._held = []
+        self._on_the_way.clear()
         self._held_since_s = time.monotonic()
 
     def _step(self) -> None:
         """Take one sample and send it, or apply the active misbehaviours."""
         faults = self._faults
         if not faults:
+            self._send_later(b"", 0.0)
             self._flush()
             self._send(self._records.take(faults))
             return
@@ -256,7 +265,26 @@ class RdtEmulator:
                 self._flush()
             return
         for _ in range(copies):
-            self._send(data)
+            self._send_later(data, self._delay_s(faults))
+
+    def _delay_s(self, faults: Faults) -> float:
+        """Return how late records are at present."""
+        rate = fault_value(faults, "lag", 0.5)
+        if rate is None:
+            self._lag_since_s = math.nan
+            return fault_value(faults, "delay", 1.0) or 0.0
+        now_s = time.monotonic()
+        if math.isnan(self._lag_since_s):
+            self._lag_since_s = now_s
+        return min(rate * (now_s - self._lag_since_s), LARGEST_LAG_S)
+
+    def _send_later(self, data: bytes, delay_s: float) -> None:
+        """Put a record on its way, and send those that have been on it for so long."""
+        now_s = time.monotonic()
+        if data:
+            self._on_the_way.append((now_s, data))
+        while self._on_the_way and now_s - self._on_the_way[0][0] >= delay_s:
+            self._send(self._on_the_way.popleft()[1])
 
     def _flush(self) -> None:
         for held in self._held:

@@ -39,6 +39,8 @@ MISBEHAVIOURS = {
     "long": "Every `value`-th record (10) has 4 bytes too many.",
     "garbage": "Every `value`-th record (10) is 36 random bytes.",
     "backlog": "Records are held for `value` s (0.05), then sent all at once, repeatedly.",
+    "delay": "Records arrive `value` s (1) after they were taken.",
+    "lag": "Records arrive ever later: by `value` s (0.5) more each second, up to 1 s.",
     "flood": "Every record is sent `value` times (50).",
     "restart": "The sensor restarts once: both sequences start at 1 again.",
     "foreign": "Another sender sends records with wrong torques to the client.",
