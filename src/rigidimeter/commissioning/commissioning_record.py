@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.commissioning.checks import Check
-from rigidimeter.documents import plain_values, write_json
+from rigidimeter.documents import plain_values, read_json, write_json
 from rigidimeter.errors import UserError
 
 SCHEMA = "rigidimeter.commissioning/1"
@@ -152,14 +152,9 @@ def read_record(path: Path) -> CommissioningRecord:
     UserError
         If there is none, it is something else, or it was changed since it was written.
     """
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise UserError(
-            f"{path}: there is no such record; make it with `rigidimeter commission`"
-        ) from None
-    except (OSError, ValueError) as error:
-        raise UserError(f"{path}: cannot be read as a commissioning record ({error})") from None
+    if not path.exists():
+        raise UserError(f"{path}: there is no such record; make it with `rigidimeter commission`")
+    values = read_json(path)
     if not isinstance(values, dict) or values.get("schema") != SCHEMA:
         raise UserError(f"{path}: is no commissioning record of the schema {SCHEMA}")
     if values.pop("digest", None) != _digest(values):

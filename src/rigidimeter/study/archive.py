@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-import json
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.documents import json_text, text_bytes, write_text
+from rigidimeter.documents import json_text, read_json, text_bytes, write_text
 from rigidimeter.errors import UserError
 from rigidimeter.recording import estimates_document
 from rigidimeter.settings import dump_settings
@@ -287,7 +286,7 @@ def _is_inputs(found: Mapping[str, Any]) -> bool:
 
 def _object(path: Path) -> dict[str, Any] | None:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        found = read_json(path)
+    except UserError:
         return None
     return found if isinstance(found, dict) else None

@@ -18,13 +18,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.documents import as_read, open_regular
+from rigidimeter.documents.bounds import (
+    COLUMNS,
+    RECORDING_BYTES,
+    TABLE_BYTES,
+    TABLE_CELLS,
+    TABLE_ROWS,
+)
+from rigidimeter.documents.escaping import NUMBER
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.table import Table, printable
 
 _DELIMITERS = ("\t", ";", ",")
-_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 _DECIMAL_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+_HEAD_BYTES = 2**16
 _MISSING = {"", "na", "n/a", "#n/a", "nan", "null", "none", "-", "–", "."}
 
 
@@ -88,7 +97,7 @@ def cell_number(text: str, name: str, where: str) -> float | None:
     """
     if is_missing(text):
         return None
-    if not _NUMBER.fullmatch(text):
+    if not NUMBER.fullmatch(text):
         raise UserError(
             f"{where}: {name} is {text!r}, which is not a number; write a number, or leave the "
             "cell empty where there is none"
@@ -107,16 +116,23 @@ def read_text_table(path: Path, *, may_be_empty: bool = False) -> TextTable:
     UserError
         If it is not such a file, or has no rows and may not be empty.
     """
-    text = _open(path, "rows", "condition,examiner,score")
-    if not text.lines.size and not may_be_empty:
+    text = _open(path, "rows", "condition,examiner,score", TABLE_BYTES)
+    n_rows, n_columns = text.lines.size, len(text.names)
+    if not n_rows and not may_be_empty:
         raise text.without_rows()
+    if n_rows > TABLE_ROWS or n_rows * n_columns > TABLE_CELLS:
+        raise UserError(
+            f"{text.source}: has {n_rows} rows of {n_columns} columns; a table of labels and "
+            f"numbers may have {TABLE_ROWS} rows and {TABLE_CELLS} cells, so leave out what is not "
+            "needed"
+        )
     frame = text.parsed(dtype=str, na_filter=False)
     cells = [frame[name].str.strip() for name in text.names]
     kept = np.flatnonzero(np.any([column != "" for column in cells], axis=0))
     if not kept.size and not may_be_empty:
         raise text.without_rows()
     columns = {
-        name: tuple(column.iloc[kept]) for name, column in zip(text.names, cells, strict=True)
+        name: tuple(map(as_read, column.iloc[kept])) for name, column in zip(text.names, cells, strict=True)
     }
     return TextTable(text.source, columns, tuple(text.lines[kept].tolist()))
 
@@ -134,7 +150,7 @@ def read_text_recording(path: Path) -> Table:
     UserError
         If it is not such a file; the sentence names the line where there is one.
     """
-    text = _open(path, "samples", "time_s,torque_nm,angle_rad")
+    text = _open(path, "samples", "time_s,torque_nm,angle_rad", RECORDING_BYTES)
     if len(text.names) < 2:
         raise UserError(
             f"{text.source}: its first line, {text.names[0][:40]!r}, names fewer than two columns; "
@@ -155,6 +171,8 @@ def read_text_recording(path: Path) -> Table:
         texts = values.astype(str).where(values.notna(), "")
         if comma:
             texts = texts.str.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
+        if texts.str.startswith("'").any():
+            texts = texts.map(as_read)
         columns[name] = texts.to_numpy(object)
     return Table(text.source, columns, lines=text.lines)
 
@@ -198,13 +216,16 @@ class _Text:
             ) from None
 
 
-def _open(path: Path, rows_are: str, example: str) -> _Text:
+def _open(path: Path, rows_are: str, example: str, most_bytes: int) -> _Text:
     """Find the columns and rows of a text table, and check that every row has every column."""
     source = str(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise UserError(f"{source} cannot be read ({error.strerror or error})") from None
+    with open_regular(path, most_bytes) as file:
+        try:
+            data = file.read(_HEAD_BYTES)
+            _refuse_zeros(source, data)  # before the rest of a large file
+            data += file.read(most_bytes)
+        except OSError as error:
+            raise UserError(f"{source}: cannot be read ({error.strerror or error})") from None
     data, lines = _content(_utf8(source, data))
     head, _, body = data.partition(b"\n")
     if not head.strip():
@@ -241,11 +262,15 @@ def _utf8(source: str, data: bytes) -> bytes:
         raise UserError(
             f"{source} is not a text file in UTF-8; in a spreadsheet, save it as CSV UTF-8"
         ) from None
-    if b"\0" in data:
+    _refuse_zeros(source, data)
+    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def _refuse_zeros(source: str, data: bytes) -> None:
+    if data[:2] not in (b"\xff\xfe", b"\xfe\xff") and b"\0" in data:
         raise UserError(
             f"{source} is not a text file: it holds zero bytes; a CSV file was expected"
         )
-    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
 def _decoded(data: bytes) -> str:
@@ -280,8 +305,13 @@ def _header(source: str, text: str, example: str) -> tuple[str, list[str]]:
         fields = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))
     except csv.Error:
         fields = text.split(delimiter)
+    if len(fields) > COLUMNS:
+        raise UserError(
+            f"{source}: its first line names {len(fields)} columns; at most {COLUMNS} are read, so "
+            "leave out those that are not needed"
+        )
     names = [printable(name.strip().strip("\"'").strip()) for name in fields]
-    if any(names) and all(_NUMBER.fullmatch(name) for name in names if name):
+    if any(names) and all(NUMBER.fullmatch(name) for name in names if name):
         raise UserError(
             f"{source}: its first line holds numbers ({', '.join(names[:3])}"
             f"{', ...' if len(names) > 3 else ''}), but it must name the columns, as in {example}"

@@ -1,16 +1,16 @@
-"""Files of text, JSON, CSV and TOML: the one place where they are written, and read as values."""
+"""Files of text, JSON and CSV: the one place where they are written."""
 
 from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rigidimeter.documents.escaping import as_written
 from rigidimeter.errors import UserError
 
 
@@ -85,46 +85,15 @@ def csv_text(
     columns : sequence of str
         The names, in order.
     rows : iterable of mappings or of sequences
-        Cells by name, or in the order of the columns; None, NaN and absent cells stay empty.
+        Cells by name, or in the order of the columns; None, NaN and absent cells stay empty. Text
+        is written by `as_written`, so that no cell is a formula or holds a control character.
     """
     import pandas as pd
 
     frame = pd.DataFrame(list(rows), columns=list(columns), dtype=object)
+    frame = frame.map(lambda cell: as_written(cell) if isinstance(cell, str) else cell)
+    frame.columns = [as_written(name) for name in columns]
     return str(frame.to_csv(index=False, lineterminator="\n"))
-
-
-def read_json(path: Path) -> Any:
-    """Return what a JSON file holds.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read or is not JSON.
-    """
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"{path}: is not valid JSON ({error})") from None
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """Return what a TOML file holds.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read or is not TOML.
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except UnicodeDecodeError:
-        raise UserError(f"{path}: is not a text file in UTF-8") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise UserError(f"{path}: is not valid TOML: {error}") from None
 
 
 def text_bytes(text: str) -> bytes:

@@ -1,0 +1,41 @@
+"""Files of text, JSON, CSV and TOML: the one place where they are written, and read as values."""
+
+from rigidimeter.documents.escaping import as_read, as_written, visible
+from rigidimeter.documents.reading import (
+    open_regular,
+    parse_json,
+    parse_toml,
+    read_bytes,
+    read_json,
+    read_toml,
+)
+from rigidimeter.documents.writing import (
+    csv_text,
+    json_line,
+    json_text,
+    plain_values,
+    replace_file,
+    text_bytes,
+    write_json,
+    write_text,
+)
+
+__all__ = [
+    "as_read",
+    "as_written",
+    "csv_text",
+    "json_line",
+    "json_text",
+    "open_regular",
+    "parse_json",
+    "parse_toml",
+    "plain_values",
+    "read_bytes",
+    "read_json",
+    "read_toml",
+    "replace_file",
+    "text_bytes",
+    "visible",
+    "write_json",
+    "write_text",
+]
