@@ -10,7 +10,7 @@ import pytest
 import scipy.io
 
 from rigidimeter.documents import read_json, read_toml
-from rigidimeter.documents.bounds import COLUMNS, DIGITS, NESTING, TABLE_ROWS
+from rigidimeter.documents.bounds import CELLS, COLUMNS, DIGITS, NESTING, TABLE_ROWS
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.readers import read_recording
 from rigidimeter.recording.formats.table_epochs import ReadOptions
@@ -118,6 +118,127 @@ def test_a_million_columns(tmp_path):
 def test_a_million_rows_of_a_small_table(tmp_path):
     path = tmp_path / "long.csv"
     path.write_bytes(b"condition,examiner,score\n" + b"OFF,A,1\n" * 10**6)
-    assert f"has 1000000 rows of 3 columns; a table of labels and numbers may have {TABLE_ROWS}" in (
-        refusal(read_text_table, path)
+    assert (
+        f"has 1000000 rows of 3 columns; a table of labels and numbers may have {TABLE_ROWS}"
+        in (refusal(read_text_table, path))
     )
+
+
+def npy(shape: str, data: bytes, descr: str = "'<f8'") -> bytes:
+    """Return an array of NumPy's format, of any header and any data."""
+    header = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}"
+    header += " " * (-(len(header) + 11) % 64) + "\n"
+    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode() + data
+
+
+def test_an_npz_bomb(tmp_path):
+    path = tmp_path / "bomb.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in ("torque_nm", "angle_rad", "time_s"):
+            archive.writestr(f"{name}.npy", npy("(12500000,)", bytes(100_000_000)))
+    assert path.stat().st_size < 400_000
+    assert "expands to 95.4 MiB; the columns that are used of a file of this size" in refused(path)
+
+
+def test_only_the_columns_that_are_used_are_expanded(tmp_path):
+    path = tmp_path / "r.npz"
+    used = {name: np.arange(50.0) for name in ("time_s", "torque_nm", "angle_rad")}
+    np.savez_compressed(path, **used)
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("other.npy", npy("(25000000,)", bytes(200_000_000)))
+    (epoch,), _ = read_recording(path, ReadOptions())
+    assert len(epoch.channels["torque_nm"]) == 50
+
+
+@pytest.mark.parametrize(
+    ("shape", "descr"), [("(10**12,)", "'<f8'"), ("(1000000000000,)", "'<f8'"), ("(-1,)", "'<f8'")]
+)
+def test_an_array_that_is_shorter_than_its_header_says(tmp_path, shape, descr):
+    path = tmp_path / "r.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("torque_nm.npy", npy(shape, bytes(800), descr))
+    assert "is not a complete NumPy archive" in refused(path)
+
+
+def test_an_archive_of_many_entries(tmp_path):
+    path = tmp_path / "r.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        for k in range(COLUMNS + 1):
+            archive.writestr(f"a{k}.npy", b"")
+    assert f"holds {COLUMNS + 1} entries; at most {COLUMNS} are read" in refused(path)
+
+
+def mat5(*elements: bytes) -> bytes:
+    return b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + b"".join(elements)
+
+
+def compressed(size: int, stored: bytes) -> bytes:
+    data = zlib.compress((14).to_bytes(4, "little") + size.to_bytes(4, "little") + stored, 9)
+    return (15).to_bytes(4, "little") + len(data).to_bytes(4, "little") + data
+
+
+@pytest.mark.parametrize(
+    ("size", "told"), [(300_000_000, "expands to 286 MiB"), (8, "than its tag")]
+)
+def test_a_mat_bomb(tmp_path, size, told):
+    path = tmp_path / "bomb.mat"
+    path.write_bytes(mat5(compressed(size, bytes(300_000_000))))
+    assert path.stat().st_size < 400_000
+    assert told in refused(path)
+
+
+def test_a_matlab_matrix_of_bytes_that_become_doubles(tmp_path):
+    """MATLAB stores doubles that are small whole numbers as bytes: 8 times as large when read."""
+    path = tmp_path / "r.mat"
+    long = np.zeros(20_000_000, dtype=np.uint8)
+    scipy.io.savemat(
+        path, {"torque_nm": long, "angle_rad": long, "fs": 1000.0}, do_compression=True
+    )
+    assert "expands to 153 MiB" in refused(path)
+
+
+def test_a_matlab_file_of_many_cells(tmp_path):
+    path = tmp_path / "r.mat"
+    empty = b"\x0e\0\0\0\0\0\0\0"
+    flags = b"\x06\0\0\0\x08\0\0\0\x01\0\0\0\0\0\0\0"
+    dims = b"\x05\0\0\0\x08\0\0\0" + (1).to_bytes(4, "little") + (10**6).to_bytes(4, "little")
+    matrix = flags + dims + b"\x01\0\x01\0a\0\0\0" + empty * 10**6
+    path.write_bytes(mat5(compressed(len(matrix), matrix)))
+    assert f"more than {CELLS} cells" in refused(path)
+
+
+def hdf5(path: Path, fill) -> Path:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name in ("time_s", "torque_nm", "angle_rad"):
+            file[name] = np.arange(50.0)
+        fill(h5py, file)
+    return path
+
+
+def test_an_hdf5_bomb(tmp_path):
+    def fill(_h5py, file):
+        del file["torque_nm"]
+        file.create_dataset("torque_nm", (10**12,), "f8")  # of which nothing is stored
+
+    text = refused(hdf5(tmp_path / "r.mat", fill))
+    assert "torque_nm expands to 7.45e+03 GiB" in text
+
+
+def test_what_an_hdf5_file_links_to_is_not_read(tmp_path):
+    def fill(h5py, file):
+        file["elsewhere"] = h5py.ExternalLink("/dev/zero", "/a")
+        file["soft"] = h5py.SoftLink("/torque_nm")
+        kept = [("/etc/hostname", 0, 80)]
+        file.create_dataset("outside", (10,), "f8", external=kept)
+
+    (epoch,), _ = read_recording(hdf5(tmp_path / "r.mat", fill), ReadOptions())
+    assert len(epoch.channels["torque_nm"]) == 50
+
+
+def test_an_hdf5_group_that_holds_itself(tmp_path):
+    def fill(_h5py, file):
+        group = file.create_group("a")
+        group["a"] = group
+
+    assert "nested too deeply" in refused(hdf5(tmp_path / "r.mat", fill))

@@ -154,7 +154,10 @@ def read_record(path: Path) -> CommissioningRecord:
     """
     if not path.exists():
         raise UserError(f"{path}: there is no such record; make it with `rigidimeter commission`")
-    values = read_json(path)
+    try:
+        values = read_json(path)
+    except UserError as error:
+        raise UserError(f"{error}; a commissioning record was expected") from None
     if not isinstance(values, dict) or values.get("schema") != SCHEMA:
         raise UserError(f"{path}: is no commissioning record of the schema {SCHEMA}")
     if values.pop("digest", None) != _digest(values):

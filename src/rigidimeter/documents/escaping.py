@@ -1,9 +1,9 @@
 r"""Text as it may be shown and as a cell of a table: nothing in it commands a terminal or a sheet.
 
-A control character, such as ESC, which begins the commands of a terminal, is written as its escape
-(``\x1b``). A cell of a CSV file that begins with ``=``, ``+``, ``-``, ``@`` or a tab and is no number
-would be a formula to a spreadsheet; an apostrophe before it makes it text there. Readers of tables
-take one such apostrophe off again. Source: OWASP, "CSV Injection".
+A control character, such as ESC, which begins the commands of a terminal, is written as its
+escape (``\x1b``). A cell of a CSV file that begins with ``=``, ``+``, ``-``, ``@`` or a tab and is
+no number would be a formula to a spreadsheet; an apostrophe before it makes it text there. Readers
+of tables take one such apostrophe off again. Source: OWASP, "CSV Injection".
 """
 
 from __future__ import annotations

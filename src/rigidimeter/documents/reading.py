@@ -125,8 +125,8 @@ def parse_json(data: bytes, source: str) -> Any:
     for name, value in _leaves(values):
         if isinstance(value, float) and not math.isfinite(value):
             raise UserError(
-                f"{source}: {name or 'the value'} is {value}, which is not a number of JSON; write null where "
-                "there is none"
+                f"{source}: {name or 'the value'} is {value}, which is not a number of JSON; "
+                "write null where there is none"
             )
     return values
 

@@ -91,8 +91,10 @@ def csv_text(
     import pandas as pd
 
     frame = pd.DataFrame(list(rows), columns=list(columns), dtype=object)
-    frame = frame.map(lambda cell: as_written(cell) if isinstance(cell, str) else cell)
-    frame.columns = [as_written(name) for name in columns]
+    for name in frame:  # not DataFrame.map, which would make numbers beside gaps floats
+        cells = [as_written(cell) if isinstance(cell, str) else cell for cell in frame[name]]
+        frame[name] = pd.Series(cells, dtype=object)
+    frame.columns = pd.Index([as_written(name) for name in columns])
     return str(frame.to_csv(index=False, lineterminator="\n"))
 
 

@@ -18,7 +18,6 @@ a file without `UserAxis` is refused. A ``*.toml`` file is written by hand:
 
 from __future__ import annotations
 
-import tomllib
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,6 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.devices.base import DeviceError
+from rigidimeter.documents import parse_toml, read_bytes
+from rigidimeter.documents.bounds import SETTINGS_BYTES
+from rigidimeter.errors import UserError
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
@@ -81,9 +83,9 @@ def read_calibration(path: Path) -> Calibration:
         If the file cannot be read, names a unit that is not known, or holds no 6 × 6 matrix.
     """
     try:
-        text = path.read_bytes()
-    except OSError as error:
-        raise DeviceError(f"torque sensor: calibration {path} cannot be read: {error}") from error
+        text = read_bytes(path, SETTINGS_BYTES)
+    except UserError as error:
+        raise DeviceError(f"torque sensor: calibration {error}") from error
     return _from_toml(path, text) if path.suffix == ".toml" else _from_xml(path, text)
 
 
@@ -119,9 +121,9 @@ def _from_xml(path: Path, text: bytes) -> Calibration:
 
 def _from_toml(path: Path, text: bytes) -> Calibration:
     try:
-        table = tomllib.loads(text.decode())
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise DeviceError(f"torque sensor: {path} is not TOML: {error}") from error
+        table = parse_toml(text, str(path))
+    except UserError as error:
+        raise DeviceError(f"torque sensor: {error}") from error
     return _calibration(
         path,
         table.get("matrix"),

@@ -5,19 +5,25 @@ Fields of structures get dotted names: `data.torque`.
 
 from __future__ import annotations
 
+import functools
+import os
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from rigidimeter.errors import UserError
-from rigidimeter.recording.formats.mat_check import check_mat5
+from rigidimeter.documents import open_regular
+from rigidimeter.documents.bounds import RECORDING_BYTES
+from rigidimeter.recording.formats.hdf5_arrays import hdf5_arrays
+from rigidimeter.recording.formats.mat_check import Variable, check_mat5
+from rigidimeter.recording.formats.stored_arrays import Expansion, Stored, check_count
 from rigidimeter.recording.formats.table import Table, table_of_arrays
 
+_VALUE_BYTES = 8
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
@@ -31,30 +37,73 @@ def read_mat(path: Path) -> Table:
     Exception
         Whatever scipy and h5py raise on a damaged file.
     """
-    with path.open("rb") as file:
+    with open_regular(path, RECORDING_BYTES) as file:
         start = file.read(520)
-    hdf5 = _HDF5 in (start[:8], start[512:520])
-    return table_of_arrays(str(path), _entries_hdf5(path) if hdf5 else _entries(path))
+        if _HDF5 in (start[:8], start[512:520]):
+            entries = hdf5_arrays(path)
+        else:
+            file.seek(0)
+            entries = _entries(path, file)
+    return table_of_arrays(str(path), entries)
 
 
-def _entries(path: Path) -> dict[str, NDArray[Any]]:
-    check_mat5(path.read_bytes())
+def _entries(path: Path, file: BinaryIO) -> dict[str, Stored]:
+    file_bytes = os.fstat(file.fileno()).st_size
+    checked, used = Expansion(path, file_bytes), Expansion(path, file_bytes)
+    variables = check_mat5(file, file_bytes, lambda n_bytes: checked.take("a variable", n_bytes))
+    if variables is None:  # version 4, which is never compressed
+        return _flat(_loaded(file, None))
+    check_count(path, len(variables))
+    names = [variable.name for variable in variables if variable.name]
+    if len(set(names)) < len(names):
+        raise ValueError("two variables have one name")
+    whole = [each for each in variables if each.content == "text or parts"]
+    for variable in whole:
+        used.take(variable.name, _VALUE_BYTES * variable.n_values)
+    parts = _flat(_loaded(file, [variable.name for variable in whole])) if whole else {}
+    entries: dict[str, Stored] = {}
+    for variable in variables:
+        name = variable.name
+        if not name or name.startswith("__"):
+            continue
+        if variable.content == "text or parts":
+            own = (name, f"{name}.")
+            entries |= {key: part for key, part in parts.items() if key.startswith(own)}
+        elif variable.content == "numbers":
+            read = functools.partial(_read, path, variable, used)
+            entries[name] = Stored(np.dtype(np.float64), variable.shape, read)
+        else:
+            dtype = np.dtype(np.complex128 if variable.content == "complex" else "V1")
+            entries[name] = Stored(dtype, variable.shape, lambda: np.empty(0))
+    return entries
+
+
+def _read(path: Path, variable: Variable, used: Expansion) -> NDArray[Any]:
+    used.take(variable.name, _VALUE_BYTES * variable.n_values)
+    with open_regular(path, RECORDING_BYTES) as file:
+        return np.asarray(_loaded(file, [variable.name])[variable.name])
+
+
+def _loaded(file: BinaryIO, names: list[str] | None) -> dict[str, Any]:
+    """Return the variables of these names, or all."""
+    file.seek(0)
     with warnings.catch_warnings():
         # A file that scipy warns of is refused, with the warning as the reason.
         warnings.simplefilter("error", scipy.io.matlab.MatReadWarning)
-        loaded = scipy.io.loadmat(path, simplify_cells=True)
-    return _flat({name: value for name, value in loaded.items() if not name.startswith("__")})
+        # A file too, say scipy's documents.
+        loaded = scipy.io.loadmat(cast("Any", file), simplify_cells=True, variable_names=names)
+    return {name: value for name, value in loaded.items() if not name.startswith("__")}
 
 
-def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, NDArray[Any]]:
+def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Stored]:
     """Give the fields of nested structures dotted names."""
-    flat: dict[str, NDArray[Any]] = {}
+    flat: dict[str, Stored] = {}
     for key, value in values.items():
         name = f"{prefix}{key}"
         if isinstance(value, Mapping):
             flat |= _flat(value, f"{name}.")
         else:
-            flat[name] = _array(value)
+            flat[name] = Stored.of(_array(value))
     return flat
 
 
@@ -68,49 +117,3 @@ def _array(value: object) -> NDArray[Any]:
     if array.dtype == object and not all(isinstance(entry, str) for entry in array.flat):
         return np.empty(array.shape, dtype="V1")
     return array
-
-
-def _entries_hdf5(path: Path) -> dict[str, NDArray[Any]]:
-    try:
-        import h5py
-    except ImportError:
-        raise UserError(
-            f"{path} is a MATLAB file of version 7.3, which needs one more package: "
-            "pip install 'rigidimeter[matlab73]' (or save it in MATLAB with -v7)"
-        ) from None
-
-    def text(dataset: Any) -> str:
-        return "".join(map(chr, np.asarray(dataset[()]).T.reshape(-1)))
-
-    def entry(dataset: Any) -> NDArray[Any]:
-        kind = dataset.attrs.get("MATLAB_class", b"").decode("ascii", "replace")
-        if "MATLAB_empty" in dataset.attrs:
-            return np.empty(0)
-        if kind == "char":
-            return np.asarray(text(dataset), dtype=object)
-        if kind == "cell":
-            cells = [file[reference] for reference in np.asarray(dataset[()]).reshape(-1)]
-            kinds = {cell.attrs.get("MATLAB_class", b"") for cell in cells}
-            if kinds != {b"char"}:
-                return np.empty(len(cells), dtype="V1")
-            return np.array(
-                ["" if "MATLAB_empty" in cell.attrs else text(cell) for cell in cells], dtype=object
-            )
-        if h5py.check_ref_dtype(dataset.dtype) is not None:
-            return np.empty(dataset.shape, dtype="V1")
-        return np.asarray(dataset[()])
-
-    entries: dict[str, NDArray[Any]] = {}
-
-    def visit(group: Any, prefix: str) -> None:
-        for key, value in group.items():
-            if key.startswith("#"):
-                continue  # where MATLAB keeps the contents of cells and its own classes
-            if isinstance(value, h5py.Group):
-                visit(value, f"{prefix}{key}.")
-            elif isinstance(value, h5py.Dataset):
-                entries[f"{prefix}{key}"] = entry(value)
-
-    with h5py.File(path, "r") as file:
-        visit(file, "")
-    return entries

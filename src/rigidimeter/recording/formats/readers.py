@@ -7,13 +7,17 @@ format that knows its own epochs, with a clock for each channel, returns epochs 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rigidimeter.documents import open_regular, visible
+from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.mat_file import read_mat
 from rigidimeter.recording.formats.npz_file import read_npz
+from rigidimeter.recording.formats.stored_arrays import Columns
 from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.table_epochs import ReadOptions, epochs_from_table
 from rigidimeter.recording.formats.text_table import read_text_recording
@@ -143,15 +147,13 @@ def formats_text() -> str:
 def _read(path: Path) -> Table | Epochs:
     reader = reader_of(path)
     if path.is_file():
-        try:
-            with path.open("rb") as file:
-                empty = not file.read(1)
-        except OSError as error:
-            raise UserError(f"{path} cannot be read ({error.strerror or error})") from None
-        if empty:
-            raise UserError(f"{path} is empty; a recording in a {path.suffix} file was expected")
+        with open_regular(path, RECORDING_BYTES) as file:
+            if not file.read(1):
+                raise UserError(
+                    f"{path} is empty; a recording in a {path.suffix} file was expected"
+                )
     try:
-        return reader.read(path)
+        found = reader.read(path)
     except UserError:
         raise
     except ImportError as error:
@@ -162,13 +164,22 @@ def _read(path: Path) -> Table | Epochs:
             f"pip install 'rigidimeter[{reader.extra}]'"
         ) from error
     except Exception as error:
-        if not reader.made_by:
-            raise
-        reason = (str(error).strip().splitlines() or [""])[0][:120] or type(error).__name__
-        raise UserError(
-            f"{path} is not a complete {reader.name} ({reason}); it must be made by "
-            f"{reader.made_by}"
-        ) from error
+        raise _refusal(reader, path, error) from error
+    if isinstance(found, Table) and isinstance(found.columns, Columns):
+        columns = found.columns.refusing(functools.partial(_refusal, reader, path))
+        return replace(found, columns=columns)
+    return found
+
+
+def _refusal(reader: Reader, path: Path, error: Exception) -> Exception:
+    """Return what says that a file is damaged, where any exception means that."""
+    if not reader.made_by or isinstance(error, MemoryError):
+        return error
+    reason = (str(error).strip().splitlines() or [""])[0][:120] or type(error).__name__
+    return UserError(
+        f"{path} is not a complete {reader.name} ({visible(reason)}); it must be made by "
+        f"{reader.made_by}"
+    )
 
 
 def _any_of(names: list[str]) -> str:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.formats.stored_arrays import Columns, Stored
 
 MISSING = frozenset({"", "na", "n/a", "#n/a", "#na", "nan", "-nan", "null", "none", "<na>"})
 """Texts, in lower case, that mark a missing sample."""
 
 _SHOWN = 20
+_LONGEST_TEXT_BYTES = 4096
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ class Table:
         return ", ".join(name[:60] for name in names[:_SHOWN]) + more
 
 
-def table_of_arrays(source: str, entries: Mapping[str, NDArray[Any]]) -> Table:
+def table_of_arrays(source: str, entries: Mapping[str, Stored]) -> Table:
     """Sort named arrays, as NumPy and MATLAB files hold them, into columns, scalars and others.
 
     An array with one value is a scalar; one with a single dimension longer than 1 is a column.
@@ -68,22 +71,24 @@ def table_of_arrays(source: str, entries: Mapping[str, NDArray[Any]]) -> Table:
     UserError
         If there is no column at all.
     """
-    columns: dict[str, NDArray[Any]] = {}
+    columns: dict[str, Callable[[], NDArray[Any]]] = {}
     scalars: dict[str, float | str] = {}
     others: dict[str, str] = {}
     for key, array in entries.items():
         name = printable(key)
         text = array.dtype.kind in "OU"
-        if array.dtype.kind not in "fiubOU":
+        if array.dtype.itemsize > _LONGEST_TEXT_BYTES:
+            others[name] = f"text of up to {array.dtype.itemsize // 4} letters"
+        elif array.dtype.kind not in "fiubOU":
             kind = "objects" if array.dtype.kind == "V" else str(array.dtype)
             others[name] = f"an array of {kind}"
         elif array.size == 0:
             others[name] = "empty"
         elif array.size == 1:
-            scalars[name] = str(array.item()) if text else float(array.item())
+            value = array.read().item()
+            scalars[name] = str(value) if text else float(value)
         elif max(array.shape) == array.size:
-            flat = array.reshape(-1)
-            columns[name] = flat.astype(object) if text else flat.astype(np.float64, copy=False)
+            columns[name] = functools.partial(_column, array, object if text else np.float64)
         else:
             others[name] = f"an array of {' × '.join(map(str, array.shape))}"
     if not columns:
@@ -92,7 +97,11 @@ def table_of_arrays(source: str, entries: Mapping[str, NDArray[Any]]) -> Table:
             f"{source} has no column of samples, that is, no array with one dimension and at least "
             f"2 values (it holds {held})"
         )
-    return Table(source, columns, scalars, others)
+    return Table(source, Columns(columns), scalars, others)
+
+
+def _column(array: Stored, dtype: type) -> NDArray[Any]:
+    return array.read().reshape(-1).astype(dtype, copy=False)
 
 
 def label_text(value: object) -> str:

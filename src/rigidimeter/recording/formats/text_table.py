@@ -132,7 +132,8 @@ def read_text_table(path: Path, *, may_be_empty: bool = False) -> TextTable:
     if not kept.size and not may_be_empty:
         raise text.without_rows()
     columns = {
-        name: tuple(map(as_read, column.iloc[kept])) for name, column in zip(text.names, cells, strict=True)
+        name: tuple(map(as_read, column.iloc[kept]))
+        for name, column in zip(text.names, cells, strict=True)
     }
     return TextTable(text.source, columns, tuple(text.lines[kept].tolist()))
 
@@ -222,8 +223,9 @@ def _open(path: Path, rows_are: str, example: str, most_bytes: int) -> _Text:
     with open_regular(path, most_bytes) as file:
         try:
             data = file.read(_HEAD_BYTES)
-            _refuse_zeros(source, data)  # before the rest of a large file
-            data += file.read(most_bytes)
+            if len(data) == _HEAD_BYTES:
+                _refuse_zeros(source, data)  # before the rest of a large file
+                data += file.read(most_bytes)
         except OSError as error:
             raise UserError(f"{source}: cannot be read ({error.strerror or error})") from None
     data, lines = _content(_utf8(source, data))

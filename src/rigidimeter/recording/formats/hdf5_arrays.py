@@ -1,0 +1,107 @@
+"""Arrays of a MATLAB file of version 7.3, which is HDF5, read by h5py.
+
+Only what lies in the file itself is read: no link to another file, no data kept in one.
+"""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.documents.bounds import CELLS, NESTING
+from rigidimeter.errors import UserError
+from rigidimeter.recording.formats.stored_arrays import Expansion, Stored, check_count
+
+
+def hdf5_arrays(path: Path) -> dict[str, Stored]:
+    """Return the arrays of a file by name; fields of structures have dotted names.
+
+    Raises
+    ------
+    UserError
+        If h5py is not installed, or the file holds more than a recording does.
+    Exception
+        Whatever h5py raises on a damaged file.
+    """
+    h5py = _h5py(path)
+    expansion = Expansion(path, path.stat().st_size)
+    entries: dict[str, Stored] = {}
+
+    def visit(group: Any, prefix: str, depth: int) -> None:
+        if depth > NESTING:  # a group may lie in itself
+            raise ValueError("its structures are nested too deeply")
+        check_count(path, len(group))
+        for key in group:
+            if key.startswith("#"):
+                continue  # where MATLAB keeps the contents of cells and its own classes
+            if not isinstance(group.get(key, getlink=True), h5py.HardLink):
+                continue
+            value = group[key]
+            if isinstance(value, h5py.Group):
+                visit(value, f"{prefix}{key}.", depth + 1)
+            elif isinstance(value, h5py.Dataset):
+                entries[f"{prefix}{key}"] = _stored(path, h5py, value, f"{prefix}{key}", expansion)
+                check_count(path, len(entries))
+
+    with h5py.File(path, "r") as file:
+        visit(file, "", 0)
+    return entries
+
+
+def _h5py(path: Path) -> Any:
+    try:
+        import h5py
+    except ImportError:
+        raise UserError(
+            f"{path} is a MATLAB file of version 7.3, which needs one more package: "
+            "pip install 'rigidimeter[matlab73]' (or save it in MATLAB with -v7)"
+        ) from None
+    return h5py
+
+
+def _stored(path: Path, h5py: Any, dataset: Any, name: str, expansion: Expansion) -> Stored:
+    """Return what a dataset is; text and single values are read at once."""
+    kind = _kind(dataset)
+    if "MATLAB_empty" in dataset.attrs:
+        return Stored.of(np.empty(0))
+    if dataset.is_virtual or dataset.external:
+        return Stored(np.dtype("V1"), dataset.shape, lambda: np.empty(0))
+    if kind == "char":
+        expansion.take(name, 4 * dataset.size)
+        return Stored.of(np.asarray(_text(dataset), dtype=object))
+    if kind == "cell":
+        if dataset.size > CELLS:
+            raise UserError(
+                f"{path}: {name[:60]} has {dataset.size} cells; at most {CELLS} are read, so save "
+                "labels as numbers"
+            )
+        expansion.take(name, 8 * dataset.size)
+        cells = [dataset.file[reference] for reference in np.asarray(dataset[()]).reshape(-1)]
+        if {_kind(cell) for cell in cells} != {"char"}:
+            return Stored(np.dtype("V1"), (len(cells),), lambda: np.empty(0))
+        expansion.take(name, sum(4 * cell.size for cell in cells))
+        texts = ["" if "MATLAB_empty" in cell.attrs else _text(cell) for cell in cells]
+        return Stored.of(np.array(texts, dtype=object))
+    if h5py.check_ref_dtype(dataset.dtype) is not None or dataset.dtype.hasobject:
+        return Stored(np.dtype("V1"), dataset.shape or (), lambda: np.empty(0))
+    read = functools.partial(_read, path, name, expansion)
+    return Stored(dataset.dtype, dataset.shape or (0,), read)
+
+
+def _read(path: Path, name: str, expansion: Expansion) -> NDArray[Any]:
+    with _h5py(path).File(path, "r") as file:
+        dataset = file[name.replace(".", "/")]
+        expansion.take(name, dataset.size * max(dataset.dtype.itemsize, 8))
+        return np.asarray(dataset[()])
+
+
+def _kind(dataset: Any) -> str:
+    return str(dataset.attrs.get("MATLAB_class", b"").decode("ascii", "replace"))
+
+
+def _text(dataset: Any) -> str:
+    return "".join(map(chr, np.asarray(dataset[()]).T.reshape(-1)))
