@@ -65,13 +65,16 @@ LOST = [
     (ASCII, "silent", Cause.DRIVE_LOST, 0.1 + 0.02),
     (ASCII, "half_replies", Cause.DRIVE_LOST, 0.1 + 0.02),
     (ASCII, "garbage", Cause.DRIVE_LOST, 0.02 * 3),
+    # One register alone: the third in a row, or 0.1 s.
+    (ASCII, "damaged_register", Cause.DRIVE_LOST, 0.1 + 0.02),
+    (ASCII, "status_is", Cause.DRIVE_LOST, 0.1 + 0.02),
 ]
 
 
 @pytest.mark.parametrize(("rig", "case", "cause", "within_s"), LOST)
 def test_fault_08_drive_lost(rig, case, cause, within_s, tmp_path, measured):
     with bench(rig) as made:
-        value = cause if case == "reports" else None
+        value = {"reports": cause, "damaged_register": 0x18, "status_is": 2**63}.get(case)
         trial = run(made, tmp_path / "s", Wrong("drive", case, value))
         bound_s = within_s + 1.0 / made.rate_hz
         # What no longer hears is stopped by its own watchdog.

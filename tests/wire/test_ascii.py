@@ -155,6 +155,11 @@ def test_slowing_down_never_turns_the_arm_back(wire):
     ("habit", "value", "cause"),
     [
         ("silent", 1, Cause.DRIVE_LOST),
+        *(
+            ("damaged_register", at, Cause.DRIVE_LOST)
+            for at in (0x18, 0x32, 0xA0, 0x24, 0xCA, 0xCB)
+        ),
+        ("status_is", 2**63, Cause.DRIVE_LOST),
         ("half_replies", 1, Cause.DRIVE_LOST),
         ("garbage", 1, Cause.DRIVE_LOST),
         ("slow_replies", 0.2, Cause.DRIVE_LOST),

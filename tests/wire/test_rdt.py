@@ -262,9 +262,7 @@ def test_a_loop_held_up_loses_nothing_at_7_khz(arm, sensor_of):
         time.sleep(0.15)
         behind = sensor.read()
         assert behind.sequence > before.sequence
-        # Newer ones wait: it is as old as its number says.
-        passed_s = (behind.sequence - before.sequence) / 7000.0
-        assert behind.time_s - before.time_s == pytest.approx(passed_s, abs=0.005)
+        assert behind.time_s == before.time_s  # newer ones wait: it is not fresh
         for _ in range(20):
             sensor.read()
         sample = sensor.read()

@@ -30,6 +30,8 @@ MISBEHAVIOURS = {
     "silent": "sends no replies",
     "error_replies": "refuses every request with this code",
     "garbage": "replies with characters that are not a reply",
+    "damaged_register": "replies to requests about this register with characters that are no reply",
+    "status_is": "reports this event status",
     "half_replies": "stops in the middle of each reply",
     "slow_replies": "replies this many seconds late",
     "wrong_baud": "changes to this baud rate by itself",
@@ -182,7 +184,7 @@ class AsciiEmulator:
             self.log.append((time.monotonic(), request, reply))
         if "silent" in faults:
             return
-        if "garbage" in faults:
+        if "garbage" in faults or _register_of(request) == faults.get("damaged_register", -1):
             reply = "\x7f#?"
         data = reply.encode("ascii") + b"\r"
         if "half_replies" in faults:
@@ -220,7 +222,8 @@ class AsciiEmulator:
         if register in TEXTS:
             return f"v {TEXTS[register]}"
         position, velocity = self._seen()
-        live = {0x32: position, 0x18: velocity, 0xA0: self._status()}
+        status = self._faults.get("status_is", self._status())
+        live = {0x32: position, 0x18: velocity, 0xA0: status}
         value = live.get(register, self._registers.get(register))
         return "e 15" if value is None else f"v {value}"
 
@@ -330,6 +333,11 @@ class AsciiEmulator:
             generator.run(0.1 * self._registers[0x2F], self._ramps(), step_s)
         else:
             generator.step(self._ramps(), step_s)
+
+
+def _register_of(request: str) -> int | None:
+    parts = request.split()
+    return _register(parts[1]) if len(parts) > 1 else None
 
 
 def _register(name: str) -> int | None:

@@ -176,10 +176,7 @@ class AsciiDrive:
             while (exchange := line.take()) is not None:
                 feedback.take(exchange, commanding=self._commanding)
             now_s = self._now()
-            if (
-                line.busy
-                and now_s - feedback.silent_since_s > self._settings.lost_s + self._cycle_s
-            ):
+            if feedback.unanswered_s(now_s) > self._settings.lost_s + self._cycle_s:
                 feedback.latch(Cause.DRIVE_LOST)
             self._check_horizon(now_s)
             if not self._commanding and not line.busy:
@@ -280,10 +277,11 @@ class AsciiDrive:
     def _send(self, *commands: str, ask_all: bool = False) -> None:
         line = self._line
         if line is not None:
-            self._feedback.silent_since_s = self._now()
             self._cycle += 1
             turns = (0xA0, 0x24) if ask_all else ((0x24,) if self._cycle % 2 else (0xA0,))
-            line.submit(*commands, *map(get, (0x32, 0x18, *turns)))
+            requests = (*commands, *map(get, (0x32, 0x18, *turns)))
+            self._feedback.asked(requests, self._now())
+            line.submit(*requests)
 
     def _check_horizon(self, now_s: float) -> None:
         """Latch a cause if the last move has ended because no command renewed it."""
@@ -308,6 +306,7 @@ class AsciiDrive:
     def _try(self, request: str) -> None:
         """Send a request that ends the motion; without an ok the drive is lost, but no error."""
         if self._line is not None and self._speaking:
+            self._feedback.forget_requests()
             text = self._line.ask(request, PATIENCE * self._settings.lost_s)
             if text != "ok":
                 self._feedback.latch(Cause.DRIVE_LOST)

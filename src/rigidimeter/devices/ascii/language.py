@@ -28,6 +28,9 @@ absolute target can be sent again without harm.
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from rigidimeter.devices.ascii.line import BITS_PER_CHARACTER, Exchange
@@ -57,6 +60,11 @@ DISABLED_BITS = {
 STATUS_FAULTS = sum(1 << bit for bit in FAULT_BITS)
 STATUS_DISABLED = sum(1 << bit for bit in DISABLED_BITS)
 DAMAGED_IN_A_ROW = 3
+"""Of one register: replies of others do not say that this one can be read."""
+
+NUMBER = re.compile(r"-?(?:0x[0-9a-fA-F]{1,8}|[0-9]{1,10})")
+LOWEST, HIGHEST = -(2**31), 2**32 - 1
+"""A register holds 32 bits, signed or not."""
 
 
 class Reply(NamedTuple):
@@ -71,18 +79,28 @@ def parse(line: str) -> Reply:
 
     >>> parse("v -120")
     Reply(kind='v', value=-120)
-    >>> parse("ok"), parse("e 33").kind, parse("v 12x").kind
-    (Reply(kind='ok', value=0), 'e', '?')
+    >>> parse("ok"), parse("e 33").kind, parse("v 12x").kind, parse("v 9223372036854775808").kind
+    (Reply(kind='ok', value=0), 'e', '?', '?')
     """
     if line == "ok":
         return Reply("ok")
     kind, _, number = line.partition(" ")
-    if kind not in ("v", "e"):
+    if kind not in ("v", "e") or not NUMBER.fullmatch(number):
         return Reply("?")
     try:
-        return Reply(kind, int(number, 0))
-    except ValueError:
+        value = int(number, 0)
+    except ValueError:  # such as 007
         return Reply("?")
+    return Reply(kind, value) if LOWEST <= value <= HIGHEST else Reply("?")
+
+
+def addressed(request: str) -> str:
+    """Return what a request is about, without a value.
+
+    >>> addressed("s r0xca -5"), addressed("g r0x32"), addressed("t 1")
+    ('s r0xca', 'g r0x32', 't 1')
+    """
+    return " ".join(request.split()[:2])
 
 
 def get(register: int) -> str:
@@ -169,25 +187,38 @@ class Feedback:
         self.position_s = -math.inf
         self.sequence = -1
         self.cause = Cause.NONE
-        self.silent_since_s = 0.0
-        """When the last request was sent or the last reply arrived."""
         self.refused = False
         """Whether a move was refused once; the following replies tell why."""
         self.counts = dict.fromkeys(("received", "lost", "damaged", "refused", "skipped"), 0)
-        self._damaged_in_a_row = 0
+        self._damaged: Counter[str] = Counter()
+        self._asked_s: dict[str, float] = {}
 
     def latch(self, cause: Cause) -> None:
         """Store a cause unless there is one already."""
         if self.cause is Cause.NONE:
             self.cause = cause
 
+    def asked(self, requests: Iterable[str], now_s: float) -> None:
+        """Note when requests were sent whose like had all been answered."""
+        for request in requests:
+            self._asked_s.setdefault(addressed(request), now_s)
+
+    def forget_requests(self) -> None:
+        """Expect no replies: those still due were discarded."""
+        self._asked_s.clear()
+
+    def unanswered_s(self, now_s: float) -> float:
+        """Return for how long some request has been without a valid reply; 0 if none is."""
+        return now_s - min(self._asked_s.values(), default=now_s)
+
     def begin(self, position: int, speed: int, status: int, now_s: float) -> None:
         """Start again from a fresh sample, without the causes of the previous run."""
         self.cause = Cause.NONE
         self.refused = False
-        self._damaged_in_a_row = 0
+        self._damaged.clear()
+        self.forget_requests()
         self.position, self.position_s, self.sequence = position, now_s, 0
-        self.speed, self.silent_since_s = speed, now_s
+        self.speed = speed
         self._take_status(status, commanding=False)
 
     def take(self, exchange: Exchange, *, commanding: bool) -> None:
@@ -197,8 +228,10 @@ class Feedback:
             self.counts["lost"] += 1
             self.latch(Cause.DRIVE_LOST)
             return
-        self.silent_since_s = at_s
-        reply = parse(text)
+        about, reply = addressed(request), parse(text)
+        if reply.kind in ("e", "v" if request.startswith("g") else "ok"):
+            self._damaged[about] = 0
+            self._asked_s.pop(about, None)
         if reply.kind == "e":
             self.counts["refused"] += 1
             if request == "t 1" and not self.refused:
@@ -207,12 +240,11 @@ class Feedback:
                 self.latch(Cause.DRIVE_FAULT)
         elif reply.kind != ("v" if request.startswith("g") else "ok"):
             self.counts["damaged"] += 1
-            self._damaged_in_a_row += 1
-            if self._damaged_in_a_row >= DAMAGED_IN_A_ROW:
+            self._damaged[about] += 1
+            if self._damaged[about] >= DAMAGED_IN_A_ROW:
                 self.latch(Cause.DRIVE_LOST)
         else:
             self.counts["received"] += 1
-            self._damaged_in_a_row = 0
             self._take_value(request, reply, at_s - seconds(len(text) + 1, self._baud), commanding)
 
     def _take_value(self, request: str, reply: Reply, asked_s: float, commanding: bool) -> None:

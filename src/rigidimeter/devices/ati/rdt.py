@@ -152,7 +152,8 @@ class AtiRdt:
         stream, buffers, sensor = self._stream, (self._buffer,), self._sensor
         buffer = self._buffer
         stream.begin()
-        touched = False
+        touched = backlog = False
+        before_s = stream.sampled_s
         try:
             for _ in range(MOST_PACKETS_A_READ):
                 size, notes, _, source = wire.recvmsg_into(buffers, NOTE_BYTES)
@@ -161,6 +162,7 @@ class AtiRdt:
                     stream.take(size, buffer, now_s - _waited_s(notes, wall_ns))
                 else:
                     stream.counts["foreign"] += 1
+            backlog = True
         except BlockingIOError:
             pass  # drained: the end of every ordinary read
         except OSError:
@@ -169,6 +171,8 @@ class AtiRdt:
             stream.damaged(now_s)
         if not touched:
             return self._sample
+        if backlog:
+            stream.sampled_s = before_s  # newer ones wait: this one is not fresh
         raw: tuple[int, ...] = ()
         torque_nm = math.nan
         if stream.packed:
