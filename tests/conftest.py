@@ -1,9 +1,16 @@
 from __future__ import annotations
 
+import json
+import os
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
+
+# Tests run side by side, and a second thread of BLAS mostly waits for the first. NumPy reads this
+# when it is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import hypothesis
 import pytest
@@ -22,9 +29,25 @@ hypothesis.settings.register_profile("fixed", derandomize=True)
 hypothesis.settings.load_profile("fixed")
 
 
+@pytest.fixture(scope="session")
+def simulated_sessions(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Run a virtual session of some settings and name, once."""
+    folder = tmp_path_factory.mktemp("sessions")
+    done: dict[str, Path] = {}
+
+    def run(values: dict[str, Any], name: str) -> Path:
+        key = json.dumps([values, name])
+        if key not in done:
+            done[key] = folder / str(len(done))
+            run_virtual_session(parse_settings(values), done[key])
+        return done[key]
+
+    return run
+
+
 @pytest.fixture
-def simulate(tmp_path: Path) -> Simulate:
-    """Run a virtual session in a new folder and return the folder."""
+def simulate(tmp_path: Path, simulated_sessions: Callable[..., Path]) -> Simulate:
+    """Return a folder with a virtual session; sessions of two names are run one by one."""
 
     def run(
         *, task: str = "prbs", epochs: int = 1, seed: int = 1, name: str = "session", **tables: Any
@@ -38,8 +61,7 @@ def simulate(tmp_path: Path) -> Simulate:
             },
             **tables,
         }
-        run_virtual_session(parse_settings(values), tmp_path / name)
-        return tmp_path / name
+        return Path(shutil.copytree(simulated_sessions(values, name), tmp_path / name))
 
     return run
 

@@ -33,7 +33,7 @@ from rigidimeter.statistics.effect_sizes import (
     rank_biserial,
     two_groups,
 )
-from rigidimeter.statistics.mixed import LikelihoodRatio, Mixed, fit_mixed, likelihood_ratio, nested
+from rigidimeter.statistics.mixed import Mixed, fit_mixed, nested
 from rigidimeter.statistics.ranksum import RankSum, ranksum
 from rigidimeter.statistics.summary import Summary, summarise
 
@@ -43,7 +43,6 @@ __all__ = [
     "EffectDifference",
     "Effects",
     "JointTest",
-    "LikelihoodRatio",
     "Mixed",
     "PublishedDifference",
     "PublishedEffect",
@@ -64,7 +63,6 @@ __all__ = [
     "interval_of",
     "joint_test",
     "largest_r",
-    "likelihood_ratio",
     "nested",
     "pairwise",
     "rank_biserial",

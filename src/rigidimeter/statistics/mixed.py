@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
 
 from rigidimeter.statistics.profiled_likelihood import Point, minimise, products
 from rigidimeter.statistics.summary import checked_sample
@@ -72,15 +71,6 @@ class Mixed:
     inseparable: Mapping[str, str]
     point: Point
     blocks: tuple[slice, ...]
-
-
-@dataclass(frozen=True)
-class LikelihoodRatio:
-    """A model with all means against a model with one: 2 Δ log L (not restricted) and its p."""
-
-    chi2: float
-    df: int
-    p: float
 
 
 def nested(outer: Sequence[str], inner: Sequence[str]) -> list[str]:
@@ -183,28 +173,6 @@ def fit_mixed(
         point=point,
         blocks=data.blocks,
     )
-
-
-def likelihood_ratio(
-    scores: ArrayLike, conditions: Sequence[str], groups: Mapping[str, Sequence[str]]
-) -> LikelihoodRatio:
-    """Compare all condition means with a single one, by maximum likelihood (not restricted).
-
-    Raises
-    ------
-    ValueError
-        As `fit_mixed`.
-    """
-    fit = fit_mixed(scores, conditions, groups)
-    y = np.asarray(scores, dtype=np.float64)
-    z = [_indicators(groups[name])[1] for name in groups if name not in fit.inseparable]
-    full, one = (
-        minimise(products(y, x, z), restricted=False).deviance
-        for x in (_indicators(conditions)[1], np.ones((y.size, 1)))
-    )
-    df = len(fit.conditions) - 1
-    ratio = max(one - full, 0.0)
-    return LikelihoodRatio(ratio, df, float(chi2.sf(ratio, df)) if df else 1.0)
 
 
 def _indicators(labels: Sequence[str]) -> tuple[tuple[str, ...], Array]:

@@ -14,6 +14,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 
 _STEPS = 200
 _PRECISION = 1e-13
+_MOST_AT_ONCE = 1_000_000
+"""Elements of each matrix while the grid is computed, so that memory does not grow with it."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ class Point:
     ratios : ndarray, shape (k,)
         γ.
     deviance : float
-        −2 log L, restricted or not.
+        −2 log L, restricted.
     gradient : ndarray, shape (k,)
     hessian : ndarray, shape (k, k)
         Of the profiled deviance.
@@ -113,8 +116,43 @@ def products(y: Array, x: Array, z: Sequence[Array]) -> Products:
     )
 
 
-def evaluate(data: Products, ratios: Array, *, restricted: bool = True) -> Point:
-    r"""Return the deviance at γ with its exact derivatives.
+class _Solved(NamedTuple):
+    """The likelihood at γ, with the leading axes of γ; root is of γ, lower of I + √γ ZᵀZ √γ."""
+
+    deviance: Array
+    squares: Array
+    shift: Array
+    unscaled: Array
+    lower: Array
+    root: Array
+
+
+def _solved(data: Products, ratios: Array) -> _Solved:
+    """Return the deviance at γ of shape (..., k), and what its derivatives are made from."""
+    widths = np.array([block.stop - block.start for block in data.blocks], dtype=np.intp)
+    root = np.sqrt(np.repeat(ratios, widths, axis=-1))
+    lower = np.linalg.cholesky(
+        np.eye(root.shape[-1]) + root[..., :, None] * data.zz * root[..., None, :]
+    )
+    right = root[..., None] * np.column_stack([data.zx, data.zr])
+    half = np.linalg.solve(lower, right)
+    taken = half.swapaxes(-1, -2) @ half  # of X and r, by the random effects
+    fixed = np.linalg.cholesky(data.xx - taken[..., :-1, :-1])
+    turned = np.linalg.inv(fixed)
+    unscaled = turned.swapaxes(-1, -2) @ turned
+    xvr = -taken[..., :-1, -1]
+    shift = (unscaled @ xvr[..., None])[..., 0]
+    squares = data.rr - taken[..., -1, -1] - np.sum(xvr * shift, axis=-1)
+    free = data.n - data.p
+    deviance = free * (1 + np.log(2 * math.pi * squares / free))
+    for factor in (lower, fixed):
+        diagonal = np.diagonal(factor, axis1=-2, axis2=-1)
+        deviance = deviance + 2 * np.sum(np.log(diagonal), axis=-1)
+    return _Solved(deviance, squares, shift, unscaled, np.asarray(lower, np.float64), root)
+
+
+def evaluate(data: Products, ratios: Array) -> Point:
+    r"""Return the restricted deviance at γ with its exact derivatives.
 
     Notes
     -----
@@ -123,55 +161,32 @@ def evaluate(data: Products, ratios: Array, *, restricted: bool = True) -> Point
     .. math:: d_i = tr B_{ii} - m u_i^T u_i / s, \qquad
               d_{ij} = -|B_{ij}|^2 + m (2 u_i^T B_{ij} u_j / s - u_i^T u_i u_j^T u_j / s^2)
 
-    Without restriction, m = n and ZᵀV⁻¹Z stands for B in what comes from the determinant.
-
     References
     ----------
     Bates, Mächler, Bolker and Walker, Fitting linear mixed-effects models using lme4, J. Stat.
     Softw. 67, 2015, eq. 42 (the profiled criterion).
     """
-    widths = np.array([block.stop - block.start for block in data.blocks], dtype=np.intp)
-    root = np.sqrt(np.repeat(ratios, widths))
-    inner = np.eye(root.size) + root[:, None] * data.zz * root
-    lower = np.linalg.cholesky(inner)
-    half = np.linalg.inv(lower) * root
+    solved = _solved(data, ratios)
+    squares, shift, unscaled = float(solved.squares), solved.shift, solved.unscaled
+    half = np.linalg.inv(solved.lower) * solved.root
     middle = half.T @ half
-
-    def through(left: Array, right: Array, plain: Array) -> Array:
-        return np.asarray(plain - left.T @ middle @ right)
-
-    zvz = through(data.zz, data.zz, data.zz)
-    zvx = through(data.zz, data.zx, data.zx)
-    zvr = through(data.zz, data.zr, data.zr)
-    xvx = through(data.zx, data.zx, data.xx)
-    xvr = through(data.zx, data.zr, np.zeros(data.p))
-    fixed = np.linalg.cholesky(xvx)
-    turned = np.linalg.inv(fixed)
-    unscaled = turned.T @ turned
-    shift = unscaled @ xvr
-    squares = data.rr - float(data.zr @ middle @ data.zr) - float(xvr @ shift)
+    zvz = data.zz - data.zz @ middle @ data.zz
+    zvx = data.zx - data.zz @ middle @ data.zx
     zpz = zvz - zvx @ unscaled @ zvx.T
-    zpy = zvr - zvx @ shift
-    free = data.n - data.p if restricted else data.n
-    deviance = 2 * float(np.sum(np.log(np.diag(lower)))) + free * (
-        1 + math.log(2 * math.pi * squares / free)
-    )
-    if restricted:
-        deviance += 2 * float(np.sum(np.log(np.diag(fixed))))
-    curve = zpz if restricted else zvz
-    k = len(data.blocks)
+    zpy = data.zr - data.zz @ middle @ data.zr - zvx @ shift
+    free, k = data.n - data.p, len(data.blocks)
     gradient, hessian = np.zeros(k), np.zeros((k, k))
     own = [float(zpy[block] @ zpy[block]) for block in data.blocks]
     for i, first in enumerate(data.blocks):
-        gradient[i] = np.trace(curve[first, first]) - free * own[i] / squares
+        gradient[i] = np.trace(zpz[first, first]) - free * own[i] / squares
         for j, second in enumerate(data.blocks):
-            hessian[i, j] = -np.sum(curve[first, second] ** 2) + free * (
+            hessian[i, j] = -np.sum(zpz[first, second] ** 2) + free * (
                 2 * zpy[first] @ zpz[first, second] @ zpy[second] / squares
                 - own[i] * own[j] / squares**2
             )
     return Point(
         np.array(ratios, dtype=np.float64),
-        deviance,
+        float(solved.deviance),
         gradient,
         hessian,
         shift,
@@ -184,7 +199,7 @@ def evaluate(data: Products, ratios: Array, *, restricted: bool = True) -> Point
     )
 
 
-def minimise(data: Products, *, restricted: bool = True) -> Point:
+def minimise(data: Products) -> Point:
     """Return the point of least deviance with γ ≥ 0.
 
     A grid finds the valley, since a likelihood of variances may have two; Newton steps, kept
@@ -196,21 +211,21 @@ def minimise(data: Products, *, restricted: bool = True) -> Point:
         If no minimum is reached, as where the observations leave no residual.
     """
     if not data.blocks:
-        return evaluate(data, np.zeros(0), restricted=restricted)
+        return evaluate(data, np.zeros(0))
     sizes = [data.n / (block.stop - block.start) for block in data.blocks]
     steps = np.array([0.0, *np.geomspace(1e-3, 1e4, 15 if len(sizes) == 1 else 8)])
     shape = (steps.size,) * len(sizes)
-    grid = [
-        evaluate(data, np.array(levels) / sizes, restricted=restricted)
-        for levels in itertools.product(*([steps] * len(sizes)))
-    ]
-    heights = np.array([point.deviance for point in grid]).reshape(shape)
+    grid = np.array(list(itertools.product(*([steps] * len(sizes))))) / sizes
+    together = math.ceil(grid.shape[0] * data.zz.size / _MOST_AT_ONCE)
+    heights = np.concatenate(
+        [_solved(data, part).deviance for part in np.array_split(grid, together)]
+    ).reshape(shape)
     valleys = heights == minimum_filter(heights, size=3, mode="nearest")
-    found = [_descend(data, grid[k], restricted) for k in np.flatnonzero(valleys)]
+    found = [_descend(data, evaluate(data, grid[k])) for k in np.flatnonzero(valleys)]
     return min(found, key=lambda point: point.deviance)
 
 
-def _descend(data: Products, point: Point, restricted: bool) -> Point:
+def _descend(data: Products, point: Point) -> Point:
     for _ in range(_STEPS):
         free = (point.ratios > 0) | (point.gradient < 0)
         if not np.any(free):
@@ -221,7 +236,7 @@ def _descend(data: Products, point: Point, restricted: bool) -> Point:
         # Where the valley bends the wrong way, go downhill with its steepness turned round.
         bend = np.maximum(np.abs(values), 1e-8 * max(float(np.max(np.abs(values))), 1e-300))
         step[free] = -vectors @ ((vectors.T @ gradient) / bend)
-        moved = _shortened(data, point, step, restricted)
+        moved = _shortened(data, point, step)
         if moved is None:
             return point
         change = np.max(np.abs(moved.ratios - point.ratios) / (moved.ratios + 1e-12))
@@ -231,13 +246,13 @@ def _descend(data: Products, point: Point, restricted: bool) -> Point:
     raise ArithmeticError("the search for the variances did not reach a minimum of the likelihood")
 
 
-def _shortened(data: Products, point: Point, step: Array, restricted: bool) -> Point | None:
+def _shortened(data: Products, point: Point, step: Array) -> Point | None:
     """Return the point after the longest halving of a step that improves, or None."""
     for halving in range(40):
         ratios = np.maximum(point.ratios + step / 2**halving, 0.0)
         if np.array_equal(ratios, point.ratios):
             return None
-        moved = evaluate(data, ratios, restricted=restricted)
+        moved = evaluate(data, ratios)
         change = moved.deviance - point.deviance
         # On the valley's floor rounding hides the descent; there the slope decides.
         level = abs(change) < 1e-10 and _slope(moved) < _slope(point)

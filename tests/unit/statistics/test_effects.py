@@ -196,6 +196,16 @@ def test_holm_orders_and_keeps_what_is_no_test() -> None:
     assert (first, third) == pytest.approx((0.02, 0.02))
     assert math.isnan(second)
     assert holm([0.9, 0.8]) == (1.0, 1.0)
+    assert holm([]) == ()
+    assert math.isnan(holm([math.nan])[0])
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 30])
+def test_holm_is_that_of_statsmodels(n: int) -> None:
+    multitest = pytest.importorskip("statsmodels.stats.multitest")
+    p_values = np.random.default_rng(n).choice([0.0, 1e-12, 0.003, 0.02, 0.02, 0.3, 1.0], n)
+    expected = multitest.multipletests(p_values, method="holm")[1]
+    assert holm(p_values.tolist()) == pytest.approx(tuple(expected), rel=1e-15)
 
 
 def test_what_cannot_be_resampled_is_refused() -> None:
