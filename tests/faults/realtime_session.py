@@ -1,7 +1,8 @@
 """A session in processes of its own, for tests that kill one of them; not a test itself.
 
-`python realtime_session.py FOLDER SECONDS [live]` prints how it ended as JSON. The file `pids.json`
-beside the folder names the processes.
+`python realtime_session.py FOLDER SECONDS [live] [save=OTHER]` prints how it ended as JSON. The
+file `pids.json` beside the folder names the processes. With `save=` the console orders another
+folder as soon as the recorder is in trouble.
 """
 
 import json
@@ -14,6 +15,7 @@ from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.shared_status import Condition, Role
 from rigidimeter.acquisition.processes.supervise import Realtime, supervise
+from rigidimeter.acquisition.run_states import Command
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import Settings
@@ -32,19 +34,25 @@ def ticks(duration_s, side):
     sink.event("epoch_started", epoch=1, label="one", task="prbs", condition="rest", time_s=0.0)
     clock = DeadlineClock()
     cause = tick = 0
-    while not cause and tick < duration_s * RATE_HZ:
+    aborted = False
+    while not cause and not aborted and tick < duration_s * RATE_HZ:
         due_s = tick / RATE_HZ
         now_s = clock.wait_until(due_s)
         sink.sample(Sample(tick, now_s, now_s - due_s, 1, 0.0, *[float(tick)] * 8, 0))
         cause = side.supervision.cause(now_s)
+        aborted = side.supervision.order().command is Command.ABORT
         tick += 1
     outcome, reason = ("fail", Cause(cause).sentence) if cause else ("success", "")
+    if aborted and not cause:
+        outcome, reason = "abort", "aborted"
     sink.event("epoch_ended", epoch=1, time_s=tick / RATE_HZ, outcome=outcome, reason=reason)
     sink.close(tick / RATE_HZ, outcome, reason)
 
 
 def main() -> None:
     folder, duration_s = Path(sys.argv[1]), float(sys.argv[2])
+    options = dict(option.partition("=")[::2] for option in sys.argv[3:])
+    save_to = Path(options["save"]) if "save" in options else None
     seen: dict[str, object] = {}
 
     def console(shared_status) -> None:
@@ -56,6 +64,8 @@ def main() -> None:
             part.replace(folder.with_name("pids.json"))
         if shared_status.condition(Role.RECORDER) is Condition.TROUBLE:
             seen["trouble"] = shared_status.note(Role.RECORDER)
+            if save_to is not None:
+                shared_status.ask_folder(save_to)
         status, live = shared_status.loop(), shared_status.live()
         if status is not None:
             seen["tick"] = status.tick
@@ -69,7 +79,7 @@ def main() -> None:
         patience=PATIENCE,
         console=console,
     )
-    print(json.dumps({**asdict(ended), "seen": seen}))
+    print(json.dumps({**asdict(ended), "folder": str(ended.folder), "seen": seen}))
 
 
 if __name__ == "__main__":

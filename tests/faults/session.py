@@ -104,7 +104,7 @@ def main(rig: str, folder: str) -> None:
         patience=PATIENCE,
         console=Console(),
     )
-    print(json.dumps(asdict(ended)), flush=True)
+    print(json.dumps({**asdict(ended), "folder": str(ended.folder)}), flush=True)
 
 
 if __name__ == "__main__":

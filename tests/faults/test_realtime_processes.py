@@ -1,95 +1,19 @@
 """A process of a real-time session is killed, stopped, or its disk fills: the others go on."""
 
-import json
 import os
 import resource
 import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
-import numpy as np
 import pytest
+from tests.faults.running_session import Session, alive, memory, wait_for
 
-from rigidimeter.acquisition.processes.supervise import OF_THE_TERMINAL, _undisturbed
+from rigidimeter.acquisition.processes.signals import HELD_BACK, held_back
 from rigidimeter.guard import Cause
 from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.sample_log import read_samples
-
-SCRIPT = Path(__file__).with_name("realtime_session.py")
-
-
-def memory() -> set[str]:
-    return {path.name for path in Path("/dev/shm").glob("rigidimeter-*")}
-
-
-def alive(pid: int) -> bool:
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-    except FileNotFoundError:
-        return False
-    return state not in "ZX"
-
-
-def wait_for(what, timeout_s=30.0):
-    until_s = time.monotonic() + timeout_s
-    while time.monotonic() < until_s:
-        found = what()
-        if found:
-            return found
-        time.sleep(0.02)
-    pytest.fail(f"{what} did not come true within {timeout_s} s")
-
-
-class Session:
-    def __init__(self, folder: Path, duration_s: float, *options: str) -> None:
-        self.folder = folder
-        self.before = memory()
-        self.process = subprocess.Popen(
-            [sys.executable, str(SCRIPT), str(folder), str(duration_s), *options],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
-    def running(self) -> dict[str, int]:
-        """Wait until samples are in the file; return the processes."""
-        path = self.folder / "samples.arrows"
-        wait_for(lambda: path.is_file() and read_samples(path)["tick"].size > 50)
-        self.mine = memory() - self.before
-        pids_path = self.folder.with_name("pids.json")
-
-        def pids() -> dict[str, int]:
-            found = json.loads(pids_path.read_text()) if pids_path.exists() else {}
-            return found if found.get("LOOP") else {}
-
-        return wait_for(pids)
-
-    def ended(self) -> dict:
-        out, err = self.process.communicate(timeout=40.0)
-        assert self.process.returncode == 0, err
-        self.said = err
-        assert not self.mine & memory()
-        return json.loads(out.splitlines()[-1])
-
-    def ticks(self) -> np.ndarray:
-        """Return the recorded ticks, having seen that each is there once and no other."""
-        found = read_samples(self.folder / "samples.arrows")["tick"]
-        np.testing.assert_array_equal(found, np.arange(found.size))
-        return found
-
-    def endings(self) -> list[tuple[str, str, str]]:
-        events, torn = read_events(self.folder / "events.jsonl")
-        assert not torn
-        kinds = [event["event"] for event in events]
-        assert kinds.count("session_ended") == kinds.count("epoch_ended") == 1
-        assert kinds[-1] == "session_ended"
-        return [
-            (event["event"], event["outcome"], event["reason"])
-            for event in events
-            if "outcome" in event
-        ]
 
 
 @pytest.fixture
@@ -101,11 +25,7 @@ def session(tmp_path):
         return started[0]
 
     yield start
-    process = started[0].process
-    if process.poll() is None:
-        process.send_signal(signal.SIGCONT)
-        process.terminate()
-        process.communicate(timeout=30.0)
+    started[0].close()
 
 
 def test_nothing_happens(session):
@@ -185,9 +105,9 @@ def test_signals_of_the_terminal_wait_while_a_process_loads():
     """They reach the whole group, and one that loads has not come to where it ignores them."""
     code = "import signal; print(*map(int, signal.pthread_sigmask(signal.SIG_BLOCK, [])))"
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [])
-    with _undisturbed():
+    with held_back():
         child = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert {int(number) for number in child.stdout.split()} >= set(OF_THE_TERMINAL)
+    assert {int(number) for number in child.stdout.split()} >= set(HELD_BACK)
     assert signal.pthread_sigmask(signal.SIG_BLOCK, []) == before
 
 
@@ -220,7 +140,7 @@ def test_the_disk_is_full_for_a_while(session):
     size = (run.folder / "samples.arrows").stat().st_size + 3001
     resource.prlimit(recorder, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
     wait_for(lambda: (run.folder / "samples.arrows").stat().st_size > size - 30000)
-    time.sleep(1.0)
+    time.sleep(0.5)  # less than what stops the arm
     written = read_samples(run.folder / "samples.arrows")["tick"].size
     assert written < 1300
     unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)

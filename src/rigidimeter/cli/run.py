@@ -69,6 +69,7 @@ def run(
       rigidimeter run protocol.toml --rig rig.toml --out session
       rigidimeter run --resume session --rig rig.toml --out session-2
     """
+    from rigidimeter.acquisition.processes.left_memory import complete_left
     from rigidimeter.acquisition.processes.loop_process import Realtime
     from rigidimeter.acquisition.processes.recorder import Recording
     from rigidimeter.acquisition.processes.supervise import supervise
@@ -78,6 +79,8 @@ def run(
     from rigidimeter.devices.rigfile import load_rig
     from rigidimeter.recording.resume import count_epochs
 
+    for line in complete_left():
+        typer.echo(line, err=True)
     settings, planned, continues = _planned(protocol, resume, seed, virtual=rig is None)
     home_rad = continues.get("origin_rad") if rig is not None else None
     _offer(out)
@@ -104,12 +107,14 @@ def run(
     )
     for remark in ended.remarks:
         typer.echo(remark, err=True)
-    good, of = count_epochs(out)
-    typer.echo(f"{good} of {of} epochs ended with success; session in {out}")
+    folder = ended.folder if ended.folder != out.absolute() else out
+    good, of = count_epochs(folder)
+    typer.echo(f"{good} of {of} epochs ended with success; session in {folder}")
     if ended.outcome != "success":
-        again = f"; continue it with `{_resume_command(out, rig)}`" if good < of else ""
+        again = f"; continue it with `{_resume_command(folder, rig)}`" if good < of else ""
         raise UserError(
-            f"{out}: the session ended with {ended.outcome or 'no outcome'}: {ended.reason}{again}"
+            f"{folder}: the session ended with {ended.outcome or 'no outcome'}: "
+            f"{ended.reason}{again}"
         )
 
 
@@ -179,17 +184,21 @@ def recover(
         str, typer.Option("--reason", metavar="TEXT", help="Why it ended, if you know.")
     ] = "the recording process ended without closing the session",
 ) -> None:
-    """Close an interrupted session, keeping everything that was written.
+    """Close an interrupted session, keeping everything that was written or is still in memory.
 
     Open epochs end with `fail` and the reason. A session that is closed already does not change.
+    Samples that a killed session left in memory are brought in, until the computer is switched off.
 
     \b
     For example:
       rigidimeter recover session
       rigidimeter recover session --reason "power cut"
     """
+    from rigidimeter.acquisition.processes.left_memory import complete_left
     from rigidimeter.recording import recover as close_session
 
+    for line in complete_left(session, reason):
+        typer.echo(line, err=True)
     found = close_session(session, reason)
     extent = f"{found.n_samples} samples up to {found.last_time_s:.3f} s"
     if found.already_closed:

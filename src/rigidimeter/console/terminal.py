@@ -11,6 +11,7 @@ import os
 import select
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import IO
 
 from rigidimeter.acquisition.processes.shared_status import (
@@ -36,7 +37,8 @@ KEYS = {
 
 HELP = (
     "p pause after this epoch, n pause now, r resume, s stop after this epoch, a abort, "
-    "h halt (power off), e emergency stop, set NAME VALUE; each with Enter"
+    "h halt (power off), e emergency stop, set NAME VALUE, save to FOLDER (if the disk is full); "
+    "each with Enter"
 )
 EVERY_S = 1.0
 
@@ -144,6 +146,9 @@ class Terminal:
             status.raise_flag(Flag.EMERGENCY_STOP)
             self._say("emergency stop")
             return
+        if text.lower().startswith("save to "):
+            self._save_to(Path(text[len("save to ") :].strip()).expanduser(), status)
+            return
         order = order_of(text)
         if order is None and text and not text.lower().startswith("set"):
             # Whoever types in a hurry means that something is wrong.
@@ -158,6 +163,18 @@ class Terminal:
             self._say(str(error))
             return
         self._say(f"ordered: {order.command.name.lower().replace('_', ' ')}")
+
+    def _save_to(self, folder: Path, status: SharedStatus) -> None:
+        """Ask the recorder for another folder, if it can write nothing to the one it has."""
+        if status.condition(Role.RECORDER) is not Condition.TROUBLE:
+            self._say("the recorder can write: another folder is for when it cannot")
+            return
+        try:
+            status.ask_folder(folder)
+        except ValueError as error:
+            self._say(str(error))
+            return
+        self._say(f"ordered: save to {folder}")
 
     def _say(self, text: str) -> None:
         if select.select([], [self._screen.fileno()], [], 0.0)[1]:

@@ -6,21 +6,22 @@ says how many. Nothing waits for it.
 
 from __future__ import annotations
 
-import signal
+import os
 import time
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.acquisition.processes.ring import Reader, SampleReader, SampleRing
+from rigidimeter.acquisition.processes.ring import Reader, SampleReader
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import (
     Condition,
     LiveEstimate,
     Role,
     SharedStatus,
 )
-from rigidimeter.acquisition.processes.watchdog import leave_signals_to_the_console
+from rigidimeter.acquisition.processes.signals import leave_to_the_others
 from rigidimeter.estimation.online import (
     STATE_SIZE,
     compiled_online_step,
@@ -70,7 +71,11 @@ class Estimator:
 
 
 def estimator_main(
-    settings: OnlineSettings, rate_hz: float, names: tuple[str, str, str], lost_s: float
+    settings: OnlineSettings,
+    rate_hz: float,
+    names: tuple[str, str, str],
+    lost_s: float,
+    console_pid: int,
 ) -> None:
     """Estimate until the loop has ended; the target of the estimator's process.
 
@@ -82,16 +87,18 @@ def estimator_main(
         Of the sample ring, the event ring and the shared status.
     lost_s : float
         Recorder and loop both silent for so long have ended.
+    console_pid : int
+        The process that started this one; without it nobody looks at the estimate.
     """
-    leave_signals_to_the_console()
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    ring, status = SampleRing.attach(names[0]), SharedStatus.attach(names[2])
+    leave_to_the_others()
+    shared = SessionMemory.attach(names)
+    status = shared.status
     try:
         status.join(Role.ESTIMATOR)
         estimator = Estimator(settings, rate_hz)
-        reader = SampleReader(ring, Reader.ESTIMATOR)
+        reader = SampleReader(shared.samples, Reader.ESTIMATOR)
         status.set_condition(Role.ESTIMATOR, Condition.RUNNING)
-        while _session_runs(status, lost_s):
+        while os.getppid() == console_pid and _session_runs(status, lost_s):
             status.beat(Role.ESTIMATOR)
             rows, missed = reader.read()
             if rows.size:
@@ -99,8 +106,7 @@ def estimator_main(
             time.sleep(LOOK_S)
         status.set_condition(Role.ESTIMATOR, Condition.DONE)
     finally:
-        ring.close()
-        status.close()
+        shared.leave()
 
 
 def _session_runs(status: SharedStatus, lost_s: float) -> bool:

@@ -7,7 +7,6 @@ is it an ordinary process again, and completes the session if the recorder could
 from __future__ import annotations
 
 import os
-import signal
 import sys
 import time
 import traceback
@@ -20,8 +19,9 @@ from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.ring_recovery import complete
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Role, SharedStatus
+from rigidimeter.acquisition.processes.signals import raise_flags
 from rigidimeter.acquisition.processes.sink import RingSink, SharedSupervision
-from rigidimeter.acquisition.processes.watchdog import WatchedProcess, leave_signals_to_the_console
+from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 from rigidimeter.errors import UserError
 
 
@@ -87,13 +87,12 @@ def loop_main(
     console_pid : int
         The process that started this one.
     """
-    leave_signals_to_the_console()
     shared = SessionMemory.attach(names)
     status = shared.status
-    signal.signal(signal.SIGTERM, lambda *_: status.raise_flag(Flag.END_ASKED))
+    raise_flags(status)
     status.join(Role.LOOP)
     if not _recorder_is_there(status, console_pid):
-        shared.close()
+        shared.leave()
         sys.exit(1)
     recorder = WatchedProcess(status.pid(Role.RECORDER))
     rate_hz = recording.settings.rig.tick_rate_hz
@@ -102,8 +101,10 @@ def loop_main(
         shared,
         console_lost_s=patience.console_lost_s,
         recorder_lost_s=patience.recorder_lost_s,
+        most_lag=round(patience.recorder_lost_s * rate_hz),
         stall_s=recording.settings.loop.stall_s,
         attended=realtime.attended,
+        console_pid=console_pid,
     )
 
     def ready() -> Prepared:
@@ -112,7 +113,7 @@ def loop_main(
             priority=realtime.priority, cpu=realtime.cpu, lock_memory=realtime.lock_memory
         )
         sink.event("loop_prepared", **prepared.facts())
-        print(prepared, file=sys.stderr, flush=True)
+        _say(str(prepared))
         return prepared
 
     code = 0
@@ -124,18 +125,24 @@ def loop_main(
         sink.close(sink.last_time_s, "fail", str(error))
     except BaseException as error:
         code = 1
-        traceback.print_exc()
+        with suppress(OSError):
+            traceback.print_exc()
         with suppress(ValueError):
             sink.close(sink.last_time_s, "fail", f"{type(error).__name__}: {error}")
     finally:
         status.set_condition(Role.LOOP, Condition.FAILED if code else Condition.DONE)
         _leave_real_time()
-        for remark in complete(Role.LOOP, shared, recording, recorder, patience):
-            print(remark, file=sys.stderr, flush=True)
-        if os.getppid() != console_pid:
-            shared.unlink()
-        shared.close()
+        remarks = complete(shared, recording, recorder, patience, lambda: status.beat(Role.LOOP))
+        if os.getppid() != console_pid:  # otherwise the console finds the same and says it
+            _say("\n".join(remarks))
+        shared.leave()
     sys.exit(code)
+
+
+def _say(text: str) -> None:
+    """Tell the operator, if the terminal is still there."""
+    with suppress(OSError):
+        print(text, file=sys.stderr, flush=True)
 
 
 def _recorder_is_there(status: SharedStatus, console_pid: int) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -66,7 +67,8 @@ class Patience:
     sync_s : float
         How often what is written is put on the disk.
     disk_s : float
-        For how long a disk that takes nothing is tried after the loop has ended.
+        For how long a disk that takes nothing is still tried once the program was told to end; the
+        session then stays in memory.
     hung_s : float
         A process that has not been heard of for so long is ended.
     console_lost_s, recorder_lost_s : float
@@ -77,7 +79,7 @@ class Patience:
     loop_lost_s: float = 1.0
     stopping_s: float = 10.0
     sync_s: float = 1.0
-    disk_s: float = 60.0
+    disk_s: float = 30.0
     hung_s: float = 8.0
     console_lost_s: float = 1.0
     recorder_lost_s: float = 5.0
@@ -144,6 +146,12 @@ class Recorder:
             self._tell("epoch_ended", epoch=self._open_epoch, outcome="fail", reason=reason)
         self._tell("session_ended", outcome="fail", reason=reason)
         self.closing = True
+
+    def move(self, writer: SessionWriter) -> None:
+        """Go on in another folder, which holds all that is in the old one."""
+        with suppress(OSError):  # an end that found no room before finds none now
+            self._writer.close_files()
+        self._writer = writer
 
     def note(self, kind: str, **facts: Any) -> None:
         """Add an event of the recorder's own."""

@@ -4,24 +4,26 @@ A write only gives the samples to the system. A thread has the files put on the 
 that up for long; the recorder asks it, goes on writing, and looks later what came of it.
 
 It beats its heart between any two writes. A disk that does not take a write is tried again and
-again, and the operator told so. When the loop has ended, or is not heard of, the session is closed
-with that as the reason.
+again, and the operator told so (`full_disk`). When the loop has ended, or is not heard of, the
+session is closed with that as the reason.
 """
 
 from __future__ import annotations
 
 import math
 import os
-import signal
 import sys
 import threading
 import time
 import traceback
+from contextlib import suppress
 
+from rigidimeter.acquisition.processes.full_disk import FullDisk
 from rigidimeter.acquisition.processes.recorder import Patience, Recorder, Recording
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Role, SharedStatus
-from rigidimeter.acquisition.processes.watchdog import WatchedProcess, leave_signals_to_the_console
+from rigidimeter.acquisition.processes.signals import raise_flags
+from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 from rigidimeter.errors import UserError
 from rigidimeter.recording.session_folder import SessionWriter
 
@@ -40,13 +42,13 @@ def recorder_main(
     console_pid : int
         The process that started this one.
     """
-    leave_signals_to_the_console()
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends with the session, not before
     shared = SessionMemory.attach(names)
     status = shared.status
+    raise_flags(status)
     status.join(Role.RECORDER)
     try:
         writer = recording.writer()
+        status.show_folder(recording.folder)
         status.set_condition(Role.RECORDER, Condition.READY, "")
         ended_well = _record(writer, recording, shared, patience, console_pid)
         status.set_condition(Role.RECORDER, Condition.DONE if ended_well else Condition.FAILED)
@@ -57,12 +59,11 @@ def recorder_main(
         status.set_condition(
             Role.RECORDER, Condition.FAILED, f"the recorder failed: {type(error).__name__}: {error}"
         )
-        traceback.print_exc()
+        with suppress(OSError):
+            traceback.print_exc()
         sys.exit(1)
     finally:
-        if os.getppid() != console_pid and not _loop_lives(status):
-            shared.unlink()
-        shared.close()
+        shared.leave()
 
 
 class FsyncWorker:
@@ -120,11 +121,6 @@ class FsyncWorker:
                 os.close(descriptor)
 
 
-def _loop_lives(status: SharedStatus) -> bool:
-    pid = status.pid(Role.LOOP)
-    return bool(pid) and WatchedProcess(pid).alive()
-
-
 def _record(
     writer: SessionWriter,
     recording: Recording,
@@ -136,9 +132,8 @@ def _record(
     status, samples = shared.status, shared.samples
     recorder = Recorder(writer, shared, recording.settings.rig.tick_rate_hz)
     fsync_worker = FsyncWorker(writer.descriptors(), status)
+    disk = FullDisk(recording, shared, patience, console_pid)
     loop: WatchedProcess | None = None
-    since_s: float | None = None  # the disk has taken nothing since then
-    over_s: float | None = None  # the loop has ended since then
     synced_s = time.monotonic()
     try:
         while True:
@@ -146,29 +141,26 @@ def _record(
             if loop is None and status.pid(Role.LOOP):
                 loop = WatchedProcess(status.pid(Role.LOOP))
             why = _loop_lost(status, loop, patience, console_pid)
-            now_s = time.monotonic()
             try:
                 recorder.drain()
                 if why and not recorder.closing:
                     recorder.close(why)
                     recorder.drain()
-                if since_s is not None:
-                    recorder.note("recording_resumed", after_s=round(now_s - since_s, 3))
-                    since_s = None
+                disk.takes(recorder)
                 status.set_condition(Role.RECORDER, Condition.RUNNING, fsync_worker.error)
             except OSError as error:
-                since_s = since_s or now_s
-                status.set_condition(
-                    Role.RECORDER,
-                    Condition.TROUBLE,
-                    f"{recording.folder}: nothing can be written there "
-                    f"({error.strerror or error}); {samples.lag()} samples wait: make room",
-                )
+                disk.refuses(error)
+                moved = disk.other_folder()
+                if moved is not None:
+                    fsync_worker.close()
+                    recorder.move(moved)
+                    fsync_worker = FsyncWorker(moved.descriptors(), status)
+                    continue
             if recorder.ended:
-                return _synced(fsync_worker, shared, patience, recording)
-            over_s = over_s or (now_s if why or recorder.closing else None)
-            if since_s is not None and over_s is not None and now_s - over_s > patience.disk_s:
+                return _synced(fsync_worker, shared, patience)
+            if disk.given_up(over=bool(why) or recorder.closing):
                 return False
+            now_s = time.monotonic()
             if recorder.epoch_ended or now_s - synced_s >= patience.sync_s:
                 recorder.epoch_ended, synced_s = False, now_s
                 fsync_worker.ask(samples.recorded)
@@ -177,9 +169,7 @@ def _record(
         fsync_worker.close()
 
 
-def _synced(
-    fsync_worker: FsyncWorker, shared: SessionMemory, patience: Patience, recording: Recording
-) -> bool:
+def _synced(fsync_worker: FsyncWorker, shared: SessionMemory, patience: Patience) -> bool:
     """Wait until the closed files are on the disk, as long as that is reasonable."""
     status, until_s = shared.status, time.monotonic() + patience.disk_s
     asked = False
@@ -194,7 +184,7 @@ def _synced(
     status.set_condition(
         Role.RECORDER,
         Condition.TROUBLE,
-        f"{recording.folder}: is written, but the disk has not confirmed it",
+        f"{status.folder()}: is written, but the disk has not confirmed it",
     )
     return True
 
@@ -216,5 +206,7 @@ def _loop_lost(
     }
     limit_s = limits_s.get(status.condition(Role.LOOP), math.inf)
     if status.age_s(Role.LOOP) > limit_s:
+        # It must not go on one day: its record is closed, and nobody knows where the arm is then.
+        loop.kill()
         return f"the loop's process did not answer for {limit_s:g} s"
     return ""

@@ -68,8 +68,8 @@ class _Ring:
         self._recorded_at = _CURSORS + 8 * Reader.RECORDER
 
     @classmethod
-    def _make(cls, capacity: int, slot_bytes: int) -> Memory:
-        memory = Memory.create(_HEADER_BYTES + capacity * slot_bytes)
+    def _make(cls, capacity: int, slot_bytes: int, name: str) -> Memory:
+        memory = Memory.create(_HEADER_BYTES + capacity * slot_bytes, name)
         memory.words[_CAPACITY], memory.words[_SLOT_BYTES] = capacity, slot_bytes
         memory.words[_KIND] = cls._kind
         return memory
@@ -122,9 +122,9 @@ class SampleRing(_Ring):
     _kind = 0x53414D504C45
 
     @classmethod
-    def create(cls, capacity: int) -> SampleRing:
+    def create(cls, capacity: int, name: str = "") -> SampleRing:
         """Make a ring for `capacity` samples."""
-        return cls(cls._make(capacity, ROW.itemsize), capacity, ROW.itemsize)
+        return cls(cls._make(capacity, ROW.itemsize, name), capacity, ROW.itemsize)
 
     @classmethod
     def attach(cls, name: str) -> SampleRing:
@@ -223,9 +223,9 @@ class EventRing(_Ring):
     _head = struct.Struct("@qq")
 
     @classmethod
-    def create(cls, capacity: int = 512, slot_bytes: int = 8192) -> EventRing:
+    def create(cls, capacity: int = 512, slot_bytes: int = 8192, name: str = "") -> EventRing:
         """Make a ring for `capacity` events of up to `slot_bytes` less 16."""
-        return cls(cls._make(capacity, slot_bytes), capacity, slot_bytes)
+        return cls(cls._make(capacity, slot_bytes, name), capacity, slot_bytes)
 
     @classmethod
     def attach(cls, name: str) -> EventRing:

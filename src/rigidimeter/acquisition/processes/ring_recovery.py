@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -93,22 +93,22 @@ def recover_from_rings(
 
 
 def complete(
-    me: Role,
     shared: SessionMemory,
     recording: Recording,
     recorder: WatchedProcess,
     patience: Patience,
+    look: Callable[[], object],
 ) -> list[str]:
     """See the recorder to its end, and do its work if that is not a good one; return remarks.
 
     Parameters
     ----------
-    me : Role
-        Whose heart beats meanwhile.
     shared : SessionMemory
     recording : Recording
     recorder : WatchedProcess
     patience : Patience
+    look : callable
+        Called some twenty times a second meanwhile: the heart of whoever waits beats there.
     """
     remarks: list[str] = []
     status = shared.status
@@ -116,7 +116,7 @@ def complete(
     hung = False
     # One that has done its work no longer beats, and may take a while to leave.
     while recorder.alive() and not hung and status.condition(Role.RECORDER) is not Condition.DONE:
-        status.beat(me)
+        look()
         # A heart that beat before the wait began may have been silent for a good reason.
         silent_s = min(status.age_s(Role.RECORDER), time.monotonic() - since_s)
         hung = silent_s > patience.hung_s
@@ -134,11 +134,16 @@ def complete(
         return remarks
     note = status.note(Role.RECORDER)
     reason = note or ("the recorder hung" if hung else "the recorder was killed")
+    folder = status.folder() or recording.folder
     try:
-        rate_hz = recording.settings.rig.tick_rate_hz
-        recover_from_rings(recording.folder, shared, reason, rate_hz)
+        recover_from_rings(folder, shared, reason, recording.settings.rig.tick_rate_hz)
     except (UserError, OSError) as error:
-        remarks.append(f"{recording.folder}: the session could not be completed ({error})")
+        remarks.append(f"{folder}: the session could not be completed ({error})")
+        if shared.needed():
+            remarks.append(
+                f"{shared.samples.lag()} samples stay in memory ({shared.where()}) until the "
+                f"computer is switched off: make room, then `rigidimeter recover {folder}`"
+            )
     return remarks
 
 

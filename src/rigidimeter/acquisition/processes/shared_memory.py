@@ -1,10 +1,10 @@
 """Memory that several processes see: made by one, attached by name by the others.
 
-Python's resource tracker removes a segment when a process that registered it ends. That is right
-for the process that made the memory: if it is killed, the tracker removes the segment after the
-last of its children has ended. It is wrong for a process that only attaches: its own tracker would
-remove a segment the others still use. Before Python 3.13 attaching registers too, so here it is
-prevented.
+It is a file in /dev/shm, which is memory. Each process that has it open holds a shared lock on it.
+The system lets go of a lock when its process ends, however it ends, so whoever gets the lock for
+itself alone knows that no living process has the memory: that is how the last one removes it, and
+how a later program tells what a killed one left. Python's resource tracker has no part in it: it
+removes what it knows when its own processes are gone, also what was not written down yet.
 
 A number of 8 bytes at a multiple of 8 is written and read in one piece on every 64-bit processor.
 That the index of a row is never seen before the row itself rests on the order in which one
@@ -15,64 +15,96 @@ may see a row that is half old. `ORDERED` says which of the two this machine is.
 
 from __future__ import annotations
 
+import fcntl
+import mmap
+import os
 import platform
 import secrets
-import sys
-from multiprocessing import resource_tracker
-from multiprocessing.shared_memory import SharedMemory
-from typing import cast
+import tempfile
+from pathlib import Path
 
 ORDERED = platform.machine().lower() in {"x86_64", "amd64"}
 """Whether writes of one processor are seen by the others in their order."""
 
+PREFIX = "rigidimeter-"
+_SHM = Path("/dev/shm")
+WHERE = _SHM if _SHM.is_dir() else Path(tempfile.gettempdir())
+"""Where the memory has its names."""
+
+
+def new_name() -> str:
+    """Return a name that nothing has."""
+    return f"{PREFIX}{secrets.token_hex(6)}"
+
 
 class Memory:
-    """A segment of shared memory.
+    """A piece of shared memory.
 
     Parameters
     ----------
-    segment : SharedMemory
-    mine : bool
-        Whether this process made it.
+    name : str
+    descriptor : int
+        Of its file; closed with the memory.
     """
 
-    def __init__(self, segment: SharedMemory, mine: bool) -> None:
-        self._segment = segment
-        self._mine = mine
-        self.bytes = memoryview(cast(memoryview, segment.buf))
+    def __init__(self, name: str, descriptor: int) -> None:
+        self.name = name
+        self._descriptor = descriptor
+        fcntl.flock(descriptor, fcntl.LOCK_SH)
+        self._map = mmap.mmap(descriptor, 0)
+        self.bytes = memoryview(self._map)
         whole = len(self.bytes) // 8 * 8
         self._part = self.bytes[:whole]
         self.words: memoryview[int] = self._part.cast("q")
         self.closed = False
 
     @classmethod
-    def create(cls, size: int) -> Memory:
-        """Make a segment of zeros under a name of its own."""
-        name = f"rigidimeter-{secrets.token_hex(6)}"
-        return cls(SharedMemory(name=name, create=True, size=size), mine=True)
+    def create(cls, size: int, name: str = "") -> Memory:
+        """Make a piece of zeros, under a name of its own if none is given.
+
+        Raises
+        ------
+        OSError
+            If there is not so much memory.
+        """
+        name = name or new_name()
+        path = WHERE / name
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+        try:
+            # All of it now: what is missing later would end the process that writes there.
+            os.posix_fallocate(descriptor, 0, size)
+            return cls(name, descriptor)
+        except BaseException:
+            os.close(descriptor)
+            path.unlink()
+            raise
 
     @classmethod
     def attach(cls, name: str) -> Memory:
-        """Attach to a segment that another process made.
+        """Attach to a piece that another process made.
 
         Raises
         ------
         FileNotFoundError
-            If there is no such segment.
+            If there is none of that name.
         """
-        if sys.version_info >= (3, 13):
-            return cls(SharedMemory(name=name, track=False), mine=False)
-        register = resource_tracker.register
-        resource_tracker.register = lambda *_: None
+        descriptor = os.open(WHERE / name, os.O_RDWR | os.O_NOFOLLOW)
         try:
-            return cls(SharedMemory(name=name), mine=False)
-        finally:
-            resource_tracker.register = register
+            return cls(name, descriptor)
+        except BaseException:
+            os.close(descriptor)
+            raise
 
-    @property
-    def name(self) -> str:
-        """What the others attach by."""
-        return self._segment.name
+    def alone(self) -> bool:
+        """Whether no other process has the memory; to be asked by one that will not use it again.
+
+        Of processes that leave at the same time at least one is told so.
+        """
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        return True
 
     def touch(self) -> None:
         """Have every page in this process's page table, so that no first write is slow."""
@@ -85,17 +117,9 @@ class Memory:
             self.words.release()
             self._part.release()
             self.bytes.release()
-            self._segment.close()
+            self._map.close()
+            os.close(self._descriptor)
 
     def unlink(self) -> None:
-        """Remove the name: the memory goes with the last process that has it. Safe twice.
-
-        A child may do it in place of a parent that was killed; they share one tracker.
-        """
-        try:
-            self._segment.unlink()
-        except FileNotFoundError:
-            return
-        if sys.version_info >= (3, 13) and not self._mine:
-            # An untracked segment does not tell the tracker that it is gone.
-            resource_tracker.unregister(f"/{self.name}", "shared_memory")
+        """Remove the name: the memory goes with the last process that has it. Safe twice."""
+        (WHERE / self.name).unlink(missing_ok=True)

@@ -18,6 +18,7 @@ import struct
 import time
 from collections.abc import Callable
 from enum import IntEnum
+from pathlib import Path
 from typing import NamedTuple
 
 from rigidimeter.acquisition.processes.shared_memory import Memory
@@ -53,10 +54,14 @@ class Condition(IntEnum):
 
 
 class Flag(IntEnum):
-    """What is raised for the loop to see; each is one number."""
+    """What is raised for the loop to see; each is one number, and any process may raise it.
+
+    END_ASKED: stop as for a fault. ABORT_ASKED: end as the operator's order `abort` does.
+    """
 
     EMERGENCY_STOP = 0
     END_ASKED = 1
+    ABORT_ASKED = 2
 
 
 class LoopStatus(NamedTuple):
@@ -105,7 +110,10 @@ _NOTE_BYTES = 1024
 _ORDER = struct.Struct("@qqd48s")
 _ORDER_SLOTS = 16
 _NAME_BYTES = 48
-_BYTES = _NOTES_BYTE + len(Role) * _NOTE_BYTES
+_PATH_BYTES = 4096
+_FOLDER_BYTE = _NOTES_BYTE + len(Role) * _NOTE_BYTES
+_ASKED_BYTE = _FOLDER_BYTE + _PATH_BYTES
+_BYTES = _ASKED_BYTE + _PATH_BYTES
 _TRIES = 1000
 
 
@@ -135,6 +143,28 @@ class _Block:
         return None
 
 
+def _text(block: _Block) -> bytes:
+    values = block.read()
+    if values is None:
+        return b""
+    length, text = values
+    assert isinstance(length, int)
+    assert isinstance(text, bytes)
+    return text[:length]
+
+
+def _write_path(block: _Block, path: Path) -> None:
+    text = os.fsencode(path.absolute())
+    if len(text) > _PATH_BYTES - 16:
+        raise ValueError(f"{path}: the path has {len(text)} bytes; {_PATH_BYTES - 16} are possible")
+    block.write(len(text), text)
+
+
+def _path(block: _Block) -> Path | None:
+    text = _text(block)
+    return Path(os.fsdecode(text)) if text else None
+
+
 class SharedStatus:
     """The shared status as one process sees it.
 
@@ -156,11 +186,14 @@ class SharedStatus:
         self._notes = [
             _Block(memory, (_NOTES_BYTE + role * _NOTE_BYTES) // 8, note) for role in Role
         ]
+        path = f"@q{_PATH_BYTES - 16}s"
+        self._folder = _Block(memory, _FOLDER_BYTE // 8, path)
+        self._asked = _Block(memory, _ASKED_BYTE // 8, path)
 
     @classmethod
-    def create(cls) -> SharedStatus:
+    def create(cls, name: str = "") -> SharedStatus:
         """Make a page for one session."""
-        memory = Memory.create(_BYTES)
+        memory = Memory.create(_BYTES, name)
         memory.words[0] = _KIND
         status = cls(memory)
         status.show_loop(LoopStatus())
@@ -219,13 +252,31 @@ class SharedStatus:
 
     def note(self, role: Role) -> str:
         """Return the last sentence of a process."""
-        values = self._notes[role].read()
-        if values is None:
-            return ""
-        length, text = values
-        assert isinstance(length, int)
-        assert isinstance(text, bytes)
-        return text[:length].decode(errors="replace")
+        return _text(self._notes[role]).decode(errors="replace")
+
+    # Folders
+
+    def show_folder(self, folder: Path) -> None:
+        """Say into which folder is recorded; only the recorder may."""
+        _write_path(self._folder, folder)
+
+    def folder(self) -> Path | None:
+        """Return into which folder is recorded; None before that is known."""
+        return _path(self._folder)
+
+    def ask_folder(self, folder: Path) -> None:
+        """Ask the recorder for another folder; only the console may.
+
+        Raises
+        ------
+        ValueError
+            If the path is too long.
+        """
+        _write_path(self._asked, folder)
+
+    def asked_folder(self) -> Path | None:
+        """Return the folder that was last asked for, if any."""
+        return _path(self._asked)
 
     # Flags
 
@@ -238,15 +289,16 @@ class SharedStatus:
         return self._words[_FLAGS + flag] != 0
 
     @staticmethod
-    def places() -> tuple[int, int, int, int, int]:
+    def places() -> tuple[int, int, int, int, int, int]:
         """Return where in `memory.words` stands what the loop touches every tick.
 
-        The flags for an emergency stop and for the end, the heartbeats of console, recorder and
-        the loop itself.
+        The flags for an emergency stop, for the end and for an abort, the heartbeats of console,
+        recorder and the loop itself.
         """
         return (
             _FLAGS + Flag.EMERGENCY_STOP,
             _FLAGS + Flag.END_ASKED,
+            _FLAGS + Flag.ABORT_ASKED,
             _HEARTS + 8 * Role.CONSOLE,
             _HEARTS + 8 * Role.RECORDER,
             _HEARTS + 8 * Role.LOOP,

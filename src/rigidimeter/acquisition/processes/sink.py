@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from functools import partial
+from os import getppid
 from time import monotonic_ns
 from typing import Any
 
@@ -15,7 +16,7 @@ from rigidimeter.acquisition.processes.shared_status import (
     Nanoseconds,
     Role,
 )
-from rigidimeter.acquisition.run_states import Order, Run, State
+from rigidimeter.acquisition.run_states import Command, Order, Run, State
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.recording.session_folder import Ending
@@ -137,11 +138,15 @@ class SharedSupervision:
     recorder_lost_s : float
         The same for the recorder. It may be long: what is not in the file stays in the ring.
     most_lag : int
-        More samples than that waiting for the recorder are a cause to stop.
+        More samples than that waiting for the recorder are a cause to stop: it lives, but the disk
+        takes nothing, or too little. Half of what the ring holds if not given.
     stall_s : float
         A suspension of more than that is a cause to stop, and stays one.
     attended : bool
         Whether an operator is there who can go on after a hold.
+    console_pid : int
+        The console, where it is the parent of this process: one that was killed is lost at once,
+        before its heartbeat is old. 0 where it is not.
     now_ns, boot_ns : callable
         CLOCK_MONOTONIC and CLOCK_BOOTTIME in nanoseconds.
     """
@@ -155,10 +160,13 @@ class SharedSupervision:
         most_lag: int | None = None,
         stall_s: float = 0.1,
         attended: bool = True,
+        console_pid: int = 0,
         now_ns: Nanoseconds = time.monotonic_ns,
         boot_ns: Nanoseconds = _boot_ns,
     ) -> None:
         self.attended = attended
+        self._console_pid = console_pid
+        self._aborted = False
         self._status, self._samples = shared.status, shared.samples
         self._console_ns = round(1e9 * console_lost_s)
         self._recorder_ns = round(1e9 * recorder_lost_s)
@@ -174,7 +182,7 @@ class SharedSupervision:
     def cause(self, now_s: float) -> int:
         """Return a `guard.Cause` to stop for, 0 if there is none."""
         words = self._words
-        emergency, ended, console, recorder, _ = self._places
+        emergency, ended, _, console, recorder, _ = self._places
         if words[emergency]:
             return _EMERGENCY_STOP
         boot_ns = self._boot_ns()
@@ -185,6 +193,8 @@ class SharedSupervision:
             return _SIGNAL
         if now_ns - words[console] > self._console_ns:
             return _CONSOLE_LOST
+        if self._console_pid and getppid() != self._console_pid:
+            return _CONSOLE_LOST
         if now_ns - words[recorder] > self._recorder_ns:
             return _RECORDER_LOST
         if self._samples.lag() > self._most_lag:
@@ -193,4 +203,7 @@ class SharedSupervision:
 
     def order(self) -> Order:
         """Return the next order that was not taken yet, `NOTHING` if there is none."""
+        if self._words[self._places[2]] and not self._aborted:
+            self._aborted = True
+            return Order(Command.ABORT)
         return self._status.take()

@@ -16,13 +16,12 @@ import contextlib
 import multiprocessing
 import os
 import signal
-import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
-from types import FrameType
+from pathlib import Path
 from typing import Any
 
 from rigidimeter.acquisition.processes.loop_process import LoopTarget, Realtime, loop_main
@@ -31,8 +30,8 @@ from rigidimeter.acquisition.processes.recorder_process import recorder_main
 from rigidimeter.acquisition.processes.ring_recovery import Recovered, complete
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Role, SharedStatus
+from rigidimeter.acquisition.processes.signals import held_back, signals_are_orders
 from rigidimeter.acquisition.processes.watchdog import WatchedProcess
-from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.errors import UserError
 from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.session_folder import EVENTS
@@ -40,8 +39,6 @@ from rigidimeter.recording.session_folder import EVENTS
 RING_S = 60.0
 """For how long the recorder may write nothing before samples are lost."""
 LOOK_S = 0.05
-OF_THE_TERMINAL = (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP)
-"""What a terminal sends to every process of a group."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +47,8 @@ class Ended:
 
     Attributes
     ----------
+    folder : Path
+        Where the session is: another than was wanted if the disk was full and that was ordered.
     outcome, reason : str
         Of the session, as they stand in its folder; `outcome` is empty if it could not be closed.
     loop_exit : int or None
@@ -62,6 +61,7 @@ class Ended:
         What else the operator should know.
     """
 
+    folder: Path
     outcome: str
     reason: str
     loop_exit: int | None
@@ -81,8 +81,8 @@ def supervise(
 ) -> Ended:
     """Run a session in processes of its own and return how it ended.
 
-    Ctrl-C asks the loop to abort; a second one, SIGTERM, and the closing of the terminal make it
-    stop as for a fault.
+    Ctrl-C asks the loop to abort; a second one, SIGTERM, SIGQUIT, and the closing of the terminal
+    make it stop as for a fault.
 
     Parameters
     ----------
@@ -111,13 +111,13 @@ def supervise(
 
     def start(name: str, main: Callable[..., None], *arguments: object) -> BaseProcess:
         process = context.Process(target=main, args=arguments, name=f"rigidimeter-{name}")
-        with _undisturbed():
+        with held_back():
             process.start()
         processes.append(process)
         return process
 
-    try:
-        with _signals_are_orders(status):
+    with signals_are_orders(status):
+        try:
             me = os.getpid()
             recorder = start("recorder", recorder_main, recording, shared.names, patience, me)
             loop = start("loop", loop_main, target, recording, shared.names, realtime, patience, me)
@@ -125,75 +125,59 @@ def supervise(
             rig = recording.settings.rig
             estimator = None
             if realtime.live_estimate:
-                estimator = start(
-                    "estimator",
-                    _estimator_main,
-                    recording.settings.online,
-                    rig.tick_rate_hz,
-                    shared.names,
-                    patience.stopping_s,
-                )
-            remarks = _see_through(loop, recorder, status, patience, console)
+                online, stopping_s = recording.settings.online, patience.stopping_s
+                last = (online, rig.tick_rate_hz, shared.names, stopping_s, me)
+                estimator = start("estimator", _estimator_main, *last)
+            look = _Look(status, console)
+            remarks = _see_through(loop, recorder, status, patience, look)
             recorder_watch = WatchedProcess(recorder.pid or 0)
             try:
-                remarks += complete(Role.CONSOLE, shared, recording, recorder_watch, patience)
+                remarks += complete(shared, recording, recorder_watch, patience, look)
             finally:
                 recorder_watch.close()
             if estimator is not None:
                 _end(estimator, 2.0)
-        outcome, reason, recovered = _outcome(recording)
-        if shared.samples.refused:
-            remarks.append(f"{shared.samples.refused} samples found no room and are not recorded")
-        samples = shared.samples.written
-        return Ended(outcome, reason, loop.exitcode, samples, recovered, tuple(remarks))
-    finally:
-        # Whatever happened here, the loop is given the time to stop the rig in order.
-        status.raise_flag(Flag.END_ASKED)
-        for process in reversed(processes):
-            _end(process, patience.stopping_s)
-        shared.unlink()
-        shared.close()
+            folder = status.folder() or recording.folder
+            outcome, reason, recovered = _outcome(folder)
+            if shared.samples.refused:
+                remarks.append(
+                    f"{shared.samples.refused} samples found no room and are not recorded"
+                )
+            return Ended(
+                folder,
+                outcome,
+                reason,
+                loop.exitcode,
+                shared.samples.written,
+                recovered,
+                (*look.remarks, *remarks),
+            )
+        finally:
+            # Whatever happened here, the loop is given the time to stop the rig in order.
+            status.raise_flag(Flag.END_ASKED)
+            for process in reversed(processes):
+                _end(process, patience.stopping_s)
+            shared.leave()
 
 
-@contextlib.contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Start a process that Ctrl-C and the terminal's end do not reach while it still loads.
+class _Look:
+    """Keeps the console's heart beating and shows the session; an error in it ends the session."""
 
-    Those go to the whole group of processes, and a new one has not yet come to where it ignores
-    them. It inherits what is blocked here; what comes meanwhile comes to this process afterwards.
-    """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_THE_TERMINAL)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    def __init__(self, status: SharedStatus, console: Callable[[SharedStatus], object]) -> None:
+        self._status, self._console = status, console
+        self.remarks: list[str] = []
 
-
-@contextlib.contextmanager
-def _signals_are_orders(status: SharedStatus) -> Iterator[None]:
-    """Turn the signals of the terminal and SIGTERM into orders to the loop."""
-    count = 0
-
-    def asked(number: int, _: FrameType | None) -> None:
-        nonlocal count
-        count += 1
-        if number == signal.SIGINT and count == 1:
-            with contextlib.suppress(ValueError):  # so many orders wait that nobody takes them
-                status.post(Order(Command.ABORT))
-                return
-        status.raise_flag(Flag.END_ASKED)
-
-    numbers: list[int] = []
-    if threading.current_thread() is threading.main_thread():
-        numbers = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
-        if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
-            numbers.remove(signal.SIGHUP)  # started with `nohup`, which is meant so
-    before = {number: signal.signal(number, asked) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    def __call__(self) -> None:
+        self._status.beat(Role.CONSOLE)
+        if self.remarks:
+            return
+        try:
+            self._console(self._status)
+        except Exception as error:
+            with contextlib.suppress(OSError):  # of a terminal that is gone
+                traceback.print_exc()
+            self.remarks.append(f"the console failed ({type(error).__name__}: {error})")
+            self._status.raise_flag(Flag.END_ASKED)
 
 
 def _await_recorder(recorder: BaseProcess, status: SharedStatus) -> None:
@@ -213,22 +197,13 @@ def _see_through(
     recorder: BaseProcess,
     status: SharedStatus,
     patience: Patience,
-    console: Callable[[SharedStatus], object],
+    look: Callable[[], object],
 ) -> list[str]:
     """Keep the operator's heart beating until the loop has ended; return remarks."""
     remarks: list[str] = []
-    recorder_told = console_failed = False
+    recorder_told = False
     while loop.is_alive():
-        status.beat(Role.CONSOLE)
-        try:
-            if not console_failed:
-                console(status)
-        except Exception as error:
-            console_failed = True
-            with contextlib.suppress(OSError):  # of a terminal that is gone
-                traceback.print_exc()
-            remarks.append(f"the console failed ({type(error).__name__}: {error})")
-            status.raise_flag(Flag.END_ASKED)
+        look()
         if (
             not recorder_told
             and not recorder.is_alive()
@@ -255,10 +230,10 @@ def _how(process: BaseProcess) -> str:
     return f"signal {signal.Signals(-code).name}" if code < 0 else f"exit status {code}"
 
 
-def _outcome(recording: Recording) -> tuple[str, str, Recovered | None]:
+def _outcome(folder: Path) -> tuple[str, str, Recovered | None]:
     """Return how the folder says the session ended, and what was recovered."""
     try:
-        events, _ = read_events(recording.folder / EVENTS)
+        events, _ = read_events(folder / EVENTS)
     except (UserError, OSError) as error:
         return "", str(error), None
     recovered = None

@@ -57,10 +57,3 @@ class WatchedProcess:
         if self._fd >= 0:
             os.close(self._fd)
             self._fd, self._gone = -1, True
-
-
-def leave_signals_to_the_console() -> None:
-    """Ignore Ctrl-C and the closing of the terminal, which reach every process of a group."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    signal.signal(signal.SIGTSTP, signal.SIG_IGN)  # Ctrl-Z would leave the last command in force

@@ -1,0 +1,214 @@
+"""Signals, killed groups and full disks: the session ends in order, nothing is lost or left."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from tests.faults.running_session import Session, alive, memory, wait_for
+
+from rigidimeter.acquisition.processes.left_memory import complete_left
+from rigidimeter.acquisition.processes.shared_status import Condition, Role, SharedStatus
+from rigidimeter.errors import UserError
+from rigidimeter.guard import Cause
+from rigidimeter.recording.sample_log import read_events
+
+
+def ignoring():
+    """Ignore what a background shell and `nohup` ignore."""
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
+
+
+@pytest.fixture
+def session(tmp_path):
+    started = []
+
+    def start(duration_s, *options, folder=tmp_path / "session", preexec=None):
+        started.append(Session(folder, duration_s, *options, preexec=preexec))
+        return started[0]
+
+    yield start
+    started[0].close()
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of its own, small enough to fill."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "none", str(folder)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("mounting a small disk is not permitted here")
+    yield folder
+    subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+def fill(folder: Path) -> Path:
+    """Leave no room; return the file that takes it."""
+    path = folder / "ballast"
+    with path.open("wb", buffering=0) as file:
+        for size in (4096, 1):
+            try:
+                while True:
+                    file.write(bytes(size))
+            except OSError:
+                continue
+    return path
+
+
+OUTCOMES = {
+    signal.SIGINT: ("abort", "aborted"),
+    signal.SIGTERM: ("fail", Cause.SIGNAL.sentence),
+    signal.SIGHUP: ("fail", Cause.SIGNAL.sentence),
+    signal.SIGQUIT: ("fail", Cause.SIGNAL.sentence),
+}
+
+
+@pytest.mark.parametrize("number", OUTCOMES)
+def test_a_signal_to_the_group_ends_it_in_order(number, session):
+    """Whatever the program that started it did with the signal, and without a traceback."""
+    run = session(60.0, preexec=ignoring)
+    run.running()
+    os.killpg(run.process.pid, number)
+    ended = run.ended()
+    assert (ended["outcome"], ended["reason"]) == OUTCOMES[number]
+    assert ended["loop_exit"] == 0
+    assert "Traceback" not in run.said
+    run.ticks()
+    run.endings()
+
+
+@pytest.mark.parametrize(
+    ("role", "number"),
+    [
+        ("RECORDER", signal.SIGTERM),
+        ("LOOP", signal.SIGINT),
+        pytest.param("RECORDER", signal.SIGINT, marks=pytest.mark.slow),
+        pytest.param("RECORDER", signal.SIGQUIT, marks=pytest.mark.slow),
+        pytest.param("LOOP", signal.SIGTERM, marks=pytest.mark.slow),
+        pytest.param("LOOP", signal.SIGHUP, marks=pytest.mark.slow),
+        pytest.param("LOOP", signal.SIGQUIT, marks=pytest.mark.slow),
+    ],
+)
+def test_a_signal_to_one_process_ends_it_in_order(role, number, session):
+    run = session(60.0)
+    os.kill(run.running()[role], number)
+    ended = run.ended()
+    assert (ended["outcome"], ended["reason"]) == OUTCOMES[number]
+    run.ticks()
+    run.endings()
+
+
+@pytest.mark.realtime(resolves_s=0.5)
+def test_a_console_that_was_killed_is_not_outlived(session, lateness):
+    run = session(60.0)
+    pids = run.running()
+    began_s = time.monotonic()
+    run.process.kill()
+    wait_for(lambda: not any(alive(pids[role]) for role in ("LOOP", "RECORDER")))
+    assert time.monotonic() - began_s < 1.0 + lateness.worst_s(began_s)  # the dead-man's time
+    run.process.communicate(timeout=30.0)
+    assert not run.mine & memory()
+    assert {ending[2] for ending in run.endings()} == {Cause.CONSOLE_LOST.sentence}
+    run.ticks()
+
+
+def test_what_a_killed_group_left_is_brought_in(session):
+    run = session(60.0)
+    run.running()
+    with pytest.raises(UserError, match="still being recorded"):
+        complete_left(run.folder)
+    os.killpg(run.process.pid, signal.SIGKILL)
+    run.process.communicate(timeout=30.0)
+    assert run.mine <= memory()
+    told = complete_left(run.folder, "the group was killed")
+    assert not run.mine & memory()
+    assert len(told) <= 1  # none if the recorder had just written
+    recovered = subprocess.run(
+        [sys.executable, "-m", "rigidimeter", "recover", str(run.folder)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert recovered.returncode == 0, recovered.stderr
+    assert [ending[1] for ending in run.endings()] == ["fail", "fail"]
+    run.ticks()
+    assert complete_left(run.folder) == []
+
+
+def status_of(run: Session) -> SharedStatus:
+    (name,) = (name for name in run.mine if name.endswith("-status"))
+    return SharedStatus.attach(name)
+
+
+def stopped_by_full_disk(run: Session, disk: Path) -> Path:
+    """Let the session run until its disk was full and the loop has stopped; return the ballast."""
+    run.running()
+    ballast = fill(disk)
+    status = status_of(run)
+    wait_for(lambda: status.condition(Role.LOOP) is Condition.DONE)
+    assert status.condition(Role.RECORDER) is Condition.TROUBLE
+    status.close()
+    assert run.process.poll() is None
+    return ballast
+
+
+def test_a_full_disk_stops_the_arm_and_the_record_waits_for_room(session, small_disk):
+    run = session(60.0, folder=small_disk / "session")
+    ballast = stopped_by_full_disk(run, small_disk)
+    ballast.unlink()
+    ended = run.ended()
+    assert ended["reason"] == Cause.RECORD_OVERFLOW.sentence
+    assert "No space left on device); 0.0 MB are free, " in ended["seen"]["trouble"]
+    assert ended["recovered"] is None
+    assert run.ticks().size == ended["samples"]
+    run.endings()
+
+
+def test_another_folder_is_taken_when_the_disk_is_full(session, small_disk, tmp_path):
+    run = session(60.0, f"save={tmp_path / 'other'}", folder=small_disk / "session")
+    run.running()
+    fill(small_disk)
+    wait_for(lambda: (tmp_path / "other" / "samples.arrows").exists())
+    run.process.send_signal(signal.SIGTERM)
+    ended = run.ended()
+    assert ended["folder"] == str(tmp_path / "other")
+    assert ended["reason"] == Cause.SIGNAL.sentence
+    assert not any("could not" in remark for remark in ended["remarks"])
+    run.folder = tmp_path / "other"
+    assert run.ticks().size == ended["samples"]
+    run.endings()
+    events, _ = read_events(run.folder / "events.jsonl")
+    (moved,) = (event for event in events if event["event"] == "recording_moved")
+    assert moved["from"] == str(small_disk / "session")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_full_disk_does_not_keep_the_program(number, session, small_disk):
+    """Told to end it ends, and the samples stay in memory until there is room."""
+    run = session(60.0, folder=small_disk / "session")
+    ballast = stopped_by_full_disk(run, small_disk)
+    began_s = time.monotonic()
+    run.process.send_signal(number)
+    out, err = run.process.communicate(timeout=40.0)
+    assert time.monotonic() - began_s < 3.0 + 5.0  # its patience with a disk, and leaving
+    assert run.process.returncode == 0, err
+    assert "Traceback" not in err
+    ended = json.loads(out.splitlines()[-1])
+    assert ended["outcome"] == ""
+    assert any("stay in memory" in remark for remark in ended["remarks"])
+    assert run.mine <= memory()
+    (told,) = complete_left(run.folder)
+    assert "could not be written" in told
+    assert run.mine <= memory()
+    ballast.unlink()
+    (told,) = complete_left(run.folder)
+    assert "were brought in" in told
+    assert not run.mine & memory()
+    assert run.ticks().size == ended["samples"]
+    assert {ending[2] for ending in run.endings()} == {Cause.RECORD_OVERFLOW.sentence}
