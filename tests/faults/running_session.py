@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigidimeter.recording.sample_log import read_events, read_samples
+from rigidimeter.recording.event_log import read_events
+from rigidimeter.recording.sample_log import read_samples
 
 SCRIPT = Path(__file__).with_name("realtime_session.py")
 

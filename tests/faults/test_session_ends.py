@@ -15,7 +15,7 @@ from rigidimeter.acquisition.processes.left_memory import complete_left
 from rigidimeter.acquisition.processes.shared_status import Condition, Role, SharedStatus
 from rigidimeter.errors import UserError
 from rigidimeter.guard import Cause
-from rigidimeter.recording.sample_log import read_events
+from rigidimeter.recording.event_log import read_events
 
 
 def ignoring():
@@ -104,7 +104,7 @@ def test_a_signal_to_one_process_ends_it_in_order(role, number, session):
     run.endings()
 
 
-@pytest.mark.realtime(resolves_s=0.5)
+@pytest.mark.realtime(resolves_s=0.1)
 def test_a_console_that_was_killed_is_not_outlived(session, lateness):
     run = session(60.0)
     pids = run.running()

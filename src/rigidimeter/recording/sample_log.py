@@ -127,7 +127,11 @@ class SampleLog:
         self._writer.write_batch(pa.RecordBatch.from_pylist([], schema=_SCHEMA))
         self._message.seek(0)
         self._message.truncate()
-        append_line(self._file, _SCHEMA.serialize().to_pybytes())
+        try:
+            append_line(self._file, _SCHEMA.serialize().to_pybytes())
+        except OSError:
+            self._file.close()
+            raise
 
     def append(self, sample: Sample) -> None:
         """Add one tick; a full batch goes to the file at once."""

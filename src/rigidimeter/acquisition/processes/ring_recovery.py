@@ -15,6 +15,10 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.ring import ROW, EventRing, SampleRing
@@ -156,7 +160,25 @@ def _samples(path: Path, ring: SampleRing, tick_rate_hz: float) -> int:
     if rows.size:
         part = path.with_name(f"{path.name}.part")
         part.unlink(missing_ok=True)
-        log = SampleLog(part, tick_rate_hz)
+        try:
+            _write_anew(part, before, rows, tick_rate_hz)
+            part.replace(path)
+        except OSError:
+            part.unlink(missing_ok=True)  # on a disk that is full it would take what room there is
+            raise
+    ring.recorded = ring.written
+    return int(rows.size)
+
+
+def _write_anew(
+    part: Path,
+    before: dict[str, NDArray[Any]] | None,
+    rows: NDArray[np.void],
+    tick_rate_hz: float,
+) -> None:
+    """Write what a file had, and the rows after it, to another file."""
+    log = SampleLog(part, tick_rate_hz)
+    try:
         # Batches stay short: a reader may look at one at a time.
         batch = max(1, int(BATCH_S * tick_rate_hz))
         if before is not None:
@@ -168,10 +190,11 @@ def _samples(path: Path, ring: SampleRing, tick_rate_hz: float) -> int:
             some = rows[first : first + batch]
             log.append_columns({name: some[name] for name in _names()})
         os.fsync(log.fileno())
+    except OSError:
+        os.ftruncate(log.fileno(), 0)  # so that it can be closed
         log.close()
-        part.replace(path)
-    ring.recorded = ring.written
-    return int(rows.size)
+        raise
+    log.close()
 
 
 def _lines(path: Path, ring: EventRing) -> list[bytes]:
