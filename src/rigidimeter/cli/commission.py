@@ -106,9 +106,9 @@ def commission(
     )
     typer.echo(str(prepare_loop_process()), err=True)
     clock = DeadlineClock()
-    with rigfile.claim(), _interrupted_once(path):
+    with rigfile.claim() as lock, _interrupted_once(path):
         found = try_rig(
-            rigfile.build(clock.now_s, chosen.rig.tick_rate_hz),
+            rigfile.build(clock.now_s, chosen.rig.tick_rate_hz, lock=lock),
             rigfile,
             chosen,
             Timebase(clock.now_s, clock.wait_until),

@@ -53,12 +53,12 @@ def run_loop(
 
     rigfile = load_rig(rig_path)
     home = Home(home_rad, HOME_TOLERANCE_RAD) if home_rad is not None else None
-    rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, home)
 
     def approve(facts: Mapping[str, Any]) -> tuple[str, ...]:
         return check_record(rigfile, facts, settings).not_tried
 
-    with rigfile.claim():
+    with rigfile.claim() as lock:
+        rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, home, lock)
         _run(settings, protocol, rig, lambda _: {}, clock, side, approve)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import asdict
 from typing import Any, NamedTuple
@@ -72,6 +72,8 @@ class ComposedRig:
         The hardware enable.
     home : Home, optional
         Where the joint must be to be enabled.
+    identified : callable
+        Called with the facts of the devices by role as soon as they are read; may refuse them.
     """
 
     def __init__(
@@ -81,9 +83,10 @@ class ComposedRig:
         tick_rate_hz: float,
         line: EnableLine | None = None,
         home: Home | None = None,
+        identified: Callable[[Mapping[str, DeviceFacts]], None] = lambda _: None,
     ) -> None:
         self._sensor, self._drive, self._line, self._home = sensor, drive, line, home
-        self._tick_rate_hz = tick_rate_hz
+        self._tick_rate_hz, self._identified = tick_rate_hz, identified
         self._bias_nm = 0.0
         self._origin_rad = 0.0
 
@@ -105,6 +108,7 @@ class ComposedRig:
             If a device does not answer, does not match the settings, or is too slow for the loop.
         """
         facts = {"torque_sensor": self._sensor.configure(), "drive": self._drive.configure()}
+        self._identified(facts)
         for role, found in facts.items():
             self._check_rate(role, found)
         return {role: asdict(found) for role, found in facts.items()}

@@ -21,6 +21,7 @@ There is no feedback: only the drive's status shows that the relay opened.
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable
 from typing import Any, ClassVar, Literal, Protocol
 
@@ -53,6 +54,11 @@ class SerialEnableLineSettings(Section):
 
     port: str
     line: Literal["rts", "dtr"] = "rts"
+
+    @property
+    def lock_names(self) -> tuple[str, ...]:
+        """What the contact is on, in whatever rig file."""
+        return (f"serial port {os.path.realpath(self.port)}",)
 
 
 class SerialEnableLine:

@@ -18,7 +18,6 @@ settings class as `Settings` and is created by ``Class(settings, now)``.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import importlib
 import inspect
@@ -26,12 +25,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from rigidimeter.devices.base import Now
+from rigidimeter.devices.base import DeviceFacts, Now
 from rigidimeter.devices.composed import ComposedRig, Home
+from rigidimeter.devices.rig_lock import RigLock
 from rigidimeter.documents import read_toml
 from rigidimeter.errors import UserError
 from rigidimeter.settings.messages import sentence
@@ -97,26 +97,44 @@ class RigFile:
             getattr(settings, "emulated", False) for _, settings in self.devices.values()
         )
 
-    def claim(self) -> BinaryIO:
-        """Reserve this rig for this process until the returned file is closed.
+    def claim(self) -> RigLock:
+        """Reserve the hardware of this rig for this process until the returned lock is closed.
+
+        Each driver's settings say in `lock_names` what it is; of a driver without the property, its
+        settings are locked.
 
         Raises
         ------
         UserError
             If another process uses it.
         """
-        file = self.path.open("rb")
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            file.close()
-            raise UserError(
-                f"{self.path}: another program uses this rig; end that one first"
-            ) from None
-        return file
+        lock = RigLock(self.path)
+        for driver, settings in self.devices.values():
+            default = (f"{driver.__module__}.{driver.__qualname__} {settings.model_dump_json()}",)
+            lock.take(getattr(settings, "lock_names", default))
+        return lock
 
-    def build(self, now: Now, tick_rate_hz: float, home: Home | None = None) -> ComposedRig:
-        """Create the devices without connecting. `home` overrides that of the file."""
+    def build(
+        self,
+        now: Now,
+        tick_rate_hz: float,
+        home: Home | None = None,
+        lock: RigLock | None = None,
+    ) -> ComposedRig:
+        """Create the devices without connecting.
+
+        `home` overrides that of the file. `lock` takes the serial numbers too, once they are read:
+        one device may have two addresses.
+        """
+
+        def take_serials(facts: Mapping[str, DeviceFacts]) -> None:
+            if lock is not None:
+                lock.take(
+                    f"{role.replace('_', ' ')}, serial number {found.serial}"
+                    for role, found in facts.items()
+                    if found.serial and not getattr(self.devices[role][1], "emulated", False)
+                )
+
         made = {role: driver(settings, now) for role, (driver, settings) in self.devices.items()}
         return ComposedRig(
             made["torque_sensor"],
@@ -124,6 +142,7 @@ class RigFile:
             tick_rate_hz,
             made.get("enable_line"),
             home or self.home,
+            take_serials,
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict
 from types import SimpleNamespace
 
@@ -30,12 +31,20 @@ class BuiltError(Exception):
     """The rig would be connected next."""
 
 
+@pytest.fixture(autouse=True)
+def _own_locks(tmp_path_factory, monkeypatch):
+    """The rigs of these tests are not those of another run of them on this machine."""
+    folder = tmp_path_factory.mktemp("locks")
+    folder.chmod(0o1777)
+    monkeypatch.setattr("rigidimeter.devices.rig_lock.FOLDERS", (folder,))
+
+
 @pytest.fixture
 def seen(monkeypatch):
     """Run the loop's target in this process up to where the rig is made; keep what was told."""
     seen = SimpleNamespace(home=None, continues=None)
 
-    def build(_, now, tick_rate_hz, home=None):
+    def build(_, now, tick_rate_hz, home=None, lock=None):
         seen.home = home
         raise BuiltError
 
@@ -98,12 +107,13 @@ def test_a_rig_that_another_uses_is_refused_before_any_process_starts(
 ):
     monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
     monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: None)
-    rig = tmp_path / "rig.toml"
+    rig, copy = tmp_path / "rig.toml", tmp_path / "copy.toml"
     rig.write_text(RIG)
+    copy.write_text(f'name = "a copy"\n{RIG}')
     with load_rig(rig).claim():
-        result = rigidimeter("run", "--rig", rig, "--out", tmp_path / "s")
+        result = rigidimeter("run", "--rig", copy, "--out", tmp_path / "s")
     assert result.status == 1
-    assert "another program uses this rig" in result.err
+    assert f"another program uses this rig (process {os.getpid()})" in result.err
     assert not (tmp_path / "s").exists()
 
 

@@ -1,10 +1,8 @@
-"""RIG.toml: who may use the rig, and where its joint must stand."""
+"""RIG.toml: what its devices are, and where its joint must stand."""
 
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 
 import pytest
 
@@ -31,42 +29,6 @@ def rig_file(tmp_path):
         return path
 
     return write
-
-
-CLAIM = """
-import sys
-from pathlib import Path
-from rigidimeter.devices.rigfile import load_rig
-claim = load_rig(Path(sys.argv[1])).claim()
-print("has it", flush=True)
-sys.stdin.read()
-"""
-
-
-def test_a_rig_is_for_one_program_at_a_time(rig_file):
-    path = rig_file("")
-    other = subprocess.Popen(
-        [sys.executable, "-c", CLAIM, str(path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    assert other.stdout is not None
-    assert other.stdout.readline() == "has it\n"
-    rig = load_rig(path)  # to read it is no claim
-    with pytest.raises(UserError, match=r"rig\.toml: another program uses this rig; end that one"):
-        rig.claim()
-    other.kill()  # the claim goes with the process, however it ends
-    other.communicate()
-    with rig.claim():
-        pass
-    rig.claim().close()  # and with the file
-
-
-def test_a_claim_within_one_process_counts_too(rig_file):
-    rig = load_rig(rig_file(""))
-    with rig.claim(), pytest.raises(UserError, match="another program uses this rig"):
-        load_rig(rig.path).claim()
 
 
 def test_without_a_home_the_joint_may_stand_anywhere(rig_file):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from statistics import median
 from typing import Literal
 
@@ -56,6 +57,11 @@ class AsciiDriveSettings(Section):
     deceleration_deg_s2: float = quantity(7000.0, "deg/s²", 0.0, 100_000.0, above=True)
     lost_s: float = quantity(0.1, "s", 0.01, 2.0)
     jump_deg: float = quantity(2.0, "deg", 0.0, 90.0, above=True)
+
+    @property
+    def lock_names(self) -> tuple[str, ...]:
+        """What the drive is on, in whatever rig file; a port may have several links to it."""
+        return (f"serial port {os.path.realpath(self.port)}",)
 
     @property
     def emulated(self) -> bool:

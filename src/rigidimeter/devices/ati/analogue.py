@@ -83,6 +83,11 @@ class AtiAnalogueSettings(Section):
     )
     sign: Literal[1, -1] = -1
 
+    @property
+    def lock_names(self) -> tuple[str, ...]:
+        """What the transducer is on, in whatever rig file."""
+        return (f"NI-DAQ card {self.channels.partition('/')[0].lower()}",)
+
 
 class AtiAnalogue:
     """A `TorqueSensor` that computes torque from six voltages.

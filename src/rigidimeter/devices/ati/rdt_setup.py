@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import http.client
 import math
+import socket
 import xml.etree.ElementTree as ElementTree
 from dataclasses import asdict, dataclass
 from typing import Literal, Self
@@ -58,6 +59,15 @@ class AtiRdtSettings(Section):
     def emulated(self) -> bool:
         """Whether the address is this computer, so that there is no hardware."""
         return self.address == "localhost" or self.address.startswith("127.")
+
+    @property
+    def lock_names(self) -> tuple[str, ...]:
+        """What the sensor is, in whatever rig file."""
+        try:
+            address = socket.gethostbyname(self.address)
+        except (OSError, UnicodeError):  # connecting says so
+            address = self.address
+        return (f"torque sensor at {address}:{self.port}",)
 
     @model_validator(mode="after")
     def _some_weight(self) -> Self:

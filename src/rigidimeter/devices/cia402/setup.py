@@ -79,6 +79,14 @@ class Cia402Settings(Section):
             self.interface == "socketcan" and str(self.channel).startswith("vcan")
         )
 
+    @property
+    def lock_names(self) -> tuple[str, ...]:
+        """What the drive is, in whatever rig file; a virtual bus ends with its process."""
+        if self.interface == "virtual":
+            return ()
+        port = f" port {self.port}" if self.interface == "udp_multicast" else ""
+        return (f"node {self.node_id} on {self.interface} {self.channel}{port}",)
+
     @field_validator("channel", mode="before")
     @classmethod
     def _text_or_number(cls, value: Any) -> Any:
