@@ -1,13 +1,13 @@
-"""One loop: what is predicted from the settings, and what the estimation simulates."""
+"""One loop: what is predicted from the settings, and what the estimation takes."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from rigidimeter.dynamics import DriveModel, JointDynamics, closed_loop_motion
+from rigidimeter.dynamics import DriveModel
+from rigidimeter.dynamics.linear_loop import Loop
 from rigidimeter.estimation.closedloop.drive_fit import loop_of
-from rigidimeter.experiment import prbs_nm
 from rigidimeter.settings import Settings, parse_settings
 
 
@@ -26,11 +26,11 @@ def test_what_is_planned_is_what_the_estimation_takes_for_its_instrument(
     settings: Settings,
 ) -> None:
     rig = settings.rig
-    perturbation = prbs_nm(settings.prbs, rig.tick_rate_hz)
-    planned = closed_loop_motion(perturbation, settings, JointDynamics(0.0045, 0.1368, 1.751))
     drive = DriveModel(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
-    loop = loop_of(settings, rig.torque.rate_hz, drive)
-    taken = loop.response(perturbation, rig.tick_rate_hz, (0.0045, 0.1368, 1.751))
-    for name in ("angle_rad", "velocity_rad_s", "acceleration_rad_s2"):
-        theirs, ours = getattr(planned, name), getattr(taken, name)
-        np.testing.assert_allclose(ours, theirs, atol=1e-6 * np.abs(theirs).max())
+    planned = Loop(settings.controller, rig)
+    taken = loop_of(settings, rig.torque.rate_hz, drive)
+    frequency_hz = np.geomspace(0.01, rig.tick_rate_hz / 2.0, 200)
+    ours, theirs = (loop.at_frequency(frequency_hz) for loop in (taken, planned))
+    for joint in ((0.0045, 0.1368, 1.751), (0.02, 0.0, 0.0)):
+        motion = theirs.command(joint) * theirs.motion
+        np.testing.assert_allclose(ours.command(joint) * ours.motion, motion, rtol=1e-6)

@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -39,7 +38,6 @@ from rigidimeter.control import admittance, butterworth_lowpass
 from rigidimeter.dynamics.joint import JointDynamics, median_joint
 from rigidimeter.dynamics.subject_torque import subject_density
 from rigidimeter.dynamics.velocity_drive import (
-    ArmMotion,
     Array,
     Complex,
     DriveModel,
@@ -170,34 +168,6 @@ class Loop:
             read_torque += held * z**-rest
         forward = steady * _lowpass(controller.torque_cutoff_hz, z, rate_hz)
         return OpenLoop(steady, forward, motion, read, read_torque)
-
-    def response(self, perturbation_nm: Array, rate_hz: float, parameters: Parameters) -> ArmMotion:
-        """Return the motion that a perturbation causes, from rest, without noise.
-
-        Parameters
-        ----------
-        perturbation_nm : array, shape (n,)
-            One value a tick.
-        rate_hz : float
-            Ticks a second.
-        parameters : (float, float, float)
-            J, B and K of the joint; the loop with it must be stable.
-        """
-        circle = on_circle(self, perturbation_nm.size, rate_hz, 1)
-        command = circle.to(perturbation_nm) * circle.loop.command(parameters)
-        return ArmMotion(*(circle.back(command * part) for part in circle.loop.motion))
-
-    def sensed(
-        self, motion: Sequence[Array], rate_hz: float, parameters: Parameters
-    ) -> list[Array]:
-        """Return how the measured torque changes with J, B and K, along a given motion.
-
-        ∂M/∂J = S a and so on, with the sensitivity S = 1 / (1 + L): in the loop a stiffer joint
-        also moves less.
-        """
-        circle = on_circle(self, motion[0].size, rate_hz, 1)
-        around = 1.0 + circle.loop.gain(parameters)
-        return [circle.back(circle.to(part) / around) for part in motion]
 
 
 def closed_loop_motion(

@@ -18,7 +18,7 @@ ticks bias the fit (`drive`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -203,11 +203,6 @@ def epoch_lines(epoch: Epoch, grid: Grid, drive: DriveModel | None) -> Lines:
     for column, part in enumerate(driven(drive, command, grid.time_s)):
         motion[:, column] += grid.transform(part)
     return Lines(grid, torque, motion)
-
-
-def response_lines(grid: Grid, parts: Sequence[Array]) -> Complex:
-    """Return simulated signals at the lines, shape (m, len(parts)); `parts` are on the grid."""
-    return np.stack([grid.transform(part) for part in parts], axis=1)
 
 
 def _spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array) -> Complex:
