@@ -34,7 +34,7 @@ from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.experiment import plan
-from rigidimeter.recording.sample_log import read_samples
+from rigidimeter.recording.sample_reading import read_samples
 from rigidimeter.settings import Settings, parse_settings
 
 PRIORITY = 80

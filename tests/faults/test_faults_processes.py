@@ -24,7 +24,7 @@ from tests.lateness import PRESENT
 from tests.wire.rig_process import RigProcess
 
 from rigidimeter.guard import Cause
-from rigidimeter.recording.sample_log import read_samples
+from rigidimeter.recording.sample_reading import read_samples
 
 ROOT = Path(__file__).parents[2]
 RIG = {"cia402": "rdt_canopen", "ascii": "rdt_ascii"}

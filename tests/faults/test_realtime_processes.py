@@ -13,7 +13,7 @@ from tests.faults.running_session import Session, alive, memory, wait_for
 from rigidimeter.acquisition.processes.signals import HELD_BACK, held_back
 from rigidimeter.guard import Cause
 from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_log import read_samples
+from rigidimeter.recording.sample_reading import read_samples
 
 
 @pytest.fixture

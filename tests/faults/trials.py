@@ -25,7 +25,7 @@ from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.experiment import plan
 from rigidimeter.guard import Cause, Reaction
 from rigidimeter.recording import SessionWriter
-from rigidimeter.recording.sample_log import read_samples
+from rigidimeter.recording.sample_reading import read_samples
 
 AT_S = 0.25
 """A fault comes when the imposed motion is fastest, half a period after its start."""

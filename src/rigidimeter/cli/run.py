@@ -183,10 +183,15 @@ def recover(
     reason: Annotated[
         str, typer.Option("--reason", metavar="TEXT", help="Why it ended, if you know.")
     ] = "the recording process ended without closing the session",
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Also a session that was closed and is damaged at its end."),
+    ] = False,
 ) -> None:
     """Close an interrupted session, keeping everything that was written or is still in memory.
 
-    Open epochs end with `fail` and the reason. A session that is closed already does not change.
+    Open epochs end with `fail` and the reason. A session that is closed already does not change,
+    and one that a process still records is refused.
     Samples that a killed session left in memory are brought in, until the computer is switched off.
 
     \b
@@ -199,11 +204,14 @@ def recover(
 
     for line in complete_left(session, reason):
         typer.echo(line, err=True)
-    found = close_session(session, reason)
+    found = close_session(session, reason, force=force)
+    for what in found.damaged:
+        typer.echo(f"error: {session}/{what} is damaged; it stays as it is", err=True)
     extent = f"{found.n_samples} samples up to {found.last_time_s:.3f} s"
     if found.already_closed:
         typer.echo(f"{session} was closed already: {extent}")
         return
     epochs = ", ".join(found.epochs_closed) or "none"
-    torn = f"; {found.torn_bytes} torn bytes kept in samples.torn" if found.torn_bytes else ""
+    kept = " and ".join(found.torn_files)
+    torn = f"; {found.torn_bytes} torn bytes of samples; kept: {kept}" if kept else ""
     typer.echo(f"{session} is closed: {extent}; open epochs closed as failed: {epochs}{torn}")

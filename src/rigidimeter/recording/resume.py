@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rigidimeter.documents import read_bytes
+from rigidimeter.documents.bounds import DOCUMENT_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import PlannedEpoch
-from rigidimeter.recording.event_log import read_events
+from rigidimeter.recording.event_log import read_events, scan_events
 from rigidimeter.recording.session_epochs import session_settings
-from rigidimeter.recording.session_folder import EVENTS, lock, read_manifest
+from rigidimeter.recording.session_folder import EVENTS, check_session, locked, read_manifest
 from rigidimeter.settings import Settings
 
 
@@ -53,7 +55,7 @@ def rest_of(folder: Path) -> Rest:
         recorded.
     """
     manifest = read_manifest(folder)
-    events = _events(folder)
+    events = _events(folder, manifest)
     planned: list[PlannedEpoch] = []
     for entry in manifest["protocol"]:
         try:
@@ -78,7 +80,12 @@ def rest_of(folder: Path) -> Rest:
         left,
         len(planned) - len(left),
         manifest["virtual"],
-        {"folder": folder.name, "created_utc": manifest["created_utc"], **origin},
+        {
+            "folder": folder.name,
+            "session_id": manifest.get("session_id", ""),
+            "created_utc": manifest["created_utc"],
+            **origin,
+        },
     )
 
 
@@ -89,18 +96,15 @@ def count_epochs(folder: Path) -> tuple[int, int]:
     return good, len(read_manifest(folder)["protocol"])
 
 
-def _events(folder: Path) -> list[dict[str, Any]]:
+def _events(folder: Path, manifest: dict[str, Any]) -> list[dict[str, Any]]:
     """Return the events of a session that nobody is recording any more."""
     path = folder / EVENTS
     if not path.is_file():
         return []
-    with path.open("rb") as file:
-        if not lock(file):
-            raise UserError(
-                f"{folder}: is still being recorded; end that session first, then continue it"
-            )
-    events, _ = read_events(path)
-    return events
+    with locked(path, "end that session first, then continue it"):
+        log = scan_events(read_bytes(path, DOCUMENT_BYTES), path)
+    check_session(folder, manifest, {EVENTS: log.session_ids})
+    return log.events
 
 
 def _went_on(events: list[dict[str, Any]], last: dict[str, Any]) -> bool:

@@ -1,14 +1,16 @@
 """The raw log of samples, appended as an Arrow IPC stream.
 
 A stream needs no footer, so what was written before the process was killed can be read: every
-complete batch. One batch holds at most `BATCH_S` seconds.
+complete batch. One batch holds at most `BATCH_S` seconds. Schema and batches carry a checksum and
+the id of the session, batches their number too: what is damaged is named and passed over.
 """
 
 from __future__ import annotations
 
 import io
+import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -16,9 +18,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from rigidimeter.errors import UserError
-
-END_OF_STREAM = b"\xff\xff\xff\xff\x00\x00\x00\x00"
+from rigidimeter.recording.arrow_stream import END_OF_STREAM, KEY
+from rigidimeter.recording.checksum import ZEROS, with_checksum
 
 BATCH_S = 0.1
 """How much can be lost when the process is killed."""
@@ -86,18 +87,15 @@ _INTEGERS = {
     "motion_status": pa.int64(),
     "cause": pa.int8(),
 }
-_SCHEMA = pa.schema(
+SCHEMA = pa.schema(
     [pa.field(name, _INTEGERS.get(name, pa.float64()), nullable=False) for name in Sample._fields]
 )
-_FIRST = len(Sample._fields) - len(Sample._field_defaults)
-"""Columns that every recording has; later versions added the others."""
-_READING = pa.ipc.IpcReadOptions(use_threads=False)
-_DTYPES = [np.dtype(field.type.to_pandas_dtype()) for field in _SCHEMA]
+DTYPES = [np.dtype(field.type.to_pandas_dtype()) for field in SCHEMA]
 
 
 def sample_dtypes() -> dict[str, np.dtype[Any]]:
     """Return the type of every recorded column, in order."""
-    return dict(zip(Sample._fields, _DTYPES, strict=True))
+    return dict(zip(Sample._fields, DTYPES, strict=True))
 
 
 class SampleLog:
@@ -112,23 +110,39 @@ class SampleLog:
         Must not exist: a recording is never overwritten.
     tick_rate_hz : float
         Sets how many samples make a batch of `BATCH_S`.
+    session_id : str
+        Of the session that the samples belong to.
+    before : bytes
+        A stream without its end that is continued; empty for a new one.
+    first_batch : int
+        The number of the first batch that is written here.
     """
 
-    def __init__(self, path: Path, tick_rate_hz: float) -> None:
+    def __init__(
+        self,
+        path: Path,
+        tick_rate_hz: float,
+        session_id: str = "",
+        *,
+        before: bytes = b"",
+        first_batch: int = 0,
+    ) -> None:
         self._file: BinaryIO = path.open("xb", buffering=0)
         # Threads cost more than they gain on a batch of a few kilobytes.
         options = pa.ipc.IpcWriteOptions(compression="lz4", use_threads=False)
         # Arrow does not look at how much of its bytes a file took, so it writes to memory.
         self._message = io.BytesIO()
-        self._writer = pa.ipc.new_stream(self._message, _SCHEMA, options=options)
+        self._writer = pa.ipc.new_stream(self._message, SCHEMA, options=options)
         self._rows: list[Sample] = []
         self._batch = max(1, int(BATCH_S * tick_rate_hz))
+        self._session_id = session_id
+        self._number = first_batch
         # Arrow writes the schema with the first batch; here it must not be lost with one.
-        self._writer.write_batch(pa.RecordBatch.from_pylist([], schema=_SCHEMA))
+        self._writer.write_batch(pa.RecordBatch.from_pylist([], schema=SCHEMA))
         self._message.seek(0)
         self._message.truncate()
         try:
-            append_line(self._file, _SCHEMA.serialize().to_pybytes())
+            append_line(self._file, before or _schema_message(session_id))
         except OSError:
             self._file.close()
             raise
@@ -148,24 +162,24 @@ class SampleLog:
             If they do not fit on the disk; then none of them is in the file.
         """
         self.flush()
-        arrays = [
-            pa.array(np.ascontiguousarray(columns[name], dtype))
-            for name, dtype in sample_dtypes().items()
-        ]
-        self._writer.write_batch(pa.record_batch(arrays, schema=_SCHEMA))
-        self._put()
+        self._put(
+            [
+                pa.array(np.ascontiguousarray(columns[name], dtype))
+                for name, dtype in sample_dtypes().items()
+            ]
+        )
 
     def flush(self) -> None:
         """Write what is waiting, however little."""
         if not self._rows:
             return
         n = len(self._rows)
-        arrays = [
-            pa.array(np.fromiter(column, dtype, n))
-            for column, dtype in zip(zip(*self._rows, strict=True), _DTYPES, strict=True)
-        ]
-        self._writer.write_batch(pa.record_batch(arrays, schema=_SCHEMA))
-        self._put()
+        self._put(
+            [
+                pa.array(np.fromiter(column, dtype, n))
+                for column, dtype in zip(zip(*self._rows, strict=True), DTYPES, strict=True)
+            ]
+        )
         self._rows.clear()
 
     def fileno(self) -> int:
@@ -180,83 +194,29 @@ class SampleLog:
         append_line(self._file, END_OF_STREAM)
         self._file.close()
 
-    def _put(self) -> None:
-        """Write what Arrow made of a batch, and forget it, also where that fails."""
+    def _put(self, arrays: Sequence[pa.Array]) -> None:
+        """Write a batch as Arrow makes it, with its checksum."""
+        facts = _facts(self._session_id, batch=self._number)
+        self._writer.write_batch(pa.record_batch(arrays, schema=SCHEMA), custom_metadata=facts)
         message = self._message.getvalue()
         self._message.seek(0)
         self._message.truncate()
-        append_line(self._file, message)
+        append_line(self._file, with_checksum(message, columns_text(SCHEMA)))
+        self._number += 1
 
 
-def _batches(file: pa.NativeFile) -> Iterator[pa.RecordBatch]:
-    """Yield each complete batch; stop where the stream breaks off."""
-    try:
-        reader = pa.ipc.open_stream(file, options=_READING)
-    except (pa.ArrowInvalid, OSError):
-        return
-    while True:
-        try:
-            yield reader.read_next_batch()
-        except (StopIteration, pa.ArrowInvalid, OSError):
-            return
+def _facts(session_id: str, **facts: int) -> dict[str, str]:
+    return {KEY: json.dumps({"checksum": ZEROS, "session_id": session_id, **facts})}
 
 
-def read_samples(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the columns of all complete batches; empty columns if there is none.
-
-    Raises
-    ------
-    UserError
-        If the stream is not one that `SampleLog` wrote.
-    """
-    data = pa.BufferReader(path.read_bytes())
-    table: pa.Table | None
-    try:
-        table = pa.ipc.open_stream(data, options=_READING).read_all()
-    except (pa.ArrowInvalid, OSError):  # the stream breaks off, or is none
-        data.seek(0)
-        try:
-            batches = list(_batches(data))
-            table = pa.Table.from_batches(batches, None if batches else _SCHEMA)
-        except pa.ArrowInvalid:
-            table = None
-    if table is None or not set(Sample._fields[:_FIRST]) <= set(table.column_names):
-        raise UserError(f"{path}: holds other columns than a recording of this version")
-    names = [name for name in Sample._fields if name in table.column_names]
-    table = table.select(names).combine_chunks()
-    if any(table.schema.field(name).type != _SCHEMA.field(name).type for name in names) or any(
-        column.null_count for column in table.columns
-    ):
-        raise UserError(f"{path}: holds other columns than a recording of this version")
-    columns = {
-        # Not to_numpy, which imports pandas.
-        name: np.from_dlpack(column.chunk(0)) if len(table) else np.empty(0, sample_dtypes()[name])
-        for name, column in zip(names, table.columns, strict=True)
-    }
-    for name, default in Sample._field_defaults.items():  # recorded before there was this column
-        columns.setdefault(name, np.full(len(table), default, _DTYPES[Sample._fields.index(name)]))
-    return columns
+def _schema_message(session_id: str) -> bytes:
+    schema = SCHEMA.with_metadata(_facts(session_id))
+    return with_checksum(schema.serialize().to_pybytes())
 
 
-def stream_extent(path: Path) -> tuple[int, bool]:
-    """Return the length in bytes up to the last complete batch, and whether the stream is closed.
-
-    Without a complete batch the length is that of the schema; without a complete schema it is 0.
-    """
-    end = 0
-    with pa.OSFile(str(path), "rb") as file:
-        try:
-            pa.ipc.open_stream(file)
-            end = file.tell()
-        except (pa.ArrowInvalid, OSError):
-            return 0, False
-        file.seek(0)
-        for _ in _batches(file):
-            end = file.tell()
-    with path.open("rb") as raw:
-        raw.seek(end)
-        closed = raw.read(8) == END_OF_STREAM
-    return end, closed
+def columns_text(schema: pa.Schema) -> bytes:
+    """Return names and types, which each batch's checksum covers: they decide what it means."""
+    return ",".join(f"{field.name}:{field.type}" for field in schema).encode()
 
 
 def append_line(file: BinaryIO, line: bytes) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -9,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_log import read_samples
+from rigidimeter.recording.session_files import SessionFiles, read_session_files
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES, read_manifest
 from rigidimeter.records import Channel, Epoch, Motion, Notice, Outcome
 from rigidimeter.settings import Settings, parse_settings
@@ -26,8 +26,11 @@ def is_session(path: Path) -> bool:
 
 def session_settings(folder: Path) -> Settings:
     """Return the settings a session was recorded with."""
-    manifest = read_manifest(folder)
-    return parse_settings(manifest["settings"], source=f"{folder}/manifest.json, settings")
+    return _settings(folder, read_manifest(folder))
+
+
+def _settings(folder: Path, manifest: Mapping[str, Any]) -> Settings:
+    return parse_settings(manifest["settings"], source=f"{folder}/{MANIFEST}, settings")
 
 
 def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
@@ -41,15 +44,11 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
     UserError
         If a file of the folder is missing or unreadable.
     """
-    manifest = read_manifest(folder)
-    settings = session_settings(folder)
-    for name in (SAMPLES, EVENTS):
-        if not (folder / name).is_file():
-            raise UserError(f"{folder}: the session has no {name}")
-    samples = read_samples(folder / SAMPLES)
-    events, _ = read_events(folder / EVENTS)
-    notices: list[Notice] = []
-    if not any(event.get("event") == "session_ended" for event in events):
+    files = read_session_files(folder)
+    manifest, samples, events = files.manifest, files.samples.columns, files.log.events
+    settings = _settings(folder, manifest)
+    notices = _damage(folder, files)
+    if files.ended is None:
         notices.append(
             Notice(
                 "warning",
@@ -78,16 +77,15 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
                 Notice(level, f"{folder}, epoch {event['label']}: no sample was written")
             )
             continue
+        rows = slice(first[number], last[number] + 1)
         if closed_well:
-            missing_s = ended[number]["time_s"] - float(samples["time_s"][last[number]])
-            if missing_s > 1.5 / settings.rig.tick_rate_hz:
-                lost = (
-                    f"its last {missing_s:.3g} s are missing; {SAMPLES} breaks off at "
-                    f"{samples['time_s'][-1]:.3f} s"
-                )
+            lost = _lost_of(files, rows, event, ended[number], 1.5 / settings.rig.tick_rate_hz)
+            if lost:
                 notices.append(Notice("error", f"{folder}, epoch {event['label']}: {lost}"))
                 ended[number] = {"outcome": "fail", "reason": lost}
-        rows = slice(first[number], last[number] + 1)
+        elif number not in ended and files.ended and files.log.damaged:
+            line = f"line {files.log.damaged[0]} of {EVENTS} is damaged"
+            ended[number] = {"outcome": "fail", "reason": f"how it ended is not known: {line}"}
         share = float(np.mean(samples["limited"][rows] > 0))
         if share > MUCH_LIMITED:
             notices.append(
@@ -104,7 +102,50 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
         for number in first
         if number not in seen
     ]
+    cut = files.ended and not files.samples.stream.closed
+    if cut and not any(notice.level == "error" for notice in notices):
+        text = f"{folder}/{SAMPLES}: its end is damaged or missing, but no sample of an epoch is"
+        notices.append(Notice("warning", text))
     return epochs, notices
+
+
+def _damage(folder: Path, files: SessionFiles) -> list[Notice]:
+    """Name what is damaged; the rest is read."""
+    said = [f"{SAMPLES}: {lost} is damaged and left out" for lost in files.samples.lost]
+    stream = files.samples.stream
+    if stream.gaps and not said:
+        damaged = sum(gap.stop - gap.start for gap in stream.gaps)
+        said = [f"{SAMPLES}: {damaged} bytes are damaged, but no sample is lost"]
+    said += [f"{EVENTS}: line {n} is damaged and left out" for n in files.log.damaged]
+    return [Notice("error", f"{folder}/{text}") for text in said]
+
+
+def _lost_of(
+    files: SessionFiles,
+    rows: slice,
+    started: Mapping[str, Any],
+    ended: Mapping[str, Any],
+    most_s: float,
+) -> str:
+    """Return what an epoch that was closed with success has lost, empty if nothing.
+
+    Its events say when it began and ended; a sample may be so many seconds away from that.
+    """
+    time_s = files.samples.columns["time_s"]
+    began_s = started.get("time_s")
+    at_start = not isinstance(began_s, int | float) or time_s[rows.start] - began_s > most_s
+    missing_s = ended["time_s"] - float(time_s[rows.stop - 1])
+    at_end = missing_s > most_s
+    for lost in files.samples.lost:
+        if (
+            rows.start < lost.row < rows.stop
+            or (at_start and lost.row == rows.start)
+            or (at_end and lost.row == rows.stop)
+        ):
+            return f"{lost} of {SAMPLES} is damaged"
+    if at_end:
+        return f"its last {missing_s:.3g} s are missing; {SAMPLES} breaks off at {time_s[-1]:.3f} s"
+    return ""
 
 
 def _extents(number: NDArray[Any]) -> tuple[dict[int, int], dict[int, int]]:
@@ -121,7 +162,7 @@ def _extents(number: NDArray[Any]) -> tuple[dict[int, int], dict[int, int]]:
 def _epoch(
     folder: Path,
     settings: Settings,
-    manifest: dict[str, Any],
+    manifest: Mapping[str, Any],
     samples: dict[str, NDArray[Any]],
     rows: slice,
     started: dict[str, Any],

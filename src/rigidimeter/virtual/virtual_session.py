@@ -14,7 +14,6 @@ import numpy as np
 from rigidimeter.acquisition import DeadlineClock, SimulatedClock
 from rigidimeter.acquisition.session_run import SessionResult, run_session
 from rigidimeter.devices import SimulatedRig
-from rigidimeter.documents import read_json, write_json
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import PlannedEpoch, plan
 from rigidimeter.recording import Recording, SessionWriter, read
@@ -103,9 +102,9 @@ def run_virtual_session(
         [asdict(epoch) for epoch in protocol.epochs],
         {"session": settings.seed},
         virtual=True,
+        created_utc=created_utc,
+        repeatable=not real_time,
     )
-    if created_utc:
-        _date(folder / "manifest.json", created_utc)
 
     def new_joint(planned: PlannedEpoch) -> dict[str, Any]:
         return {"true_joint": asdict(rig.new_epoch(settings.subject[planned.condition]))}
@@ -119,9 +118,3 @@ def run_virtual_session(
         before_epoch=new_joint,
         progress=progress,
     )
-
-
-def _date(manifest: Path, created_utc: str) -> None:
-    """Put the planned date into a manifest, before the session begins."""
-    values = read_json(manifest) | {"created_utc": created_utc}
-    write_json(manifest, values)

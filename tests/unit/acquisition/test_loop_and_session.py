@@ -16,7 +16,7 @@ from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.devices import Reading, SimulatedRig
 from rigidimeter.experiment import plan
 from rigidimeter.recording import SessionWriter
-from rigidimeter.recording.sample_log import read_samples
+from rigidimeter.recording.sample_reading import read_samples
 from rigidimeter.settings import parse_settings
 
 SETTINGS = parse_settings(

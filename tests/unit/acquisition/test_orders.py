@@ -14,7 +14,7 @@ from rigidimeter.devices import SimulatedRig
 from rigidimeter.experiment import plan, prbs_nm
 from rigidimeter.guard import Cause
 from rigidimeter.recording import SessionWriter
-from rigidimeter.recording.sample_log import read_samples
+from rigidimeter.recording.sample_reading import read_samples
 from rigidimeter.settings import parse_settings
 
 VALUES = {

@@ -12,7 +12,8 @@ from rigidimeter.acquisition.processes.sink import RingSink
 from rigidimeter.errors import UserError
 from rigidimeter.recording import session_folder as folder_module
 from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_log import Sample, append_line, read_samples
+from rigidimeter.recording.sample_log import Sample, append_line
+from rigidimeter.recording.sample_reading import read_samples
 from rigidimeter.settings import Settings
 
 RATE_HZ = 1000.0

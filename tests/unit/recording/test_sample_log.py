@@ -10,10 +10,9 @@ from rigidimeter.recording.sample_log import (
     SAMPLE_UNITS,
     Sample,
     SampleLog,
-    read_samples,
     sample_dtypes,
-    stream_extent,
 )
+from rigidimeter.recording.sample_reading import read_samples, scan_samples
 
 
 def sample(k):
@@ -59,9 +58,10 @@ def test_a_stream_cut_anywhere_gives_its_whole_batches(tmp_path, share):
     n = len(read_samples(path)["tick"])
     assert n % 100 == 0
     assert n >= int(share * 2000) - 200
-    extent, closed = stream_extent(path)
-    assert extent <= path.stat().st_size
-    assert not closed
+    stream = scan_samples(path.read_bytes(), path).stream
+    assert stream.stop <= path.stat().st_size
+    assert not stream.closed
+    assert not stream.gaps
 
 
 def test_a_recording_is_never_written_over(tmp_path):

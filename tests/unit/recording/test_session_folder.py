@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pyarrow as pa
 import pytest
+from tests.version_1 import as_version_1
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import (
@@ -12,7 +13,8 @@ from rigidimeter.recording import (
     recover,
     session_settings,
 )
-from rigidimeter.recording.sample_log import SAMPLE_UNITS, read_samples
+from rigidimeter.recording.sample_log import SAMPLE_UNITS
+from rigidimeter.recording.sample_reading import read_samples
 from rigidimeter.settings import Settings
 
 
@@ -185,8 +187,8 @@ def test_a_manifest_that_lost_a_key_is_named(simulate, key):
         ('"task": "prbs"', '"task": "dance"', "task is 'dance'"),
     ],
 )
-def test_a_damaged_event_is_named(simulate, old, new, words):
-    folder = simulate()
+def test_a_damaged_event_of_version_1_is_named(simulate, old, new, words):
+    folder = as_version_1(simulate())
     text = (folder / "events.jsonl").read_text()
     assert old in text
     (folder / "events.jsonl").write_text(text.replace(old, new, 1))

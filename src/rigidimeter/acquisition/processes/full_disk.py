@@ -22,7 +22,8 @@ from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Rol
 from rigidimeter.documents import json_line
 from rigidimeter.errors import UserError
 from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_log import BATCH_S, read_samples
+from rigidimeter.recording.sample_log import BATCH_S
+from rigidimeter.recording.sample_reading import read_samples
 from rigidimeter.recording.session_folder import EVENTS, SAMPLES, SessionWriter
 
 SAID_S = 5.0

@@ -2,8 +2,8 @@
 
 A ring keeps what the recorder had not written, and some of what it had. Which of the two a row is
 the file itself says, by the last tick in a whole batch, so nothing is written twice and nothing
-left out, wherever the recorder was killed. The samples are written anew to a file beside the old
-one, which then takes its place; a fault half-way leaves the old one as it was.
+left out, wherever the recorder was killed. The samples are added to a copy of the file, which then
+takes its place; a fault half-way leaves the old one as it was.
 
 Whoever is left does it, once the recorder has ended or was ended (`complete`).
 """
@@ -15,7 +15,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +25,10 @@ from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import Condition, Role
 from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 from rigidimeter.errors import UserError
-from rigidimeter.recording.event_log import append_event, read_events
-from rigidimeter.recording.recovery import recover
-from rigidimeter.recording.sample_log import BATCH_S, SampleLog, append_line, read_samples
+from rigidimeter.recording.event_log import append_event, checked_line, read_events
+from rigidimeter.recording.recovery import close_files
+from rigidimeter.recording.sample_log import BATCH_S, SampleLog, append_line
+from rigidimeter.recording.sample_reading import scan_samples
 from rigidimeter.recording.session_folder import EVENTS, SAMPLES, lock, read_manifest
 
 
@@ -65,7 +65,7 @@ def recover_from_rings(
         If the disk does not take it.
     """
     samples, events = shared.samples, shared.events
-    read_manifest(folder)
+    session_id = str(read_manifest(folder).get("session_id", ""))
     path = folder / EVENTS
     with path.open("ab", buffering=0) as file:
         if not lock(file):
@@ -75,8 +75,8 @@ def recover_from_rings(
             content = path.read_bytes()
             file.truncate(content.rfind(b"\n") + 1)
         was_closed = any(event.get("event") == "session_ended" for event in known)
-        added = _samples(folder / SAMPLES, samples, tick_rate_hz)
-        lines = _lines(path, events)
+        added = _samples(folder / SAMPLES, samples, tick_rate_hz, session_id)
+        lines = _lines(path, events, session_id)
         if (added or lines or torn or not was_closed) and not was_closed:
             append_event(
                 file,
@@ -87,12 +87,13 @@ def recover_from_rings(
                     "missing_samples": samples.refused,
                     "reason": reason,
                 },
+                session_id,
             )
         for line in lines:
             append_line(file, line)
             events.recorded += 1
         os.fsync(file.fileno())
-    recover(folder, reason)
+    close_files(folder, reason, force=True)
     return Recovered(added, len(lines), samples.refused)
 
 
@@ -151,17 +152,25 @@ def complete(
     return remarks
 
 
-def _samples(path: Path, ring: SampleRing, tick_rate_hz: float) -> int:
+def _samples(path: Path, ring: SampleRing, tick_rate_hz: float, session_id: str) -> int:
     """Add the rows that the file has not; return how many."""
-    before = read_samples(path) if path.is_file() else None
+    content = path.read_bytes() if path.is_file() else b""
+    before = scan_samples(content, path)
     rows = ring.kept()
-    if before is not None and before["tick"].size:
-        rows = rows[rows["tick"] > before["tick"][-1]]
+    if before.columns["tick"].size:
+        rows = rows[rows["tick"] > before.columns["tick"][-1]]
     if rows.size:
         part = path.with_name(f"{path.name}.part")
         part.unlink(missing_ok=True)
         try:
-            _write_anew(part, before, rows, tick_rate_hz)
+            log = SampleLog(
+                part,
+                tick_rate_hz,
+                session_id,
+                before=content[: before.stream.stop],
+                first_batch=before.next_batch,
+            )
+            _append(log, rows, tick_rate_hz)
             part.replace(path)
         except OSError:
             part.unlink(missing_ok=True)  # on a disk that is full it would take what room there is
@@ -170,22 +179,11 @@ def _samples(path: Path, ring: SampleRing, tick_rate_hz: float) -> int:
     return int(rows.size)
 
 
-def _write_anew(
-    part: Path,
-    before: dict[str, NDArray[Any]] | None,
-    rows: NDArray[np.void],
-    tick_rate_hz: float,
-) -> None:
-    """Write what a file had, and the rows after it, to another file."""
-    log = SampleLog(part, tick_rate_hz)
+def _append(log: SampleLog, rows: NDArray[np.void], tick_rate_hz: float) -> None:
+    """Write rows, and put them on the disk."""
     try:
         # Batches stay short: a reader may look at one at a time.
         batch = max(1, int(BATCH_S * tick_rate_hz))
-        if before is not None:
-            for first in range(0, before["tick"].size, 100 * batch):
-                log.append_columns(
-                    {name: column[first : first + 100 * batch] for name, column in before.items()}
-                )
         for first in range(0, rows.size, batch):
             some = rows[first : first + batch]
             log.append_columns({name: some[name] for name in _names()})
@@ -197,12 +195,15 @@ def _write_anew(
     log.close()
 
 
-def _lines(path: Path, ring: EventRing) -> list[bytes]:
+def _lines(path: Path, ring: EventRing, session_id: str) -> list[bytes]:
     """Return the lines that the file has not.
 
     The cursor moves after each line, so only the first can be in the file already.
     """
-    waiting = [ring.get(number).line for number in range(ring.recorded, ring.written)]
+    waiting = [
+        checked_line(ring.get(number).line, session_id)
+        for number in range(ring.recorded, ring.written)
+    ]
     if waiting and waiting[0] in path.read_bytes().splitlines(keepends=True)[-4:]:
         ring.recorded += 1
         return waiting[1:]

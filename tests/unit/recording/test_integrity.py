@@ -1,0 +1,216 @@
+"""Damage within the files of a session: noticed, named, and no more lost than is damaged."""
+
+import json
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from tests.version_1 import as_version_1
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording import read_session, session_settings
+from rigidimeter.recording.checksum import FIELD, ZEROS, checksum_holds, with_checksum
+from rigidimeter.recording.event_log import read_events, scan_events
+from rigidimeter.recording.sample_log import SampleLog, sample_dtypes
+from rigidimeter.recording.sample_reading import read_samples, scan_samples
+
+BATCH = 100
+
+
+def flip(path, bit):
+    content = bytearray(path.read_bytes())
+    content[bit // 8] ^= 1 << bit % 8
+    path.write_bytes(bytes(content))
+
+
+def stream(path, n_batches=6, session_id="a" * 16, **options):
+    log = SampleLog(path, 1000.0, session_id, **options)
+    for k in range(n_batches):
+        rows = {name: np.arange(BATCH).astype(dtype) for name, dtype in sample_dtypes().items()}
+        rows["tick"] = rows["tick"] + k * BATCH
+        log.append_columns(rows)
+    log.close()
+    return scan_samples(path.read_bytes(), path)
+
+
+def test_a_checksum_covers_every_bit_and_its_context():
+    line = with_checksum(b"{" + FIELD + ZEROS.encode() + b'", "event": "a"}', b"context")
+    assert checksum_holds(line, b"context")
+    assert not checksum_holds(line, b"contexts")
+    for bit in range(8 * len(line)):
+        damaged = bytearray(line)
+        damaged[bit // 8] ^= 1 << bit % 8
+        assert not checksum_holds(bytes(damaged), b"context")
+
+
+def test_any_reader_of_arrow_reads_the_stream(tmp_path):
+    stream(tmp_path / "s.arrows")
+    table = pa.ipc.open_stream((tmp_path / "s.arrows").read_bytes()).read_all()
+    assert table.num_rows == 6 * BATCH
+    facts = json.loads(table.schema.metadata[b"rigidimeter"])
+    assert facts["session_id"] == "a" * 16
+
+
+@pytest.mark.parametrize("where", ["marker", "metadata length", "metadata", "body"])
+@pytest.mark.parametrize("batch", [0, 2, 5])
+def test_a_damaged_batch_is_named_and_the_others_are_read(tmp_path, batch, where):
+    path = tmp_path / "s.arrows"
+    message = stream(path).stream.batches[batch]
+    byte = message.start + {"marker": 1, "metadata length": 6, "metadata": 60, "body": 2000}[where]
+    flip(path, 8 * byte + 3)
+    found = scan_samples(path.read_bytes(), path)
+    ticks = np.arange(6 * BATCH)
+    np.testing.assert_array_equal(found.columns["tick"], ticks[ticks // BATCH != batch])
+    assert found.columns["angle_rad"].size == 5 * BATCH
+    (lost,) = found.lost
+    first = batch * BATCH
+    words = f"batch {batch} (ticks {first} to {first + BATCH - 1})"
+    if batch == 5:
+        words = f"batch 5 and what follows it (from tick {first} on)"
+    assert str(lost) == words
+    assert found.stream.closed
+
+
+def test_a_damaged_schema_loses_no_sample(tmp_path):
+    path = tmp_path / "s.arrows"
+    stream(path)
+    flip(path, 8 * 100)
+    found = scan_samples(path.read_bytes(), path)
+    assert found.columns["tick"].size == 6 * BATCH
+    assert not found.lost
+    assert found.stream.gaps
+    assert found.session_ids == ("a" * 16,)
+
+
+def test_a_batch_that_is_cut_out_is_missed_by_its_number(tmp_path):
+    path = tmp_path / "s.arrows"
+    message = stream(path).stream.batches[3]
+    content = path.read_bytes()
+    path.write_bytes(content[: message.start] + content[message.stop :])
+    found = scan_samples(path.read_bytes(), path)
+    assert [str(lost) for lost in found.lost] == ["batch 3 (ticks 300 to 399)"]
+
+
+def test_a_zeroed_block_loses_the_batches_it_touches(tmp_path):
+    path = tmp_path / "s.arrows"
+    message = stream(path).stream.batches[2]
+    content = bytearray(path.read_bytes())
+    content[message.start - 32 : message.start + 32] = bytes(64)
+    path.write_bytes(bytes(content))
+    found = scan_samples(path.read_bytes(), path)
+    assert [str(lost) for lost in found.lost] == ["batches 1 to 2 (ticks 100 to 299)"]
+
+
+def test_an_epoch_that_touches_damage_is_excluded_and_the_others_are_not(simulate):
+    folder = simulate(epochs=3)
+    path = folder / "samples.arrows"
+    whole, _ = read_session(folder)
+    found = scan_samples(path.read_bytes(), path)
+    row = int(np.flatnonzero(found.columns["epoch"] == 2)[5000])
+    batch = next(m for m in found.stream.batches if m.facts["batch"] == row // BATCH)
+    flip(path, 8 * (batch.stop - 500))
+    epochs, notices = read_session(folder)
+    assert [epoch.closed.kind for epoch in epochs] == ["included", "excluded", "included"]
+    assert f"batch {row // BATCH} (ticks " in epochs[1].closed.reason
+    assert [notice.level for notice in notices] == ["error", "error"]
+    for k in (0, 2):
+        np.testing.assert_array_equal(
+            epochs[k].channels["torque_nm"].values, whole[k].channels["torque_nm"].values
+        )
+
+
+def test_damage_in_a_rest_excludes_no_epoch(simulate):
+    folder = simulate(epochs=2)
+    path = folder / "samples.arrows"
+    found = scan_samples(path.read_bytes(), path)
+    epoch, ends = found.columns["epoch"], np.cumsum([BATCH] * len(found.stream.batches))
+    resting = [k for k, end in enumerate(ends) if (epoch[end - BATCH : end] == -1).all()]
+    flip(path, 8 * (found.stream.batches[resting[1]].stop - 500))
+    epochs, notices = read_session(folder)
+    assert [epoch.closed.kind for epoch in epochs] == ["included", "included"]
+    assert [notice.level for notice in notices] == ["error"]
+
+
+def test_a_damaged_line_of_events_is_named_and_the_others_count(simulate):
+    folder = simulate(epochs=2)
+    events = folder / "events.jsonl"
+    text = events.read_text()
+    at = text.index("epoch_ended")
+    flip(events, 8 * at)
+    epochs, notices = read_session(folder)
+    assert [epoch.closed.kind for epoch in epochs] == ["excluded", "included"]
+    assert "line 3 of events.jsonl is damaged" in epochs[0].closed.reason
+    assert "line 3 is damaged" in notices[0].text
+    log = scan_events(events.read_bytes(), events)
+    assert log.damaged == (3,)
+    assert len(log.events) == 5
+
+
+def test_a_damaged_manifest_is_refused(simulate):
+    folder = simulate()
+    path = folder / "manifest.json"
+    path.write_text(path.read_text().replace('"band_low_hz"', '"band_low_hz" ', 1))
+    with pytest.raises(UserError, match=r"manifest\.json: is damaged or was changed"):
+        read_session(folder)
+    with pytest.raises(UserError, match=r"manifest\.json: is damaged or was changed"):
+        session_settings(folder)
+
+
+@pytest.mark.parametrize("name", ["samples.arrows", "events.jsonl", "manifest.json"])
+def test_files_of_two_sessions_are_refused(simulate, name):
+    one, two = simulate(name="a"), simulate(name="b", seed=2)
+    ids = [json.loads((f / "manifest.json").read_text())["session_id"] for f in (one, two)]
+    (one / name).write_bytes((two / name).read_bytes())
+    with pytest.raises(UserError, match="put back the files of one session") as refused:
+        read_session(one)
+    assert all(session_id in str(refused.value) for session_id in ids)
+
+
+@pytest.mark.parametrize("name", ["samples.arrows", "events.jsonl"])
+def test_a_file_without_an_id_is_refused_in_a_session_with_one(simulate, name):
+    one, two = simulate(name="a"), as_version_1(simulate(name="b"))
+    (one / name).write_bytes((two / name).read_bytes())
+    with pytest.raises(UserError, match="a session without an id"):
+        read_session(one)
+
+
+def test_version_1_gives_the_same_numbers(simulate):
+    folder = simulate(epochs=2)
+    epochs, _ = read_session(folder)
+    old, notices = read_session(as_version_1(folder))
+    assert not notices
+    for before, after in zip(epochs, old, strict=True):
+        assert (before.label, before.closed) == (after.label, after.closed)
+        for name, channel in before.channels.items():
+            np.testing.assert_array_equal(channel.values, after.channels[name].values)
+
+
+def test_version_1_passes_over_a_batch_that_cannot_be_decoded(simulate):
+    folder = as_version_1(simulate())
+    path = folder / "samples.arrows"
+    found = scan_samples(path.read_bytes(), path)
+    assert not found.stream.checked
+    n = found.columns["tick"].size
+    content = bytearray(path.read_bytes())
+    content[found.stream.batches[7].start : found.stream.batches[7].start + 64] = bytes(64)
+    path.write_bytes(bytes(content))
+    found = scan_samples(path.read_bytes(), path)
+    assert found.columns["tick"].size == n - BATCH
+    assert [str(lost) for lost in found.lost] == ["batch 7 (ticks 700 to 799)"]
+
+
+def test_a_stream_that_is_continued_goes_on_counting(tmp_path):
+    path = tmp_path / "s.arrows"
+    found = stream(path)
+    before = path.read_bytes()[: found.stream.stop]
+    stream(tmp_path / "t.arrows", 2, before=before, first_batch=found.next_batch)
+    again = scan_samples((tmp_path / "t.arrows").read_bytes(), path)
+    assert [m.facts["batch"] for m in again.stream.batches] == list(range(8))
+    assert not again.lost
+    assert read_samples(tmp_path / "t.arrows")["tick"].size == 8 * BATCH
+
+
+def test_events_are_read_without_what_protects_them(simulate):
+    events, torn = read_events(simulate() / "events.jsonl")
+    assert not torn
+    assert not any({"checksum", "session_id"} & event.keys() for event in events)
