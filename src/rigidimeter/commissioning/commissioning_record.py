@@ -1,27 +1,32 @@
 """The commissioning record: what was checked on which rig, for which controller, and how it went.
 
-`RIG.commissioned.json` lies beside `RIG.toml`. Its digest is a seal against accidents, a file that
-was edited or cut short; it is no signature and keeps nobody from forging one. What it holds for is
-said by `coverage`.
+`RIG.commissioned.json` lies beside `RIG.toml`, sealed. What it holds for is said by `coverage`.
 
 A rig of hardware asks for more than an emulated one: what only a person can tell, and a name.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from rigidimeter.commissioning.checks import Check
-from rigidimeter.documents import plain_values, read_json, write_json
-from rigidimeter.errors import UserError
+from rigidimeter.commissioning.sealed_record import (
+    RecordKind,
+    digest,
+    read_sealed,
+    write_sealed,
+)
+from rigidimeter.documents import plain_values
 
-SCHEMA = "rigidimeter.commissioning/1"
+KIND = RecordKind(
+    "rigidimeter.commissioning/1",
+    "commissioning record",
+    "rigidimeter commission",
+    "commission again",
+)
 
 MUST_PASS = (
     "devices read back",
@@ -88,7 +93,12 @@ class CommissioningRecord:
     made_utc: str
     signed_by: str = ""
     emulated: bool = False
-    schema: str = field(default=SCHEMA)
+    schema: str = field(default=KIND.schema)
+
+    @property
+    def digest(self) -> str:
+        """Its seal, by which a daily check names the record that it belongs to."""
+        return digest(plain_values(_values(self)))
 
     @property
     def failed(self) -> tuple[Check, ...]:
@@ -139,9 +149,7 @@ def record_path(rig: Path) -> Path:
 
 def write_record(path: Path, record: CommissioningRecord) -> None:
     """Write the record with its digest; a failed write leaves the old record."""
-    values = plain_values({**asdict(record), "passed": record.passed})
-    values["digest"] = _digest(values)
-    write_json(path, values)
+    write_sealed(path, _values(record))
 
 
 def read_record(path: Path) -> CommissioningRecord:
@@ -152,35 +160,14 @@ def read_record(path: Path) -> CommissioningRecord:
     UserError
         If there is none, it is something else, or it was changed since it was written.
     """
-    if not path.exists():
-        raise UserError(f"{path}: there is no such record; make it with `rigidimeter commission`")
-    try:
-        values = read_json(path)
-    except UserError as error:
-        raise UserError(f"{error}; a commissioning record was expected") from None
-    if not isinstance(values, dict) or values.get("schema") != SCHEMA:
-        raise UserError(f"{path}: is no commissioning record of the schema {SCHEMA}")
-    if values.pop("digest", None) != _digest(values):
-        raise UserError(
-            f"{path}: was changed since it was written (its digest differs); commission again"
-        )
-    try:
-        values.pop("passed")
-        values["checks"] = tuple(Check(**check) for check in values["checks"])
-        record = CommissioningRecord(**values)
-        made = datetime.fromisoformat(record.made_utc)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise UserError(
-            f"{path}: was written by another version of rigidimeter, "
-            f"{values.get('software', 'which it does not say')} ({error}); commission again"
-        ) from None
-    if made.tzinfo is None:
-        raise UserError(
-            f"{path}: made_utc = {record.made_utc!r} names no time zone; commission again"
-        )
-    return record
+    return read_sealed(path, KIND, _record)
 
 
-def _digest(values: Mapping[str, Any]) -> str:
-    text = json.dumps(values, sort_keys=True, ensure_ascii=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+def _values(record: CommissioningRecord) -> dict[str, Any]:
+    return {**asdict(record), "passed": record.passed}
+
+
+def _record(values: dict[str, Any]) -> CommissioningRecord:
+    kept = {name: value for name, value in values.items() if name != "passed"}
+    kept["checks"] = tuple(Check(**check) for check in values["checks"])
+    return CommissioningRecord(**kept)

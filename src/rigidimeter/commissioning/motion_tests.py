@@ -27,6 +27,7 @@ from rigidimeter.settings import Settings
 from rigidimeter.units import rad_from_deg
 
 ANGLE_PER_COMMAND, COMPLETED = "angle per command", "motions were completed"
+VELOCITY_PER_ANGLE = "velocity per change of angle"
 SMALL_MOVE_PERCENT = 30.0
 EXPLAINED = 0.5
 """A torque of which an arm explains less than this share shows no arm."""
@@ -60,7 +61,13 @@ def steps(settings: Settings) -> Array:
 
 
 def small_move_check(result: TrialResult, settings: Settings) -> Check:
-    """Check direction and rough scale of the first motion."""
+    """Check direction and rough scale of the first motion, and its velocity if that ended it."""
+    if result.cause is Cause.VELOCITY_WRONG:
+        apart = _velocity_check(result.readings, settings)
+        if not apart.passed:
+            return apart
+        words = stopped_for(result.cause)
+        return yes(apart.name, False, words, apart.limit, _VELOCITY_REMEDY)
     found = following(result.readings, settings.rig.drive_damping_ratio)
     check = within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, SMALL_MOVE_PERCENT, _SCALE_REMEDY)
     if result.cause is Cause.NONE:
@@ -85,14 +92,7 @@ def swing_checks(result: TrialResult, settings: Settings) -> tuple[list[Check], 
             _REASON_REMEDY,
         ),
         within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, percent, _SCALE_REMEDY),
-        within(
-            "velocity per change of angle",
-            velocity_scale(readings),
-            "1",
-            1.0,
-            percent,
-            "sign or units of the velocity in the rig file are not those of the angle",
-        ),
+        _velocity_check(readings, settings),
         below(
             "following error",
             math.degrees(found.worst_rad),
@@ -102,6 +102,12 @@ def swing_checks(result: TrialResult, settings: Settings) -> tuple[list[Check], 
         ),
     ]
     return checks, found
+
+
+def _velocity_check(readings: Readings, settings: Settings) -> Check:
+    percent = settings.commissioning.scale_tolerance_percent
+    found = velocity_scale(readings)
+    return within(VELOCITY_PER_ANGLE, found, "1", 1.0, percent, _VELOCITY_REMEDY)
 
 
 def torque_sign(
@@ -173,7 +179,8 @@ def drift_check(readings: Readings, limit_deg: float) -> Check:
     )
 
 
-_REASON_REMEDY = "remove the reason and commission again"
+_REASON_REMEDY = "remove the reason and try again"
+_VELOCITY_REMEDY = "sign or units of the velocity in the rig file are not those of the angle"
 _NOT_AS_COMMANDED = (Cause.POSITION_LIMIT_EXCEEDED, Cause.NOT_FOLLOWING, Cause.OVERSPEED)
 """What the guard stops for where sign or scale are wrong."""
 _SCALE_REMEDY = (

@@ -90,7 +90,7 @@ def following(
         return _line(model(bandwidth_hz)(at_s - delay_s), angle)
 
     if highest_hz is None:
-        delay_s = _least(lambda d: fitted(math.inf, d)[1], 0.0, LONGEST_S)
+        delay_s = least(lambda d: fitted(math.inf, d)[1], 0.0, LONGEST_S)
         scale, _, worst = fitted(math.inf, delay_s)
         return Following(scale, delay_s, math.inf, worst)
 
@@ -99,7 +99,7 @@ def following(
     log_highest = math.log(highest_hz)
 
     def best_delay_s(bandwidth_hz: float) -> float:
-        return _least(lambda d: fitted(bandwidth_hz, d)[1], 0.0, LONGEST_DRIVE_S, 0.01, 1)
+        return least(lambda d: fitted(bandwidth_hz, d)[1], 0.0, LONGEST_DRIVE_S, 0.01, 1)
 
     pairs = [(float(f), best_delay_s(float(f))) for f in np.geomspace(1.0, highest_hz, 12)]
     start = min(pairs, key=lambda pair: fitted(*pair)[1])
@@ -175,12 +175,12 @@ def fit_arm(
         motion = [np.interp(then, grid, x) for x in (acceleration, velocity, angle)]
         return np.stack([*motion, np.ones_like(then)], axis=1)
 
-    solve = _solve_positive if resists else _solve
+    solve = _solve_positive if resists else least_squares
 
     def left(delay_s: float) -> float:
         return solve(columns(delay_s), torque)[1]
 
-    delay_s = _least(left, 0.0, LONGEST_S)
+    delay_s = least(left, 0.0, LONGEST_S)
     table = columns(delay_s)
     (J, B, K), unexplained = solve(table, torque)[0][:3], left(delay_s)
     whole = float(np.sum((torque - torque.mean()) ** 2))
@@ -212,7 +212,7 @@ def _line(x: Array, y: Array) -> tuple[float, float, float]:
     return slope, float(rest @ rest), float(np.max(np.abs(rest)))
 
 
-def _solve(table: Array, y: Array) -> tuple[Array, float]:
+def least_squares(table: Array, y: Array) -> tuple[Array, float]:
     """Return least-squares coefficients and the sum of the squares left; columns are scaled."""
     size = np.linalg.norm(table, axis=0)
     size[size == 0.0] = 1.0
@@ -229,7 +229,7 @@ def _solve_positive(table: Array, y: Array) -> tuple[Array, float]:
     return found / size, float(left) ** 2
 
 
-def _least(
+def least(
     measure: Callable[[float], float],
     low: float,
     high: float,

@@ -16,69 +16,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
-from rigidimeter.commissioning.checks import Check, impossible, yes
+from rigidimeter.commissioning.checks import yes
 from rigidimeter.commissioning.commissioning_record import CommissioningRecord
 from rigidimeter.commissioning.coverage import covered, kept_facts
+from rigidimeter.commissioning.first_steps import SETTLE_S, Findings, at_rest, move, small_move
 from rigidimeter.commissioning.manual_checks import ask_operator, known_angle, known_torque
 from rigidimeter.commissioning.margins import margin_checks
 from rigidimeter.commissioning.motion_tests import (
     ANGLE_PER_COMMAND,
     COMPLETED,
-    drift_check,
-    small_move_check,
     step_checks,
     steps,
     swing,
     swing_checks,
     torque_sign,
 )
-from rigidimeter.commissioning.static_tests import (
-    facts_checks,
-    lateness,
-    lost_check,
-    noise_checks,
-    rate_checks,
-)
+from rigidimeter.commissioning.static_tests import facts_checks
 from rigidimeter.commissioning.stopping import emergency_stop_checks, watchdog_checks
-from rigidimeter.commissioning.trial import (
-    Array,
-    Operator,
-    Setup,
-    Timebase,
-    TrialResult,
-    drop_old_samples,
-    follow,
-    hold,
-    listen,
-    trial,
-)
+from rigidimeter.commissioning.trial import Operator, Setup, Timebase
 from rigidimeter.devices.base import DeviceError, Rig
 from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
-
-SETTLE_S = 0.5
-
-
-@dataclass
-class _Findings:
-    """What came of the trials so far."""
-
-    checks: list[Check] = field(default_factory=list)
-    numbers: dict[str, float] = field(default_factory=dict)
-
-    def none_failed(self) -> bool:
-        """Whether no check failed."""
-        return not any(check.outcome == "failed" for check in self.checks)
-
-    def refrain(self, why: str) -> None:
-        """Say of the rest that it was not tried."""
-        self.checks.append(impossible("everything after this", "tried", why))
 
 
 def commission(
@@ -111,7 +72,7 @@ def commission(
         For the record.
     """
     setup = Setup(rig, settings, time, operator)
-    found = _Findings()
+    found = Findings()
     facts: Mapping[str, Any] = {}
     name, limit = "devices read back", "what the rig file says"
     try:
@@ -137,10 +98,11 @@ def commission(
     )
 
 
-def _try_all(setup: Setup, found: _Findings, facts: Mapping[str, Any]) -> None:
+def _try_all(setup: Setup, found: Findings, facts: Mapping[str, Any]) -> None:
     operator, limits = setup.operator, setup.limits
     found.checks += facts_checks(facts, setup.settings)
-    _without_power(setup, found)
+    at_rest(setup, found, limits.idle_s)
+    _by_hand(setup, found)
     if not found.none_failed():
         found.refrain("a check without power failed; put that right first")
         return
@@ -151,7 +113,7 @@ def _try_all(setup: Setup, found: _Findings, facts: Mapping[str, Any]) -> None:
     ):
         found.refrain("the operator did not agree to it")
         return
-    if not (_small_move(setup, found) and _swing(setup, found) and _steps(setup, found)):
+    if not (small_move(setup, found, SETTLE_S) and _swing(setup, found) and _steps(setup, found)):
         found.refrain("the motions went wrong; put that right first")
         return
     found.checks.append(known_torque(setup))
@@ -160,24 +122,11 @@ def _try_all(setup: Setup, found: _Findings, facts: Mapping[str, Any]) -> None:
     found.checks += emergency_stop_checks(setup)
 
 
-def _without_power(setup: Setup, found: _Findings) -> None:
-    rig, settings, operator, limits = setup.rig, setup.settings, setup.operator, setup.limits
-    operator.say(f"At rest, without power: {limits.idle_s:g} s. Nobody touches the joint.")
-    drop_old_samples(setup)
-    listen(setup, SETTLE_S)  # a drive that was never asked has nothing to say yet
-    before = dict(rig.counts)
-    readings = listen(setup, limits.idle_s)
-    found.checks += rate_checks(
-        "torque", readings.torque_time_s, settings.rig.torque.rate_hz, settings
-    )
-    found.checks.append(lost_check(before, rig.counts, limits.lost_percent))
-    found.checks += noise_checks(readings, settings)
-    found.checks.append(lateness(readings, settings))
-    torque = readings.torque_nm[np.isfinite(readings.torque_nm)]
-    found.numbers["torque_bias_nm"] = float(np.mean(torque)) if len(torque) else 0.0
+def _by_hand(setup: Setup, found: Findings) -> None:
+    """Ask for the mechanical stops and a known angle, without power."""
     found.checks.append(
         ask_operator(
-            operator,
+            setup.operator,
             "mechanical stops",
             "Without power: lead the joint to both ends by hand, and back. Do mechanical stops end "
             "its way on both sides, where a person's arm still bears it?",
@@ -187,38 +136,11 @@ def _without_power(setup: Setup, found: _Findings) -> None:
     found.checks.append(known_angle(setup))
 
 
-def _small_move(setup: Setup, found: _Findings) -> bool:
-    """Give power, then move by a fraction of a degree; return whether that went as told."""
-    settings, limits = setup.settings, setup.limits
-    setup.operator.say(f"A small move of {limits.nudge_deg:g} deg.")
-    at_rest = trial(setup, hold(SETTLE_S))
-    found.checks += rate_checks(
-        "motion", at_rest.readings.motion_time_s, settings.rig.motion.rate_hz, settings
-    )
-    found.checks.append(drift_check(at_rest.readings, 0.5 * limits.nudge_deg))
-    if at_rest.cause is not Cause.NONE:
-        words = at_rest.cause.sentence
-        found.checks.append(yes(COMPLETED, False, words, "yes", "remove the reason"))
-    if not found.none_failed():
-        return False
-    velocity = swing(settings, limits.nudge_deg, 0.2 * limits.swing_speed_deg_s, 1)
-    result = trial(setup, hold(SETTLE_S), follow(velocity, setup.rate_hz))
-    check = small_move_check(result, settings)
-    if not check.passed:
-        found.checks.append(check)
-    return check.passed
-
-
-def _move(setup: Setup, velocity_rad_s: Array) -> TrialResult:
-    """Stand still, move, and stand still."""
-    return trial(setup, hold(SETTLE_S), follow(velocity_rad_s, setup.rate_hz), hold(SETTLE_S))
-
-
-def _swing(setup: Setup, found: _Findings) -> bool:
+def _swing(setup: Setup, found: Findings) -> bool:
     settings, operator, limits = setup.settings, setup.operator, setup.limits
     operator.say(f"Slowly by {limits.swing_deg:g} deg to both sides.")
     velocity = swing(settings, limits.swing_deg, limits.swing_speed_deg_s, limits.swings)
-    swung = _move(setup, velocity)
+    swung = move(setup, velocity)
     checks, followed = swing_checks(swung, settings)
     sign, work_j = torque_sign(swung.readings, settings.rig.drive_damping_ratio, followed.scale)
     found.checks += [*checks, sign]
@@ -239,10 +161,10 @@ def _swing(setup: Setup, found: _Findings) -> bool:
     return seen.outcome != "failed"
 
 
-def _steps(setup: Setup, found: _Findings) -> bool:
+def _steps(setup: Setup, found: Findings) -> bool:
     settings = setup.settings
     setup.operator.say("Small quick steps.")
-    stepped = _move(setup, steps(settings))
+    stepped = move(setup, steps(settings))
     checks, drive, arm = step_checks(stepped, settings)
     delay_s = arm.delay_s if checks[-1].passed else None
     margins, numbers = margin_checks(settings, drive.bandwidth_hz, delay_s)

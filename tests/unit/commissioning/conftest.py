@@ -201,7 +201,7 @@ def commissioned(settings: Settings, rigfile: RigFile, monkeypatch: Any) -> Comm
         **faults: Any,
     ) -> CommissioningRecord:
         time = FakeTime()
-        slept = SimpleNamespace(sleep=lambda s: time.wait_until(time.now() + s))
+        slept = SimpleNamespace(monotonic=time.now, sleep=lambda s: time.wait_until(time.now() + s))
         monkeypatch.setattr("rigidimeter.devices.composed.time", slept)
         push_nm = [0.0]
         arm = EmulatedArm(

@@ -19,8 +19,9 @@ from rigidimeter.commissioning import (
     write_record,
 )
 from rigidimeter.commissioning.checks import untried
-from rigidimeter.commissioning.commissioning_record import A_PERSON_TELLS, MUST_PASS, _digest
+from rigidimeter.commissioning.commissioning_record import A_PERSON_TELLS, MUST_PASS
 from rigidimeter.commissioning.coverage import EXACT, LIMITS, covered, kept_facts
+from rigidimeter.commissioning.sealed_record import digest
 from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings, parse_settings
@@ -220,7 +221,7 @@ def sealed(rigfile: RigFile, changes: dict[str, Any]) -> None:
     path = record_path(rigfile.path)
     values = json.loads(path.read_text(encoding="utf-8")) | changes
     values.pop("digest")
-    path.write_text(json.dumps(values | {"digest": _digest(values)}), encoding="utf-8")
+    path.write_text(json.dumps(values | {"digest": digest(values)}), encoding="utf-8")
 
 
 def test_a_failed_check_is_refused(rigfile: RigFile, record: CommissioningRecord) -> None:
