@@ -17,6 +17,8 @@ Each name is imported when it is first used, so that `import rigidimeter` costs 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -46,9 +48,30 @@ _ROOMS = {
 def __getattr__(name: str) -> Any:
     if name not in _ROOMS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    function = getattr(import_module(_ROOMS[name]), name)
+    function = _for_python(getattr(import_module(_ROOMS[name]), name))
     globals()[name] = function
     return function
+
+
+def _for_python(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the function with messages that name arguments, not options of the command line."""
+    from dataclasses import replace
+
+    from rigidimeter.errors import UserError, arguments_named
+
+    @wraps(function)
+    def called(*values: Any, **named: Any) -> Any:
+        try:
+            found = function(*values, **named)
+        except UserError as error:
+            raise UserError(arguments_named(str(error))) from error.__cause__
+        if not (notices := getattr(found, "notices", ())):
+            return found
+        texts = (arguments_named(notice.text) for notice in notices)
+        told = tuple(replace(one, text=text) for one, text in zip(notices, texts, strict=True))
+        return replace(found, notices=told)
+
+    return called
 
 
 def __dir__() -> list[str]:

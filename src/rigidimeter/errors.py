@@ -1,5 +1,10 @@
 """The one exception that is meant for the person at the keyboard."""
 
+import re
+
+_COLUMN = re.compile(r"--column (?:([a-z_]+)=([^\s',;:)]+)|'([a-z_]+)=([^']+)')")
+_OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
+
 
 class UserError(Exception):
     """Something the user can put right, said in one plain sentence.
@@ -7,3 +12,15 @@ class UserError(Exception):
     The command line prints the sentence and exits with a non-zero status, without a traceback.
     The sentence names the file, the field and the value, and says what would be right.
     """
+
+
+def arguments_named(message: str) -> str:
+    """Return a message with Python's arguments in place of options of the command line.
+
+    Examples
+    --------
+    >>> arguments_named("joint.csv has no column time_s; say --rate-hz or --column time_s=t")
+    "joint.csv has no column time_s; say rate_hz or column={'time_s': 't'}"
+    """
+    text = _COLUMN.sub(r"column={'\1\3': '\2\4'}", message).replace("--reaction", "reaction=True")
+    return _OPTION.sub(lambda found: found[1].replace("-", "_"), text)

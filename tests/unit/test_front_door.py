@@ -6,6 +6,7 @@ import sys
 import pytest
 
 import rigidimeter
+from rigidimeter.errors import UserError, arguments_named
 
 NAMES = {"compare", "design", "estimate", "identify", "read", "report", "simulate"}
 
@@ -21,6 +22,30 @@ def test_each_name_is_a_function_with_a_docstring() -> None:
         assert callable(function)
         assert len((function.__doc__ or "").splitlines()) > 3
         assert getattr(rigidimeter, name) is function
+
+
+def test_messages_name_arguments_and_not_options(tmp_path) -> None:
+    bad, good = tmp_path / "bad.csv", tmp_path / "good.csv"
+    rows = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(4000))
+    bad.write_text("t,torque_nm,angle_rad\n" + rows)
+    good.write_text("time_s,torque_nm,angle_rad\n" + rows)
+    wanted = r"say rate_hz, or .* as in column={'time_s': 't'} "
+    with pytest.raises(UserError, match=wanted) as raised:
+        rigidimeter.read(bad)
+    assert "--" not in str(raised.value)
+    (notice,) = rigidimeter.read([bad, good]).notices
+    assert "say rate_hz" in notice.text
+    assert "--" not in notice.text
+
+
+def test_arguments_in_place_of_options() -> None:
+    for message, expected in {
+        "say --rate-hz": "say rate_hz",
+        "a sensor that needs --reaction": "a sensor that needs reaction=True",
+        "give --column 'torque_nm=My Fz'; or not": "give column={'torque_nm': 'My Fz'}; or not",
+        "names no option -- only a dash--like file": "names no option -- only a dash--like file",
+    }.items():
+        assert arguments_named(message) == expected
 
 
 def test_another_name_is_an_attribute_error() -> None:

@@ -7,6 +7,8 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from rigidimeter.cli.table_lines import number_text
+
 if TYPE_CHECKING:
     from rigidimeter.study import Comparison, RatingsFound, StudyResult
 
@@ -48,7 +50,7 @@ def comparison_lines(found: StudyResult) -> list[str]:
             mark = "*" if row.chosen else " "
             lines.append(
                 f" {mark}{row.measure.title}, {row.method}, J {row.inertia}: shift "
-                f"{row.shift:.4g}, p {_p(row.p)}, by days {_p(row.p_day)}"
+                f"{row.shift:.4g}, p {number_text(row.p)}, by days {number_text(row.p_day)}"
             )
     return [*lines, *_exclusions(found)] if found.sessions else lines
 
@@ -83,10 +85,12 @@ def _days(found: StudyResult) -> Iterator[str]:
         if d.remark:
             yield f"  no test: {d.remark}"
             continue
-        medians = "" if math.isnan(d.p_days) else f", rank-sum of day medians p {_p(d.p_days)}"
+        medians = (
+            "" if math.isnan(d.p_days) else f", rank-sum of day medians p {number_text(d.p_days)}"
+        )
         yield (
             f"  {c.reference} − {c.other}: {_interval(d.estimate, d.low, d.high)}, "
-            f"p {_p(d.p)} (by Holm {_p(c.days_p_holm)}; {d.df:.1f} df){medians}"
+            f"p {number_text(d.p)} (by Holm {number_text(c.days_p_holm)}; {d.df:.1f} df){medians}"
         )
         if not math.isnan(d.day_share):
             yield f"  of the variance between epochs, {100 * d.day_share:.0f} % is between days"
@@ -114,7 +118,8 @@ def _effects(found: StudyResult) -> Iterator[str]:
             yield f"{pair}: {d.estimate:.3f}, no interval: every resample gives the same ({how})"
         else:
             size = _interval(d.estimate, d.low, d.high, ".3f")
-            yield f"{pair}: {size}, p {_p(d.p)}, by Holm {_p(each.p_holm)} ({how})"
+            p, adjusted = number_text(d.p), number_text(each.p_holm)
+            yield f"{pair}: {size}, p {p}, by Holm {adjusted} ({how})"
 
 
 def _ratings(found: RatingsFound) -> Iterator[str]:
@@ -127,14 +132,14 @@ def _ratings(found: RatingsFound) -> Iterator[str]:
     yield f"  means {means}"
     yield (
         f"  {found.reference} − {found.other}: {c.estimate:.3g}, SE {c.se:.3g}, "
-        f"F(1, {c.df_residual:g}) = {c.f:.3g}, p {_p(c.p_residual)}; Kenward-Roger p "
-        f"{_p(c.p_kenward_roger)}"
+        f"F(1, {c.df_residual:g}) = {c.f:.3g}, p {number_text(c.p_residual)}; Kenward-Roger p "
+        f"{number_text(c.p_kenward_roger)}"
     )
     if found.contrast_days is not None:
         d = found.contrast_days
         yield (
             f"  with an offset for every day: {d.estimate:.3g}, SE {d.se_kenward_roger:.3g}, "
-            f"p {_p(d.p_kenward_roger)} ({d.df_kenward_roger:.1f} df)"
+            f"p {number_text(d.p_kenward_roger)} ({d.df_kenward_roger:.1f} df)"
         )
 
 
@@ -150,7 +155,3 @@ def _exclusions(found: StudyResult) -> Iterator[str]:
 
 def _interval(value: float, low: float, high: float, digits: str = ".4g") -> str:
     return f"{value:{digits}} [{low:{digits}} to {high:{digits}}]"
-
-
-def _p(value: float) -> str:
-    return "–" if math.isnan(value) else f"{value:.2g}"

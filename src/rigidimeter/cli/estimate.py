@@ -12,12 +12,13 @@ import typer
 
 from rigidimeter.cli.inputs import analyse_recordings, keep_inputs
 from rigidimeter.cli.options import CsvOption, JsonOption, Recordings, reads_recordings
-from rigidimeter.cli.table_lines import text_table
+from rigidimeter.cli.table_lines import number_text, text_table, with_error
 
 if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Score
 
 _FIT_HEADING = ("epoch", "condition", "J kg·m²", "B N·m·s/rad", "K N·m/rad", "R²", "VAF %", "")
+_DIGITS = (".5g", ".4g", ".4g")
 _SCORE_HEADING = ("epoch", "condition", "impulse N·m·s", "work J", "")
 
 
@@ -114,8 +115,8 @@ def _pooled(analysis: Analysis) -> list[str]:
         (
             "" if i else fit.condition or "all",
             parameter.symbol,
-            f"{fit.value[i]:.5g}",
-            f"[{fit.low[i]:.5g}, {fit.high[i]:.5g}]",
+            number_text(fit.value[i], ".5g"),
+            "" if math.isnan(fit.low[i]) else f"[{fit.low[i]:.5g}, {fit.high[i]:.5g}]",
             parameter.unit,
         )
         for fit in analysis.pooled
@@ -146,11 +147,12 @@ def _fit_table(fits: Sequence[Fit]) -> list[str]:
         (
             fit.epoch,
             fit.condition,
-            f"{fit.inertia_kg_m2:.5g} ±{fit.inertia_kg_m2_se:8.2g}",
-            f"{fit.damping_nm_s_rad:.4g} ±{fit.damping_nm_s_rad_se:8.2g}",
-            f"{fit.stiffness_nm_rad:.4g} ±{fit.stiffness_nm_rad_se:8.2g}",
-            f"{fit.r_squared:.4f}",
-            f"{fit.vaf_percent:.2f}",
+            *(
+                with_error(value, se, digits)
+                for value, se, digits in zip(fit.value, fit.se, _DIGITS, strict=True)
+            ),
+            number_text(fit.r_squared, ".4f"),
+            number_text(fit.vaf_percent, ".2f"),
         )
         for fit in fits
     ]
@@ -159,7 +161,12 @@ def _fit_table(fits: Sequence[Fit]) -> list[str]:
 
 def _scores(analysis: Analysis) -> list[str]:
     rows = [
-        (score.epoch, score.condition, f"{score.impulse_nm_s:.5g}", f"{score.work_j:.5g}")
+        (
+            score.epoch,
+            score.condition,
+            number_text(score.impulse_nm_s, ".5g"),
+            number_text(score.work_j, ".5g"),
+        )
         for score in analysis.scores
     ]
     if not rows:

@@ -9,7 +9,7 @@ import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption, Recordings, reads_recordings
-from rigidimeter.cli.table_lines import Rows, text_table
+from rigidimeter.cli.table_lines import Rows, text_table, with_error
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -130,8 +130,7 @@ def _fit_lines(row: ModelRow) -> list[str]:
     rows = [
         (
             f"{one.term} {one.name}".strip(),
-            f"{one.value:.5g}",
-            f"±{one.standard_error:8.2g}",
+            with_error(one.value, one.standard_error, ".5g"),
             one.unit,
         )
         for one in fit.parameters
@@ -139,6 +138,6 @@ def _fit_lines(row: ModelRow) -> list[str]:
     ]
     return [
         f"  {'+'.join(row.terms)}, VAF {fit.vaf_percent:.2f} %",
-        *text_table(rows, "<>><", "    "),
+        *text_table(rows, "<><", "    "),
         *(f"    {remark}" for remark in fit.remarks),
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 Rows = list[tuple[str, ...]]
@@ -34,3 +35,14 @@ def text_table(rows: Iterable[Sequence[str]], align: str, indent: str = "") -> l
         ).rstrip()
         for row in cells
     ]
+
+
+def number_text(value: float, digits: str = ".2g") -> str:
+    """Return a number, or a dash where there is none."""
+    return "–" if math.isnan(value) else f"{value:{digits}}"
+
+
+def with_error(value: float, standard_error: float, digits: str) -> str:
+    """Return a number ± its standard error, or alone where a method gives no error."""
+    shown = number_text(value, digits)
+    return shown if math.isnan(standard_error) else f"{shown} ±{standard_error:8.2g}"

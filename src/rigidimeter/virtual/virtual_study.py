@@ -2,15 +2,18 @@
 
 Every session has a seed of its own (`plan`), so it is the same whichever process runs it and
 whenever; the whole folder is the same byte for byte for equal seeds. ``study.toml`` is written
-last: a folder that has one is complete.
+last: a folder that has one is complete. What was written is removed when it is interrupted.
 """
 
 from __future__ import annotations
 
+import shutil
 import signal
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import fields
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -59,17 +62,30 @@ def write_virtual_study(
     UserError
         If the folder is not empty or cannot be written, or a session fails.
     """
-    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
-        raise UserError(f"{folder}: is there already; a study is never written over, name another")
+    made = not folder.exists()
+    if not made and not (folder.is_dir() and not any(folder.iterdir())):
+        raise UserError(f"{folder}: {_in_the_way(folder)} name another")
     plans = plan_study(design, seed)
-    if processes > 1:
-        _run_beside(plans, folder, processes, progress)
-    else:
-        _run_in_turn(plans, folder, progress)
+    run = partial(_run_beside, processes=processes) if processes > 1 else _run_in_turn
+    try:
+        run(plans, folder, progress=progress)
+    except (KeyboardInterrupt, SystemExit):
+        # Half a study is of no use, and its sessions could be taken for all of them.
+        shutil.rmtree(folder / "sessions", ignore_errors=True)
+        if made:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
     write_text(folder / "sessions.csv", _sessions(plans, design.subject))
     write_text(folder / "ratings.csv", _ratings(plans, design.subject))
     write_text(folder / "study.toml", _study_toml(design, seed))
     return plans
+
+
+def _in_the_way(folder: Path) -> str:
+    if (folder / "sessions").is_dir() and not (folder / "study.toml").exists():
+        return "holds a study that was not finished: it has no study.toml; remove it or"
+    return "is there already; a study is never written over,"
 
 
 def _run_in_turn(plans: Sequence[DayPlan], folder: Path, progress: Progress) -> None:
@@ -81,7 +97,9 @@ def _run_in_turn(plans: Sequence[DayPlan], folder: Path, progress: Progress) -> 
     progress(before_s)
 
 
-def _run_beside(plans: Sequence[DayPlan], folder: Path, processes: int, progress: Progress) -> None:
+def _run_beside(
+    plans: Sequence[DayPlan], folder: Path, *, processes: int, progress: Progress
+) -> None:
     """Run sessions in processes; end them when we are interrupted."""
     context = get_context("spawn")
     reached = context.Array("d", len(plans), lock=False)
@@ -124,6 +142,8 @@ def _run(plan: DayPlan, folder: Path, progress: Progress) -> None:
     result = run_virtual_session(
         plan.settings, folder / plan.folder, progress=progress, created_utc=plan.created_utc
     )
+    if result.outcome == "abort":  # a session closes in order when it is interrupted
+        raise KeyboardInterrupt
     if result.outcome != "success":
         raise UserError(
             f"{folder / plan.folder}: the session ended with {result.outcome}: {result.reason}"

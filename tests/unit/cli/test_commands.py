@@ -5,6 +5,9 @@ import sys
 import numpy as np
 import pytest
 
+from rigidimeter.cli.estimate import estimate_lines
+from rigidimeter.records import Analysis, Fit, Outcome, Score
+
 
 def test_help_names_every_command_and_gives_examples(rigidimeter):
     ran = rigidimeter("--help")
@@ -299,3 +302,19 @@ def test_microseconds_given_as_seconds_are_refused_in_words(rigidimeter, tmp_pat
     ran = rigidimeter("estimate", tmp_path / "us.csv")
     assert ran.status == 1
     assert "check the unit of the time stamps" in ran.err
+
+
+def test_what_was_not_estimated_is_a_dash_and_has_no_error():
+    value, nan = np.array([0.0045, 0.137, 1.75]), np.full(3, np.nan)
+    fits = tuple(
+        Fit("a.csv", label, "OFF", "other", outcome, numbers, nan, nan, nan, nan, r_squared=0.97)
+        for label, numbers, outcome in (
+            ("1", value, Outcome()),
+            ("2", nan, Outcome("failed", "too short")),
+        )
+    )
+    scores = (Score("a.csv", "3", "OFF", Outcome("failed", "no motion")),)
+    text = "\n".join(estimate_lines(Analysis("other", fits, fits, 0.0045, scores, fits[:1])))
+    assert "nan" not in text
+    assert "±" not in text.partition("\n")[2]
+    assert text.count("0.137 ") == 3

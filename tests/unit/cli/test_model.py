@@ -88,3 +88,10 @@ def test_what_is_wrong_is_one_sentence(rigidimeter, joint, options, words):
     ran = rigidimeter("model", joint, *options)
     assert ran.status == 1
     assert words in ran.err
+
+
+def test_an_unknown_term_is_named_once(rigidimeter, joint):
+    ran = rigidimeter("model", joint, "--terms", "foo")
+    assert ran.status == 1
+    assert ran.err.count("foo") == 1
+    assert "there is no term 'foo'; known: inertia," in ran.err

@@ -4,6 +4,7 @@ import csv
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,13 @@ def assert_shows(text: str, values: Sequence[float | None], digits: int) -> None
 
 @pytest.fixture(scope="module")
 def study() -> StudyResult:
-    return made_study(Design(days=(4, 3), epochs=(4, 4), scores=(3, 3)))
+    made = made_study(Design(days=(4, 3), epochs=(4, 4), scores=(3, 3)))
+    first = made.analysis.fits[0]
+    pooled = tuple(
+        replace(first, source="pooled", epoch="pooled", condition=name, value=share * first.value)
+        for name, share in (("OFF", 1.01), ("DBS", 0.87), ("", 0.93))
+    )
+    return replace(made, analysis=replace(made.analysis, pooled=pooled))
 
 
 @pytest.fixture(scope="module")
@@ -224,3 +231,39 @@ def test_estimates_and_scores_of_every_epoch(study, json, folder: Path, page: Pa
                 assert f" {found[name]:.4g}" in line or f" {found[name]:.5g}" in line
     for score, row in zip(json["estimates"]["scores"], rows_of(folder, "scores"), strict=True):
         assert_same(row, score)
+
+
+def test_scores_of_every_epoch(study, json, folder: Path, page: ParsedPage) -> None:
+    lines = estimate_lines(study.analysis)
+    begin = next(k for k, line in enumerate(lines) if line.startswith("Scores of each"))
+    lines = [line for line in lines[begin + 2 :] if line.startswith("  ")]
+    shown = page.table("Scores of the epochs")
+    columns = [shown[0].index(next(h for h in shown[0] if h.startswith(name)))
+               for name in ("Angular impulse", "Work", "Cycles", "Frequency")]  # fmt: skip
+    for score, row, cells, line in zip(
+        json["estimates"]["scores"], rows_of(folder, "scores"), shown[1:], lines, strict=True
+    ):
+        assert (row["source"], row["epoch"]) == (score["source"], score["epoch"])
+        assert line.split()[:2] == [score["epoch"], score["condition"]]
+        values = [score[name] for name in ("impulse_nm_s", "work_j", "n_cycles", "frequency_hz")]
+        for column, value in zip(columns, values, strict=True):
+            assert_shows(cells[column], [value], 4)
+        assert_shows(" ".join(line.split()[2:4]), values[:2], 5)
+
+
+def test_pooled_estimates(study, json, folder: Path, page: ParsedPage) -> None:
+    whole = json["estimates"]["pooled"]
+    found = {**whole["conditions"], "all": whole}
+    lines = estimate_lines(study.analysis)
+    begin = next(k for k, line in enumerate(lines) if line.startswith("J, B, K of all epochs"))
+    shown = page.table("All epochs of a condition together")
+    rows = rows_of(folder, "pooled")
+    assert [row["condition"] for row in rows] == ["OFF", "DBS", "(all)"]
+    for place, ((name, fit), row) in enumerate(zip(found.items(), rows, strict=True)):
+        assert_same(row, fit)
+        assert lines[begin + 1 + 3 * place].split()[0] == name
+        for k, parameter in enumerate(PARAMETERS):
+            ends = [fit[parameter], fit[f"{parameter}_low"], fit[f"{parameter}_high"]]
+            assert_shows(shown[1 + place][1 + k], ends, 4)
+            line = lines[begin + 1 + 3 * place + k].partition(" " + "JBK"[k] + " ")[2]
+            assert_shows(line.partition("]")[0], ends, 5)

@@ -48,6 +48,26 @@ def test_two_processes_write_the_same_bytes(folder: Path, tmp_path: Path) -> Non
     assert seen[-1] == pytest.approx(study_length_s(plan_study(tiny(), 3)))
 
 
+@pytest.mark.parametrize("processes", [1, 2])
+def test_an_interrupted_study_leaves_nothing_that_looks_whole(
+    tmp_path: Path, processes: int
+) -> None:
+    def interrupt(time_s: float) -> None:
+        if time_s > 10.0:
+            raise KeyboardInterrupt
+
+    place = tmp_path / "study"
+    with pytest.raises(KeyboardInterrupt):
+        write_virtual_study(place, tiny(), 3, processes=processes, progress=interrupt)
+    assert not place.exists()
+
+
+def test_what_a_kill_left_is_named(tmp_path: Path) -> None:
+    (tmp_path / "sessions").mkdir()
+    with pytest.raises(UserError, match=r"not finished: it has no study.toml; remove it"):
+        write_virtual_study(tmp_path, tiny(), 3, processes=1)
+
+
 def test_the_tables_name_every_session(folder: Path) -> None:
     study = tomllib.loads((folder / "study.toml").read_text(encoding="utf-8"))
     assert study["schema"] == "rigidimeter.study/1"

@@ -144,30 +144,29 @@ def parse_terms(text: str | Iterable[str]) -> tuple[str, ...]:
     """
     given = text.split(",") if isinstance(text, str) else list(text)
     names = [name.strip() for name in given if name.strip()]
-    shown = ",".join(names)
     if not names:
         raise UserError("no term is named; for example inertia,damping,stiffness")
+    where = f"{','.join(names)}: " if len(names) > 1 else ""
     linear = [term.name for term in TERMS]
     found: list[str] = []
     for name in names:
         for single in GROUPS.get(name, (name,)):
             if single.startswith("reflex") and single not in REFLEXES:
                 raise UserError(
-                    f"{shown}: there is no term {single!r}; a reflex is one of "
+                    f"{where}there is no term {single!r}; a reflex is one of "
                     f"{', '.join(REFLEX_KINDS)}, followed by + or - for the direction of motion "
                     "that stretches the muscle, or by nothing to let the data decide"
                 )
             if single not in linear and single not in REFLEXES:
                 known = ", ".join(term_names())
-                raise UserError(f"{shown}: there is no term {single!r}; known: {known}")
+                raise UserError(f"{where}there is no term {single!r}; known: {known}")
             if single in found:
-                raise UserError(f"{shown}: {single} is named twice; name each term once")
+                raise UserError(f"{where}{single} is named twice; name each term once")
             found.append(single)
     kinds = [name.rstrip("+-") for name in found if name in REFLEXES]
     signs = [name[-1] for name in found if name in REFLEXES and name[-1] in "+-"]
     if len(kinds) > 2 or (len(kinds) == 2 and (len(signs) < 2 or signs[0] == signs[1])):
         raise UserError(
-            f"{shown}: one reflex fits each direction; name one reflex, or one with + and one "
-            "with -"
+            f"{where}one reflex fits each direction; name one reflex, or one with + and one with -"
         )
     return tuple(found)
