@@ -1,5 +1,6 @@
 """Files beyond any bound: one sentence each, before they take the memory or the time."""
 
+import json
 import os
 import zipfile
 import zlib
@@ -15,6 +16,9 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.readers import read_recording
 from rigidimeter.recording.formats.table_epochs import ReadOptions
 from rigidimeter.recording.formats.text_table import read_text_table
+from rigidimeter.recording.resume import rest_of
+from rigidimeter.statistics import fit_mixed
+from rigidimeter.statistics.bootstrap import bootstrap
 
 HEAD = b"time_s,torque_nm,angle_rad\n"
 
@@ -242,3 +246,72 @@ def test_an_hdf5_group_that_holds_itself(tmp_path):
         group["a"] = group
 
     assert "nested too deeply" in refused(hdf5(tmp_path / "r.mat", fill))
+
+
+def table(path: Path, time_s=None, scale_torque=1.0, scale_angle=1.0, **more) -> Path:
+    """Write a recording of 50 rows."""
+    k = np.arange(50.0)
+    columns = {
+        "time_s": k / 100 if time_s is None else time_s,
+        "torque_nm": np.cos(k) * scale_torque,
+        "angle_rad": np.sin(k) * scale_angle,
+        **more,
+    }
+    np.savez(path, **{name: values for name, values in columns.items() if values is not False})
+    return path
+
+
+@pytest.mark.parametrize(
+    ("changed", "options", "told"),
+    [
+        ({"scale_torque": 1e-320}, {}, "the largest value of torque_nm is 9.99989e-321; it must"),
+        ({"scale_angle": 1e-320}, {}, "the largest value of angle_rad is"),
+        ({"scale_angle": 1e300}, {}, "must be from 1e-30 to 1e+30 in SI units"),
+        ({"time_s": np.arange(50) * 1e-310}, {}, "rows that are 1e-310 s apart"),
+        ({"time_s": np.arange(50) * 1e300}, {}, "rows that are 1e+300 s apart"),
+        ({}, {"epoch_length_s": 1e-300}, "more than 10000 epochs of --epoch-length-s 1e-300"),
+    ],
+)
+def test_numbers_beyond_arithmetic(tmp_path, changed, options, told):
+    assert told in refused(table(tmp_path / "r.npz", **changed), **options)
+
+
+@pytest.mark.parametrize("rate_hz", [1e-308, 5e-324, 1e-5, 1e300])
+def test_sampling_rates_of_nothing(tmp_path, rate_hz):
+    path = table(tmp_path / "r.npz", time_s=False)
+    with pytest.raises(UserError, match=r"--rate-hz .* must be from 0\.001 to 1e\+07 Hz"):
+        read_recording(path, ReadOptions(rate_hz=rate_hz))
+
+
+def test_an_epoch_for_every_row(tmp_path):
+    path = tmp_path / "r.npz"
+    k = np.arange(30_000.0)
+    np.savez(path, time_s=k / 100, torque_nm=np.cos(k), angle_rad=np.sin(k), epoch=k)
+    assert "the epoch column changes more than 20000 times" in refused(path)
+
+
+@pytest.mark.parametrize(
+    ("n_scores", "n_examiners"), [(12_000, 3_000), (100_000, 50_000), (100_000, 200)]
+)
+def test_more_ratings_than_can_be_modelled(n_scores, n_examiners):
+    examiners = [f"E{k % n_examiners}" for k in range(n_scores)]
+    conditions = [("OFF", "DBS")[k // 7 % 2] for k in range(n_scores)]
+    with pytest.raises(ValueError, match="are too many for a mixed model; with so many scores"):
+        fit_mixed(np.zeros(n_scores), conditions, {"examiner": examiners})
+
+
+def test_more_values_than_can_be_resampled():
+    with pytest.raises(UserError, match="must be at most 2083"):
+        bootstrap(lambda a, b: a[:, 0] - b[:, 0], (6000, 6000), np.random.default_rng(1))
+
+
+@pytest.mark.parametrize("value", [5, [], "a", {"origin_rad": "x"}, {"origin_rad": True}])
+def test_a_session_that_continues_nothing(simulate, value):
+    folder = simulate()
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["continues"] = value
+    manifest["schema"] = "rigidimeter.session/1"  # which has no checksum
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(UserError) as caught:
+        rest_of(folder)
+    assert str(folder) in str(caught.value)

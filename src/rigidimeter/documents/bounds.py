@@ -55,11 +55,15 @@ EXPANSION = 100
 """How many times the size of its file they may hold beyond that. Measured signals shrink by 2 to 20
 times; a file of zeros, as an archive made to fill the memory is, by 1,000 times."""
 
-SCORES_TIMES_GROUPS = 20_000_000
-"""Of a mixed model: its matrices have this many numbers each, 160 MB."""
+SCORES_BY_GROUPS_SQUARED = 3e9
+"""Of a mixed model, scores times the square of the groups, which its time grows with: about 10 s.
+It is 10,000 ratings by 500 examiners, or 100,000 by 170."""
 
-GROUPS = 1_000
-"""Of a mixed model, in all its groupings: its time grows with the cube of them."""
+BOOTSTRAP_COUNTS = 25_000_000
+"""Of a bootstrap, resamples times units, each 16 bytes: 9,999 resamples of 2,500 units."""
+
+NOTICES = 20
+"""Of one kind about the rows of one table; the others are counted."""
 
 
 def size_text(n_bytes: float) -> str:

@@ -77,18 +77,14 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
     Raises
     ------
     UserError
-        As `open_regular`, or if the file grows beyond its bound while it is read.
+        As `open_regular`.
     """
     with open_regular(path, most_bytes) as file:
         try:
-            data = file.read(most_bytes + 1)
+            # Not read(most_bytes), which would make room for as much.
+            data = file.read(os.fstat(file.fileno()).st_size)
         except OSError as error:
             raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
-    if len(data) > most_bytes:
-        raise UserError(
-            f"{path}: grew beyond {size_text(most_bytes)} while it was read; read it when it is "
-            "complete"
-        )
     return data
 
 

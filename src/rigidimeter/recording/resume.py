@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,15 @@ from rigidimeter.recording.event_log import read_events, scan_events
 from rigidimeter.recording.session_epochs import session_settings
 from rigidimeter.recording.session_folder import EVENTS, check_session, locked, read_manifest
 from rigidimeter.settings import Settings
+
+_PLANNED: Mapping[str, type | tuple[type, ...]] = {
+    "number": int,
+    "label": str,
+    "task": str,
+    "condition": str,
+    "duration_s": (int, float),
+    "rest_s": (int, float),
+}
 
 
 @dataclass(frozen=True)
@@ -61,9 +71,9 @@ def rest_of(folder: Path) -> Rest:
         try:
             planned.append(PlannedEpoch(**entry))
         except TypeError:
-            raise UserError(
-                f"{folder}/manifest.json: protocol holds {entry!r}, which is no planned epoch"
-            ) from None
+            raise _unplanned(folder, entry) from None
+        if not all(isinstance(getattr(planned[-1], key), kind) for key, kind in _PLANNED.items()):
+            raise _unplanned(folder, entry)
     if not planned:
         raise UserError(f"{folder}: the session has no protocol, so it cannot be continued")
     ended = [event for event in events if event.get("event") == "epoch_ended"]
@@ -73,6 +83,13 @@ def rest_of(folder: Path) -> Rest:
         done.add(ended[-1]["epoch"])
     # The first session sets the origin: otherwise the limits would drift from session to session.
     origins = [manifest.get("continues", {}), *events]
+    for found in origins:
+        origin_rad = found.get("origin_rad", 0.0)
+        if isinstance(origin_rad, bool) or not isinstance(origin_rad, int | float):
+            raise UserError(
+                f"{folder}: origin_rad is {origin_rad!r}; it must be the angle in rad at which the "
+                "session began"
+            )
     origin = next(({"origin_rad": o["origin_rad"]} for o in origins if "origin_rad" in o), {})
     left = tuple(epoch for epoch in planned if epoch.number not in done)
     return Rest(
@@ -86,6 +103,12 @@ def rest_of(folder: Path) -> Rest:
             "created_utc": manifest["created_utc"],
             **origin,
         },
+    )
+
+
+def _unplanned(folder: Path, entry: Any) -> UserError:
+    return UserError(
+        f"{folder}/manifest.json: protocol holds {str(entry)[:200]}, which is no planned epoch"
     )
 
 

@@ -213,6 +213,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     for key, kind in MANIFEST_TYPES.items():
         if not isinstance(manifest.get(key), kind):
             raise UserError(f"{path}: {key} is missing or damaged; the manifest was changed")
+    if not isinstance(manifest.get("continues", {}), dict):
+        raise UserError(f"{path}: continues is damaged; it must be an object, or absent")
     if schema == SCHEMA and not checksum_holds(content):
         raise UserError(
             f"{path}: is damaged or was changed since it was written (its checksum does not hold); "

@@ -17,6 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from rigidimeter.documents.bounds import BOOTSTRAP_COUNTS
+from rigidimeter.errors import UserError
+
 Array = NDArray[np.float64]
 Statistic = Callable[..., Array]
 
@@ -84,6 +87,11 @@ def bootstrap(
     """
     if resamples < 100:
         raise ValueError(f"a bootstrap needs at least 100 resamples, got {resamples}")
+    if resamples * sum(sizes) > BOOTSTRAP_COUNTS:
+        raise UserError(
+            f"--resamples {resamples} of {sum(sizes)} values or units are too many; with so many "
+            f"values it must be at most {BOOTSTRAP_COUNTS // sum(sizes)} (at least 100)"
+        )
     if not 0 < confidence < 1:
         raise ValueError(f"confidence must be between 0 and 1, got {confidence}")
     if min(sizes) < 1:

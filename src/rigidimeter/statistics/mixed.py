@@ -9,12 +9,14 @@ tests of the means are in `statistics.contrasts`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rigidimeter.documents.bounds import SCORES_BY_GROUPS_SQUARED
 from rigidimeter.statistics.profiled_likelihood import Point, minimise, products
 from rigidimeter.statistics.summary import checked_sample
 
@@ -104,7 +106,9 @@ def fit_mixed(
     ------
     ValueError
         If a score is not finite, lengths differ, fewer scores are given than conditions plus one,
-        or the model leaves no residual at all (its variance would be zero).
+        there are more scores and groups than can be modelled, or the model leaves no residual at
+        all (its variance would be zero).
+
 
     Notes
     -----
@@ -130,6 +134,14 @@ def fit_mixed(
     for name, labels in {"conditions": conditions, **groups}.items():
         if len(labels) != y.size:
             raise ValueError(f"{name} has {len(labels)} labels for {y.size} scores")
+    n_groups = sum(len(set(labels)) for labels in (conditions, *groups.values()))
+    if y.size * n_groups**2 > SCORES_BY_GROUPS_SQUARED:
+        raise ValueError(
+            f"{y.size} scores in {n_groups} conditions and groups ({', '.join(groups)}) are too "
+            f"many for a mixed model; with so many scores at most "
+            f"{math.isqrt(int(SCORES_BY_GROUPS_SQUARED / y.size))} are modelled, so check the "
+            "columns, or leave out a grouping"
+        )
     names, x = _indicators(conditions)
     if y.size <= len(names):
         raise ValueError(f"{y.size} scores cannot give {len(names)} means and their error")

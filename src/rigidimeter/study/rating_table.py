@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from rigidimeter.documents.bounds import NOTICES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import TextTable
 from rigidimeter.statistics import nested
@@ -151,29 +153,39 @@ def _repeated(source: str, rows: Sequence[Rating], with_day: bool) -> list[str]:
             key = (row.subject, row.examiner, row.condition, row.day)
             seen.setdefault(key, []).append(row)
     said = []
-    for (_, examiner, condition, day), found in seen.items():
-        if len(found) > 1:
-            lines = " and ".join(str(row.line) for row in found)
-            by = f" by examiner {examiner}" if examiner else ""
-            said.append(
-                f"{source}, lines {lines}: rated more than once{by} in {condition} on day {day} "
-                f"({', '.join(f'{row.score:g}' for row in found)}); all are used as separate "
-                "ratings. If one is a copy, p is too small: take it out"
-            )
+    repeated = {key: found for key, found in seen.items() if len(found) > 1}
+    for (_, examiner, condition, day), found in list(repeated.items())[:NOTICES]:
+        lines = " and ".join(str(row.line) for row in found[:NOTICES])
+        by = f" by examiner {examiner}" if examiner else ""
+        said.append(
+            f"{source}, lines {lines}: rated more than once{by} in {condition} on day {day} "
+            f"({', '.join(f'{row.score:g}' for row in found[:NOTICES])}); all are used as separate "
+            "ratings. If one is a copy, p is too small: take it out"
+        )
+    if len(repeated) > NOTICES:
+        more = len(repeated) - NOTICES
+        said.append(
+            f"{source}: {more} more were rated more than once, and are used in the same way"
+        )
     return said
 
 
 def _single(rows: Sequence[Rating], random: Sequence[str]) -> list[str]:
     said = []
     for name, labels in groupings(rows, random).items():
-        once = [label for label in dict.fromkeys(labels) if labels.count(label) == 1]
+        once = [label for label, count in Counter(labels).items() if count == 1]
         if once and len(once) < len(set(labels)) and name != "subject/day":
             said.append(
-                f"{name} {', '.join(once)} gave one rating; its offset is strongly shrunken"
+                f"{name} {_some(once)} gave one rating; its offset is strongly shrunken"
                 if name == "examiner"
-                else f"{name} {', '.join(once)} has one rating; its offset is shrunken"
+                else f"{name} {_some(once)} has one rating; its offset is shrunken"
             )
     return said
+
+
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - NOTICES} more" if len(names) > NOTICES else ""
+    return ", ".join(names[:NOTICES]) + more
 
 
 def _unmodelled(rows: Sequence[Rating], random: Sequence[str]) -> list[str]:

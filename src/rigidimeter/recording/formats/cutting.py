@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.documents.bounds import EPOCHS
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.columns import seconds
 from rigidimeter.recording.formats.gaps import Rows, longest_s
@@ -38,10 +39,16 @@ def by_label(
     A label that returns after something else is another epoch: the second run of `1` is named
     `1 (2)`, and a notice says so.
     """
+    runs = _runs(column, 2 * EPOCHS)
+    if not runs:
+        raise UserError(
+            f"{source}: the epoch column changes more than {2 * EPOCHS} times; name the column of "
+            "the epochs with --column epoch=NAME"
+        )
     stretches: list[Stretch] = []
     notices: list[Notice] = []
     times_seen: dict[str, int] = {}
-    for label, start, stop in _runs(column):
+    for label, start, stop in runs:
         if not label:
             continue
         times_seen[label] = times_seen.get(label, 0) + 1
@@ -69,6 +76,11 @@ def by_length(source: str, clock: Rows, length_s: float) -> tuple[list[Stretch],
     """
     time_s, step_s = clock.time_s, clock.step_s
     elapsed = time_s - time_s[0]
+    if not (elapsed[-1] + step_s) / length_s <= EPOCHS:
+        raise UserError(
+            f"{source} lasts {seconds(float(elapsed[-1]))}, which is more than {EPOCHS} epochs of "
+            f"--epoch-length-s {length_s:g}; give a longer one"
+        )
     # A quarter of an interval keeps a stamp that rounding put just before its boundary.
     index = np.floor((elapsed + 0.25 * step_s) / length_s).astype(np.int64)
     starts = np.flatnonzero(np.diff(index, prepend=-1))
@@ -125,13 +137,18 @@ def _letters(index: int) -> str:
     return (_letters(rest - 1) if rest else "") + chr(ord("a") + last)
 
 
-def _runs(column: NDArray[Any]) -> list[tuple[str, int, int]]:
-    """Return label, start and stop of each run of one label; empty labels are runs too."""
+def _runs(column: NDArray[Any], most: int | None = None) -> list[tuple[str, int, int]]:
+    """Return label, start and stop of each run of one label; empty labels are runs too.
+
+    Nothing is returned where the column changes more than `most` times.
+    """
     changed = np.asarray(column[1:] != column[:-1], dtype=bool)
     if column.dtype != object:
         changed &= ~(np.isnan(column[1:]) & np.isnan(column[:-1]))
     starts = [0, *(np.flatnonzero(changed) + 1).tolist()]
     runs: list[tuple[str, int, int]] = []
+    if most is not None and len(starts) > most:
+        return runs
     for start, stop in zip(starts, [*starts[1:], column.size], strict=True):
         label = label_text(column[start])
         if runs and runs[-1][0] == label:  # the same label, written in two ways

@@ -16,6 +16,7 @@ from typing import Any, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.documents.bounds import EPOCHS, MAGNITUDE, SAMPLING_RATE_HZ
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.columns import (
     LABELS,
@@ -101,6 +102,12 @@ class ReadOptions:
                 raise UserError(f"{option} {value!r}: {what} must be a number")
             if value is not None and not 0 < value < math.inf:
                 raise UserError(f"{option} {value:g}: {what} must be greater than 0 {unit}")
+        low_hz, high_hz = SAMPLING_RATE_HZ
+        if self.rate_hz is not None and not low_hz <= self.rate_hz <= high_hz:
+            raise UserError(
+                f"--rate-hz {self.rate_hz:g}: the sampling rate must be from {low_hz:g} to "
+                f"{high_hz:g} Hz"
+            )
         if self.task not in (None, *get_args(Task)):
             raise UserError(f"--task {self.task}: must be {' or '.join(get_args(Task))}")
 
@@ -116,11 +123,13 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
     names = find_columns(table, options.columns)
     n_rows = table.columns[names["torque_nm"]].size
     clock = Rows.of(time_stamps(table, names.get("time_s"), options.rate_hz, n_rows))
+    _check_rate(table.source, names.get("time_s"), clock)
     signals, notices = _signals(table, names, clock, options.reaction)
     notices += _about_units(table.source, signals, clock.step_s)
     labels = {name: _label_column(table, names[name], n_rows) for name in LABELS if name in names}
     stretches, more = _stretches(table, clock, labels.get("epoch"), options.epoch_length_s)
     notices += more
+    _check_epochs(table.source, len(stretches))
     epochs: list[Epoch] = []
     losses: dict[str, dict[str, list[Loss]]] = {name: {} for name in signals}
     for stretch in stretches:
@@ -139,6 +148,7 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
             breaks += found
         pieces, more = _pieces(table.source, present, clock, stretch, breaks)
         notices += more
+        _check_epochs(table.source, len(epochs) + len(pieces))
         epochs += [
             Epoch(table.source, label, channels, condition=condition, task=task)
             for label, channels in pieces
@@ -154,6 +164,24 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
     return epochs, notices
 
 
+def _check_epochs(source: str, n_epochs: int) -> None:
+    if n_epochs > EPOCHS:
+        raise UserError(
+            f"{source}: has more than {EPOCHS} epochs or pieces between gaps; check the epoch "
+            "column and the time, or split the recording"
+        )
+
+
+def _check_rate(source: str, name: str | None, clock: Rows) -> None:
+    low_hz, high_hz = SAMPLING_RATE_HZ
+    if not 1 / high_hz <= clock.step_s <= 1 / low_hz:
+        stamps = f"the stamps of {name}" if name else "the sampling rate"
+        raise UserError(
+            f"{source}: {stamps} give rows that are {clock.step_s:g} s apart; a recording must "
+            f"have from {low_hz:g} to {high_hz:g} Hz, with the time in seconds"
+        )
+
+
 def _signals(
     table: Table, names: Mapping[str, str], clock: Rows, reaction: bool
 ) -> tuple[dict[str, Signal], list[Notice]]:
@@ -166,6 +194,7 @@ def _signals(
         if reaction and name == "torque_nm":
             values = -values
         signal = make_signal(name, clock, values)
+        _check_magnitude(table.source, _spoken(name, names[name]), signal)
         if signal.values.size:
             signals[name] = signal
         else:
@@ -182,6 +211,17 @@ def _signals(
         ),
         *(Notice("error", f"{text}; the entry was left out") for text in strays),
     ]
+
+
+def _check_magnitude(source: str, column: str, signal: Signal) -> None:
+    """Refuse values whose powers or reciprocals are no doubles."""
+    least, most = MAGNITUDE
+    amplitude = float(np.max(np.abs(signal.values), initial=0.0))
+    if amplitude and not least <= amplitude <= most:
+        raise UserError(
+            f"{source}: the largest value of {column} is {amplitude:g}; it must be from {least:g} "
+            f"to {most:g} in SI units, or 0 throughout"
+        )
 
 
 def _label_column(table: Table, name: str, n_rows: int) -> NDArray[Any]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -225,7 +226,7 @@ def _open(path: Path, rows_are: str, example: str, most_bytes: int) -> _Text:
             data = file.read(_HEAD_BYTES)
             if len(data) == _HEAD_BYTES:
                 _refuse_zeros(source, data)  # before the rest of a large file
-                data += file.read(most_bytes)
+                data += file.read(os.fstat(file.fileno()).st_size)
         except OSError as error:
             raise UserError(f"{source}: cannot be read ({error.strerror or error})") from None
     data, lines = _content(_utf8(source, data))
