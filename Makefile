@@ -23,7 +23,7 @@ demo: install
 	$(BIN)/rigidimeter demo --out $(OUT)
 
 test: install
-	$(BIN)/python -m pytest -n auto -m 'not slow and not realtime'
+	$(BIN)/python -m pytest -n auto --dist loadfile -m 'not slow and not realtime'
 	$(BIN)/python -m pytest -n 2 -m 'not slow and realtime'
 
 check: install

@@ -1,6 +1,7 @@
 """What the commands cost in CPU time, beside another source tree, in one run.
 
-The study is the virtual one of the paper's size, made once. Each command runs by turns from both
+The study is the virtual one of the paper's size, made once, by the other tree if there is one: what
+an older version recorded is read by both. Each command runs by turns from both
 trees, on a fresh copy of the study, so that no run finds what another one kept. CPU time is user
 and system time of the process and its children.
 
@@ -82,12 +83,12 @@ def measured(command: str, source: Path, study: Path) -> Cost:
         return run(source, folder, *arguments[command])
 
 
-def made(study: Path) -> Path:
-    """Return the study; the working tree makes it if it is not there."""
+def made(study: Path, source: Path) -> Path:
+    """Return the study; the tree makes it if it is not there."""
     study = study.resolve()
     if not (study / "study.toml").is_file():
         study.parent.mkdir(parents=True, exist_ok=True)
-        cost = run(SOURCE, study.parent, "study", "simulate", "--out", study.name)
+        cost = run(source, study.parent, "study", "simulate", "--out", study.name)
         print(f"study simulate: {cost.cpu_s:.1f} s CPU, {cost.wall_s:.1f} s", flush=True)
     return study
 
@@ -139,14 +140,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not (source / "rigidimeter").is_dir():
             raise SystemExit(f"{source}: there is no rigidimeter in it; name a src folder")
     with tempfile.TemporaryDirectory() as temporary:
-        study = made(options.study or Path(temporary) / "study")
-        for source in sources:  # compile what is not compiled yet
-            run(source, Path(temporary), "estimate", next((study / "sessions").iterdir()))
+        commands = options.command or COMMANDS
+        study = options.study or Path(temporary) / "study"
+        if commands != ["reproduce"]:
+            study = made(study, sources[-1])
+            for source in sources:  # compile what is not compiled yet
+                run(source, Path(temporary), "estimate", next((study / "sessions").iterdir()))
         head = f"{'command':<10} {'CPU s':>8} {'wall s':>8}"
         if len(sources) > 1:
             head += f" {'other':>8} {'wall s':>8} {'CPU ×':>8} {'wall ×':>8}"
         print(head, flush=True)
-        for command in options.command or COMMANDS:
+        for command in commands:
             print(_lines(command, by_turns(command, sources, study, options.repeats)), flush=True)
 
 
