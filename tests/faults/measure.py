@@ -58,6 +58,14 @@ FAULTS: dict[int, tuple[str, str, str]] = {
     22: ("parameters changed while running", "session: bounds", "bounded, no bump, logged"),
     23: ("two faults at once, a fault while stopping", "guard: latch",
          "first cause, stronger stop"),
+    24: ("motion that nobody commanded, 2 to 4.5 deg/s: running, holding, zeroing",
+         "guard: expected angle, rest; zeroing", "S1, no run"),
+    25: ("velocity reported as 0 or with the wrong sign, in a tremor",
+         "guard: velocity against the change of the angle", "S1"),
+    26: ("torque with the wrong sign, gain 0, a last bit that toggles, a constant axis, 1 s late",
+         "guard: does the torque answer the motion", "S1"),
+    27: ("torque pauses for 95 ms of every 100, 30 of every 60",
+         "guard: share of the time with an old reading", "S1"),
 }  # fmt: skip
 """Fault, what detects it, reaction: S0, S1 and SH as in the document."""
 
@@ -65,6 +73,7 @@ VIRTUAL_CANNOT = "the simulated rig runs in the loop's process"
 NOT_CARRIED = {
     (5, "virtual"): "no packets",
     (9, "virtual"): VIRTUAL_CANNOT,
+    (24, "rdt_ascii"): "a move that ended is held in position",
 }
 """Why a rig cannot have a fault."""
 

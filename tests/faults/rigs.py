@@ -17,6 +17,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -131,6 +132,10 @@ class SpoiledRig:
         self.habits: dict[str, Any] = {}
         self.trace: list[tuple[float, float, float]] = []
         self._held: Any = None
+        self._sent: Any = None
+        self._past: deque[float] = deque()
+        self._constant_nm = math.nan
+        self._ticks, self.rate_hz = 0, 1.0 / inner._interval_s
         self._angle_held = math.nan
         self.connect, self.configure = inner.connect, inner.configure
         self.zero, self.stop = inner.zero, inner.stop
@@ -171,6 +176,11 @@ class SpoiledRig:
             reading = reading._replace(angle_rad=habits["angle is"])
         if "velocity is" in habits:
             reading = reading._replace(velocity_rad_s=habits["velocity is"])
+        if "velocity gain" in habits:
+            reading = reading._replace(
+                velocity_rad_s=habits["velocity gain"] * reading.velocity_rad_s
+            )
+        reading = self._untrue(reading)
         if "torque stops" in habits:
             self._held = self._held or reading
             reading = reading._replace(
@@ -197,6 +207,31 @@ class SpoiledRig:
             raise habits["raises"]
         return reading
 
+    def _untrue(self, reading: Any) -> Any:
+        """Spoil the torque as the emulated sensor does."""
+        habits, torque_nm = self.habits, reading.torque_nm
+        self._ticks += 1
+        if "late" in habits:
+            self._past.append(torque_nm)
+            ready = len(self._past) > habits["late"] * self.rate_hz
+            torque_nm = self._past.popleft() if ready else self._past[0]
+        torque_nm *= habits.get("gain", 1.0)
+        if "toggles" in habits:
+            torque_nm = 0.0005 * (self._ticks % 2)
+        if "axis_constant" in habits:
+            self._constant_nm = torque_nm if math.isnan(self._constant_nm) else self._constant_nm
+            torque_nm = self._constant_nm
+        reading = reading._replace(torque_nm=torque_nm)
+        for name, sends_s in (("pauses", habits.get("pauses", 0.0)), ("bursts", 0.005)):
+            if name in habits and self._sent is not None:
+                phase_s = (self._ticks / self.rate_hz) % (sends_s + habits[name])
+                if phase_s >= sends_s:
+                    reading = reading._replace(
+                        torque_nm=self._sent.torque_nm, torque_time_s=self._sent.torque_time_s
+                    )
+        self._sent = reading
+        return reading
+
     def _see(self, reading: Any) -> Any:
         self.trace.append((reading.motion_time_s, reading.angle_rad, reading.velocity_rad_s))
         return reading
@@ -207,6 +242,9 @@ class SpoiledRig:
             return velocity_rad_s
         if "runs away" in self.habits:
             self.inner.write(self.habits["runs away"])
+            return velocity_rad_s if self.powered else 0.0
+        if "drifts" in self.habits:
+            self.inner.write(velocity_rad_s + self.habits["drifts"])
             return velocity_rad_s if self.powered else 0.0
         return self.inner.write(velocity_rad_s)
 

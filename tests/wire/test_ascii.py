@@ -228,7 +228,12 @@ def test_power_that_comes_back_moves_nothing(wire):
 
 @pytest.mark.parametrize(
     ("habit", "value", "measured_rad_s"),
-    [("does_not_follow", 1, 0.0), ("runs_away", 1.2, 1.2), ("encoder_frozen", 1, SPEED_RAD_S)],
+    [
+        ("does_not_follow", 1, 0.0),
+        ("runs_away", 1.2, 1.2),
+        ("encoder_frozen", 1, SPEED_RAD_S),
+        ("velocity_gain", -1.0, -SPEED_RAD_S),
+    ],
 )
 def test_what_the_guard_must_see_is_passed_on_as_it_is(wire, habit, value, measured_rad_s):
     drive = wire.enabled()

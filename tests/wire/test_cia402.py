@@ -187,7 +187,7 @@ REFUSED = {
 }
 PASSED_ON = {
     *("does not follow", "runs away", "drifts"),
-    *("encoder frozen", "encoder jump", "encoder sign"),
+    *("encoder frozen", "encoder jump", "encoder sign", "velocity gain"),
 }
 
 

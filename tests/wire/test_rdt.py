@@ -191,6 +191,11 @@ RUNNING = [
     ("spike", 20, Cause.NONE, None),
     ("gain", None, Cause.NONE, None),
     ("other_axis", None, Cause.NONE, None),
+    ("toggles", None, Cause.NONE, None),
+    ("axis_constant", None, Cause.NONE, None),
+    ("late", 0.1, Cause.NONE, None),
+    ("pauses", None, Cause.NONE, None),
+    ("bursts", None, Cause.TORQUE_FROZEN, None),
     ("silent", None, Cause.NONE, None),
 ]
 

@@ -30,10 +30,10 @@ from rigidimeter.devices.base import Reading, Rig
 from rigidimeter.guard import (
     REACTIONS,
     Cause,
-    ConsistencyState,
     Limited,
     Reaction,
     consistency_limits,
+    consistency_state,
     consistency_step,
     guard_limits,
     guard_state,
@@ -123,7 +123,7 @@ class ControlLoop:
         set_admittance(self, controller.inertia_kg_m2, controller.damping_nm_s_rad)
         # What a tick changes.
         self.filtered = BiquadState()
-        self.guard, self.consistency = guard_state(self.limits), ConsistencyState()
+        self.guard, self.consistency = guard_state(self.limits), consistency_state()
         self.tick = 0
         self.elapsed_ticks = 1
         self.late_in_a_row = 0
@@ -275,8 +275,9 @@ def _run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: 
         loop.guard = loop.guard._replace(velocity_rad_s=0.0)
     was_cut = loop.guard.reaction
     measured = torque_nm, angle, velocity, due_s - motion_s, due_s - torque_s
+    told = loop.guard.velocity_rad_s, perturbation_nm
     loop.consistency, apart = consistency_step(
-        loop.agreement, loop.consistency, loop.guard.velocity_rad_s, *measured, loop.elapsed_ticks
+        loop.agreement, loop.consistency, *told, *measured, loop.elapsed_ticks
     )
     loop.guard, allowed, limited = guard_step(
         loop.limits,

@@ -42,6 +42,7 @@ MISBEHAVIOURS = {
     "encoder_frozen": "keeps reporting the present position and velocity",
     "encoder_jump": "adds this many counts to the position",
     "encoder_sign_flip": "reports position and velocity with the opposite sign",
+    "velocity_gain": "reports so many times the velocity, such as 0 or -1",
     "stale_target": "keeps this target velocity in 0.1 counts/s, whatever is written",
     "changes_state": "changes to this desired state by itself",
 }
@@ -259,6 +260,7 @@ class AsciiEmulator:
         if "encoder_sign_flip" in self._faults:
             position, velocity = -position, -velocity
         position += float(self._faults.get("encoder_jump", 0.0))
+        velocity *= float(self._faults.get("velocity_gain", 1.0))
         return round(position), round(10.0 * velocity)
 
     def _powered(self) -> bool:

@@ -5,14 +5,18 @@ from rigidimeter.guard.consistency import (
     ConsistencyLimits,
     ConsistencyState,
     consistency_limits,
+    consistency_state,
     consistency_step,
 )
 from rigidimeter.guard.limits import GuardLimits, GuardState, guard_limits, guard_state, released
 from rigidimeter.guard.recorded_guard import Replayed, replay
 from rigidimeter.guard.step import Limited, guard_step, why_ended
+from rigidimeter.guard.torque_answer import AnswerLimits, AnswerState, answer_limits
 
 __all__ = [
     "REACTIONS",
+    "AnswerLimits",
+    "AnswerState",
     "Cause",
     "ConsistencyLimits",
     "ConsistencyState",
@@ -21,7 +25,9 @@ __all__ = [
     "Limited",
     "Reaction",
     "Replayed",
+    "answer_limits",
     "consistency_limits",
+    "consistency_state",
     "consistency_step",
     "guard_limits",
     "guard_state",

@@ -1,6 +1,7 @@
 """Whether the readings agree with each other and with what was sent.
 
-`watch` looks at one tick; what is here needs time to show. Four laws, each with its own memory:
+`watch` looks at one tick; what is here needs time to show. Each law has its own memory. That the
+torque answers the motion is `torque_answer`'s; the others are:
 
 rest       While zero is commanded the angle stays where it was, to `hold_rad`, from `settle_s`
            after the last command on: twice the reaction time, after which a drive of second order
@@ -35,6 +36,13 @@ from math import isfinite, isnan
 from typing import NamedTuple
 
 from rigidimeter.guard.causes import Cause
+from rigidimeter.guard.torque_answer import (
+    AnswerLimits,
+    AnswerState,
+    answer_limits,
+    answer_state,
+    answer_step,
+)
 from rigidimeter.guard.watch import energy_after
 from rigidimeter.settings import MotionSensorSettings, Settings, TorqueSensorSettings
 from rigidimeter.units import rad_from_deg
@@ -67,6 +75,7 @@ OLD_MEMORY_S, OLD_MEMORY_STALES = 0.5, 5.0
 """Of the share: one pause of `stale_s` then is at most 1 − e^(−1/5) = 0.18 of it."""
 
 _SAME_STAMP_S = 1e-6
+_NO_CAUSE = int(Cause.NONE)
 
 
 class ConsistencyLimits(NamedTuple):
@@ -79,6 +88,7 @@ class ConsistencyLimits(NamedTuple):
     """
 
     interval_s: float
+    answer: AnswerLimits
     settle_s: float = 0.0
     hold_rad: float = math.inf
     summed_s: float = SUMMED_S
@@ -99,6 +109,7 @@ class ConsistencyState(NamedTuple):
     angle, `energy_j` what goes to and fro at it. `torque_old` and `motion_old` are shares of time.
     """
 
+    answer: AnswerState
     still_s: float = 0.0
     held_rad: float = math.nan
     angle_rad: float = math.nan
@@ -112,6 +123,11 @@ class ConsistencyState(NamedTuple):
     energy_j: float = 0.0
     torque_old: float = 0.0
     motion_old: float = 0.0
+
+
+def consistency_state() -> ConsistencyState:
+    """Return the state before the first tick."""
+    return ConsistencyState(answer_state())
 
 
 def consistency_limits(settings: Settings) -> ConsistencyLimits:
@@ -128,6 +144,7 @@ def consistency_limits(settings: Settings) -> ConsistencyLimits:
 
     return ConsistencyLimits(
         interval_s=interval_s,
+        answer=answer_limits(settings),
         settle_s=2.0 * guard.reaction_time_s,
         hold_rad=rad_from_deg(guard.hold_limit_deg + rig.motion.angle_resolution_deg),
         summed_s=summed_s,
@@ -143,6 +160,7 @@ def consistency_step(
     limits: ConsistencyLimits,
     state: ConsistencyState,
     sent_rad_s: float,
+    perturbation_nm: float,
     torque_nm: float,
     angle_rad: float,
     velocity_rad_s: float,
@@ -158,6 +176,8 @@ def consistency_step(
     state : ConsistencyState
     sent_rad_s : float
         The command in force since the tick before.
+    perturbation_nm : float
+        Of this tick; 0 where nothing perturbs.
     torque_nm, angle_rad, velocity_rad_s : float
         The newest readings. One that is not finite is left out: `watch` names it.
     age_s, torque_age_s : float
@@ -165,10 +185,8 @@ def consistency_step(
     elapsed_ticks : int
         Ticks since the step before.
     """
-    still_s, held, before, speed_before, age_before, moved, reported, apart, both, pace, *rest = (
-        state
-    )
-    energy, torque_old, motion_old = rest
+    answer, still_s, held, before, speed_before, age_before, moved, reported = state[:8]
+    apart, both, pace, energy, torque_old, motion_old = state[8:]
     elapsed_s = max(elapsed_ticks, 1) * limits.interval_s
     forgotten = min(elapsed_s / limits.old_memory_s, 1.0)
     torque_old += ((torque_age_s > limits.torque_old_s) - torque_old) * forgotten
@@ -197,11 +215,27 @@ def consistency_step(
             before, speed_before, age_before = angle_rad, velocity_rad_s, age_s
     energy = energy_after(energy, torque_nm * pace if isfinite(torque_nm) else 0.0, elapsed_s)
 
-    after = ConsistencyState(
-        *(still_s, held, before, speed_before, age_before, moved, reported, apart, both, pace),
-        *(energy, torque_old, motion_old),
+    answer, unanswered = answer_step(
+        limits.answer, answer, perturbation_nm, torque_nm, angle_rad, elapsed_ticks
     )
-    return after, _found(limits, after)
+    after = ConsistencyState(
+        answer,
+        still_s,
+        held,
+        before,
+        speed_before,
+        age_before,
+        moved,
+        reported,
+        apart,
+        both,
+        pace,
+        energy,
+        torque_old,
+        motion_old,
+    )
+    found = _found(limits, after)
+    return after, found if found != _NO_CAUSE else unanswered
 
 
 def _found(limits: ConsistencyLimits, state: ConsistencyState) -> int:
@@ -215,4 +249,4 @@ def _found(limits: ConsistencyLimits, state: ConsistencyState) -> int:
         return int(Cause.ENERGY_HIGH)
     if max(state.torque_old, state.motion_old) > OLD_SHARE:
         return int(Cause.SELDOM_FRESH)
-    return int(Cause.NONE)
+    return _NO_CAUSE

@@ -15,13 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.guard.causes import Cause, Reaction
-from rigidimeter.guard.consistency import ConsistencyLimits, ConsistencyState, consistency_step
+from rigidimeter.guard.consistency import (
+    ConsistencyLimits,
+    consistency_state,
+    consistency_step,
+)
 from rigidimeter.guard.limits import GuardLimits, GuardState, guard_state, released
 from rigidimeter.guard.step import guard_step
+from rigidimeter.guard.torque_answer import AnswerLimits
 
 _INPUTS = (
     *("velocity_request_rad_s", "torque_nm", "angle_rad", "velocity_rad_s"),
-    *("motion_time_s", "torque_time_s"),
+    *("motion_time_s", "torque_time_s", "perturbation_nm"),
 )
 
 _FOUND_HERE = {
@@ -30,6 +35,7 @@ _FOUND_HERE = {
     *(Cause.OVERSPEED, Cause.NOT_FOLLOWING, Cause.TORQUE_TOO_HIGH, Cause.ENERGY_HIGH),
     *(Cause.TORQUE_HIGH, Cause.POWER_HIGH),
     *(Cause.MOVED_AT_REST, Cause.VELOCITY_WRONG, Cause.SELDOM_FRESH),
+    *(Cause.TORQUE_SILENT, Cause.TORQUE_SIGN),
 }
 """What `watch` and `consistency` find themselves, so that other limits may find it elsewhere or not
 at all."""
@@ -64,13 +70,14 @@ def replay(
         Of the session.
     columns : mapping
         As `recording.read_samples` gives them: tick, velocity_request_rad_s, torque_nm, angle_rad,
-        velocity_rad_s, motion_time_s, torque_time_s and cause.
+        velocity_rad_s, motion_time_s, torque_time_s, perturbation_nm
+        and cause.
     agreement : ConsistencyLimits, optional
         For the session's tick: `consistency_limits(settings)`; without them nothing is found that
         needs time to show.
     """
-    agreement = agreement or ConsistencyLimits(limits.interval_s)
-    agreed = ConsistencyState()
+    agreement = agreement or ConsistencyLimits(limits.interval_s, AnswerLimits(limits.interval_s))
+    agreed = consistency_state()
     ticks, recorded = columns["tick"].tolist(), columns["cause"].tolist()
     elapsed = np.diff(columns["tick"], prepend=columns["tick"][:1]).tolist()
     inputs = zip(*(columns[name].tolist() for name in _INPUTS), strict=True)
@@ -78,12 +85,14 @@ def replay(
     state, before = guard_state(limits), int(Cause.NONE)
     rows = enumerate(zip(ticks, elapsed, recorded, inputs, strict=True))
     for k, (tick, passed, cause, values) in rows:
-        request, torque_nm, angle, velocity, motion_s, torque_s = values
+        request, torque_nm, angle, velocity, motion_s, torque_s, perturbation_nm = values
         if cause == Cause.NONE != before and _is_held_at_rest(state):
             state = released(state)
         due_s = tick / tick_rate_hz
         measured = torque_nm, angle, velocity, due_s - motion_s, due_s - torque_s
-        agreed, apart = consistency_step(agreement, agreed, state.velocity_rad_s, *measured, passed)
+        agreed, apart = consistency_step(
+            agreement, agreed, state.velocity_rad_s, perturbation_nm, *measured, passed
+        )
         state, said.velocity_command_rad_s[k], said.limited[k] = guard_step(
             limits,
             state,

@@ -6,28 +6,29 @@ import numpy as np
 import pytest
 
 from rigidimeter.guard import (
+    AnswerLimits,
     Cause,
     ConsistencyLimits,
-    ConsistencyState,
     consistency_limits,
+    consistency_state,
     consistency_step,
 )
 from rigidimeter.settings import parse_settings
 
 DT = 0.001
-NOTHING = ConsistencyLimits(DT)
+NOTHING = ConsistencyLimits(DT, AnswerLimits(DT))
 
 
 def run(limits, n, angle, velocity, *, sent=1.0, torque=0.0, ages=(0.0, 0.0), elapsed=1, start=0):
     """Step through functions of the time; return the first tick with a cause, it, and the state."""
-    state = ConsistencyState()
+    state = consistency_state()
 
     def at(value, t):
         return value(t) if callable(value) else value
 
     for k in range(start, n):
         t = k * elapsed * limits.interval_s
-        values = [at(value, t) for value in (sent, torque, angle, velocity, *ages)]
+        values = [at(value, t) for value in (sent, 0.0, torque, angle, velocity, *ages)]
         state, cause = consistency_step(limits, state, *values, elapsed)
         if cause:
             return k, Cause(cause), state
@@ -213,7 +214,9 @@ def test_each_limit_is_the_settings_in_si_units():
             }
         )
     )
-    assert limits._asdict() == pytest.approx(
+    values = limits._asdict()
+    assert values.pop("answer").interval_s == 0.002
+    assert values == pytest.approx(
         {
             "interval_s": 0.002,
             "settle_s": 0.1,
@@ -238,16 +241,12 @@ def test_on_a_slow_line_the_sums_hold_three_samples():
 
 def test_whatever_comes_the_state_stays_finite():
     rng = np.random.default_rng(3)
-    state = ConsistencyState()
+    state = consistency_state()
     values = [math.nan, math.inf, -math.inf, 0.0, 1.0, -0.3, 0.02, 1e300]
     for _ in range(3000):
-        drawn = rng.choice(values[:-1], 6).tolist()
+        drawn = rng.choice(values[:-1], 7).tolist()
         state, cause = consistency_step(
             consistency_limits(parse_settings({})), state, *drawn, int(rng.integers(-3, 200))
         )
         assert cause in set(Cause)
-        assert all(
-            math.isfinite(v)
-            for name, v in state._asdict().items()
-            if name != "held_rad" and name != "angle_rad"
-        )
+        assert all(math.isfinite(value) for value in (state.still_s, *state[4:]))

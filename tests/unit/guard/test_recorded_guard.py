@@ -126,7 +126,7 @@ def test_other_limits_find_other_things():
 def test_nothing_recorded_gives_nothing():
     names = (
         *("tick", "cause", "velocity_request_rad_s", "torque_nm", "angle_rad", "velocity_rad_s"),
-        *("motion_time_s", "torque_time_s"),
+        *("motion_time_s", "torque_time_s", "perturbation_nm"),
     )
     again = replay(
         GuardLimits(0.7, 3.0, 100.0, 0.02, 0.001), 1000.0, {name: np.array([]) for name in names}
@@ -150,10 +150,10 @@ def by_hand(torques, releases=(), requests=None, step_of=lambda k: 1):
             limits, state, request, torque, 0.0, 0.0, due_s - motion_s, due_s - torque_s,
             0, step_of(k) if k else 1,
         )  # fmt: skip
-        rows.append((tick, state.cause, request, torque, 0.0, 0.0, motion_s, torque_s, sent))
+        rows.append((tick, state.cause, request, torque, 0.0, 0.0, motion_s, torque_s, 0.0, sent))
     names = (
         *("tick", "cause", "velocity_request_rad_s", "torque_nm", "angle_rad", "velocity_rad_s"),
-        *("motion_time_s", "torque_time_s", "velocity_command_rad_s"),
+        *("motion_time_s", "torque_time_s", "perturbation_nm", "velocity_command_rad_s"),
     )
     return limits, {n: np.array(c) for n, c in zip(names, zip(*rows, strict=True), strict=True)}
 
@@ -200,7 +200,7 @@ FOUND = {
     *("TORQUE_NOT_FINITE", "MOTION_NOT_FINITE", "COMMAND_NOT_FINITE", "POSITION_LIMIT_EXCEEDED"),
     *("MOTION_STALE", "TORQUE_STALE", "STAMP_AHEAD", "OVERSPEED", "NOT_FOLLOWING"),
     *("TORQUE_TOO_HIGH", "ENERGY_HIGH", "TORQUE_HIGH", "POWER_HIGH"),
-    *("MOVED_AT_REST", "VELOCITY_WRONG", "SELDOM_FRESH"),
+    *("MOVED_AT_REST", "VELOCITY_WRONG", "SELDOM_FRESH", "TORQUE_SILENT", "TORQUE_SIGN"),
 }
 
 

@@ -34,6 +34,7 @@ MISBEHAVIOURS = {
     "encoder frozen": "keeps reporting the present position and velocity",
     "encoder jump": "reports a position with an error (value: in rad)",
     "encoder sign": "reports position and velocity with the wrong sign",
+    "velocity gain": "reports so many times the velocity (value: 0 or less, as a rule)",
     "slow answers": "answers SDO requests late (value: by how many s)",
     "wrong watchdog": "accepts the heartbeat watchdog but uses another (value: in ms)",
     "ignores quick stop": "keeps moving after a quick-stop command",
@@ -48,6 +49,7 @@ DEFAULTS = {
     "runs away": 6.0,
     "drifts": 0.08,
     "encoder jump": 1.0,
+    "velocity gain": 0.0,
     "slow answers": 0.5,
     "wrong watchdog": 0,
 }
@@ -169,6 +171,7 @@ class Servo:
         angle_rad += self.wrong.get("encoder jump", 0.0)
         sign = -1 if "encoder sign" in self.wrong else 1
         units = sign * UNITS_PER_RAD
+        velocity_rad_s *= self.wrong.get("velocity gain", 1.0)
         return round(angle_rad * units), round(velocity_rad_s * units)
 
     def control(self, control: int) -> None:

@@ -231,6 +231,8 @@ class RdtEmulator:
                 self._faults = {k: v for k, v in self._faults.items() if k not in ONCE}
         if "restart" in faults:
             self._records.restart(1)
+        if self._paused(faults):
+            return
         data = self._records.take(faults)
         if "silent" in faults:
             return
@@ -285,6 +287,15 @@ class RdtEmulator:
             self._on_the_way.append((now_s, data))
         while self._on_the_way and now_s - self._on_the_way[0][0] >= delay_s:
             self._send(self._on_the_way.popleft()[1])
+
+    def _paused(self, faults: Faults) -> bool:
+        """Return whether nothing is measured now; the numbers of records go on without a gap."""
+        now_s = time.monotonic()
+        half_s = fault_value(faults, "pauses", 0.03)
+        if half_s is not None and now_s % (2.0 * half_s) < half_s:
+            return True
+        pause_s = fault_value(faults, "bursts", 0.095)
+        return pause_s is not None and now_s % (0.005 + pause_s) >= 0.005
 
     def _flush(self) -> None:
         for held in self._held:

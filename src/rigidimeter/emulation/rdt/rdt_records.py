@@ -47,6 +47,11 @@ MISBEHAVIOURS = {
     "bias": "The torque has an error of `value` N·m (1), as after zeroing under load.",
     "gain": "The torque is multiplied by `value` (-1); 0 gives a constant.",
     "other_axis": "The torque is on another axis, and the measured one has only noise.",
+    "toggles": "The torque is 0, and its last count toggles.",
+    "axis_constant": "The torque keeps its value; the other axes have their noise.",
+    "late": "The torque is that of `value` s (1) ago; sequences and stamps are of now.",
+    "pauses": "No records are sent for `value` s (0.03) of every twice that.",
+    "bursts": "Records are sent for 5 ms, then none for `value` s (0.095).",
     "spike": "Every `value`-th record (100) shows 50 N·m more.",
     "changed_units": "The page shows lbf-in.",
     "unknown_units": "The page shows an unknown torque unit.",
@@ -91,6 +96,7 @@ class RecordSource:
 
     def __init__(self, arm: EmulatedArm, rate_hz: float, seed: int) -> None:
         self._arm = arm
+        self._rate_hz = rate_hz
         self._samples_a_record = max(round(SAMPLE_RATE_HZ / rate_hz), 1)
         rng = random.Random(seed)
         # Drawn in advance to save time at 7 kHz.
@@ -104,6 +110,7 @@ class RecordSource:
         self.sequence = sequence
         self._ft_sequence = 0
         self._before: tuple[int, ...] = ()
+        self._past_nm: deque[float] = deque()
         self.last = b""
 
     def take(self, faults: Faults) -> bytes:
@@ -122,6 +129,7 @@ class RecordSource:
                 self._ft_sequence -= self._samples_a_record
             if "frozen_record" in faults and self.last:
                 return self.last
+            torque_nm = self._untrue(faults, torque_nm)
             torque_nm += fault_value(faults, "bias", 1.0) or 0.0
             gain = fault_value(faults, "gain", -1.0)
             torque_nm *= 1.0 if gain is None else gain
@@ -144,3 +152,16 @@ class RecordSource:
         self.last = RECORD.pack(sequence, ft_sequence & 0xFFFFFFFF, status, *counts)
         self.sent.append((sequence, torque_nm))
         return self.last
+
+    def _untrue(self, faults: Faults, torque_nm: float) -> float:
+        """Return the torque of a sensor that measures something else than the torque of now."""
+        late_s = fault_value(faults, "late", 1.0)
+        if late_s is not None:
+            self._past_nm.append(torque_nm)
+            ready = len(self._past_nm) > late_s * self._rate_hz
+            torque_nm = self._past_nm.popleft() if ready else self._past_nm[0]
+        if "toggles" in faults:
+            torque_nm = (self.taken % 2) / COUNTS_PER_UNIT
+        if "axis_constant" in faults and self._before:
+            torque_nm = -self._before[-1] / COUNTS_PER_UNIT
+        return torque_nm

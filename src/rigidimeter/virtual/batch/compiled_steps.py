@@ -55,7 +55,7 @@ def compiled() -> Compiled:
         ) from error
 
     def inlined(function: Callable[..., Any], **helpers: Any) -> Any:
-        return njit(_with_helpers(function, helpers), inline="always", error_model="numpy")
+        return njit(with_helpers(function, helpers), inline="always", error_model="numpy")
 
     drive = inlined(drive_step)
     outermost: list[tuple[Callable[..., Any], dict[str, Any]]] = [
@@ -69,9 +69,9 @@ def compiled() -> Compiled:
                 "quantised": inlined(quantised),
                 "guard_step": inlined(
                     step.guard_step,
-                    Limited=_numbers(step.Limited),
+                    Limited=numbers(step.Limited),
                     energy_after=inlined(watch.energy_after),
-                    found_wrong=inlined(watch.found_wrong, Cause=_numbers(Cause)),
+                    found_wrong=inlined(watch.found_wrong, Cause=numbers(Cause)),
                     outside=inlined(watch.outside),
                     _farthest_in_flight=inlined(step._farthest_in_flight),
                     _stoppable_speed=inlined(step._stoppable_speed),
@@ -85,7 +85,7 @@ def compiled() -> Compiled:
     digest = _digest()
     functions: list[Any] = []
     for function, helpers in outermost:
-        own = _with_helpers(function, helpers)
+        own = with_helpers(function, helpers)
         own.__qualname__ = f"{function.__qualname__}_{digest}"
         try:
             functions.append(njit(own, cache=True, nogil=True, error_model="numpy"))
@@ -94,7 +94,7 @@ def compiled() -> Compiled:
     return Compiled(*functions)
 
 
-def _with_helpers(function: Callable[..., Any], helpers: dict[str, Any]) -> FunctionType:
+def with_helpers(function: Callable[..., Any], helpers: dict[str, Any]) -> FunctionType:
     """Return the same code, finding `helpers` where it looks for names of its module."""
     assert isinstance(function, FunctionType)
     return FunctionType(
@@ -105,7 +105,7 @@ def _with_helpers(function: Callable[..., Any], helpers: dict[str, Any]) -> Func
     )
 
 
-def _numbers(members: type[IntEnum]) -> Any:
+def numbers(members: type[IntEnum]) -> Any:
     """Return the members as plain numbers under the same names."""
     make: Any = namedtuple
     return make(members.__name__, members.__members__)(*(int(member) for member in members))
