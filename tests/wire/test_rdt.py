@@ -195,7 +195,7 @@ RUNNING = [
     ("axis_constant", None, Cause.NONE, None),
     ("late", 0.1, Cause.NONE, None),
     ("pauses", None, Cause.NONE, None),
-    ("bursts", None, Cause.TORQUE_FROZEN, None),
+    ("bursts", None, Cause.NONE, None),
     ("silent", None, Cause.NONE, None),
 ]
 
