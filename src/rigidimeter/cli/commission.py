@@ -17,6 +17,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.table_lines import text_table
+from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -99,12 +100,12 @@ def commission(
         )
     operator = Operator(
         ask=(lambda _: True) if yes else _ask,
-        say=lambda what: typer.echo(what, err=True),
+        say=lambda what: echo(what, err=True),
         present=not yes,
         known_torque_nm=known_torque,
         known_angle_deg=known_angle,
     )
-    typer.echo(str(prepare_loop_process()), err=True)
+    echo(str(prepare_loop_process()), err=True)
     clock = DeadlineClock()
     with rigfile.claim() as lock, _interrupted_once(path):
         found = try_rig(
@@ -118,14 +119,14 @@ def commission(
             signed_by=signed_by,
         )
     write_record(path, found)
-    typer.echo(table(found))
-    typer.echo(f"Record: {path}")
+    echo(table(found))
+    echo(f"Record: {path}")
     if found.objection:
         raise UserError(f"{rig}: not fit for a person: {found.objection}")
     if found.not_tried:
-        typer.echo(f"Not tried: {', '.join(found.not_tried)}.")
+        echo(f"Not tried: {', '.join(found.not_tried)}.")
     what = "this emulated rig, with nobody in it" if found.emulated else "this rig"
-    typer.echo(
+    echo(
         f"Valid for {what}, its devices and this controller, for "
         f"{chosen.commissioning.validity_days:g} days."
     )

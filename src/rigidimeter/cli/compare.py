@@ -23,6 +23,7 @@ from rigidimeter.cli.options import (
     Recordings,
     reads_recordings,
 )
+from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ def compare(
             folder, recordings, key, pair=(reference, other), seed=seed, resamples=resamples
         )
         _write(analysed.result, *outputs, str(folder))
-        typer.echo("\n".join(comparison_lines(analysed.result)))
+        echo("\n".join(comparison_lines(analysed.result)))
         _say_changes(analysed.result, folder, analysed.kept)
         raise typer.Exit(analysed.status)
     keep_inputs(outputs, paths)
@@ -133,7 +134,7 @@ def compare(
     )
     say(found.notices)
     _write(found, *outputs)
-    typer.echo("\n".join(comparison_lines(found)))
+    echo("\n".join(comparison_lines(found)))
     raise typer.Exit(status)
 
 
@@ -150,10 +151,10 @@ def _write(
 
 
 def _say_changes(found: StudyResult, folder: Path, kept: bool) -> None:
-    typer.echo("")
+    echo("")
     if found.changes:
-        typer.echo("Since the last analysis:")
+        echo("Since the last analysis:")
     for change in found.changes:
-        typer.echo(f"  {change}")
+        echo(f"  {change}")
     if kept:
-        typer.echo(f"{folder / 'analysis'}: estimates.json, comparison.json and tables")
+        echo(f"{folder / 'analysis'}: estimates.json, comparison.json and tables")

@@ -9,6 +9,7 @@ import typer
 
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import JsonOption, SettingsOption
+from rigidimeter.cli.terminal import echo
 
 
 def design(
@@ -89,11 +90,11 @@ def design(
         search=criterion if optimise else None,
         with_multisine=multisine,
     )
-    typer.echo("\n".join(design_lines(designed, power, alpha)))
+    echo("\n".join(design_lines(designed, power, alpha)))
     if out is not None:
         from rigidimeter.reporting.design_folder import write_design_folder
 
-        typer.echo(f"\nWritten to {out}: {', '.join(write_design_folder(out, designed))}")
+        echo(f"\nWritten to {out}: {', '.join(write_design_folder(out, designed))}")
     if json_out is not None:
         write_json(json_out, design_document(designed))
     refuse_unstable(designed.settings, designed.stability)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 
@@ -75,7 +76,7 @@ def emulate(
         try:
             serve(rig, rig_out)
         except KeyboardInterrupt:
-            typer.echo("rigidimeter: emulation ended", err=True)
+            echo("rigidimeter: emulation ended", err=True)
 
 
 def _check_target(rig_out: Path) -> None:

@@ -13,6 +13,7 @@ import typer
 from rigidimeter.cli.inputs import analyse_recordings, keep_inputs
 from rigidimeter.cli.options import CsvOption, JsonOption, Recordings, reads_recordings
 from rigidimeter.cli.table_lines import number_text, text_table, with_error
+from rigidimeter.cli.terminal import echo
 
 if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Score
@@ -50,7 +51,7 @@ def estimate(
         write_estimates_json(json_out, analysis)
     if csv_out is not None:
         write_estimates_csv(csv_out, analysis)
-    typer.echo("\n".join(estimate_lines(analysis)))
+    echo("\n".join(estimate_lines(analysis)))
     raise typer.Exit(status)
 
 

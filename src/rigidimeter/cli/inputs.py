@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from rigidimeter.cli.options import Recordings
+from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -86,8 +85,10 @@ def keep_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:
 
 def say(notices: Iterable[Notice]) -> None:
     """Print notices to the standard error, one sentence a line."""
+    from rigidimeter.documents.escaping import visible
+
     for notice in notices:
-        typer.echo(f"{notice.level}: {notice.text}", err=True)
+        echo(f"{notice.level}: {visible(notice.text)}", err=True)
 
 
 def _say_failed(analysis: Analysis) -> bool:
@@ -95,9 +96,7 @@ def _say_failed(analysis: Analysis) -> bool:
     results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
     failed = [result for result in results if result.outcome.kind == "failed"]
     for result in failed:
-        typer.echo(
-            f"error: {result.source}, epoch {result.epoch}: {result.outcome.reason}", err=True
-        )
+        echo(f"error: {result.source}, epoch {result.epoch}: {result.outcome.reason}", err=True)
     return bool(failed)
 
 
@@ -191,7 +190,7 @@ def analyse_study_folder(
     try:
         changes = keep(read, result)
     except UserError as error:
-        typer.echo(f"error: the analysis is not kept: {error}", err=True)
+        echo(f"error: the analysis is not kept: {error}", err=True)
         kept = False
     sessions = (folder / session.path for session in result.sessions)
     tables = (path for name, path in read.folder.files.items() if name != "key")

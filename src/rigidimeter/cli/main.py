@@ -29,6 +29,7 @@ from rigidimeter.cli.reproduce import reproduce
 from rigidimeter.cli.run import recover, run
 from rigidimeter.cli.simulate import simulate
 from rigidimeter.cli.study import demo, study
+from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 from rigidimeter.version import __version__
 
@@ -46,7 +47,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"rigidimeter {__version__}")
+        echo(f"rigidimeter {__version__}")
         raise typer.Exit
 
 
@@ -129,7 +130,14 @@ def main() -> None:
     try:
         app()
     except UserError as error:
-        typer.echo(f"rigidimeter: {error}", err=True)
+        echo(f"rigidimeter: {error}", err=True)
+        sys.exit(1)
+    except MemoryError:
+        echo(
+            "rigidimeter: this needs more memory than the computer has; split the input, or "
+            "analyse less of it at once",
+            err=True,
+        )
         sys.exit(1)
     except BrokenPipeError:
         # The reader of our output has gone, as in `rigidimeter ... | head`: not our error.
@@ -137,9 +145,9 @@ def main() -> None:
         sys.exit(0)
     except OSError as error:
         what = f"{error.filename}: " if error.filename else ""
-        typer.echo(f"rigidimeter: {what}{error.strerror or error}", err=True)
+        echo(f"rigidimeter: {what}{error.strerror or error}", err=True)
         sys.exit(1)
     except SystemExit as end:
         if end.code == _INTERRUPTED:  # typer turns the interruption of a command into this
-            typer.echo("rigidimeter: interrupted", err=True)
+            echo("rigidimeter: interrupted", err=True)
         raise

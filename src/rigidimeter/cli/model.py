@@ -10,6 +10,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption, Recordings, reads_recordings
 from rigidimeter.cli.table_lines import Rows, text_table, with_error
+from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -81,10 +82,10 @@ def model(
     for each in found:
         problems = () if compare else each.unfitted
         for problem in problems or ((each.problem,) if each.problem else ()):
-            typer.echo(f"error: {each.epoch.name}: {problem}", err=True)
+            echo(f"error: {each.epoch.name}: {problem}", err=True)
     if json_out is not None:
         write_json(json_out, model_document(found))
-    typer.echo("\n\n".join("\n".join(_lines(each)) for each in found))
+    echo("\n\n".join("\n".join(_lines(each)) for each in found))
     raise typer.Exit(int(read.failed or any(each.failed for each in found)))
 
 

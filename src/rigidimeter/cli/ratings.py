@@ -12,6 +12,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption
 from rigidimeter.cli.table_lines import text_table
+from rigidimeter.cli.terminal import echo
 
 if TYPE_CHECKING:
     from rigidimeter.study import RatingsFound
@@ -102,7 +103,7 @@ def ratings(
     say(tuple(Notice("warning", text) for text in found.notices))
     if json_out is not None:
         write_json(json_out, ratings_document(found))
-    typer.echo("\n".join(_lines(found)))
+    echo("\n".join(_lines(found)))
 
 
 def _lines(found: RatingsFound) -> Iterator[str]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from rigidimeter.cli.terminal import echo
 
 if TYPE_CHECKING:
     from rigidimeter.acquisition.clock import DeadlineClock
@@ -81,7 +82,7 @@ def _run(
         side.sink.event("rig_configured", **facts)
         if not_tried:
             what = ", ".join(not_tried)
-            print(f"Not tried when the rig was commissioned: {what}.", file=sys.stderr)
+            echo(f"Not tried when the rig was commissioned: {what}.", err=True)
             side.sink.event("not_commissioned", checks=list(not_tried))
         side.ready()
         run_session(

@@ -14,6 +14,7 @@ from rigidimeter.cli.inputs import (
     study_of,
 )
 from rigidimeter.cli.options import KeyOption, Recordings, reads_recordings
+from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def report(
         result = recording_result(read, analysis, command_line())
     page = write_page(result, out, title)
     write_estimates_json(out / "estimates.json", result.analysis)
-    typer.echo(str(page))
+    echo(str(page))
     raise typer.Exit(status)
 
 

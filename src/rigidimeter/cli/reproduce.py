@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 
@@ -64,6 +65,6 @@ def reproduce(
             raise UserError(f"--out {out}: cannot be written ({reason})") from None
     width = max(len(row.id) for row in rows)
     for row in rows:
-        typer.echo(f"{row.id:{width}}  {row.verdict}")
-    typer.echo("; ".join(f"{count} {verdict}" for verdict, count in tally(rows).items()))
-    typer.echo(str(page))
+        echo(f"{row.id:{width}}  {row.verdict}")
+    echo("; ".join(f"{count} {verdict}" for verdict, count in tally(rows).items()))
+    echo(str(page))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rigidimeter.cli.options import NewSessionOption, SeedOption
+from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def run(
     from rigidimeter.recording.resume import count_epochs
 
     for line in complete_left():
-        typer.echo(line, err=True)
+        echo(line, err=True)
     settings, planned, continues = _planned(protocol, resume, seed, virtual=rig is None)
     home_rad = continues.get("origin_rad") if rig is not None else None
     _offer(out)
@@ -106,10 +107,10 @@ def run(
         console=Terminal(sys.stdin if attended else None, sys.stdout),
     )
     for remark in ended.remarks:
-        typer.echo(remark, err=True)
+        echo(remark, err=True)
     folder = ended.folder if ended.folder != out.absolute() else out
     good, of = count_epochs(folder)
-    typer.echo(f"{good} of {of} epochs ended with success; session in {folder}")
+    echo(f"{good} of {of} epochs ended with success; session in {folder}")
     if ended.outcome != "success":
         again = f"; continue it with `{_resume_command(folder, rig)}`" if good < of else ""
         raise UserError(
@@ -150,7 +151,7 @@ def _planned(
         )
     if not rest.epochs:
         raise UserError(f"{resume}: nothing is left to run, all {rest.done} epochs are done")
-    typer.echo(f"{rest.done} epochs are done; {len(rest.epochs)} are left")
+    echo(f"{rest.done} epochs are done; {len(rest.epochs)} are left")
     return rest.settings, Protocol(rest.settings.seed, rest.epochs), dict(rest.continues)
 
 
@@ -203,15 +204,15 @@ def recover(
     from rigidimeter.recording import recover as close_session
 
     for line in complete_left(session, reason):
-        typer.echo(line, err=True)
+        echo(line, err=True)
     found = close_session(session, reason, force=force)
     for what in found.damaged:
-        typer.echo(f"error: {session}/{what} is damaged; it stays as it is", err=True)
+        echo(f"error: {session}/{what} is damaged; it stays as it is", err=True)
     extent = f"{found.n_samples} samples up to {found.last_time_s:.3f} s"
     if found.already_closed:
-        typer.echo(f"{session} was closed already: {extent}")
+        echo(f"{session} was closed already: {extent}")
         return
     epochs = ", ".join(found.epochs_closed) or "none"
     kept = " and ".join(found.torn_files)
     torn = f"; {found.torn_bytes} torn bytes of samples; kept: {kept}" if kept else ""
-    typer.echo(f"{session} is closed: {extent}; open epochs closed as failed: {epochs}{torn}")
+    echo(f"{session} is closed: {extent}; open epochs closed as failed: {epochs}{torn}")

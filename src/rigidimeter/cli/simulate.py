@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from rigidimeter.cli.options import NewSessionOption, SeedOption, SettingsOption
+from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 
@@ -72,9 +73,7 @@ def simulate(
     chosen = changed_settings(chosen, changes, "the options")
     with Meter("simulate", session_length_s(chosen)) as meter:
         result = run_virtual_session(chosen, out, real_time=real_time, progress=meter.reach)
-    typer.echo(
-        f"{result.epochs_good} of {result.epochs_run} epochs ended with success; session in {out}"
-    )
+    echo(f"{result.epochs_good} of {result.epochs_run} epochs ended with success; session in {out}")
     if result.epochs_run and not result.epochs_good:
         raise UserError(
             f"{out}: no epoch ended with success; events.jsonl holds the reason of each"

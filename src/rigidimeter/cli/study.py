@@ -10,6 +10,7 @@ import typer
 
 from rigidimeter.cli.inputs import analyse_study_folder
 from rigidimeter.cli.options import NewStudyOption, Recordings, StudySeedOption
+from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def new(
     from rigidimeter.study.new_folder import write_new_study
 
     write_new_study(folder, title)
-    typer.echo(f"{folder}: write your sessions into {folder / 'sessions.csv'}")
+    echo(f"{folder}: write your sessions into {folder / 'sessions.csv'}")
 
 
 @study.command()
@@ -82,14 +83,14 @@ def simulate(
         raise UserError(f"--design {design}: there is no such design; known: {', '.join(DESIGNS)}")
     chosen = DESIGNS[design]
     plans = _simulated(out, chosen, seed, processes)
-    typer.echo(f"{chosen.title}, seed {seed}: {len(plans)} sessions on the virtual rig")
+    echo(f"{chosen.title}, seed {seed}: {len(plans)} sessions on the virtual rig")
     for condition in chosen.conditions:
         ratings = sum(len(plan.ratings) for plan in plans if plan.condition == condition.name)
-        typer.echo(
+        echo(
             f"  {condition.name}: {condition.prbs_epochs} PRBS and {condition.sinusoid_epochs} "
             f"sinusoidal epochs, {ratings} ratings"
         )
-    typer.echo(f"{out}: read it with: rigidimeter compare {out}")
+    echo(f"{out}: read it with: rigidimeter compare {out}")
 
 
 def demo(
@@ -132,15 +133,15 @@ def demo(
 
     start_s = time.monotonic()
     _move_aside(out)
-    typer.echo(
+    echo(
         f"A virtual subject, 2 days, OFF and DBS: {4 * prbs_epochs} PRBS and "
         f"{4 * sinusoid_epochs} sinusoidal epochs of 20 s with their rests"
     )
     _simulated(out, two_day_design(prbs_epochs, sinusoid_epochs), seed)
     found = analyse_study_folder(out, Recordings([out]))
     page = write_page(found.result, out / "report")
-    typer.echo(f"Done in {time.monotonic() - start_s:.0f} s. Open the report in a browser:")
-    typer.echo(str(page.resolve()))
+    echo(f"Done in {time.monotonic() - start_s:.0f} s. Open the report in a browser:")
+    echo(str(page.resolve()))
     raise typer.Exit(found.status)
 
 
@@ -167,4 +168,4 @@ def _move_aside(out: Path) -> None:
         out.rename(aside)
     except OSError as error:
         raise UserError(f"{out}: cannot be moved aside ({error.strerror or error})") from None
-    typer.echo(f"{out} was there already and is now {aside}")
+    echo(f"{out} was there already and is now {aside}")

@@ -14,7 +14,7 @@ from rigidimeter.documents import json_text, write_text
 from rigidimeter.paper.comparison_table import AGREES, DIFFERS, UNPUBLISHED, VERDICTS, Row, Verdict
 from rigidimeter.paper.rows import SECTIONS
 from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.page import data_uri
+from rigidimeter.reporting.page import data_uri, shown_text
 from rigidimeter.reporting.style import svg_text
 from rigidimeter.version import __version__
 
@@ -47,7 +47,11 @@ def render_page(rows: Sequence[Row], svg: Mapping[str, str], seed: int) -> str:
     """Return the page as text, with its style inside, and the figures that `svg` has by name."""
     own, report = resources.files("rigidimeter.paper"), resources.files("rigidimeter.reporting")
     environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        autoescape=True,
+        finalize=shown_text,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.globals["number"] = number
     environment.globals["short"] = _SHORT

@@ -13,7 +13,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from rigidimeter.documents import csv_text
+from rigidimeter.documents import csv_text, visible
 from rigidimeter.reporting.contents import Block, Column, Figure, Section, Table
 from rigidimeter.reporting.numbers import interval, number, p_value, short_names
 from rigidimeter.reporting.sections import SECTIONS
@@ -111,7 +111,11 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
     sources += [fit.source for fit in (*analysis.fits, *analysis.fixed_inertia)]
     names = short_names([*sources, *(score.source for score in analysis.scores)])
     environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        autoescape=True,
+        finalize=shown_text,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.tests["table"] = lambda block: isinstance(block, Table)
     environment.tests["figure"] = lambda block: isinstance(block, Figure)
@@ -130,6 +134,11 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
         virtual=sum(epoch.virtual for epoch in result.epochs),
         version=__version__,
     )
+
+
+def shown_text(value: Any) -> Any:
+    """Return a value of a page; in text control characters are escapes, which HTML forbids."""
+    return visible(value, lines=True) if type(value) is str else value
 
 
 def data_uri(svg: str) -> str:

@@ -21,8 +21,11 @@ from matplotlib import font_manager
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
+
+from rigidimeter.documents import visible
 
 GREY = "#555555"
 WARN = "#8A3B00"
@@ -76,13 +79,16 @@ def svg_text(figure: Figure, mark: str = "") -> str:
     with styled():
         if mark:
             figure.suptitle(mark, x=0.995, ha="right", fontsize=8, style="italic", color=WARN)
+        for text in figure.findobj(Text):  # fonts have no control characters, XML forbids them
+            if (shown := visible(text.get_text(), lines=True)) != text.get_text():
+                text.set_text(shown)
         figure.savefig(file, format="svg", metadata={"Date": None, "Creator": "rigidimeter"})
     # A clipping path is named after its place in memory; it is named by its order instead.
-    text = file.getvalue()
-    names = dict.fromkeys(re.findall(r'<clipPath id="(\w+)"', text))
+    document = file.getvalue()
+    names = dict.fromkeys(re.findall(r'<clipPath id="(\w+)"', document))
     numbers = {name: f"clip-{number}" for number, name in enumerate(names)}
     return re.sub(
-        r'(?<=[#"])p[0-9a-f]{10}(?=[")])', lambda found: numbers.get(found[0], found[0]), text
+        r'(?<=[#"])p[0-9a-f]{10}(?=[")])', lambda found: numbers.get(found[0], found[0]), document
     )
 
 

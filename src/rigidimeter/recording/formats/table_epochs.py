@@ -178,7 +178,7 @@ def _check_rate(source: str, name: str | None, clock: Rows) -> None:
         stamps = f"the stamps of {name}" if name else "the sampling rate"
         raise UserError(
             f"{source}: {stamps} give rows that are {clock.step_s:g} s apart; a recording must "
-            f"have from {low_hz:g} to {high_hz:g} Hz, with the time in seconds"
+            f"have from {low_hz:g} to {high_hz:g} Hz, so check the unit of the time stamps (s)"
         )
 
 
