@@ -18,12 +18,11 @@ from rigidimeter.acquisition.processes.supervise import Realtime, supervise
 from rigidimeter.acquisition.run_states import Command
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample
-from rigidimeter.settings import Settings
+from rigidimeter.settings import parse_settings
 
 RATE_HZ = 500
-PATIENCE = Patience(
-    look_s=0.05, loop_lost_s=1.0, recorder_lost_s=1.0, console_lost_s=1.0, hung_s=2.0, disk_s=3.0
-)
+PATIENCE = Patience(look_s=0.05, loop_lost_s=1.0, hung_s=2.0, disk_s=3.0)
+SETTINGS = parse_settings({"loop": {"console_lost_s": 1.0, "recorder_lost_s": 1.0}})
 
 
 def ticks(duration_s, side):
@@ -74,7 +73,7 @@ def main() -> None:
 
     ended = supervise(
         partial(ticks, duration_s),
-        Recording(folder, Settings(), virtual=True),
+        Recording(folder, SETTINGS, virtual=True),
         realtime=Realtime(priority=0, lock_memory=False, live_estimate="live" in sys.argv),
         patience=PATIENCE,
         console=console,

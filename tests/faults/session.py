@@ -1,8 +1,10 @@
 """A session in processes of its own, on a rig that its file describes: for tests to kill.
 
-    python -m tests.faults.session RIG.toml FOLDER
+    python -m tests.faults.session RIG.toml FOLDER [usual]
 
-Prints one line of JSON with the process ids when the loop runs, and one with the ending.
+RIG.toml may be `virtual`: the simulated rig. With `usual` the processes wait for each other as long
+as `rigidimeter run` has them. Prints one line of JSON with the process ids when the loop runs, and
+one with the ending.
 """
 
 from __future__ import annotations
@@ -14,21 +16,25 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.loop_process import LoopSide, Realtime
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.shared_status import Condition, Role, SharedStatus
 from rigidimeter.acquisition.processes.supervise import supervise
 from rigidimeter.acquisition.session_run import run_session
+from rigidimeter.devices import SimulatedRig
+from rigidimeter.devices.base import Rig
 from rigidimeter.devices.rigfile import load_rig
 from rigidimeter.experiment import plan
 from rigidimeter.settings import Settings, parse_settings
 
-RATE_HZ = {"cia402": 500.0, "ascii": 50.0}
-SPEED_DEG_S = {"cia402": 126.0, "ascii": 38.0}
-PATIENCE = Patience(
-    loop_lost_s=0.5, stopping_s=3.0, hung_s=1.5, console_lost_s=0.5, recorder_lost_s=1.0
-)
+RATE_HZ = {"cia402": 500.0, "ascii": 50.0, "virtual": 500.0}
+SPEED_DEG_S = {"cia402": 126.0, "ascii": 38.0, "virtual": 126.0}
+VIRTUAL = Path("virtual")
+PATIENCE = Patience(loop_lost_s=0.5, stopping_s=3.0, hung_s=1.5)
+CONSOLE_LOST_S, RECORDER_LOST_S = 0.5, 1.0
 
 
 def settings_for(drive: str) -> Settings:
@@ -53,7 +59,12 @@ def settings_for(drive: str) -> Settings:
             },
             "controller": {"torque_cutoff_hz": 10.0},
             "guard": guard,
-            "loop": {"missed_in_a_row": 100, "stall_s": 0.4},
+            "loop": {
+                "missed_in_a_row": 100,
+                "stall_s": 0.4,
+                "console_lost_s": CONSOLE_LOST_S,
+                "recorder_lost_s": RECORDER_LOST_S,
+            },
             "sinusoid": {
                 "amplitude_deg": 3.0 if slow else 10.0,
                 "frequency_hz": 2.0,
@@ -72,7 +83,11 @@ def settings_for(drive: str) -> Settings:
 def run_loop(settings: Settings, rig_path: Path, side: LoopSide) -> None:
     """Run the session; the target of the loop's process."""
     clock = DeadlineClock()
-    rig = load_rig(rig_path).build(clock.now_s, settings.rig.tick_rate_hz)
+    rig: Rig
+    if rig_path == VIRTUAL:
+        rig = SimulatedRig(settings.rig, settings.subject["OFF"], np.random.default_rng(1))
+    else:
+        rig = load_rig(rig_path).build(clock.now_s, settings.rig.tick_rate_hz)
     protocol = plan(settings.protocol, settings.prbs, settings.sinusoid, 1)
     try:
         rig.connect()
@@ -84,25 +99,36 @@ def run_loop(settings: Settings, rig_path: Path, side: LoopSide) -> None:
 
 
 class Console:
-    """Says who is who, once."""
+    """Says who is who, once, and if asked what the names of the shared memory begin with."""
 
-    said = False
+    def __init__(self, memory: bool) -> None:
+        self.said = False
+        self.memory = memory
 
     def __call__(self, shared_status: SharedStatus) -> None:
         if not self.said and shared_status.condition(Role.LOOP) is Condition.RUNNING:
             self.said = True
-            print(json.dumps({role.name: shared_status.pid(role) for role in Role}), flush=True)
+            said: dict[str, int | str] = {role.name: shared_status.pid(role) for role in Role}
+            if self.memory:
+                said["MEMORY"] = shared_status.name.rpartition("-")[0]
+            print(json.dumps(said), flush=True)
 
 
-def main(rig: str, folder: str) -> None:
-    drive = "ascii" if 'driver = "ascii"' in Path(rig).read_text() else "cia402"
-    settings = settings_for(drive)
+def drive_of(rig: Path) -> str:
+    """Return which drive a rig file names."""
+    if rig == VIRTUAL:
+        return "virtual"
+    return "ascii" if 'driver = "ascii"' in rig.read_text() else "cia402"
+
+
+def main(rig: str, folder: str, patience: str = "") -> None:
+    settings = settings_for(drive_of(Path(rig)))
     ended = supervise(
         partial(run_loop, settings, Path(rig)),
         Recording(Path(folder), settings, seeds={"session": 1}),
         realtime=Realtime(live_estimate=False, attended=False),
-        patience=PATIENCE,
-        console=Console(),
+        patience=Patience() if patience == "usual" else PATIENCE,
+        console=Console(patience == "usual"),
     )
     print(json.dumps({**asdict(ended), "folder": str(ended.folder)}), flush=True)
 

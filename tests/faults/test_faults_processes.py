@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.faults.session import PATIENCE, RATE_HZ, SPEED_DEG_S
+from tests.faults.session import CONSOLE_LOST_S, RATE_HZ, RECORDER_LOST_S, SPEED_DEG_S
 from tests.lateness import PRESENT
 from tests.wire.rig_process import RigProcess
 
@@ -175,7 +175,7 @@ def test_fault_09_loop_process_lost(drive, number, tmp_path, measured):
 def test_fault_19_console_process_lost(number, tmp_path, measured):
     with session("cia402", tmp_path) as running:
         at_s = running.signal_at_speed("CONSOLE", number)
-        bound_s = PATIENCE.console_lost_s + 1 / RATE_HZ["cia402"] + 126 / 6000 + 0.03
+        bound_s = CONSOLE_LOST_S + 1 / RATE_HZ["cia402"] + 126 / 6000 + 0.03
         rest_s = running.rest_s(at_s, bound_s)
         assert rest_s <= bound_s + slack_s(at_s)
         events, samples = running.closed()
@@ -214,9 +214,9 @@ def test_fault_21_recorder_process_lost(number, tmp_path, measured):
     """The loop goes on until it must not, then stops in order; nothing of the record is lost."""
     with session("cia402", tmp_path) as running:
         at_s = running.signal_at_speed("RECORDER", number)
-        bound_s = PATIENCE.recorder_lost_s + 1 / RATE_HZ["cia402"] + 126 / 6000 + 0.03
+        bound_s = RECORDER_LOST_S + 1 / RATE_HZ["cia402"] + 126 / 6000 + 0.03
         rest_s = running.rest_s(at_s, bound_s)
-        assert 0.5 * PATIENCE.recorder_lost_s < rest_s <= bound_s + slack_s(at_s)
+        assert 0.5 * RECORDER_LOST_S < rest_s <= bound_s + slack_s(at_s)
         events, samples = running.closed()
         assert Cause.RECORDER_LOST.sentence in events[-1]["reason"]
         assert samples["cause"][-1] == int(Cause.RECORDER_LOST)

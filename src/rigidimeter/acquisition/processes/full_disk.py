@@ -117,7 +117,7 @@ class FullDisk:
         if not (over and told):
             return False
         self._over_s = self._over_s or time.monotonic()
-        limit_s = patience.console_lost_s if alone else patience.disk_s
+        limit_s = self._recording.settings.loop.console_lost_s if alone else patience.disk_s
         return time.monotonic() - self._over_s > limit_s
 
 

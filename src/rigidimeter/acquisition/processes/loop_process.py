@@ -95,14 +95,14 @@ def loop_main(
         shared.leave()
         sys.exit(1)
     recorder = WatchedProcess(status.pid(Role.RECORDER))
-    rate_hz = recording.settings.rig.tick_rate_hz
+    rate_hz, limits = recording.settings.rig.tick_rate_hz, recording.settings.loop
     sink = RingSink(shared, rate_hz)
     supervision = SharedSupervision(
         shared,
-        console_lost_s=patience.console_lost_s,
-        recorder_lost_s=patience.recorder_lost_s,
-        most_lag=round(patience.recorder_lost_s * rate_hz),
-        stall_s=recording.settings.loop.stall_s,
+        console_lost_s=limits.console_lost_s,
+        recorder_lost_s=limits.recorder_lost_s,
+        most_lag=round(limits.recorder_lost_s * rate_hz),
+        stall_s=limits.stall_s,
         attended=realtime.attended,
         console_pid=console_pid,
     )

@@ -71,8 +71,6 @@ class Patience:
         session then stays in memory.
     hung_s : float
         A process that has not been heard of for so long is ended.
-    console_lost_s, recorder_lost_s : float
-        After how long the loop stops because of them.
     """
 
     look_s: float = BATCH_S
@@ -81,8 +79,6 @@ class Patience:
     sync_s: float = 1.0
     disk_s: float = 30.0
     hung_s: float = 8.0
-    console_lost_s: float = 1.0
-    recorder_lost_s: float = 5.0
 
 
 class Recorder:
