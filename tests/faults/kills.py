@@ -10,9 +10,10 @@ that wakes must not command. What is left in memory is brought in by `rigidimete
 
 The samples that the loop made are counted in its ring, which outlives its name in a mapping here.
 Those are lost that are in no file in the end; how many `recover` brought in is named. The arm's
-rest is that of the emulated arm; that of a simulated arm is in the record, and ends with the loop's
-process. The status is 1 if more than 0.1 s were lost, the arm still moved, a command followed the
-end, or anything was left.
+rest is that of the emulated arm. On the virtual rig it is the last command of zero in the record;
+there is none where the loop was killed or stopped, since its process has the arm in it. The status
+is 1 if more than 0.1 s were lost, the arm still moved, a command followed the end, or anything was
+left.
 """
 
 from __future__ import annotations
@@ -170,7 +171,12 @@ def one_kill(
                 found.wrong = "the arm still moves"
         _look_at_record(found, folder, ring)
         if bench is None:
-            _rest_of_record(found, folder, session_s, killed="LOOP" in roles)
+            _rest_of_record(
+                found,
+                folder,
+                session_s,
+                killed="LOOP" in roles and number in (signal.SIGKILL, signal.SIGSTOP),
+            )
         found.left += [path.name for path in ring.left()]
     finally:
         for pid in pids.values():
@@ -242,9 +248,9 @@ def _closings(folder: Path) -> int:
 
 
 def _rest_of_record(found: Killed, folder: Path, session_s: float, *, killed: bool) -> None:
-    """Take the arm's rest from the record; a loop that was killed has taken its arm with it."""
+    """Take from the record when rest was commanded; a killed loop has taken its arm with it."""
     samples = read_samples(folder / "samples.arrows")
-    moving = np.flatnonzero(np.abs(samples["velocity_rad_s"]) > MOVES_RAD_S)
+    moving = np.flatnonzero(samples["velocity_command_rad_s"])
     last = int(moving[-1]) if moving.size else 0
     if last + 1 < samples["time_s"].size:
         found.rest_s = float(samples["time_s"][last + 1]) - session_s

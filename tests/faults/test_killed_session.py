@@ -21,7 +21,14 @@ def start(folder, *options):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=ignoring,
     )
+
+
+def ignoring():
+    """Ignore what a shell ignores in the background; the program is to obey it all the same."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGQUIT, signal.SIG_IGN)
 
 
 def wait_for_epoch(folder, number, timeout_s=60.0):
@@ -88,7 +95,7 @@ def test_in_real_time_at_most_a_tenth_of_a_second_is_lost(tmp_path, lateness):
     assert samples["time_s"][-1] >= ran_s - 0.1 - 0.02 - lateness.worst_s(started)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT])
 def test_an_interrupted_session_closes_in_order(tmp_path, number):
     folder = tmp_path / "session"
     process = start(folder, "--epochs", "50")

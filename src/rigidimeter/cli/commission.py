@@ -134,11 +134,11 @@ def commission(
 
 @contextlib.contextmanager
 def _interrupted_once(record: Path) -> Iterator[None]:
-    """Let Ctrl-C, SIGTERM and the closing of the terminal end it, once, and say what that left.
+    """Let Ctrl-C, Ctrl-\\, SIGTERM and the end of the terminal end it, once; say what that left.
 
     A second one would break off the steps that bring the drive to rest and take its power away.
     """
-    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
     before = {}
 
     def ended(_: int, __: FrameType | None) -> None:

@@ -1,5 +1,7 @@
 import math
+import os
 import time
+from pathlib import Path
 
 import pytest
 
@@ -134,6 +136,36 @@ def test_causes_to_stop(shared_status, rings, now):
     assert supervision.cause(0.0) == Cause.SIGNAL
     shared_status.raise_flag(Flag.EMERGENCY_STOP)
     assert supervision.cause(0.0) == Cause.EMERGENCY_STOP
+
+
+def test_a_console_that_was_killed_is_lost_at_once(shared_status, rings, now, monkeypatch):
+    shared_status.beat(Role.CONSOLE)
+    shared_status.beat(Role.RECORDER)
+    supervision = SharedSupervision(
+        SessionMemory(*rings, shared_status), console_pid=os.getppid(), now_ns=now, boot_ns=now
+    )
+    assert supervision.cause(0.0) == Cause.NONE
+    monkeypatch.setattr("rigidimeter.acquisition.processes.sink.getppid", lambda: 1)
+    assert supervision.cause(0.0) == Cause.CONSOLE_LOST
+
+
+def test_an_interrupt_is_one_order_to_abort(shared_status, rings):
+    supervision = SharedSupervision(SessionMemory(*rings, shared_status))
+    shared_status.post(Order(Command.PAUSE))
+    shared_status.raise_flag(Flag.ABORT_ASKED)
+    taken = [supervision.order().command for _ in range(3)]
+    assert taken == [Command.ABORT, Command.PAUSE, NOTHING.command]
+
+
+def test_folders_are_shown_and_asked_for(shared_status, tmp_path):
+    assert shared_status.folder() is None
+    assert shared_status.asked_folder() is None
+    shared_status.show_folder(tmp_path / "µ")
+    shared_status.ask_folder(Path("other"))
+    assert shared_status.folder() == tmp_path / "µ"
+    assert shared_status.asked_folder() == Path.cwd() / "other"
+    with pytest.raises(ValueError, match="4080 are possible"):
+        shared_status.ask_folder(Path("x" * 5000))
 
 
 @pytest.fixture

@@ -43,7 +43,7 @@ def test_a_known_torque_that_tells_nothing_is_refused(value):
         _check_known({"--known-torque-nm": value})
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
 def test_who_interrupts_twice_does_not_break_off_the_stopping(tmp_path, number):
     before, steps = signal.getsignal(number), []
     record = tmp_path / "record.json"

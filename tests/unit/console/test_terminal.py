@@ -231,6 +231,20 @@ def test_the_loop_is_shown_once_a_second_and_trouble_once(desk):
     assert desk.said() == ["the disk is full"]
 
 
+def test_another_folder_is_asked_for_while_the_recorder_can_write_nothing(desk, tmp_path):
+    folder = tmp_path / "Other One"
+    desk.type(f"save to {folder}\n")
+    assert desk.said() == ["the recorder can write: another folder is for when it cannot"]
+    assert desk.shared_status.asked_folder() is None
+    desk.shared_status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
+    desk.type(f"save to  {folder} \n")
+    assert desk.said()[0] == f"ordered: save to {folder}"
+    assert desk.shared_status.asked_folder() == folder
+    desk.type(f"save to {'x' * 5000}\n")
+    assert desk.said()[-1].endswith("4080 are possible")
+    assert desk.orders() == []
+
+
 def test_before_the_first_tick_nothing_is_shown(desk):
     assert desk.shared_status.loop() is not None
     assert math.isnan(desk.shared_status.loop().angle_rad)

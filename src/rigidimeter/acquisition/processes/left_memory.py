@@ -45,11 +45,11 @@ def complete_left(only: Path | None = None, reason: str = KILLED) -> list[str]:
     wanted = only.resolve() if only is not None else None
     for stem in sorted({path.name.rpartition("-")[0] for path in WHERE.glob(f"{PREFIX}*-*")}):
         names = (stem + PARTS[0], stem + PARTS[1], stem + PARTS[2])
-        try:
-            shared = SessionMemory.attach(names)
-        except FileNotFoundError:
+        if not all((WHERE / name).exists() for name in names):
             _remove_unfinished(names)
             continue
+        try:
+            shared = SessionMemory.attach(names)
         except (ValueError, OSError):  # of another version, or of another user
             continue
         try:

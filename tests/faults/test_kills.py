@@ -1,0 +1,11 @@
+"""A few of the sessions that `python -m tests.faults.kills` ends at random moments."""
+
+import pytest
+from tests.faults.kills import run
+
+
+@pytest.mark.realtime(resolves_s=1.0)
+@pytest.mark.parametrize("rig", ["virtual", pytest.param("canopen", marks=pytest.mark.slow)])
+def test_whatever_is_killed_nothing_is_lost_or_left(rig):
+    results = run(2, 7, (rig,))
+    assert not [result for result in results if result.bad]

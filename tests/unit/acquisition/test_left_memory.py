@@ -1,0 +1,128 @@
+"""Shared memory goes with the last process that has it, unless it holds what is in no file."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from rigidimeter.acquisition.processes import left_memory
+from rigidimeter.acquisition.processes.left_memory import complete_left
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.shared_memory import PREFIX, WHERE, Memory
+from rigidimeter.acquisition.processes.shared_status import Condition, Role
+from rigidimeter.acquisition.processes.sink import RingSink
+from rigidimeter.errors import UserError
+from rigidimeter.recording import SessionWriter
+from rigidimeter.recording.event_log import read_events
+from rigidimeter.recording.sample_log import Sample, read_samples
+from rigidimeter.settings import Settings
+
+
+@pytest.fixture
+def made(tmp_path):
+    """Memory of a session of 150 samples, of which 100 are in the folder; no writer lives."""
+    shared = SessionMemory.create(100.0, 10.0)
+    writer = SessionWriter(tmp_path / "s", Settings(), [], {}, virtual=True)
+    shared.status.show_folder(tmp_path / "s")
+    sink = RingSink(shared, 100.0)
+    sink.event("session_started", time_s=0.0)
+    for tick in range(150):
+        sink.sample(sample(tick))
+    rows = shared.samples.rows(0, 100)
+    writer.columns({name: rows[name] for name in rows.dtype.names})
+    shared.samples.recorded = 100
+    writer._log._file.close()
+    writer._events.close()
+    yield shared
+    if not shared.samples.memory.closed:
+        shared.close()
+    for name in shared.names:
+        (WHERE / name).unlink(missing_ok=True)
+
+
+def sample(tick: int) -> Sample:
+    return Sample(tick, tick / 100.0, 0.0, -1, *[0.5] * 9, 0)
+
+
+def there(shared: SessionMemory) -> list[bool]:
+    return [(WHERE / name).exists() for name in shared.names]
+
+
+def test_the_last_one_removes_it(made):
+    other = SessionMemory.attach(made.names)
+    made.samples.recorded = made.samples.written
+    made.events.recorded = made.events.written
+    other.leave()
+    assert there(made) == [True] * 3
+    made.leave()
+    assert there(made) == [False] * 3
+
+
+def test_what_is_in_no_file_stays(made):
+    made.leave()
+    assert there(made) == [True] * 3
+
+
+def test_what_came_after_the_end_of_the_record_does_not_stay(made):
+    made.status.set_condition(Role.RECORDER, Condition.DONE)
+    made.leave()
+    assert there(made) == [False] * 3
+
+
+def test_what_was_left_is_brought_into_its_folder_once(made, tmp_path):
+    made.close()
+    assert complete_left(tmp_path / "another") == []
+    (told,) = complete_left(tmp_path / "s", "a power cut")
+    assert told == f"{tmp_path / 's'}: 50 samples that were only in memory were brought in"
+    assert there(made) == [False] * 3
+    assert read_samples(tmp_path / "s" / "samples.arrows")["tick"].tolist() == list(range(150))
+    events, _ = read_events(tmp_path / "s" / "events.jsonl")
+    assert events[-1]["reason"] == "a power cut"
+    assert complete_left(tmp_path / "s") == []
+
+
+def test_a_living_process_keeps_it(made, tmp_path, monkeypatch):
+    monkeypatch.setattr(left_memory, "LEAVING_S", 0.1)
+    holder = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            "import sys; from rigidimeter.acquisition.processes.shared_memory import Memory\n"
+            "memory = Memory.attach(sys.argv[1]); print('has it', flush=True); sys.stdin.read()",
+            made.status.name,
+        ],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    assert holder.stdout.readline() == b"has it\n"
+    made.close()
+    with pytest.raises(UserError, match="still being recorded"):
+        complete_left(tmp_path / "s")
+    assert complete_left() == []
+    assert there(made) == [True] * 3
+    holder.kill()
+    holder.communicate()
+    assert len(complete_left(tmp_path / "s")) == 1
+
+
+def test_a_folder_that_cannot_be_completed_is_named_and_the_memory_kept(made, tmp_path):
+    made.close()
+    (tmp_path / "s" / "manifest.json").unlink()
+    (told,) = complete_left(tmp_path / "s")
+    assert "50 samples of this session wait in memory" in told
+    assert made.samples.name in told
+    assert there(made) == [True] * 3
+
+
+def test_parts_of_a_set_that_was_never_complete_are_removed_but_not_at_once(monkeypatch):
+    memory = Memory.create(64, f"{PREFIX}unfinished{os.getpid()}-samples")
+    memory.close()
+    path = WHERE / memory.name
+    complete_left(path)
+    assert path.exists()
+    monkeypatch.setattr(left_memory, "MAKING_S", -1.0)
+    time.sleep(0.01)
+    complete_left(path)
+    assert not path.exists()
