@@ -30,7 +30,7 @@ def alive(pid: int) -> bool:
     """Whether a process has not ended."""
     try:
         state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-    except FileNotFoundError:
+    except (FileNotFoundError, ProcessLookupError):
         return False
     return state not in "ZX"
 
@@ -44,6 +44,19 @@ def wait_for(what: Callable[[], Any], timeout_s: float = 30.0) -> Any:
             return found
         time.sleep(0.02)
     pytest.fail(f"{what} did not come true within {timeout_s} s")
+
+
+def fill(folder: Path) -> Path:
+    """Leave no room; return the file that takes it."""
+    path = folder / "ballast"
+    with path.open("wb", buffering=0) as file:
+        for size in (4096, 1):
+            try:
+                while True:
+                    file.write(bytes(size))
+            except OSError:
+                continue
+    return path
 
 
 class Session:

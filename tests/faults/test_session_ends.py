@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from tests.faults.running_session import Session, alive, memory, wait_for
+from tests.faults.running_session import Session, alive, fill, memory, wait_for
 
 from rigidimeter.acquisition.processes.left_memory import complete_left
 from rigidimeter.acquisition.processes.shared_status import Condition, Role, SharedStatus
@@ -34,31 +34,6 @@ def session(tmp_path):
 
     yield start
     started[0].close()
-
-
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of its own, small enough to fill."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "none", str(folder)]
-    if subprocess.run(mount, capture_output=True, check=False).returncode:
-        pytest.skip("mounting a small disk is not permitted here")
-    yield folder
-    subprocess.run(["umount", "--lazy", str(folder)], check=True)
-
-
-def fill(folder: Path) -> Path:
-    """Leave no room; return the file that takes it."""
-    path = folder / "ballast"
-    with path.open("wb", buffering=0) as file:
-        for size in (4096, 1):
-            try:
-                while True:
-                    file.write(bytes(size))
-            except OSError:
-                continue
-    return path
 
 
 OUTCOMES = {

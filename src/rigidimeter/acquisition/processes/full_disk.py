@@ -72,8 +72,8 @@ class FullDisk:
             free = f"{shutil.disk_usage(folder).free / 1e6:.1f} MB are free, "
         note = (
             f"{folder}: nothing can be written there ({error.strerror or error}); "
-            f"{free}{self._shared.samples.lag()} samples wait in memory: make room, or order "
-            f"`save to FOLDER`{self._refusal}"
+            f"{free}{self._shared.samples.lag()} samples wait in memory: make room, order "
+            f"`save to FOLDER`{self._refusal}, or end with Ctrl-C, and they stay in memory"
         )
         self._shared.status.set_condition(Role.RECORDER, Condition.TROUBLE, note)
 

@@ -101,7 +101,8 @@ def loop_main(
         shared,
         console_lost_s=limits.console_lost_s,
         recorder_lost_s=limits.recorder_lost_s,
-        most_lag=round(limits.recorder_lost_s * rate_hz),
+        # A recorder that is silent is named as that first.
+        most_lag=round((limits.recorder_lost_s + 2 * patience.look_s) * rate_hz),
         stall_s=limits.stall_s,
         attended=realtime.attended,
         console_pid=console_pid,
