@@ -46,7 +46,7 @@ from tests.wire.rig_process import RigProcess
 from rigidimeter.acquisition.processes.ring import ROW
 from rigidimeter.acquisition.processes.shared_memory import WHERE
 from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_log import read_samples
+from rigidimeter.recording.sample_reading import read_samples
 
 ROOT = Path(__file__).parents[2]
 SIGNALS = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM, signal.SIGQUIT)

@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_log import read_samples
+from rigidimeter.recording.sample_reading import read_samples
 
 SCRIPT = Path(__file__).with_name("realtime_session.py")
 

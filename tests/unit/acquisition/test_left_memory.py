@@ -14,9 +14,10 @@ from rigidimeter.acquisition.processes.shared_memory import PREFIX, WHERE, Memor
 from rigidimeter.acquisition.processes.shared_status import Condition, Role
 from rigidimeter.acquisition.processes.sink import RingSink
 from rigidimeter.errors import UserError
-from rigidimeter.recording import SessionWriter
+from rigidimeter.recording import SessionWriter, recover
 from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_log import Sample, read_samples
+from rigidimeter.recording.sample_log import Sample
+from rigidimeter.recording.sample_reading import read_samples
 from rigidimeter.settings import Settings
 
 
@@ -110,10 +111,20 @@ def test_a_living_process_keeps_it(made, tmp_path, monkeypatch):
 def test_a_folder_that_cannot_be_completed_is_named_and_the_memory_kept(made, tmp_path):
     made.close()
     (tmp_path / "s" / "manifest.json").unlink()
-    (told,) = complete_left(tmp_path / "s")
-    assert "50 samples of this session wait in memory" in told
+    with pytest.raises(UserError, match="50 samples of this session wait in memory"):
+        complete_left(tmp_path / "s")
+    (told,) = complete_left()  # it keeps no other session from running
     assert made.samples.name in told
     assert there(made) == [True] * 3
+
+
+def test_a_record_that_was_closed_is_not_gone_on_with(made, tmp_path):
+    made.close()
+    recover(tmp_path / "s", "closed before")
+    before = {path.name: path.read_bytes() for path in (tmp_path / "s").iterdir()}
+    complete_left(tmp_path / "s")
+    assert before == {path.name: path.read_bytes() for path in (tmp_path / "s").iterdir()}
+    assert there(made) == [False] * 3
 
 
 def test_parts_of_a_set_that_was_never_complete_are_removed_but_not_at_once(monkeypatch):

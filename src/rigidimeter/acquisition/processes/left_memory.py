@@ -39,7 +39,8 @@ def complete_left(only: Path | None = None, reason: str = KILLED) -> list[str]:
     Raises
     ------
     UserError
-        If a process still records into the folder `only`.
+        If a process still records into the folder `only`, or what is in memory cannot be written
+        there: closed without it, the record would have lost it.
     """
     told: list[str] = []
     wanted = only.resolve() if only is not None else None
@@ -63,7 +64,10 @@ def complete_left(only: Path | None = None, reason: str = KILLED) -> list[str]:
             elif not shared.needed():
                 shared.unlink()
             elif folder is not None and (mine or wanted is None):
-                told.append(_complete(shared, folder, reason))
+                line, done = _complete(shared, folder, reason)
+                if mine and not done:
+                    raise UserError(line)
+                told.append(line)
         finally:
             shared.close()
     return told
@@ -79,8 +83,8 @@ def _left(shared: SessionMemory, wait_s: float) -> bool:
     return True
 
 
-def _complete(shared: SessionMemory, folder: Path, reason: str) -> str:
-    """Bring one session's memory into its folder and remove it; return what to tell."""
+def _complete(shared: SessionMemory, folder: Path, reason: str) -> tuple[str, bool]:
+    """Bring one session's memory into its folder and remove it; say so, and whether it was."""
     waiting = shared.samples.lag()
     try:
         rate_hz = float(read_manifest(folder)["settings"]["rig"]["tick_rate_hz"])
@@ -90,9 +94,9 @@ def _complete(shared: SessionMemory, folder: Path, reason: str) -> str:
             f"{folder}: {waiting} samples of this session wait in memory, but could not be "
             f"written ({error}); mend that and use `rigidimeter recover {folder}`, or remove "
             f"{shared.where()} and its two neighbours"
-        )
+        ), False
     shared.unlink()
-    return f"{folder}: {found.samples} samples that were only in memory were brought in"
+    return f"{folder}: {found.samples} samples that were only in memory were brought in", True
 
 
 def _remove_unfinished(names: tuple[str, str, str]) -> None:

@@ -75,9 +75,10 @@ def recover_from_rings(
             content = path.read_bytes()
             file.truncate(content.rfind(b"\n") + 1)
         was_closed = any(event.get("event") == "session_ended" for event in known)
-        added = _samples(folder / SAMPLES, samples, tick_rate_hz, session_id)
-        lines = _lines(path, events, session_id)
-        if (added or lines or torn or not was_closed) and not was_closed:
+        # Whoever closed it had brought all in first; what came after its end does not belong to it.
+        added = 0 if was_closed else _samples(folder / SAMPLES, samples, tick_rate_hz, session_id)
+        lines = [] if was_closed else _lines(path, events, session_id)
+        if not was_closed:
             append_event(
                 file,
                 {
