@@ -215,7 +215,8 @@ def _until_over(
         if not living:
             found.ended_s = now_s - at_s
             break
-        if stopped and (now_s - at_s > STOPPED_S or set(living) <= set(stopped)):
+        others = set(pids.values()) - set(stopped)
+        if stopped and (now_s - at_s > STOPPED_S or (others and not others & set(living))):
             for pid in stopped:
                 with suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGCONT)

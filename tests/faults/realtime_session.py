@@ -1,8 +1,8 @@
 """A session in processes of its own, for tests that kill one of them; not a test itself.
 
 `python realtime_session.py FOLDER SECONDS [live] [save=OTHER]` prints how it ended as JSON. The
-file `pids.json` beside the folder names the processes. With `save=` the console orders another
-folder as soon as the recorder is in trouble.
+file `pids.json` beside the folder names the processes and their memory. With `save=` the console
+orders another folder as soon as the recorder is in trouble.
 """
 
 import json
@@ -55,7 +55,10 @@ def main() -> None:
     seen: dict[str, object] = {}
 
     def console(shared_status) -> None:
-        pids = {role.name: shared_status.pid(role) for role in Role}
+        pids = {
+            **{role.name: shared_status.pid(role) for role in Role},
+            "MEMORY": shared_status.name.rpartition("-")[0],
+        }
         if seen.get("pids") != pids:
             seen["pids"] = pids
             part = folder.with_name("pids.part")

@@ -70,7 +70,6 @@ class Session:
         preexec: Callable[[], object] | None = None,
     ) -> None:
         self.folder = folder
-        self.before = memory()
         self.process = subprocess.Popen(
             [sys.executable, str(SCRIPT), str(folder), str(duration_s), *options],
             stdout=subprocess.PIPE,
@@ -84,14 +83,16 @@ class Session:
         """Wait until samples are in the file; return the processes."""
         path = self.folder / "samples.arrows"
         wait_for(lambda: path.is_file() and read_samples(path)["tick"].size > 50)
-        self.mine = memory() - self.before
         pids_path = self.folder.with_name("pids.json")
 
-        def pids() -> dict[str, int]:
+        def pids() -> dict[str, int | str]:
             found = json.loads(pids_path.read_text()) if pids_path.exists() else {}
             return found if found.get("LOOP") else {}
 
-        return wait_for(pids)
+        found = wait_for(pids)
+        stem = found.pop("MEMORY")  # other sessions may run beside this one
+        self.mine = {name for name in memory() if name.startswith(stem)}
+        return dict(found)
 
     def ended(self) -> dict[str, Any]:
         """Wait for its end; return how it ended, having seen that no memory is left."""

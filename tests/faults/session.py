@@ -35,10 +35,14 @@ SPEED_DEG_S = {"cia402": 126.0, "ascii": 38.0, "virtual": 126.0}
 VIRTUAL = Path("virtual")
 PATIENCE = Patience(loop_lost_s=0.5, stopping_s=3.0, hung_s=1.5)
 CONSOLE_LOST_S, RECORDER_LOST_S = 0.5, 1.0
+ALONE = {"console_lost_s": CONSOLE_LOST_S, "recorder_lost_s": RECORDER_LOST_S}
 
 
-def settings_for(drive: str) -> Settings:
-    """Return settings under which the arm swings to and fro for a while."""
+def settings_for(drive: str, usual: bool = False) -> Settings:
+    """Return settings under which the arm swings to and fro for a while.
+
+    With `usual` the loop goes on alone for as long as by default.
+    """
     rate_hz = RATE_HZ[drive]
     slow = drive == "ascii"
     guard: dict[str, Any] = {"reaction_time_s": 0.03}
@@ -59,12 +63,7 @@ def settings_for(drive: str) -> Settings:
             },
             "controller": {"torque_cutoff_hz": 10.0},
             "guard": guard,
-            "loop": {
-                "missed_in_a_row": 100,
-                "stall_s": 0.4,
-                "console_lost_s": CONSOLE_LOST_S,
-                "recorder_lost_s": RECORDER_LOST_S,
-            },
+            "loop": {"missed_in_a_row": 100, "stall_s": 0.4, **({} if usual else ALONE)},
             "sinusoid": {
                 "amplitude_deg": 3.0 if slow else 10.0,
                 "frequency_hz": 2.0,
@@ -122,13 +121,14 @@ def drive_of(rig: Path) -> str:
 
 
 def main(rig: str, folder: str, patience: str = "") -> None:
-    settings = settings_for(drive_of(Path(rig)))
+    usual = patience == "usual"
+    settings = settings_for(drive_of(Path(rig)), usual)
     ended = supervise(
         partial(run_loop, settings, Path(rig)),
         Recording(Path(folder), settings, seeds={"session": 1}),
         realtime=Realtime(live_estimate=False, attended=False),
-        patience=Patience() if patience == "usual" else PATIENCE,
-        console=Console(patience == "usual"),
+        patience=Patience() if usual else PATIENCE,
+        console=Console(usual),
     )
     print(json.dumps({**asdict(ended), "folder": str(ended.folder)}), flush=True)
 

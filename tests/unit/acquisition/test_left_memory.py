@@ -1,16 +1,15 @@
 """Shared memory goes with the last process that has it, unless it holds what is in no file."""
 
-import os
 import subprocess
 import sys
 import time
 
 import pytest
 
-from rigidimeter.acquisition.processes import left_memory
+from rigidimeter.acquisition.processes import left_memory, session_memory, shared_memory
 from rigidimeter.acquisition.processes.left_memory import complete_left
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_memory import PREFIX, WHERE, Memory
+from rigidimeter.acquisition.processes.shared_memory import PREFIX, Memory
 from rigidimeter.acquisition.processes.shared_status import Condition, Role
 from rigidimeter.acquisition.processes.sink import RingSink
 from rigidimeter.errors import UserError
@@ -21,8 +20,18 @@ from rigidimeter.recording.sample_reading import read_samples
 from rigidimeter.settings import Settings
 
 
+@pytest.fixture(autouse=True)
+def where(tmp_path, monkeypatch):
+    """A place for shared memory that no other session on this machine has."""
+    where = tmp_path / "shm"
+    where.mkdir()
+    for module in (shared_memory, session_memory, left_memory):
+        monkeypatch.setattr(module, "WHERE", where)
+    return where
+
+
 @pytest.fixture
-def made(tmp_path):
+def made(tmp_path, where):
     """Memory of a session of 150 samples, of which 100 are in the folder; no writer lives."""
     shared = SessionMemory.create(100.0, 10.0)
     writer = SessionWriter(tmp_path / "s", Settings(), [], {}, virtual=True)
@@ -39,8 +48,6 @@ def made(tmp_path):
     yield shared
     if not shared.samples.memory.closed:
         shared.close()
-    for name in shared.names:
-        (WHERE / name).unlink(missing_ok=True)
 
 
 def sample(tick: int) -> Sample:
@@ -48,7 +55,7 @@ def sample(tick: int) -> Sample:
 
 
 def there(shared: SessionMemory) -> list[bool]:
-    return [(WHERE / name).exists() for name in shared.names]
+    return [(shared_memory.WHERE / name).exists() for name in shared.names]
 
 
 def test_the_last_one_removes_it(made):
@@ -84,15 +91,18 @@ def test_what_was_left_is_brought_into_its_folder_once(made, tmp_path):
     assert complete_left(tmp_path / "s") == []
 
 
-def test_a_living_process_keeps_it(made, tmp_path, monkeypatch):
+def test_a_living_process_keeps_it(made, where, tmp_path, monkeypatch):
     monkeypatch.setattr(left_memory, "LEAVING_S", 0.1)
     holder = subprocess.Popen(
         [
             sys.executable,
             "-c",
-            "import sys; from rigidimeter.acquisition.processes.shared_memory import Memory\n"
-            "memory = Memory.attach(sys.argv[1]); print('has it', flush=True); sys.stdin.read()",
+            "import sys, pathlib; from rigidimeter.acquisition.processes import shared_memory\n"
+            "shared_memory.WHERE = pathlib.Path(sys.argv[2])\n"
+            "memory = shared_memory.Memory.attach(sys.argv[1])\n"
+            "print('has it', flush=True); sys.stdin.read()",
             made.status.name,
+            str(where),
         ],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -127,10 +137,10 @@ def test_a_record_that_was_closed_is_not_gone_on_with(made, tmp_path):
     assert there(made) == [False] * 3
 
 
-def test_parts_of_a_set_that_was_never_complete_are_removed_but_not_at_once(monkeypatch):
-    memory = Memory.create(64, f"{PREFIX}unfinished{os.getpid()}-samples")
+def test_parts_of_a_set_that_was_never_complete_are_removed_but_not_at_once(where, monkeypatch):
+    memory = Memory.create(64, f"{PREFIX}unfinished-samples")
     memory.close()
-    path = WHERE / memory.name
+    path = where / memory.name
     complete_left(path)
     assert path.exists()
     monkeypatch.setattr(left_memory, "MAKING_S", -1.0)

@@ -13,6 +13,7 @@ dies, the console after both, the loop after the console and the recorder.
 from __future__ import annotations
 
 import contextlib
+import math
 import multiprocessing
 import os
 import signal
@@ -211,9 +212,14 @@ def _see_through(
         ):
             recorder_told = True
             remarks.append(f"the recorder ended while the loop ran ({_how(recorder)})")
-        silent = status.age_s(Role.LOOP) > patience.hung_s
-        if silent and status.condition(Role.LOOP) in (Condition.RUNNING, Condition.STOPPING):
-            remarks.append(f"the loop did not answer for {patience.hung_s:g} s and was ended")
+        # The recorder ends a loop that no longer answers; this is for where it cannot.
+        limits_s = {
+            Condition.RUNNING: 2 * patience.loop_lost_s,
+            Condition.STOPPING: patience.hung_s,
+        }
+        limit_s = limits_s.get(status.condition(Role.LOOP), math.inf)
+        if status.age_s(Role.LOOP) > limit_s:
+            remarks.append(f"the loop did not answer for {limit_s:g} s and was ended")
             loop.kill()
             loop.join(1.0)
             break
