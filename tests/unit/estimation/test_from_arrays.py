@@ -1,6 +1,7 @@
 import doctest
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,12 +29,18 @@ def arrays() -> dict[str, np.ndarray]:
     }
 
 
-@pytest.mark.parametrize("method", ["auto", "published", "bandlimited", "iv", "spectral", "ml"])
-def test_identify_gives_the_numbers_of_estimate(arrays, rigidimeter, tmp_path, method):
+@pytest.fixture(scope="module")
+def csv_file(arrays: dict[str, np.ndarray], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("arrays") / "a.csv"
     table = np.column_stack(list(arrays.values()))
-    np.savetxt(tmp_path / "a.csv", table, "%.17g", ",", header=",".join(arrays), comments="")
+    np.savetxt(path, table, "%.17g", ",", header=",".join(arrays), comments="")
+    return path
+
+
+@pytest.mark.parametrize("method", ["auto", "published", "bandlimited", "iv", "spectral", "ml"])
+def test_identify_gives_the_numbers_of_estimate(arrays, csv_file, rigidimeter, tmp_path, method):
     options = ["--rate-hz", 1000, "--task", "prbs", "--method", method]
-    ran = rigidimeter("estimate", tmp_path / "a.csv", *options, "--json", tmp_path / "a.json")
+    ran = rigidimeter("estimate", csv_file, *options, "--json", tmp_path / "a.json")
     assert ran.status == 0, ran.err
     document = json.loads((tmp_path / "a.json").read_text())
     fit = identify(**arrays, rate_hz=RATE_HZ, method=method)
