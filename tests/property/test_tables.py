@@ -45,9 +45,9 @@ def written(folder: str, suffix: str, data, delimiter: str = ",", decimal: str =
 def test_what_is_written_is_read(data, suffix):
     with TemporaryDirectory() as folder:
         table = read_table(written(folder, suffix, data))
-    assert list(table.columns) == list(data)
-    for name, values in data.items():
-        np.testing.assert_array_equal(table.columns[name], values)
+        assert list(table.columns) == list(data)
+        for name, values in data.items():  # each is read when it is asked for
+            np.testing.assert_array_equal(table.columns[name], values)
 
 
 @settings(deadline=None, max_examples=40)
