@@ -132,6 +132,9 @@ def start(rig: Path, folder: Path) -> tuple[subprocess.Popen[bytes], dict[str, i
     said = folder.with_name("said").read_text()
     assert line, f"the session did not start: {said}"
     first = json.loads(line)
+    if "MEMORY" not in first:  # it is how the session ended
+        process.wait()
+        raise EndedItselfError
     stem = first.pop("MEMORY")
     return process, {role: pid for role, pid in first.items() if pid}, Ring(stem)
 
