@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -112,9 +113,14 @@ class Session:
     def close(self) -> None:
         """End what still runs."""
         if self.process.poll() is None:
-            self.process.send_signal(signal.SIGCONT)
+            os.killpg(self.process.pid, signal.SIGCONT)
             self.process.terminate()
-            self.process.communicate(timeout=30.0)
+            try:
+                self.process.communicate(timeout=30.0)
+            except subprocess.TimeoutExpired:
+                os.killpg(self.process.pid, signal.SIGKILL)
+                self.process.communicate()
+                raise
 
     def endings(self) -> list[tuple[str, str, str]]:
         """Return what was closed, with its outcome and reason: once each, and nothing follows."""
