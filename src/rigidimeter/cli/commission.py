@@ -7,7 +7,7 @@ import math
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated
@@ -21,7 +21,7 @@ from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.commissioning import CommissioningRecord
+    from rigidimeter.commissioning import Check
 
 
 def commission(
@@ -99,7 +99,7 @@ def commission(
             f"{rig}: is real hardware; name the person responsible for it with --signed-by NAME"
         )
     operator = Operator(
-        ask=(lambda _: True) if yes else _ask,
+        ask=(lambda _: True) if yes else ask,
         say=lambda what: echo(what, err=True),
         present=not yes,
         known_torque_nm=known_torque,
@@ -107,7 +107,7 @@ def commission(
     )
     echo(str(prepare_loop_process()), err=True)
     clock = DeadlineClock()
-    with rigfile.claim() as lock, _interrupted_once(path):
+    with rigfile.claim() as lock, interrupted_once(path, "commission again"):
         found = try_rig(
             rigfile.build(clock.now_s, chosen.rig.tick_rate_hz, lock=lock),
             rigfile,
@@ -119,7 +119,7 @@ def commission(
             signed_by=signed_by,
         )
     write_record(path, found)
-    echo(table(found))
+    echo(table(found.checks))
     echo(f"Record: {path}")
     if found.objection:
         raise UserError(f"{rig}: not fit for a person: {found.objection}")
@@ -133,7 +133,7 @@ def commission(
 
 
 @contextlib.contextmanager
-def _interrupted_once(record: Path) -> Iterator[None]:
+def interrupted_once(record: Path, again: str) -> Iterator[None]:
     """Let Ctrl-C, Ctrl-\\, SIGTERM and the end of the terminal end it, once; say what that left.
 
     A second one would break off the steps that bring the drive to rest and take its power away.
@@ -152,7 +152,7 @@ def _interrupted_once(record: Path) -> Iterator[None]:
         yield
     except (KeyboardInterrupt, typer.Abort):
         raise UserError(
-            f"interrupted: the rig was stopped, and {record} was not written; commission again"
+            f"interrupted: the rig was stopped, and {record} was not written; {again}"
         ) from None
     finally:
         for number, handler in before.items():
@@ -166,7 +166,7 @@ def _check_known(known: Mapping[str, float | None]) -> None:
             raise UserError(f"{option} {value:g}: must be a number other than 0")
 
 
-def table(record: CommissioningRecord) -> str:
+def table(checks: Sequence[Check]) -> str:
     """Return the checks as lines, each with its remedy below where it has one."""
     marks = {"passed": "ok", "failed": "FAIL"}
     rows = [("", "check", "found", "must be")]
@@ -177,14 +177,15 @@ def table(record: CommissioningRecord) -> str:
             "" if check.value is None else check.words,
             check.limit,
         )
-        for check in record.checks
+        for check in checks
     ]
     heading, *lines = text_table(rows, "<<<<")
     shown = [heading]
-    for check, line in zip(record.checks, lines, strict=True):
+    for check, line in zip(checks, lines, strict=True):
         shown += [line, f"      {check.remedy}"] if check.remedy else [line]
     return "\n".join(shown)
 
 
-def _ask(question: str) -> bool:
+def ask(question: str) -> bool:
+    """Put a question at the terminal; anything but yes is no."""
     return typer.confirm(question, default=False, err=True)

@@ -16,6 +16,7 @@ from typing import Annotated
 
 import typer
 
+from rigidimeter.cli.check import check
 from rigidimeter.cli.commission import commission
 from rigidimeter.cli.compare import compare
 from rigidimeter.cli.design import design
@@ -100,6 +101,7 @@ for command in (
     simulate,
     run,
     commission,
+    check,
     emulate,
     estimate,
     model,

@@ -48,7 +48,7 @@ def run_loop(
         _run(settings, protocol, rig, new_joint, clock, side, lambda _: ())
         return
     # What is slow to load is loaded before the sensor's samples flow.
-    from rigidimeter.commissioning import check_record
+    from rigidimeter.commissioning import check_record, require_daily_check
     from rigidimeter.devices.composed import Home
     from rigidimeter.devices.rigfile import load_rig
 
@@ -56,7 +56,10 @@ def run_loop(
     home = Home(home_rad, HOME_TOLERANCE_RAD) if home_rad is not None else None
 
     def approve(facts: Mapping[str, Any]) -> tuple[str, ...]:
-        return check_record(rigfile, facts, settings).not_tried
+        commissioned = check_record(rigfile, facts, settings)
+        today = require_daily_check(rigfile, commissioned, settings)
+        side.sink.event("daily_check", made_utc=today.made_utc, **today.numbers)
+        return commissioned.not_tried
 
     with rigfile.claim() as lock:
         rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, home, lock)

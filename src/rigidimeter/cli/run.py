@@ -61,8 +61,8 @@ def run(
     """Run a protocol in real time, on the virtual rig or on hardware.
 
     Loop, recorder and live estimate run in separate processes. With --rig, the rig must have been
-    commissioned (`rigidimeter commission`). Fit mechanical stops and a hardware enable before you
-    rely on this program.
+    commissioned (`rigidimeter commission`) and checked within a day (`rigidimeter check`). Fit
+    mechanical stops and a hardware enable before you rely on this program.
 
     \b
     For example:
@@ -75,7 +75,7 @@ def run(
     from rigidimeter.acquisition.processes.recorder import Recording
     from rigidimeter.acquisition.processes.supervise import supervise
     from rigidimeter.cli.realtime_rig import run_loop
-    from rigidimeter.commissioning import check_record
+    from rigidimeter.commissioning import check_record, require_daily_check, with_measured_floor
     from rigidimeter.console import Terminal
     from rigidimeter.devices.rigfile import load_rig
     from rigidimeter.recording.resume import count_epochs
@@ -89,7 +89,9 @@ def run(
         # What is wrong with the rig or its record is said before any process starts, and so is
         # that another has the rig; the loop's process then claims it.
         rigfile = load_rig(rig)
-        check_record(rigfile, None, settings)
+        commissioned = check_record(rigfile, None, settings)
+        today = require_daily_check(rigfile, commissioned, settings, settings_path=protocol)
+        settings = with_measured_floor(settings, today)
         rigfile.claim().close()
     recording = Recording(
         out,

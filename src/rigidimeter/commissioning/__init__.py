@@ -8,18 +8,35 @@ from rigidimeter.commissioning.commissioning_record import (
     write_record,
 )
 from rigidimeter.commissioning.coverage import check_record
+from rigidimeter.commissioning.daily_check import Compared, daily_check
+from rigidimeter.commissioning.daily_record import (
+    DailyRecord,
+    daily_path,
+    read_daily,
+    require_daily_check,
+    with_measured_floor,
+    write_daily,
+)
 from rigidimeter.commissioning.sequence import commission
 from rigidimeter.commissioning.trial import Operator, Timebase
 
 __all__ = [
     "Check",
     "CommissioningRecord",
+    "Compared",
+    "DailyRecord",
     "Operator",
     "Outcome",
     "Timebase",
     "check_record",
     "commission",
+    "daily_check",
+    "daily_path",
+    "read_daily",
     "read_record",
     "record_path",
+    "require_daily_check",
+    "with_measured_floor",
+    "write_daily",
     "write_record",
 ]

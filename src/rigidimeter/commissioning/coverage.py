@@ -31,6 +31,9 @@ LIMITS = ("guard", "loop", "zeroing", "prbs", "sinusoid")
 EXACT = ("reaction_time_s", "stale_s", "duration_s")
 """Numbers among them that must be the same."""
 
+FLOORS = ("least_inertia_kg_m2",)
+"""Numbers among them that may be larger, never smaller."""
+
 
 def kept_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Return the facts that must be the same at every run."""
@@ -151,10 +154,15 @@ def _same_controller(path: Path, before: Mapping[str, Any], now: Mapping[str, An
     for table in ("controller", *LIMITS):
         for key, value in now[table].items():
             tried = before.get(table, {}).get(key)
-            tighter = table in LIMITS and key not in EXACT and tried is not None and value <= tried
-            if value != tried and not tighter:
+            if value != tried and not (table in LIMITS and _tighter(key, tried, value)):
                 raise UserError(f"{path}: covers {table}.{key} = {tried!r}, not {value!r}; {again}")
     arms = list(before.get("arms", {}).values())
     for name, arm in now["arms"].items():
         if arm not in arms:
             raise UserError(f"{path}: does not cover the arm of [subject.{name}]; {again}")
+
+
+def _tighter(key: str, tried: float | None, value: float) -> bool:
+    if tried is None or key in EXACT:
+        return False
+    return value >= tried if key in FLOORS else value <= tried

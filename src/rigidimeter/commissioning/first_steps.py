@@ -93,6 +93,7 @@ def small_move(setup: Setup, found: Findings, rest_s: float) -> bool:
     return check.passed
 
 
-def move(setup: Setup, velocity_rad_s: Array) -> TrialResult:
-    """Stand still, move, and stand still."""
-    return trial(setup, hold(SETTLE_S), follow(velocity_rad_s, setup.rate_hz), hold(SETTLE_S))
+def move(setup: Setup, velocity_rad_s: Array, spread: float = 0.0) -> TrialResult:
+    """Stand still, move, and stand still; `spread` is that of `trial`."""
+    way = follow(velocity_rad_s, setup.rate_hz)
+    return trial(setup, hold(SETTLE_S), way, hold(SETTLE_S), spread=spread)

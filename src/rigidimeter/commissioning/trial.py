@@ -35,6 +35,8 @@ PILED_UP = {int(Cause.TORQUE_STALE), int(Cause.TORQUE_PACKETS), int(Cause.TORQUE
 """What a sensor says when nobody has listened for a while."""
 
 DURING_TRIAL = -1
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+"""Multiples of it fill an interval evenly."""
 
 
 @dataclass(frozen=True)
@@ -126,8 +128,9 @@ class TrialResult:
 class _Shifted:
     """Rig and clock of a loop that begins now: the times of the readings count from there."""
 
-    def __init__(self, setup: Setup, origin_s: float) -> None:
+    def __init__(self, setup: Setup, origin_s: float, spread: float) -> None:
         self._rig, self._time, self._origin_s = setup.rig, setup.time, origin_s
+        self._spread_s, self._written = spread / setup.rate_hz, 0
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._rig, name)
@@ -139,12 +142,30 @@ class _Shifted:
             motion_time_s=reading.motion_time_s - self._origin_s,
         )
 
+    def write(self, velocity_rad_s: float) -> float:
+        if self._spread_s:
+            self._written += 1
+            wait_s = self._spread_s * (GOLDEN * self._written % 1.0)
+            self._time.wait_until(self._time.now() + wait_s)
+        return self._rig.write(velocity_rad_s)
+
     def wait_until(self, deadline_s: float) -> float:
         return self._time.wait_until(self._origin_s + deadline_s) - self._origin_s
 
 
-def trial(setup: Setup, *stretches: Stretch) -> TrialResult:
+def trial(setup: Setup, *stretches: Stretch, spread: float = 0.0) -> TrialResult:
     """Enable the rig at zero velocity, run the stretches, take the power away.
+
+    Parameters
+    ----------
+    setup : Setup
+    stretches : callables
+        Run one after the other, until the guard ends one.
+    spread : float
+        Each command is sent later in its tick, by up to this share of it. A drive answers within a
+        few ms of a command, and the loop reads just before the next: at a low tick rate it would
+        never see the torque of the acceleration. With the commands spread over the tick, it sees
+        all of its parts alike.
 
     Raises
     ------
@@ -160,7 +181,7 @@ def trial(setup: Setup, *stretches: Stretch) -> TrialResult:
     try:
         rig.enable()
         _empty(setup)
-        here: Any = _Shifted(setup, setup.time.now() + 1.0 / setup.rate_hz)
+        here: Any = _Shifted(setup, setup.time.now() + 1.0 / setup.rate_hz, spread)
         loop = ControlLoop(settings, here, here, samples.append)
         try:
             for stretch in stretches:

@@ -12,6 +12,10 @@ class CommissioningSettings(Section):
     before it, `step_deg_s` of the quick small velocity steps. The known torque is held for
     `known_torque_s` by hand. Everything else that is compared is a limit of the guard, of the
     zeroing or of the margins.
+
+    Of the daily check: `daily_rest_s` is listened without power and held with it, then the joint
+    moves for `daily_motion_s` at up to `daily_speed_deg_s`. The inertia found is compared within
+    `inertia_tolerance_percent`, the delay within `delay_tolerance_s` or a tick if that is longer.
     """
 
     validity_days: float = quantity(180.0, "days", 1.0, 3650.0)
@@ -30,3 +34,9 @@ class CommissioningSettings(Section):
     watchdog_longest_s: float = quantity(0.5, "s", 0.01, 5.0)
     watchdog_margin_s: float = quantity(0.1, "s", 0.01, 2.0)
     emergency_stop_wait_s: float = quantity(15.0, "s", 1.0, 120.0)
+    daily_validity_h: float = quantity(24.0, "h", 1.0, 168.0)
+    daily_rest_s: float = quantity(2.0, "s", 0.5, 60.0)
+    daily_motion_s: float = quantity(6.0, "s", 2.0, 60.0)
+    daily_speed_deg_s: float = quantity(24.0, "deg/s", 1.0, 120.0)
+    inertia_tolerance_percent: float = quantity(20.0, "%", 1.0, 40.0)
+    delay_tolerance_s: float = quantity(0.01, "s", 0.001, 0.1)

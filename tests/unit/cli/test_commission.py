@@ -7,7 +7,7 @@ import signal
 
 import pytest
 
-from rigidimeter.cli.commission import _check_known, _interrupted_once
+from rigidimeter.cli.commission import _check_known, interrupted_once
 from rigidimeter.cli.emulate import _check_target
 from rigidimeter.errors import UserError
 
@@ -57,7 +57,7 @@ def test_who_interrupts_twice_does_not_break_off_the_stopping(tmp_path, number):
                 steps.append(step)
 
     said = r"the rig was stopped, and .*record\.json was not written"
-    with pytest.raises(UserError, match=said), _interrupted_once(record):
+    with pytest.raises(UserError, match=said), interrupted_once(record, "commission again"):
         trials()
     assert steps == ["stop", "disable", "close"]
     assert signal.getsignal(number) == before

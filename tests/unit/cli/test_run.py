@@ -27,6 +27,9 @@ counts_per_turn = 1000
 """
 
 
+CHECKED = SimpleNamespace(reference=None)
+
+
 class BuiltError(Exception):
     """The rig would be connected next."""
 
@@ -54,6 +57,7 @@ def seen(monkeypatch):
 
     monkeypatch.setattr(RigFile, "build", build)
     monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: None)
+    monkeypatch.setattr("rigidimeter.commissioning.require_daily_check", lambda *_, **__: CHECKED)
     monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", supervise)
     return seen
 
@@ -102,11 +106,27 @@ def test_a_rig_without_a_record_is_refused_before_any_process_starts(
     assert not (tmp_path / "s").exists()
 
 
+def test_a_rig_that_was_not_checked_today_is_refused_with_the_command_to_type(
+    tmp_path, monkeypatch, rigidimeter
+):
+    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
+    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: None)
+    rig, protocol = tmp_path / "rig.toml", tmp_path / "protocol.toml"
+    rig.write_text(RIG)
+    protocol.write_text("seed = 2\n")
+    result = rigidimeter("run", protocol, "--rig", rig, "--out", tmp_path / "s")
+    assert result.status == 1
+    command = f"`rigidimeter check {rig} --settings {protocol}`"
+    assert f"rig.checked.json: there is no such record; make it with {command}" in result.err
+    assert not (tmp_path / "s").exists()
+
+
 def test_a_rig_that_another_uses_is_refused_before_any_process_starts(
     tmp_path, monkeypatch, rigidimeter
 ):
     monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
     monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: None)
+    monkeypatch.setattr("rigidimeter.commissioning.require_daily_check", lambda *_, **__: CHECKED)
     rig, copy = tmp_path / "rig.toml", tmp_path / "copy.toml"
     rig.write_text(RIG)
     copy.write_text(f'name = "a copy"\n{RIG}')

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 
 from rigidimeter.commissioning import CommissioningRecord, Operator, Timebase, commission
@@ -43,6 +44,7 @@ class FakeSensor:
         self._arm, self._now, self._faults = arm, now, faults
         self._sample = TorqueSample(math.nan, -math.inf)
         self._history: deque[TorqueSample] = deque()
+        self._noise = np.random.default_rng(1)
         self.counts: dict[str, int] = {"received": 0, "lost": 0}
 
     def connect(self) -> None: ...
@@ -59,6 +61,8 @@ class FakeSensor:
             torque += faults.get("bias_nm", 0.0)
             if "dead" in faults:
                 torque = 0.0
+            if "other_axis" in faults:
+                torque = 0.001 * float(self._noise.standard_normal())
             self._sample = TorqueSample(torque, now_s)
             self._history.append(self._sample)
             self.counts["received"] += 1
@@ -104,7 +108,8 @@ class FakeDrive:
     def _live(self) -> None:
         now_s = self._now()
         while self._queue and self._queue[0][0] <= now_s + 1e-9:
-            self._arm.command(self._faults.get("command_scale", 1.0) * self._queue.popleft()[1])
+            wanted_rad_s = self._faults.get("command_scale", 1.0) * self._queue.popleft()[1]
+            self._arm.command(wanted_rad_s + self._faults.get("drift_rad_s", 0.0))
         silent = "deaf_watchdog" not in self._faults and now_s - self._written_s > 0.1
         if self._on and (silent or self._pressed()):
             self._halt()
@@ -183,8 +188,48 @@ def settings() -> Settings:
     return parse_settings({"rig": rig, "guard": {"reaction_time_s": 0.1}})
 
 
+class FakeRig(NamedTuple):
+    """A rig, its file, its clock, and the world that it stands in."""
+
+    rig: ComposedRig
+    file: RigFile
+    timebase: Timebase
+    world: World
+
+
 @pytest.fixture
-def commissioned(settings: Settings, rigfile: RigFile, monkeypatch: Any) -> Commissioned:
+def fake_rig(rigfile: RigFile, monkeypatch: Any) -> Callable[..., FakeRig]:
+    """Build a fake rig with faults."""
+
+    def build(
+        joint: tuple[float, float, float], noise_sd_nm: float, emulated: bool, faults: Any
+    ) -> FakeRig:
+        time = FakeTime()
+        slept = SimpleNamespace(monotonic=time.now, sleep=lambda s: time.wait_until(time.now() + s))
+        monkeypatch.setattr("rigidimeter.devices.composed.time", slept)
+        push_nm = [0.0]
+        arm = EmulatedArm(
+            JointDynamics(*joint),
+            noise_sd_nm=noise_sd_nm,
+            voluntary_nm=lambda _: push_nm[0],
+            now=time.now,
+        )
+        rig = ComposedRig(
+            FakeSensor(arm, time.now, faults), FakeDrive(arm, time.now, faults), RATE_HZ
+        )
+        wires = {"drive": (object, SimpleNamespace(emulated=emulated))}
+        return FakeRig(
+            rig,
+            replace(rigfile, devices=wires),
+            Timebase(time.now, time.wait_until),
+            World(faults, arm, time, push_nm),
+        )
+
+    return build
+
+
+@pytest.fixture
+def commissioned(settings: Settings, fake_rig: Callable[..., FakeRig]) -> Commissioned:
     """Commission a fake rig with faults, and with the settings and operator given."""
 
     def run(
@@ -200,27 +245,12 @@ def commissioned(settings: Settings, rigfile: RigFile, monkeypatch: Any) -> Comm
         signed_by: str = "A. Weber",
         **faults: Any,
     ) -> CommissioningRecord:
-        time = FakeTime()
-        slept = SimpleNamespace(monotonic=time.now, sleep=lambda s: time.wait_until(time.now() + s))
-        monkeypatch.setattr("rigidimeter.devices.composed.time", slept)
-        push_nm = [0.0]
-        arm = EmulatedArm(
-            JointDynamics(*joint),
-            noise_sd_nm=noise_sd_nm,
-            voluntary_nm=lambda _: push_nm[0],
-            now=time.now,
-        )
-        world = World(faults, arm, time, push_nm)
-        rig = ComposedRig(
-            FakeSensor(arm, time.now, faults), FakeDrive(arm, time.now, faults), RATE_HZ
-        )
-        chosen = settings.model_copy(update={"commissioning": QUICK, **(tables or {})})
-        wires = {"drive": (object, SimpleNamespace(emulated=emulated))}
+        rig, file, timebase, world = fake_rig(joint, noise_sd_nm, emulated, faults)
         return commission(
             rig,
-            replace(rigfile, devices=wires),
-            chosen,
-            Timebase(time.now, time.wait_until),
+            file,
+            settings.model_copy(update={"commissioning": QUICK, **(tables or {})}),
+            timebase,
             Operator(
                 ask=lambda question: ask(question, world),
                 present=present,

@@ -20,7 +20,7 @@ from rigidimeter.commissioning import (
 )
 from rigidimeter.commissioning.checks import untried
 from rigidimeter.commissioning.commissioning_record import A_PERSON_TELLS, MUST_PASS
-from rigidimeter.commissioning.coverage import EXACT, LIMITS, covered, kept_facts
+from rigidimeter.commissioning.coverage import EXACT, FLOORS, LIMITS, covered, kept_facts
 from rigidimeter.commissioning.sealed_record import digest
 from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.errors import UserError
@@ -312,9 +312,10 @@ def with_value(table: str, key: str, factor: float) -> Settings:
 def test_tighter_is_covered_and_looser_is_not(
     rigfile: RigFile, record: CommissioningRecord, table: str, key: str
 ) -> None:
-    tighter = with_value(table, key, 0.99)
+    less, more = with_value(table, key, 0.99), with_value(table, key, 1.01)
+    tighter, looser = (more, less) if key in FLOORS else (less, more)
     with pytest.raises(UserError, match=rf"covers {table}\.{key} = .*, not "):
-        check(rigfile, settings=with_value(table, key, 1.01))
+        check(rigfile, settings=looser)
     if key in EXACT:
         with pytest.raises(UserError, match=rf"covers {table}\.{key} = "):
             check(rigfile, settings=tighter)

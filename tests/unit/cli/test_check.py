@@ -1,0 +1,61 @@
+"""`rigidimeter check`: what is refused before anything is connected."""
+
+from __future__ import annotations
+
+import pytest
+
+HARDWARE = """
+[torque_sensor]
+driver = "ati-rdt"
+address = "192.0.2.1"
+[drive]
+driver = "ascii"
+port = "/dev/no-such"
+counts_per_turn = 1000
+"""
+EMULATED = HARDWARE.replace("192.0.2.1", "127.0.0.1").replace("/dev/no-such", "/dev/pts/99")
+
+
+@pytest.fixture
+def rig(tmp_path):
+    path = tmp_path / "RIG.toml"
+    path.write_text(EMULATED)
+    return path
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "nan", "inf"])
+def test_a_known_inertia_must_be_above_zero(rig, rigidimeter, value):
+    ran = rigidimeter("check", rig, "--yes", "--known-inertia-kg-m2", value)
+    assert ran.status == 1
+    assert f"--known-inertia-kg-m2 {float(value):g}: must be a number above 0" in ran.err
+
+
+def test_a_flag_does_not_look_whether_an_arm_is_in_hardware(rig, rigidimeter):
+    rig.write_text(HARDWARE)
+    ran = rigidimeter("check", rig, "--yes")
+    assert ran.status == 1
+    assert "is real hardware; somebody must look" in ran.err
+
+
+def test_somebody_must_answer(rig, rigidimeter):
+    ran = rigidimeter("check", rig)
+    assert ran.status == 1
+    assert "nobody can answer the question" in ran.err
+
+
+def test_the_rig_is_commissioned_first(rig, rigidimeter):
+    ran = rigidimeter("check", rig, "--yes")
+    assert ran.status == 1
+    assert "there is no such record; make it with `rigidimeter commission`" in ran.err
+    assert not rig.with_name("RIG.checked.json").exists()
+
+
+def test_a_damaged_reference_is_given_up_knowingly(rig, rigidimeter, monkeypatch):
+    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: None)
+    rig.with_name("RIG.checked.json").write_text("{}")
+    ran = rigidimeter("check", rig, "--yes")
+    assert ran.status == 1
+    assert (
+        "is no daily check of the schema rigidimeter.check/1; its reference is lost, so add"
+        in ran.err
+    )
