@@ -1,6 +1,7 @@
 """Text, JSON, CSV and TOML: full precision, nothing half written, and refusals in a sentence."""
 
 import csv
+import hashlib
 import io
 import json
 import math
@@ -14,6 +15,8 @@ from rigidimeter.documents import (
     csv_text,
     json_line,
     json_text,
+    noted_digests,
+    read_bytes,
     read_json,
     read_toml,
     replace_file,
@@ -83,3 +86,24 @@ def test_what_cannot_be_read_is_a_sentence(tmp_path):
     for read in (read_json, read_toml):
         with pytest.raises(UserError, match="cannot be read"):
             read(tmp_path / "none")
+
+
+def test_a_digest_is_of_what_was_read(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_bytes(b"old")
+    with noted_digests() as noted:
+        assert read_bytes(path, 10) == b"old"
+        path.write_bytes(b"new")
+    assert noted == {path: hashlib.sha256(b"old").hexdigest()}
+    read_bytes(path, 10)
+    assert len(noted) == 1
+
+
+def test_a_file_that_changes_between_two_readings_is_refused(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_bytes(b"old")
+    with noted_digests():
+        read_bytes(path, 10)
+        path.write_bytes(b"new")
+        with pytest.raises(UserError, match="was changed while it was read"):
+            read_bytes(path, 10)

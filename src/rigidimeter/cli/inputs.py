@@ -194,6 +194,8 @@ def analyse_study_folder(
         kept = False
     sessions = (folder / session.path for session in result.sessions)
     tables = (path for name, path in read.folder.files.items() if name != "key")
-    facts = provenance((*tables, *sessions), result.settings, command_line())
+    named = {path: read.folder.digests[name] for name, path in read.folder.files.items()}
+    below = {folder / name: digest for name, digest in read.gathered.digests.items()}
+    facts = provenance((*tables, *sessions), named | below, result.settings, command_line())
     result = replace(result, changes=tuple(changes), provenance=facts)
     return AnalysedStudy(result, kept, int(bad or not kept))

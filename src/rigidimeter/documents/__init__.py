@@ -2,6 +2,7 @@
 
 from rigidimeter.documents.escaping import as_read, as_written, visible
 from rigidimeter.documents.reading import (
+    noted_digests,
     open_regular,
     parse_json,
     parse_toml,
@@ -26,6 +27,7 @@ __all__ = [
     "csv_text",
     "json_line",
     "json_text",
+    "noted_digests",
     "open_regular",
     "parse_json",
     "parse_toml",

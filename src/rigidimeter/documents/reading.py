@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 import math
 import os
@@ -9,6 +11,8 @@ import re
 import stat
 import tomllib
 from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -28,6 +32,9 @@ _KINDS = (
     (stat.S_ISBLK, "a device"),
     (stat.S_ISSOCK, "a socket"),
 )
+
+
+_noted: ContextVar[dict[Path, str] | None] = ContextVar("noted", default=None)
 
 
 def open_regular(path: Path, most_bytes: int) -> BinaryIO:
@@ -51,13 +58,44 @@ def open_regular(path: Path, most_bytes: int) -> BinaryIO:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
             _check(path, os.fstat(descriptor), most_bytes)
-            return os.fdopen(descriptor, "rb")
         except BaseException:
             os.close(descriptor)
             raise
+        file = os.fdopen(descriptor, "rb")
+        try:
+            _note(path, file)
+        except BaseException:
+            file.close()
+            raise
+        return file
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         reason = getattr(error, "strerror", None) or error
         raise UserError(f"{path}: cannot be read ({reason})") from None
+
+
+@contextmanager
+def noted_digests() -> Iterator[dict[Path, str]]:
+    """Note the SHA-256 of every file that is opened for reading meanwhile, as it is then.
+
+    A digest that is computed later may be that of another file of the same name. A file that is
+    opened again and is no longer the same is refused: parts of two would make one result.
+    """
+    found: dict[Path, str] = {}
+    token = _noted.set(found)
+    try:
+        yield found
+    finally:
+        _noted.reset(token)
+
+
+def _note(path: Path, file: io.BufferedReader) -> None:
+    noted = _noted.get()
+    if noted is None:
+        return
+    digest = hashlib.file_digest(file, "sha256").hexdigest()
+    file.seek(0)
+    if noted.setdefault(path, digest) != digest:
+        raise UserError(f"{path}: was changed while it was read; run the command again")
 
 
 def _check(path: Path, status: os.stat_result, most_bytes: int) -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from rigidimeter.documents import noted_digests
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import ReadOptions, read_recording, reader_of
 from rigidimeter.records import Epoch, Notice, Task
@@ -31,12 +32,15 @@ class Recording:
         Those given, else those of the first session folder, else the defaults.
     paths : tuple of Path
         What was asked for, each once.
+    digests : mapping of Path to str
+        SHA-256 of every file that was read, as it was then.
     """
 
     epochs: tuple[Epoch, ...]
     notices: tuple[Notice, ...]
     settings: Settings
     paths: tuple[Path, ...]
+    digests: Mapping[Path, str] = field(default_factory=dict)
 
     @property
     def failed(self) -> bool:
@@ -96,17 +100,20 @@ def read(
     first: Settings | None = None
     epochs: list[Epoch] = []
     notices: list[Notice] = []
+    digests: dict[Path, str] = {}
     for path, name in dict(zip(asked, conditions, strict=True)).items():
         try:
-            reader = reader_of(path)
-            if reader.settings is not None:
-                recorded = reader.settings(path)
-                first = first or recorded
-                notices += _about_settings(path, recorded, first, compared)
-            found, remarks = read_recording(path, replace(options, condition=name))
+            with noted_digests() as noted:
+                reader = reader_of(path)
+                recorded = None if reader.settings is None else reader.settings(path)
+                found, remarks = read_recording(path, replace(options, condition=name))
         except UserError as error:
             notices.append(Notice("error", str(error)))
             continue
+        if recorded is not None:
+            first = first or recorded
+            notices += _about_settings(path, recorded, first, compared)
+        digests |= noted
         epochs += found
         notices += remarks
     if not epochs:
@@ -116,6 +123,7 @@ def read(
         tuple(notices),
         chosen or first or load_settings(None),
         tuple(dict.fromkeys(asked)),
+        digests,
     )
 
 

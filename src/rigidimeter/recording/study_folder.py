@@ -18,6 +18,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from rigidimeter.documents import noted_digests
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import TextTable, read_text_table
 from rigidimeter.recording.formats.text_table import cell_number
@@ -76,6 +77,8 @@ class StudyFolder:
         None where there is no blinding key.
     files : mapping of str to Path
         The tables and `study.toml` that exist, by the name under which a digest is kept.
+    digests : mapping of str to str
+        SHA-256 of what was read of each, by the same names.
     notices : tuple of Notice
         What is wrong with single rows and columns.
     """
@@ -87,6 +90,7 @@ class StudyFolder:
     exclusions: tuple[Row, ...]
     key: tuple[Row, ...] | None
     files: Mapping[str, Path]
+    digests: Mapping[str, str]
     notices: tuple[Notice, ...]
 
 
@@ -104,6 +108,11 @@ def read_study_folder(folder: Path, key: Path | None = None) -> StudyFolder:
         If `study.toml` or a table cannot be read, a column that must exist is missing, or there is
         no session.
     """
+    with noted_digests() as noted:
+        return _read_folder(folder, key, noted)
+
+
+def _read_folder(folder: Path, key: Path | None, noted: Mapping[Path, str]) -> StudyFolder:
     about = read_study_toml(folder / STUDY_FILE)
     notices: list[Notice] = []
     files = {STUDY_FILE: folder / STUDY_FILE}
@@ -137,6 +146,7 @@ def read_study_folder(folder: Path, key: Path | None = None) -> StudyFolder:
         tables["exclusions"] or (),
         tables["key"],
         files,
+        {name: noted[path] for name, path in files.items()},
         tuple(notices),
     )
 

@@ -87,5 +87,5 @@ def recording_result(recording: Recording, analysis: Analysis, command: str = ""
         settings=recording.settings,
         epochs=recording.epochs,
         notices=recording.notices,
-        provenance=provenance(recording.paths, recording.settings, command),
+        provenance=provenance(recording.paths, recording.digests, recording.settings, command),
     )

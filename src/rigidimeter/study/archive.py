@@ -25,7 +25,6 @@ from rigidimeter.recording import estimates_document
 from rigidimeter.settings import dump_settings
 from rigidimeter.study.measures import RATING
 from rigidimeter.study.results import StudyResult
-from rigidimeter.study.sessions import file_digest
 from rigidimeter.study.study_analysis import StudyRead
 from rigidimeter.study.tables import comparison_document, result_tables, table_csv
 from rigidimeter.version import __version__
@@ -92,7 +91,6 @@ def keep(read: StudyRead, study: StudyResult) -> list[str]:
 
 
 def _inputs(read: StudyRead, study: StudyResult) -> dict[str, Any]:
-    files = {name: file_digest(path) for name, path in read.folder.files.items()}
     return {
         "schema": INPUTS_SCHEMA,
         "software": f"rigidimeter {__version__}",
@@ -102,8 +100,13 @@ def _inputs(read: StudyRead, study: StudyResult) -> dict[str, Any]:
         "seed": study.seed,
         "resamples": study.resamples,
         "settings": dump_settings(study.settings),
-        "files": files | read.gathered.digests,
+        "files": {**read.folder.digests, **read.gathered.digests},
     }
+
+
+def _file_digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _edited(
@@ -120,7 +123,7 @@ def _edited(
             if not path.is_file():
                 if digest and name in results:
                     said.append(f"{ANALYSIS}/{name} was taken away; it is written again")
-            elif file_digest(path) not in (digest, results.get(name)):
+            elif _file_digest(path) not in (digest, results.get(name)):
                 edited[name] = _free(folder, f"{name}.edited")
                 how = "was changed by hand after it was written" if digest else "was there already"
                 said.append(

@@ -5,19 +5,31 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
 from rigidimeter.recording import is_session, read_manifest
+from rigidimeter.recording.session_folder import SAMPLES
 from rigidimeter.settings import Settings, dump_settings
-from rigidimeter.study.sessions import file_digest
 from rigidimeter.version import __version__
 
 
-def provenance(paths: Iterable[Path], settings: Settings, command: str = "") -> dict[str, str]:
-    """Return the facts that let somebody else make the same result again."""
+def provenance(
+    paths: Iterable[Path], digests: Mapping[Path, str], settings: Settings, command: str = ""
+) -> dict[str, str]:
+    """Return the facts that let somebody else make the same result again.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        Session folders and files that were read.
+    digests : mapping of Path to str
+        SHA-256 of what was read of each file: by now it may hold something else.
+    settings : Settings
+    command : str
+    """
     canonical = json.dumps(dump_settings(settings), sort_keys=True)
     facts = {
         "rigidimeter": __version__,
@@ -30,10 +42,12 @@ def provenance(paths: Iterable[Path], settings: Settings, command: str = "") -> 
     for path in paths:
         if is_session(path):
             manifest = read_manifest(path)
+            checked = "session_id" in manifest
             facts[f"{path}"] = (
                 f"session of {manifest['created_utc']}, seeds {manifest['seeds']}, samples SHA-256 "
-                f"{file_digest(path / 'samples.arrows')}"
+                f"{digests.get(path / SAMPLES, 'not known')}, "
+                + ("with checksums" if checked else "without checksums: cannot be verified")
             )
-        elif path.is_file():
-            facts[f"{path}"] = f"SHA-256 {file_digest(path)}"
+        elif path in digests:
+            facts[f"{path}"] = f"SHA-256 {digests[path]}"
     return facts

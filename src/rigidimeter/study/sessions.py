@@ -6,7 +6,6 @@ twice, disagrees with the table about its condition, or was commanded otherwise 
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections import Counter
@@ -15,6 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from typing import Any
 
+from rigidimeter.documents import noted_digests, open_regular
+from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording import ReadOptions, is_session, read_recording, session_settings
 from rigidimeter.recording.event_log import read_events
@@ -54,7 +55,8 @@ class Gathered:
         In the order of the table.
     left_out : tuple of LeftOut
     digests : mapping of str to str
-        SHA-256 of every file of every recording in the table, by its path below the study.
+        SHA-256 of every file of every recording in the table, as it was read, by its path below the
+        study.
     notices : tuple of Notice
     """
 
@@ -118,7 +120,9 @@ def gather(
 
     for row in read.sessions:
         try:
-            session, said = _read(read, row, names, at, samples, digests)
+            # One that is changed while it is read is refused, so digest and result belong together.
+            with noted_digests() as noted:
+                session, said = _read(read, row, names, at, samples, digests, noted)
         except (_Refused, UserError) as error:
             leave_out(row, str(error))
         except OSError as error:  # such as a path too long for the file system
@@ -147,6 +151,7 @@ def _read(
     at: dict[Path, Row],
     samples: dict[str, Row],
     digests: dict[str, str],
+    noted: Mapping[Path, str],
 ) -> tuple[Session, list[Notice]]:
     path, source = read.folder / row["path"], source_of(row["path"])
     if is_outside(row["path"]):
@@ -165,7 +170,8 @@ def _read(
         raise _Refused(f"{path}: is not a session folder, it has no {MANIFEST}")
     for name in (MANIFEST, SAMPLES, EVENTS) if from_session else ("",):
         if (path / name).is_file():
-            digests[str(PurePath(source) / name)] = file_digest(path / name)
+            open_regular(path / name, RECORDING_BYTES).close()
+            digests[str(PurePath(source) / name)] = noted[path / name]
     # Before the condition is looked at: a copy under another name is no less a copy.
     digest = digests.get(str(PurePath(source) / (SAMPLES if from_session else "")), "")
     if digest and digest in samples:
@@ -306,12 +312,6 @@ def _other_settings(sessions: Sequence[Session]) -> list[Notice]:
             )
             said.append(Notice("warning", text))
     return said
-
-
-def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _line(row: Row) -> str:

@@ -101,8 +101,8 @@ def test_a_zeroed_block_loses_the_batches_it_touches(tmp_path):
     assert [str(lost) for lost in found.lost] == ["batches 1 to 2 (ticks 100 to 299)"]
 
 
-def test_an_epoch_that_touches_damage_is_excluded_and_the_others_are_not(simulate):
-    folder = simulate(epochs=3)
+def test_an_epoch_that_touches_damage_is_excluded_and_the_others_are_not(recorded):
+    folder = recorded(epochs=3)
     path = folder / "samples.arrows"
     whole, _ = read_session(folder)
     found = scan_samples(path.read_bytes(), path)
@@ -119,8 +119,8 @@ def test_an_epoch_that_touches_damage_is_excluded_and_the_others_are_not(simulat
         )
 
 
-def test_damage_in_a_rest_excludes_no_epoch(simulate):
-    folder = simulate(epochs=2)
+def test_damage_in_a_rest_excludes_no_epoch(recorded):
+    folder = recorded(epochs=2)
     path = folder / "samples.arrows"
     found = scan_samples(path.read_bytes(), path)
     epoch, ends = found.columns["epoch"], np.cumsum([BATCH] * len(found.stream.batches))
@@ -131,8 +131,8 @@ def test_damage_in_a_rest_excludes_no_epoch(simulate):
     assert [notice.level for notice in notices] == ["error"]
 
 
-def test_a_damaged_line_of_events_is_named_and_the_others_count(simulate):
-    folder = simulate(epochs=2)
+def test_a_damaged_line_of_events_is_named_and_the_others_count(recorded):
+    folder = recorded(epochs=2)
     events = folder / "events.jsonl"
     text = events.read_text()
     at = text.index("epoch_ended")
@@ -146,8 +146,8 @@ def test_a_damaged_line_of_events_is_named_and_the_others_count(simulate):
     assert len(log.events) == 5
 
 
-def test_a_damaged_manifest_is_refused(simulate):
-    folder = simulate()
+def test_a_damaged_manifest_is_refused(recorded):
+    folder = recorded()
     path = folder / "manifest.json"
     path.write_text(path.read_text().replace('"band_low_hz"', '"band_low_hz" ', 1))
     with pytest.raises(UserError, match=r"manifest\.json: is damaged or was changed"):
@@ -157,8 +157,8 @@ def test_a_damaged_manifest_is_refused(simulate):
 
 
 @pytest.mark.parametrize("name", ["samples.arrows", "events.jsonl", "manifest.json"])
-def test_files_of_two_sessions_are_refused(simulate, name):
-    one, two = simulate(name="a"), simulate(name="b", seed=2)
+def test_files_of_two_sessions_are_refused(recorded, name):
+    one, two = recorded(name="a"), recorded(name="b", seed=2)
     ids = [json.loads((f / "manifest.json").read_text())["session_id"] for f in (one, two)]
     (one / name).write_bytes((two / name).read_bytes())
     with pytest.raises(UserError, match="put back the files of one session") as refused:
@@ -167,15 +167,15 @@ def test_files_of_two_sessions_are_refused(simulate, name):
 
 
 @pytest.mark.parametrize("name", ["samples.arrows", "events.jsonl"])
-def test_a_file_without_an_id_is_refused_in_a_session_with_one(simulate, name):
-    one, two = simulate(name="a"), as_version_1(simulate(name="b"))
+def test_a_file_without_an_id_is_refused_in_a_session_with_one(recorded, name):
+    one, two = recorded(name="a"), as_version_1(recorded(name="b"))
     (one / name).write_bytes((two / name).read_bytes())
     with pytest.raises(UserError, match="a session without an id"):
         read_session(one)
 
 
-def test_version_1_gives_the_same_numbers(simulate):
-    folder = simulate(epochs=2)
+def test_version_1_gives_the_same_numbers(recorded):
+    folder = recorded(epochs=2)
     epochs, _ = read_session(folder)
     old, notices = read_session(as_version_1(folder))
     assert not notices
@@ -185,8 +185,8 @@ def test_version_1_gives_the_same_numbers(simulate):
             np.testing.assert_array_equal(channel.values, after.channels[name].values)
 
 
-def test_version_1_passes_over_a_batch_that_cannot_be_decoded(simulate):
-    folder = as_version_1(simulate())
+def test_version_1_passes_over_a_batch_that_cannot_be_decoded(recorded):
+    folder = as_version_1(recorded())
     path = folder / "samples.arrows"
     found = scan_samples(path.read_bytes(), path)
     assert not found.stream.checked
@@ -210,7 +210,7 @@ def test_a_stream_that_is_continued_goes_on_counting(tmp_path):
     assert read_samples(tmp_path / "t.arrows")["tick"].size == 8 * BATCH
 
 
-def test_events_are_read_without_what_protects_them(simulate):
-    events, torn = read_events(simulate() / "events.jsonl")
+def test_events_are_read_without_what_protects_them(recorded):
+    events, torn = read_events(recorded() / "events.jsonl")
     assert not torn
     assert not any({"checksum", "session_id"} & event.keys() for event in events)

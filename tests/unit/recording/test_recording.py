@@ -1,5 +1,6 @@
 """`read`: several paths become one recording, and a bad one loses no other."""
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read
 from rigidimeter.settings import parse_settings
+from rigidimeter.study import provenance
 from rigidimeter.virtual.virtual_session import run_virtual_session
 
 
@@ -101,3 +103,14 @@ def test_settings_are_those_given_or_of_the_first_session(session, tmp_path):
     given = read([file, session], settings=settings_file)
     assert given.settings.estimation.band_low_hz == 0.3
     assert read(file).settings == parse_settings({})
+
+
+def test_digests_are_of_what_was_read(tmp_path):
+    path = write(tmp_path / "a.csv")
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    recording = read(path)
+    path.write_text("another file")
+    assert recording.digests == {path: digest}
+    assert provenance([path], recording.digests, recording.settings)[str(path)] == (
+        f"SHA-256 {digest}"
+    )

@@ -51,6 +51,17 @@ def test_inputs_hold_a_digest_of_every_file(study: Path) -> None:
     assert inputs["settings"]["scores"]["cycles"] == 4
 
 
+def test_digests_are_of_what_was_read_not_of_what_lies_there_now(study: Path) -> None:
+    names = ["study.toml", "sessions.csv", "ratings.csv", "sessions/2-OFF/samples.arrows"]
+    before = {name: hashlib.sha256((study / name).read_bytes()).hexdigest() for name in names}
+    read = read_study(study)
+    for name in names:  # changed after it was read, before the result is written
+        (study / name).write_bytes((study / name).read_bytes() + b"\n")
+    keep(read, analyse_study(read, resamples=RESAMPLES))
+    files = json.loads((study / "analysis/inputs.json").read_text())["files"]
+    assert {name: files[name] for name in names} == before
+
+
 def test_a_new_exclusion_is_told_with_the_numbers_it_moved(study: Path) -> None:
     kept(study)
     before = json.loads((study / "analysis/comparison.json").read_text())
