@@ -1,9 +1,9 @@
-"""Put every small fault into the guard and see that a test fails.
+"""Put every small fault into the guard, and into how a driver stops, and see that a test fails.
 
     python -m tests.mutation [--every N] [part of a mutant's name]
 
-Ends with 1 if a mutant survives that is not known to do the same as the guard, if a known one is
-no longer there, or if the guard fails its tests without any fault.
+Ends with 1 if a mutant survives that is not known to do the same as the module, if a known one is
+no longer there, or if a module fails its tests without any fault.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import sys
 import time
 
 from tests.mutation.equivalent import EQUIVALENT
-from tests.mutation.mutants import guard_modules, mutants, unchanged
+from tests.mutation.mutants import modules, mutants, title, unchanged
 from tests.mutation.runner import survivors
 
 
@@ -24,11 +24,11 @@ def main() -> int:
     asked = parser.parse_args()
 
     start = time.monotonic()
-    modules = guard_modules()
-    everything = [mutant for path in modules for mutant in mutants(path)]
+    paths = modules()
+    everything = [mutant for path in paths for mutant in mutants(path)]
     wrong = [f"no longer there: {n}" for n in set(EQUIVALENT) - {m.name for m in everything}]
-    sound = {mutant.name for mutant in survivors([unchanged(path) for path in modules])}
-    wrong += [f"fails its tests as it is: {p.name}" for p in modules if p.name not in sound]
+    sound = {mutant.name for mutant in survivors([unchanged(path) for path in paths])}
+    wrong += [f"fails its tests as it is: {title(p)}" for p in paths if title(p) not in sound]
     wanted = [m for m in everything if asked.name in m.name and m.name not in EQUIVALENT]
     wanted = wanted[:: asked.every]
     print(*wrong, sep="\n", end="\n" if wrong else "", flush=True)

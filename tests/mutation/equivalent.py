@@ -1,9 +1,21 @@
-"""Mutants that do the same as the guard, by name, each with the reason."""
+"""Mutants that do the same as the module, by name, each with the reason."""
 
 SLOWER = "looks closer where it need not; what it finds there does not limit"
 NEAR = "step.py guard_step: "
 
+MOMENT = "a time in floating point is never met to the bit"
+CAN = "cia402/drive.py Cia402Drive."
+
 EQUIVALENT: dict[str, str] = {
+    CAN + "_check_watchdog: now_s - min(wire.sync_s, wire.asked_s) > self._stops_itself_s → "
+    "now_s - min(wire.sync_s, wire.asked_s) >= self._stops_itself_s": MOMENT,
+    CAN + "_find_cause: now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s → "
+    "now_s - wire.heard_s >= settings.heartbeat_s + settings.lost_s": MOMENT,
+    CAN + "_find_cause: now_s > self._settled_s → now_s >= self._settled_s": MOMENT,
+    CAN + "_find_cause: now_s - wire.asked_s > settings.lost_s → "
+    "now_s - wire.asked_s >= settings.lost_s": MOMENT,
+    CAN + "stop: self._wire.is_open and self._control is not Control.DISABLE_VOLTAGE → "
+    "self._control is not Control.DISABLE_VOLTAGE": "a bus that was closed was told to disable",
     "recorded_guard.py replay: Cause.NONE → Cause.SOFTWARE": "a guard at the start holds nothing",
     "step.py guard_step: 1 → 0": "elapsed_ticks if not given: none counts as one",
     NEAR + "speed * speed / (2.0 * limits.acceleration_rad_s2) → "

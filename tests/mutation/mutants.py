@@ -13,9 +13,29 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Mutant", "guard_modules", "mutants", "unchanged"]
+__all__ = ["Mutant", "modules", "mutants", "title", "unchanged"]
 
-GUARD = Path(__file__).parents[2] / "src/rigidimeter/guard"
+PACKAGE = Path(__file__).parents[2] / "src/rigidimeter"
+GUARD = PACKAGE / "guard"
+
+STOP_PATHS = {
+    PACKAGE / "devices/cia402/drive.py": (
+        *("Cia402Drive._check_watchdog", "Cia402Drive._find_cause", "Cia402Drive._halt"),
+        *("Cia402Drive.stop", "Cia402Drive.disable", "Cia402Drive.close"),
+    ),
+    PACKAGE / "devices/ascii/drive.py": (
+        *("AsciiDrive._check_horizon", "AsciiDrive._try"),
+        *("AsciiDrive.stop", "AsciiDrive.disable", "AsciiDrive.close"),
+    ),
+    PACKAGE / "devices/composed.py": (
+        *("ComposedRig.stop", "ComposedRig.disable", "ComposedRig.close"),
+    ),
+    PACKAGE / "devices/enable_line.py": (
+        *("SerialEnableLine.close_contact", "SerialEnableLine.open_contact"),
+        "SerialEnableLine.close",
+    ),
+}
+"""Of the drivers, the functions that bring a rig to rest or take its power."""
 
 
 @dataclass(frozen=True)
@@ -43,23 +63,33 @@ OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast
 FUNCTIONS = {"min": "max", "max": "min", "ceil": "floor", "abs": "float"}
 
 
-def guard_modules() -> list[Path]:
-    """Return the modules of the guard that hold anything."""
-    return sorted(path for path in GUARD.glob("*.py") if path.name != "__init__.py")
+def modules() -> list[Path]:
+    """Return the modules of the guard that hold anything, and those with a driver's stop."""
+    guard = sorted(path for path in GUARD.glob("*.py") if path.name != "__init__.py")
+    return [*guard, *STOP_PATHS]
 
 
 def unchanged(path: Path) -> Mutant:
     """Return the module as it is, under its own name."""
-    return Mutant(path, path.name, path.read_text(encoding="utf-8"))
+    return Mutant(path, title(path), path.read_text(encoding="utf-8"))
+
+
+def title(path: Path) -> str:
+    """Return the name of a module; two drivers have one called the same."""
+    devices = PACKAGE / "devices"
+    return str(path.relative_to(devices)) if path.is_relative_to(devices) else path.name
 
 
 def mutants(path: Path) -> Iterator[Mutant]:
-    """Yield every mutant of a module."""
+    """Yield every mutant of a module, or of those of its functions that stop a rig."""
+    wanted = STOP_PATHS.get(path)
     tree = ast.parse(path.read_text(encoding="utf-8"))
     seen: Counter[str] = Counter()
     for parent, field, index, node, where in list(_places(tree, "")):
+        if wanted is not None and where not in wanted:
+            continue
         for changed in _changes(node):
-            name = f"{path.name} {where}: {_text(node)} → {_text(changed)}"
+            name = f"{title(path)} {where}: {_text(node)} → {_text(changed)}"
             seen[name] += 1
             if seen[name] > 1:
                 name += f" #{seen[name]}"
@@ -136,6 +166,8 @@ def _changes(node: ast.AST) -> Iterator[ast.AST]:
         case ast.Return() if node.value is not None:
             yield _with(node, value=ast.Constant(None))
         case ast.Assign() | ast.Raise():
+            yield ast.Pass()
+        case ast.Expr(value=ast.Call()):  # an action that is left out
             yield ast.Pass()
         case ast.AnnAssign() if node.value is not None:
             yield _with(node, value=ast.Constant(-1))

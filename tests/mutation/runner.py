@@ -1,7 +1,8 @@
-"""Run the guard's own tests against a mutant, in a child process that has it in place.
+"""Run the tests of a module against a mutant of it, in a child process that has it in place.
 
 The child is forked with the heavy libraries already imported, so that a mutant costs a fraction of
-a second. Each module is looked at by the tests that know the guard alone.
+a second. Each module is looked at by the tests that know it alone: those of the guard, and those of
+how a driver stops.
 """
 
 from __future__ import annotations
@@ -22,26 +23,42 @@ from tests.mutation.mutants import Mutant
 __all__ = ["survivors"]
 
 ROOT = Path(__file__).parents[2]
-PACKAGE = "rigidimeter.guard"
-UNIT = ROOT / "tests/unit/guard"
+SOURCE = ROOT / "src"
+ROOMS = ("rigidimeter.guard", "rigidimeter.devices")
+"""Imported anew for each mutant: the guard and what uses it."""
+
+GUARD, DEVICES = ROOT / "tests/unit/guard", ROOT / "tests/unit/devices"
 TESTS = {
-    "causes.py": ("test_causes.py",),
-    "limits.py": ("test_limits.py",),
-    "watch.py": ("test_watch.py", "test_step.py"),
-    "step.py": ("test_step.py",),
-    "recorded_guard.py": ("test_recorded_guard.py",),
+    "guard/causes.py": (GUARD / "test_causes.py",),
+    "guard/limits.py": (GUARD / "test_limits.py",),
+    "guard/watch.py": (GUARD / "test_watch.py", GUARD / "test_step.py"),
+    "guard/step.py": (GUARD / "test_step.py",),
+    "guard/recorded_guard.py": (GUARD / "test_recorded_guard.py",),
+    "guard/consistency.py": (GUARD / "test_consistency.py",),
+    "devices/cia402/drive.py": (DEVICES / "test_stop_paths.py",),
+    "devices/ascii/drive.py": (DEVICES / "test_stop_paths.py",),
+    "devices/composed.py": (DEVICES / "test_composed.py",),
+    "devices/enable_line.py": (DEVICES / "test_enable_line.py",),
 }
 LONGEST_S = 60
 """A mutant that takes longer goes round for ever: that is seen, too."""
 
-HEAVY = ("scipy.signal", "rigidimeter.settings", "rigidimeter.dynamics", "rigidimeter.experiment")
+HEAVY = (
+    "can",
+    "canopen",
+    "scipy.signal",
+    "rigidimeter.settings",
+    "rigidimeter.dynamics",
+    "rigidimeter.experiment",
+)
 
 
 class _InPlace(MetaPathFinder, Loader):
     """Finds the mutant where the module would be."""
 
     def __init__(self, mutant: Mutant) -> None:
-        self._name = f"{PACKAGE}.{mutant.path.stem}"
+        parts = mutant.path.relative_to(SOURCE).with_suffix("").parts
+        self._name = ".".join(parts)
         self._code = compile(mutant.source, str(mutant.path), "exec")
 
     def find_spec(self, fullname: str, *_: object) -> ModuleSpec | None:
@@ -85,9 +102,10 @@ def _child(mutant: Mutant) -> int:
 
 def _tested(mutant: Mutant) -> int:
     """Return 0 if every test passes with the mutant in place."""
-    for name in [name for name in sys.modules if name.startswith(PACKAGE)]:
+    for name in [name for name in sys.modules if name.startswith(ROOMS)]:
         del sys.modules[name]
     sys.meta_path.insert(0, _InPlace(mutant))
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"  # each costs a mutant time
     options = ["-x", "-q", "-p", "no:cacheprovider", "--noconftest", "--assert=plain"]
-    return int(pytest.main([*options, *(str(UNIT / name) for name in TESTS[mutant.path.name])]))
+    tests = TESTS[mutant.path.relative_to(SOURCE / "rigidimeter").as_posix()]
+    return int(pytest.main([*options, *map(str, tests)]))

@@ -1,4 +1,4 @@
-"""The tests of the guard see what is put wrong in it."""
+"""The tests of the guard, and of how a driver stops, see what is put wrong there."""
 
 import subprocess
 import sys
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from tests.mutation.equivalent import EQUIVALENT
-from tests.mutation.mutants import guard_modules, mutants
+from tests.mutation.mutants import modules, mutants
 
 ROOT = Path(__file__).parents[2]
 
@@ -27,17 +27,17 @@ def test_each_fault_has_a_name_of_its_own(tmp_path):
 
 
 def test_every_mutant_can_be_compiled_and_differs():
-    for path in guard_modules():
+    for path in modules():
         same = compile(path.read_text(encoding="utf-8"), "m", "exec")
         names = set()
         for mutant in mutants(path):
             assert compile(mutant.source, "m", "exec") != same
             names.add(mutant.name)
-        assert len(names) > 50
+        assert len(names) > (50 if path.parent.name == "guard" else 5)
 
 
 def test_what_is_known_to_do_the_same_is_there_and_has_a_reason():
-    there = {mutant.name for path in guard_modules() for mutant in mutants(path)}
+    there = {mutant.name for path in modules() for mutant in mutants(path)}
     assert set(EQUIVALENT) <= there
     assert all(EQUIVALENT.values())
 

@@ -24,7 +24,10 @@ class Sensor:
         self.time_s += 0.001
         return TorqueSample(1.5, self.time_s)
 
-    def close(self) -> None: ...
+    closed = False
+
+    def close(self) -> None:
+        self.closed = True
 
 
 class Drive:
@@ -125,3 +128,13 @@ def test_a_drive_that_answers_so_late_that_samples_are_lost_is_named(drive, took
             rig._fresh_angle_rad(took_s)
     else:  # the loop names the sensor
         assert rig._fresh_angle_rad(took_s) == ANGLE_RAD
+
+
+def test_a_rig_without_a_contact_ends_by_its_drive(drive):
+    sensor = Sensor()
+    rig = ComposedRig(sensor, drive, 100.0)
+    rig.stop()
+    rig.disable()
+    rig.close()
+    assert drive.asked == ["stop", "disable", "disable", "close"]
+    assert sensor.closed

@@ -70,3 +70,15 @@ def test_a_port_that_is_not_there_is_named():
     contact = SerialEnableLine(SerialEnableLine.Settings(port="/dev/no-such"), time.monotonic)
     with pytest.raises(DeviceError, match="no-such"):
         contact.close_contact()
+
+
+def test_the_port_is_opened_once_and_the_line_lowered_before_it_is_closed(port):
+    opened = []
+    settings = SerialEnableLine.Settings(port="/dev/ttyS9")
+    contact = SerialEnableLine(settings, time.monotonic, lambda name: opened.append(name) or port)
+    contact.close_contact()
+    contact.close_contact()
+    assert opened == ["/dev/ttyS9"]
+    contact.close()
+    contact.close()
+    assert (port.lines["rts"], port.closed) == (False, True)

@@ -235,7 +235,6 @@ class AsciiDrive:
     def stop(self) -> None:
         """Abort the move: the drive brakes with its own deceleration and stays at rest."""
         self._commanding = False
-        self._sent = 0
         if self._powered:
             request = "t 0" if self._settings.mode == "moves" else set_(0x2F, 0)
             self._try(request)
@@ -243,7 +242,6 @@ class AsciiDrive:
     def disable(self) -> None:
         """Remove the power at once; a drive that does not confirm it is reported as lost."""
         self._commanding = False
-        self._sent = 0
         self._powered = False
         self._try(set_(0x24, OFF))
 

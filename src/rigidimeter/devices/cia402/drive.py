@@ -213,7 +213,6 @@ class Cia402Drive:
         """Return why the drive is not in the commanded state, NONE if it is."""
         wire, settings = self._wire, self._settings
         if wire.booted:
-            self._configured = False
             self._halt(Control.DISABLE_VOLTAGE)
         if wire.booted or wire.alarmed or wire.state in FAULTS:
             return Cause.DRIVE_FAULT
