@@ -45,7 +45,15 @@ OUTCOMES = {
 }
 
 
-@pytest.mark.parametrize("number", OUTCOMES)
+@pytest.mark.parametrize(
+    "number",
+    [
+        signal.SIGINT,
+        signal.SIGHUP,
+        pytest.param(signal.SIGTERM, marks=pytest.mark.slow),
+        pytest.param(signal.SIGQUIT, marks=pytest.mark.slow),  # also on the wire, fault 20
+    ],
+)
 def test_a_signal_to_the_group_ends_it_in_order(number, session):
     """Whatever the program that started it did with the signal, and without a traceback."""
     run = session(60.0, preexec=ignoring)
@@ -164,7 +172,9 @@ def test_another_folder_is_taken_when_the_disk_is_full(session, small_disk, tmp_
     assert moved["from"] == str(small_disk / "session")
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)]
+)
 def test_a_full_disk_does_not_keep_the_program(number, session, small_disk):
     """Told to end it ends, and the samples stay in memory until there is room."""
     run = session(60.0, folder=small_disk / "session")
