@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test check bench bench-loop hazards mutation clean
+.PHONY: install demo test check bench bench-loop hazards mutation fuzz clean
 
 install: $(STAMP)
 
@@ -47,6 +47,11 @@ hazards: install
 
 mutation: install
 	$(BIN)/python -m tests.mutation
+
+SEED ?= 1
+CASES ?= 4000
+fuzz: install
+	$(BIN)/python -m tests.fuzz --cases $(CASES) --seed $(SEED)
 
 clean:
 	rm -rf $(VENV) build src/*.egg-info .pytest_cache .mypy_cache .ruff_cache

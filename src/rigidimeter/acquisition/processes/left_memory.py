@@ -7,6 +7,7 @@ The next `rigidimeter run` or `rigidimeter recover` finds it here.
 
 from __future__ import annotations
 
+import math
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -103,7 +104,8 @@ def _remove_unfinished(names: tuple[str, str, str]) -> None:
     """Remove the parts of a set that was never complete, unless it is being made now."""
     paths = [WHERE / name for name in names]
     with suppress(OSError):
-        made_s = max(path.stat().st_ctime for path in paths if path.exists())
+        # Whoever made them may have removed them by now.
+        made_s = max((path.stat().st_ctime for path in paths if path.exists()), default=math.inf)
         if time.time() - made_s > MAKING_S:
             for path in paths:
                 path.unlink(missing_ok=True)

@@ -1,0 +1,26 @@
+"""A part of the cases of the fuzzer, in one process: no traceback, only the output is changed."""
+
+import pytest
+from tests.fuzz import TARGETS, run_case, run_here
+
+SHARES = 5
+
+
+@pytest.mark.parametrize("share", range(SHARES))
+def test_damaged_inputs_are_read_or_refused(share):
+    failed = [
+        f"{result.case}\n{result.failed}"
+        for result in (run_case(case, 1) for case in range(share, 200, SHARES))
+        if result.failed
+    ]
+    assert failed == []
+
+
+@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+def test_sound_inputs_are_read(target, tmp_path, monkeypatch):
+    target.make(tmp_path)
+    (tmp_path / "out").mkdir()
+    monkeypatch.chdir(tmp_path)
+    _, said = run_here(target.command)
+    for word in ("cannot be read", "is not a ", "is damaged", "is missing", "no such", "Usage"):
+        assert word not in said
