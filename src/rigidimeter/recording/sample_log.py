@@ -201,7 +201,7 @@ class SampleLog:
         message = self._message.getvalue()
         self._message.seek(0)
         self._message.truncate()
-        append_line(self._file, with_checksum(message, columns_text(SCHEMA)))
+        append_line(self._file, with_checksum(message, _COLUMNS))
         self._number += 1
 
 
@@ -217,6 +217,9 @@ def _schema_message(session_id: str) -> bytes:
 def columns_text(schema: pa.Schema) -> bytes:
     """Return names and types, which each batch's checksum covers: they decide what it means."""
     return ",".join(f"{field.name}:{field.type}" for field in schema).encode()
+
+
+_COLUMNS = columns_text(SCHEMA)
 
 
 def append_line(file: BinaryIO, line: bytes) -> None:
