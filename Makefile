@@ -46,6 +46,7 @@ hazards: install
 	$(BIN)/python -m tests.faults.measure
 
 mutation: install
+	$(BIN)/python -m tests.mutation --hand-made
 	$(BIN)/python -m tests.mutation
 
 SEED ?= 1

@@ -9,14 +9,13 @@ from __future__ import annotations
 import ast
 import copy
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Mutant", "modules", "mutants", "title", "unchanged"]
+__all__ = ["PACKAGE", "Mutant", "mutants", "title", "unchanged"]
 
 PACKAGE = Path(__file__).parents[2] / "src/rigidimeter"
-GUARD = PACKAGE / "guard"
 
 STOP_PATHS = {
     PACKAGE / "devices/cia402/drive.py": (
@@ -63,12 +62,6 @@ OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast
 FUNCTIONS = {"min": "max", "max": "min", "ceil": "floor", "abs": "float"}
 
 
-def modules() -> list[Path]:
-    """Return the modules of the guard that hold anything, and those with a driver's stop."""
-    guard = sorted(path for path in GUARD.glob("*.py") if path.name != "__init__.py")
-    return [*guard, *STOP_PATHS]
-
-
 def unchanged(path: Path) -> Mutant:
     """Return the module as it is, under its own name."""
     return Mutant(path, title(path), path.read_text(encoding="utf-8"))
@@ -80,19 +73,24 @@ def title(path: Path) -> str:
     return str(path.relative_to(devices)) if path.is_relative_to(devices) else path.name
 
 
-def mutants(path: Path) -> Iterator[Mutant]:
-    """Yield every mutant of a module, or of those of its functions that stop a rig."""
-    wanted = STOP_PATHS.get(path)
+def mutants(path: Path, wanted: Callable[[str], bool] = lambda _: True) -> Iterator[Mutant]:
+    """Yield every mutant whose name is wanted; making the others' source would take time.
+
+    Of a module, or of those of its functions that stop a rig.
+    """
+    functions = STOP_PATHS.get(path)
     tree = ast.parse(path.read_text(encoding="utf-8"))
     seen: Counter[str] = Counter()
     for parent, field, index, node, where in list(_places(tree, "")):
-        if wanted is not None and where not in wanted:
+        if functions is not None and where not in functions:
             continue
         for changed in _changes(node):
             name = f"{title(path)} {where}: {_text(node)} → {_text(changed)}"
             seen[name] += 1
             if seen[name] > 1:
                 name += f" #{seen[name]}"
+            if not wanted(name):
+                continue
             _put(parent, field, index, changed)
             source = ast.unparse(ast.fix_missing_locations(tree))
             _put(parent, field, index, node)

@@ -1,16 +1,17 @@
-"""Run the tests of a module against a mutant of it, in a child process that has it in place.
+"""Run a module's own tests against a mutant, in a child process that has it in place.
 
 The child is forked with the heavy libraries already imported, so that a mutant costs a fraction of
-a second. Each module is looked at by the tests that know it alone: those of the guard, and those of
-how a driver stops.
+a second. Each module is looked at by the fast tests that know it best, the quickest first.
 """
 
 from __future__ import annotations
 
 import importlib
 import os
+import resource
 import signal
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
@@ -18,43 +19,59 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from tests.mutation.mutants import Mutant
+from tests.mutation.mutants import PACKAGE, Mutant
 
-__all__ = ["survivors"]
+__all__ = ["TESTS", "seen_by"]
 
 ROOT = Path(__file__).parents[2]
-SOURCE = ROOT / "src"
-ROOMS = ("rigidimeter.guard", "rigidimeter.devices")
-"""Imported anew for each mutant: the guard and what uses it."""
+NAME = PACKAGE.name
+UNIT = "tests/unit"
 
-GUARD, DEVICES = ROOT / "tests/unit/guard", ROOT / "tests/unit/devices"
-TESTS = {
-    "guard/watch.py": (GUARD / "test_watch.py", GUARD / "test_step.py"),
-    "devices/cia402/drive.py": (DEVICES / "test_stop_paths.py",),
-    "devices/ascii/drive.py": (DEVICES / "test_stop_paths.py",),
-    "devices/composed.py": (DEVICES / "test_composed.py",),
-    "devices/enable_line.py": (DEVICES / "test_enable_line.py",),
-}
-"""Where they are not the file of the guard's tests with the module's name."""
-
-LONGEST_S = 60
-"""A mutant that takes longer goes round for ever: that is seen, too."""
-
-HEAVY = (
-    "can",
-    "canopen",
-    "scipy.signal",
-    "rigidimeter.settings",
-    "rigidimeter.dynamics",
-    "rigidimeter.experiment",
+_RUN = tuple(
+    f"acquisition/test_{name}.py"
+    for name in ("tick", "modes", "session_run", "orders", "loop_and_session")
 )
+TESTS = {
+    "control/admittance.py": ("control/test_admittance.py",),
+    "control/filters.py": ("control/test_filters.py",),
+    "control/tracking.py": ("control/test_tracking.py",),
+    "guard/causes.py": ("guard/test_causes.py",),
+    "guard/consistency.py": ("guard/test_consistency.py",),
+    "guard/limits.py": ("guard/test_limits.py",),
+    "guard/recorded_guard.py": ("guard/test_recorded_guard.py",),
+    "guard/step.py": ("guard/test_step.py",),
+    "guard/torque_answer.py": ("guard/test_torque_answer.py", "guard/test_consistency.py"),
+    "guard/watch.py": ("guard/test_watch.py", "guard/test_step.py"),
+    "acquisition/control_modes.py": ("acquisition/test_modes.py", *_RUN),
+    "acquisition/controller_run.py": ("acquisition/test_session_run.py", *_RUN),
+    "acquisition/run_states.py": ("acquisition/test_states.py", "acquisition/test_session_run.py"),
+    "acquisition/session_run.py": ("acquisition/test_session_run.py", *_RUN),
+    "acquisition/supervision.py": ("acquisition/test_session_run.py",),
+    "acquisition/tick.py": _RUN,
+    "acquisition/processes/sink.py": ("acquisition/test_shared_status.py",),
+    "devices/ascii/drive.py": ("devices/test_stop_paths.py",),
+    "devices/cia402/drive.py": ("devices/test_stop_paths.py",),
+    "devices/composed.py": ("devices/test_composed.py",),
+    "devices/enable_line.py": ("devices/test_enable_line.py",),
+}
+"""Of each module, below `tests/unit`."""
+
+CPU_S, WALL_S = 30, 600
+"""A mutant that takes more goes round for ever, or waits for ever: that is seen, too."""
+
+MEMORY_BYTES, FILE_BYTES = 4 << 30, 100 << 20
+"""What a mutant that records for ever may fill."""
+
+HEAVY = ("can", "canopen", "numpy", "scipy.signal", "pyarrow", "hypothesis", f"{NAME}.settings")
+KEPT = tuple(f"{NAME}.{room}" for room in ("settings", "records", "documents", "units", "errors"))
+"""Rooms of the package that know no mutated module: a child takes them as they are."""
 
 
 class _InPlace(MetaPathFinder, Loader):
     """Finds the mutant where the module would be."""
 
     def __init__(self, mutant: Mutant) -> None:
-        parts = mutant.path.relative_to(SOURCE).with_suffix("").parts
+        parts = mutant.path.relative_to(PACKAGE.parent).with_suffix("").parts
         self._name = ".".join(parts)
         self._code = compile(mutant.source, str(mutant.path), "exec")
 
@@ -65,45 +82,72 @@ class _InPlace(MetaPathFinder, Loader):
         exec(self._code, module.__dict__)
 
 
-def survivors(mutants: Sequence[Mutant], workers: int = 2) -> Iterator[Mutant]:
-    """Yield each mutant that no test saw."""
+class _First:
+    """Keeps the name of the first test that fails, or of the file that cannot be imported."""
+
+    name = ""
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            self.name = self.name or report.nodeid
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        if report.failed:
+            self.name = self.name or f"{report.nodeid} (import)"
+
+
+def seen_by(mutants: Sequence[Mutant], workers: int = 2) -> Iterator[tuple[Mutant, str]]:
+    """Yield each mutant with the test that saw it, empty if none did."""
     for name in HEAVY:
         importlib.import_module(name)
     waiting, running = list(reversed(mutants)), {}
-    while waiting or running:
-        while waiting and len(running) < workers:
-            mutant = waiting.pop()
-            running[_child(mutant)] = mutant
-        pid, status = os.wait()
-        mutant = running.pop(pid)
-        if os.waitstatus_to_exitcode(status) == 0:
-            yield mutant
+    with tempfile.TemporaryDirectory() as scratch:
+        while waiting or running:
+            while waiting and len(running) < workers:
+                mutant = waiting.pop()
+                pid, answer = _child(mutant, Path(scratch) / str(len(waiting)))
+                running[pid] = mutant, answer
+            pid, status = os.wait()
+            mutant, answer = running.pop(pid)
+            with os.fdopen(answer) as file:
+                test = file.read()
+            code = os.waitstatus_to_exitcode(status)
+            yield mutant, "" if code == 0 else test or f"no end: {code}"
 
 
-def _child(mutant: Mutant) -> int:
-    """Fork a process that ends with 0 if no test fails."""
+def _child(mutant: Mutant, scratch: Path) -> tuple[int, int]:
+    """Fork a process that ends with 0 if no test fails, and tells which did."""
     sys.stdout.flush()
+    answer, tell = os.pipe()
     pid = os.fork()
     if pid:
-        return pid
+        os.close(tell)
+        return pid, answer
     status = 1
     try:
-        signal.alarm(LONGEST_S)
+        resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
+        signal.alarm(WALL_S)
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
-        status = _tested(mutant)
+        status, name = _tested(mutant, scratch)
+        os.write(tell, name.encode())
     finally:
         os._exit(status)
 
 
-def _tested(mutant: Mutant) -> int:
-    """Return 0 if every test passes with the mutant in place."""
-    for name in [name for name in sys.modules if name.startswith(ROOMS)]:
-        del sys.modules[name]
+def _tested(mutant: Mutant, scratch: Path) -> tuple[int, str]:
+    """Return 0 if every test passes with the mutant in place, else the first that does not."""
+    for name in [name for name in sys.modules if name.startswith(NAME)]:
+        if not name.startswith(KEPT):
+            del sys.modules[name]
     sys.meta_path.insert(0, _InPlace(mutant))
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"  # each costs a mutant time
     options = ["-x", "-q", "-p", "no:cacheprovider", "--noconftest", "--assert=plain"]
-    module = mutant.path.relative_to(SOURCE / "rigidimeter").as_posix()
-    tests = TESTS.get(module, (GUARD / f"test_{mutant.path.stem}.py",))
-    return int(pytest.main([*options, *map(str, tests)]))
+    options += ["-m", "not slow and not realtime", "--basetemp", str(scratch)]
+    tests = dict.fromkeys(TESTS[mutant.path.relative_to(PACKAGE).as_posix()])
+    first = _First()
+    os.chdir(ROOT)
+    return int(pytest.main([*options, *(f"{UNIT}/{test}" for test in tests)], [first])), first.name

@@ -1,4 +1,4 @@
-"""The tests of the guard, and of how a driver stops, see what is put wrong there."""
+"""The tests of what moves the arm see what is put wrong in it."""
 
 import subprocess
 import sys
@@ -6,9 +6,12 @@ from pathlib import Path
 
 import pytest
 from tests.mutation.equivalent import EQUIVALENT
-from tests.mutation.mutants import modules, mutants
+from tests.mutation.hand_made import HAND_MADE
+from tests.mutation.mutants import PACKAGE, mutants
+from tests.mutation.runner import TESTS, UNIT
 
 ROOT = Path(__file__).parents[2]
+MODULES = [PACKAGE / name for name in TESTS]
 
 
 def run(*arguments):
@@ -26,28 +29,60 @@ def test_each_fault_has_a_name_of_its_own(tmp_path):
     ]
 
 
-def test_every_mutant_can_be_compiled_and_differs():
-    for path in modules():
-        same = compile(path.read_text(encoding="utf-8"), "m", "exec")
-        names = set()
-        for mutant in mutants(path):
-            assert compile(mutant.source, "m", "exec") != same
-            names.add(mutant.name)
-        assert len(names) > (50 if path.parent.name == "guard" else 5)
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
+def test_mutants_can_be_compiled_and_differ(path):
+    names = []
+
+    def sampled(name):
+        names.append(name)
+        return len(names) % 40 == 1
+
+    same = compile(path.read_text(encoding="utf-8"), "m", "exec")
+    for mutant in mutants(path, sampled):
+        assert compile(mutant.source, "m", "exec") != same
+    assert names
+    assert len(set(names)) == len(names)
+
+
+def test_every_module_of_guard_and_control_is_looked_at():
+    there = {
+        path.relative_to(PACKAGE).as_posix()
+        for room in ("guard", "control")
+        for path in (PACKAGE / room).glob("*.py")
+        if path.name != "__init__.py"
+    }
+    assert there <= set(TESTS)
+    assert all((ROOT / UNIT / test).exists() for tests in TESTS.values() for test in tests)
 
 
 def test_what_is_known_to_do_the_same_is_there_and_has_a_reason():
-    there = {mutant.name for path in modules() for mutant in mutants(path)}
-    assert set(EQUIVALENT) <= there
+    known = EQUIVALENT.keys()
+    there = {
+        mutant.name for path in MODULES for mutant in mutants(path, lambda name: name in known)
+    }
+    assert there == known
     assert all(EQUIVALENT.values())
 
 
-def test_a_sample_of_the_faults_is_seen():
-    ran = run("--every", "80")
+@pytest.mark.parametrize("fault", HAND_MADE, ids=lambda fault: fault.file)
+def test_what_is_made_by_hand_stands_once_in_the_source_and_changes_it(fault):
+    source = (PACKAGE / fault.file).read_text(encoding="utf-8")
+    assert source.count(fault.text) == 1, fault
+    assert compile(fault.mutant().source, "m", "exec") != compile(source, "m", "exec")
+    assert fault.effect
+    assert fault.file in TESTS
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--every", "80", "step.py"], ["--hand-made", "--every", "20"]]
+)
+def test_a_sample_of_the_faults_is_seen(arguments):
+    ran = run(*arguments)
     assert ran.returncode == 0, ran.stdout + ran.stderr
 
 
 @pytest.mark.slow
-def test_every_fault_is_seen():
-    ran = run()
+@pytest.mark.parametrize("arguments", [[], ["--hand-made"]])
+def test_every_fault_is_seen(arguments):
+    ran = run(*arguments)
     assert ran.returncode == 0, ran.stdout + ran.stderr

@@ -1,0 +1,342 @@
+"""Faults made by hand, where the loop decides what the arm does: each must fail a fast test.
+
+Each has the exact text in the source, which occurs there once, what stands there instead, and what
+it would do to the arm or to the record. The guard's small faults are made by `mutants`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from tests.mutation.mutants import PACKAGE, Mutant
+
+__all__ = ["HAND_MADE", "HandMade"]
+
+
+class HandMade(NamedTuple):
+    """A file of the package, a text in it, what stands there instead, and what comes of it."""
+
+    file: str
+    text: str
+    instead: str
+    effect: str
+
+    def mutant(self) -> Mutant:
+        """Return the file with the fault."""
+        path = PACKAGE / self.file
+        source = path.read_text(encoding="utf-8").replace(self.text, self.instead)
+        where = self.text.strip().split("\n")[0]
+        return Mutant(path, f"{self.file}: {where} ({self.effect})", source)
+
+
+TICK = "acquisition/tick.py"
+MODES = "acquisition/control_modes.py"
+SESSION = "acquisition/session_run.py"
+RUN = "acquisition/controller_run.py"
+STATES = "acquisition/run_states.py"
+SINK = "acquisition/processes/sink.py"
+STEP, WATCH, LIMITS = "guard/step.py", "guard/watch.py", "guard/limits.py"
+CONSISTENCY, ANSWER = "guard/consistency.py", "guard/torque_answer.py"
+ADMITTANCE, FILTER, TRACKING = "control/admittance.py", "control/filters.py", "control/tracking.py"
+
+HAND_MADE = tuple(
+    HandMade(*fault)
+    for fault in (
+        # Time
+        (TICK, "        loop.rig.read(late)\n", "", "begins with readings from before enabling"),
+        (TICK, "loop.rig.read(loop.elapsed_ticks)", "loop.rig.read()", "rig not told of missed"),
+        (TICK, "    loop.tick += ticks\n", "", "a late tick is made up for: commands in a burst"),
+        (TICK, "elapsed_ticks = ticks + 1", "elapsed_ticks = 1", "missed ticks told to nobody"),
+        (
+            TICK,
+            "from_outside),\n        loop.elapsed_ticks,",
+            "from_outside),\n        1,",
+            "the guard counts less than was sent: position and following are wrong",
+        ),
+        (TICK, "k = min(k + loop.elapsed_ticks - 1, last)", "pass", "the target lags"),
+        (TICK, "if ticks >= loop.stall_ticks:", "if False:", "a stall is only a missed tick"),
+        (TICK, "int(Cause.DEADLINES_MISSED)", "int(Cause.NONE)", "a loop ever late goes on"),
+        (TICK, "    loop.late_in_a_row += 1\n", "", "a loop ever late goes on"),
+        (TICK, ", loop.late_in_a_row = 1, 0", " = 1", "rare late ticks add up to a stop"),
+        (
+            TICK,
+            "loop.guard = loop.guard._replace(velocity_rad_s=0.0)",
+            "pass",
+            "after a stall the old velocity sets the arm going again",
+        ),
+        (TICK, "if from_outside == STALLED:", "if False:", "the same after a suspension"),
+        (
+            TICK,
+            "        loop.clock.wait_until(loop.time_s)\n        loop.rig.write(velocity)",
+            "        loop.rig.write(velocity)",
+            "a ramp without waiting: the arm is stopped with a blow",
+        ),
+        (
+            TICK,
+            "max(abs(velocity) - _brake_rad_s(loop), 0.0)",
+            "0.0",
+            "a ramp that cannot be recorded is a blow",
+        ),
+        (TICK, "        _ramp_unrecorded(loop)\n", "", "a fault of the program leaves it moving"),
+        (
+            TICK,
+            "math.ceil(abs(loop.guard.velocity_rad_s) / _brake_rad_s(loop))",
+            "0",
+            "a long ramp ends before rest and the power is cut",
+        ),
+        # Causes
+        (TICK, "        loop.rig.disable()\n", "        pass\n", "a cut leaves the power on"),
+        (
+            TICK,
+            "and was_cut != CUT",
+            "and was_cut == 0",
+            "an emergency stop in a ramp cuts nothing",
+        ),
+        (TICK, "_stronger(late, reading.cause)", "late", "what the devices report is dropped"),
+        (
+            TICK,
+            "_stronger(_stronger(late, reading.cause), from_outside)",
+            "_stronger(late, reading.cause)",
+            "emergency stop, console, recorder are dropped",
+        ),
+        (
+            TICK,
+            "_stronger(_stronger(late, reading.cause), from_outside)",
+            "_stronger(reading.cause, from_outside)",
+            "stalls and missed deadlines are dropped",
+        ),
+        (
+            TICK,
+            "REACTIONS[other] > REACTIONS[cause]",
+            "REACTIONS[other] < REACTIONS[cause]",
+            "of two causes the weaker wins",
+        ),
+        (TICK, "if loop.guard.reaction > known:", "if False:", "an epoch goes on after a stop"),
+        (
+            TICK,
+            "if loop.guard.reaction > known:",
+            "if loop.guard.reaction > 1:",
+            "the perturbation is not switched off on a hold",
+        ),
+        (
+            TICK,
+            "order.command is not Command.NONE and loop.take_order(order)",
+            "False",
+            "no order is taken",
+        ),
+        (TICK, "        apart,\n    )", "    )", "motion nobody commanded is not stopped"),
+        (
+            TICK,
+            "*measured, loop.elapsed_ticks\n",
+            "*measured\n",
+            "it is seen late after missed ticks",
+        ),
+        (STEP, "if cause == _NO_CAUSE:", "if True:", "the first cause is overwritten"),
+        (
+            STEP,
+            "reaction = max(reaction, REACTIONS[found])",
+            "reaction = REACTIONS[found]",
+            "a later, weaker cause makes a stop a hold",
+        ),
+        (
+            LIMITS,
+            "state.reaction > Reaction.HOLD or state.velocity_rad_s != 0.0",
+            "state.reaction > Reaction.HOLD",
+            "a hold is released while the arm moves",
+        ),
+        # Readings
+        (TICK, "if math.isfinite(torque_nm):", "if True:", "a NaN stays in the filter for ever"),
+        (TICK, "loop.filtered, smooth_nm", "_, smooth_nm", "the filter forgets: torque all but 0"),
+        (TICK, "command(reading, smooth_nm, k)", "command(reading, torque_nm, k)", "no filter"),
+        (TICK, "due_s - motion_s", "due_s - torque_s", "an old angle passes as a new one"),
+        (TICK, "due_s - torque_s", "due_s - motion_s", "an old torque passes as a new one"),
+        (TICK, "if math.isfinite(angle):", "if True:", "the way back begins nowhere"),
+        (WATCH, "if not torque_age_s <= limits.stale_s:", "if False:", "a silent sensor passes"),
+        (WATCH, "if not age_s <= limits.stale_s:", "if False:", "a silent drive passes"),
+        (CONSISTENCY, "return int(Cause.MOVED_AT_REST)", "pass", "a drive that creeps passes"),
+        (
+            CONSISTENCY,
+            "return int(Cause.VELOCITY_WRONG)",
+            "pass",
+            "a velocity with no sense passes",
+        ),
+        (CONSISTENCY, "return int(Cause.SELDOM_FRESH)", "pass", "a sensor that pauses passes"),
+        # Commands
+        (TICK, "loop.rig.write(allowed)", "loop.rig.write(request)", "no limit reaches the wire"),
+        (
+            TICK,
+            "            request,\n            sent,",
+            "            request,\n            request,",
+            "the record shows what was asked for, not what was sent",
+        ),
+        (
+            TICK,
+            "sent = loop.rig.write(allowed)",
+            "sent = allowed * (loop.rig.write(allowed) == loop.rig.write(allowed))",
+            "the record shows what was allowed; the drive is told twice",
+        ),
+        (
+            TICK,
+            "limited == POSITION_LIMITED and not",
+            "limited == CUT and not",
+            "an epoch at the position limit counts",
+        ),
+        (
+            STEP,
+            "left = limits.position_rad - toward * angle",
+            "left = limits.position_rad - angle",
+            "one position limit is not kept",
+        ),
+        (
+            WATCH,
+            "if not abs(angle_rad) <= limits.position_rad",
+            "if not angle_rad <= limits.position_rad",
+            "beyond one position limit nothing stops it",
+        ),
+        (STEP, "elif sent < sent_before - change:", "elif False:", "blows toward one side"),
+        # Control
+        (
+            MODES,
+            "min(loop.elapsed_ticks, LONGEST_STEP) - 1",
+            "0",
+            "after a missed tick the admittance steps over one only",
+        ),
+        (
+            MODES,
+            "admittance_step(step, velocity, value, torque_nm), value",
+            "admittance_step(step, velocity, -value, torque_nm), value",
+            "the perturbation pushes the other way than recorded",
+        ),
+        (
+            MODES,
+            "loop.perturbation_scale * perturbation_nm[k]",
+            "perturbation_nm[k]",
+            "the operator cannot make the perturbation smaller",
+        ),
+        (MODES, "if not low <= value <= high:", "if False:", "any parameter is taken"),
+        (
+            MODES,
+            "start_rad, interval_s = loop.angle_rad, loop.interval_s",
+            "start_rad, interval_s = 0.0, loop.interval_s",
+            "the way back is a jump",
+        ),
+        (
+            MODES,
+            "return round(loop.tick - reading.motion_time_s * loop.rate_hz)",
+            "return 0",
+            "an old reading is held against the present target",
+        ),
+        (
+            ADMITTANCE,
+            "(perturbation_nm - torque_nm)",
+            "(perturbation_nm + torque_nm)",
+            "the drive pushes back against the subject: unstable",
+        ),
+        (FILTER, "b2 * value - a2 * output", "b2 * value", "a filter that is none"),
+        (TRACKING, "(target_rad - angle_rad)", "(angle_rad - target_rad)", "runs away"),
+        # The session
+        (SESSION, "abs(bias_nm) > limits.bias_limit_nm", "False", "zeroed under load"),
+        (
+            SESSION,
+            "noise_sd_nm > limits.noise_limit_nm",
+            "False",
+            "zeroed while the subject moves",
+        ),
+        (
+            SESSION,
+            "why or _moved(readings, session.settings)",
+            "why",
+            "zeroed while the joint moves",
+        ),
+        (
+            SESSION,
+            "ticks.cause is Cause.NONE and not ticks.interrupted",
+            "True",
+            "a zero from a part of the time",
+        ),
+        (SESSION, "    session.rig.zero(bias_nm)\n", "", "the torque keeps its bias"),
+        (
+            SESSION,
+            "            rest(loop, return_s, return_s)\n        if not run.may_go_on():",
+            "        if not run.may_go_on():",
+            "an epoch begins before the way back has ended",
+        ),
+        (
+            SESSION,
+            "while not loop.at_rest and not run.stopped_by_guard():",
+            "while False:",
+            "a release while the arm moves is an exception",
+        ),
+        (
+            SESSION,
+            "    try:\n        ramp_to_rest(run.loop)\n    finally:\n",
+            "    ramp_to_rest(run.loop)\n    if True:\n",
+            "a ramp that fails leaves the power on and the record open",
+        ),
+        (
+            SESSION,
+            "    finally:\n        rig.disable()",
+            "    except ZeroDivisionError:\n        raise\n    else:\n        rig.disable()",
+            "a drive that cannot be stopped keeps its power",
+        ),
+        (
+            SESSION,
+            "            _brake_and_disable(session)\n        finally:",
+            "            _brake_and_disable(session)\n        except ZeroDivisionError:\n"
+            "            raise\n        else:",
+            "where disabling fails the record stays open",
+        ),
+        (
+            SESSION,
+            "if loop.cause in (Cause.DRIVE_LOST, Cause.DRIVE_STATE):",
+            "if False:",
+            "a drive that no longer obeys is not told to brake",
+        ),
+        (SESSION, "            hold(loop, BRAKE_S)\n", "            pass\n", "falls unbraked"),
+        (
+            SESSION,
+            "        run.fail(run.cause or Cause.SOFTWARE, reason)\n",
+            "",
+            "a program that failed ends with success",
+        ),
+        (SESSION, "if run.open_epoch is not None:", "if False:", "an epoch stays open"),
+        # Orders
+        (RUN, "self._rig.disable()", "pass", "a halt leaves the power on for a tick"),
+        (
+            RUN,
+            "if self.loop.reaction <= Reaction.HOLD:",
+            "if self.loop.reaction <= Reaction.RAMP:",
+            "after a stop the session goes on",
+        ),
+        (
+            RUN,
+            "if self.loop.reaction is Reaction.NONE or",
+            "if self.loop.reaction is not Reaction.RAMP or",
+            "after a hold the session goes on by itself",
+        ),
+        (RUN, "Run(State.PAUSED, stop_next=self.run.stop_next)", "Run(State.PAUSED)", "goes on"),
+        (STATES, "at_once=True, stop_next=run.stop_next", "at_once=True", "a stop is forgotten"),
+        (STATES, "Run(State.RUNNING, stop_next=run.stop_next)", "Run(State.RUNNING)", "the same"),
+        # What other processes say
+        (SINK, "if words[emergency]:", "if False:", "the emergency stop is not read"),
+        (SINK, "boot_ns - now_ns > self._suspended_ns", "False", "a suspension is not seen"),
+        (SINK, "if words[ended]:", "if False:", "the arm moves on though told to end"),
+        (SINK, "now_ns - words[console] > self._console_ns", "False", "nobody is there"),
+        (SINK, "now_ns - words[recorder] > self._recorder_ns", "False", "nothing is recorded"),
+        (SINK, "self._samples.lag() > self._most_lag", "False", "samples are lost"),
+        (SINK, "getppid() != self._console_pid", "False", "a killed console is missed for a while"),
+        (SINK, "return self._status.take()", "return Order()", "the operator is not heard"),
+        (
+            SINK,
+            "self._words[self._places[2]] and not self._aborted",
+            "False",
+            "the arm moves on though a signal asked for the end",
+        ),
+        (
+            SINK,
+            "        self._words[self._heart] = monotonic_ns()\n",
+            "",
+            "a loop that runs is taken for one that hangs",
+        ),
+    )
+)
