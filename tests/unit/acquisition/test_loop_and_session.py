@@ -15,6 +15,7 @@ from rigidimeter.acquisition import (
 from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.devices import Reading, SimulatedRig
 from rigidimeter.experiment import plan
+from rigidimeter.guard import Cause
 from rigidimeter.recording import SessionWriter
 from rigidimeter.recording.sample_reading import read_samples
 from rigidimeter.settings import parse_settings
@@ -171,3 +172,25 @@ def test_a_stamp_ahead_of_its_tick_does_not_end_an_imposed_motion():
     target_rad = [1e-4 * k for k in range(50)]
     ended = follow(loop, 1, target_rad, [0.1] * 50)
     assert (loop.tick, ended.cause) == (50, 0)
+
+
+def test_a_cut_takes_the_power_within_its_tick():
+    """Before anything else is written, and not only when the session closes."""
+    rig, calls = SpoiledRig(lambda r: r._replace(cause=int(Cause.EMERGENCY_STOP)), 20), []
+    rig.disable = lambda: calls.append("disable")
+    rig.write = lambda velocity: calls.append("write") or velocity
+    loop = ControlLoop(SETTINGS, rig, SimulatedClock(), lambda _: None)
+    follow(loop, 1, [0.0] * 40, [0.0] * 40)
+    assert calls == [*["write"] * 20, "disable", "write"]
+
+
+def test_one_torque_that_is_no_number_leaves_the_filter_as_it_was():
+    rig = SpoiledRig(lambda r: r._replace(torque_nm=math.nan), 20)
+    loop = ControlLoop(SETTINGS, rig, SimulatedClock(), lambda _: None)
+    rig.enable()
+    follow(loop, 1, [0.0] * 20, [0.0] * 20)
+    before = loop.filtered
+    follow(loop, 1, [0.0], [0.0])
+    assert loop.cause is Cause.TORQUE_NOT_FINITE
+    assert loop.filtered == before
+    assert all(math.isfinite(value) for value in loop.filtered)

@@ -9,6 +9,7 @@ from rigidimeter.guard import (
     AnswerLimits,
     Cause,
     ConsistencyLimits,
+    consistency,
     consistency_limits,
     consistency_state,
     consistency_step,
@@ -248,3 +249,25 @@ def test_whatever_comes_the_state_stays_finite():
         state, cause = consistency_step(limits, state, *drawn, int(rng.integers(-3, 200)))
         assert cause in set(Cause)
         assert all(math.isfinite(value) for value in (state.still_s, *state[4:]))
+
+
+def test_the_figures_of_the_laws_and_what_they_begin_with():
+    assert (consistency.SUMMED_S, consistency.SQUARED_S, consistency.WRONG_SHARE) == (
+        0.05,
+        0.3,
+        0.375,
+    )
+    assert (consistency.UNSEEN_DEG, consistency.SMOOTHED_S) == (0.1, 0.02)
+    assert (consistency.FEW_SAMPLES, consistency.LEAST_OLD_S) == (3.0, 0.012)
+    assert (*(0.2, 0.5, 5.0),) == (
+        consistency.OLD_SHARE,
+        consistency.OLD_MEMORY_S,
+        consistency.OLD_MEMORY_STALES,
+    )
+    # Nothing is found where nothing is given.
+    assert NOTHING[2:] == (0.0, math.inf, 0.05, math.inf, math.inf, math.inf, math.inf, 0.5)
+    state = consistency_state()
+    assert state.still_s == 0.0
+    assert math.isnan(state.held_rad)
+    assert math.isnan(state.angle_rad)
+    assert state[4:] == (0.0,) * 10

@@ -10,6 +10,12 @@ from rigidimeter.experiment import prbs_nm
 from rigidimeter.guard import AnswerLimits, Cause, answer_limits
 from rigidimeter.guard.torque_answer import (
     FILTER_RAD_S,
+    FIT_LEAVES,
+    INSTRUMENTS_LEAVE,
+    SHOWN_MEMORY_S,
+    SUMMED_EVERY_S,
+    UNSHOWN_NM,
+    WINDOW_S,
     Filtered,
     answer_state,
     answer_step,
@@ -183,3 +189,16 @@ def test_each_limit_is_the_settings_in_si_units():
     limits = answer_limits(parse_settings({"rig": slow, **tables}))
     assert (limits.summed_ticks, limits.half_entries, limits.decay) == (1, 25, 1.0)
     assert limits.gain == pytest.approx(0.02 / parse_settings({}).controller.inertia_kg_m2)
+
+
+def test_the_figures_of_the_laws_and_what_they_begin_with():
+    assert (SHOWN_MEMORY_S, WINDOW_S, SUMMED_EVERY_S) == (0.25, 1.0, 0.004)
+    assert (FIT_LEAVES, INSTRUMENTS_LEAVE, UNSHOWN_NM) == (0.03, 0.12, 0.0003)
+    assert AnswerLimits(DT)[1:] == (0.5, 1.0, 0.0, 4, 125, 0.0, math.inf)
+    state = answer_state()
+    assert state.sums.shape == (3, 28)
+    assert not state.sums.any()
+    for signal in state[1:4]:
+        assert math.isnan(signal.value)
+        assert signal[1:] == (0.0, 0.0, 0.0)
+    assert state[4:] == (0.0, 0.0, 0.0, 0, 0, 0)
