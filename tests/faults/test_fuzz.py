@@ -1,7 +1,8 @@
 """A part of the cases of the fuzzer, in one process: no traceback, only the output is changed."""
 
 import pytest
-from tests.fuzz import TARGETS, run_case, run_here
+from tests.fuzz import run_case, run_here
+from tests.fuzz_inputs import TARGETS
 
 SHARES = 5
 
