@@ -229,11 +229,12 @@ def holm(p_values: Sequence[float]) -> tuple[float, ...]:
     >>> holm([0.01, 0.04, 0.03])
     (0.03, 0.06, 0.06)
     """
+    from statsmodels.stats.multitest import multipletests
+
     adjusted = np.array(p_values, dtype=np.float64)
-    known = np.flatnonzero(~np.isnan(adjusted))
-    ascending = known[np.argsort(adjusted[known])]
-    scaled = adjusted[ascending] * np.arange(known.size, 0, -1)
-    adjusted[ascending] = np.minimum(np.maximum.accumulate(scaled), 1.0)
+    known = ~np.isnan(adjusted)
+    if known.any():
+        adjusted[known] = multipletests(adjusted[known], method="holm")[1]
     return tuple(adjusted.tolist())
 
 

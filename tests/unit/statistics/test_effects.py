@@ -200,14 +200,6 @@ def test_holm_orders_and_keeps_what_is_no_test() -> None:
     assert math.isnan(holm([math.nan])[0])
 
 
-@pytest.mark.parametrize("n", [1, 2, 5, 30])
-def test_holm_is_that_of_statsmodels(n: int) -> None:
-    multitest = pytest.importorskip("statsmodels.stats.multitest")
-    p_values = np.random.default_rng(n).choice([0.0, 1e-12, 0.003, 0.02, 0.02, 0.3, 1.0], n)
-    expected = multitest.multipletests(p_values, method="holm")[1]
-    assert holm(p_values.tolist()) == pytest.approx(tuple(expected), rel=1e-15)
-
-
 def test_what_cannot_be_resampled_is_refused() -> None:
     groups = two_groups([1.0, 2.0], [3.0])
     with pytest.raises(ValueError, match="at least 100"):
