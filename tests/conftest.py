@@ -102,6 +102,7 @@ def rigidimeter(monkeypatch, capsys) -> Callable[..., Ran]:
 REALTIME = {
     # What is commissioned must not be later than a tick of 4 ms.
     "tests/wire/test_commission": {"priority": 50, "resolves_s": 0.02},
+    "tests/wire/test_daily_check": {"priority": 50, "resolves_s": 0.02},
     "tests/wire/": {"priority": 10},
     "tests/faults/test_faults_processes": {},  # true processes, as in life
     "tests/faults/test_faults_": {"priority": 10, "resolves_s": 0.02},
