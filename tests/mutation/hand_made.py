@@ -178,7 +178,7 @@ HAND_MADE = tuple(
         (
             TICK,
             "limited == POSITION_LIMITED and not",
-            "limited == CUT and not",
+            "limited == STALLED and not",
             "an epoch at the position limit counts",
         ),
         (

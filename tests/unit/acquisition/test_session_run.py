@@ -559,6 +559,14 @@ def test_how_a_run_ends_that_nothing_ended(state, left, outcome, reason):
     assert (run.outcome, run.reason, run.cause) == (outcome, reason, Cause.NONE)
 
 
+def test_a_hold_keeps_the_stop_that_was_ordered_before():
+    run, states = controller_run(Desk())
+    run.change_state(Run(State.RUNNING, stop_next=True))
+    run.loop.guard = run.loop.guard._replace(cause=int(Cause.POWER_HIGH), reaction=1)
+    assert run.may_go_on()
+    assert states[-1] == Run(State.PAUSED, stop_next=True)
+
+
 def test_a_hold_in_the_last_epoch_is_told_though_all_was_run():
     run, _ = controller_run()
     run.loop.guard = run.loop.guard._replace(cause=int(Cause.POWER_HIGH), reaction=1)

@@ -226,6 +226,18 @@ def test_the_two_clocks_are_those_of_the_machine(shared_status, rings):
     assert supervision.cause(0.0) == Cause.NONE
 
 
+def test_each_sample_is_a_heartbeat_of_the_loop(shared_status, rings):
+    sink = RingSink(SessionMemory(*rings, shared_status), tick_rate_hz=10.0)
+    real = SharedStatus(shared_status.memory)
+    assert real.age_s(Role.LOOP) == math.inf
+    sink.sample(sample(0))
+    assert real.age_s(Role.LOOP) < math.inf
+    heart = shared_status.places()[-1]
+    shared_status.memory.words[heart] = 1
+    sink.sample(sample(1))
+    assert shared_status.memory.words[heart] > 1
+
+
 def test_the_sink_keeps_events_in_their_place(shared_status, rings):
     samples, events = rings
     sink = RingSink(SessionMemory(*rings, shared_status), tick_rate_hz=10.0)
