@@ -16,6 +16,8 @@ EQUIVALENT: dict[str, str] = {
     "now_s - wire.asked_s >= settings.lost_s": MOMENT,
     CAN + "stop: self._wire.is_open and self._control is not Control.DISABLE_VOLTAGE → "
     "self._control is not Control.DISABLE_VOLTAGE": "a bus that was closed was told to disable",
+    "tracking.py minimum_jerk: elapsed_s >= duration_s → elapsed_s > duration_s": "at its end the "
+    "polynomial and its derivative are 0, too",
     "recorded_guard.py replay: Cause.NONE → Cause.SOFTWARE": "a guard at the start holds nothing",
     "step.py guard_step: 1 → 0": "elapsed_ticks if not given: none counts as one",
     NEAR + "speed * speed / (2.0 * limits.acceleration_rad_s2) → "

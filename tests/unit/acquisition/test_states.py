@@ -1,8 +1,10 @@
 """The table of states and commands, line by line."""
 
+import math
+
 import pytest
 
-from rigidimeter.acquisition.run_states import Command, Run, State, after, epoch_over
+from rigidimeter.acquisition.run_states import NOTHING, Command, Run, State, after, epoch_over
 
 RUNNING, PAUSED = Run(State.RUNNING), Run(State.PAUSED)
 
@@ -70,3 +72,10 @@ def test_stopping_cannot_be_taken_back():
     stopping = Run(State.STOPPING)
     for command in (Command.RESUME, Command.START, Command.PAUSE, Command.STOP, Command.RESET):
         assert after(stopping, command) == stopping
+
+
+def test_the_numbers_that_other_processes_read_stay():
+    assert [state.value for state in State] == list(range(5))
+    assert [command.value for command in Command] == list(range(10))
+    assert (NOTHING.command, NOTHING.name) == (Command.NONE, "")
+    assert math.isnan(NOTHING.value)

@@ -26,3 +26,10 @@ def test_steps_give_what_lfilter_gives():
 def test_a_cutoff_beyond_nyquist_is_refused(cutoff_hz):
     with pytest.raises(ValueError, match="cutoff must be between"):
         butterworth_lowpass(cutoff_hz, 1000.0)
+
+
+def test_a_cutoff_within_is_taken_and_the_bound_is_named():
+    for cutoff_hz in (0.5, 499.0):
+        assert butterworth_lowpass(cutoff_hz, 1000.0).b0 > 0.0
+    with pytest.raises(ValueError, match="between 0 and 500 Hz, got 700 Hz"):
+        butterworth_lowpass(700.0, 1000.0)

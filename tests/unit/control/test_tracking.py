@@ -23,3 +23,7 @@ def test_the_velocity_is_the_derivative_of_the_angle():
     t = np.linspace(0.0, 2.0, 2001)
     angle, velocity = np.array([minimum_jerk(0.3, 2.0, float(time)) for time in t]).T
     np.testing.assert_allclose(np.gradient(angle, t)[1:-1], velocity[1:-1], atol=1e-6)
+
+
+def test_after_its_time_the_way_back_stays_at_its_end():
+    assert minimum_jerk(0.3, 2.0, 3.0) == (0.0, 0.0)
