@@ -292,6 +292,9 @@ def _run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: 
     if loop.guard.reaction == CUT and was_cut != CUT:
         loop.rig.disable()
     sent = loop.rig.write(allowed)
+    if sent != allowed and math.isfinite(sent):
+        # A busy line, or a drive with coarse steps: the guard counts on from what is in force.
+        loop.guard = loop.guard._replace(velocity_rad_s=sent)
     if limited:
         loop.limited_ticks += 1
         if limited == POSITION_LIMITED and not loop.limit_time_s <= due_s:

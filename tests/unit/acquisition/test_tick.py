@@ -66,6 +66,28 @@ def test_what_the_drive_sent_is_recorded_not_what_was_allowed():
     assert [s.velocity_command_rad_s for s in samples] == [0.1, 0.2, 0.3]
 
 
+def test_a_ramp_ends_when_zero_is_in_force_not_when_it_was_asked_for():
+    loop, samples = made(SETTINGS)
+    run_ticks(loop, 3, 10, constant(CHANGE_RAD_S))
+    write, busy = loop.rig.write, iter([True, True, True, False])
+
+    def write_on_busy_line(velocity_rad_s):
+        return loop.rig.velocity_rad_s if next(busy) else write(velocity_rad_s)
+
+    loop.rig.write = write_on_busy_line
+    ramp_to_rest(loop)
+    assert loop.rig.velocity_rad_s == 0.0
+    assert [s.velocity_command_rad_s for s in samples[10:]] == [CHANGE_RAD_S] * 3 + [0.0]
+
+
+def test_what_is_in_force_counts_for_where_the_joint_should_be():
+    loop, _ = made(SETTINGS)
+    loop.rig.write, write = (lambda asked: write(0.5 * asked)), loop.rig.write
+    result = run_ticks(loop, 3, 1000, constant(0.5))
+    assert result.cause is Cause.NONE
+    assert loop.angle_rad > 2.0 * loop.limits.following_rad
+
+
 def test_each_field_of_the_record_is_the_readings_own():
     reading = Reading(0.1, 0.0001, 0.02, 0.003, 0.0002, 11, 12, 13, 14)
     loop, samples = made(SETTINGS, change=lambda *_: reading, late={0: 0.0005})
