@@ -120,6 +120,12 @@ def _terminated(_signal: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
+def _say_interrupted() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # it ends already; another would be a traceback
+    echo("rigidimeter: interrupted", err=True)
+
+
 def main() -> None:
     """Run the command line; a mistake of the user ends with one sentence and status 1."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT):  # also where a parent ignores it
@@ -149,7 +155,10 @@ def main() -> None:
         what = f"{error.filename}: " if error.filename else ""
         echo(f"rigidimeter: {what}{error.strerror or error}", err=True)
         sys.exit(1)
+    except KeyboardInterrupt:  # before typer has read the command line
+        _say_interrupted()
+        sys.exit(_INTERRUPTED)
     except SystemExit as end:
         if end.code == _INTERRUPTED:  # typer turns the interruption of a command into this
-            echo("rigidimeter: interrupted", err=True)
+            _say_interrupted()
         raise

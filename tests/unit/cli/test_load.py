@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -120,3 +122,17 @@ def test_an_interruption_is_one_line(rigidimeter, tmp_path):
     path.write_text("raise KeyboardInterrupt")
     ran = rigidimeter("--load", path, "estimate", "--help")
     assert (ran.status, ran.err.strip()) == (130, "rigidimeter: interrupted")
+
+
+def test_an_interruption_while_the_commands_are_built_is_one_line():
+    code = """
+import signal
+from rigidimeter.cli import main
+main.app = lambda: signal.raise_signal(signal.SIGINT)
+try:
+    main.main()
+finally:
+    signal.raise_signal(signal.SIGINT)  # once more: it ends already
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr.strip()) == (130, "rigidimeter: interrupted")

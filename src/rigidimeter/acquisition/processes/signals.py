@@ -12,6 +12,7 @@ import contextlib
 import signal
 import threading
 from collections.abc import Iterator
+from multiprocessing import resource_tracker
 from types import FrameType
 
 from rigidimeter.acquisition.processes.shared_status import Flag, SharedStatus
@@ -53,6 +54,8 @@ def held_back() -> Iterator[None]:
     A new process has not yet come to where it handles them. It inherits what is blocked here, and
     takes what came meanwhile once it has.
     """
+    # Started with the first process otherwise, after which SIGINT and SIGTERM are let through.
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, HELD_BACK)
     try:
         yield
