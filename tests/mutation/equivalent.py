@@ -3,8 +3,13 @@
 SLOWER = "looks closer where it need not; what it finds there does not limit"
 NEAR = "step.py guard_step: "
 
-MOMENT = "a time in floating point is never met to the bit"
+MOMENT = "a measured value in floating point is never met to the bit"
 CAN = "cia402/drive.py Cia402Drive."
+LOOP = "tick.py ControlLoop.__init__: "
+SET = "each tick sets it before it is read"
+ANEW = "each stretch sets it; a ramp before the first has no velocity to take off"
+GIVEN = "a default that is never used: every result is made with all its fields"
+RAMP = "only a ramp uses it, and its controller does not ask for the tick's number"
 
 EQUIVALENT: dict[str, str] = {
     CAN + "_check_watchdog: now_s - min(wire.sync_s, wire.asked_s) > self._stops_itself_s → "
@@ -33,4 +38,25 @@ EQUIVALENT: dict[str, str] = {
     + "if found != _NO_CAUSE: ... → if True: ...": "no cause changes neither cause nor reaction",
     "step.py _farthest_in_flight: 1 → 0": "none back gives 0, which is where it starts",
     "step.py _stoppable_speed: distance_rad <= 0.0 → distance_rad < 0.0": "the root gives 0, too",
+    "session_run.py _moved: moved_deg <= limit_deg + settings.rig.motion.angle_resolution_deg → "
+    "moved_deg < limit_deg + settings.rig.motion.angle_resolution_deg": MOMENT,
+    LOOP + "self.elapsed_ticks = 1 → pass": SET,
+    LOOP + "1 → 2": SET,
+    LOOP + "1 → 0": SET,
+    LOOP + "self.missed_ticks = 0 → pass": ANEW,
+    LOOP + "0 → 1 #3": ANEW,
+    LOOP + "0 → -1 #3": ANEW,
+    LOOP + "self.limited_ticks = 0 → pass": ANEW,
+    LOOP + "0 → 1 #4": ANEW,
+    LOOP + "0 → -1 #4": ANEW,
+    LOOP + "self.limit_time_s = math.nan → pass": ANEW,
+    "tick.py TickResult: missed_ticks: int = 0 → missed_ticks: int = -1": GIVEN,
+    "tick.py TickResult: 0 → 1": GIVEN,
+    "tick.py TickResult: 0 → -1": GIVEN,
+    "tick.py TickResult: interrupted: bool = False → interrupted: bool = -1": GIVEN,
+    "tick.py TickResult: False → True": GIVEN,
+    "tick.py ramp_to_rest: 0 → 1": RAMP,
+    "tick.py ramp_to_rest: 0 → -1": RAMP,
+    "tick.py _run_tick: 0 → 1": RAMP,
+    "tick.py _run_tick: 0 → -1": RAMP,
 }

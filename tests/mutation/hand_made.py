@@ -295,7 +295,7 @@ HAND_MADE = tuple(
         (SESSION, "            hold(loop, BRAKE_S)\n", "            pass\n", "falls unbraked"),
         (
             SESSION,
-            "        run.fail(run.cause or Cause.SOFTWARE, reason)\n",
+            '        run.outcome, run.reason = "fail", reason\n',
             "",
             "a program that failed ends with success",
         ),

@@ -126,12 +126,14 @@ def _places(node: ast.AST, where: str) -> Iterator[tuple[ast.AST, str, int | Non
 
 
 def _does_nothing(node: ast.AST) -> bool:
-    """Whether it is a docstring, an import, or the list of names a star would import."""
+    """Whether it is a docstring, an import, the names a star would import, or a type's name."""
     if isinstance(node, ast.Import | ast.ImportFrom):
         return True
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return True
-    return isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+    return isinstance(node, ast.Assign) and (
+        ast.unparse(node.targets[0]) == "__all__" or ast.unparse(node.value).startswith("Callable[")
+    )
 
 
 def _changes(node: ast.AST) -> Iterator[ast.AST]:
@@ -161,6 +163,8 @@ def _changes(node: ast.AST) -> Iterator[ast.AST]:
             yield _with(node, test=ast.UnaryOp(ast.Not(), node.test))
             yield _with(node, test=ast.Constant(False))
             yield _with(node, test=ast.Constant(True))
+        case ast.Return(value=ast.Constant(value=False)):
+            pass  # nothing is as untrue; the constant itself is changed
         case ast.Return() if node.value is not None:
             yield _with(node, value=ast.Constant(None))
         case ast.Assign() | ast.Raise():

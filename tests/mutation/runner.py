@@ -29,7 +29,10 @@ UNIT = "tests/unit"
 
 _RUN = tuple(
     f"acquisition/test_{name}.py"
-    for name in ("tick", "modes", "session_run", "orders", "loop_and_session")
+    for name in (
+        *("tick", "modes", "session_run", "session_end", "zeroing", "controller_run"),
+        *("orders", "loop_and_session"),
+    )
 )
 TESTS = {
     "control/admittance.py": ("control/test_admittance.py",),
@@ -43,7 +46,7 @@ TESTS = {
     "guard/torque_answer.py": ("guard/test_torque_answer.py", "guard/test_consistency.py"),
     "guard/watch.py": ("guard/test_watch.py", "guard/test_step.py"),
     "acquisition/control_modes.py": ("acquisition/test_modes.py", *_RUN),
-    "acquisition/controller_run.py": ("acquisition/test_session_run.py", *_RUN),
+    "acquisition/controller_run.py": ("acquisition/test_controller_run.py", *_RUN),
     "acquisition/run_states.py": ("acquisition/test_states.py", "acquisition/test_session_run.py"),
     "acquisition/session_run.py": ("acquisition/test_session_run.py", *_RUN),
     "acquisition/supervision.py": ("acquisition/test_session_run.py",),

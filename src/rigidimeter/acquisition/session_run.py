@@ -43,7 +43,7 @@ class SessionResult:
     reason: str
     epochs_run: int
     epochs_good: int
-    cause: Cause = Cause.NONE
+    cause: Cause
 
 
 @dataclass
@@ -137,7 +137,7 @@ def run_session(
     except Exception as error:
         plain = isinstance(error, UserError)
         reason = str(error) if plain else f"{type(error).__name__}: {error}"
-        run.fail(run.cause or Cause.SOFTWARE, reason)
+        run.outcome, run.reason = "fail", reason
         raise
     finally:
         _close(session)

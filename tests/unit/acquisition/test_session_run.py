@@ -1,98 +1,25 @@
-"""A whole session on an exact rig: its order, its end however it comes, and what is told of it."""
+"""A whole session on an exact rig: its order, what is ordered, and what the guard makes of it."""
 
 import math
 from itertools import pairwise
-from typing import NamedTuple
 
 import pytest
-from tests.unit.acquisition.exact_rig import Desk, ExactRig, LateClock
-
-from rigidimeter.acquisition.controller_run import ControllerRun
-from rigidimeter.acquisition.run_states import Command, Order, Run, State
-from rigidimeter.acquisition.session_run import (
-    BRAKE_S,
-    FEWEST_ZEROING_SAMPLES,
-    LOOK_S,
-    SessionResult,
-    run_session,
+from tests.unit.acquisition.exact_rig import Desk
+from tests.unit.acquisition.whole_session import (
+    EPOCH,
+    LOOK,
+    RATE_HZ,
+    REST,
+    RETURN,
+    VALUES,
+    session,
 )
-from rigidimeter.devices.base import DeviceError
-from rigidimeter.experiment import plan, prbs_nm
+
+from rigidimeter.acquisition.run_states import Command, Order, State
+from rigidimeter.acquisition.session_run import SessionResult
+from rigidimeter.experiment import prbs_nm
 from rigidimeter.guard import Cause
 from rigidimeter.settings import parse_settings
-
-RATE_HZ = 50.0
-SENSOR = {"rate_hz": RATE_HZ}
-VALUES = {
-    "rig": {"tick_rate_hz": RATE_HZ, "torque": SENSOR, "motion": SENSOR},
-    "guard": {"reaction_time_s": 0.08},
-    "loop": {"stall_s": 1.0},
-    "prbs": {"duration_s": 1.0},
-    "sinusoid": {"duration_s": 1.0, "motion_s": 1.0, "amplitude_deg": 1.0, "taper_s": 0.1},
-    "protocol": {"blocks": [{"epochs": 2}], "rests_s": [0.6], "return_s": 0.5},
-    "zeroing": {"duration_s": 0.4},
-}
-EPOCH, REST, RETURN, LOOK = 50, 30, 25, round(LOOK_S * RATE_HZ)
-"""In ticks."""
-
-HAND_KG_M2 = 0.0045
-
-
-class ListSink:
-    """Keeps everything in order."""
-
-    def __init__(self):
-        self.samples, self.events, self.closed = [], [], []
-        self.sample = self.samples.append
-
-    def event(self, kind, **facts):
-        self.events.append({"event": kind, **facts})
-
-    def close(self, time_s, outcome, reason):
-        self.closed.append((time_s, outcome, reason))
-
-    def of(self, kind):
-        return [event for event in self.events if event["event"] == kind]
-
-
-class Ran(NamedTuple):
-    result: SessionResult | None
-    error: BaseException | None
-    rig: ExactRig
-    sink: ListSink
-    states: list[Run]
-
-    @property
-    def epochs(self):
-        """The numbers of the epochs, with how each ended."""
-        return [(e["epoch"], e["outcome"]) for e in self.sink.of("epoch_ended")]
-
-    @property
-    def labels(self):
-        return [e["label"] for e in self.sink.of("epoch_started")]
-
-
-def session(desk=None, *, change=lambda tick, reading: reading, late=None, values=None, **options):
-    settings = parse_settings({**VALUES, **(values or {})})
-    rig = options.pop("rig", None) or ExactRig(change, 1.0 / RATE_HZ, HAND_KG_M2)
-    protocol = plan(settings.protocol, settings.prbs, settings.sinusoid, 1)
-    sink, states = options.pop("sink", None) or ListSink(), []
-    result, error = None, None
-    try:
-        result = run_session(
-            protocol,
-            settings,
-            rig,
-            LateClock(late, 1.0 / RATE_HZ),
-            sink,
-            supervision=desk,
-            state_changed=states.append,
-            **options,
-        )
-    except Exception as caught:
-        error = caught
-    return Ran(result, error, rig, sink, states)
-
 
 # As planned
 
@@ -165,6 +92,13 @@ def test_a_pause_waits_for_the_epoch_and_goes_back_before_the_next():
     assert [r.state for r in ran.states] == [
         *(State.RUNNING, State.RUNNING, State.PAUSED, State.RUNNING, State.STOPPING)
     ]
+
+
+def test_a_paused_run_looks_every_tenth_of_a_second_whether_it_may_go_on():
+    """At 1 kHz: 11 ticks, the way back of 500, a look of 100 in which it is resumed."""
+    desk = Desk(orders={10: Command.PAUSE_NOW, 520: Command.RESUME})
+    ran = session(desk, values={"rig": {}})
+    assert ran.sink.of("epoch_started")[1]["time_s"] == pytest.approx(0.011 + 0.5 + 0.1 + 0.5)
 
 
 def test_a_pause_now_ends_the_epoch_which_comes_again_first_and_once():
@@ -288,6 +222,15 @@ def test_a_hold_without_an_operator_is_the_end():
     )
 
 
+def test_a_session_in_one_process_has_no_operator_who_could_continue():
+    def high(tick, reading):
+        return reading._replace(cause=int(Cause.TORQUE_HIGH)) if tick == 20 else reading
+
+    ran = session(None, change=high)
+    assert ran.labels == ["1"]
+    assert "no operator was there to continue" in ran.result.reason
+
+
 def test_an_ordered_stop_outlives_a_hold_and_a_resume():
     ran = session(Desk({20: Cause.TORQUE_HIGH}, {10: Command.STOP, 90: Command.RESUME}))
     assert ran.labels == ["1"]
@@ -307,270 +250,3 @@ def test_resumed_while_the_arm_still_moves_it_waits_for_rest():
     assert max(steps) <= math.radians(30.0) / RATE_HZ * (1 + 1e-9)
     released = next(s for s in ran.sink.samples[46:] if s.cause == 0)
     assert ran.sink.samples[released.tick - 1].velocity_command_rad_s == 0.0
-
-
-# The end
-
-
-@pytest.mark.parametrize(
-    ("cause", "stops", "brakes"),
-    [
-        (Cause.DRIVE_LOST, True, False),
-        (Cause.DRIVE_STATE, True, True),
-        (Cause.DRIVE_FAULT, False, False),
-    ],
-)
-def test_a_drive_that_no_longer_obeys_brakes_by_itself_before_its_power_goes(cause, stops, brakes):
-    ran = session(Desk({20: cause}))
-    names = [name for name, *_ in ran.rig.calls]
-    assert ("stop" in names) == stops
-    after = names[names.index("stop") + 1 :] if stops else ["disable"]
-    assert after == ["read", "write"] * (round(BRAKE_S * RATE_HZ) if brakes else 0) + ["disable"]
-
-
-class Failing(ExactRig):
-    """From tick 20 on the named steps raise."""
-
-    def __init__(self, *names):
-        super().__init__(interval_s=1.0 / RATE_HZ, inertia_kg_m2=HAND_KG_M2)
-        for name in names:
-            step = getattr(self, name)
-
-            def failing(*arguments, name=name, step=step):
-                done = step(*arguments)
-                if self.tick >= 20:
-                    raise RuntimeError(f"{name} failed")
-                return done
-
-            setattr(self, name, failing)
-
-
-@pytest.mark.parametrize(
-    "names",
-    [("read",), ("write",), ("read", "write"), ("read", "disable"), ("read", "write", "disable")],
-)
-def test_whatever_fails_the_power_goes_and_the_record_is_closed(names):
-    ran = session(rig=Failing(*names))
-    assert isinstance(ran.error, RuntimeError)
-    assert ("disable",) in ran.rig.calls
-    (closed,) = ran.sink.closed
-    assert closed[1:] == ("fail", f"RuntimeError: {names[0]} failed")
-    assert ran.epochs == [(1, "fail")]
-    ended = ran.sink.of("epoch_ended")[0]
-    assert ended["reason"] == f"RuntimeError: {names[0]} failed"
-    if names == ("read",):  # ramped by writing alone
-        assert ran.rig.of("write")[-1] == 0.0
-
-
-def test_a_drive_that_can_not_be_stopped_loses_its_power_all_the_same():
-    rig = Failing("stop")
-    ran = session(Desk({20: Cause.DRIVE_LOST}), rig=rig)
-    assert str(ran.error) == "stop failed"
-    assert rig.calls[-1] == ("disable",)
-    assert ran.sink.closed[0][1] == "fail"
-
-
-def test_a_rig_that_is_not_enabled_ends_the_session_with_its_own_sentence():
-    rig = ExactRig(interval_s=1.0 / RATE_HZ)
-
-    def refuse():
-        raise DeviceError("drive: no supply voltage")
-
-    rig.enable = refuse
-    ran = session(rig=rig)
-    assert isinstance(ran.error, DeviceError)
-    assert ran.sink.closed[0][1:] == ("fail", "drive: no supply voltage")
-    assert rig.calls == [("disable",)]
-
-
-def test_an_interrupt_is_an_abort_with_a_ramp():
-    def interrupt(tick, reading):
-        if tick == 20:
-            raise KeyboardInterrupt
-        return reading
-
-    ran = session(change=interrupt)
-    assert (ran.result.outcome, ran.result.reason) == ("abort", "interrupted by the operator")
-    assert ran.epochs == [(1, "abort")]
-    assert ran.rig.calls[-2:] == [("write", 0.0), ("disable",)]
-
-
-def test_a_program_that_fails_after_a_cause_keeps_the_cause():
-    sink = ListSink()
-    event = sink.event
-
-    def failing(kind, **facts):
-        event(kind, **facts)
-        if kind == "epoch_ended" and not sink.closed and "limited_ticks" in facts:
-            raise RuntimeError("no room")
-
-    sink.event = failing
-    ran = session(sink=sink)
-    assert str(ran.error) == "no room"
-    assert sink.closed[0][1:] == ("fail", "RuntimeError: no room")
-
-
-# Zeroing
-
-
-def torque(bias_nm, ripple_nm=0.01):
-    return lambda k, r: r._replace(torque_nm=r.torque_nm + bias_nm + ripple_nm * (-1) ** k)
-
-
-def creep(tick, reading):
-    """Move at 2.5 deg/s."""
-    speed_rad_s = math.radians(2.5)
-    angle_rad = speed_rad_s * tick / RATE_HZ
-    return reading._replace(angle_rad=angle_rad, velocity_rad_s=speed_rad_s)
-
-
-def test_the_sensor_is_zeroed_with_the_mean_of_the_whole_time():
-    ran = session(Desk(), change=torque(0.5), zero_first=True)
-    assert ran.rig.of("zero") == [pytest.approx(0.5)]
-    (zeroed,) = ran.sink.of("sensor_zeroed")
-    assert (zeroed["time_s"], zeroed["refused"]) == (0.4, "")
-    assert zeroed["bias_nm"] == pytest.approx(0.5)
-    assert zeroed["noise_sd_nm"] == pytest.approx(0.01 * math.sqrt(20 / 19))
-    (enabled,) = ran.sink.of("rig_enabled")
-    assert (enabled["time_s"], enabled["origin_rad"]) == (0.0, 0.25)
-    assert ran.sink.of("epoch_started")[0]["time_s"] == 0.4
-
-
-def test_without_zeroing_nothing_is_held_first():
-    ran = session(Desk())
-    assert ran.rig.of("zero") == []
-    assert ran.sink.of("rig_enabled") == []
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (torque(1.01), "at rest the torque sensor reads 1.01 N·m, more than"),
-        (torque(-1.01), "at rest the torque sensor reads -1.01 N·m, more than"),
-        (torque(0.0, 0.11), "at rest the torque varies by 0.113 N·m (SD), more than"),
-        (
-            lambda k, r: r._replace(torque_time_s=(k - k % 2 if k > 3 else 0) / RATE_HZ),
-            "only 9 torque samples came in 0.4 s",
-        ),
-        (creep, "the joint moved by"),
-    ],
-)
-def test_a_session_does_not_begin_on_a_zero_that_is_none(change, words):
-    ran = session(Desk(), change=change, zero_first=True)
-    assert ran.result.outcome == "fail"
-    assert words in ran.result.reason
-    assert ran.rig.of("zero") == []
-    assert ran.labels == []
-    (zeroed,) = ran.sink.of("sensor_zeroed")
-    assert zeroed["refused"] == ran.result.reason
-    if "only" in words:
-        assert (zeroed["bias_nm"], zeroed["noise_sd_nm"]) == (None, None)
-
-
-@pytest.mark.parametrize("change", [torque(0.99), torque(-0.99), torque(0.0, 0.09)])
-def test_within_the_limits_it_does(change):
-    ran = session(Desk(), change=change, zero_first=True)
-    assert ran.result.outcome == "success"
-
-
-def test_ten_samples_are_enough():
-    """Each is read twice."""
-    assert round(VALUES["zeroing"]["duration_s"] * RATE_HZ) == 2 * FEWEST_ZEROING_SAMPLES
-
-    def change(k, reading):
-        return reading._replace(torque_time_s=(k - k % 2) / RATE_HZ)
-
-    ran = session(Desk(), change=change, zero_first=True)
-    assert ran.result.outcome == "success"
-
-
-@pytest.mark.parametrize("held", [False, True])
-def test_a_zero_that_was_interrupted_is_made_again(held):
-    """Until then the torque is another: what was heard is thrown away."""
-    orders = {50: Command.RESUME}
-    desk = Desk({10: Cause.TORQUE_HIGH} if held else {}, orders)
-    if not held:
-        orders[10] = desk.orders[10] = Command.PAUSE_NOW
-    ran = session(
-        desk,
-        change=lambda k, r: r._replace(torque_nm=r.torque_nm + (0.9 if k < 15 else 0.1)),
-        zero_first=True,
-    )
-    assert ran.rig.of("zero") == [pytest.approx(0.1)]
-    assert ran.result.outcome == "success"
-
-
-@pytest.mark.parametrize("command", [Command.ABORT, Command.HALT])
-def test_an_end_while_zeroing_leaves_no_zero(command):
-    ran = session(Desk(orders={5: command}), zero_first=True)
-    assert ran.rig.of("zero") == []
-    assert ran.labels == []
-    assert ran.result.outcome == ("abort" if command is Command.ABORT else "fail")
-
-
-# How it is led
-
-
-def controller_run(desk=None):
-    sink, states = ListSink(), []
-    settings = parse_settings(VALUES)
-    rig = ExactRig(interval_s=1.0 / RATE_HZ)
-    clock = LateClock(interval_s=1.0 / RATE_HZ)
-    run = ControllerRun(settings, rig, clock, sink, lambda _: None, desk, states.append)
-    return run, states
-
-
-def test_a_run_begins_idle_and_a_state_is_told_once():
-    run, states = controller_run()
-    assert (run.run, run.open_epoch, run.outcome, run.reason) == (Run(), None, "success", "")
-    assert run.cause is Cause.NONE
-    run.change_state(Run(State.RUNNING))
-    run.change_state(Run(State.RUNNING))
-    assert states == [Run(State.RUNNING)]
-    assert run.is_in(State.RUNNING)
-    assert not run.is_in(State.PAUSED)
-
-
-def test_a_reason_that_stands_is_not_overwritten_at_the_end():
-    run, _ = controller_run()
-    run.fail(Cause.SIGNAL, "told to end")
-    run.conclude(3)
-    assert (run.outcome, run.reason, run.cause) == ("fail", "told to end", Cause.SIGNAL)
-
-
-@pytest.mark.parametrize(
-    ("state", "left", "outcome", "reason"),
-    [
-        (Run(State.RUNNING), 0, "success", ""),
-        (Run(State.RUNNING), 2, "fail", "ended with 2 epochs left"),
-        (Run(State.STOPPING), 2, "success", "stopped by the operator with 2 epochs left"),
-        (
-            Run(State.STOPPING, aborted=True),
-            1,
-            "abort",
-            "aborted by the operator with 1 epochs left",
-        ),
-    ],
-)
-def test_how_a_run_ends_that_nothing_ended(state, left, outcome, reason):
-    run, _ = controller_run()
-    run.change_state(state)
-    run.conclude(left)
-    assert (run.outcome, run.reason, run.cause) == (outcome, reason, Cause.NONE)
-
-
-def test_a_hold_keeps_the_stop_that_was_ordered_before():
-    run, states = controller_run(Desk())
-    run.change_state(Run(State.RUNNING, stop_next=True))
-    run.loop.guard = run.loop.guard._replace(cause=int(Cause.POWER_HIGH), reaction=1)
-    assert run.may_go_on()
-    assert states[-1] == Run(State.PAUSED, stop_next=True)
-
-
-def test_a_hold_in_the_last_epoch_is_told_though_all_was_run():
-    run, _ = controller_run()
-    run.loop.guard = run.loop.guard._replace(cause=int(Cause.POWER_HIGH), reaction=1)
-    run.conclude(0)
-    assert run.outcome == "success"
-    assert run.cause is Cause.POWER_HIGH
-    assert run.reason == f"the guard held the rig in the last epoch: {Cause.POWER_HIGH.sentence}"

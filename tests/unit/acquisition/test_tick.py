@@ -366,6 +366,12 @@ def test_an_order_that_ends_the_stretch_is_told_and_none_taken_for_nothing():
     assert run_ticks(loop, 1, 2, constant(0.0)).interrupted is False
 
 
+def test_an_order_that_nobody_takes_ends_nothing():
+    loop, _ = made(SETTINGS, desk=Desk(orders={2: Command.ABORT}))
+    assert run_ticks(loop, 1, 10, constant(0.0)).interrupted is False
+    assert loop.tick == 10
+
+
 def test_progress_is_told_each_second_of_the_session():
     told = []
     settings = parse_settings(
@@ -398,6 +404,20 @@ def test_a_ramp_that_cannot_be_recorded_waits_for_each_tick():
     # The tick that failed, how late that has made it, and then one tick after the other.
     assert waits == [0, 0, *range(7, 7 + len(written(loop)[11:]))]
     assert len(samples) == 10
+
+
+def test_a_ramp_that_does_not_come_to_rest_is_given_up_ten_ticks_late():
+    """From 9.5 ticks' worth of velocity, which never becomes less."""
+    loop, samples = made(SETTINGS)
+    loop.guard = moving = loop.guard._replace(velocity_rad_s=9.5 * CHANGE_RAD_S)
+
+    def give_back(sample):
+        samples.append(sample)
+        loop.guard = moving
+
+    loop.record = give_back
+    ramp_to_rest(loop)
+    assert len(samples) == 10 + 10
 
 
 def test_a_ramp_takes_both_signs_and_ends_at_zero():

@@ -1,0 +1,112 @@
+"""How a session ends, whatever ends it: the power goes and the record is closed."""
+
+import pytest
+from tests.unit.acquisition.exact_rig import Desk, ExactRig
+from tests.unit.acquisition.whole_session import HAND_KG_M2, RATE_HZ, ListSink, session
+
+from rigidimeter.devices.base import DeviceError
+from rigidimeter.guard import Cause
+
+
+@pytest.mark.parametrize(
+    ("cause", "stops", "brakes"),
+    [
+        (Cause.DRIVE_LOST, True, False),
+        (Cause.DRIVE_STATE, True, True),
+        (Cause.DRIVE_FAULT, False, False),
+    ],
+)
+def test_a_drive_that_no_longer_obeys_brakes_by_itself_before_its_power_goes(cause, stops, brakes):
+    ran = session(Desk({20: cause}))
+    names = [name for name, *_ in ran.rig.calls]
+    assert ("stop" in names) == stops
+    after = names[names.index("stop") + 1 :] if stops else ["disable"]
+    assert after == ["read", "write"] * (5 if brakes else 0) + ["disable"]
+
+
+def test_its_own_ramp_has_a_tenth_of_a_second():
+    ran = session(Desk({20: Cause.DRIVE_STATE}), values={"rig": {}})
+    names = [name for name, *_ in ran.rig.calls]
+    assert names[names.index("stop") :].count("read") == 100  # at 1 kHz
+
+
+class Failing(ExactRig):
+    """From tick 20 on the named steps raise."""
+
+    def __init__(self, *names):
+        super().__init__(interval_s=1.0 / RATE_HZ, inertia_kg_m2=HAND_KG_M2)
+        for name in names:
+            step = getattr(self, name)
+
+            def failing(*arguments, name=name, step=step):
+                done = step(*arguments)
+                if self.tick >= 20:
+                    raise RuntimeError(f"{name} failed")
+                return done
+
+            setattr(self, name, failing)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("read",), ("write",), ("read", "write"), ("read", "disable"), ("read", "write", "disable")],
+)
+def test_whatever_fails_the_power_goes_and_the_record_is_closed(names):
+    ran = session(rig=Failing(*names))
+    assert isinstance(ran.error, RuntimeError)
+    assert ("disable",) in ran.rig.calls
+    (closed,) = ran.sink.closed
+    assert closed[1:] == ("fail", f"RuntimeError: {names[0]} failed")
+    assert ran.epochs == [(1, "fail")]
+    ended = ran.sink.of("epoch_ended")[0]
+    assert ended["reason"] == f"RuntimeError: {names[0]} failed"
+    if names == ("read",):  # ramped by writing alone
+        assert ran.rig.of("write")[-1] == 0.0
+
+
+def test_a_drive_that_can_not_be_stopped_loses_its_power_all_the_same():
+    rig = Failing("stop")
+    ran = session(Desk({20: Cause.DRIVE_LOST}), rig=rig)
+    assert str(ran.error) == "stop failed"
+    assert rig.calls[-1] == ("disable",)
+    assert ran.sink.closed[0][1] == "fail"
+
+
+def test_a_rig_that_is_not_enabled_ends_the_session_with_its_own_sentence():
+    rig = ExactRig(interval_s=1.0 / RATE_HZ)
+
+    def refuse():
+        raise DeviceError("drive: no supply voltage")
+
+    rig.enable = refuse
+    ran = session(rig=rig)
+    assert isinstance(ran.error, DeviceError)
+    assert ran.sink.closed[0][1:] == ("fail", "drive: no supply voltage")
+    assert rig.calls == [("disable",)]
+
+
+def test_an_interrupt_is_an_abort_with_a_ramp():
+    def interrupt(tick, reading):
+        if tick == 20:
+            raise KeyboardInterrupt
+        return reading
+
+    ran = session(change=interrupt)
+    assert (ran.result.outcome, ran.result.reason) == ("abort", "interrupted by the operator")
+    assert ran.epochs == [(1, "abort")]
+    assert ran.rig.calls[-2:] == [("write", 0.0), ("disable",)]
+
+
+def test_a_program_that_fails_after_a_cause_keeps_the_cause():
+    sink = ListSink()
+    event = sink.event
+
+    def failing(kind, **facts):
+        event(kind, **facts)
+        if kind == "epoch_ended" and not sink.closed and "limited_ticks" in facts:
+            raise RuntimeError("no room")
+
+    sink.event = failing
+    ran = session(sink=sink)
+    assert str(ran.error) == "no room"
+    assert sink.closed[0][1:] == ("fail", "RuntimeError: no room")
