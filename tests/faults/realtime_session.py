@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
-from rigidimeter.acquisition.processes.shared_status import Condition, Role
+from rigidimeter.acquisition.processes.status_values import Condition, Role
 from rigidimeter.acquisition.processes.supervise import Realtime, supervise
 from rigidimeter.acquisition.run_states import Command
 from rigidimeter.guard import Cause

@@ -21,7 +21,8 @@ import numpy as np
 from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.loop_process import LoopSide, Realtime
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
-from rigidimeter.acquisition.processes.shared_status import Condition, Role, SharedStatus
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.status_values import Condition, Role
 from rigidimeter.acquisition.processes.supervise import supervise
 from rigidimeter.acquisition.session_run import run_session
 from rigidimeter.devices import SimulatedRig

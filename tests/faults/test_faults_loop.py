@@ -19,8 +19,8 @@ from tests.faults.trials import (
 )
 
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import Role
 from rigidimeter.acquisition.processes.sink import SharedSupervision
+from rigidimeter.acquisition.processes.status_values import Role
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order
 from rigidimeter.devices.base import DeviceError
 from rigidimeter.devices.composed import ComposedRig

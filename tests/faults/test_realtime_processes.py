@@ -10,7 +10,7 @@ import time
 import pytest
 from tests.faults.running_session import Session, alive, memory, wait_for
 
-from rigidimeter.acquisition.processes.signals import HELD_BACK, held_back
+from rigidimeter.acquisition.processes.end_signals import HELD_BACK, held_back
 from rigidimeter.guard import Cause
 from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.sample_reading import read_samples

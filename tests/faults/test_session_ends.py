@@ -13,7 +13,8 @@ from tests.faults.running_session import Session, alive, fill, memory, wait_for
 
 from rigidimeter.acquisition.processes.left_memory import complete_left
 from rigidimeter.acquisition.processes.recorder import Patience
-from rigidimeter.acquisition.processes.shared_status import Condition, Role, SharedStatus
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.status_values import Condition, Role
 from rigidimeter.errors import UserError
 from rigidimeter.guard import Cause
 from rigidimeter.recording.event_log import read_events

@@ -12,7 +12,7 @@ import typer
 from rigidimeter.cli.commission import ask, interrupted_once, table
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
-from rigidimeter.cli.terminal import echo
+from rigidimeter.cli.output import echo
 from rigidimeter.errors import UserError
 
 

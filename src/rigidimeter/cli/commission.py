@@ -16,8 +16,8 @@ import typer
 
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
+from rigidimeter.cli.output import echo
 from rigidimeter.cli.table_lines import text_table
-from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

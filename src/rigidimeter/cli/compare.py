@@ -23,7 +23,7 @@ from rigidimeter.cli.options import (
     Recordings,
     reads_recordings,
 )
-from rigidimeter.cli.terminal import echo
+from rigidimeter.cli.output import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import typer
 
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import JsonOption, SettingsOption
-from rigidimeter.cli.terminal import echo
+from rigidimeter.cli.output import echo
 
 
 def design(

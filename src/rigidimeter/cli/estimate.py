@@ -12,8 +12,8 @@ import typer
 
 from rigidimeter.cli.inputs import analyse_recordings, keep_inputs
 from rigidimeter.cli.options import CsvOption, JsonOption, Recordings, reads_recordings
+from rigidimeter.cli.output import echo
 from rigidimeter.cli.table_lines import number_text, text_table, with_error
-from rigidimeter.cli.terminal import echo
 
 if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Score

@@ -24,13 +24,13 @@ from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
 from rigidimeter.cli.model import model
 from rigidimeter.cli.options import RegistryCommand
+from rigidimeter.cli.output import echo
 from rigidimeter.cli.ratings import ratings
 from rigidimeter.cli.report import report
 from rigidimeter.cli.reproduce import reproduce
 from rigidimeter.cli.run import recover, run
 from rigidimeter.cli.simulate import simulate
 from rigidimeter.cli.study import demo, study
-from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 from rigidimeter.version import __version__
 

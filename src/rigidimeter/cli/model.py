@@ -9,8 +9,8 @@ import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption, Recordings, reads_recordings
+from rigidimeter.cli.output import echo
 from rigidimeter.cli.table_lines import Rows, text_table, with_error
-from rigidimeter.cli.terminal import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption
+from rigidimeter.cli.output import echo
 from rigidimeter.cli.table_lines import text_table
-from rigidimeter.cli.terminal import echo
 
 if TYPE_CHECKING:
     from rigidimeter.study import RatingsFound

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigidimeter.cli.terminal import echo
+from rigidimeter.cli.output import echo
 
 if TYPE_CHECKING:
     from rigidimeter.acquisition.clock import DeadlineClock

@@ -14,7 +14,7 @@ from rigidimeter.cli.inputs import (
     study_of,
 )
 from rigidimeter.cli.options import KeyOption, Recordings, reads_recordings
-from rigidimeter.cli.terminal import echo
+from rigidimeter.cli.output import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

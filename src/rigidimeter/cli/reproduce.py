@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rigidimeter.cli.terminal import echo
+from rigidimeter.cli.output import echo
 from rigidimeter.errors import UserError
 
 

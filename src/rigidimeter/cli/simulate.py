@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from rigidimeter.cli.options import NewSessionOption, SeedOption, SettingsOption
-from rigidimeter.cli.terminal import echo
+from rigidimeter.cli.output import echo
 from rigidimeter.errors import UserError
 
 

@@ -10,7 +10,7 @@ import typer
 
 from rigidimeter.cli.inputs import analyse_study_folder
 from rigidimeter.cli.options import NewStudyOption, Recordings, StudySeedOption
-from rigidimeter.cli.terminal import echo
+from rigidimeter.cli.output import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

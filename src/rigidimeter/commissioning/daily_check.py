@@ -19,9 +19,9 @@ from rigidimeter.commissioning.checks import yes
 from rigidimeter.commissioning.commissioning_record import CommissioningRecord
 from rigidimeter.commissioning.daily_record import DailyRecord, Reference, objection
 from rigidimeter.commissioning.first_steps import Findings, at_rest, move, small_move
+from rigidimeter.commissioning.inertia_fit import TorqueAnswer, quick_motion, torque_answer
 from rigidimeter.commissioning.motion_tests import COMPLETED, swing, swing_checks
 from rigidimeter.commissioning.static_tests import facts_checks
-from rigidimeter.commissioning.torque_answer import TorqueAnswer, quick_motion, torque_answer
 from rigidimeter.commissioning.torque_checks import (
     NO_ANSWER,
     KnownInertia,

@@ -12,7 +12,7 @@ import math
 from typing import NamedTuple
 
 from rigidimeter.commissioning.checks import Check, below, impossible, number, yes
-from rigidimeter.commissioning.torque_answer import TorqueAnswer
+from rigidimeter.commissioning.inertia_fit import TorqueAnswer
 from rigidimeter.commissioning.trial import stopped_for
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings

@@ -14,13 +14,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
-from rigidimeter.acquisition.processes.shared_status import (
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.status_values import (
     Condition,
     Flag,
     LiveEstimate,
     LoopStatus,
     Role,
-    SharedStatus,
 )
 from rigidimeter.acquisition.run_states import Command, Order, State
 from rigidimeter.guard import Cause

@@ -10,8 +10,8 @@ from rigidimeter.acquisition.processes import left_memory, session_memory, share
 from rigidimeter.acquisition.processes.left_memory import complete_left
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_memory import PREFIX, Memory
-from rigidimeter.acquisition.processes.shared_status import Condition, Role
 from rigidimeter.acquisition.processes.sink import RingSink
+from rigidimeter.acquisition.processes.status_values import Condition, Role
 from rigidimeter.errors import UserError
 from rigidimeter.recording import SessionWriter, recover
 from rigidimeter.recording.event_log import read_events

@@ -7,15 +7,15 @@ import pytest
 
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import (
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.sink import RingSink, SharedSupervision
+from rigidimeter.acquisition.processes.status_values import (
     Condition,
     Flag,
     LiveEstimate,
     LoopStatus,
     Role,
-    SharedStatus,
 )
-from rigidimeter.acquisition.processes.sink import RingSink, SharedSupervision
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order, Run, State
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample

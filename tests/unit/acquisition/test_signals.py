@@ -7,7 +7,7 @@ import sys
 
 FIRST_PROCESS = """
 import multiprocessing, signal
-from rigidimeter.acquisition.processes.signals import HELD_BACK, held_back
+from rigidimeter.acquisition.processes.end_signals import HELD_BACK, held_back
 
 if __name__ == "__main__":
     process = multiprocessing.get_context("spawn").Process(target=len, args=("",))

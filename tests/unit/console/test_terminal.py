@@ -7,13 +7,13 @@ import os
 
 import pytest
 
-from rigidimeter.acquisition.processes.shared_status import (
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.status_values import (
     Condition,
     Flag,
     LiveEstimate,
     LoopStatus,
     Role,
-    SharedStatus,
 )
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order, State
 from rigidimeter.console.terminal import KEYS, Terminal, order_of, status_line

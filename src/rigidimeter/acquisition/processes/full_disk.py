@@ -18,7 +18,7 @@ from pathlib import Path
 
 from rigidimeter.acquisition.processes.recorder import Patience, Recorder, Recording
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Role
+from rigidimeter.acquisition.processes.status_values import Condition, Flag, Role
 from rigidimeter.documents import json_line
 from rigidimeter.errors import UserError
 from rigidimeter.recording.event_log import read_events

@@ -13,15 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.acquisition.processes.end_signals import leave_to_the_others
 from rigidimeter.acquisition.processes.ring import Reader, SampleReader
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import (
-    Condition,
-    LiveEstimate,
-    Role,
-    SharedStatus,
-)
-from rigidimeter.acquisition.processes.signals import leave_to_the_others
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.status_values import Condition, LiveEstimate, Role
 from rigidimeter.estimation.online import (
     STATE_SIZE,
     compiled_online_step,

@@ -14,13 +14,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
+from rigidimeter.acquisition.processes.end_signals import raise_flags
 from rigidimeter.acquisition.processes.realtime_scheduling import Prepared, prepare_loop_process
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.ring_recovery import complete
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Role, SharedStatus
-from rigidimeter.acquisition.processes.signals import raise_flags
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.acquisition.processes.sink import RingSink, SharedSupervision
+from rigidimeter.acquisition.processes.status_values import Condition, Flag, Role
 from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 from rigidimeter.errors import UserError
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from rigidimeter.acquisition.processes.ring import ROW, Event
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import Role
+from rigidimeter.acquisition.processes.status_values import Role
 from rigidimeter.documents import json_line
 from rigidimeter.recording.sample_log import BATCH_S
 from rigidimeter.recording.session_folder import SessionWriter

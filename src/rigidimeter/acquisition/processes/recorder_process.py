@@ -18,11 +18,12 @@ import time
 import traceback
 from contextlib import suppress
 
+from rigidimeter.acquisition.processes.end_signals import raise_flags
 from rigidimeter.acquisition.processes.full_disk import FullDisk
 from rigidimeter.acquisition.processes.recorder import Patience, Recorder, Recording
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Role, SharedStatus
-from rigidimeter.acquisition.processes.signals import raise_flags
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.status_values import Condition, Flag, Role
 from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 from rigidimeter.errors import UserError
 from rigidimeter.recording.session_folder import SessionWriter

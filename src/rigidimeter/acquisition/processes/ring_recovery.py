@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.ring import ROW, EventRing, SampleRing
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import Condition, Role
+from rigidimeter.acquisition.processes.status_values import Condition, Role
 from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 from rigidimeter.errors import UserError
 from rigidimeter.recording.event_log import append_event, checked_line, read_events

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.shared_memory import WHERE, Memory, new_name
-from rigidimeter.acquisition.processes.shared_status import Condition, Role, SharedStatus
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.status_values import Condition, Role
 
 PARTS = ("-samples", "-events", "-status")
 """What the names of the three end with; they begin alike."""

@@ -10,12 +10,8 @@ from time import monotonic_ns
 from typing import Any
 
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import (
-    Condition,
-    LoopStatus,
-    Nanoseconds,
-    Role,
-)
+from rigidimeter.acquisition.processes.shared_status import Nanoseconds
+from rigidimeter.acquisition.processes.status_values import Condition, LoopStatus, Role
 from rigidimeter.acquisition.run_states import Command, Order, Run, State
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample

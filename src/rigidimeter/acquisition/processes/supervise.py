@@ -25,13 +25,14 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
+from rigidimeter.acquisition.processes.end_signals import held_back, signals_are_orders
 from rigidimeter.acquisition.processes.loop_process import LoopTarget, Realtime, loop_main
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.recorder_process import recorder_main
 from rigidimeter.acquisition.processes.ring_recovery import Recovered, complete
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import Condition, Flag, Role, SharedStatus
-from rigidimeter.acquisition.processes.signals import held_back, signals_are_orders
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.status_values import Condition, Flag, Role
 from rigidimeter.acquisition.processes.watchdog import WatchedProcess
 from rigidimeter.errors import UserError
 from rigidimeter.recording.event_log import read_events

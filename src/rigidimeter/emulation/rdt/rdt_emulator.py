@@ -241,12 +241,7 @@ class RdtEmulator:
             return
         if self._due(faults, "lose"):
             return
-        if self._due(faults, "short"):
-            data = data[:20]
-        if self._due(faults, "long"):
-            data += b"\0\0\0\0"
-        if self._due(faults, "garbage"):
-            data = self._random.randbytes(36)
+        data = self._damaged(faults, data)
         if "foreign" in faults:
             fields = list(RECORD.unpack(self._records.last))
             fields[8] += 10_000_000
@@ -268,6 +263,15 @@ class RdtEmulator:
             return
         for _ in range(copies):
             self._send_later(data, self._delay_s(faults))
+
+    def _damaged(self, faults: Faults, data: bytes) -> bytes:
+        if self._due(faults, "short"):
+            data = data[:20]
+        if self._due(faults, "long"):
+            data += b"\0\0\0\0"
+        if self._due(faults, "garbage"):
+            data = self._random.randbytes(36)
+        return data
 
     def _delay_s(self, faults: Faults) -> float:
         """Return how late records are at present."""

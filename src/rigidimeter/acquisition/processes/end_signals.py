@@ -15,7 +15,8 @@ from collections.abc import Iterator
 from multiprocessing import resource_tracker
 from types import FrameType
 
-from rigidimeter.acquisition.processes.shared_status import Flag, SharedStatus
+from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.status_values import Flag
 
 ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 """What ends a session."""

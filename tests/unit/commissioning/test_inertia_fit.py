@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidimeter.commissioning.torque_answer import (
+from rigidimeter.commissioning.inertia_fit import (
     FREQUENCIES_HZ,
     PERIOD_S,
     WEIGHTS,
