@@ -21,6 +21,10 @@ EQUIVALENT: dict[str, str] = {
     "now_s - wire.asked_s >= settings.lost_s": MOMENT,
     CAN + "stop: self._wire.is_open and self._control is not Control.DISABLE_VOLTAGE → "
     "self._control is not Control.DISABLE_VOLTAGE": "a bus that was closed was told to disable",
+    "ascii/drive.py AsciiDrive._check_horizon: now_s - self._commanded_s > "
+    "self._settings.horizon_s → now_s - self._commanded_s >= self._settings.horizon_s": MOMENT,
+    "ascii/drive.py AsciiDrive._try: self._line is not None and self._speaking → "
+    "self._speaking": "nothing is spoken to without a port",
     "tracking.py minimum_jerk: elapsed_s >= duration_s → elapsed_s > duration_s": "at its end the "
     "polynomial and its derivative are 0, too",
     "recorded_guard.py replay: Cause.NONE → Cause.SOFTWARE": "a guard at the start holds nothing",

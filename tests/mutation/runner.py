@@ -52,7 +52,7 @@ TESTS = {
     "acquisition/supervision.py": ("acquisition/test_session_run.py",),
     "acquisition/tick.py": _RUN,
     "acquisition/processes/sink.py": ("acquisition/test_shared_status.py",),
-    "devices/ascii/drive.py": ("devices/test_stop_paths.py",),
+    "devices/ascii/drive.py": ("devices/test_serial_stop_paths.py",),
     "devices/cia402/drive.py": ("devices/test_stop_paths.py",),
     "devices/composed.py": ("devices/test_composed.py",),
     "devices/enable_line.py": ("devices/test_enable_line.py",),
