@@ -263,9 +263,15 @@ HAND_MADE = tuple(
         ),
         (
             SESSION,
-            "while not loop.at_rest and not run.stopped_by_guard():",
+            "while run.is_in(State.RUNNING) and not loop.at_rest:",
             "while False:",
             "a release while the arm moves is an exception",
+        ),
+        (
+            SESSION,
+            "run.loop.reaction is before or run.may_go_on()",
+            "True",
+            "a hold after the order to go on is released at once",
         ),
         (
             SESSION,

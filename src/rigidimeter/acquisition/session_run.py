@@ -169,11 +169,15 @@ def _ready_for_epoch(session: _Session) -> bool:
     while run.is_in(State.PAUSED):
         if loop.reaction is Reaction.NONE:
             rest(loop, return_s, return_s)
-        while run.is_in(State.PAUSED) and not run.stopped_by_guard():
-            hold(loop, LOOK_S)
+            if not run.may_go_on():
+                return False
+        while run.is_in(State.PAUSED):
+            if not _look(run):
+                return False
+        while run.is_in(State.RUNNING) and not loop.at_rest:
+            if not _look(run):
+                return False
         if run.is_in(State.RUNNING):
-            while not loop.at_rest and not run.stopped_by_guard():
-                hold(loop, LOOK_S)
             loop.guard = released(loop.guard)
             # The full way back, whatever was ordered before it: an epoch begins at its place.
             rest(loop, return_s, return_s)
@@ -181,6 +185,16 @@ def _ready_for_epoch(session: _Session) -> bool:
             return False
         run.change_state(epoch_over(run.run))
     return run.is_in(State.RUNNING)
+
+
+def _look(run: ControllerRun) -> bool:
+    """Stand still for a moment; return whether the run goes on.
+
+    A hold that comes meanwhile pauses it again: what was ordered before it does not end it.
+    """
+    before = run.loop.reaction
+    hold(run.loop, LOOK_S)
+    return run.loop.reaction is before or run.may_go_on()
 
 
 def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:

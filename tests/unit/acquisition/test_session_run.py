@@ -212,6 +212,19 @@ def test_a_hold_is_a_pause_that_the_operator_ends():
     assert any(s.velocity_command_rad_s for s in epoch)
 
 
+@pytest.mark.parametrize(("resume", "hold"), [(20, 25), (51, 52)])
+def test_a_hold_that_comes_after_the_order_to_go_on_is_not_ended_by_it(resume, hold):
+    """On the way back of a pause, from 11 on; and standing still, looking every 5 ticks from 36."""
+    orders = {10: Command.PAUSE_NOW, resume: Command.RESUME, 200: Command.RESUME}
+    ran = session(Desk({hold: Cause.TORQUE_HIGH}, orders))
+    assert ran.epochs[0] == (1, "abort")
+    assert {s.cause for s in ran.sink.samples[hold:201]} == {int(Cause.TORQUE_HIGH)}
+    assert ran.sink.of("epoch_started")[1]["time_s"] * RATE_HZ == pytest.approx(201 + RETURN, abs=4)
+    states = [run.state for run in ran.states]
+    resumed = [State.RUNNING, State.PAUSED]
+    assert states == [*resumed, State.PAUSED, *resumed, State.RUNNING, State.STOPPING]
+
+
 def test_a_hold_without_an_operator_is_the_end():
     ran = session(Desk({20: Cause.TORQUE_HIGH}, attended=False))
     assert ran.labels == ["1"]

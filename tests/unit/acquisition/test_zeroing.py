@@ -149,8 +149,16 @@ def test_an_end_while_zeroing_leaves_no_zero(command):
     assert ran.result.outcome == ("abort" if command is Command.ABORT else "fail")
 
 
-def test_a_hold_while_zeroing_that_nobody_ends_leaves_no_zero_and_no_epoch():
-    ran = session(Desk({5: Cause.TORQUE_HIGH}, attended=False), zero_first=True)
+@pytest.mark.parametrize(
+    ("causes", "orders"),
+    [
+        ({5: Cause.TORQUE_HIGH}, {}),
+        ({15: Cause.TORQUE_HIGH}, {5: Command.PAUSE_NOW, 12: Command.RESUME}),
+    ],
+)
+def test_a_hold_that_nobody_ends_leaves_no_zero_and_no_epoch(causes, orders):
+    """While zeroing, or on the way back from a pause of it."""
+    ran = session(Desk(causes, orders, attended=False), zero_first=True)
     assert ran.rig.of("zero") == []
     assert ran.labels == []
     assert ran.result.cause is Cause.TORQUE_HIGH
