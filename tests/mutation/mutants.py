@@ -206,7 +206,8 @@ def _other_calls(node: ast.Call) -> Iterator[ast.AST]:
         for i in range(len(node.args) - 1):
             swapped = [*node.args]
             swapped[i : i + 2] = reversed(node.args[i : i + 2])
-            yield _with(node, args=swapped)
+            if ast.dump(swapped[i]) != ast.dump(node.args[i]):
+                yield _with(node, args=swapped)
 
 
 OTHER_MEMBERS = {

@@ -89,6 +89,8 @@ def test_a_pause_waits_for_the_epoch_and_goes_back_before_the_next():
     # Way back, looks of 0.1 s in the last of which it is resumed, the way back again.
     second = ran.sink.of("epoch_started")[1]["time_s"] * RATE_HZ
     assert second == pytest.approx(200 + LOOK + RETURN)
+    led = [math.isfinite(s.target_angle_rad) for s in ran.sink.samples[EPOCH : round(second)]]
+    assert led == [True] * RETURN + [False] * (len(led) - 2 * RETURN) + [True] * RETURN
     assert [r.state for r in ran.states] == [
         *(State.RUNNING, State.RUNNING, State.PAUSED, State.RUNNING, State.STOPPING)
     ]
@@ -142,6 +144,13 @@ def test_a_stop_and_an_abort(orders, ended, outcome, reason):
     assert ran.sink.closed[0][1:] == (outcome, reason)
     assert ran.rig.calls[-1] == ("disable",)
     assert ran.states[-1].state is State.STOPPING
+
+
+def test_an_abort_on_the_way_back_of_a_pause_only_ramps():
+    ran = session(Desk(orders={10: Command.PAUSE, 60: Command.ABORT}))
+    assert ran.sink.samples[60].velocity_command_rad_s != 0.0
+    assert len(ran.sink.samples) <= 61 + 2
+    assert ran.result.outcome == "abort"
 
 
 def test_a_stop_in_a_rest_does_not_wait_for_its_end():
@@ -233,6 +242,12 @@ def test_a_hold_without_an_operator_is_the_end():
         "the guard held the rig and no operator was there to continue: "
         f"{Cause.TORQUE_HIGH.sentence}"
     )
+
+
+def test_without_an_operator_no_epoch_begins_after_a_hold_on_the_way_back():
+    orders = {10: Command.PAUSE_NOW, 20: Command.RESUME}
+    ran = session(Desk({25: Cause.TORQUE_HIGH}, orders, attended=False))
+    assert (ran.labels, ran.result.cause) == (["1"], Cause.TORQUE_HIGH)
 
 
 def test_a_session_in_one_process_has_no_operator_who_could_continue():
