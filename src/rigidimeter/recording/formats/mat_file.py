@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rigidimeter.documents import open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.recording.formats.hdf5_arrays import hdf5_arrays
+from rigidimeter.recording.formats.mat4_check import check_mat4
 from rigidimeter.recording.formats.mat_check import Variable, check_mat5
 from rigidimeter.recording.formats.stored_arrays import Expansion, Stored, check_count
 from rigidimeter.recording.formats.table import Table, table_of_arrays
@@ -52,6 +53,7 @@ def _entries(path: Path, file: BinaryIO) -> dict[str, Stored]:
     checked, used = Expansion(path, file_bytes), Expansion(path, file_bytes)
     variables = check_mat5(file, file_bytes, lambda n_bytes: checked.take("a variable", n_bytes))
     if variables is None:  # version 4, which is never compressed
+        check_count(path, check_mat4(file, file_bytes))
         return _flat(_loaded(file, None))
     check_count(path, len(variables))
     names = [variable.name for variable in variables if variable.name]
