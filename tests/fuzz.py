@@ -27,7 +27,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from tests.fuzz_inputs import CALLS, NUMBERS, OPTIONS, TARGETS, mutated, write_csv
+from tests.fuzz_damage import NUMBERS, mutated, strange
+from tests.fuzz_inputs import CALLS, OPTIONS, TARGETS, Archive, columns, write_csv
 
 from rigidimeter.cli.main import main as rigidimeter
 from rigidimeter.documents import read_bytes, visible
@@ -36,6 +37,8 @@ from rigidimeter.errors import UserError
 MEMORY_BYTES = 2**30
 TIME_S = 30.0
 """Of a processor; on the wall four times as much, since other work may run on the machine."""
+OPTION_CASES = 3
+"""In each round of the targets."""
 WORKERS = os.cpu_count() or 1
 
 
@@ -62,20 +65,22 @@ def label(case: int, seed: int) -> str:
 
 def kind_of(case: int) -> str:
     """Return what a case damages."""
-    return "option" if case % 8 == 7 else TARGETS[case % len(TARGETS)].name
+    place = case % (len(TARGETS) + OPTION_CASES)
+    return TARGETS[place].name if place < len(TARGETS) else "option"
 
 
 def prepare(case: int, seed: int, folder: Path) -> tuple[str, list[str]]:
     """Write a case into a folder; return its name and its command line."""
     rng = np.random.default_rng([seed, case])
-    target = TARGETS[case % len(TARGETS)]
-    target.make(folder)
     (folder / "out").mkdir()
-    if kind_of(case) == "option":  # a number of the command line
+    name = kind_of(case)
+    if name == "option":  # a number of the command line
         write_csv(folder)
         option, *values = OPTIONS[int(rng.integers(len(OPTIONS)))]
         given = [option, *values, str(rng.choice(NUMBERS))]
         return f"option {' '.join(given)[:60]}", ["estimate", "r.csv", *given]
+    target = next(target for target in TARGETS if target.name == name)
+    target.make(folder)
     path = folder / target.damaged
     kind = int(rng.integers(24))
     if kind == 0:
@@ -86,6 +91,13 @@ def prepare(case: int, seed: int, folder: Path) -> tuple[str, list[str]]:
         path.unlink()
         path.symlink_to("/dev/zero")
         return f"{target.name}, endless", [*target.command]
+    if kind < 8 and isinstance(target, Archive):
+        way, arrays = strange(columns(), rng)
+        try:
+            target.save(path, arrays)
+        except (TypeError, ValueError):  # a format has not every type
+            way = "sound"
+        return f"{target.name}, {way}", [*target.command]
     way, data = mutated(read_bytes(path, 2**30), rng)
     path.write_bytes(data)
     return f"{target.name}, {way}", [*target.command]
