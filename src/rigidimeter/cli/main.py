@@ -24,7 +24,7 @@ from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
 from rigidimeter.cli.model import model
 from rigidimeter.cli.options import RegistryCommand
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.output import VisibleErrors, echo
 from rigidimeter.cli.ratings import ratings
 from rigidimeter.cli.report import report
 from rigidimeter.cli.reproduce import reproduce
@@ -38,6 +38,7 @@ _INTERRUPTED = 130
 
 app = typer.Typer(
     name="rigidimeter",
+    cls=VisibleErrors,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

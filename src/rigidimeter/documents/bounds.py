@@ -6,6 +6,8 @@ takes the memory or the time of the computer, whether it is damaged, mistaken or
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 MIB = 2**20
 
 RECORDING_BYTES = 8192 * MIB
@@ -62,6 +64,9 @@ It is 10,000 ratings by 500 examiners, or 100,000 by 170."""
 BOOTSTRAP_COUNTS = 25_000_000
 """Of a bootstrap, resamples times units, each 16 bytes: 9,999 resamples of 2,500 units."""
 
+SHOWN_LINES = 5
+"""Of the lines that one sentence is about; the others are counted."""
+
 NOTICES = 20
 """Of one kind about the rows of one table; the others are counted."""
 
@@ -78,3 +83,16 @@ def size_text(n_bytes: float) -> str:
         if n_bytes >= factor:
             return f"{n_bytes / factor:.3g} {unit}"
     return f"{n_bytes:.0f} bytes"
+
+
+def lines_text(lines: Sequence[int]) -> str:
+    """Return lines of a file for a message: the first, and how many more.
+
+    Examples
+    --------
+    >>> lines_text([3]), lines_text([3, 4, 5, 8, 9, 11, 12])
+    ('line 3', 'lines 3, 4, 5, 8, 9 and 2 more')
+    """
+    shown = ", ".join(map(str, lines[:SHOWN_LINES]))
+    more = f" and {len(lines) - SHOWN_LINES} more" if len(lines) > SHOWN_LINES else ""
+    return f"line{'' if len(lines) == 1 else 's'} {shown}{more}"

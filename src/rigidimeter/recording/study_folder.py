@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigidimeter.documents import noted_digests
+from rigidimeter.documents.bounds import lines_text
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import TextTable, read_text_table
 from rigidimeter.recording.formats.text_table import cell_number
@@ -185,13 +186,15 @@ def _unknown_columns(path: Path, present: Sequence[str], known: Sequence[str]) -
 
 
 def _rows(table: TextTable, needed: Sequence[str], notices: list[Notice]) -> Iterable[Row]:
+    lacking: dict[str, list[int]] = {}
     for index, line in enumerate(table.lines):
-        where = f"{table.source}, line {line}"
         cells = {name: cells[index] for name, cells in table.columns.items()}
         empty = [name for name in needed if name not in _MAY_BE_EMPTY and not cells[name]]
         if empty:
-            notices.append(
-                Notice("error", f"{where}: no {' and '.join(empty)} is given; the row is left out")
-            )
+            lacking.setdefault(" and ".join(empty), []).append(line)
             continue
         yield Row(table.source, line, cells)
+    for names, lines in lacking.items():
+        rows = "the row is" if len(lines) == 1 else "the rows are"
+        text = f"{table.source}, {lines_text(lines)}: no {names} is given; {rows} left out"
+        notices.append(Notice("error", text))

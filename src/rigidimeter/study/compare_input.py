@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rigidimeter.documents.bounds import lines_text
 from rigidimeter.errors import UserError
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.recording import read_estimates
@@ -197,14 +198,14 @@ def _kept(
     notices = []
     nameless = [table.lines[k] for k, label in enumerate(labels) if not label]
     if nameless:
-        notices.append(f"{table.source}: no {by} in {_lines(nameless)}; left out")
+        notices.append(f"{table.source}: no {by} in {lines_text(nameless)}; left out")
     outcomes = table.columns.get("outcome")
     if outcomes is not None and set(outcomes) <= {"included", "excluded", "failed"}:
         out = [table.lines[k] for k in rows if outcomes[k] != "included"]
         rows = [k for k in rows if outcomes[k] == "included"]
         if out:
             notices.append(
-                f"{table.source}: outcome is excluded or failed in {_lines(out)}; left out"
+                f"{table.source}: outcome is excluded or failed in {lines_text(out)}; left out"
             )
     return rows, notices
 
@@ -232,7 +233,7 @@ def _column(
             raise UserError(
                 f"{table.source}: {name} has no value in {group}, so there is nothing to compare"
             )
-    notices = [f"{table.source}: no {name} in {_lines(missing)}; left out"] if missing else []
+    notices = [f"{table.source}: no {name} in {lines_text(missing)}; left out"] if missing else []
     return found, notices
 
 
@@ -257,9 +258,3 @@ def _cautions(source: str, found: Comparison, by_session: bool) -> list[str]:
             "interval too narrow"
         )
     return said
-
-
-def _lines(lines: Sequence[int]) -> str:
-    shown = ", ".join(map(str, lines[:5]))
-    more = f" and {len(lines) - 5} more" if len(lines) > 5 else ""
-    return f"line{'' if len(lines) == 1 else 's'} {shown}{more}"

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rigidimeter.documents.bounds import NOTICES
+from rigidimeter.documents.bounds import NOTICES, lines_text
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import TextTable
 from rigidimeter.statistics import nested
@@ -70,17 +70,15 @@ def ratings_of(
             table.column(columns[role], f"--{role}")
     present = [role for role, name in columns.items() if name in table.columns]
     rows: list[Rating] = []
-    left_out: list[int] = []
-    notices: list[str] = []
+    left_out: dict[str, list[int]] = {}
     for index, line in enumerate(table.lines):
         where = f"{table.source}, line {line}"
         score = table.number(columns["score"], index)
         labels = {r: table.columns[columns[r]][index] for r in present if r != "score"}
         empty = [role for role in labels if role in needed and not labels[role]]
         if score is None or empty:
-            left_out.append(line)
             lacking = "score" if score is None else " and ".join(empty)
-            notices.append(f"{where}: no {lacking} is given; the row was left out")
+            left_out.setdefault(lacking, []).append(line)
             continue
         if not scale[0] <= score <= scale[1]:
             raise UserError(
@@ -88,8 +86,9 @@ def ratings_of(
                 f"{scale[1]:g}; put the rating right, or give the scale with --scale LOW HIGH"
             )
         rows.append(Rating(line, score=score, **labels))
+    n_left_out = sum(map(len, left_out.values()))
     if len(rows) < FEWEST:
-        lack = f" ({len(left_out)} more lack a score or a label)" if left_out else ""
+        lack = f" ({n_left_out} more lack a score or a label)" if n_left_out else ""
         raise UserError(
             f"{table.source} holds {len(rows)} rating{'' if len(rows) == 1 else 's'}{lack}; at "
             f"least {FEWEST} are needed for two means and their error"
@@ -99,9 +98,15 @@ def ratings_of(
             f"{table.source} holds ratings of one condition only ({named.pop()}); a contrast needs "
             "two, by name in the column that --condition gives"
         )
+    notices = [
+        f"{table.source}, {lines_text(lines)}: no {lacking} is given; "
+        f"the row{' was' if len(lines) == 1 else 's were'} left out"
+        for lacking, lines in left_out.items()
+    ]
     notices += oddities(table.source, rows, random, scale[0], step, with_day="day" in present)
     notices += _unmodelled(rows, random)
-    return Ratings(tuple(rows), tuple(left_out), tuple(notices))
+    out = sorted(line for lines in left_out.values() for line in lines)
+    return Ratings(tuple(rows), tuple(out), tuple(notices))
 
 
 def oddities(

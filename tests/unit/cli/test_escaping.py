@@ -47,6 +47,26 @@ def test_a_refusal_shows_a_name_without_commands(rigidimeter, tmp_path):
     assert "\\x1b[2Ja.csv: there is no such file" in ran.err
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        ("--\x1b]0;t\x07",),
+        ("\x1b]0;t\x07",),
+        ("estimate", "a.csv", "--\x1b]0;t\x07"),
+        ("study", "\x1b]0;t\x07"),
+        ("design", "\x1b]0;t\x07"),
+    ],
+    ids=("option", "command", "option of a command", "command of study", "argument"),
+)
+def test_an_error_of_usage_shows_a_word_without_commands(rigidimeter, given):
+    ran = rigidimeter(*given)
+    assert ran.status == 2
+    assert "Usage: " in ran.err
+    assert "\x1b" not in ran.err
+    assert "\x07" not in ran.err
+    assert "\\x1b]0;t\\x07" in ran.err
+
+
 @settings(deadline=None, max_examples=60)
 @given(text=st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=8))
 def test_text_of_a_table_is_read_as_it_was_written(text):

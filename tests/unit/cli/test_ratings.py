@@ -161,6 +161,11 @@ SAID = [
     (changed(5, "score", "2.2"), "not in steps of 0.5: 2.2 in line 5; used as they are", 15),
     (changed(5, "score", "NA"), "line 5: no score is given; the row was left out", 14),
     (changed(5, "examiner", ""), "line 5: no examiner is given; the row was left out", 14),
+    (
+        [*ROWS, *[("OFF", "1", "A", "")] * 7],
+        "lines 17, 18, 19, 20, 21 and 2 more: no score is given; the rows were left out",
+        15,
+    ),
     ([*ROWS, ROWS[-1]], "lines 16 and 17: rated more than once by examiner C in DBS on day 5", 16),
     ([*ROWS, ("OFF", "9", "D", "2.0")], "examiner D gave one rating", 16),
     (

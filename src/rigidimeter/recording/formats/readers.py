@@ -82,7 +82,7 @@ def reader_of(path: Path) -> Reader:
     if not path.exists():
         raise UserError(f"{path}: there is no such file")
     suffix = path.suffix.lower()
-    named = [reader for reader in READERS if suffix in reader.suffixes and path.is_file()]
+    named = [reader for reader in READERS if suffix in reader.suffixes and not path.is_dir()]
     for reader in (*named, *(reader for reader in READERS if reader.sniff is not None)):
         if reader.sniff is None or reader.sniff(path):
             return reader
@@ -146,7 +146,7 @@ def formats_text() -> str:
 
 def _read(path: Path) -> Table | Epochs:
     reader = reader_of(path)
-    if path.is_file():
+    if not path.is_dir():
         with open_regular(path, RECORDING_BYTES) as file:
             if not file.read(1):
                 raise UserError(
