@@ -244,9 +244,10 @@ def test_a_hold_without_an_operator_is_the_end():
     )
 
 
-def test_without_an_operator_no_epoch_begins_after_a_hold_on_the_way_back():
+@pytest.mark.parametrize("hold", [25, 45])  # on the way to the pause, and from it
+def test_without_an_operator_no_epoch_begins_after_a_hold_on_the_way_back(hold):
     orders = {10: Command.PAUSE_NOW, 20: Command.RESUME}
-    ran = session(Desk({25: Cause.TORQUE_HIGH}, orders, attended=False))
+    ran = session(Desk({hold: Cause.TORQUE_HIGH}, orders, attended=False))
     assert (ran.labels, ran.result.cause) == (["1"], Cause.TORQUE_HIGH)
 
 
