@@ -3,7 +3,8 @@
 PRBS epochs of every kind of subject run on the compiled batch, with two sizes of joint and two
 rates of the torque sensor: the paper's 100 samples/s, and 1000. What is recorded then passes
 `guard.consistency`, compiled from its own source. Epochs start from rest, so each one also is a
-beginning. A cause of the guard's own limits (torque, power, energy) that ends an epoch early is
+beginning. A cause of the guard's own limits (torque, power, energy, a
+second at the position limit) that ends an epoch early is
 counted apart: it is no false alarm. `not following` is the guard's own too, and counts as one.
 
     kind       the subject
@@ -75,7 +76,10 @@ RESISTED = {
     "energy_limit_j": 60.0,
 }
 RATES_HZ = (100.0, 1000.0)
-OWN = {Cause.NONE, Cause.TORQUE_HIGH, Cause.TORQUE_TOO_HIGH, Cause.POWER_HIGH, Cause.ENERGY_HIGH}
+OWN = {
+    *(Cause.NONE, Cause.TORQUE_HIGH, Cause.TORQUE_TOO_HIGH, Cause.POWER_HIGH, Cause.ENERGY_HIGH),
+    Cause.HELD_AT_LIMIT,
+}
 """What may end an epoch without being a false alarm."""
 
 

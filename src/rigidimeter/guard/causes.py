@@ -63,6 +63,7 @@ class Cause(IntEnum):
     TORQUE_SILENT = 33
     TORQUE_SIGN = 34
     SELDOM_FRESH = 35
+    HELD_AT_LIMIT = 36
 
     @property
     def sentence(self) -> str:
@@ -113,9 +114,11 @@ _SENTENCES = {
     Cause.TORQUE_SILENT: "the joint was accelerated and the torque sensor did not show it",
     Cause.TORQUE_SIGN: "the torque sensor answered the perturbation with the wrong sign",
     Cause.SELDOM_FRESH: "fresh readings came too seldom",
+    Cause.HELD_AT_LIMIT: "the joint was driven against the position limit for too long: the "
+    "subject pushes, or the torque has an offset or the wrong sign",
 }
 
-_HOLD = {Cause.TORQUE_HIGH, Cause.POWER_HIGH}
+_HOLD = {Cause.TORQUE_HIGH, Cause.POWER_HIGH, Cause.HELD_AT_LIMIT}
 _CUT = {Cause.EMERGENCY_STOP, Cause.OPERATOR_HALT}
 
 REACTIONS = tuple(

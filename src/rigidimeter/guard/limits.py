@@ -19,6 +19,10 @@ UNDONE = 0.1
 """The part of the reaction time by which a second-order drive is still off where the reaction time
 is the least that the settings allow: its response overshoots, so it is no mixture of delays."""
 
+AT_LIMIT_S = 1.0
+"""A joint that is driven against the position limit for so long is not being measured. Whoever
+pushes it for a moment, or a perturbation that asks for more, turns back before."""
+
 _NO_CAUSE, _NO_REACTION = int(Cause.NONE), int(Reaction.NONE)
 
 
@@ -30,7 +34,8 @@ class GuardLimits(NamedTuple):
     being crossed. `tolerance_rad` is how far beyond the position limit a reading may be before it
     counts as a fault: sensor noise at the limit is none. `stale_s` is how old a reading may be.
     `following_rad` is how far the angle may be outside of where the commands can have brought it,
-    `drift_rad_s` how fast that place may follow the angle.
+    `drift_rad_s` how fast that place may follow the angle. `at_limit_s` is for how long without a
+    break the position limit may hold the command back.
     """
 
     position_rad: float
@@ -48,6 +53,7 @@ class GuardLimits(NamedTuple):
     energy_j: float = math.inf
     following_rad: float = math.inf
     drift_rad_s: float = 0.0
+    at_limit_s: float = math.inf
 
 
 class GuardState(NamedTuple):
@@ -59,7 +65,7 @@ class GuardState(NamedTuple):
     used once. `angle_rad` is the last reading that was a number, `age_s` how old it is,
     `origin_rad` where the running sum began on the angle's scale (NaN before the first reading),
     `energy_j` what went to and fro within the last second. `cause` is the first one, `reaction` the
-    strongest.
+    strongest. `limited_s` is for how long the position limit has held the command back.
     """
 
     sent_rad: NDArray[np.float64]
@@ -71,6 +77,7 @@ class GuardState(NamedTuple):
     energy_j: float = 0.0
     cause: int = _NO_CAUSE
     reaction: int = _NO_REACTION
+    limited_s: float = 0.0
 
 
 def guard_limits(settings: Settings) -> GuardLimits:
@@ -98,6 +105,7 @@ def guard_limits(settings: Settings) -> GuardLimits:
         energy_j=guard.energy_limit_j,
         following_rad=rad_from_deg(following_deg),
         drift_rad_s=rad_from_deg(guard.drift_limit_deg_s),
+        at_limit_s=AT_LIMIT_S,
     )
 
 

@@ -51,7 +51,7 @@ class Limited(IntEnum):
 
 
 _NO_CAUSE, _NOT_LIMITED = int(Cause.NONE), int(Limited.NOT)
-_CUT = int(Reaction.CUT)
+_AT_LIMIT, _CUT = int(Limited.POSITION), int(Reaction.CUT)
 
 
 def why_ended(settings: Settings, cause: Cause, limit_time_s: float) -> str:
@@ -111,7 +111,7 @@ def guard_step(
     """
     dt, reaction_time_s = limits.interval_s, limits.reaction_time_s
     ticks_per_s = 1.0 / dt
-    ring, newest, sent_before, angle, age, origin, energy, cause, reaction = state
+    ring, newest, sent_before, angle, age, origin, energy, cause, reaction, limited_s = state
     oldest, passed = ring.size - 1, max(elapsed_ticks, 1)
     was_latched = cause != _NO_CAUSE
     elapsed_s = passed * dt
@@ -156,6 +156,7 @@ def guard_step(
         torque_age_s,
         astray,
         energy,
+        limited_s,
     )
     if REACTIONS[disagreement] > REACTIONS[found]:
         found = disagreement
@@ -198,7 +199,8 @@ def guard_step(
         fastest = _stoppable_speed(limits.acceleration_rad_s2, held_s, left)
         if abs(sent) > fastest:
             sent, limited = math.copysign(fastest, sent), max(limited, int(Limited.POSITION))
-    after = GuardState(ring, newest, sent, angle, age, origin, energy, cause, reaction)
+    limited_s = limited_s + elapsed_s if limited == _AT_LIMIT else 0.0
+    after = GuardState(ring, newest, sent, angle, age, origin, energy, cause, reaction, limited_s)
     return after, sent, limited
 
 

@@ -57,6 +57,7 @@ def found_wrong(
     torque_age_s: float,
     astray_rad: float,
     energy_j: float,
+    limited_s: float,
 ) -> int:
     """Return the `Cause` of the first law that is broken, 0 if none is.
 
@@ -90,4 +91,6 @@ def found_wrong(
         return int(Cause.TORQUE_HIGH)
     if not abs(torque_nm * velocity_rad_s) <= limits.power_w:
         return int(Cause.POWER_HIGH)
+    if not limited_s <= limits.at_limit_s:
+        return int(Cause.HELD_AT_LIMIT)
     return int(Cause.NONE)

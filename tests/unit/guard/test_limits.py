@@ -54,6 +54,7 @@ def test_each_limit_is_the_settings_in_si_units():
         # the setting, one step of the encoder, a tenth of what full speed covers in 50 ms
         "following_rad": (3.0 + 0.25 + 0.5) * DEG,
         "drift_rad_s": 0.03 * DEG,
+        "at_limit_s": 1.0,
     }
     assert limits._asdict() == pytest.approx(expected, rel=1e-12)
 
@@ -68,7 +69,7 @@ def test_what_is_not_given_does_not_limit():
     limits = GuardLimits(0.7, 3.0, 100.0, 0.02, 0.001)
     assert limits[5:] == (
         *(0.0, 0.01, math.inf, 0.5),
-        *(math.inf, math.inf, math.inf, math.inf, math.inf, 0.0),
+        *(math.inf, math.inf, math.inf, math.inf, math.inf, 0.0, math.inf),
     )
 
 
@@ -80,7 +81,7 @@ def test_the_memory_reaches_back_to_the_oldest_command_that_may_still_move_the_j
     assert not state.sent_rad.any()
     assert state[1:5] == (0, 0.0, 0.0, 0.0)
     assert math.isnan(state.origin_rad)
-    assert state[6:] == (0.0, Cause.NONE, Reaction.NONE)
+    assert state[6:] == (0.0, Cause.NONE, Reaction.NONE, 0.0)
 
 
 def test_a_memory_of_parts_of_a_tick_is_rounded_up():

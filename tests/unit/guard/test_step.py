@@ -11,6 +11,7 @@ from rigidimeter.guard import (
     Reaction,
     guard_state,
     guard_step,
+    released,
     why_ended,
 )
 from rigidimeter.settings import Settings
@@ -205,6 +206,43 @@ def test_at_or_beyond_the_limit_nothing_goes_outward(sign, angle):
     assert (abs(sent), limited, state.cause) == (0.0, Limited.POSITION, Cause.NONE)
     _, sent, limited = step(at(), sign * -0.05, angle=sign * angle)
     assert (sent, limited) == (sign * -0.05, Limited.NOT)
+
+
+def pressed(times, limits, state=None, request=1.0, elapsed=1):
+    """Return the state after so many ticks at the limit, of a controller that asks for more."""
+    state = at() if state is None else state
+    for _ in range(times):
+        state, _, _ = step(state, request, angle=0.7, limits=limits, elapsed=elapsed)
+    return state
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_joint_that_is_driven_against_the_limit_for_long_is_held(sign):
+    limits = BINARY._replace(at_limit_s=1.0, reaction_time_s=0.0)
+    state = guard_state(limits)._replace(velocity_rad_s=0.0)
+    for tick in range(1, 12):
+        state, sent, limited = step(state, sign, angle=sign * 64.0, limits=limits)
+        assert (abs(sent), state.cause) == (0.0, Cause.NONE if tick <= 9 else Cause.HELD_AT_LIMIT)
+    assert (state.reaction, limited) == (Reaction.HOLD, Limited.LATCHED)
+
+
+def test_ticks_that_were_missed_at_the_limit_count():
+    limits = LIMITS._replace(at_limit_s=0.05)
+    assert pressed(6, limits, elapsed=10).cause == Cause.NONE  # 0.06 s, said at the next tick
+    assert pressed(7, limits, elapsed=10).cause == Cause.HELD_AT_LIMIT
+
+
+def test_a_moment_away_from_the_limit_begins_the_time_again():
+    limits = LIMITS._replace(at_limit_s=0.05)
+    state = pressed(1, limits, pressed(45, limits), request=-0.01)
+    assert (state.limited_s, state.cause) == (0.0, Cause.NONE)
+    assert pressed(45, limits, state).cause == Cause.NONE
+
+
+def test_after_the_operator_went_on_the_time_begins_again():
+    limits = LIMITS._replace(at_limit_s=0.05)
+    state = released(pressed(60, limits))
+    assert (state.limited_s, pressed(45, limits, state).cause) == (0.0, Cause.NONE)
 
 
 def test_just_before_the_limit_something_still_goes_outward():
@@ -407,15 +445,15 @@ def test_a_cut_does_not_ramp(velocity):
 
 def test_of_two_causes_at_once_the_graver_is_named():
     limits = LIMITS._replace(torque_nm=10.0)
-    hold_and_report, _, _ = step(at(), torque=11.0, reported=Cause.DRIVE_FAULT, limits=limits)
-    assert hold_and_report[-2:] == (Cause.DRIVE_FAULT, Reaction.RAMP)
-    found_and_hold, _, _ = step(at(), torque=math.nan, reported=Cause.POWER_HIGH)
-    assert found_and_hold[-2:] == (Cause.TORQUE_NOT_FINITE, Reaction.RAMP)
+    held, _, _ = step(at(), torque=11.0, reported=Cause.DRIVE_FAULT, limits=limits)
+    assert (held.cause, held.reaction) == (Cause.DRIVE_FAULT, Reaction.RAMP)
+    found, _, _ = step(at(), torque=math.nan, reported=Cause.POWER_HIGH)
+    assert (found.cause, found.reaction) == (Cause.TORQUE_NOT_FINITE, Reaction.RAMP)
 
 
 def test_of_two_as_grave_the_one_that_was_reported_is_named():
     state, _, _ = step(at(), torque=math.nan, reported=Cause.TORQUE_STATUS)
-    assert state[-2:] == (Cause.TORQUE_STATUS, Reaction.RAMP)
+    assert (state.cause, state.reaction) == (Cause.TORQUE_STATUS, Reaction.RAMP)
 
 
 def test_while_latched_the_position_limit_still_holds():

@@ -22,6 +22,7 @@ LIMITS = GuardLimits(
     power_w=16.0,
     energy_j=5.0,
     following_rad=0.03125,
+    at_limit_s=1.0,
 )
 WELL = {
     "requested_rad_s": 0.5,
@@ -33,6 +34,7 @@ WELL = {
     "torque_age_s": 0.002,
     "astray_rad": 0.0,
     "energy_j": 0.1,
+    "limited_s": 0.5,
 }
 
 AT_THE_BOUNDARY = [
@@ -43,6 +45,7 @@ AT_THE_BOUNDARY = [
     ("astray_rad", 0.03125, Cause.NOT_FOLLOWING),
     ("energy_j", 5.0, Cause.ENERGY_HIGH),
     ("torque_nm", 10.0, Cause.TORQUE_HIGH),
+    ("limited_s", 1.0, Cause.HELD_AT_LIMIT),
 ]
 SIGNED = {"angle_rad", "velocity_rad_s", "astray_rad", "torque_nm"}
 
