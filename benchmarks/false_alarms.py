@@ -2,10 +2,10 @@
 
 PRBS epochs of every kind of subject run on the compiled batch, with two sizes of joint and two
 rates of the torque sensor: the paper's 100 samples/s, and 1000. What is recorded then passes
-`guard.consistency`, compiled from its own source. Epochs start from rest, so each one also is a
-beginning. A cause of the guard's own limits (torque, power, energy, a
-second at the position limit) that ends an epoch early is
-counted apart: it is no false alarm. `not following` is the guard's own too, and counts as one.
+`guard.consistency`, compiled with what it calls from their own sources. Epochs start from rest, so
+each one also is a beginning. A cause of the guard's own limits (torque, power, energy, a second at
+the position limit) that ends an epoch early is counted apart: it is no false alarm. `not following`
+is the guard's own too, and counts as one.
 
     kind       the subject
     relaxed    a voluntary torque of 0.05 N·m (SD)
@@ -35,6 +35,7 @@ from rigidimeter.guard import (
     Cause,
     ConsistencyLimits,
     ConsistencyState,
+    agreement,
     consistency,
     consistency_limits,
     consistency_state,
@@ -167,20 +168,19 @@ def compiled() -> Callable[..., tuple[int, int]]:
         return njit(with_helpers(function, helpers), error_model="numpy", nogil=True)
 
     causes = numbers(Cause)
-    solved = made(torque_answer.solved)
     answer = made(
         torque_answer.answer_step,
         Cause=causes,
         lowpassed=made(torque_answer.lowpassed),
-        add_products=made(torque_answer.add_products),
-        closed=made(torque_answer.closed, solved=solved),
+        sign_is_wrong=made(torque_answer.sign_is_wrong, solved=made(torque_answer.solved)),
     )
-    step = made(
-        consistency.consistency_step,
+    means = made(
+        agreement.means_step,
+        Cause=causes,
         answer_step=answer,
         energy_after=made(watch.energy_after),
-        _found=made(consistency._found, Cause=causes),
     )
+    step = made(consistency.consistency_step, Cause=causes, means_step=means)
 
     return made(first_cause, consistency_step=step)
 
@@ -198,7 +198,7 @@ def count(kind: Kind, wanted_s: float, seed: int, find: Callable[..., tuple[int,
             for i in range(len(batch)):
                 n = int(batch.ticks[i])
                 own = Cause(int(batch.cause[i]))
-                cause, at = find(limits, consistency_state(), *epoch_columns(batch, i, n))
+                cause, at = find(limits, consistency_state(limits), *epoch_columns(batch, i, n))
                 found = Cause(int(cause))
                 if own is not Cause.NONE and at >= n - 1:
                     found = own  # what the guard itself finds at a tick goes before it

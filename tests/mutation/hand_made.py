@@ -36,6 +36,7 @@ RUN = "acquisition/controller_run.py"
 STATES = "acquisition/run_states.py"
 SINK = "acquisition/processes/sink.py"
 STEP, WATCH, LIMITS = "guard/step.py", "guard/watch.py", "guard/limits.py"
+AGREEMENT = "guard/agreement.py"
 CONSISTENCY, ANSWER = "guard/consistency.py", "guard/torque_answer.py"
 ADMITTANCE, FILTER, TRACKING = "control/admittance.py", "control/filters.py", "control/tracking.py"
 
@@ -127,8 +128,8 @@ HAND_MADE = tuple(
         (TICK, "        apart,\n    )", "    )", "motion nobody commanded is not stopped"),
         (
             TICK,
-            "*measured, loop.elapsed_ticks\n",
-            "*measured\n",
+            "        loop.elapsed_ticks,\n    )\n    loop.guard",
+            "    )\n    loop.guard",
             "it is seen late after missed ticks",
         ),
         (STEP, "if cause == _NO_CAUSE:", "if True:", "the first cause is overwritten"),
@@ -153,14 +154,14 @@ HAND_MADE = tuple(
         (TICK, "if math.isfinite(angle):", "if True:", "the way back begins nowhere"),
         (WATCH, "if not torque_age_s <= limits.stale_s:", "if False:", "a silent sensor passes"),
         (WATCH, "if not age_s <= limits.stale_s:", "if False:", "a silent drive passes"),
-        (CONSISTENCY, "return int(Cause.MOVED_AT_REST)", "pass", "a drive that creeps passes"),
+        (CONSISTENCY, "found = int(Cause.MOVED_AT_REST)", "pass", "a drive that creeps passes"),
         (
-            CONSISTENCY,
-            "return int(Cause.VELOCITY_WRONG)",
+            AGREEMENT,
+            "cause = int(Cause.VELOCITY_WRONG)",
             "pass",
             "a velocity with no sense passes",
         ),
-        (CONSISTENCY, "return int(Cause.SELDOM_FRESH)", "pass", "a sensor that pauses passes"),
+        (AGREEMENT, "cause = int(Cause.SELDOM_FRESH)", "pass", "a sensor that pauses passes"),
         # Commands
         (TICK, "loop.rig.write(allowed)", "loop.rig.write(request)", "no limit reaches the wire"),
         (

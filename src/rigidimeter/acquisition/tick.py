@@ -123,7 +123,7 @@ class ControlLoop:
         set_admittance(self, controller.inertia_kg_m2, controller.damping_nm_s_rad)
         # What a tick changes.
         self.filtered = BiquadState()
-        self.guard, self.consistency = guard_state(self.limits), consistency_state()
+        self.guard, self.consistency = guard_state(self.limits), consistency_state(self.agreement)
         self.tick = 0
         self.elapsed_ticks = 1
         self.late_in_a_row = 0
@@ -274,16 +274,28 @@ def _run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: 
         # would set the arm going again; one without brakes by its own ramp.
         loop.guard = loop.guard._replace(velocity_rad_s=0.0)
     was_cut = loop.guard.reaction
-    measured = torque_nm, angle, velocity, due_s - motion_s, due_s - torque_s
-    told = loop.guard.velocity_rad_s, perturbation_nm
+    motion_age_s, torque_age_s = due_s - motion_s, due_s - torque_s
     loop.consistency, apart = consistency_step(
-        loop.agreement, loop.consistency, *told, *measured, loop.elapsed_ticks
+        loop.agreement,
+        loop.consistency,
+        loop.guard.velocity_rad_s,
+        perturbation_nm,
+        torque_nm,
+        angle,
+        velocity,
+        motion_age_s,
+        torque_age_s,
+        loop.elapsed_ticks,
     )
     loop.guard, allowed, limited = guard_step(
         loop.limits,
         loop.guard,
         request,
-        *measured,
+        torque_nm,
+        angle,
+        velocity,
+        motion_age_s,
+        torque_age_s,
         # A loop that stood still comes first: the drive's own watchdog follows from it.
         _stronger(_stronger(late, reading.cause), from_outside),
         loop.elapsed_ticks,

@@ -1,10 +1,9 @@
 """The last word before the wire: limits, plausibility, and a latch that keeps the first cause."""
 
+from rigidimeter.guard.agreement import ConsistencyLimits, consistency_limits
 from rigidimeter.guard.causes import REACTIONS, Cause, Reaction
 from rigidimeter.guard.consistency import (
-    ConsistencyLimits,
     ConsistencyState,
-    consistency_limits,
     consistency_state,
     consistency_step,
 )

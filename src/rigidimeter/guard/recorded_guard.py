@@ -14,15 +14,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.guard.agreement import ConsistencyLimits
 from rigidimeter.guard.causes import Cause, Reaction
 from rigidimeter.guard.consistency import (
-    ConsistencyLimits,
     consistency_state,
     consistency_step,
 )
 from rigidimeter.guard.limits import GuardLimits, GuardState, guard_state, released
 from rigidimeter.guard.step import guard_step
-from rigidimeter.guard.torque_answer import AnswerLimits
 
 _INPUTS = (
     *("velocity_request_rad_s", "torque_nm", "angle_rad", "velocity_rad_s"),
@@ -76,8 +75,8 @@ def replay(
         For the session's tick: `consistency_limits(settings)`; without them nothing is found that
         needs time to show.
     """
-    agreement = agreement or ConsistencyLimits(limits.interval_s, AnswerLimits(limits.interval_s))
-    agreed = consistency_state()
+    agreement = agreement or ConsistencyLimits(limits.interval_s)
+    agreed = consistency_state(agreement)
     ticks, recorded = columns["tick"].tolist(), columns["cause"].tolist()
     elapsed = np.diff(columns["tick"], prepend=columns["tick"][:1]).tolist()
     inputs = zip(*(columns[name].tolist() for name in _INPUTS), strict=True)

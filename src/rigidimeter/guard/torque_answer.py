@@ -28,14 +28,15 @@ sign    While the perturbation runs, what the controller would do with it alone,
         the perturbation leaves more of the one, a stronger one more of the other: then nothing can
         be said, and nothing is. `benchmarks.false_alarms` counts how often something was.
 
-Windows of one second begin every half second. A step only adds, multiplies, compares and takes
-square roots; sums are written in place: a state is used once.
+Windows of one second begin every half second. A step takes the mean of a few ticks: a mean leaves
+out what filters of 5 Hz would only alias, and costs a fraction of a step each tick. It only adds,
+multiplies, divides and compares. The window is written in place: a state is used once.
 """
 
 from __future__ import annotations
 
 import math
-from math import isfinite, isnan
+from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -50,7 +51,12 @@ FILTER_RAD_S = 2.0 * math.pi * 5.0
 
 SHOWN_MEMORY_S = 0.25
 WINDOW_S = 1.0
-SUMMED_EVERY_S = 0.004
+MEAN_OF_S = 0.008
+"""A step is of the mean over so long, or over a tick where that is longer."""
+
+LONGEST_S = 0.06
+"""However late a step comes, the filters go on by no more than this: they do not overshoot."""
+
 
 FIT_LEAVES, INSTRUMENTS_LEAVE = 0.03, 0.12
 """Of the mean squares of torque and a, at most, where the sign is believed to be wrong."""
@@ -58,83 +64,72 @@ FIT_LEAVES, INSTRUMENTS_LEAVE = 0.03, 0.12
 UNSHOWN_NM = 0.0003
 """A torque so small may hide in the sensor's noise."""
 
+_NO_CAUSE = int(Cause.NONE)
+
 
 class AnswerLimits(NamedTuple):
-    """Filter, controller and thresholds.
+    """Controller and thresholds.
 
-    `blend` is the coefficient of a low-pass step, `decay` and `gain` those of the admittance for
-    the perturbation alone. `summed_ticks` go between two entries of the sums, `half_entries` in
-    half a window. `inertia_kg_m2` is J₀; at 0 the size is not looked at. `unshown_nm` is the torque
-    below which it is not.
+    `rate_per_s` is B_c/J_c of the controller. `half_steps` go into half a window. `inertia_kg_m2`
+    is J₀; at 0 the size is not looked at. `unshown_nm` is the torque below which it is not.
     """
 
-    interval_s: float
-    blend: float = 0.5
-    decay: float = 1.0
-    gain: float = 0.0
-    summed_ticks: int = 4
-    half_entries: int = 125
+    rate_per_s: float = 0.0
+    half_steps: int = 62
     inertia_kg_m2: float = 0.0
     unshown_nm: float = math.inf
 
 
-class Filtered(NamedTuple):
-    """A signal and what three equal low-passes in a row make of it; NaN before the first value."""
+Filtered = tuple[float, float, float, float]
+"""A signal and what three equal low-passes in a row make of it."""
 
-    value: float = math.nan
-    once: float = 0.0
-    twice: float = 0.0
-    thrice: float = 0.0
+NOTHING_YET: Filtered = (math.nan, 0.0, 0.0, 0.0)
+AT_REST: Filtered = (0.0, 0.0, 0.0, 0.0)
 
 
 class AnswerState(NamedTuple):
     """What is remembered.
 
-    `torque`, `angle` and `alone` are M, θ and θ_p filtered; `alone_rad_s` is θ_p'. `shown_nm2` and
-    `moved2` are the means of the filtered M² and a². `sums` has three rows of 28 sums of products:
-    the half window that fills, the one before it, and both. `ticks` and `entries` count what is in
-    the row that fills, `halves` how many have been filled.
+    `window` has a row of (a_p, v_p, q_p, a, v, q, M) for each step, the oldest of which is
+    overwritten; `steps` counts those since the perturbation began. `torque`, `angle` and `alone`
+    are M, θ and θ_p filtered. `alone_per_s` is θ_p', `perturbation_nm` what drove it last; θ_p is
+    that of J_c = 1, as only ratios are used. `shown_nm2` and `moved2` are the means of the filtered
+    M² and a².
     """
 
-    sums: NDArray[np.float64]
-    torque: Filtered = Filtered()
-    angle: Filtered = Filtered()
-    alone: Filtered = Filtered()
-    alone_rad_s: float = 0.0
+    window: NDArray[np.float64]
+    torque: Filtered = NOTHING_YET
+    angle: Filtered = NOTHING_YET
+    alone: Filtered = AT_REST
+    alone_per_s: float = 0.0
+    perturbation_nm: float = 0.0
     shown_nm2: float = 0.0
     moved2: float = 0.0
-    ticks: int = 0
-    entries: int = 0
-    halves: int = 0
+    steps: int = 0
+
+
+def mean_of_ticks(tick_rate_hz: float) -> int:
+    """Return how many ticks a step is the mean of."""
+    return max(round(MEAN_OF_S * tick_rate_hz), 1)
 
 
 def answer_limits(settings: Settings) -> AnswerLimits:
     """Return the limits for the loop's tick."""
     rig, controller = settings.rig, settings.controller
-    interval_s = 1.0 / rig.tick_rate_hz
-    half = 0.5 * FILTER_RAD_S * interval_s
-    rate = controller.damping_nm_s_rad / controller.inertia_kg_m2
-    decay = math.exp(-rate * interval_s)
-    summed_ticks = max(round(SUMMED_EVERY_S / interval_s), 1)
+    step_s = mean_of_ticks(rig.tick_rate_hz) / rig.tick_rate_hz
     inertia = settings.guard.least_inertia_kg_m2
     steps_rad_s2 = 2.0 * rad_from_deg(rig.motion.angle_resolution_deg) * FILTER_RAD_S**2
     return AnswerLimits(
-        interval_s=interval_s,
-        blend=half / (1.0 + half),
-        decay=decay,
-        gain=(1.0 - decay) / controller.damping_nm_s_rad
-        if rate
-        else interval_s / controller.inertia_kg_m2,
-        summed_ticks=summed_ticks,
-        half_entries=max(round(0.5 * WINDOW_S / (summed_ticks * interval_s)), 1),
+        rate_per_s=controller.damping_nm_s_rad / controller.inertia_kg_m2,
+        half_steps=max(round(0.5 * WINDOW_S / step_s), 1),
         inertia_kg_m2=inertia,
         unshown_nm=UNSHOWN_NM + rig.torque.resolution_nm + inertia * steps_rad_s2,
     )
 
 
-def answer_state() -> AnswerState:
+def answer_state(limits: AnswerLimits) -> AnswerState:
     """Return the state before the first tick."""
-    return AnswerState(np.zeros((3, 28)))
+    return AnswerState(np.zeros((2 * limits.half_steps, 7)))
 
 
 def answer_step(
@@ -143,126 +138,96 @@ def answer_step(
     perturbation_nm: float,
     torque_nm: float,
     angle_rad: float,
-    elapsed_ticks: int = 1,
+    elapsed_s: float,
 ) -> tuple[AnswerState, int]:
-    """Look at one tick; return the state after it and a `Cause`, 0 if the torque answers.
+    """Take the means of a few ticks; return the state and a `Cause`, 0 if the torque answers.
 
     Parameters
     ----------
     limits : AnswerLimits
     state : AnswerState
     perturbation_nm : float
-        What is added to the controller's torque at this tick; 0 where nothing perturbs.
+        What is added to the controller's torque; 0 where nothing perturbs.
     torque_nm, angle_rad : float
-        The newest readings. A tick with one that is not finite is left out.
-    elapsed_ticks : int
-        Ticks since the step before.
+        The readings.
+    elapsed_s : float
+        The time that the means are of.
     """
-    if not (isfinite(torque_nm) and isfinite(angle_rad) and isfinite(perturbation_nm)):
-        return state, int(Cause.NONE)
-    sums, torque, angle, alone, alone_rad_s, shown, moved, ticks, entries, halves = state
-    blend = limits.blend
+    window, torque, angle, alone, alone_per_s, pushed_nm, shown, moved, steps = state
+    if elapsed_s > LONGEST_S:
+        elapsed_s = LONGEST_S
+    w = FILTER_RAD_S
+    half = 0.5 * w * elapsed_s
+    blend = half / (1.0 + half)
     torque = lowpassed(blend, torque, torque_nm)
     angle = lowpassed(blend, angle, angle_rad)
-    w = FILTER_RAD_S
-    answer = torque.twice - torque.thrice
-    a = w * w * (angle.value - 3.0 * angle.once + 3.0 * angle.twice - angle.thrice)
-    weight = min(max(elapsed_ticks, 1) * limits.interval_s / SHOWN_MEMORY_S, 1.0)
-    shown += (answer * answer - shown) * weight
+    m = torque[2] - torque[3]
+    value, once, twice, thrice = angle
+    a = w * w * (value - 3.0 * (once - twice) - thrice)
+    weight = elapsed_s / SHOWN_MEMORY_S
+    shown += (m * m - shown) * weight
     moved += (a * a - moved) * weight
-    cause = int(Cause.NONE)
+    cause = _NO_CAUSE
     needed = limits.inertia_kg_m2 * limits.inertia_kg_m2 * moved
     if needed > limits.unshown_nm * limits.unshown_nm and shown < needed:
         cause = int(Cause.TORQUE_SILENT)
 
     if perturbation_nm == 0.0:  # nothing perturbs: the next window begins with the next epoch
-        alone, alone_rad_s = Filtered(math.nan, 0.0, 0.0, 0.0), 0.0
-        ticks = entries = halves = 0
+        alone, alone_per_s, pushed_nm, steps = AT_REST, 0.0, 0.0, 0
     else:
-        for _ in range(min(max(elapsed_ticks, 1), _LONGEST_STEP)):
-            alone_rad_s = limits.decay * alone_rad_s + limits.gain * perturbation_nm
-        before = 0.0 if isnan(alone.value) else alone.value
-        alone = lowpassed(blend, alone, before + alone_rad_s * limits.interval_s)
-        ticks += 1
-        if ticks >= limits.summed_ticks:
-            ticks = 0
-            v = w * (angle.once - 2.0 * angle.twice + angle.thrice)
-            z1 = w * w * (alone.value - 3.0 * alone.once + 3.0 * alone.twice - alone.thrice)
-            z2 = w * (alone.once - 2.0 * alone.twice + alone.thrice)
-            z3 = alone.twice - alone.thrice
-            add_products(sums, entries == 0, z1, z2, z3, a, v, angle.twice - angle.thrice, answer)
-            entries += 1
-            if entries >= limits.half_entries:
-                entries = 0
-                halves = min(halves + 1, 2)
-                if closed(sums) and halves == 2 and cause == int(Cause.NONE):
-                    cause = int(Cause.TORQUE_SIGN)
-    after = AnswerState(
-        sums, torque, angle, alone, alone_rad_s, shown, moved, ticks, entries, halves
-    )
+        # The controller alone, trapezoidal as the filters are, so that both are late by the same.
+        drag = 0.5 * limits.rate_per_s * elapsed_s
+        push = 0.5 * (pushed_nm + perturbation_nm) * elapsed_s
+        before, pushed_nm = alone_per_s, perturbation_nm
+        alone_per_s = (alone_per_s * (1.0 - drag) + push) / (1.0 + drag)
+        alone = lowpassed(blend, alone, alone[0] + 0.5 * (before + alone_per_s) * elapsed_s)
+        there, first, second, third = alone
+        row = window[steps % window.shape[0]]
+        row[0] = w * w * (there - 3.0 * (first - second) - third)
+        row[1] = w * (first - 2.0 * second + third)
+        row[2] = second - third
+        row[3] = a
+        row[4] = w * (once - 2.0 * twice + thrice)
+        row[5] = twice - thrice
+        row[6] = m
+        steps += 1
+        ended = steps >= window.shape[0] and steps % limits.half_steps == 0
+        if ended and cause == _NO_CAUSE and sign_is_wrong(window):
+            cause = int(Cause.TORQUE_SIGN)
+    after = AnswerState(window, torque, angle, alone, alone_per_s, pushed_nm, shown, moved, steps)
     return after, cause
-
-
-_LONGEST_STEP = 5
-"""In ticks, however many were missed: as far as the controller itself steps."""
 
 
 def lowpassed(blend: float, before: Filtered, value: float) -> Filtered:
     """Return the next step of three low-passes; trapezoidal, so that none adds a delay."""
-    if isnan(before.value):
-        return Filtered(value, value, value, value)
+    value_before, once_before, twice_before, thrice_before = before
+    if isnan(value_before):
+        return value, value, value, value
     kept = 1.0 - 2.0 * blend
-    once = kept * before.once + blend * (value + before.value)
-    twice = kept * before.twice + blend * (once + before.once)
-    thrice = kept * before.thrice + blend * (twice + before.twice)
-    return Filtered(value, once, twice, thrice)
+    once = kept * once_before + blend * (value + value_before)
+    twice = kept * twice_before + blend * (once + once_before)
+    return value, once, twice, kept * thrice_before + blend * (twice + twice_before)
 
 
-def add_products(
-    sums: NDArray[np.float64],
-    first: bool,
-    z1: float,
-    z2: float,
-    z3: float,
-    a: float,
-    v: float,
-    q: float,
-    m: float,
-) -> None:
-    """Add the products of instruments z, regressors (a, v, q) and torque m to the first row.
-
-    The order: z xᵀ by rows, z m, the upper half of z zᵀ and of x xᵀ, x m, m². Each row of z and x
-    is scaled as it is; only ratios are used.
-    """
-    products = (
-        *(z1 * a, z1 * v, z1 * q, z2 * a, z2 * v, z2 * q, z3 * a, z3 * v, z3 * q),
-        *(z1 * m, z2 * m, z3 * m),
-        *(z1 * z1, z1 * z2, z1 * z3, z2 * z2, z2 * z3, z3 * z3),
-        *(a * a, a * v, a * q, v * v, v * q, q * q),
-        *(a * m, v * m, q * m, m * m),
+def sign_is_wrong(window: NDArray[np.float64]) -> bool:
+    """Return whether the rows (z, x, m) of a window show the wrong sign, by their products."""
+    s = (window[:, :, None] * window[:, None, :]).sum(axis=0)
+    power, accelerated = s[6, 6], s[3, 3]
+    j, b, k = solved(
+        *(s[0, 3], s[0, 4], s[0, 5], s[1, 3], s[1, 4], s[1, 5], s[2, 3], s[2, 4], s[2, 5]),
+        *(s[0, 6], s[1, 6], s[2, 6]),
     )
-    for k in range(28):
-        sums[0, k] = products[k] if first else sums[0, k] + products[k]
-
-
-def closed(sums: NDArray[np.float64]) -> bool:
-    """End a half window; return whether the window of the last two shows the wrong sign."""
-    for n in range(28):
-        sums[2, n] = sums[0, n] + sums[1, n]
-        sums[1, n] = sums[0, n]
-    s = sums[2]
-    power = s[27]
-    j, b, k = solved(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11])
     if not (j < 0.0 and b < 0.0):
         return False
-    square = j * j * s[18] + b * b * s[21] + k * k * s[23]
-    square += 2.0 * (j * b * s[19] + j * k * s[20] + b * k * s[22])
-    left = power - 2.0 * (j * s[24] + b * s[25] + k * s[26]) + square
+    square = j * j * accelerated + b * b * s[4, 4] + k * k * s[5, 5]
+    square += 2.0 * (j * b * s[3, 4] + j * k * s[3, 5] + b * k * s[4, 5])
+    left = power - 2.0 * (j * s[3, 6] + b * s[4, 6] + k * s[5, 6]) + square
     g1, g2, g3 = solved(
-        s[12], s[13], s[14], s[13], s[15], s[16], s[14], s[16], s[17], s[0], s[3], s[6]
+        *(s[0, 0], s[0, 1], s[0, 2], s[1, 0], s[1, 1], s[1, 2], s[2, 0], s[2, 1], s[2, 2]),
+        *(s[0, 3], s[1, 3], s[2, 3]),
     )
-    moved = s[18] - (g1 * s[0] + g2 * s[3] + g3 * s[6])
-    return bool(left < FIT_LEAVES * power and moved < INSTRUMENTS_LEAVE * s[18])
+    moved = accelerated - (g1 * s[0, 3] + g2 * s[1, 3] + g3 * s[2, 3])
+    return bool(left < FIT_LEAVES * power and moved < INSTRUMENTS_LEAVE * accelerated)
 
 
 def solved(

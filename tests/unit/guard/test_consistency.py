@@ -9,7 +9,7 @@ from rigidimeter.guard import (
     AnswerLimits,
     Cause,
     ConsistencyLimits,
-    consistency,
+    agreement,
     consistency_limits,
     consistency_state,
     consistency_step,
@@ -17,12 +17,12 @@ from rigidimeter.guard import (
 from rigidimeter.settings import parse_settings
 
 DT = 0.001
-NOTHING = ConsistencyLimits(DT, AnswerLimits(DT))
+NOTHING = ConsistencyLimits(DT)
 
 
 def run(limits, n, angle, velocity, *, sent=1.0, torque=0.0, ages=(0.0, 0.0), elapsed=1, start=0):
     """Step through functions of the time; return the first tick with a cause, it, and the state."""
-    state = consistency_state()
+    state = consistency_state(limits)
 
     def at(value, t):
         return value(t) if callable(value) else value
@@ -104,8 +104,8 @@ def test_the_squares_are_what_theory_says():
     p2 = 0.5 * (0.05 * OMEGA * 0.05) ** 2 / (1 + (OMEGA * 0.05) ** 2)
     for gain, apart, both in ((1.0, 0.0, 2.0), (0.0, 1.0, 1.0), (-1.0, 4.0, 2.0)):
         state = run(NOTHING, 5000, *swing(gain))[2]
-        assert state.both_rad2 == pytest.approx(both * p2, rel=0.15)
-        assert state.apart_rad2 == pytest.approx(apart * p2, rel=0.15, abs=1e-3 * p2)
+        assert state.means.both_rad2 == pytest.approx(both * p2, rel=0.15)
+        assert state.means.apart_rad2 == pytest.approx(apart * p2, rel=0.15, abs=1e-3 * p2)
 
 
 def test_what_resolution_explains_is_not_looked_at():
@@ -153,7 +153,7 @@ def test_the_energy_is_that_of_the_angle():
     lag = math.atan(OMEGA * 0.02)
     product = math.sin(lag) + (0.5 * math.pi - lag) * math.cos(lag)  # of two sines, rectified
     mean = 1.5708 * math.cos(lag) * 2.0 / math.pi * product
-    assert state.energy_j == pytest.approx(mean, rel=0.1)
+    assert state.means.energy_j == pytest.approx(mean, rel=0.1)
     limits = NOTHING._replace(energy_j=0.5 * mean)
     k, cause, _ = run(limits, 6000, angle, 0.0, torque=lambda t: 2.0 * velocity(t) / 1.5708)
     assert cause == Cause.ENERGY_HIGH
@@ -189,9 +189,62 @@ def test_a_slow_sensor_and_a_single_pause_are_none(ages):
 
 
 def test_the_share_is_of_the_time_not_of_the_steps():
-    one = run(FRESH, 300, 0.0, 0.0, ages=(0.0, paused(0.05, 0.1)))[2].torque_old
-    three = run(FRESH, 100, 0.0, 0.0, ages=(0.0, paused(0.05, 0.1)), elapsed=3)[2].torque_old
+    one = run(FRESH, 300, 0.0, 0.0, ages=(0.0, paused(0.05, 0.1)))[2].means.torque_old
+    three = run(FRESH, 100, 0.0, 0.0, ages=(0.0, paused(0.05, 0.1)), elapsed=3)[2].means.torque_old
     assert three == pytest.approx(one, abs=0.02)
+
+
+# --- the ticks between two means
+
+
+def test_the_first_tick_is_a_mean_of_its_own_where_the_filters_begin():
+    state = consistency_state(NOTHING)
+    for k in range(9):
+        state, _ = consistency_step(NOTHING, state, 1.0, 0.0, 1.0 + k, 0.1 * k, 1.0, 0.003, 0.0)
+        if k == 0:
+            assert state.means.answer.torque == (1.0,) * 4
+            assert state.means.answer.angle == (0.0,) * 4
+            assert state.means.since_s == pytest.approx(0.003)
+    assert (state.means.angle_rad, state.means.since_s) == pytest.approx((0.45, 0.0065))
+    assert state.ticks == 0
+
+
+def test_a_mean_is_of_the_ticks_with_readings_over_the_time_of_all():
+    state = consistency_state(NOTHING)._replace(ticks=0)
+    means = []
+    for k, (torque, elapsed) in enumerate([(1.0, 1), (math.nan, 1), (2.0, 5), (6.0, 1)]):
+        assert means == []
+        state, _ = consistency_step(
+            NOTHING, state, 1.0, 0.5, torque, 0.1 * k, 1.0, 0.0, 0.0, elapsed
+        )
+        if state.ticks == 0:
+            means.append(k)
+    assert means == [3]
+    answer = state.means.answer
+    assert (answer.torque[0], answer.angle[0]) == pytest.approx((3.0, 0.5 / 3))
+    assert answer.perturbation_nm == 0.5
+    assert (state.means.angle_rad, state.means.velocity_rad_s) == pytest.approx((0.5 / 3, 1.0))
+    # Read 1, 7 and 8 ms after the last mean, so 5.33 ms after it, 2.67 ms before its own end.
+    assert state.means.since_s == pytest.approx(0.008 / 3)
+    assert state[3:] == (0,) * 5 + (0.0,) * 5
+
+
+def test_no_reading_in_all_the_ticks_makes_no_mean():
+    state = consistency_state(NOTHING)._replace(ticks=0)
+    for k in range(20):
+        state, _ = consistency_step(NOTHING, state, 1.0, 0.5, math.nan, 0.1, 1.0, 0.0, 0.0)
+        assert (state.ticks, state.readings) == (k + 1, 0)
+    state, _ = consistency_step(NOTHING, state, 1.0, 0.5, 2.0, 0.1, 1.0, 0.0, 0.0)
+    assert (state.ticks, state.means.answer.torque[0]) == (0, 2.0)
+
+
+def test_ticks_of_which_one_is_not_perturbed_are_not():
+    for first, expected in ((0.0, 0), (-0.5, 1)):
+        state = consistency_state(NOTHING)._replace(ticks=0)
+        for k in range(8):
+            given = first if k == 0 else 0.25
+            state, _ = consistency_step(NOTHING, state, 1.0, given, 2.0, 0.1, 1.0, 0.0, 0.0)
+        assert state.means.answer.steps == expected
 
 
 # --- settings
@@ -216,7 +269,8 @@ def test_each_limit_is_the_settings_in_si_units():
         )
     )
     values = limits._asdict()
-    assert values.pop("answer").interval_s == 0.002
+    assert values.pop("answer").rate_per_s > 0.0
+    assert values.pop("mean_of_ticks") == 4
     assert values == pytest.approx(
         {
             "interval_s": 0.002,
@@ -242,32 +296,34 @@ def test_on_a_slow_line_the_sums_hold_three_samples():
 
 def test_whatever_comes_the_state_stays_finite():
     rng, limits = np.random.default_rng(3), consistency_limits(parse_settings({}))
-    state = consistency_state()
+    state = consistency_state(limits)
     values = [math.nan, math.inf, -math.inf, 0.0, 1.0, -0.3, 0.02, 1e300]
     for _ in range(3000):
         drawn = rng.choice(values[:-1], 7).tolist()
         state, cause = consistency_step(limits, state, *drawn, int(rng.integers(-3, 200)))
         assert cause in set(Cause)
-        assert all(math.isfinite(value) for value in (state.still_s, *state[4:]))
+        assert all(math.isfinite(value) for value in (state.still_s, *state[3:], *state.means[2:]))
 
 
 def test_the_figures_of_the_laws_and_what_they_begin_with():
-    assert (consistency.SUMMED_S, consistency.SQUARED_S, consistency.WRONG_SHARE) == (
+    assert (agreement.SUMMED_S, agreement.SQUARED_S, agreement.WRONG_SHARE) == (
         0.05,
         0.3,
         0.375,
     )
-    assert (consistency.UNSEEN_DEG, consistency.SMOOTHED_S) == (0.1, 0.02)
-    assert (consistency.FEW_SAMPLES, consistency.LEAST_OLD_S) == (3.0, 0.012)
+    assert (agreement.UNSEEN_DEG, agreement.SMOOTHED_S) == (0.1, 0.02)
+    assert (agreement.FEW_SAMPLES, agreement.LEAST_OLD_S) == (3.0, 0.012)
     assert (*(0.2, 0.5, 5.0),) == (
-        consistency.OLD_SHARE,
-        consistency.OLD_MEMORY_S,
-        consistency.OLD_MEMORY_STALES,
+        agreement.OLD_SHARE,
+        agreement.OLD_MEMORY_S,
+        agreement.OLD_MEMORY_STALES,
     )
     # Nothing is found where nothing is given.
-    assert NOTHING[2:] == (0.0, math.inf, 0.05, math.inf, math.inf, math.inf, math.inf, 0.5)
-    state = consistency_state()
+    assert NOTHING[1:3] == (AnswerLimits(), 8)
+    assert NOTHING[3:] == (0.0, math.inf, 0.05, math.inf, math.inf, math.inf, math.inf, 0.5)
+    state = consistency_state(NOTHING)
     assert state.still_s == 0.0
     assert math.isnan(state.held_rad)
-    assert math.isnan(state.angle_rad)
-    assert state[4:] == (0.0,) * 10
+    assert state[3:] == (7, 0, 0, 0, 0) + (0.0,) * 5
+    assert math.isnan(state.means.angle_rad)
+    assert state.means[2:] == (0.0,) * 10

@@ -9,22 +9,26 @@ from rigidimeter.control import admittance, admittance_step
 from rigidimeter.experiment import prbs_nm
 from rigidimeter.guard import AnswerLimits, Cause, answer_limits
 from rigidimeter.guard.torque_answer import (
+    AT_REST,
     FILTER_RAD_S,
     FIT_LEAVES,
     INSTRUMENTS_LEAVE,
+    LONGEST_S,
+    MEAN_OF_S,
+    NOTHING_YET,
     SHOWN_MEMORY_S,
-    SUMMED_EVERY_S,
     UNSHOWN_NM,
     WINDOW_S,
-    Filtered,
     answer_state,
     answer_step,
     lowpassed,
+    mean_of_ticks,
     solved,
 )
 from rigidimeter.settings import parse_settings
 
 DT = 0.001
+MEAN_OF_TICKS = mean_of_ticks(1.0 / DT)
 LIMITS = answer_limits(parse_settings({}))
 
 
@@ -36,9 +40,10 @@ def test_three_equations_are_solved():
 
 
 def test_at_its_corner_each_low_pass_leaves_half_the_power_and_turns_by_45_degrees():
-    state, found = Filtered(), []
+    state, found = NOTHING_YET, []
+    half = 0.5 * FILTER_RAD_S * DT
     for k in range(3000):
-        state = lowpassed(LIMITS.blend, state, math.sin(FILTER_RAD_S * k * DT))
+        state = lowpassed(half / (1 + half), state, math.sin(FILTER_RAD_S * k * DT))
         found.append(state[1:])
     t = FILTER_RAD_S * DT * np.arange(3000)
     for order in (1, 2, 3):
@@ -47,7 +52,7 @@ def test_at_its_corner_each_low_pass_leaves_half_the_power_and_turns_by_45_degre
 
 
 def test_a_signal_begins_where_it_is():
-    assert lowpassed(0.1, Filtered(), 3.0) == (3.0, 3.0, 3.0, 3.0)
+    assert lowpassed(0.1, NOTHING_YET, 3.0) == (3.0, 3.0, 3.0, 3.0)
 
 
 # --- size
@@ -55,11 +60,11 @@ def test_a_signal_begins_where_it_is():
 
 def imposed(inertia, seconds=2.0, hz=2.0, amplitude=0.2, limits=LIMITS, elapsed=1):
     """Return when an imposed sinusoid of a pure inertia is found silent, and as what."""
-    omega, state = 2 * math.pi * hz, answer_state()
+    omega, state = 2 * math.pi * hz, answer_state(limits)
     for k in range(round(seconds / DT / elapsed)):
         angle = amplitude * (1.0 - math.cos(omega * k * DT * elapsed))
         torque = inertia * omega * omega * (amplitude - angle) if k else 0.0
-        state, cause = answer_step(limits, state, 0.0, torque, angle, elapsed)
+        state, cause = answer_step(limits, state, 0.0, torque, angle, elapsed * DT)
         if cause:
             return k * DT * elapsed, Cause(cause)
     return seconds, Cause.NONE
@@ -80,7 +85,7 @@ def test_torque_below_it_does_not(inertia):
 def test_a_motion_too_gentle_for_the_sensor_and_no_least_inertia_show_nothing():
     assert imposed(0.0, amplitude=0.001)[1] == Cause.NONE
     assert imposed(0.0, limits=LIMITS._replace(inertia_kg_m2=0.0))[1] == Cause.NONE
-    assert imposed(0.0, limits=AnswerLimits(DT))[1] == Cause.NONE
+    assert imposed(0.0, limits=AnswerLimits())[1] == Cause.NONE
 
 
 # --- sign
@@ -92,7 +97,8 @@ def perturbed(sign=1.0, seconds=4.0, push=lambda t: 0.0, joint=(0.0045, 0.1368, 
     step = admittance(settings.controller.inertia_kg_m2, settings.controller.damping_nm_s_rad, DT)
     inertia, damping, stiffness = joint
     angle = velocity = command = torque = 0.0
-    state = answer_state()
+    state, means = answer_state(LIMITS), np.zeros(3)
+    state, _ = answer_step(LIMITS, state, *means.tolist(), MEAN_OF_TICKS * DT)  # at rest before
     for k, value in enumerate(prbs_nm(settings.prbs, 1000.0)[: round(seconds / DT)].tolist()):
         t = k * DT
         command = admittance_step(step, command, value, torque)
@@ -101,7 +107,11 @@ def perturbed(sign=1.0, seconds=4.0, push=lambda t: 0.0, joint=(0.0045, 0.1368, 
         angle += velocity * DT
         torque = inertia * acceleration + damping * velocity + stiffness * angle - push(t)
         torque *= sign if t >= from_s else 1.0
-        state, cause = answer_step(LIMITS, state, value, torque, angle)
+        means += np.array((value, torque, angle)) / MEAN_OF_TICKS
+        if k % MEAN_OF_TICKS != MEAN_OF_TICKS - 1:
+            continue
+        state, cause = answer_step(LIMITS, state, *means.tolist(), MEAN_OF_TICKS * DT)
+        means[:] = 0.0
         if cause:
             return t, Cause(cause)
     return seconds, Cause.NONE
@@ -141,19 +151,56 @@ def test_a_gain_of_next_to_nothing_is_found_soon(gain, within_s):
 
 def test_a_window_begins_anew_after_a_rest():
     """Half a second before a rest and half a second after it are no second."""
-    state = answer_state()
-    for k in range(1400):
-        value = 0.0 if k == 700 else math.sin(0.02 * k) + math.sin(0.05 * k)
-        state, _ = answer_step(LIMITS, state, value, 1.0, 0.01 * math.sin(0.03 * k))
-        if k in (699, 700):
-            assert state.halves == (1 if k == 699 else 0)
-    assert state.halves == 1
+    state = answer_state(LIMITS)
+    for k in range(175):
+        value = 0.0 if k == 87 else math.sin(0.16 * k) + math.sin(0.4 * k) + 3.0
+        state, _ = answer_step(LIMITS, state, value, 1.0, 0.01 * math.sin(0.24 * k), 0.008)
+        if k in (86, 87):
+            assert state.steps == (87 if k == 86 else 0)
+            assert (state.alone == AT_REST) == (k == 87)
+            assert (state.alone_per_s == state.perturbation_nm == 0.0) == (k == 87)
+    assert state.steps == 87
 
 
-def test_what_is_no_number_is_left_out():
-    state, _ = answer_step(LIMITS, answer_state(), 1.0, 0.5, 0.1)
-    for values in ((math.nan, 0.5, 0.1), (1.0, math.inf, 0.1), (1.0, 0.5, math.nan)):
-        assert answer_step(LIMITS, state, *values) == (state, 0)
+def test_the_window_is_that_of_the_last_second_and_is_looked_at_every_half():
+    limits, state = LIMITS._replace(half_steps=3), None
+    state = answer_state(limits)
+    rows = []
+    for k in range(8):
+        state, _ = answer_step(limits, state, 1.0, 0.1 * k, 0.01 * k * k, 0.008)
+        rows.append(state.window[k % 6].copy())
+    for k in range(2, 8):
+        np.testing.assert_array_equal(state.window[k % 6], rows[k])
+
+
+def test_the_controller_alone_is_that_of_the_perturbation():
+    """J_c θ'' + B_c θ' = M with J_c = 1: θ' = (1 − e^(−rt)) M/r, and θ its integral."""
+    limits, state, rate = LIMITS._replace(rate_per_s=10.0), answer_state(LIMITS), 10.0
+    for _ in range(125):
+        state, _ = answer_step(limits, state, 2.0, 0.1, 0.0, 0.008)
+    # The first step rises to M, which counts as half a step.
+    t = 124.5 * 0.008
+    decayed = math.exp(-rate * t)
+    assert state.alone_per_s == pytest.approx(2.0 / rate * (1.0 - decayed), rel=1e-3)
+    expected = 2.0 / rate * (t - (1.0 - decayed) / rate)
+    assert state.alone[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_step_that_comes_late_filters_over_the_time_that_passed():
+    """Steps of 8 and 16 ms in turn leave of a slow sinusoid what steps of 8 ms leave."""
+    states, ends = [], []
+    for steps in ((0.008, 0.008, 0.008), (0.008, 0.016)):
+        state, t = answer_state(LIMITS), 0.0
+        for k in range(600 // len(steps)):
+            elapsed_s = steps[k % len(steps)]
+            t += elapsed_s
+            angle = 0.1 * math.sin(2.0 * math.pi * t)
+            state, _ = answer_step(LIMITS, state, 0.0, 10.0 * angle, angle, elapsed_s)
+        states.append(state)
+        ends.append(t)
+    np.testing.assert_allclose(states[0].torque, states[1].torque, atol=2e-3)
+    state, _ = answer_step(LIMITS, states[0], 0.0, 5.0, 1.0, 100.0)
+    assert 0.0 < state.torque[3] < state.torque[1] < 5.0
 
 
 def test_each_limit_is_the_settings_in_si_units():
@@ -170,15 +217,10 @@ def test_each_limit_is_the_settings_in_si_units():
             }
         )
     )
-    half = 0.5 * 2 * math.pi * 5.0 * 0.002
     assert limits._asdict() == pytest.approx(
         {
-            "interval_s": 0.002,
-            "blend": half / (1 + half),
-            "decay": math.exp(-0.08),
-            "gain": (1 - math.exp(-0.08)) / 2.0,
-            "summed_ticks": 2,
-            "half_entries": 125,
+            "rate_per_s": 40.0,
+            "half_steps": 62,
             "inertia_kg_m2": 0.002,
             "unshown_nm": 0.0003 + 0.003 + 0.002 * math.radians(0.02) * (10 * math.pi) ** 2,
         }
@@ -187,18 +229,18 @@ def test_each_limit_is_the_settings_in_si_units():
     tables = {"controller": {"torque_cutoff_hz": 10.0, "damping_nm_s_rad": 0.0}}
     tables["guard"] = {"reaction_time_s": 0.1}
     limits = answer_limits(parse_settings({"rig": slow, **tables}))
-    assert (limits.summed_ticks, limits.half_entries, limits.decay) == (1, 25, 1.0)
-    assert limits.gain == pytest.approx(0.02 / parse_settings({}).controller.inertia_kg_m2)
+    assert (limits.half_steps, limits.rate_per_s) == (25, 0.0)
+    assert [mean_of_ticks(rate_hz) for rate_hz in (50.0, 500.0, 1000.0, 4000.0)] == [1, 4, 8, 32]
 
 
 def test_the_figures_of_the_laws_and_what_they_begin_with():
-    assert (SHOWN_MEMORY_S, WINDOW_S, SUMMED_EVERY_S) == (0.25, 1.0, 0.004)
+    assert (SHOWN_MEMORY_S, WINDOW_S, MEAN_OF_S, LONGEST_S) == (0.25, 1.0, 0.008, 0.06)
     assert (FIT_LEAVES, INSTRUMENTS_LEAVE, UNSHOWN_NM) == (0.03, 0.12, 0.0003)
-    assert AnswerLimits(DT)[1:] == (0.5, 1.0, 0.0, 4, 125, 0.0, math.inf)
-    state = answer_state()
-    assert state.sums.shape == (3, 28)
-    assert not state.sums.any()
-    for signal in state[1:4]:
-        assert math.isnan(signal.value)
+    assert AnswerLimits() == (0.0, 62, 0.0, math.inf)
+    state = answer_state(AnswerLimits())
+    assert state.window.shape == (124, 7)
+    assert not state.window.any()
+    for signal in state[1:3]:
+        assert math.isnan(signal[0])
         assert signal[1:] == (0.0, 0.0, 0.0)
-    assert state[4:] == (0.0, 0.0, 0.0, 0, 0, 0)
+    assert state[3:] == (AT_REST, 0.0, 0.0, 0.0, 0.0, 0)
