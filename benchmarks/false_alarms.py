@@ -172,7 +172,10 @@ def compiled() -> Callable[..., tuple[int, int]]:
         torque_answer.answer_step,
         Cause=causes,
         lowpassed=made(torque_answer.lowpassed),
-        sign_is_wrong=made(torque_answer.sign_is_wrong, solved=made(torque_answer.solved)),
+        sign_is_wrong=made(
+            torque_answer.sign_is_wrong,
+            fitted=made(torque_answer.fitted, solved=made(torque_answer.solved)),
+        ),
     )
     means = made(
         agreement.means_step,

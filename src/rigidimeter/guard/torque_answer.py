@@ -210,15 +210,24 @@ def lowpassed(blend: float, before: Filtered, value: float) -> Filtered:
 
 
 def sign_is_wrong(window: NDArray[np.float64]) -> bool:
-    """Return whether the rows (z, x, m) of a window show the wrong sign, by their products."""
+    """Return whether a window shows the wrong sign, as far as it shows a joint at all."""
+    j, b, _, torque_left, motion_left = fitted(window)
+    if not (j < 0.0 and b < 0.0):
+        return False
+    return torque_left < FIT_LEAVES and motion_left < INSTRUMENTS_LEAVE
+
+
+def fitted(window: NDArray[np.float64]) -> tuple[float, float, float, float, float]:
+    """Return J, B, K and what fit and instruments leave of the mean squares of torque and a.
+
+    A row of the window is (z, x, M). Where a square is nothing, its share is NaN.
+    """
     s = (window[:, :, None] * window[:, None, :]).sum(axis=0)
     power, accelerated = s[6, 6], s[3, 3]
     j, b, k = solved(
         *(s[0, 3], s[0, 4], s[0, 5], s[1, 3], s[1, 4], s[1, 5], s[2, 3], s[2, 4], s[2, 5]),
         *(s[0, 6], s[1, 6], s[2, 6]),
     )
-    if not (j < 0.0 and b < 0.0):
-        return False
     square = j * j * accelerated + b * b * s[4, 4] + k * k * s[5, 5]
     square += 2.0 * (j * b * s[3, 4] + j * k * s[3, 5] + b * k * s[4, 5])
     left = power - 2.0 * (j * s[3, 6] + b * s[4, 6] + k * s[5, 6]) + square
@@ -227,7 +236,13 @@ def sign_is_wrong(window: NDArray[np.float64]) -> bool:
         *(s[0, 3], s[1, 3], s[2, 3]),
     )
     moved = accelerated - (g1 * s[0, 3] + g2 * s[1, 3] + g3 * s[2, 3])
-    return bool(left < FIT_LEAVES * power and moved < INSTRUMENTS_LEAVE * accelerated)
+    return (
+        float(j),
+        float(b),
+        float(k),
+        float(left / power) if power > 0.0 else math.nan,
+        float(moved / accelerated) if accelerated > 0.0 else math.nan,
+    )
 
 
 def solved(

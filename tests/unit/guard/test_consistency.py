@@ -14,6 +14,8 @@ from rigidimeter.guard import (
     consistency_state,
     consistency_step,
 )
+from rigidimeter.guard.agreement import MeansState, means_step
+from rigidimeter.guard.torque_answer import answer_state
 from rigidimeter.settings import parse_settings
 
 DT = 0.001
@@ -68,6 +70,23 @@ def test_a_reading_from_before_the_joint_had_settled_is_no_place_to_hold():
 
     assert run(REST, 1000, late, 0.0, sent=0.0, ages=(late_s, 0.0))[1] == Cause.NONE
     assert run(REST, 1000, late, 0.0, sent=0.0)[1] == Cause.MOVED_AT_REST
+
+
+def test_a_joint_that_was_told_to_move_holds_at_a_new_place():
+    assert (
+        run(REST, 1000, lambda t: min(t, 0.5), 0.0, sent=lambda t: float(t < 0.5))[1] == Cause.NONE
+    )
+    state = consistency_state(REST)
+    for angle, sent in ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)):
+        for _ in range(100):
+            state, cause = consistency_step(REST, state, sent, 0.0, 0.0, angle, 0.0, 0.0, 0.0)
+            assert cause == Cause.NONE
+
+
+def test_no_tick_and_fewer_count_as_one():
+    for elapsed in (0, -3):
+        state, _ = consistency_step(REST, consistency_state(REST), *(0.0,) * 7, elapsed)
+        assert state.still_s == DT
 
 
 # --- velocity
@@ -139,6 +158,30 @@ def test_a_drive_at_rest_and_a_reading_that_is_no_number_show_nothing():
 
     _, cause, _ = run(VELOCITY, 2000, broken, velocity, torque=math.nan)
     assert cause == Cause.NONE
+
+
+@pytest.mark.parametrize("passed_s", [0.01, 0.04])
+def test_one_mean_after_another_is_what_the_equations_say(passed_s):
+    answer = answer_state(NOTHING.answer)
+    before = MeansState(answer, 0.2, 1.0, 0.0, 0.3, 0.1, 0.05, 0.06, 0.5)
+    after, cause = means_step(NOTHING, before, 0, 0, 0.3, 2.0, passed_s, 0, 0, passed_s + 0.001)
+    kept = 1.0 - passed_s / 0.05
+    moved, reported = 0.3 * kept + 0.1, 0.1 * kept + 1.5 * passed_s
+    weight = passed_s / 0.3
+    pace = 0.5 + (0.1 - 0.5 * passed_s) / max(passed_s, 0.02)
+    assert cause == Cause.NONE
+    assert after[1:9] == pytest.approx(
+        (
+            *(0.3, 2.0, 0.001, moved, reported),
+            0.05 + ((moved - reported) ** 2 - 0.05) * weight,
+            0.06 + (moved**2 + reported**2 - 0.06) * weight,
+            pace,
+        )
+    )
+    same, _ = means_step(NOTHING, after, 0, 0, 9.0, 9.0, -0.001, 0, 0, 0.008)
+    assert same[1:9] == (*after[1:3], pytest.approx(0.009), *after[4:9])
+    long, _ = means_step(NOTHING, before, 0, 0, 0.3, 2.0, 5.0, 0, 0, 5.0)
+    assert long[4:8] == pytest.approx((0.1, 7.5, 7.4**2, 0.1**2 + 7.5**2))
 
 
 # --- energy

@@ -21,6 +21,7 @@ from rigidimeter.guard.torque_answer import (
     WINDOW_S,
     answer_state,
     answer_step,
+    fitted,
     lowpassed,
     mean_of_ticks,
     solved,
@@ -37,6 +38,24 @@ def test_three_equations_are_solved():
     matrix, right = rng.standard_normal((3, 3)), rng.standard_normal(3)
     np.testing.assert_allclose(solved(*matrix.ravel(), *right), np.linalg.solve(matrix, right))
     assert solved(*(0.0,) * 9, 1.0, 1.0, 1.0) == (0.0, 0.0, 0.0)
+
+
+def test_a_window_is_fitted_by_its_instruments():
+    rng = np.random.default_rng(2)
+    z, x, m = rng.standard_normal((124, 3)), rng.standard_normal((124, 3)), np.zeros(124)
+    x += z @ rng.standard_normal((3, 3))
+    m = x @ [0.3, 2.0, 5.0] + 0.5 * rng.standard_normal(124)
+    joint = np.linalg.solve(z.T @ x, z.T @ m)
+    left = np.sum((m - x @ joint) ** 2) / np.sum(m * m)
+    a = x[:, 0]
+    alone = np.sum((a - z @ np.linalg.lstsq(z, a, rcond=None)[0]) ** 2) / np.sum(a * a)
+    np.testing.assert_allclose(fitted(np.column_stack([z, x, m])), (*joint, left, alone))
+
+
+def test_a_window_of_nothing_shows_nothing():
+    joint, shares = fitted(np.zeros((124, 7)))[:3], fitted(np.zeros((124, 7)))[3:]
+    assert joint == (0.0, 0.0, 0.0)
+    assert all(math.isnan(share) for share in shares)
 
 
 def test_at_its_corner_each_low_pass_leaves_half_the_power_and_turns_by_45_degrees():
