@@ -120,13 +120,14 @@ class Ring:
 
 def start(rig: Path, folder: Path) -> tuple[subprocess.Popen[bytes], dict[str, int], Ring]:
     """Start a session; return it, its processes and its ring once the arm is about to move."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "tests.faults.session", str(rig), str(folder), "usual"],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=folder.with_name("said").open("wb"),
-        start_new_session=True,
-    )
+    with folder.with_name("said").open("wb") as said_file:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "tests.faults.session", str(rig), str(folder), "usual"],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=said_file,
+            start_new_session=True,
+        )
     assert process.stdout is not None
     line = process.stdout.readline() if select.select([process.stdout], [], [], 60.0)[0] else b""
     said = folder.with_name("said").read_text()
@@ -134,6 +135,7 @@ def start(rig: Path, folder: Path) -> tuple[subprocess.Popen[bytes], dict[str, i
     first = json.loads(line)
     if "MEMORY" not in first:  # it is how the session ended
         process.wait()
+        process.stdout.close()
         raise EndedItselfError
     stem = first.pop("MEMORY")
     return process, {role: pid for role, pid in first.items() if pid}, Ring(stem)
@@ -195,6 +197,8 @@ def one_kill(
                 os.kill(pid, signal.SIGKILL)
         process.kill()
         process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
         for path in ring.left():
             path.unlink(missing_ok=True)
     return found

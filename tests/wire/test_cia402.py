@@ -255,6 +255,9 @@ def test_what_only_a_comparison_shows_is_passed_on_to_the_guard(wire, name):
     elif name == "encoder frozen":
         assert after.angle_rad - before.angle_rad < truth["angle_rad"] - before.angle_rad - 0.05
         assert _run(drive, 0.5, for_s=0.05).raw == after.raw
+    elif name == "velocity gain":
+        assert after.velocity_rad_s == 0.0
+        assert after.angle_rad - before.angle_rad == pytest.approx(0.1, abs=0.03)
     elif name == "encoder jump":
         assert after.angle_rad - truth["angle_rad"] == pytest.approx(1.0, abs=0.05)
     else:

@@ -62,14 +62,16 @@ def steps(settings: Settings) -> Array:
 
 def small_move_check(result: TrialResult, settings: Settings) -> Check:
     """Check direction and rough scale of the first motion, and its velocity if that ended it."""
-    if result.cause is Cause.VELOCITY_WRONG:
+    found = following(result.readings, settings.rig.drive_damping_ratio)
+    check = within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, SMALL_MOVE_PERCENT, _SCALE_REMEDY)
+    if result.cause is Cause.VELOCITY_WRONG and check.passed:
         apart = _velocity_check(result.readings, settings)
         if not apart.passed:
             return apart
         words = stopped_for(result.cause)
         return yes(apart.name, False, words, apart.limit, _VELOCITY_REMEDY)
-    found = following(result.readings, settings.rig.drive_damping_ratio)
-    check = within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, SMALL_MOVE_PERCENT, _SCALE_REMEDY)
+    if result.cause is Cause.VELOCITY_WRONG:  # the angle agrees with neither command nor velocity
+        return check
     if result.cause is Cause.NONE:
         return check
     if result.cause not in _NOT_AS_COMMANDED:  # a motion cut short tells nothing of the scale
