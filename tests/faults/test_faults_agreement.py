@@ -101,8 +101,12 @@ UNTRUE = {
 }
 
 
-@pytest.mark.parametrize("rig", RIGS)
-@pytest.mark.parametrize("case", UNTRUE)
+@pytest.mark.parametrize(
+    ("case", "rig"),
+    # At 50 Hz the lag of a serial drive leaves the instruments too little of the motion to judge
+    # the sign by; the daily check does.
+    [(case, rig) for case in UNTRUE for rig in RIGS if (case, rig) != ("sign", ASCII)],
+)
 def test_fault_26_a_torque_that_does_not_answer(rig, case, tmp_path, measured):
     wrong, causes, within_s = UNTRUE[case]
     with bench(rig, **LONG) as made:
