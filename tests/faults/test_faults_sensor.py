@@ -185,7 +185,8 @@ def test_fault_05_few_bad_packets_are_tolerated_and_the_newest_wins(rig, tmp_pat
             0.1 * k: lambda name=name: made.misbehave(Wrong("sensor", name))
             for k, name in enumerate(once, 1)
         }
-        acts |= {0.5: lambda: made.misbehave(Wrong("sensor", "backlog")), 0.8: made.behave}
+        # Backlogs of 10 ms; with longer ones the torque would be old too often.
+        acts |= {0.5: lambda: made.misbehave(Wrong("sensor", "backlog", 0.01)), 0.8: made.behave}
         trial = run(made, tmp_path / "s", then=acts)
         assert trial.result.outcome == "success", trial.result
         assert_whole(trial)
