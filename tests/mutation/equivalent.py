@@ -61,8 +61,8 @@ EQUIVALENT: dict[str, str] = {
     "tick.py TickResult: 0 → -1": GIVEN,
     "tick.py TickResult: interrupted: bool = False → interrupted: bool = -1": GIVEN,
     "tick.py TickResult: False → True": GIVEN,
-    "tick.py ramp_to_rest: 0 → 1": RAMP,
-    "tick.py ramp_to_rest: 0 → -1": RAMP,
-    "tick.py _run_tick: 0 → 1": RAMP,
-    "tick.py _run_tick: 0 → -1": RAMP,
+    "ramp.py ramp_to_rest: 0 → 1": RAMP,
+    "ramp.py ramp_to_rest: 0 → -1": RAMP,
+    "tick.py run_tick: 0 → 1": RAMP,
+    "tick.py run_tick: 0 → -1": RAMP,
 }

@@ -29,7 +29,7 @@ class HandMade(NamedTuple):
         return Mutant(path, f"{self.file}: {where} ({self.effect})", source)
 
 
-TICK = "acquisition/tick.py"
+TICK, RAMP = "acquisition/tick.py", "acquisition/ramp.py"
 MODES = "acquisition/control_modes.py"
 SESSION = "acquisition/session_run.py"
 RUN = "acquisition/controller_run.py"
@@ -67,20 +67,20 @@ HAND_MADE = tuple(
         ),
         (TICK, "if from_outside == STALLED:", "if False:", "the same after a suspension"),
         (
-            TICK,
+            RAMP,
             "        loop.clock.wait_until(loop.time_s)\n        loop.rig.write(velocity)",
             "        loop.rig.write(velocity)",
             "a ramp without waiting: the arm is stopped with a blow",
         ),
         (
-            TICK,
+            RAMP,
             "max(abs(velocity) - _brake_rad_s(loop), 0.0)",
             "0.0",
             "a ramp that cannot be recorded is a blow",
         ),
-        (TICK, "        _ramp_unrecorded(loop)\n", "", "a fault of the program leaves it moving"),
+        (RAMP, "        _ramp_unrecorded(loop)\n", "", "a fault of the program leaves it moving"),
         (
-            TICK,
+            RAMP,
             "math.ceil(abs(loop.guard.velocity_rad_s) / _brake_rad_s(loop))",
             "0",
             "a long ramp ends before rest and the power is cut",

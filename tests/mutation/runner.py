@@ -30,10 +30,11 @@ UNIT = "tests/unit"
 _RUN = tuple(
     f"acquisition/test_{name}.py"
     for name in (
-        *("tick", "modes", "session_run", "session_end", "zeroing", "controller_run"),
-        *("orders", "loop_and_session"),
+        *("tick", "late_ticks", "ramp", "modes", "session_run", "session_end", "zeroing"),
+        *("controller_run", "orders", "loop_and_session"),
     )
 )
+_STEP = tuple(f"guard/test_{name}.py" for name in ("step", "position_limit", "following"))
 TESTS = {
     "control/admittance.py": ("control/test_admittance.py",),
     "control/filters.py": ("control/test_filters.py",),
@@ -43,11 +44,12 @@ TESTS = {
     "guard/consistency.py": ("guard/test_consistency.py",),
     "guard/limits.py": ("guard/test_limits.py",),
     "guard/recorded_guard.py": ("guard/test_recorded_guard.py",),
-    "guard/step.py": ("guard/test_step.py",),
+    "guard/step.py": _STEP,
     "guard/torque_answer.py": ("guard/test_torque_answer.py", "guard/test_consistency.py"),
-    "guard/watch.py": ("guard/test_watch.py", "guard/test_step.py"),
+    "guard/watch.py": ("guard/test_watch.py", *_STEP),
     "acquisition/control_modes.py": ("acquisition/test_modes.py", *_RUN),
     "acquisition/controller_run.py": ("acquisition/test_controller_run.py", *_RUN),
+    "acquisition/ramp.py": _RUN,
     "acquisition/run_states.py": ("acquisition/test_states.py", "acquisition/test_session_run.py"),
     "acquisition/session_run.py": ("acquisition/test_session_run.py", *_RUN),
     "acquisition/supervision.py": ("acquisition/test_session_run.py",),

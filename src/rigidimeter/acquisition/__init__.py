@@ -6,7 +6,8 @@ start sooner.
 
 from rigidimeter.acquisition.clock import Clock, DeadlineClock, SimulatedClock
 from rigidimeter.acquisition.control_modes import follow, hold, perturb, rest
-from rigidimeter.acquisition.tick import ControlLoop, ramp_to_rest
+from rigidimeter.acquisition.ramp import ramp_to_rest
+from rigidimeter.acquisition.tick import ControlLoop
 
 __all__ = [
     "Clock",

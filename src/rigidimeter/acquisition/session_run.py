@@ -12,9 +12,10 @@ from typing import Any
 from rigidimeter.acquisition.clock import Clock
 from rigidimeter.acquisition.control_modes import follow, hold, perturb, rest
 from rigidimeter.acquisition.controller_run import ControllerRun
+from rigidimeter.acquisition.ramp import ramp_to_rest
 from rigidimeter.acquisition.run_states import Command, Run, State, after, epoch_over
 from rigidimeter.acquisition.supervision import Sink, Supervision
-from rigidimeter.acquisition.tick import ramp_to_rest, skip_passed_ticks
+from rigidimeter.acquisition.tick import skip_passed_ticks
 from rigidimeter.devices.base import Reading, Rig
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import PlannedEpoch, Protocol, prbs_nm, sinusoid

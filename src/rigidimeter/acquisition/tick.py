@@ -1,4 +1,4 @@
-"""One tick: wait, read, filter, control, guard, write, record; and the ramp to rest at the end.
+"""One tick: wait, read, filter, control, guard, write, record; and stretches of ticks.
 
 All that is remembered from one tick to the next is in a `ControlLoop`; the functions here take it
 as their first argument. The loop sees the rig only through `devices.base` and takes its clock as an
@@ -47,9 +47,6 @@ REST = -1
 
 LONGEST_STEP = 5
 """In ticks, however many were missed."""
-
-SPARE_TICKS = 10
-"""A ramp to rest may take so many ticks more than the speed and the acceleration limit say."""
 
 POSITION_LIMITED, CUT, STALLED = int(Limited.POSITION), int(Reaction.CUT), int(Cause.STALLED)
 
@@ -165,52 +162,14 @@ def set_admittance(loop: ControlLoop, inertia_kg_m2: float, damping_nm_s_rad: fl
 
 def skip_passed_ticks(loop: ControlLoop) -> None:
     """Leave out the ticks that went by while the rig was enabled, which takes its time."""
-    while (late := _ticks_late(loop)) > 0:
+    while (late := ticks_late(loop)) > 0:
         loop.rig.read(late)
         loop.tick += late
 
 
-def _ticks_late(loop: ControlLoop) -> int:
+def ticks_late(loop: ControlLoop) -> int:
     """Wait for the tick that is due, and return how many whole ticks late that is."""
     return math.floor(loop.clock.wait_until(loop.time_s) * loop.rate_hz) - loop.tick
-
-
-def ramp_to_rest(loop: ControlLoop) -> None:
-    """Ramp the velocity to zero within the acceleration limit, however long that takes.
-
-    A tick that fails, say because its sample cannot be recorded, does not end the ramp. It goes
-    on without reading and recording, and the failure is raised after it.
-    """
-    try:
-        # The guard takes as much off at every tick; some more for how floats are rounded.
-        ticks = math.ceil(abs(loop.guard.velocity_rad_s) / _brake_rad_s(loop))
-        for _ in range(ticks + SPARE_TICKS):
-            if loop.guard.velocity_rad_s == 0.0:
-                return
-            _run_tick(loop, REST, 0, _no_motion)
-    except BaseException:
-        _ramp_unrecorded(loop)
-        raise
-
-
-def _no_motion(_: Reading, __: float, ___: int) -> tuple[float, float, float]:
-    return 0.0, 0.0, math.nan
-
-
-def _brake_rad_s(loop: ControlLoop) -> float:
-    return loop.limits.acceleration_rad_s2 * loop.interval_s
-
-
-def _ramp_unrecorded(loop: ControlLoop) -> None:
-    """Only write: what else a tick does has failed."""
-    # The ramp takes its time, however late the failure made it.
-    loop.tick += max(_ticks_late(loop), 0)
-    while (velocity := loop.guard.velocity_rad_s) != 0.0:
-        velocity = math.copysign(max(abs(velocity) - _brake_rad_s(loop), 0.0), velocity)
-        loop.guard = loop.guard._replace(velocity_rad_s=velocity)
-        loop.clock.wait_until(loop.time_s)
-        loop.rig.write(velocity)
-        loop.tick += 1
 
 
 def run_ticks(
@@ -234,7 +193,7 @@ def run_ticks(
     interrupted = False
     k = 0
     while k < n:
-        k = _run_tick(loop, epoch, k, command, n - 1) + 1
+        k = run_tick(loop, epoch, k, command, n - 1) + 1
         if loop.guard.reaction > known:
             break
         order = loop.supervision.order()
@@ -247,7 +206,7 @@ def run_ticks(
     return TickResult(loop.limit_time_s, loop.cause, *counts, interrupted)
 
 
-def _run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: int = 0) -> int:
+def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: int = 0) -> int:
     """Run tick `k` of a stretch; return which it was, a later one if ticks were missed."""
     due_s = loop.tick / loop.rate_hz
     now_s = loop.clock.wait_until(due_s)
@@ -301,6 +260,10 @@ def _run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: 
         loop.elapsed_ticks,
         apart,
     )
+    # The guard has counted this tick. Where one of the calls below fails, what follows is due at
+    # the next tick: the velocity may change by one tick's worth only once a tick.
+    tick = loop.tick
+    loop.tick = tick + 1
     if loop.guard.reaction == CUT and was_cut != CUT:
         loop.rig.disable()
     sent = loop.rig.write(allowed)
@@ -315,7 +278,7 @@ def _run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: 
         loop.angle_rad = angle
     loop.record(
         Sample(
-            loop.tick,
+            tick,
             now_s,
             lateness_s,
             epoch,
@@ -336,7 +299,6 @@ def _run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: 
             loop.guard.cause,
         )
     )
-    loop.tick += 1
     return k
 
 

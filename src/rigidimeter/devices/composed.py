@@ -95,7 +95,7 @@ class ComposedRig:
         try:
             self._sensor.connect()
             self._drive.connect()
-        except BaseException:
+        except BaseException:  # also when interrupted: an open line keeps others out
             self.close()
             raise
 
@@ -140,7 +140,7 @@ class ComposedRig:
             self._origin_rad = self._fresh_angle_rad(time.monotonic() - began_s)
             if self._home is not None:
                 self._home.check(self._origin_rad)
-        except BaseException:
+        except BaseException:  # also when interrupted: the drive may have power by now
             self.disable()
             raise
 

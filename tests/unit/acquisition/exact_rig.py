@@ -4,11 +4,18 @@ What happened is in `calls`, in order. Times are those of the loop's ticks, so a
 milliseconds and gives the same numbers every time.
 """
 
+import math
+
 from rigidimeter.acquisition import ControlLoop
 from rigidimeter.acquisition.run_states import NOTHING, Order
 from rigidimeter.devices import Reading
+from rigidimeter.settings import parse_settings
 
 INTERVAL_S = 0.001
+SETTINGS = parse_settings({})
+CHANGE_RAD_S = math.radians(SETTINGS.guard.acceleration_limit_deg_s2) * INTERVAL_S
+"""What the acceleration limit allows in one tick: 6000 deg/s² in 1 ms, 0.105 rad/s."""
+
 LONGEST = 2000
 """In ticks: a run that takes more is one that does not end."""
 

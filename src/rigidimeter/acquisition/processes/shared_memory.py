@@ -74,7 +74,7 @@ class Memory:
             # All of it now: what is missing later would end the process that writes there.
             os.posix_fallocate(descriptor, 0, size)
             return cls(name, descriptor)
-        except BaseException:
+        except BaseException:  # also when interrupted: what is not unlinked outlives this process
             os.close(descriptor)
             path.unlink()
             raise
@@ -91,7 +91,7 @@ class Memory:
         descriptor = os.open(WHERE / name, os.O_RDWR | os.O_NOFOLLOW)
         try:
             return cls(name, descriptor)
-        except BaseException:
+        except (OSError, ValueError):  # it cannot be mapped, or is empty
             os.close(descriptor)
             raise
 

@@ -163,7 +163,7 @@ class Cia402Drive:
             wire.alarmed = False
             self._cause = Cause.NONE
             power_up(wire, self._now, self._settings.enable_timeout_s, self._who)
-        except BaseException:
+        except BaseException:  # also when interrupted: the drive may have power by now
             self.disable()
             raise
         self._control = Control.ENABLE_OPERATION
