@@ -2,6 +2,7 @@
 
 SLOWER = "looks closer where it need not; what it finds there does not limit"
 NEAR = "step.py guard_step: "
+ANSWER = "torque_answer.py "
 
 MOMENT = "a measured value in floating point is never met to the bit"
 CAN = "cia402/drive.py Cia402Drive."
@@ -12,6 +13,17 @@ GIVEN = "a default that is never used: every result is made with all its fields"
 RAMP = "only a ramp uses it, and its controller does not ask for the tick's number"
 
 EQUIVALENT: dict[str, str] = {
+    "agreement.py means_step: passed_s > _SAME_STAMP_S → passed_s >= _SAME_STAMP_S": MOMENT,
+    ANSWER + "answer_limits: 0.5 * WINDOW_S → 0.5 / WINDOW_S": "a window lasts 1 s",
+    ANSWER + "answer_step: elapsed_s > LONGEST_S → elapsed_s >= LONGEST_S": "it becomes what it is",
+    ANSWER + "answer_step: needed > limits.unshown_nm * limits.unshown_nm → "
+    "needed >= limits.unshown_nm * limits.unshown_nm": MOMENT,
+    ANSWER + "answer_step: shown < needed → shown <= needed": MOMENT,
+    ANSWER + "sign_is_wrong: j < 0.0 → j <= 0.0": MOMENT,
+    ANSWER + "sign_is_wrong: b < 0.0 → b <= 0.0": MOMENT,
+    ANSWER + "sign_is_wrong: torque_left < FIT_LEAVES → torque_left <= FIT_LEAVES": MOMENT,
+    ANSWER + "sign_is_wrong: motion_left < INSTRUMENTS_LEAVE → "
+    "motion_left <= INSTRUMENTS_LEAVE": MOMENT,
     CAN + "_check_watchdog: now_s - min(wire.sync_s, wire.asked_s) > self._stops_itself_s → "
     "now_s - min(wire.sync_s, wire.asked_s) >= self._stops_itself_s": MOMENT,
     CAN + "_find_cause: now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s → "

@@ -132,7 +132,8 @@ def _does_nothing(node: ast.AST) -> bool:
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return True
     return isinstance(node, ast.Assign) and (
-        ast.unparse(node.targets[0]) == "__all__" or ast.unparse(node.value).startswith("Callable[")
+        ast.unparse(node.targets[0]) == "__all__"
+        or ast.unparse(node.value).startswith(("Callable[", "tuple["))
     )
 
 

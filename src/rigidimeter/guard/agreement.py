@@ -119,12 +119,12 @@ def consistency_limits(settings: Settings) -> ConsistencyLimits:
     """Return the limits for the loop's tick."""
     guard, rig = settings.guard, settings.rig
     interval_s = 1.0 / rig.tick_rate_hz
-    summed_s = max(SUMMED_S, FEW_SAMPLES * interval_s, FEW_SAMPLES / rig.motion.rate_hz)
+    summed_s = max(SUMMED_S, FEW_SAMPLES / rig.motion.rate_hz)
     unseen_deg = UNSEEN_DEG + 2.0 * rig.motion.angle_resolution_deg
     unseen_deg += summed_s * rig.motion.velocity_resolution_deg_s
 
     def old_s(sensor: TorqueSensorSettings | MotionSensorSettings) -> float:
-        apart_s = max(1.0 / sensor.rate_hz, interval_s) + sensor.jitter_s
+        apart_s = 1.0 / sensor.rate_hz + sensor.jitter_s  # no sensor is faster than the loop
         return sensor.latency_s + max(FEW_SAMPLES * apart_s, LEAST_OLD_S)
 
     return ConsistencyLimits(

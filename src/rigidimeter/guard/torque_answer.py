@@ -121,7 +121,7 @@ def answer_limits(settings: Settings) -> AnswerLimits:
     steps_rad_s2 = 2.0 * rad_from_deg(rig.motion.angle_resolution_deg) * FILTER_RAD_S**2
     return AnswerLimits(
         rate_per_s=controller.damping_nm_s_rad / controller.inertia_kg_m2,
-        half_steps=max(round(0.5 * WINDOW_S / step_s), 1),
+        half_steps=round(0.5 * WINDOW_S / step_s),
         inertia_kg_m2=inertia,
         unshown_nm=UNSHOWN_NM + rig.torque.resolution_nm + inertia * steps_rad_s2,
     )
