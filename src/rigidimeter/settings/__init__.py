@@ -6,6 +6,7 @@ from rigidimeter.settings.estimation_settings import (
     DiagnosticLevels,
     DiagnosticsSettings,
     EstimationSettings,
+    Level,
     OnlineSettings,
     ScoreSettings,
 )
@@ -50,6 +51,7 @@ __all__ = [
     "DiagnosticsSettings",
     "EstimationSettings",
     "GuardSettings",
+    "Level",
     "LoopSettings",
     "MarginsSettings",
     "MotionSensorSettings",

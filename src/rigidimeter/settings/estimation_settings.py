@@ -82,8 +82,10 @@ class DiagnosticLevels(Section):
     residual_perturbation: Level = "doubt"
     lack_of_fit: Level = "doubt"
     held_out_vaf: Level = "exclude"
+    r_squared: Level = "doubt"
     voluntary_torque: Level = "doubt"
     active_movement: Level = "doubt"
+    loop_bias: Level = "doubt"
     emg_activity: Level = "doubt"
     saturation: Level = "exclude"
     frozen: Level = "exclude"
@@ -110,10 +112,12 @@ class DiagnosticsSettings(Section):
     residual_flatness_least: float = quantity(0.7, "1", 0.0, 1.0)
     residual_perturbation_most_percent: float = quantity(10.0, "%", 0.0, 100.0)
     lack_of_fit_most_percent: float = quantity(2.0, "%", 0.0, 100.0)
+    r_squared_least: float = quantity(0.3, "1", -100.0, 1.0)
     held_out_vaf_least_percent: float = quantity(0.0, "%", -1000.0, 100.0)
     voluntary_low_hz: float = quantity(0.3, "Hz", 0.01, 20.0)
     voluntary_high_hz: float = quantity(4.0, "Hz", 0.05, 50.0)
     voluntary_share_most_percent: float = quantity(15.0, "%", 0.0, 100.0)
+    loop_bias_most_percent: float = quantity(50.0, "%", 0.0, 1000.0)
     active_torque_nm: float = quantity(0.1, "N·m", 0.0, 100.0, above=True)
     active_share_percent: float = quantity(50.0, "%", 0.0, 1000.0)
     active_most_percent: float = quantity(20.0, "%", 0.0, 100.0)

@@ -10,9 +10,36 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigidimeter.dynamics import Loop
+from rigidimeter.estimation.least_squares_bias import compensated
+from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.signals import Array, Signals
-from rigidimeter.records import Epoch, Finding
-from rigidimeter.settings import DiagnosticsSettings
+from rigidimeter.records import Epoch, Finding, Fit
+from rigidimeter.settings import DiagnosticLevels, DiagnosticsSettings, Level
+
+DEFAULT_LEVELS = DiagnosticLevels()
+
+UNKNOWN_WIDTH = 0.1
+"""The share of a parameter that stands for half its interval where a method gives none."""
+
+
+def push_harmless(case: Case) -> str:
+    """Return why torque of the subject's own does not bias the estimate; empty where it does."""
+    if case.uses_perturbation and case.method is not None:
+        return (
+            f"{case.method.name} uses the motion that the perturbation causes alone, so J, B and K "
+            "are not biased by it; it is in their intervals"
+        )
+    share = case.loop_bias_percent
+    if share is not None and share <= case.settings.loop_bias_most_percent:
+        return f"it biases J, B and K by {share:.2g} % of half their intervals at most"
+    return ""
+
+
+def never(case: Case) -> str:
+    """Return that a failed check is not harmless."""
+    del case
+    return ""
 
 
 @dataclass(frozen=True)
@@ -32,6 +59,12 @@ class Case:
         The recorded column of what the guard changed.
     position_limit_rad : float, optional
         Where the position limit was, each way from angle 0.
+    fit : Fit, optional
+        The estimate with its intervals.
+    method : Method, optional
+        That made it.
+    loop : Loop, optional
+        In which the joint was moved, as the settings and the recording say.
     """
 
     epoch: Epoch
@@ -40,6 +73,42 @@ class Case:
     settings: DiagnosticsSettings
     limited: ArrayLike | None = None
     position_limit_rad: float | None = None
+    fit: Fit | None = None
+    method: Method | None = None
+    loop: Loop | None = None
+
+    @property
+    def uses_perturbation(self) -> bool:
+        """Whether the perturbation is the instrument of the method used."""
+        return self.method is not None and self.method.uses_perturbation
+
+    @cached_property
+    def loop_bias(self) -> Array | None:
+        """By how much J, B and K are off because torque of the subject comes back by the loop.
+
+        Shape (3,), NaN where it is too much to be told; None where this cannot be: for a method
+        that it does not bias, or where the loop is unknown.
+        """
+        if self.loop is None or self.fit is None or self.uses_perturbation:
+            return None
+        without = compensated(self.signals, self.loop)
+        return np.full(3, np.nan) if without is None else np.asarray(self.parameters - without)
+
+    @cached_property
+    def half_widths(self) -> Array:
+        """Half the 95 % intervals of J, B and K; `UNKNOWN_WIDTH` of them where there are none."""
+        width = np.abs(self.parameters) * UNKNOWN_WIDTH
+        if self.fit is None:
+            return width
+        half = 0.5 * (self.fit.high - self.fit.low)
+        return np.where(np.isfinite(half), half, width)
+
+    @cached_property
+    def loop_bias_percent(self) -> float | None:
+        """`loop_bias` in % of `half_widths`, the largest of the three."""
+        if self.loop_bias is None:
+            return None
+        return 100.0 * float(np.max(np.abs(self.loop_bias) / self.half_widths))
 
     @cached_property
     def voluntary_nm(self) -> Array:
@@ -89,6 +158,11 @@ class Check:
     of_fit : bool
         Whether the function looks at J, B and K; where not, it is called once for each epoch and
         not again for each method.
+    harmless : callable
+        From a `Case` in which the check failed to the reason why this cannot move J, B or K of the
+        method used by more than their intervals; an empty text where it can. What is harmless is a
+        note with the reason in place of the meaning, unless `[diagnostics.levels]` sets another
+        level than the default.
     """
 
     name: str
@@ -97,21 +171,33 @@ class Check:
     meaning: str
     remedy: str
     of_fit: bool = True
+    harmless: Callable[[Case], str] = never
 
     def looks(self, case: Case) -> Look | None:
         """Return what the check sees, or None where it lacks what it needs."""
         return self.function(case) if all(case.has(name) for name in self.needs) else None
 
-    def finding(self, look: Look, settings: DiagnosticsSettings) -> Finding:
-        """Return what was seen as a finding; a check that passed is a note without a remedy."""
+    def finding(self, look: Look, settings: DiagnosticsSettings, harmless: str = "") -> Finding:
+        """Return what was seen as a finding; a check that passed is a note without a remedy.
+
+        Parameters
+        ----------
+        look : Look
+        settings : DiagnosticsSettings
+        harmless : str
+            Why a failure does not move J, B or K; empty where it does.
+        """
         if not look.failed:
             return Finding(self.name, "note", look.value, look.threshold, look.fact, "")
+        level: Level = getattr(settings.levels, self.name, "doubt")
+        if harmless and level == getattr(DEFAULT_LEVELS, self.name, "doubt"):
+            level = "note"
         return Finding(
             self.name,
-            getattr(settings.levels, self.name, "doubt"),
+            level,
             look.value,
             look.threshold,
-            f"{look.fact}: {look.meaning or self.meaning}",
+            f"{look.fact}: {harmless or look.meaning or self.meaning}",
             look.remedy or self.remedy,
         )
 

@@ -7,12 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from rigidimeter.dynamics import DriveModel, Loop
 from rigidimeter.estimation.bandlimited import bandlimited_signals
+from rigidimeter.estimation.closedloop.drive_fit import loop_of
 from rigidimeter.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
+from rigidimeter.estimation.methods import method_named
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Finding, Fit, Outcome
@@ -44,7 +47,8 @@ def diagnose(case: Case, seen: Mapping[str, Look | None] | None = None) -> tuple
     for check in CHECKS:
         look = seen[check.name] if check.name in seen else check.looks(case)
         if look is not None:
-            found.append(check.finding(look, case.settings))
+            reason = check.harmless(case) if look.failed else ""
+            found.append(check.finding(look, case.settings, reason))
     return tuple(found)
 
 
@@ -52,7 +56,10 @@ def checked(prepared: PreparedEpoch, fit: Fit) -> Fit:
     """Return the fit with what the checks found, excluded if one of them says so."""
     if fit.n_samples == 0 or prepared.obstacle:
         return fit  # the fit has said why
-    findings = diagnose(_case(prepared, fit.value), prepared.once(_seen_without_fit))
+    case = replace(
+        _case(prepared, fit.value), fit=fit, method=method_named(fit.method), loop=_loop(prepared)
+    )
+    findings = diagnose(case, prepared.once(_seen_without_fit))
     failed = [finding for finding in findings if finding.remedy]
     grave = [finding for finding in failed if finding.level == "exclude"]
     outcome = fit.outcome
@@ -67,6 +74,13 @@ def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
     limit_rad = rad_from_deg(settings.guard.position_limit_deg) if from_session else None
     signals = prepared.signals(bandlimited_signals)
     return Case(epoch, signals, parameters, settings.diagnostics, position_limit_rad=limit_rad)
+
+
+def _loop(prepared: PreparedEpoch) -> Loop:
+    """Return the loop that the settings describe, with the drive that the recording shows."""
+    rig = prepared.settings.rig
+    drive = prepared.source.drive or DriveModel(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
+    return loop_of(prepared.settings, prepared.epoch.channels["torque_nm"].rate_hz, drive)
 
 
 def _seen_without_fit(prepared: PreparedEpoch) -> dict[str, Look | None]:

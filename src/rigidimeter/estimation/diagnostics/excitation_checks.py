@@ -16,7 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from rigidimeter.estimation.diagnostics.check_record import Check, Look, at_least, at_most
+from rigidimeter.estimation.diagnostics.check_record import (
+    Check,
+    Look,
+    at_least,
+    at_most,
+    push_harmless,
+)
 from rigidimeter.estimation.scores import single_frequency_share
 from rigidimeter.estimation.signals import Array, Signals, kinematics, spline
 from rigidimeter.records import PARAMETERS, Channel, Epoch
@@ -206,5 +212,6 @@ EXCITATION_CHECKS = (
         "the rest is the subject, noise, or a joint that is not linear",
         "ask the subject to relax, perturb more strongly, or pool epochs with instruments",
         of_fit=False,
+        harmless=push_harmless,
     ),
 )

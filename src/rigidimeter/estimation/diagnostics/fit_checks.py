@@ -14,7 +14,12 @@ from scipy import signal
 from scipy.special import digamma
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
-from rigidimeter.estimation.diagnostics.check_record import Check, Look, at_least
+from rigidimeter.estimation.diagnostics.check_record import (
+    Check,
+    Look,
+    at_least,
+    push_harmless,
+)
 from rigidimeter.estimation.diagnostics.excitation_checks import (
     lines_inside,
     perturbation_nm,
@@ -127,6 +132,12 @@ def held_out_vaf(signals: Signals, settings: DiagnosticsSettings) -> Look:
     )
 
 
+def r_squared(value: float, settings: DiagnosticsSettings) -> Look:
+    """Return the share of the torque that J, B and K explain."""
+    least = settings.r_squared_least
+    return at_least(value, least, f"R² is {value:.2g} (at least {least:g})")
+
+
 def negative_parameters(parameters: Array) -> Look:
     """Return how many of J, B and K are not above zero (none may be)."""
     wrong = [name for name, value in zip("JBK", parameters, strict=True) if not value > 0]
@@ -177,6 +188,7 @@ RESIDUAL_CHECKS = (
             "standard errors for white noise are too small"
         ),
         "use the intervals for coloured residuals; see the residual's spectrum",
+        harmless=push_harmless,
     ),
     Check(
         "residual_perturbation",
@@ -187,6 +199,7 @@ RESIDUAL_CHECKS = (
             "look for a delay between torque and motion, for a reflex, for stiffness that changes "
             "with the angle; the subject's own torque biases least squares in this way too"
         ),
+        harmless=push_harmless,
     ),
     Check(
         "held_out_vaf",
@@ -195,10 +208,19 @@ RESIDUAL_CHECKS = (
         "the fit does not foresee torque that it has not seen",
         "look for movement of the subject's own, and for a change during the epoch",
         of_fit=False,
+        harmless=push_harmless,
     ),
 )
 
 PARAMETER_CHECKS = (
+    Check(
+        "r_squared",
+        (),
+        lambda c: r_squared(c.fit.r_squared, c.settings) if c.fit is not None else None,
+        "most of the torque is not J, B and K, and least squares puts a part of it into them",
+        "look for movement of the subject's own; record the perturbation and use iv",
+        harmless=push_harmless,
+    ),
     Check(
         "negative_parameters",
         (),

@@ -14,7 +14,13 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
-from rigidimeter.estimation.diagnostics.check_record import Check, Look, at_most
+from rigidimeter.estimation.diagnostics.check_record import (
+    Case,
+    Check,
+    Look,
+    at_most,
+    push_harmless,
+)
 from rigidimeter.estimation.diagnostics.excitation_checks import lines_inside, power_lines
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.records import Channel
@@ -91,6 +97,26 @@ def active_movement(voluntary_nm: Array, signals: Signals, settings: Diagnostics
     )
 
 
+def loop_bias(case: Case) -> Look | None:
+    """Return how far the loop pulls least squares from the joint, in % of half the intervals."""
+    bias, value = case.loop_bias, case.loop_bias_percent
+    if bias is None or value is None:
+        return None
+    most = case.settings.loop_bias_most_percent
+    if not np.isfinite(value):
+        fact = "no J, B and K go with this torque in this loop"
+    else:
+        shares = 100.0 * bias / np.abs(case.parameters)
+        of_each = ", ".join(
+            f"{name} by {share:+.2g} %" for name, share in zip("JBK", shares, strict=True)
+        )
+        fact = (
+            f"torque of the subject that comes back as motion by the loop moves {of_each}, at most "
+            f"{value:.2g} % of half their intervals (at most {most:g} %)"
+        )
+    return at_most(value, most, fact)
+
+
 def emg_envelope_v(emg: Channel, window_s: float) -> Array:
     """Return the moving mean of the rectified EMG, its own mean taken off first, in V."""
     length = max(round(window_s * emg.rate_hz), 1)
@@ -119,6 +145,13 @@ def emg_activity(emg: Channel, settings: DiagnosticsSettings) -> Look:
 
 MOVEMENT_CHECKS = (
     Check(
+        "loop_bias",
+        (),
+        loop_bias,
+        "least squares takes it for the joint, and the intervals do not include that",
+        "record the perturbation and use iv, or ask the subject to relax and repeat",
+    ),
+    Check(
         "voluntary_torque",
         (),
         lambda c: voluntary_torque(c.voluntary_nm, c.signals, c.settings),
@@ -127,6 +160,7 @@ MOVEMENT_CHECKS = (
             "does not, and is less precise"
         ),
         "record the perturbation, use iv and pool epochs, or leave the epoch out",
+        harmless=push_harmless,
     ),
     Check(
         "active_movement",
@@ -134,6 +168,7 @@ MOVEMENT_CHECKS = (
         lambda c: active_movement(c.voluntary_nm, c.signals, c.settings),
         "the subject moved, and the estimate is of a joint that is not at rest",
         "ask the subject to relax and repeat, or leave these seconds out",
+        harmless=push_harmless,
     ),
     Check(
         "emg_activity",
@@ -142,5 +177,6 @@ MOVEMENT_CHECKS = (
         "the muscle was active",
         "ask the subject to relax and repeat, or leave the active part out",
         of_fit=False,
+        harmless=push_harmless,
     ),
 )

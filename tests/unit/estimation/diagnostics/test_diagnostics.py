@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from rigidimeter.dynamics import Loop
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import Signals, epoch_signals, fit_inertia_damping_stiffness
+from rigidimeter.estimation.bandlimited import BANDLIMITED
 from rigidimeter.estimation.diagnostics import (
     CHECKS,
     Case,
@@ -23,9 +25,16 @@ from rigidimeter.estimation.diagnostics import (
 )
 from rigidimeter.estimation.diagnostics.movement_checks import active_seconds, emg_envelope_v
 from rigidimeter.records import Channel, Epoch
-from rigidimeter.settings import DiagnosticLevels, DiagnosticsSettings, EstimationSettings
+from rigidimeter.settings import (
+    ControllerSettings,
+    DiagnosticLevels,
+    DiagnosticsSettings,
+    EstimationSettings,
+    RigSettings,
+)
 
 SETTINGS = DiagnosticsSettings()
+LOOP = Loop(ControllerSettings(), RigSettings())
 TRUTH = np.array([0.0045, 0.1368, 1.751])
 RATE_HZ, N = 200.0, 4000
 T = np.arange(N) / RATE_HZ
@@ -138,7 +147,11 @@ def test_a_sound_epoch_passes_every_check(sound):
 def test_every_level_that_can_be_set_belongs_to_a_check(sound):
     epoch, signals, parameters = sound
     emg = with_channel(epoch, "emg_v", 1e-5 * np.random.default_rng(1).standard_normal(N))
-    findings = diagnose(Case(emg, signals, parameters, SETTINGS, np.zeros(N), 1.0))
+    fit = fit_inertia_damping_stiffness(signals)
+    case = Case(
+        emg, signals, parameters, SETTINGS, np.zeros(N), 1.0, fit, BANDLIMITED, LOOP
+    )  # fmt: skip
+    findings = diagnose(case)
     names = [finding.name for finding in findings]
     # The misfit of several epochs together is found where they are fitted together.
     assert sorted([*names, "lack_of_fit"]) == sorted(DiagnosticLevels.model_fields)
