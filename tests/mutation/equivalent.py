@@ -3,6 +3,7 @@
 SLOWER = "looks closer where it need not; what it finds there does not limit"
 NEAR = "step.py guard_step: "
 ANSWER = "torque_answer.py "
+STEP = "consistency.py consistency_step: "
 
 MOMENT = "a measured value in floating point is never met to the bit"
 CAN = "cia402/drive.py Cia402Drive."
@@ -10,10 +11,27 @@ LOOP = "tick.py ControlLoop.__init__: "
 SET = "each tick sets it before it is read"
 ANEW = "each stretch sets it; a ramp before the first has no velocity to take off"
 GIVEN = "a default that is never used: every result is made with all its fields"
+BEGUN = "a default that is never used: a state begins within its first mean"
+ANY_SIGN = "infinite or no number in a sum makes the sum so, whatever the signs"
 RAMP = "only a ramp uses it, and its controller does not ask for the tick's number"
 
 EQUIVALENT: dict[str, str] = {
     "agreement.py means_step: passed_s > _SAME_STAMP_S → passed_s >= _SAME_STAMP_S": MOMENT,
+    "consistency.py ConsistencyState: ticks: int = 0 → ticks: int = -1": BEGUN,
+    "consistency.py ConsistencyState: 0 → 1": BEGUN,
+    "consistency.py ConsistencyState: 0 → -1": BEGUN,
+    STEP + "1 → 0": "elapsed_ticks if not given: none counts as one",
+    STEP + "elapsed_ticks < 1 → elapsed_ticks <= 1": "one counts as one",
+    STEP + "1 → 2 #2": "one counts as one",
+    STEP + "perturbation_nm + torque_nm + angle_rad + velocity_rad_s + age_s → "
+    "perturbation_nm + torque_nm + angle_rad + velocity_rad_s - age_s": ANY_SIGN,
+    STEP + "perturbation_nm + torque_nm + angle_rad + velocity_rad_s → "
+    "perturbation_nm + torque_nm + angle_rad - velocity_rad_s": ANY_SIGN,
+    STEP + "perturbation_nm + torque_nm + angle_rad → "
+    "perturbation_nm + torque_nm - angle_rad": ANY_SIGN,
+    STEP + "perturbation_nm + torque_nm → perturbation_nm - torque_nm": ANY_SIGN,
+    STEP + "ConsistencyState(means, still_s, held, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0) → "
+    "ConsistencyState(means, still_s, held, 0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0, 0.0)": "0 is 0.0",
     ANSWER + "answer_limits: 0.5 * WINDOW_S → 0.5 / WINDOW_S": "a window lasts 1 s",
     ANSWER + "answer_step: elapsed_s > LONGEST_S → elapsed_s >= LONGEST_S": "it becomes what it is",
     ANSWER + "answer_step: needed > limits.unshown_nm * limits.unshown_nm → "

@@ -114,7 +114,7 @@ def consistency_step(
     found = _NO_CAUSE
     one_sum = perturbation_nm + torque_nm + angle_rad + velocity_rad_s + age_s
     if one_sum - one_sum == 0.0:  # not so where one of them is infinite or no number
-        if still_s <= limits.settle_s or still_s <= limits.settle_s + age_s:
+        if still_s <= limits.settle_s + max(age_s, 0.0):
             held = math.nan
         elif isnan(held):
             held = angle_rad

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from tests.unit.guard.many_steps import DT, NOTHING, run
 
 from rigidimeter.guard import (
     AnswerLimits,
     Cause,
-    ConsistencyLimits,
     agreement,
     consistency_limits,
     consistency_state,
@@ -17,77 +17,6 @@ from rigidimeter.guard import (
 from rigidimeter.guard.agreement import MeansState, means_step
 from rigidimeter.guard.torque_answer import answer_state
 from rigidimeter.settings import parse_settings
-
-DT = 0.001
-NOTHING = ConsistencyLimits(DT)
-
-
-def run(limits, n, angle, velocity, *, sent=1.0, torque=0.0, ages=(0.0, 0.0), elapsed=1, start=0):
-    """Step through functions of the time; return the first tick with a cause, it, and the state."""
-    state = consistency_state(limits)
-
-    def at(value, t):
-        return value(t) if callable(value) else value
-
-    for k in range(start, n):
-        t = k * elapsed * limits.interval_s
-        values = [at(value, t) for value in (sent, 0.0, torque, angle, velocity, *ages)]
-        state, cause = consistency_step(limits, state, *values, elapsed)
-        if cause:
-            return k, Cause(cause), state
-    return n, Cause.NONE, state
-
-
-# --- rest
-
-
-REST = NOTHING._replace(settle_s=0.0405, hold_rad=0.2505)
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_joint_told_to_rest_may_move_by_the_hold_limit(sign):
-    # 1 rad/s, held from 0.040 s on: 0.2505 rad are passed at 0.291 s, not at 0.290 s.
-    k, cause, _ = run(REST, 1000, lambda t: sign * t, sign, sent=0.0)
-    assert (k, cause) == (291, Cause.MOVED_AT_REST)
-    assert run(REST._replace(hold_rad=2.0), 1000, lambda t: sign * t, sign, sent=0.0)[0] == 1000
-
-
-def test_a_joint_may_settle_first_and_move_when_told():
-    assert run(REST, 1000, lambda t: min(100.0 * t, 3.0), 0.0, sent=0.0)[1] == Cause.NONE
-    assert run(REST, 3000, lambda t: t, 1.0, sent=1e-9)[1] == Cause.NONE
-
-    def now_and_then(t):
-        return 1.0 if round(t / DT) % 30 == 0 else 0.0
-
-    assert run(REST, 3000, lambda t: t, 1.0, sent=now_and_then)[1] == Cause.NONE
-
-
-def test_a_reading_from_before_the_joint_had_settled_is_no_place_to_hold():
-    late_s = 0.05
-
-    def late(t):  # comes to rest at 0.04 s, seen 50 ms later
-        return min(max(t - late_s, 0.0), 0.04) * 20.0
-
-    assert run(REST, 1000, late, 0.0, sent=0.0, ages=(late_s, 0.0))[1] == Cause.NONE
-    assert run(REST, 1000, late, 0.0, sent=0.0)[1] == Cause.MOVED_AT_REST
-
-
-def test_a_joint_that_was_told_to_move_holds_at_a_new_place():
-    assert (
-        run(REST, 1000, lambda t: min(t, 0.5), 0.0, sent=lambda t: float(t < 0.5))[1] == Cause.NONE
-    )
-    state = consistency_state(REST)
-    for angle, sent in ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)):
-        for _ in range(100):
-            state, cause = consistency_step(REST, state, sent, 0.0, 0.0, angle, 0.0, 0.0, 0.0)
-            assert cause == Cause.NONE
-
-
-def test_no_tick_and_fewer_count_as_one():
-    for elapsed in (0, -3):
-        state, _ = consistency_step(REST, consistency_state(REST), *(0.0,) * 7, elapsed)
-        assert state.still_s == DT
-
 
 # --- velocity
 
@@ -231,10 +160,17 @@ def test_a_slow_sensor_and_a_single_pause_are_none(ages):
     assert run(FRESH, 5000, 0.0, 0.0, ages=ages)[1] == Cause.NONE
 
 
-def test_the_share_is_of_the_time_not_of_the_steps():
-    one = run(FRESH, 300, 0.0, 0.0, ages=(0.0, paused(0.05, 0.1)))[2].means.torque_old
-    three = run(FRESH, 100, 0.0, 0.0, ages=(0.0, paused(0.05, 0.1)), elapsed=3)[2].means.torque_old
-    assert three == pytest.approx(one, abs=0.02)
+@pytest.mark.parametrize("elapsed", [1, 3])
+@pytest.mark.parametrize("sensor", [0, 1])
+def test_the_share_is_of_the_time_not_of_the_steps_and_of_the_sensor_that_is_old(sensor, elapsed):
+    # Three times 38 ms, to 0.2, 0.1 and 0 s before the end, with a memory of 0.5 s.
+    expected = sum(math.exp(-s / 0.5) - math.exp(-(s + 0.038) / 0.5) for s in (0.2, 0.1, 0.0))
+    ages = [0.0, 0.0]
+    ages[sensor] = paused(0.05, 0.1)
+    means = run(FRESH, 300 // elapsed, 0.0, 0.0, ages=ages, elapsed=elapsed)[2].means
+    shares = means.motion_old, means.torque_old
+    assert shares[sensor] == pytest.approx(expected, abs=0.02)
+    assert shares[1 - sensor] == 0.0
 
 
 # --- the ticks between two means
