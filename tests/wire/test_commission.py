@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import threading
 from collections.abc import Callable, Iterator
@@ -11,12 +10,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from tests.wire.rig_process import RigProcess
+from tests.wire.trial_setup import settings, setup
 
 from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.commissioning import (
     CommissioningRecord,
     Operator,
-    Timebase,
     check_record,
     commission,
     read_record,
@@ -26,41 +26,14 @@ from rigidimeter.commissioning import (
 from rigidimeter.commissioning.commissioning_record import A_PERSON_TELLS
 from rigidimeter.devices.rigfile import load_rig
 from rigidimeter.errors import UserError
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.settings import Settings
 from rigidimeter.settings.commissioning_settings import CommissioningSettings
 
 pytest.importorskip("can")
 pytest.importorskip("canopen")
 pytest.importorskip("serial")
 
-_spec = importlib.util.spec_from_file_location(
-    "rig_process", Path(__file__).with_name("rig_process.py")
-)
-assert _spec is not None
-assert _spec.loader is not None
-_module = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(_module)
-RigProcess = _module.RigProcess
-
 QUICK = CommissioningSettings(idle_s=0.6, swings=1, steps_s=1.2, known_torque_s=0.5)
-
-
-def settings(rate_hz: float, **guard: float) -> Settings:
-    sensor = {"rate_hz": rate_hz}
-    return parse_settings(
-        {
-            "rig": {"tick_rate_hz": rate_hz, "torque": sensor, "motion": sensor},
-            "guard": {
-                "reaction_time_s": 0.15,
-                "stale_s": 0.3,
-                "speed_limit_deg_s": 60.0,
-                "acceleration_limit_deg_s2": 1500.0,
-                **guard,
-            },
-            # A machine shared with other tests is late at times; the drives' watchdogs are 0.1 s.
-            "loop": {"missed_in_a_row": 50, "stall_s": 0.09},
-        }
-    )
 
 
 @pytest.fixture(scope="module")
@@ -85,14 +58,10 @@ def tried(
     ask: Callable[[str], bool] = lambda _: True,
     **operator: Any,
 ) -> tuple[CommissioningRecord, list[str]]:
-    clock, rigfile = DeadlineClock(), load_rig(rig)
-    chosen = chosen.model_copy(update={"commissioning": QUICK})
+    rigfile, chosen = load_rig(rig), chosen.model_copy(update={"commissioning": QUICK})
     record = commission(
-        rigfile.build(clock.now_s, chosen.rig.tick_rate_hz),
+        setup(rigfile, chosen, Operator(ask=ask, **{"present": False, **operator})),
         rigfile,
-        chosen,
-        Timebase(clock.now_s, clock.wait_until),
-        Operator(ask=ask, **{"present": False, **operator}),
         made_utc="2026-01-01T00:00:00+00:00",
         software="0",
     )

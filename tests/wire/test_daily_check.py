@@ -2,57 +2,28 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from tests.wire.rig_process import RigProcess
+from tests.wire.trial_setup import settings, setup
 
-from rigidimeter.acquisition.clock import DeadlineClock
-from rigidimeter.commissioning import Compared, DailyRecord, Operator, Timebase, daily_check
+from rigidimeter.commissioning import Compared, DailyRecord, Operator, daily_check
 from rigidimeter.commissioning.daily_record import Reference
 from rigidimeter.devices.rigfile import load_rig
-from rigidimeter.settings import Settings, parse_settings
 
 pytest.importorskip("can")
 pytest.importorskip("canopen")
 pytest.importorskip("serial")
-
-_spec = importlib.util.spec_from_file_location(
-    "rig_process", Path(__file__).with_name("rig_process.py")
-)
-assert _spec is not None
-assert _spec.loader is not None
-_module = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(_module)
-RigProcess = _module.RigProcess
 
 CUFF_KG_M2 = 0.002
 COMMISSIONED: Any = SimpleNamespace(
     digest="of the commissioning", numbers={"torque_after_motion_s": 0.001}
 )
 RATES_HZ = {"cia402": 250.0, "ascii": 60.0}
-
-
-def settings(rate_hz: float) -> Settings:
-    sensor = {"rate_hz": rate_hz}
-    return parse_settings(
-        {
-            "rig": {"tick_rate_hz": rate_hz, "torque": sensor, "motion": sensor},
-            "guard": {
-                "reaction_time_s": 0.15,
-                "stale_s": 0.3,
-                "speed_limit_deg_s": 60.0,
-                "acceleration_limit_deg_s2": 1500.0,
-            },
-            # A machine shared with other tests is late at times; the drives' watchdogs are 0.1 s.
-            "loop": {"missed_in_a_row": 50, "stall_s": 0.09},
-            "commissioning": {"daily_rest_s": 1.0},
-        }
-    )
 
 
 @pytest.fixture(scope="module", params=["cia402", pytest.param("ascii", marks=pytest.mark.slow)])
@@ -66,14 +37,12 @@ def bench(request: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[An
 
 def checked(bench: Any) -> DailyRecord:
     rate_hz = RATES_HZ[bench.drive]
-    clock, rigfile = DeadlineClock(), load_rig(bench.rig)
+    chosen = settings(rate_hz, commissioning={"daily_rest_s": 1.0})
+    rigfile, operator = load_rig(bench.rig), Operator(ask=lambda _: True, present=False)
     with rigfile.claim() as lock:
         return daily_check(
-            rigfile.build(clock.now_s, rate_hz, lock=lock),
+            setup(rigfile, chosen, operator, lock=lock),
             rigfile,
-            settings(rate_hz),
-            Timebase(clock.now_s, clock.wait_until),
-            Operator(ask=lambda _: True, present=False),
             lambda _: COMMISSIONED,
             compared=Compared(
                 reference=Reference(CUFF_KG_M2, 2e-5, "2026-01-01", COMMISSIONED.digest, "first")

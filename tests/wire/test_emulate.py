@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import signal
 from pathlib import Path
 
 import pytest
+from tests.wire.rig_process import RigProcess
 
 from rigidimeter.devices.rigfile import load_rig
 
 pytest.importorskip("serial")
 
-_spec = importlib.util.spec_from_file_location(
-    "rig_process", Path(__file__).with_name("rig_process.py")
-)
-assert _spec is not None
-assert _spec.loader is not None
-_module = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(_module)
-
 
 def test_the_rig_answers_every_line_and_ends_in_order(tmp_path: Path) -> None:
-    with _module.RigProcess(tmp_path / "RIG.toml", "ascii") as rig:
+    with RigProcess(tmp_path / "RIG.toml", "ascii") as rig:
         assert load_rig(rig.rig).name == "emulated rig"
         assert rig.command("place 12")["ok"]
         state = rig.state()
@@ -50,6 +42,6 @@ def test_the_rig_answers_every_line_and_ends_in_order(tmp_path: Path) -> None:
 def test_a_rig_that_cannot_start_says_why(tmp_path: Path) -> None:
     with (
         pytest.raises(AssertionError, match=r"torque-rate-hz|rate_hz"),
-        _module.RigProcess(tmp_path / "RIG.toml", "ascii", "--torque-rate-hz", "-1"),
+        RigProcess(tmp_path / "RIG.toml", "ascii", "--torque-rate-hz", "-1"),
     ):
         pass

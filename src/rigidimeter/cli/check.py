@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from rigidimeter.cli.commission import ask, interrupted_once, table
+from rigidimeter.cli.commission import claimed, table
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
@@ -56,12 +56,8 @@ def check(
     """
     from datetime import UTC, datetime
 
-    from rigidimeter.acquisition.clock import DeadlineClock
-    from rigidimeter.acquisition.processes.realtime_scheduling import prepare_loop_process
     from rigidimeter.commissioning import (
         Compared,
-        Operator,
-        Timebase,
         check_record,
         daily_check,
         daily_path,
@@ -95,19 +91,10 @@ def check(
         if not new_reference:
             raise UserError(f"{error}; its reference is lost, so add --new-reference") from None
         before = None
-    echo(str(prepare_loop_process()), err=True)
-    clock = DeadlineClock()
-    with rigfile.claim() as lock, interrupted_once(path, "check the rig again"):
+    with claimed(rigfile, chosen, path, "check the rig again", yes) as setup:
         found = daily_check(
-            rigfile.build(clock.now_s, chosen.rig.tick_rate_hz, lock=lock),
+            setup,
             rigfile,
-            chosen,
-            Timebase(clock.now_s, clock.wait_until),
-            Operator(
-                ask=(lambda _: True) if yes else ask,
-                say=lambda what: echo(what, err=True),
-                present=not yes,
-            ),
             lambda facts: check_record(rigfile, facts, chosen),
             compared=Compared(known_inertia, before, new_reference),
             made_utc=datetime.now(UTC).isoformat(timespec="seconds"),

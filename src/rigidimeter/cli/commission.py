@@ -21,7 +21,9 @@ from rigidimeter.cli.table_lines import text_table
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.commissioning import Check
+    from rigidimeter.commissioning import Check, Setup
+    from rigidimeter.devices.rigfile import RigFile
+    from rigidimeter.settings import Settings
 
 
 def commission(
@@ -78,10 +80,8 @@ def commission(
     """
     from datetime import UTC, datetime
 
-    from rigidimeter.acquisition.clock import DeadlineClock
-    from rigidimeter.acquisition.processes.realtime_scheduling import prepare_loop_process
-    from rigidimeter.commissioning import Operator, Timebase, record_path, write_record
     from rigidimeter.commissioning import commission as try_rig
+    from rigidimeter.commissioning import record_path, write_record
     from rigidimeter.devices.rigfile import load_rig
     from rigidimeter.settings import load_settings
     from rigidimeter.version import __version__
@@ -98,22 +98,11 @@ def commission(
         raise UserError(
             f"{rig}: is real hardware; name the person responsible for it with --signed-by NAME"
         )
-    operator = Operator(
-        ask=(lambda _: True) if yes else ask,
-        say=lambda what: echo(what, err=True),
-        present=not yes,
-        known_torque_nm=known_torque,
-        known_angle_deg=known_angle,
-    )
-    echo(str(prepare_loop_process()), err=True)
-    clock = DeadlineClock()
-    with rigfile.claim() as lock, interrupted_once(path, "commission again"):
+    known = {"known_torque_nm": known_torque, "known_angle_deg": known_angle}
+    with claimed(rigfile, chosen, path, "commission again", yes, **known) as setup:
         found = try_rig(
-            rigfile.build(clock.now_s, chosen.rig.tick_rate_hz, lock=lock),
+            setup,
             rigfile,
-            chosen,
-            Timebase(clock.now_s, clock.wait_until),
-            operator,
             made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
             software=__version__,
             signed_by=signed_by,
@@ -130,6 +119,37 @@ def commission(
         f"Valid for {what}, its devices and this controller, for "
         f"{chosen.commissioning.validity_days:g} days."
     )
+
+
+@contextlib.contextmanager
+def claimed(
+    rigfile: RigFile,
+    settings: Settings,
+    record: Path,
+    again: str,
+    yes: bool,
+    **known: float | None,
+) -> Iterator[Setup]:
+    """Prepare this process for the loop and claim the rig; give it, not connected yet.
+
+    An interrupt says that `record` was not written, and to do it `again`. With `yes` nobody is
+    asked. `known` is what an `Operator` knows.
+    """
+    from rigidimeter.acquisition.clock import DeadlineClock
+    from rigidimeter.acquisition.processes.realtime_scheduling import prepare_loop_process
+    from rigidimeter.commissioning import Operator, Setup, Timebase
+
+    operator = Operator(
+        ask=(lambda _: True) if yes else _ask,
+        say=lambda what: echo(what, err=True),
+        present=not yes,
+        **known,
+    )
+    echo(str(prepare_loop_process()), err=True)
+    clock = DeadlineClock()
+    with rigfile.claim() as lock, interrupted_once(record, again):
+        rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, lock=lock)
+        yield Setup(rig, settings, Timebase(clock.now_s, clock.wait_until), operator)
 
 
 @contextlib.contextmanager
@@ -186,6 +206,6 @@ def table(checks: Sequence[Check]) -> str:
     return "\n".join(shown)
 
 
-def ask(question: str) -> bool:
+def _ask(question: str) -> bool:
     """Put a question at the terminal; anything but yes is no."""
     return typer.confirm(question, default=False, err=True)

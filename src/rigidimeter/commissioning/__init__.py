@@ -18,7 +18,7 @@ from rigidimeter.commissioning.daily_record import (
     write_daily,
 )
 from rigidimeter.commissioning.sequence import commission
-from rigidimeter.commissioning.trial import Operator, Timebase
+from rigidimeter.commissioning.trial import Operator, Setup, Timebase
 
 __all__ = [
     "Check",
@@ -27,6 +27,7 @@ __all__ = [
     "DailyRecord",
     "Operator",
     "Outcome",
+    "Setup",
     "Timebase",
     "check_record",
     "commission",

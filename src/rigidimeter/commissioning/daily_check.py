@@ -30,11 +30,10 @@ from rigidimeter.commissioning.torque_checks import (
     precision_check,
     sign_check,
 )
-from rigidimeter.commissioning.trial import Operator, Setup, Timebase, stopped_for
-from rigidimeter.devices.base import DeviceError, Rig
+from rigidimeter.commissioning.trial import Setup, stopped_for
+from rigidimeter.devices.base import DeviceError
 from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.guard import Cause
-from rigidimeter.settings import Settings
 
 DELAY_NUMBER = "torque_after_motion_s"
 """The delay in the numbers of a commissioning record."""
@@ -96,11 +95,8 @@ class Compared:
 
 
 def daily_check(
-    rig: Rig,
+    setup: Setup,
     rigfile: RigFile,
-    settings: Settings,
-    time: Timebase,
-    operator: Operator,
     approve: Callable[[Mapping[str, Any]], CommissioningRecord],
     *,
     compared: Compared,
@@ -113,15 +109,9 @@ def daily_check(
 
     Parameters
     ----------
-    rig : Rig
-        Not connected yet.
+    setup : Setup
     rigfile : RigFile
-        Which it was built from.
-    settings : Settings
-        Of the protocol that will run on it.
-    time : Timebase
-        Of the same clock that the drivers have.
-    operator : Operator
+        Which the rig was built from.
     approve : callable
         Takes the facts of the devices and gives the commissioning record that holds for them, or
         refuses with a `UserError`, which passes through.
@@ -129,7 +119,7 @@ def daily_check(
     made_utc, software : str
         For the record.
     """
-    setup, found = Setup(rig, settings, time, operator), Findings()
+    rig, found = setup.rig, Findings()
     commissioned: CommissioningRecord | None = None
     answer: TorqueAnswer | None = None
     name = "devices read back"
@@ -138,7 +128,7 @@ def daily_check(
         facts = rig.configure()
         commissioned = approve(facts)
         name = "devices answer"
-        found.checks += facts_checks(facts, settings)
+        found.checks += facts_checks(facts, setup.settings)
         answer = _try(setup, found, commissioned, compared)
     except DeviceError as error:
         found.checks.append(yes(name, False, "refused", "as commissioned", str(error)))
@@ -158,7 +148,7 @@ def daily_check(
         numbers={name: value for name, value in found.numbers.items() if math.isfinite(value)},
         reference=reference,
         known_inertia_kg_m2=compared.known_inertia_kg_m2,
-        validity_h=settings.commissioning.daily_validity_h,
+        validity_h=setup.limits.daily_validity_h,
         software=software,
         made_utc=made_utc,
     )

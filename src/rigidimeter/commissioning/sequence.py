@@ -35,19 +35,15 @@ from rigidimeter.commissioning.motion_tests import (
 )
 from rigidimeter.commissioning.static_tests import facts_checks
 from rigidimeter.commissioning.stopping import emergency_stop_checks, watchdog_checks
-from rigidimeter.commissioning.trial import Operator, Setup, Timebase
-from rigidimeter.devices.base import DeviceError, Rig
+from rigidimeter.commissioning.trial import Setup
+from rigidimeter.devices.base import DeviceError
 from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.guard import Cause
-from rigidimeter.settings import Settings
 
 
 def commission(
-    rig: Rig,
+    setup: Setup,
     rigfile: RigFile,
-    settings: Settings,
-    time: Timebase,
-    operator: Operator,
     *,
     made_utc: str,
     software: str,
@@ -59,20 +55,14 @@ def commission(
 
     Parameters
     ----------
-    rig : Rig
-        Not connected yet.
+    setup : Setup
+        `settings.commissioning` says what is tried.
     rigfile : RigFile
-        Which it was built from.
-    settings : Settings
-        Of the protocol that will run on it; `settings.commissioning` says what is tried.
-    time : Timebase
-        Of the same clock that the drivers have.
-    operator : Operator
+        Which the rig was built from.
     made_utc, software, signed_by : str
         For the record.
     """
-    setup = Setup(rig, settings, time, operator)
-    found = Findings()
+    rig, found = setup.rig, Findings()
     facts: Mapping[str, Any] = {}
     name, limit = "devices read back", "what the rig file says"
     try:
@@ -89,7 +79,7 @@ def commission(
         rig_digest=rigfile.digest,
         emulated=rigfile.emulated,
         facts=kept_facts(facts),
-        covered=covered(settings),
+        covered=covered(setup.settings),
         checks=tuple(found.checks),
         numbers={name: value for name, value in found.numbers.items() if math.isfinite(value)},
         software=software,

@@ -81,7 +81,18 @@ class Operator:
 
 @dataclass(frozen=True)
 class Setup:
-    """What is tried, with which settings and clock, and by whom."""
+    """What is tried, with which settings and clock, and by whom.
+
+    Parameters
+    ----------
+    rig : Rig
+        Not connected yet.
+    settings : Settings
+        Of the protocol that will run on it.
+    time : Timebase
+        Of the same clock that the drivers have.
+    operator : Operator
+    """
 
     rig: Rig
     settings: Settings

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from rigidimeter.commissioning import CommissioningRecord, Operator, Timebase, commission
+from rigidimeter.commissioning import CommissioningRecord, Operator, Setup, Timebase, commission
 from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, TorqueSample
 from rigidimeter.devices.composed import ComposedRig
 from rigidimeter.devices.rigfile import RigFile
@@ -246,17 +246,16 @@ def commissioned(settings: Settings, fake_rig: Callable[..., FakeRig]) -> Commis
         **faults: Any,
     ) -> CommissioningRecord:
         rig, file, timebase, world = fake_rig(joint, noise_sd_nm, emulated, faults)
+        chosen = settings.model_copy(update={"commissioning": QUICK, **(tables or {})})
+        operator = Operator(
+            ask=lambda question: ask(question, world),
+            present=present,
+            known_torque_nm=known_torque_nm,
+            known_angle_deg=known_angle_deg,
+        )
         return commission(
-            rig,
+            Setup(rig, chosen, timebase, operator),
             file,
-            settings.model_copy(update={"commissioning": QUICK, **(tables or {})}),
-            timebase,
-            Operator(
-                ask=lambda question: ask(question, world),
-                present=present,
-                known_torque_nm=known_torque_nm,
-                known_angle_deg=known_angle_deg,
-            ),
             made_utc="2026-01-01T00:00:00+00:00",
             software="0",
             signed_by=signed_by,

@@ -13,6 +13,7 @@ from rigidimeter.commissioning import (
     Compared,
     DailyRecord,
     Operator,
+    Setup,
     daily_check,
 )
 from rigidimeter.commissioning.daily_check import FIRST, NEW
@@ -49,12 +50,10 @@ def checked(record: Any, settings: Any, fake_rig: Any) -> Any:
                 questions.append(question)
             return consent
 
+        chosen = settings.model_copy(update={"commissioning": QUICK})
         found = daily_check(
-            rig,
+            Setup(rig, chosen, timebase, Operator(ask=ask)),
             file,
-            settings.model_copy(update={"commissioning": QUICK}),
-            timebase,
-            Operator(ask=ask),
             lambda _: commissioned,
             compared=compared or Compared(reference=reference(record)),
             made_utc=MADE,
