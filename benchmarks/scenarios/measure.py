@@ -1,0 +1,75 @@
+"""Analyse the recordings of a scenario, and keep of each what a row of the table needs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+import numpy as np
+from tests.scenarios.catalogue import SCENARIOS
+from tests.scenarios.recordings import without_perturbation
+
+from rigidimeter.records import Fit
+from rigidimeter.study.analysis import Preparation, analyse_prepared
+
+EPOCHS = 4
+METHODS = {"iv": "iv", "bandlimited": "bandlimited", "blind": "bandlimited"}
+"""What is asked for, and the estimator: ``blind`` has no column of the perturbation."""
+
+Kept = dict[str, Any]
+"""One recording by one method: the truth, its fits, the pooled fit."""
+
+
+def measure(
+    names: Sequence[str], recordings: int, methods: Sequence[str], jobs: int
+) -> Iterator[tuple[str, dict[str, list[Kept]]]]:
+    """Yield each scenario with its recordings by method, a scenario at a time."""
+    tasks = [(name, number, tuple(methods)) for name in names for number in range(recordings)]
+    with ProcessPoolExecutor(jobs) as pool:
+        found = map(_one, tasks) if jobs == 1 else pool.map(_one, tasks)
+        for name in names:
+            both = [next(found) for _ in range(recordings)]
+            yield name, {method: [kept[method] for kept in both] for method in methods}
+
+
+def _one(task: tuple[str, int, tuple[str, ...]]) -> dict[str, Kept]:
+    """Simulate one recording and analyse it by each method."""
+    name, number, methods = task
+    scenario = SCENARIOS[name]
+    epochs, truth = scenario.simulated(number, EPOCHS)
+    settings = scenario.analysed_with()
+    known = Preparation(epochs, settings)
+    found = {}
+    for method in methods:
+        hidden = method == "blind"
+        with np.errstate(all="ignore"):
+            analysis = analyse_prepared(
+                Preparation(map(without_perturbation, epochs), settings) if hidden else known,
+                METHODS[method],
+            )
+        found[method] = {
+            "truth": truth.tolist(),
+            "fits": [_fit(fit) for fit in analysis.fits],
+            "pooled": [_fit(fit) for fit in analysis.pooled],
+        }
+    return found
+
+
+def _fit(fit: Fit) -> Kept:
+    """Return the numbers of a fit, and what casts doubt on it."""
+    doubts = {finding.name for finding in fit.findings if finding.level != "note"}
+    if not fit.outcome.included and not doubts:
+        doubts.add(fit.outcome.kind)
+    return {
+        "value": _numbers(fit.value),
+        "low": _numbers(fit.low),
+        "high": _numbers(fit.high),
+        "doubts": sorted(doubts),
+    }
+
+
+def _numbers(values: Iterable[float]) -> list[float | None]:
+    """Return numbers as JSON holds them: none in place of what is not finite."""
+    return [float(f"{value:.6g}") if math.isfinite(value) else None for value in values]

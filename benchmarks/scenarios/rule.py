@@ -1,0 +1,134 @@
+"""One row of the table from its recordings, and whether it keeps the rule.
+
+The answer of a row is wrong if the mean error of J, B or K exceeds 10 %, or if less than 80 % of
+the 95 % intervals hold the truth, in single epochs or pooled. A wrong answer must come with the
+right finding in at least 90 % of the recordings; a right one may be doubted in at most 5 %. Where
+the joint is not one J, B and K, to say so is no false doubt even if their means are right.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+LARGEST_ERROR = 0.10
+LEAST_COVERAGE = 0.80
+LEAST_RAISED = 0.90
+MOST_DOUBTED = 0.05
+
+
+class Answer(NamedTuple):
+    """What estimates were, as shares of the truth, each of shape (3,); NaN without any."""
+
+    bias: Array
+    scatter: Array
+    coverage: Array
+
+    @property
+    def off(self) -> bool:
+        """Whether J, B or K is off; no answer is not."""
+        return bool(np.any(np.abs(self.bias) > LARGEST_ERROR))
+
+    @property
+    def wrong(self) -> bool:
+        """Whether J, B or K is off or its intervals do not hold; no answer is not wrong."""
+        return self.off or bool(np.any(self.coverage < LEAST_COVERAGE))
+
+
+class Row(NamedTuple):
+    """One scenario by one method.
+
+    Attributes
+    ----------
+    epochs, pooled : Answer
+    doubted_epochs, doubted : float
+        Shares of the epochs and of the recordings with a doubt.
+    in_vain : float
+        Share of the recordings with a doubt that is false if the answer is right.
+    raised : float
+        Share of the recordings with a finding that is right for the scenario.
+    shares : dict of str to float
+        In what share of the recordings each finding was.
+    recordings : int
+    """
+
+    epochs: Answer
+    pooled: Answer
+    doubted_epochs: float
+    doubted: float
+    in_vain: float
+    raised: float
+    shares: dict[str, float]
+    recordings: int
+
+    @property
+    def wrong(self) -> bool:
+        """Whether the answer is wrong, in single epochs or pooled."""
+        return self.epochs.wrong or self.pooled.wrong
+
+    @property
+    def breaks(self) -> str:
+        """How the row breaks the rule; empty where it does not."""
+        if not self.wrong:
+            return "" if self.in_vain <= MOST_DOUBTED else "false doubt"
+        if self.raised >= LEAST_RAISED:
+            return ""
+        return "silent, off" if self.epochs.off or self.pooled.off else "silent, too sure"
+
+
+def row(kept: Sequence[dict[str, Any]], right: Sequence[str], other_model: bool = False) -> Row:
+    """Return the row of these recordings.
+
+    Parameters
+    ----------
+    kept : sequence of mapping
+        As `measure` keeps them.
+    right : sequence of str
+        The beginnings of the findings that are right.
+    other_model : bool
+        Whether the joint is not one J, B and K.
+    """
+    truth = np.concatenate([recording["truth"] for recording in kept])
+    fits = [fit for recording in kept for fit in recording["fits"]]
+    pooled = [(recording["pooled"][0], np.mean(recording["truth"], axis=0))
+              for recording in kept if recording["pooled"]]  # fmt: skip
+    found = [
+        {name for fit in (*one["fits"], *one["pooled"]) for name in fit["doubts"]} for one in kept
+    ]
+    said = [{name for name in names if name.startswith(tuple(right))} for names in found]
+    vain = [
+        names - known if other_model else names for names, known in zip(found, said, strict=True)
+    ]
+    counts = Counter(name for names in found for name in names)
+    n = len(kept)
+    return Row(
+        _answer(fits, truth),
+        _answer([fit for fit, _ in pooled], np.array([mean for _, mean in pooled])),
+        float(np.mean([bool(fit["doubts"]) for fit in fits])),
+        float(np.mean([bool(names) for names in found])),
+        float(np.mean([bool(names) for names in vain])),
+        float(np.mean([bool(names) for names in said])),
+        {name: count / n for name, count in counts.most_common()},
+        n,
+    )
+
+
+def _answer(fits: Sequence[dict[str, Any]], truth: Array) -> Answer:
+    if not fits:
+        return Answer(*np.full((3, 3), np.nan))
+    value, low, high = (
+        np.array([fit[key] for fit in fits], dtype=float) for key in ("value", "low", "high")
+    )
+    there = np.isfinite(value).all(axis=1)
+    if not there.any():
+        return Answer(*np.full((3, 3), np.nan))
+    value, low, high, truth = value[there], low[there], high[there], truth[there]
+    error = value / truth - 1.0
+    # An interval that is not known holds nothing.
+    held = (low <= truth) & (truth <= high)
+    return Answer(error.mean(axis=0), error.std(axis=0), held.mean(axis=0))

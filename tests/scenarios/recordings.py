@@ -1,0 +1,116 @@
+"""A set-up of limb, rig and subject becomes the epochs of a recording, with the truth of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from tests.scenarios.motion import ADDED, COURSE_HZ, DAMPING, FINE_HZ, STIFFNESS, run
+from tests.scenarios.perturbations import Perturbation, perturbation_nm
+from tests.scenarios.plant import Controller, Drive, Joint, TorquePath
+from tests.scenarios.sensors import Sensor, kept, newest, recorded, stamp_errors_s, taken
+from tests.scenarios.subject import Subject, courses
+
+from rigidimeter.records import Channel, Epoch
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What really is, which the settings of the analysis need not know.
+
+    `velocity` says whether the velocity is recorded beside the angle.
+    """
+
+    joint: Joint
+    controller: Controller
+    drive: Drive
+    path: TorquePath
+    torque: Sensor
+    motion: Sensor
+    perturbation: Perturbation
+    subject: Subject
+    velocity: bool = True
+
+
+class Simulated(NamedTuple):
+    """Epochs and what their J, B and K were, shape (epochs, 3): means where they changed."""
+
+    epochs: list[Epoch]
+    truth: Array
+
+
+def simulate(setup: Setup, n_epochs: int, seed: np.random.SeedSequence) -> Simulated:
+    """Simulate the epochs of one recording."""
+    both = [
+        _epoch(setup, number, np.random.default_rng(child))
+        for number, child in enumerate(seed.spawn(n_epochs))
+    ]
+    return Simulated([epoch for epoch, _ in both], np.array([truth for _, truth in both]))
+
+
+def without_perturbation(epoch: Epoch) -> Epoch:
+    """Return the epoch as a file without a column of the perturbation holds it."""
+    channels = {k: v for k, v in epoch.channels.items() if k != "perturbation_nm"}
+    return Epoch(epoch.source, epoch.label, channels, epoch.condition, epoch.task)
+
+
+def _epoch(setup: Setup, number: int, rng: np.random.Generator) -> tuple[Epoch, Array]:
+    asked, tick_rate_hz = setup.perturbation, setup.controller.tick_rate_hz
+    perturbation = perturbation_nm(asked, tick_rate_hz)
+    ticks = perturbation.size
+    course = courses(setup.subject, asked.duration_s, number, rng)
+    torque_steps = taken(setup.torque, asked.duration_s, rng)
+    which = newest(torque_steps, setup.torque, tick_rate_hz, ticks)
+    at_ms = np.arange(course.shape[1]) / COURSE_HZ
+    added = setup.torque.noise * rng.standard_normal(torque_steps.size)
+    added += np.interp(torque_steps / FINE_HZ, at_ms, course[ADDED])
+    angle, velocity, torque, command = run(
+        setup.joint,
+        setup.drive,
+        setup.path,
+        setup.controller,
+        course,
+        perturbation,
+        np.where(which >= 0, torque_steps[which], -1),
+        added[which],
+    )
+    channels = [
+        _channel("torque_nm", torque[torque_steps] + added, torque_steps, setup.torque, rng)
+    ]
+    channels += _motion(setup, angle, velocity, rng)
+    tick_s = np.arange(ticks) / tick_rate_hz
+    channels.append(Channel("velocity_command_rad_s", tick_s, command))
+    channels.append(Channel("perturbation_nm", tick_s, perturbation))
+    epoch = Epoch(
+        source="simulated elsewhere",
+        label=str(number),
+        channels={channel.name: channel for channel in channels},
+        condition="OFF",
+        task="prbs",
+        excitation_hz=asked.band_hz,
+        virtual=True,
+    )
+    J, B, K = setup.joint.inertia_kg_m2, setup.joint.damping_nm_s_rad, setup.joint.stiffness_nm_rad
+    return epoch, np.array([J, B * course[DAMPING].mean(), K * course[STIFFNESS].mean()])
+
+
+def _channel(
+    name: str, values: Array, steps: NDArray[np.int64], sensor: Sensor, rng: np.random.Generator
+) -> Channel:
+    keep, errors = kept(sensor, steps.size, rng), stamp_errors_s(sensor, steps.size, rng)
+    return recorded(name, values, steps, sensor, sensor.step, keep, errors)
+
+
+def _motion(setup: Setup, angle: Array, velocity: Array, rng: np.random.Generator) -> list[Channel]:
+    sensor = setup.motion
+    steps = taken(sensor, setup.perturbation.duration_s, rng)
+    keep, errors = kept(sensor, steps.size, rng), stamp_errors_s(sensor, steps.size, rng)
+    both = [("angle_rad", angle, sensor.step), ("velocity_rad_s", velocity, sensor.rate_step)]
+    return [
+        recorded(name, values[steps], steps, sensor, step, keep, errors)
+        for name, values, step in both[: 2 if setup.velocity else 1]
+    ]
