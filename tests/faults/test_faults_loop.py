@@ -326,7 +326,10 @@ def test_fault_20_exception_that_stays(rig, tmp_path, measured):
 
 
 @pytest.mark.parametrize("rig", RIGS)
-def test_fault_20_interrupt(rig, tmp_path, measured):
+def test_fault_20_interrupt(rig, tmp_path, measured, request):
+    # Whoever started the tests may have had it ignored; here it must raise in this process.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     with bench(rig) as made:
         trial = run(made, tmp_path / "s", lambda: os.kill(os.getpid(), signal.SIGINT))
         assert trial.error is None
