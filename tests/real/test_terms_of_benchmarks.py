@@ -54,9 +54,9 @@ def test_the_axis_has_its_published_friction_in_each_direction(emps):
         assert abs(fit[term].value - value) < 2 * sd, term
 
 
-@pytest.mark.parametrize(("name", "least"), [("z_df", 94.0), ("z_df2", 94.0), ("z_pf", 88.0)])
+@pytest.mark.parametrize(("name", "least"), [("z_df", 91.0), ("z_df2", 93.5), ("z_pf", 86.5)])
 @pytest.mark.parametrize("reflex", ["reflex-fir+", "reflex-second-order+"])
-def test_a_reflex_predicts_the_half_it_has_not_seen(shared_data, name, least, reflex):
+def test_a_reflex_predicts_blocks_that_it_has_not_seen(shared_data, name, least, reflex):
     motion = ankle(shared_data, name)
     compared = compare_models(motion, [JBK.split(","), f"{JBK},{reflex}".split(",")], ANKLE_BAND_HZ)
     plain, with_reflex = compared.rows
@@ -76,7 +76,7 @@ def test_the_wrong_direction_and_no_reflex_show_themselves(shared_data):
     print([row.held_out_vaf_percent for row in compared.rows])
     assert plain.fit is not None
     assert right.fit is not None
-    assert wrong.held_out_vaf_percent < 75.0
+    assert wrong.held_out_vaf_percent < 70.0
     assert right.held_out_vaf_percent > wrong.held_out_vaf_percent + 13.0
     ratio = plain.fit["stiffness"].value / right.fit["stiffness"].value
     print("K without / with", ratio)

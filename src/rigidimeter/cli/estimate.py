@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
@@ -13,7 +12,7 @@ import typer
 from rigidimeter.cli.inputs import analyse_recordings, keep_inputs
 from rigidimeter.cli.options import CsvOption, JsonOption, Recordings, reads_recordings
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.table_lines import number_text, text_table, with_error
+from rigidimeter.cli.table_lines import number_text, text_table, with_error, wrapped
 
 if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Score
@@ -61,14 +60,10 @@ def estimate_lines(analysis: Analysis) -> list[str]:
     return [line for block in blocks if (lines := block(analysis)) for line in (*lines, "")][:-1]
 
 
-def _wrapped(text: str, indent: str = "") -> list[str]:
-    return textwrap.wrap(text, 100, subsequent_indent=indent + "  ", initial_indent=indent)
-
-
 def _method(analysis: Analysis) -> list[str]:
     if not analysis.method_reason:
         return []
-    return _wrapped(f"Method {analysis.method}: {analysis.method_reason}.")
+    return wrapped(f"Method {analysis.method}: {analysis.method_reason}.")
 
 
 def _delays(analysis: Analysis) -> list[str]:
@@ -82,9 +77,9 @@ def _delays(analysis: Analysis) -> list[str]:
                 f"Torque {1e3 * abs(delay.delay_s):.3g} ± {1e3 * delay.delay_s_se:.2g} ms {side} "
                 f"than the motion in {delay.source}: {done}."
             )
-            lines += _wrapped(text)
+            lines += wrapped(text)
         elif delay.remark and any(fit.source == delay.source for fit in analysis.fits):
-            lines += _wrapped(f"{delay.source}: {delay.remark}.")
+            lines += wrapped(f"{delay.source}: {delay.remark}.")
     return lines
 
 
@@ -135,10 +130,10 @@ def _findings(analysis: Analysis) -> list[str]:
         if not fits:
             continue
         where = "1 epoch" if len(fits) == 1 else f"{len(fits)} epochs"
-        lines += _wrapped(
+        lines += wrapped(
             f"{first.level}: {where} of {len(analysis.fits)}, first epoch {fits[0].epoch}: "
             f"{first.text}. Remedy: {first.remedy}.",
-            indent=" ",
+            " ",
         )
     return ["What the checks found (the JSON file has all of it)", *lines] if lines else []
 

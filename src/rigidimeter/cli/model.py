@@ -10,7 +10,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption, Recordings, reads_recordings
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.table_lines import Rows, text_table, with_error
+from rigidimeter.cli.table_lines import Rows, text_table, with_error, wrapped
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 USUAL = "inertia,damping,stiffness"
 COMPARED = f"{USUAL},reflex,cubic,directional-damping,coulomb"
-_HEADING = ("", "parameters", "VAF %", "held out", "AIC", "BIC", "white p", "input p", "model")
+_HEADING = (
+    *("", "parameters", "VAF %", "held out, 95 %", "AIC", "BIC", "white p", "input p", "model"),
+)
 
 
 @reads_recordings
@@ -37,9 +39,9 @@ def model(
         bool,
         typer.Option(
             "--compare",
-            help="Fit each model to the first half of an epoch, judge it on the second, and "
-            "recommend one. With one --terms, try J, B and K alone, with each further term, and "
-            "with all terms.",
+            help="Let each model predict blocks of an epoch that it has not seen, and recommend "
+            "one. With one --terms, try J, B and K alone, with each further term, and more beside "
+            "the best as long as they predict better.",
         ),
     ] = False,
     json_out: JsonOption = None,
@@ -47,7 +49,8 @@ def model(
     """Fit the torque as a sum of terms by name, and find which terms it needs.
 
     Recordings are read as by `estimate`. A band from 0 Hz (--band-hz 0 40) keeps the mean of the
-    torque, which offset and coulomb need. The exit status is 1 if any input was bad.
+    torque, which offset and coulomb need. Each epoch passes the checks of `estimate` first. The
+    exit status is 1 if any input was bad, or if no model is recommended for an epoch.
 
     \b
     For example:
@@ -65,7 +68,8 @@ def model(
             f"--method {recordings.method}: terms are fitted only with bandlimited; leave it out"
         )
     named = [parse_terms(text) for text in terms or [COMPARED if compare else USUAL]]
-    models = candidates(named[0]) if compare and len(named) == 1 else named
+    grow = compare and len(named) == 1
+    models = candidates(named[0]) if grow else named
     band_hz = recordings.band_hz
     if band_hz is not None and band_hz[0] == 0:
         if not band_hz[1] > 0:
@@ -78,7 +82,7 @@ def model(
     keep_inputs((json_out,), recordings.paths)
     read = recordings.read()
     say(read.notices)
-    found = model_recording(read, models, compare=compare, high_hz=high_hz)
+    found = model_recording(read, models, compare=compare, grow=grow, high_hz=high_hz)
     for each in found:
         problems = () if compare else each.unfitted
         for problem in problems or ((each.problem,) if each.problem else ()):
@@ -95,17 +99,23 @@ def _lines(found: ModelledEpoch) -> list[str]:
     low, high = found.models.band_hz
     compared = found.models.compared
     heading = f"{found.epoch.name}, {low:.4g} to {high:.4g} Hz"
+    findings = [
+        line
+        for finding in found.models.findings
+        for line in wrapped(f"{finding.level}: {finding.text}. Remedy: {finding.remedy}.", "  ")
+    ]
     if not found.compared:
-        return [heading, *(line for row in compared.rows for line in _fit_lines(row))]
+        fits = (line for row in compared.rows for line in _fit_lines(row))
+        return [heading, *fits, *findings]
     recommended = compared.recommended
     shown = _fit_lines(recommended) if recommended is not None else []
-    return [heading, *_table(compared), *shown]
+    return [heading, *_table(compared), *shown, *findings]
 
 
 def _table(compared: Comparison) -> list[str]:
     rows: Rows = [_HEADING]
     for row in compared.rows:
-        name = "+".join(row.terms)
+        name = row.name
         if row.fit is None:
             rows.append(("", *[""] * 7, f"{name}: {row.problem}"))
             continue
@@ -113,15 +123,23 @@ def _table(compared: Comparison) -> list[str]:
         numbers = (
             f"{fit.n_parameters}",
             f"{fit.vaf_percent:.2f}",
-            f"{row.held_out_vaf_percent:.2f}",
+            _held_out(row),
             f"{fit.aic:.1f}",
             f"{fit.bic:.1f}",
             f"{fit.test.ljung_box_p:.2g}",
             f"{fit.test.input_p:.2g}",
         )
         rows.append(("*" if row is compared.recommended else "", *numbers, name))
-    verdict = "none is recommended" if compared.recommended is None else "recommended"
-    return [*text_table(rows, "<>>>>>>><"), f"  {verdict}: {compared.reason}"]
+    pushing = [f"  {row.name}: {row.problem}" for row in compared.rows if row.fit and row.problem]
+    verdict = "no model is recommended" if compared.recommended is None else "recommended"
+    lines = wrapped(f"{verdict}: {compared.reason}", "  ")
+    return [*text_table(rows, "<>>>>>>><"), *pushing, *lines]
+
+
+def _held_out(row: ModelRow) -> str:
+    if row.held_out is None:
+        return ""
+    return "{:.2f} [{:.2f}, {:.2f}]".format(*row.held_out)
 
 
 def _fit_lines(row: ModelRow) -> list[str]:
@@ -141,4 +159,9 @@ def _fit_lines(row: ModelRow) -> list[str]:
         f"  {'+'.join(row.terms)}, VAF {fit.vaf_percent:.2f} %",
         *text_table(rows, "<><", "    "),
         *(f"    {remark}" for remark in fit.remarks),
+        *(
+            f"    {one.term} from what no linear loop explains: "
+            f"{with_error(one.value, one.standard_error, '.5g')} {one.unit}"
+            for one in row.beyond
+        ),
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterable, Sequence
 
 Rows = list[tuple[str, ...]]
@@ -46,3 +47,8 @@ def with_error(value: float, standard_error: float, digits: str) -> str:
     """Return a number ± its standard error, or alone where a method gives no error."""
     shown = number_text(value, digits)
     return shown if math.isnan(standard_error) else f"{shown} ±{standard_error:8.2g}"
+
+
+def wrapped(text: str, indent: str = "") -> list[str]:
+    """Return a sentence as lines of at most 100 characters, the later ones indented further."""
+    return textwrap.wrap(text, 100, subsequent_indent=indent + "  ", initial_indent=indent)

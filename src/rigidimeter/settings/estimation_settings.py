@@ -78,6 +78,7 @@ class DiagnosticLevels(Section):
     coherence: Level = "doubt"
     band_share: Level = "doubt"
     imposed_sinusoid: Level = "exclude"
+    static_torque: Level = "exclude"
     residual_whiteness: Level = "note"
     residual_perturbation: Level = "doubt"
     lack_of_fit: Level = "doubt"
@@ -109,6 +110,7 @@ class DiagnosticsSettings(Section):
     coherence_least: float = quantity(0.5, "1", 0.0, 1.0)
     band_share_least_percent: float = quantity(50.0, "%", 0.0, 100.0)
     single_frequency_most_percent: float = quantity(85.0, "%", 1.0, 100.0)
+    static_torque_least_percent: float = quantity(0.5, "%", 0.0, 100.0)
     residual_flatness_least: float = quantity(0.7, "1", 0.0, 1.0)
     residual_perturbation_most_percent: float = quantity(10.0, "%", 0.0, 100.0)
     lack_of_fit_most_percent: float = quantity(2.0, "%", 0.0, 100.0)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from rigidimeter.errors import UserError
-from rigidimeter.estimation.terms import EpochModels, TermsFit, model_epoch
+from rigidimeter.estimation.epoch_models import EpochModels, model_epoch
+from rigidimeter.estimation.terms import ModelRow, TermsFit
 from rigidimeter.recording import Recording
 from rigidimeter.records import Epoch
 from rigidimeter.study.analysis import Preparation
@@ -43,13 +45,10 @@ class ModelledEpoch:
 
     @property
     def failed(self) -> bool:
-        """Whether nothing could be fitted, or not everything that was asked for by its terms."""
+        """Whether no model is recommended, or not everything asked for by its terms was fitted."""
         if self.models is None:
             return True
-        n_unfitted = len(self.unfitted)
-        return n_unfitted == len(self.models.compared.rows) or (
-            n_unfitted > 0 and not self.compared
-        )
+        return self.models.compared.recommended is None if self.compared else bool(self.unfitted)
 
 
 def model_recording(
@@ -57,6 +56,7 @@ def model_recording(
     models: Sequence[Sequence[str]],
     *,
     compare: bool = False,
+    grow: bool = False,
     high_hz: float | None = None,
 ) -> tuple[ModelledEpoch, ...]:
     """Fit models to each perturbed epoch of a recording, or compare them.
@@ -66,7 +66,7 @@ def model_recording(
     recording : Recording
     models : sequence of sequences of str
         The terms of each.
-    compare, high_hz
+    compare, grow, high_hz
         As for `model_epoch`.
 
     Raises
@@ -78,7 +78,7 @@ def model_recording(
     for prepared in Preparation(recording.epochs, recording.settings).perturbed():
         epoch = prepared.epoch
         try:
-            fits = model_epoch(epoch, models, recording.settings, compare=compare, high_hz=high_hz)
+            fits = model_epoch(prepared, models, compare=compare, grow=grow, high_hz=high_hz)
         except ValueError as error:
             found.append(ModelledEpoch(epoch, None, str(error), compare))
         else:
@@ -111,20 +111,26 @@ def _epoch_values(found: ModelledEpoch) -> dict[str, Any]:
         "outcome": epoch.closed.kind,
         "reason": epoch.closed.reason,
         "band_hz": list(found.models.band_hz),
+        "findings": [vars(finding) for finding in found.models.findings],
     }
     if found.compared:
         chosen = compared.recommended
         values |= {"recommended": chosen and list(chosen.terms), "why": compared.reason}
-    values["models"] = [
-        {
-            "terms": list(row.terms),
-            "problem": row.problem,
-            "held_out_vaf_percent": row.held_out_vaf_percent,
-            **(_fit_values(row.fit) if row.fit is not None else {}),
-        }
-        for row in compared.rows
-    ]
+    values["models"] = [_row_values(row) for row in compared.rows]
     return values
+
+
+def _row_values(row: ModelRow) -> dict[str, Any]:
+    low, high = row.held_out[1:] if row.held_out is not None else (math.nan, math.nan)
+    return {
+        "terms": list(row.terms),
+        "problem": row.problem,
+        "held_out_vaf_percent": row.held_out_vaf_percent,
+        "held_out_vaf_low_percent": low,
+        "held_out_vaf_high_percent": high,
+        "beyond_linear": [vars(one) for one in row.beyond],
+        **(_fit_values(row.fit) if row.fit is not None else {}),
+    }
 
 
 def _fit_values(fit: TermsFit) -> dict[str, Any]:

@@ -95,3 +95,50 @@ def test_an_unknown_term_is_named_once(rigidimeter, joint):
     assert ran.status == 1
     assert ran.err.count("foo") == 1
     assert "there is no term 'foo'; known: inertia," in ran.err
+
+
+def _unrelated(angle, rng):
+    """A torque of 0.5 N·m that has nothing to do with the motion."""
+    return np.convolve(rng.standard_normal(angle.size + 19), np.full(20, 0.1), "valid")
+
+
+def _gravity(angle, rng):
+    """What a controller adds to carry the arm: a function of the angle, never measured."""
+    del rng
+    return 1.2 * np.sin(angle + 0.4)
+
+
+def _steps(angle, rng):
+    """A train of steps, one a second."""
+    levels = np.repeat(rng.choice([-0.5, 0.0, 0.5], 40), 200)
+    return levels[: angle.size] + 0.005 * rng.standard_normal(angle.size)
+
+
+@pytest.mark.parametrize(
+    ("torque", "words"),
+    [
+        (_unrelated, "none of these models"),
+        (_gravity, "the torque was computed from the angle"),
+        (_steps, "none of these models"),
+    ],
+)
+def test_a_torque_that_is_no_joints_has_no_model(rigidimeter, joint, tmp_path, torque, words):
+    rng = np.random.default_rng(7)
+    time_s, angle, _ = np.loadtxt(joint, delimiter=",", skiprows=1).T
+    values = np.column_stack([time_s, angle, torque(angle, rng)])
+    table = tmp_path / "other.csv"
+    np.savetxt(table, values, "%.9g", ",", header="time_s,angle_rad,torque_nm", comments="")
+    ran = rigidimeter("model", table, "--compare", "--band-hz", 0.15, 15, "--json", tmp_path / "m")
+    assert ran.status == 1
+    (epoch,) = json.loads((tmp_path / "m").read_text())["epochs"]
+    assert epoch["recommended"] is None
+    assert words in epoch["why"]
+    assert words in " ".join(ran.out.split())
+
+
+def test_the_checks_of_an_estimate_are_shown(rigidimeter, joint, tmp_path):
+    ran = rigidimeter("model", joint, "--band-hz", 0.15, 15, "--json", tmp_path / "m.json")
+    assert ran.status == 0, ran.err
+    (epoch,) = json.loads((tmp_path / "m.json").read_text())["epochs"]
+    assert "residual_whiteness" in [finding["name"] for finding in epoch["findings"]]
+    assert "Remedy:" in ran.out

@@ -15,6 +15,7 @@ from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
+from rigidimeter.estimation.diagnostics.torque_checks import TORQUE_CHECKS
 from rigidimeter.estimation.methods import method_named
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array
@@ -24,6 +25,7 @@ from rigidimeter.units import rad_from_deg
 CHECKS: list[Check] = [
     *CHANNEL_CHECKS,
     *EXCITATION_CHECKS,
+    *TORQUE_CHECKS,
     *RESIDUAL_CHECKS,
     *MOVEMENT_CHECKS,
     *PARAMETER_CHECKS,

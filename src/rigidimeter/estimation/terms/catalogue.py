@@ -38,12 +38,15 @@ class Term:
         What it is, in one sentence.
     regressor : callable
         From wide-band signals to an array of shape (n,).
+    resists : bool
+        Whether a negative coefficient would push: it is then something else than the term.
     """
 
     name: str
     unit: str
     meaning: str
     regressor: Callable[[Signals], Array]
+    resists: bool = False
 
 
 TERMS: list[Term] = [
@@ -60,6 +63,7 @@ TERMS: list[Term] = [
         "N·m",
         "Dry friction: the same at any speed, against it.",
         lambda m: np.sign(m.velocity_rad_s),
+        resists=True,
     ),
     Term(
         "quadratic",
@@ -102,12 +106,14 @@ TERMS: list[Term] = [
         "N·m",
         "Dry friction while it moves toward positive angle.",
         lambda m: np.where(m.velocity_rad_s > 0, 1.0, 0.0),
+        resists=True,
     ),
     Term(
         "coulomb-",
         "N·m",
         "Dry friction while it moves toward negative angle.",
         lambda m: np.where(m.velocity_rad_s < 0, -1.0, 0.0),
+        resists=True,
     ),
 ]
 """Terms that are linear in their coefficient. Code from outside the package may append its own."""

@@ -1,79 +1,100 @@
-"""Which model: fitted on the first part of a recording, judged on the rest.
+"""Which model: judged by what it predicts of blocks that it has not seen.
 
-More terms always fit better; they predict better only if they are there. Among the models whose
-held-out residual variance is within 5 % of the least, the one with the fewest parameters is
-recommended.
+More terms always fit better; they predict better only if they are there. And in a closed loop the
+subject's own torque moves the joint, so that a delayed velocity predicts it in every block though
+the joint has no reflex. Models are therefore compared by what no linear filter of the motion
+predicts (`beyond_linear`); where they differ in linear terms alone, by the torque itself.
+
+A model is recommended if its prediction is better than that of an offset alone, by a margin and
+with an interval for all comparisons together; a larger one instead of a smaller one likewise. A
+reflex or a friction that pushes, however well it predicts, is something else and not chosen.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
 
-from rigidimeter.estimation.bandlimited import band_hz, bandlimited_signals
-from rigidimeter.estimation.diagnostics import reconstructed_torque_nm
-from rigidimeter.estimation.diagnostics.movement_checks import voluntary_torque
-from rigidimeter.estimation.methods import fit_epoch
-from rigidimeter.estimation.screening import before_fit
-from rigidimeter.estimation.signals import Signals, motion_channels
-from rigidimeter.estimation.terms.catalogue import REFLEXES, parse_terms
+import numpy as np
+
+from rigidimeter.estimation.signals import Array, Signals
+from rigidimeter.estimation.terms.beyond_linear import beyond_linear
+from rigidimeter.estimation.terms.catalogue import GROUPS, REFLEXES, parse_terms
+from rigidimeter.estimation.terms.held_out import Gain, block_errors, gain
 from rigidimeter.estimation.terms.reflex import REFLEX_KINDS
-from rigidimeter.estimation.terms.term_fit import TermsFit, fit_terms, predicted_vaf_percent
-from rigidimeter.estimation.terms.wideband import wideband_signals
-from rigidimeter.records import Epoch
-from rigidimeter.settings import USABLE_FRACTION_OF_RATE, Settings
+from rigidimeter.estimation.terms.regressors import Design
+from rigidimeter.estimation.terms.term_fit import TermsFit, fit_terms
+from rigidimeter.estimation.terms.term_gains import TermGain, directed, pushes
 
 BASE = ("inertia", "damping", "stiffness")
 
-NEARLY_AS_GOOD = 1.05
-"""Held-out residual variance, over the least, up to which fewer parameters are preferred."""
+LEAST_PERCENT = 5.0
+"""Of the torque's variance, that a model must predict beyond an offset."""
 
-SMALL_P = 0.01
+MARGIN_PERCENT = 1.0
+"""Of the error of a smaller model, that a larger one must predict."""
 
 
 @dataclass(frozen=True)
 class ModelRow:
-    """One model: its fit, and where models are compared the VAF of what it predicts.
+    """One model: its fit to all of the data, and where models are compared what it predicts.
 
-    `fit` is None where the model could not be fitted; `problem` then says why.
+    Attributes
+    ----------
+    terms : tuple of str
+    fit : TermsFit or None
+        None where the model could not be fitted; `problem` then says why.
+    held_out : Gain or None
+        The share of the torque's variance that it predicts beyond an offset, in blocks that it has
+        not seen.
+    beyond : tuple of TermGain
+        The terms that are not linear in the motion.
+    problem : str
+        Why it could not be fitted, or is not to be chosen.
     """
 
     terms: tuple[str, ...]
     fit: TermsFit | None
-    held_out_vaf_percent: float = math.nan
+    held_out: Gain | None = None
+    beyond: tuple[TermGain, ...] = ()
     problem: str = ""
+    errors: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
+    beyond_errors: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
+
+    @property
+    def held_out_vaf_percent(self) -> float:
+        """The share that it predicts, NaN where models are not compared."""
+        return math.nan if self.held_out is None else self.held_out.percent
+
+    @property
+    def name(self) -> str:
+        """Its terms in one word."""
+        return "+".join(self.terms)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A row for each model, the recommended one among them (None if no model could be fitted)."""
+    """A row for each model, the recommended one among them (None where there is none)."""
 
     rows: tuple[ModelRow, ...]
     recommended: ModelRow | None
     reason: str
 
 
-class EpochModels(NamedTuple):
-    """The models of one epoch, and the band they were fitted in."""
-
-    band_hz: tuple[float, float]
-    compared: Comparison
-
-
 def candidates(terms: Sequence[str]) -> list[tuple[str, ...]]:
-    """Return models from J, B, K up to the named terms: alone, with each further one, with all.
+    """Return models from J, B, K up to one further term: alone, and with each of the others.
 
-    A reflex named without its dynamics is tried with each.
+    A reflex named without its dynamics is tried with each; of two halves beside their whole one is
+    enough.
     """
     terms = parse_terms(terms)
     base = tuple(name for name in terms if name in (*BASE, "offset")) or terms[:1]
-    more = [name for name in terms if name not in base]
+    halves = [half for group in GROUPS.values() for half in group if half[:-1] in terms]
+    more = [name for name in terms if name not in base and not (name in halves and "-" in name)]
     plain = [name for name in more if name.rstrip("+-") == "reflex"]
     more += [name.replace("reflex", kind) for name in plain for kind in REFLEX_KINDS[1:]]
-    steps = [base, *((*base, name) for name in more), terms]
-    return list(dict.fromkeys(steps))
+    return list(dict.fromkeys([base, *((*base, name) for name in more)]))
 
 
 def compare_models(
@@ -81,8 +102,10 @@ def compare_models(
     models: Sequence[Sequence[str]],
     band_hz: tuple[float, float],
     trim_s: float = 1.0,
+    *,
+    grow: bool = False,
 ) -> Comparison:
-    """Fit each model on the first half, predict the second, and recommend one.
+    """Let each model predict blocks that it has not seen, and recommend one.
 
     Parameters
     ----------
@@ -91,17 +114,24 @@ def compare_models(
     models : sequence of sequences of str
         The terms of each.
     band_hz, trim_s
-        As for `fit_terms`; the cut between the halves is trimmed on both sides.
+        As for `fit_terms`; as long is left out at each side of a block.
+    grow : bool
+        Add further terms to the best model, one by one, as long as that predicts better.
     """
-    half = round(0.5 * motion.time_s.size)
-    first, rest = _part(motion, slice(0, half)), _part(motion, slice(half, None))
-    rows = []
-    for model in models:
-        row = fit_model(first, model, band_hz, trim_s)
-        if row.fit is not None:
-            row = replace(row, held_out_vaf_percent=predicted_vaf_percent(row.fit, rest))
-        rows.append(row)
-    return Comparison(tuple(rows), *_recommend(rows))
+    judge = _Judge(motion, band_hz, trim_s, len(models))
+    rows = [judge.row(model) for model in models]
+    chosen, reason = judge.recommend(rows)
+    single = dict.fromkeys(name for model in models for name in parse_terms(model))
+    while grow and chosen is not None and chosen.beyond:
+        known = {frozenset(row.terms) for row in rows}
+        bases = {_base(name) for name in chosen.terms}
+        further = [(*chosen.terms, name) for name in single if _base(name) not in bases]
+        new = [judge.row(model) for model in further if frozenset(model) not in known]
+        rows += new
+        smaller, (chosen, reason) = chosen, judge.recommend(rows)
+        if chosen is smaller:
+            break
+    return Comparison(tuple(rows), chosen, reason)
 
 
 def fit_model(
@@ -115,109 +145,118 @@ def fit_model(
     return ModelRow(fit.terms, fit)
 
 
-def model_epoch(
-    epoch: Epoch,
-    models: Sequence[Sequence[str]],
-    settings: Settings,
-    *,
-    compare: bool = False,
-    high_hz: float | None = None,
-) -> EpochModels:
-    """Fit models to an epoch, or compare them.
+class _Judge:
+    """The blocks of one epoch, and how well each model predicts them."""
 
-    Parameters
-    ----------
-    epoch : Epoch
-        With torque and motion on one clock.
-    models : sequence of sequences of str
-        The terms of each.
-    settings : Settings
-    compare : bool
-        Fit to the first half, predict the second and recommend a model; else fit to all of it.
-    high_hz : float, optional
-        The upper edge of a band that begins at 0 Hz, instead of the band of the settings.
+    def __init__(
+        self, motion: Signals, band_hz: tuple[float, float], trim_s: float, models: int
+    ) -> None:
+        self._comparisons = max(models - 1, 1)
+        self._motion, self._band_hz, self._trim_s = motion, band_hz, trim_s
+        self._beyond = beyond_linear(motion, band_hz, trim_s)
+        self._target = self._beyond.series(self._beyond.torque)
 
-    Raises
-    ------
-    ValueError
-        If the epoch cannot be used; the text says why.
-    """
-    estimation = settings.estimation
-    obstacle = before_fit(epoch, estimation)
-    if obstacle:
-        raise ValueError(obstacle)
-    band = band_hz(epoch, estimation)
-    if high_hz is not None:
-        used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
-        slowest_hz = min(channel.rate_hz for channel in used)
-        band = (0.0, min(high_hz, USABLE_FRACTION_OF_RATE * slowest_hz))
-    motion = wideband_signals(epoch, band[1])
-    if not compare:
-        rows = (fit_model(motion, model, band, estimation.trim_s) for model in models)
-        return EpochModels(band, Comparison(tuple(rows), None, ""))
-    compared = compare_models(motion, models, band, estimation.trim_s)
-    pushes = _voluntary_torque(epoch, settings)
-    if pushes:
-        compared = replace(compared, recommended=None, reason=pushes)
-    return EpochModels(band, compared)
-
-
-def _voluntary_torque(epoch: Epoch, settings: Settings) -> str:
-    """Return why held-out data cannot choose a model, or an empty text.
-
-    In the closed loop the subject's own torque is in the motion in both halves alike, so a term
-    that fits it predicts it too, and says nothing of the joint.
-    """
-    if "perturbation_nm" not in epoch.channels:
-        return ""
-    fit = fit_epoch(epoch, "iv", settings)
-    if fit.n_samples == 0:
-        return ""
-    signals = bandlimited_signals(epoch, settings.estimation)
-    own_nm = reconstructed_torque_nm(signals, fit.value)
-    look = voluntary_torque(own_nm, signals, settings.diagnostics)
-    if not look.failed:
-        return ""
-    return (
-        f"{look.value:.2g} % of the torque's variance is the subject's own, which the loop puts "
-        "into the motion too; a term that fits it predicts it in both halves and says nothing "
-        "about the joint"
-    )
-
-
-def _part(motion: Signals, part: slice) -> Signals:
-    return replace(
-        motion,
-        time_s=motion.time_s[part],
-        torque_nm=motion.torque_nm[part],
-        acceleration_rad_s2=motion.acceleration_rad_s2[part],
-        velocity_rad_s=motion.velocity_rad_s[part],
-        angle_rad=motion.angle_rad[part],
-    )
-
-
-def _recommend(rows: Sequence[ModelRow]) -> tuple[ModelRow | None, str]:
-    fitted = [(row, row.fit) for row in rows if row.fit is not None]
-    if not fitted:
-        return None, "no model could be fitted"
-    best, _ = max(fitted, key=lambda pair: pair[0].held_out_vaf_percent)
-    least = 100.0 - best.held_out_vaf_percent
-    good = [
-        pair for pair in fitted if 100.0 - pair[0].held_out_vaf_percent <= NEARLY_AS_GOOD * least
-    ]
-    chosen, fit = min(good, key=lambda pair: (pair[1].n_parameters, pair[1].bic))
-    named = "+".join(chosen.terms)
-    reason = f"{named}: predicts {chosen.held_out_vaf_percent:.2f} % of the part it has not seen"
-    if chosen is not best:
-        reason += (
-            f", and {'+'.join(best.terms)} with {best.held_out_vaf_percent:.2f} % does not "
-            "justify its additional parameters"
+    def row(self, model: Sequence[str]) -> ModelRow:
+        """Fit one model to all, let it predict each block, and look at its signs."""
+        names = parse_terms(model)
+        decided, solved = directed(self._beyond, names)
+        row = fit_model(self._motion, decided, self._band_hz, self._trim_s)
+        if row.fit is None:
+            return replace(row, terms=names)
+        bent = self._beyond.not_linear(decided)
+        grid = [self._beyond.series(self._beyond.columns(bent, q)) for q in self._beyond.grid(bent)]
+        design = Design(self._motion, decided, self._band_hz, self._trim_s)
+        target, columns = design.torque_nm[design.keep], design.columns(row.fit.nonlinear)
+        rate_hz, gap_s = design.rate_hz, self._trim_s
+        errors = block_errors(target, [columns], rate_hz, gap_s)
+        return replace(
+            row,
+            held_out=gain(block_errors(target, [], rate_hz, gap_s, mean=True), errors),
+            beyond=solved,
+            problem="; ".join(filter(None, map(pushes, solved))),
+            errors=errors,
+            beyond_errors=block_errors(self._target, grid, self._beyond.series_rate_hz, gap_s),
         )
-    elif len(fitted) > 1:
-        second = max(row.held_out_vaf_percent for row, _ in fitted if row is not chosen)
-        reason += f", the next best {second:.2f} %"
-    if fit.test.input_p < SMALL_P:
-        reason += "; its residual still depends on the velocity, so a term may be missing"
-    elif not any(name in REFLEXES for name in chosen.terms) and fit.test.ljung_box_p < SMALL_P:
-        reason += "; its residual is coloured"
-    return chosen, reason
+
+    def recommend(self, rows: Sequence[ModelRow]) -> tuple[ModelRow | None, str]:
+        """Return the model to use, and why."""
+        fitted = [row for row in rows if row.fit is not None and row.held_out is not None]
+        if not fitted:
+            return None, "no model could be fitted"
+        # A larger model has to be better than the smallest, whether or not that explains enough.
+        sound = [row for row in fitted if not row.problem]
+        chosen, more, smaller = self._climb(sound or fitted)
+        held_out = chosen.held_out
+        assert held_out is not None
+        if not _beats(held_out, LEAST_PERCENT) or chosen.problem:
+            return None, _none_explains(chosen)
+        reason = (
+            f"{chosen.name}: predicts {held_out.text} of the torque's variance in blocks that it "
+            "has not seen"
+        )
+        if more is None:
+            return chosen, reason
+        return chosen, (
+            f"{reason}, and {more.text} of what {smaller.name} leaves"
+            f"{'' if _same_bent(smaller, chosen) else ' beyond any linear loop'}"
+        )
+
+    def _climb(self, rows: Sequence[ModelRow]) -> tuple[ModelRow, Gain | None, ModelRow]:
+        """Return the largest model that predicts better than those it was held against.
+
+        With it what it gains over the one before it, None where it is the smallest.
+        """
+        chosen = smaller = min(rows, key=lambda row: (_size(row), -row.held_out_vaf_percent))
+        count = self._comparisons
+        gained: Gain | None = None
+        while True:
+            better = [
+                (row, more)
+                for row in rows
+                if _size(row) > _size(chosen)
+                and _beats(more := _more(chosen, row, count), MARGIN_PERCENT)
+            ]
+            if not better:
+                return chosen, gained, smaller
+            best, _ = max(better, key=lambda pair: pair[1].percent)
+            alike = [
+                pair for pair in better if not _beats(_more(pair[0], best, count), MARGIN_PERCENT)
+            ]
+            smaller = chosen
+            chosen, gained = min(alike, key=lambda pair: (_size(pair[0]), -pair[1].percent))
+
+
+def _more(smaller: ModelRow, larger: ModelRow, comparisons: int) -> Gain:
+    if _same_bent(smaller, larger):
+        return gain(smaller.errors, larger.errors, comparisons)
+    return gain(smaller.beyond_errors, larger.beyond_errors, comparisons)
+
+
+def _same_bent(one: ModelRow, other: ModelRow) -> bool:
+    return _beyond_terms(one) == _beyond_terms(other)
+
+
+def _beats(more: Gain, least_percent: float) -> bool:
+    return more.low_percent > 0 and more.percent > least_percent
+
+
+def _beyond_terms(row: ModelRow) -> frozenset[str]:
+    return frozenset(one.term for one in row.beyond)
+
+
+def _none_explains(best: ModelRow) -> str:
+    assert best.held_out is not None
+    return "none of these models explains this torque: " + (
+        best.problem
+        or f"the best, {best.name}, predicts {best.held_out.text} of its variance in blocks that "
+        f"it has not seen; it must be {LEAST_PERCENT:g} % and its interval above 0"
+    )
+
+
+def _size(row: ModelRow) -> int:
+    return 0 if row.fit is None else row.fit.n_parameters
+
+
+def _base(name: str) -> str:
+    """Return what of a name two terms of one model may not share."""
+    return "reflex" if name in REFLEXES else name

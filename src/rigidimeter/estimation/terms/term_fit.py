@@ -1,4 +1,4 @@
-"""Fit a sum of terms to torque and motion, and predict with it.
+"""Fit a sum of terms to torque and motion.
 
     F(M) = Σ c_k F(term_k(angle, velocity, acceleration; q)) + residual
 
@@ -126,15 +126,6 @@ def fit_terms(
     if undecided:
         return _both_directions(motion, terms, undecided[0], band_hz, trim_s)
     return _fit(Design(motion, terms, band_hz, trim_s), band_hz, trim_s)
-
-
-def predicted_vaf_percent(fit: TermsFit, motion: Signals) -> float:
-    """Return how much of the torque the fit predicts, in its band, for a motion new to it."""
-    design = Design(motion, fit.terms, fit.band_hz, fit.trim_s)
-    predicted = design.columns(fit.nonlinear) @ fit.linear
-    measured = design.torque_nm[design.keep]
-    unexplained = float(np.var(measured - predicted)) / float(np.var(measured))
-    return 100.0 * (1.0 - unexplained)
 
 
 def _both_directions(

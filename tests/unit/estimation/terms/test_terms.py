@@ -10,11 +10,8 @@ from rigidimeter.errors import UserError
 from rigidimeter.estimation import Signals
 from rigidimeter.estimation.terms import (
     TERMS,
-    candidates,
-    compare_models,
     fit_terms,
     parse_terms,
-    predicted_vaf_percent,
     wideband_from_angle,
 )
 from rigidimeter.estimation.terms.reflex import kernel, pass_through, stretch_velocity
@@ -176,30 +173,6 @@ def test_without_a_sign_the_data_decide(exact):
     fit = fit_terms(driven(exact, exact.angle_rad + reflex), "stiffness,reflex", BAND_HZ)
     assert fit.terms == ("stiffness", "reflex-")
     assert "decided for stretch by motion toward negative angle" in fit.remarks[0]
-
-
-def test_the_rest_is_predicted_and_the_true_model_recommended(exact):
-    rng = np.random.default_rng(2)
-    torque = 0.01 * exact.acceleration_rad_s2 + 0.2 * exact.velocity_rad_s + 3 * exact.angle_rad
-    torque = torque + 2e3 * exact.angle_rad**3
-    torque = torque + 0.05 * np.std(torque) * rng.standard_normal(torque.size)
-    compared = compare_models(
-        driven(exact, torque), candidates(parse_terms("inertia,damping,stiffness,coulomb,cubic")),
-        BAND_HZ,
-    )  # fmt: skip
-    assert compared.recommended is not None
-    assert compared.recommended.terms == ("inertia", "damping", "stiffness", "cubic")
-    assert "predicts" in compared.reason
-    first = compared.rows[0]
-    assert first.fit is not None
-    assert first.held_out_vaf_percent < compared.recommended.held_out_vaf_percent
-
-
-def test_a_prediction_is_of_the_motion_given(exact):
-    fit = fit_terms(driven(exact, 3.0 * exact.angle_rad), "stiffness", BAND_HZ)
-    assert predicted_vaf_percent(fit, driven(exact, 3.0 * exact.angle_rad)) == pytest.approx(100.0)
-    # Twice the torque: half is unexplained, a quarter of the variance.
-    assert predicted_vaf_percent(fit, driven(exact, 6.0 * exact.angle_rad)) == pytest.approx(75.0)
 
 
 def test_white_noise_passes_for_white_and_a_forgotten_term_does_not(exact):

@@ -1,0 +1,249 @@
+"""What of the torque, and of a term, no linear filter of the motion explains.
+
+In a closed loop the subject's own torque moves the joint, so that any linear function of the
+motion, a delayed velocity too, may predict it. A term that is not linear has a part that does not:
+
+    max(v, 0) = v/2 + |v|/2,    E[M_sub |v(t − τ)|] = 0    where signals are symmetric
+
+and for sign v or θ³ the part left by a free linear filter, if the subject's torque is Gaussian.
+So torque and term are taken as spectral lines, and in every stretch of about 1 Hz the angle, the
+velocity and the acceleration are projected out of both with free complex gains: a linear filter
+with a memory of about a second. What is left of the torque is divided by its own power in the
+stretch, so that a coloured residual counts as what it is: where the subject pushes, lines weigh
+little. The lines then are independent and of one variance,
+
+    e_k = c z_k + ε_k,    ĉ = Σ Re(z_k* e_k) / Σ |z_k|²,    var ĉ = σ² / (2 Σ |z_k|²)
+
+times Σ w⁴ n / (Σ w²)² for the taper w.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from rigidimeter.estimation.signals import Array, Signals
+from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
+from rigidimeter.estimation.terms.reflex import kernel, stretch_velocity
+
+Complex = NDArray[np.complex128]
+
+STRETCH_HZ = 1.0
+FEWEST_LINES = 9
+"""Lines of a stretch, three for each of angle, velocity and acceleration."""
+
+NOTHING = 1e-3
+"""A term of which less than this share of the size is left is linear."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Coefficients of a fit to the lines, shape (p,), their covariance, and what is left."""
+
+    values: Array
+    covariance: Array
+    residual: Complex
+
+    @property
+    def standard_errors(self) -> Array:
+        """Square roots of the diagonal of the covariance."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+@dataclass(frozen=True, eq=False)
+class BeyondLinear:
+    """An epoch's torque and terms without what is linear in the motion, white.
+
+    Attributes
+    ----------
+    motion : Signals
+        Wide-band.
+    frequency_hz : array, shape (m,)
+        Of the lines, as many to each stretch.
+    torque : complex array, shape (m,)
+        What is left of the torque; the mean of |torque|² is 1.
+    """
+
+    motion: Signals
+    frequency_hz: Array
+    torque: Complex
+    _window: Array
+    _first: int
+    _basis: Complex
+    _size_nm: Array
+    _made: dict[str, Complex] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def taper_loss(self) -> float:
+        """By how much the taper enlarges a variance."""
+        squares = self._window**2
+        return float(squares.size * np.sum(squares**2) / np.sum(squares) ** 2)
+
+    def columns(self, names: Sequence[str], nonlinear: Sequence[float] = ()) -> Complex:
+        """Return what is left of each term, shape (m, p); a column for each linear parameter.
+
+        Parameters
+        ----------
+        names : sequence of str
+        nonlinear : sequence of float
+            The parameters inside the reflexes, in the order of the names.
+        """
+        found: list[Complex] = []
+        used = 0
+        for name in names:
+            if name not in REFLEXES:
+                found.append(self._left(name))
+                continue
+            one = kernel(name)
+            own = np.asarray(nonlinear[used : used + len(one.nonlinear)], dtype=np.float64)
+            used += own.size
+            # The gains of the path change slowly over a stretch, as the filter that is free there.
+            stretch = self._stretch_lines(name)
+            found += [self._white(stretch * gain) for gain in one.transfer(self.frequency_hz, own)]
+        return np.stack(found, axis=1) if found else np.zeros((self.torque.size, 0), complex)
+
+    def grid(self, names: Sequence[str]) -> list[tuple[float, ...]]:
+        """Return the points at which the parameters inside the reflexes are tried."""
+        starts = [kernel(name).starts for name in names if name in REFLEXES]
+        return [sum(parts, ()) for parts in product(*starts)]
+
+    def not_linear(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Return the terms that are more than a linear filter of the motion."""
+        return tuple(name for name in names if name in REFLEXES or self._share(name) > NOTHING)
+
+    def series(self, lines: Complex) -> Array:
+        """Return white lines, shape (m, ...), as samples in time, shape (n, ...), tapered ends off.
+
+        Their sum of squares over a piece of time is the piece's share of Σ |lines|².
+        """
+        last = self._first + self.torque.size
+        whole = np.zeros((last + 1, *lines.shape[1:]), dtype=np.complex128)
+        whole[self._first : last] = lines
+        n = 2 * last
+        values = fft.irfft(whole, n, axis=0) * np.sqrt(n / 2)
+        edge = round(n * float(np.mean(self._window < 0.5)) / 2)
+        return np.asarray(values[edge : n - edge], dtype=np.float64)
+
+    @property
+    def series_rate_hz(self) -> float:
+        """Samples of a series per second."""
+        duration_s = self._window.size / self.motion.rate_hz
+        return 2 * (self._first + self.torque.size) / duration_s
+
+    def solve(self, columns: Complex) -> Solution:
+        """Fit columns, shape (m, p), to the torque; collinear ones share their coefficient."""
+        rows = np.concatenate([columns.real, columns.imag])
+        target = np.concatenate([self.torque.real, self.torque.imag])
+        lengths = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+        inverse = np.linalg.pinv(rows / lengths, rcond=1e-8)
+        values = inverse @ target / lengths
+        residual = self.torque - columns @ values
+        free = rows.shape[0] * (1 - self._basis.shape[2] / self._basis.shape[1]) - values.size
+        variance = float(np.sum(np.abs(residual) ** 2)) / free * self.taper_loss
+        root = inverse / lengths[:, None]
+        return Solution(values, variance * (root @ root.T), residual)
+
+    def _left(self, name: str) -> Complex:
+        term = term_named(name)
+        assert term is not None
+        if name not in self._made:
+            self._made[name] = self._white(self._lines(term.regressor(self.motion)))
+        return self._made[name]
+
+    def _stretch_lines(self, name: str) -> Complex:
+        side = "stretch" + name[-1]
+        if side not in self._made:
+            self._made[side] = self._lines(stretch_velocity(self.motion, name))
+        return self._made[side]
+
+    def _share(self, name: str) -> float:
+        term = term_named(name)
+        assert term is not None
+        lines = self._lines(term.regressor(self.motion))
+        whole = float(np.linalg.norm(lines / np.repeat(self._size_nm, self._basis.shape[1])))
+        return float(np.linalg.norm(self._left(name))) / whole if whole > 0 else 0.0
+
+    def _lines(self, values: Array) -> Complex:
+        return _lines(values, self._window, self._first, self.frequency_hz.size)
+
+    def _white(self, lines: Complex) -> Complex:
+        parts = lines.reshape(self._basis.shape[:2])
+        return np.asarray((_without(parts, self._basis) / self._size_nm[:, None]).ravel())
+
+
+def beyond_linear(
+    motion: Signals, band_hz: tuple[float, float], taper_s: float = 1.0
+) -> BeyondLinear:
+    """Take an epoch's torque and motion to lines, and what is linear out of the torque.
+
+    Parameters
+    ----------
+    motion : Signals
+        Wide-band.
+    band_hz : (float, float)
+    taper_s : float
+        Over which the ends fall off.
+
+    Raises
+    ------
+    ValueError
+        If the band holds too few lines, or the motion explains the torque to the last digit.
+    """
+    n, rate_hz = motion.time_s.size, motion.rate_hz
+    duration_s = n / rate_hz
+    # The first line of a record is its drift.
+    first = max(int(np.ceil(band_hz[0] * duration_s - 1e-6)), 2)
+    count = int(band_hz[1] * duration_s + 1e-6) - first + 1
+    each = max(round(STRETCH_HZ * duration_s), FEWEST_LINES)
+    stretches = count // each
+    if stretches < 1:
+        raise ValueError(
+            f"{duration_s:.3g} s hold {max(count, 0)} spectral lines from {band_hz[0]:g} to "
+            f"{band_hz[1]:g} Hz; at least {each} are needed to tell terms from a linear loop"
+        )
+    each = count // stretches
+    used = each * stretches
+    window = _taper(n, rate_hz, taper_s)
+    linear = [
+        _lines(values, window, first, used).reshape(stretches, each)
+        for values in (motion.acceleration_rad_s2, motion.velocity_rad_s, motion.angle_rad)
+    ]
+    columns = np.stack(linear, axis=2)
+    columns /= np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), 1e-300)
+    basis, _ = np.linalg.qr(columns)
+    torque = _lines(motion.torque_nm, window, first, used).reshape(stretches, each)
+    left = _without(torque, basis)
+    size_nm = np.sqrt(np.sum(np.abs(left) ** 2, axis=1) / (each - 3))
+    if not np.all(size_nm > 1e-12 * float(np.sqrt(np.mean(np.abs(torque) ** 2)))):
+        raise ValueError("the motion explains the torque to the last digit")
+    return BeyondLinear(
+        motion,
+        np.arange(first, first + used) / duration_s,
+        np.asarray((left / size_nm[:, None]).ravel()),
+        window,
+        first,
+        np.asarray(basis),
+        size_nm,
+    )
+
+
+def _without(parts: Complex, basis: Complex) -> Complex:
+    gains = np.einsum("bmk,bm->bk", basis.conj(), parts)
+    return np.asarray(parts - np.einsum("bmk,bk->bm", basis, gains))
+
+
+def _lines(values: Array, window: Array, first: int, count: int) -> Complex:
+    spectrum = fft.rfft(window * (values - np.mean(values)))
+    return np.asarray(spectrum[first : first + count], dtype=np.complex128)
+
+
+def _taper(n: int, rate_hz: float, taper_s: float) -> Array:
+    centre_s = (np.arange(n) + 0.5) / rate_hz
+    edge_s = np.minimum(centre_s, n / rate_hz - centre_s)
+    phase = np.minimum(edge_s / taper_s, 1.0) if taper_s > 0 else np.ones(n)
+    return np.asarray(0.5 - 0.5 * np.cos(np.pi * phase), dtype=np.float64)
