@@ -73,6 +73,16 @@ def test_a_loop_that_stood_still_sets_nothing_going_again(late_s, stalled):
     assert at_tick == (0.0 if stalled else pytest.approx(1.0))
 
 
+def test_a_loop_that_stood_still_stops_at_once_however_little_the_arm_may_be_accelerated():
+    """10 deg/s² is 0.17 mrad/s in a tick: a ramp from any velocity would go on for ticks."""
+    settings = parse_settings({"guard": {"acceleration_limit_deg_s2": 10.0}})
+    loop, samples = made(settings, late={20: 0.0401}, inertia_kg_m2=HAND_KG_M2)
+    ended = run_ticks(loop, 1, 100, constant(1.0))
+    assert ended.cause is Cause.STALLED
+    assert samples[19].velocity_command_rad_s > 0.003
+    assert samples[20].velocity_command_rad_s == 0.0
+
+
 def test_after_a_suspension_nothing_is_set_going_again():
     """No tick is late, for the loop's clock slept too."""
     loop, _ = made(SETTINGS, desk=Desk({20: Cause.STALLED}))

@@ -8,7 +8,7 @@ from tests.unit.acquisition.exact_rig import INTERVAL_S, Desk, made
 from rigidimeter.acquisition import follow, hold, perturb, ramp_to_rest, rest
 from rigidimeter.acquisition.control_modes import LARGEST_FACTOR, change_parameter
 from rigidimeter.acquisition.run_states import Command, Order
-from rigidimeter.acquisition.tick import LONGEST_STEP, REST
+from rigidimeter.acquisition.tick import REST
 from rigidimeter.control import minimum_jerk
 from rigidimeter.guard import Cause
 from rigidimeter.settings import parse_settings
@@ -50,13 +50,13 @@ def test_the_joint_yields_to_the_torque_that_is_measured():
     assert velocity_rad_s[-1] == pytest.approx(0.5 / B, rel=0.01)  # J/B = 29 ms
 
 
-@pytest.mark.parametrize("missed", [1, 3, LONGEST_STEP - 1, LONGEST_STEP + 3])
+@pytest.mark.parametrize("missed", [1, 3, 4, 8])
 def test_after_missed_ticks_the_admittance_steps_over_all_of_them_up_to_five(missed):
     late_s = (missed + 0.5) * INTERVAL_S
     loop, samples = made(SETTINGS, late={5: late_s})
     perturb(loop, 1, [0.05] * 30)
     before = samples[4].velocity_command_rad_s
-    steps = min(missed + 1, LONGEST_STEP)
+    steps = min(missed + 1, 5)
     assert samples[5].velocity_request_rad_s == pytest.approx(over(steps, before, 0.05))
     after = samples[5].velocity_command_rad_s
     assert samples[6].velocity_request_rad_s == pytest.approx(over(1, after, 0.05))
@@ -112,6 +112,12 @@ def test_a_rest_returns_from_where_the_arm_is_and_then_holds():
     assert abs(samples[-1].angle_rad) < 1e-4
     assert {s.epoch for s in samples} == {REST}
     assert not any(s.perturbation_nm for s in samples)
+
+
+def test_a_rest_before_any_reading_begins_where_the_rig_was_enabled():
+    loop, samples = made(SETTINGS)
+    rest(loop, 0.01, 0.5)
+    assert {s.target_angle_rad for s in samples} == {0.0}
 
 
 def test_a_rest_compares_an_old_reading_with_the_target_of_its_time():

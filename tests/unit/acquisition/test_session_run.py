@@ -30,6 +30,7 @@ def test_a_session_runs_what_was_planned_tells_it_and_takes_the_power_away():
     assert [event["event"] for event in ran.sink.events] == [
         *("session_started", "epoch_started", "epoch_ended", "epoch_started", "epoch_ended")
     ]
+    assert ran.sink.events[0]["time_s"] == 0.0
     first, second = ran.sink.of("epoch_started")
     assert (first["time_s"], first["note"], first["label"]) == (0.0, 1, "1")
     assert (second["time_s"], second["note"], second["label"]) == (1.6, 2, "2")

@@ -50,6 +50,18 @@ def test_what_is_in_force_counts_for_where_the_joint_should_be():
     assert loop.angle_rad > 2.0 * loop.limits.following_rad
 
 
+def test_a_drive_that_does_not_know_what_it_sent_is_taken_to_have_sent_what_was_allowed():
+    """Were NaN remembered, no ramp from it would ever end."""
+    loop, samples = made(SETTINGS)
+    write = loop.rig.write
+    loop.rig.write = lambda asked: math.nan if len(samples) == 3 else write(asked)
+    assert run_ticks(loop, 1, 6, constant(2.0)).cause is Cause.NONE
+    ramp = [CHANGE_RAD_S * (k + 1) for k in range(6)]
+    assert math.isnan(samples[3].velocity_command_rad_s)
+    del ramp[3], samples[3]
+    assert [s.velocity_command_rad_s for s in samples] == pytest.approx(ramp)
+
+
 def test_each_field_of_the_record_is_the_readings_own():
     reading = Reading(0.1, 0.0001, 0.02, 0.003, 0.0002, 11, 12, 13, 14)
     loop, samples = made(SETTINGS, change=lambda *_: reading, late={0: 0.0005})
@@ -150,6 +162,16 @@ def test_a_cut_takes_the_power_away_in_its_tick_before_anything_is_written():
     assert (ended.cause, loop.reaction, len(samples)) == (Cause.EMERGENCY_STOP, Reaction.CUT, 6)
     hold(loop, 0.003)
     assert loop.rig.calls.count(("disable",)) == 1
+
+
+def test_after_a_stop_no_stretch_of_motion_goes_on():
+    """Whoever asks for one gets a tick, in which nothing is asked of the drive."""
+    loop, samples = made(SETTINGS, desk=Desk({2: Cause.DRIVE_FAULT}))
+    run_ticks(loop, 1, 10, constant(0.1))
+    for ticks in (4, 5):
+        ended = run_ticks(loop, 1, 10, constant(0.1))
+        assert (ended.cause, len(samples)) == (Cause.DRIVE_FAULT, ticks)
+        assert samples[-1].velocity_command_rad_s == 0.0
 
 
 DEVICE, OUTSIDE = Cause.TORQUE_PACKETS, Cause.SIGNAL
