@@ -88,6 +88,10 @@ class DiagnosticLevels(Section):
     active_movement: Level = "doubt"
     loop_bias: Level = "doubt"
     emg_activity: Level = "doubt"
+    varying_with_time: Level = "doubt"
+    varying_with_angle: Level = "doubt"
+    varying_with_phase: Level = "doubt"
+    varying_between_epochs: Level = "doubt"
     saturation: Level = "exclude"
     frozen: Level = "exclude"
     velocity_scale: Level = "exclude"
@@ -126,6 +130,8 @@ class DiagnosticsSettings(Section):
     emg_window_s: float = quantity(0.25, "s", 0.01, 10.0)
     emg_baseline_factor: float = quantity(3.0, "1", 1.0, 1000.0, above=True)
     emg_active_most_percent: float = quantity(20.0, "%", 0.0, 100.0)
+    varying_most_percent: float = quantity(10.0, "%", 0.0, 1000.0)
+    varying_chance: float = quantity(0.01, "1", 0.0, 1.0, above=True)
     saturated_most_percent: float = quantity(0.5, "%", 0.0, 100.0)
     frozen_most_s: float = quantity(0.1, "s", 0.0, 60.0)
     velocity_scale_most_percent: float = quantity(10.0, "%", 0.1, 1000.0)

@@ -20,6 +20,7 @@ from rigidimeter.estimation import (
     single_frequency_share,
 )
 from rigidimeter.estimation.alignment import MOST_EPOCHS, aligned_prepared
+from rigidimeter.estimation.between_epochs import between_epochs
 from rigidimeter.estimation.diagnostics import checked
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, prepare
@@ -190,6 +191,8 @@ def analyse_prepared(
     ]
     if pooled and counted != fitted:  # what a check excludes must not be in the pool either
         _, pooled = estimator.fit(counted, None, lambda _: None, True)
+    by_perturbation = estimator.uses_perturbation
+    pooled = [_with_differences(fit, fits, by_perturbation, preparation.settings) for fit in pooled]
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
     if included:
@@ -211,6 +214,15 @@ def analyse_prepared(
         delays,
         reason,
     )
+
+
+def _with_differences(
+    pooled: Fit, fits: Sequence[Fit], by_perturbation: bool, settings: Settings
+) -> Fit:
+    """Return a pooled fit with what its epochs say of a joint that differs between them."""
+    own = [fit for fit in fits if fit.outcome.included and fit.condition == pooled.condition]
+    found = between_epochs(own, by_perturbation, settings.diagnostics)
+    return pooled if found is None else replace(pooled, findings=(*pooled.findings, found))
 
 
 def _without_drive(epochs: Sequence[PreparedEpoch], after: bool) -> str:

@@ -11,8 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimeter.dynamics import Loop
+from rigidimeter.estimation.diagnostics.varying_lines import varying_lines
+from rigidimeter.estimation.diagnostics.varying_selection import Variation, variation
 from rigidimeter.estimation.least_squares_bias import compensated
 from rigidimeter.estimation.method_record import Method
+from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.records import Epoch, Finding, Fit
 from rigidimeter.settings import DiagnosticLevels, DiagnosticsSettings, Level
@@ -65,6 +68,8 @@ class Case:
         That made it.
     loop : Loop, optional
         In which the joint was moved, as the settings and the recording say.
+    prepared : PreparedEpoch, optional
+        The epoch with what was made of it; without it nothing is said of a joint that varies.
     """
 
     epoch: Epoch
@@ -76,6 +81,7 @@ class Case:
     fit: Fit | None = None
     method: Method | None = None
     loop: Loop | None = None
+    prepared: PreparedEpoch | None = None
 
     @property
     def uses_perturbation(self) -> bool:
@@ -109,6 +115,17 @@ class Case:
         if self.loop_bias is None:
             return None
         return 100.0 * float(np.max(np.abs(self.loop_bias) / self.half_widths))
+
+    @cached_property
+    def variation(self) -> Variation | None:
+        """What varies within the epoch; None where that cannot be tested."""
+        if self.prepared is None:
+            return None
+        try:
+            lines = varying_lines(self.prepared, self.parameters)
+            return variation(lines, self.settings.varying_chance)
+        except ValueError:
+            return None
 
     @cached_property
     def voluntary_nm(self) -> Array:

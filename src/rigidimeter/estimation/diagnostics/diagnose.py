@@ -16,6 +16,7 @@ from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHEC
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
 from rigidimeter.estimation.diagnostics.torque_checks import TORQUE_CHECKS
+from rigidimeter.estimation.diagnostics.varying_checks import VARYING_CHECKS
 from rigidimeter.estimation.methods import method_named
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array
@@ -28,6 +29,7 @@ CHECKS: list[Check] = [
     *TORQUE_CHECKS,
     *RESIDUAL_CHECKS,
     *MOVEMENT_CHECKS,
+    *VARYING_CHECKS,
     *PARAMETER_CHECKS,
 ]
 """Every check of an epoch. Code from outside the package may append its own."""
@@ -36,7 +38,8 @@ CHECKS: list[Check] = [
 def diagnose(case: Case, seen: Mapping[str, Look | None] | None = None) -> tuple[Finding, ...]:
     """Run every check for which there is something to look at; passed ones are among the findings.
 
-    The one check of several epochs together, `lack_of_fit`, is made where they are fitted together.
+    The checks of several epochs, `lack_of_fit` and `varying_between_epochs`, are made where these
+    are fitted together.
 
     Parameters
     ----------
@@ -75,7 +78,14 @@ def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
     from_session = epoch.excitation_hz is not None
     limit_rad = rad_from_deg(settings.guard.position_limit_deg) if from_session else None
     signals = prepared.signals(bandlimited_signals)
-    return Case(epoch, signals, parameters, settings.diagnostics, position_limit_rad=limit_rad)
+    return Case(
+        epoch,
+        signals,
+        parameters,
+        settings.diagnostics,
+        position_limit_rad=limit_rad,
+        prepared=prepared,
+    )
 
 
 def _loop(prepared: PreparedEpoch) -> Loop:

@@ -1,0 +1,76 @@
+"""Whether the joint stayed the same within the epoch: J, B and K with time, angle and phase."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
+from rigidimeter.estimation.diagnostics.varying_selection import Change, Variation
+from rigidimeter.records import PARAMETERS
+from rigidimeter.settings import DiagnosticsSettings
+
+WITH = {
+    "varying_with_time": "time",
+    "varying_with_angle": "the angle",
+    "varying_with_phase": "the phase of the movement",
+}
+
+
+def varying_look(name: str, found: Variation, settings: DiagnosticsSettings) -> Look | None:
+    """Return how far the parameters go with one thing, in % of their means."""
+    if name not in found.p:
+        return None
+    most = settings.varying_most_percent
+    changes = sorted(found.changes.get(name, []), key=lambda change: -change.percent)
+    if not changes:
+        fact = (
+            f"no change of the joint with {WITH[name]} is beyond chance (p = {found.p[name]:.2g})"
+        )
+        return Look(0.0, most, False, fact)
+    large = [change for change in changes if change.percent > most]
+    text = "; ".join(_sentence(change) for change in large or changes[:1])
+    return Look(
+        changes[0].percent,
+        most,
+        bool(large),
+        f"with {WITH[name]} {text} (at most {most:g} %)",
+    )
+
+
+def _sentence(change: Change) -> str:
+    _, symbol, unit, _ = PARAMETERS[change.parameter]
+    return (
+        f"{symbol} goes from {change.low:.3g} ± {change.low_half:.2g} {unit} {change.low_at} to "
+        f"{change.high:.3g} ± {change.high_half:.2g} {unit} {change.high_at}, a range of "
+        f"{change.percent:.0f} % of the mean (by chance p = {change.p:.1g})"
+    )
+
+
+def _look(case: Case, name: str) -> Look | None:
+    found = case.variation
+    return None if found is None else varying_look(name, found, case.settings)
+
+
+_MEANING = "the estimate is a mean over a joint that was not the same throughout, and its interval"
+
+VARYING_CHECKS = tuple(
+    Check(name, (), partial(_look, name=name), meaning, remedy)
+    for name, meaning, remedy in (
+        (
+            "varying_with_time",
+            f"{_MEANING} says nothing of how far it went",
+            "cut the epoch into shorter ones, or fit the part in which the joint did not change",
+        ),
+        (
+            "varying_with_angle",
+            f"{_MEANING} holds for no angle in particular",
+            "use a smaller perturbation about each angle of interest, and state the angle",
+        ),
+        (
+            "varying_with_phase",
+            f"{_MEANING} holds for no phase in particular",
+            "estimate each phase by itself, from many cycles, or hold the joint still",
+        ),
+    )
+)
+"""The checks of a joint that varies within an epoch."""
