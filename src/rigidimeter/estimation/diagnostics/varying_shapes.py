@@ -22,7 +22,7 @@ from scipy import fft
 from rigidimeter.estimation.diagnostics.varying_lines import VaryingLines
 from rigidimeter.estimation.signals import Array
 
-TIME_DEGREE, FINER_TIME_DEGREE = 3, 8
+TIME_DEGREE, FINER_TIME_DEGREE = 3, 20
 SLOW_HZ = 0.5
 """The angle below this is where the joint is; above, how it is perturbed there."""
 
