@@ -21,9 +21,9 @@ def test_every_check_has_its_row_and_no_other_has() -> None:
     names = [row[0].strip("`") for row in _rows()]
     assert sorted(names) == sorted(DiagnosticLevels.model_fields)
     assert len(names) == len(set(names))
-    # The checks of several epochs together are made where they are fitted together.
-    together = ["lack_of_fit", "varying_between_epochs"]
-    assert sorted(names) == sorted([*(check.name for check in CHECKS), *together])
+    # Some are found where epochs are fitted.
+    of_fits = ["lack_of_fit", "varying_between_epochs", "between_samples"]
+    assert sorted(names) == sorted([*(check.name for check in CHECKS), *of_fits])
 
 
 def test_the_levels_are_the_defaults() -> None:

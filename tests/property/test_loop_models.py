@@ -7,7 +7,7 @@ import pytest
 
 from rigidimeter.dynamics import DriveModel
 from rigidimeter.dynamics.linear_loop import Loop
-from rigidimeter.estimation.closedloop.drive_fit import loop_of
+from rigidimeter.estimation.closedloop.observation import loop_of
 from rigidimeter.settings import Settings, parse_settings
 
 
@@ -26,7 +26,7 @@ def test_what_is_planned_is_what_the_estimation_takes_for_its_instrument(
     settings: Settings,
 ) -> None:
     rig = settings.rig
-    drive = DriveModel(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
+    drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
     planned = Loop(settings.controller, rig)
     taken = loop_of(settings, rig.torque.rate_hz, drive)
     frequency_hz = np.geomspace(0.01, rig.tick_rate_hz / 2.0, 200)

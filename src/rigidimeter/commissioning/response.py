@@ -198,7 +198,7 @@ def _drive_angle(
         return lambda at_s: sent_angle_rad(readings, at_s)
     grid = np.arange(readings.time_s[0], readings.time_s[-1] + 1.0 / GRID_HZ, 1.0 / GRID_HZ)
     mean_rad_s = np.diff(sent_angle_rad(readings, grid)) * GRID_HZ
-    drive = DriveModel(bandwidth_hz, damping_ratio)
+    drive = DriveModel.second_order(bandwidth_hz, damping_ratio)
     followed = drive.held(mean_rad_s, 1.0 / GRID_HZ).angle_rad
     return lambda at_s: np.interp(at_s, grid[:-1], followed)
 

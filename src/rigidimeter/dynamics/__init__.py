@@ -1,5 +1,6 @@
 """The plant and its loop: joint, drive, sensors, subject as steps, and the linear loop of them."""
 
+from rigidimeter.dynamics.drive_model import EVEN, ArmMotion, DriveModel, lowpass, with_conjugates
 from rigidimeter.dynamics.joint import (
     JointDynamics,
     arm_response,
@@ -40,9 +41,7 @@ from rigidimeter.dynamics.subject_torque import (
     subject_density,
 )
 from rigidimeter.dynamics.velocity_drive import (
-    ArmMotion,
     Drive,
-    DriveModel,
     DriveState,
     drive,
     drive_step,
@@ -50,6 +49,7 @@ from rigidimeter.dynamics.velocity_drive import (
 
 __all__ = [
     "BLOCK_TICKS",
+    "EVEN",
     "SAME_TIME_S",
     "ArmMotion",
     "ClosedLoopMotion",
@@ -72,6 +72,7 @@ __all__ = [
     "drive_step",
     "loop_margins",
     "loop_stability",
+    "lowpass",
     "median_joint",
     "moment",
     "near_instability",
@@ -84,4 +85,5 @@ __all__ = [
     "spectral_radius",
     "subject_density",
     "voluntary_motion_sd",
+    "with_conjugates",
 ]

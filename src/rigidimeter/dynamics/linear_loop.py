@@ -35,14 +35,9 @@ import scipy
 from numpy.typing import ArrayLike
 
 from rigidimeter.control import admittance, butterworth_lowpass
+from rigidimeter.dynamics.drive_model import Array, Complex, DriveModel, lowpass
 from rigidimeter.dynamics.joint import JointDynamics, median_joint
 from rigidimeter.dynamics.subject_torque import subject_density
-from rigidimeter.dynamics.velocity_drive import (
-    Array,
-    Complex,
-    DriveModel,
-    drive_matrices,
-)
 from rigidimeter.settings import ControllerSettings, RigSettings, Settings, SubjectSettings
 
 Parameters = tuple[float, float, float]
@@ -91,9 +86,10 @@ class OpenLoop(NamedTuple):
     ----------
     admittance, forward : array, shape (m,)
         A, and A F, in rad/s per N·m.
-    motion, read : array, shape (3, m)
-        Acceleration, velocity and angle of the arm per velocity command: at the ticks, and as the
-        reading of the torque sensor sees them, delays included.
+    motion, sensed, read : array, shape (3, m)
+        Acceleration, velocity and angle of the arm per velocity command: at the ticks, the same
+        through the filter of the torque sensor, and as the reading of that sensor has them, delays
+        included.
     read_torque : array, shape (m,)
         Reading per torque: what the delays alone do.
     """
@@ -101,6 +97,7 @@ class OpenLoop(NamedTuple):
     admittance: Complex
     forward: Complex
     motion: Complex
+    sensed: Complex
     read: Complex
     read_torque: Complex
 
@@ -130,13 +127,26 @@ class Loop:
         J_c and B_c of the admittance, and the cutoff of the low-pass in front of it.
     rig : RigSettings
         Tick rate, drive and torque sensor.
-    drive_delay_s : float
-        A pure delay before the drive answers.
+    identified : DriveModel, optional
+        The drive as a recording shows it, instead of that of the rig.
+    lowpass_hz : float
+        Butterworth filter of the torque sensor; 0 for none.
+    lowpass_order : int
     """
 
     controller: ControllerSettings
     rig: RigSettings
-    drive_delay_s: float = 0.0
+    identified: DriveModel | None = None
+    lowpass_hz: float = 0.0
+    lowpass_order: int = 2
+
+    @property
+    def drive(self) -> DriveModel:
+        """The drive."""
+        if self.identified is not None:
+            return self.identified
+        rig = self.rig
+        return DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
 
     def at_frequency(self, frequency_hz: ArrayLike) -> OpenLoop:
         """Return the loop at frequencies above 0 and up to half the tick rate, shape (m,)."""
@@ -153,21 +163,21 @@ class Loop:
         controller, rig = self.controller, self.rig
         decay, gain = admittance(controller.inertia_kg_m2, controller.damping_nm_s_rad, interval_s)
         steady = gain / (1.0 - decay / z)
-        drive = DriveModel(rig.drive_bandwidth_hz, rig.drive_damping_ratio, self.drive_delay_s)
-        motion = drive.transfer(z, interval_s)
-        late = z ** (-self.drive_delay_s * rate_hz)
+        motion = sensed = self.drive.transfer(z, interval_s)
+        seen, through = self.drive, np.ones_like(z)
+        if self.lowpass_hz > 0:
+            seen = self.drive.smoothed(self.lowpass_hz, self.lowpass_order)
+            sensed = seen.transfer(z, interval_s)
+            through = lowpass(np.asarray(np.log(z) * rate_hz), self.lowpass_hz, self.lowpass_order)
         read, read_torque = np.zeros_like(motion), np.zeros_like(z)
         ages = _ages_by_sample(rig, rate_hz)
         ticks = sum(age.ticks for age in ages)
         for whole, rest, count in ages:
             held = _delays(z, whole, count) / ticks
-            step, push = drive_matrices(
-                drive.bandwidth_hz, drive.damping_ratio, (1.0 - rest) * interval_s
-            )
-            read += (step @ motion + push[:, None] * late) * held / z
-            read_torque += held * z**-rest
+            read += seen.transfer(z, interval_s, -rest * interval_s) * held
+            read_torque += through * held * z**-rest
         forward = steady * _lowpass(controller.torque_cutoff_hz, z, rate_hz)
-        return OpenLoop(steady, forward, motion, read, read_torque)
+        return OpenLoop(steady, forward, motion, sensed, read, read_torque)
 
 
 def closed_loop_motion(

@@ -19,9 +19,8 @@ it. A step of the command from rest gives v = c (1 − C − σS).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import scipy
@@ -50,14 +49,6 @@ class DriveState(NamedTuple):
     angle_rad: float = 0.0
     velocity_rad_s: float = 0.0
     acceleration_rad_s2: float = 0.0
-
-
-class ArmMotion(NamedTuple):
-    """Acceleration, velocity and angle, in the order of J, B and K; each of shape (n,)."""
-
-    acceleration_rad_s2: Array
-    velocity_rad_s: Array
-    angle_rad: Array
 
 
 def drive_coefficients(
@@ -137,61 +128,3 @@ def drive_matrices(
     interval_s, m11, m12, m21, m22, n1, n2 = drive(bandwidth_hz, damping_ratio, interval_s)
     step = np.array([[m22, m21, 0.0], [m12, m11, 0.0], [n2, n1, 1.0]])
     return step, np.array([-m21, 1.0 - m11, interval_s - n1])
-
-
-@dataclass(frozen=True)
-class DriveModel:
-    """A drive as it is known or identified, with a pure delay before it answers."""
-
-    bandwidth_hz: float
-    damping_ratio: float
-    delay_s: float = 0.0
-
-    def transfer(self, z: Complex, interval_s: float) -> Complex:
-        """Return acceleration, velocity and angle per held command at z, at the ticks.
-
-        Parameters
-        ----------
-        z : array, shape (m,)
-            Not 1, where the angle has no end.
-        interval_s : float
-
-        Returns
-        -------
-        array, shape (3, m)
-        """
-        # (zI − Φ)⁻¹ Γ. The angle is in no other row.
-        step, push = drive_matrices(self.bandwidth_hz, self.damping_ratio, interval_s)
-        (a11, a12), (a21, a22) = step[:2, :2]
-        determinant = (z - a11) * (z - a22) - a12 * a21
-        acceleration = ((z - a22) * push[0] + a12 * push[1]) / determinant
-        velocity = (a21 * push[0] + (z - a11) * push[1]) / determinant
-        angle = (push[2] + step[2, 1] * velocity + step[2, 0] * acceleration) / (z - 1)
-        motion = np.stack([acceleration, velocity, angle])
-        return motion * z ** (-self.delay_s / interval_s) if self.delay_s else motion
-
-    def sampled_derivative(self, omega_rad_s: Array, interval_s: float) -> Complex:
-        """Return the acceleration at the ticks over the derivative of the velocity's samples.
-
-        1 − (ω_n Δt)²/12 at low frequency: the command's stairs hold the acceleration at the ticks
-        below its mean.
-        """
-        acceleration, velocity, _ = self.transfer(np.exp(1j * omega_rad_s * interval_s), interval_s)
-        return np.asarray(acceleration / (1j * omega_rad_s * velocity))
-
-    def held(self, command_rad_s: Array, interval_s: float) -> ArmMotion:
-        """Return the motion at the ticks under commands held from tick to tick, from rest."""
-        step, push = drive_matrices(self.bandwidth_hz, self.damping_ratio, interval_s)
-        acceleration, velocity = held_response(step[:2, :2], push[:2], command_rad_s)
-        moved = push[2] * command_rad_s + step[2, 1] * velocity + step[2, 0] * acceleration
-        return ArmMotion(acceleration, velocity, np.concatenate(([0.0], np.cumsum(moved[:-1]))))
-
-    def after(self, elapsed_s: Array, motion: ArmMotion, command_rad_s: Array) -> ArmMotion:
-        """Return the motion a time after each tick, from that at the tick and its command."""
-        # `drive_step`, element by element.
-        coefficients = drive_coefficients(self.bandwidth_hz, self.damping_ratio, elapsed_s)
-        steps: Any = (elapsed_s, *coefficients)
-        states: Any = motion[::-1]
-        commands: Any = command_rad_s
-        moved: Any = drive_step(Drive(*steps), DriveState(*states), commands)
-        return ArmMotion(*moved[::-1])

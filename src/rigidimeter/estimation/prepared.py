@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 from rigidimeter.dynamics import DriveModel
-from rigidimeter.estimation.closedloop.drive_fit import fit_drive
+from rigidimeter.estimation.closedloop.drive_fit import FoundDrive, fit_drive
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.signals import Signals
 from rigidimeter.records import Channel, Epoch, Outcome
@@ -32,10 +32,10 @@ class Source:
         self._made: dict[Hashable, Any] = {}
 
     @cached_property
-    def drive(self) -> DriveModel | None:
+    def drive(self) -> FoundDrive | None:
         """The drive, identified from the first epoch that allows it; None where it is unknown."""
         rig = self._settings.rig
-        start = DriveModel(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
+        start = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
         sound = (
             epoch
             for epoch in self._epochs

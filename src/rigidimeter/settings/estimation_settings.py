@@ -25,6 +25,10 @@ class EstimationSettings(Section):
     `band_high_closed_loop_hz` to the methods that weight each frequency by its noise. Higher, they
     gain precision where the subject pushes slowly, and take a soft cuff for the joint.
 
+    `torque_lowpass_hz` is the corner of the low-pass in the torque sensor or its amplifier, a
+    Butterworth filter of the given order; 0 where there is none, or none below half the rate. What
+    it does to the torque is then done to the motion too.
+
     `intervals` says how standard errors and intervals are made: "hac" holds for any residual,
     "bootstrap" draws blocks, "white" takes the residual for white within the band.
     """
@@ -33,6 +37,8 @@ class EstimationSettings(Section):
     band_high_hz: float = quantity(10.0, "Hz", 0.1, 1000.0)
     band_high_unknown_hz: float = quantity(50.0, "Hz", 0.1, 1000.0)
     band_high_closed_loop_hz: float = quantity(30.0, "Hz", 0.1, 1000.0)
+    torque_lowpass_hz: float = quantity(0.0, "Hz", 0.0, 100000.0)
+    torque_lowpass_order: int = quantity(2, "1", 1, 8)
     trim_s: float = quantity(1.0, "s", 0.0, 60.0)
     shortest_epoch_s: float = quantity(5.0, "s", 1.0, 600.0)
     published_highpass_hz: float = quantity(0.2, "Hz", 0.001, 10.0)
@@ -82,6 +88,7 @@ class DiagnosticLevels(Section):
     residual_whiteness: Level = "note"
     residual_perturbation: Level = "doubt"
     lack_of_fit: Level = "doubt"
+    between_samples: Level = "doubt"
     held_out_vaf: Level = "exclude"
     r_squared: Level = "doubt"
     voluntary_torque: Level = "doubt"
@@ -119,6 +126,7 @@ class DiagnosticsSettings(Section):
     residual_perturbation_most_percent: float = quantity(10.0, "%", 0.0, 100.0)
     lack_of_fit_most_percent: float = quantity(2.0, "%", 0.0, 100.0)
     r_squared_least: float = quantity(0.3, "1", -100.0, 1.0)
+    between_samples_most_percent: float = quantity(1.0, "%", 0.0, 100.0)
     held_out_vaf_least_percent: float = quantity(0.0, "%", -1000.0, 100.0)
     voluntary_low_hz: float = quantity(0.3, "Hz", 0.01, 20.0)
     voluntary_high_hz: float = quantity(4.0, "Hz", 0.05, 50.0)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.dynamics import DriveModel, DriveState, drive, drive_step
+from rigidimeter.dynamics import DriveState, drive, drive_step
 from rigidimeter.dynamics.velocity_drive import drive_coefficients, drive_matrices
 
 
@@ -63,25 +63,3 @@ def test_the_matrices_are_the_step() -> None:
     expected = drive_step(drive(50.0, 0.7071, 1e-3), state, command)
     found = step @ np.array(state[::-1]) + push * command
     np.testing.assert_allclose(found, expected[::-1], rtol=1e-12)
-
-
-def test_held_commands_move_the_drive_as_its_steps_do() -> None:
-    commands = np.random.default_rng(0).standard_normal(300)
-    found = DriveModel(40.0, 0.8).held(commands, 1e-3)
-    np.testing.assert_allclose(np.stack(found), stepped(commands).T[::-1], atol=1e-9)
-
-
-def test_the_transfer_function_is_that_of_the_steps():
-    # A command z^k answers, in the long run, with the transfer function times z^k.
-    z = np.exp(2j * np.pi * 12.5 / 1000.0)
-    k = np.arange(4000)
-    states = stepped(np.real(z**k)) + 1j * stepped(np.imag(z**k))
-    acceleration, velocity, _ = DriveModel(40.0, 0.8).transfer(np.array([z]), 1e-3)
-    assert states[-1, 1] / z ** k[-1] == pytest.approx(velocity[0], rel=1e-9)
-    assert states[-1, 2] / z ** k[-1] == pytest.approx(acceleration[0], rel=1e-9)
-
-
-def test_stairs_hold_the_acceleration_at_the_ticks_low():
-    ratio = DriveModel(50.0, 0.7071).sampled_derivative(np.array([2 * np.pi * 0.1]), 1e-3)
-    expected = 1 - (2 * np.pi * 50.0 * 1e-3) ** 2 / 12
-    assert ratio[0].real == pytest.approx(expected, abs=2e-4)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
+from rigidimeter.estimation.closedloop.between_doubt import between_samples
 from rigidimeter.estimation.closedloop.lack_of_fit import misfits, worst_misfit
 from rigidimeter.estimation.closedloop.linear_problems import (
     Linearise,
@@ -146,14 +147,22 @@ def _fit_condition(
         except ValueError as error:
             fits[place] = _without_numbers(epoch, method.name, str(error))
         else:
-            fits[place] = _epoch_fit(epoch, method.name, fit, observation, inertia_kg_m2)
+            found = _epoch_fit(epoch, method.name, fit, observation, inertia_kg_m2)
+            doubt = between_samples(
+                epoch, observation, fit.values, fit.between, settings.diagnostics
+            )
+            fits[place] = replace(found, findings=doubt)
             singles[place] = fit
         progress(1.0 - POOLED_SHARE)
     if shared is None:
         return fits, []
     finding = _misfit(good, made, singles, settings)
     together = _pooled_fit(method.name, condition, shared, good, inertia_kg_m2)
-    return fits, [together if finding is None else replace(together, findings=(finding,))]
+    doubt = between_samples(
+        good[0].epoch, good[0].observation, shared.values, shared.between, settings.diagnostics
+    )
+    findings = doubt if finding is None else (finding, *doubt)
+    return fits, [replace(together, findings=findings)]
 
 
 def _fit_all(
@@ -219,8 +228,9 @@ def _estimate(fit: LineFit, inertia_kg_m2: float | None) -> Estimate:
         )
     else:
         half = student.ppf(0.975, fit.degrees) * fit.standard_errors
-        ends = fit.values - half, fit.values + half
-        found = Estimate(fit.values, fit.standard_errors, *ends, bound, fit.covariance)
+        low, high = fit.values - half, fit.values + half
+        found = Estimate(fit.values, fit.standard_errors, low, high, bound, fit.covariance)
+    found = found._replace(low=low - fit.between, high=high + fit.between)
     return found if inertia_kg_m2 is None else found.with_inertia(inertia_kg_m2)
 
 

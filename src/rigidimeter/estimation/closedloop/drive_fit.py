@@ -1,121 +1,216 @@
 """The drive between command and motion, identified from the recording itself.
 
-Command and velocity are known almost without noise, so bandwidth, damping and delay of the drive
-(`rigidimeter.dynamics.velocity_drive`) follow from them closely. They matter for what sampling
-hides: a drive that is told a staircase ripples between the ticks, and a torque sampled at the tick
-sees the ripple at its edge, an acceleration smaller by (ω Δt)²/12 than the samples of the velocity
-suggest: 0.8 % for 50 Hz at 1 kHz, and all of that would be taken from J.
+Command and velocity are known almost without noise, so they show how the drive follows. What it
+does between the samples follows from that: the command is held from tick to tick, and the poles
+that the samples show go on between them. It matters because a torque that is sampled at the ticks
+sees the acceleration at the ticks, not its mean: with a drive of second order and 50 Hz at 1 kHz
+it is 0.8 % smaller than the samples of the velocity suggest, with a PI drive 12 %, and all of that
+would be taken from J.
+
+No form of the drive is assumed. Those of `STRUCTURES` are fitted to one half of the samples and
+predict the other, and the simplest that predicts as well as the best is taken.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from rigidimeter.dynamics import ArmMotion, DriveModel, Loop
+from rigidimeter.dynamics import DriveModel
+from rigidimeter.estimation.closedloop.drive_search import (
+    Fitted,
+    Samples,
+    Structure,
+    power_left,
+    search,
+)
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel, Epoch
-from rigidimeter.settings import Settings
 
-LARGEST_MISFIT = 0.005
-"""Above this share of the velocity's standard deviation the drive is not of second order."""
-
-LARGEST_RATIO = 0.08
-"""Ticks per period of the drive's bandwidth beyond which a command in a foreign file is rather one
-that was logged more slowly than it was sent: its stairs would then be too long."""
-
-EVEN = 0.01
-"""A stamp this share of an interval away from a tick is that tick."""
-
-
-def driven(drive: DriveModel, command: Channel, time_s: Array) -> ArmMotion:
-    """Return the motion under a recorded command, from rest, at any times; exact between ticks."""
-    # From the first tick on: on a clock that counts from 1970 a delay is below the rounding.
-    origin_s = command.time_s[0]
-    ticks_s, sent = command.time_s - origin_s, command.values
-    interval_s = 1.0 / command.mean_rate_hz
-    motion = drive.held(sent, interval_s)
-    then_s = (time_s - origin_s) - drive.delay_s
-    # A stamp that is a rounding error early belongs to the tick it names.
-    k = np.searchsorted(ticks_s, then_s + EVEN * interval_s, side="right") - 1
-    k = np.clip(k, 0, sent.size - 1)
-    elapsed_s = np.maximum(then_s - ticks_s[k], 0.0)
-    elapsed_s[elapsed_s < EVEN * interval_s] = 0.0
-    at_ticks = ArmMotion(*(part[k] for part in motion))
-    return drive.after(elapsed_s, at_ticks, sent[k]) if np.any(elapsed_s) else at_ticks
+STRUCTURES = (
+    Structure("second order", 2, 0),
+    Structure("velocity PI", 2, 1),
+    Structure("second order in a position loop", 3, 0, 0.1),
+    Structure("velocity PI with a lag", 3, 1, 4.0),
+    Structure("second order with a position loop beside it", 3, 1, 0.1),
+    Structure("velocity PI in a position loop", 3, 2, 0.1),
+    Structure("velocity PI with a lag in a position loop", 4, 2, 4.0),
+    Structure("velocity PI in a position loop with a lag", 4, 2, 0.1),
+)
+"""From simple to complicated."""
 
 
-def fit_drive(epoch: Epoch, start: DriveModel) -> DriveModel | None:
-    """Identify the drive from command and velocity; None where it does not explain the velocity.
+FEWEST_SAMPLES, MOST_SAMPLES = 50, 3000
+"""Of the velocity; more do not make a drive known any better that is not quite linear."""
+
+SETTLED_S = 0.3
+"""An epoch may begin in motion, and the model begins at rest."""
+
+LARGEST_MISFIT = 0.1
+"""Above this share of the velocity's standard deviation the command does not explain it."""
+
+AS_GOOD, RIVAL = 1.05, 4.0
+"""A structure that leaves this many times the power of the best predicts as well; one that leaves
+no more than the second of them might be there."""
+
+UNSEEN = 2e-5
+"""Structures that differ by less than this share of the velocity's SD are alike."""
+
+BETTER = 0.98
+"""A pole more is worth a try where the last one brought the power down to this share."""
+
+QUIET = 3e-4
+"""What is left below this share of the velocity's SD needs no friction."""
+
+FINER, STAIRS = 4, 0.5
+"""A command that was logged more slowly than it was sent goes on between its samples: if lines
+between them, in so many steps, leave this share of what stairs leave, the stairs are not known."""
+
+
+class FoundDrive(NamedTuple):
+    """A drive that was identified.
+
+    Attributes
+    ----------
+    model : DriveModel
+    structure : str
+    misfit : float
+        What the drive leaves of velocity that it was not fitted to, as a share of its SD.
+    rivals : tuple of DriveModel
+        Others that predict the velocity as well: the structure fitted to each half of the samples,
+        and other structures.
+    """
+
+    model: DriveModel
+    structure: str
+    misfit: float
+    rivals: tuple[DriveModel, ...]
+
+
+def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
+    """Identify the drive from command and velocity; None where they do not show it.
 
     Parameters
     ----------
     epoch : Epoch
     start : DriveModel
-        Where the search starts.
+        Of second order, where the search starts.
 
     Returns
     -------
-    DriveModel or None
-        None if command or velocity was not recorded, if what the fit leaves exceeds 0.5 % of the
-        velocity's standard deviation, or if the command seems to have been logged more slowly than
-        it was sent: then nothing is known of what happens between the ticks.
+    FoundDrive or None
+        None if command or velocity was not recorded, if no structure explains the velocity, or if
+        the command seems to have been logged more slowly than it was sent.
     """
+    samples = _samples(epoch)
+    if samples is None:
+        return None
+    everyone = _fitted(samples, start)
+    fitted = [one for one in everyone if not one.too_fast]
+    if not fitted:
+        return None
+    least = min(one.power for one in fitted)
+    if least > QUIET**2 and _power_between_lines(samples, fitted[0].model) < STAIRS * least:
+        return None
+    tried = [_tried(samples, one) for one in fitted if one.power <= AS_GOOD * least + UNSEEN**2]
+    best = min(one.power for one in tried)
+    equal = [one for one in tried if one.power <= AS_GOOD * best + UNSEEN**2]
+    chosen, misfit = equal[0].whole, math.sqrt(equal[0].power)
+    if misfit > LARGEST_MISFIT or not 0.5 < chosen.model.gain < 2.0:
+        return None
+    near = (one for one in everyone if one.power <= RIVAL * least + UNSEEN**2)
+    others = (one.model for one in near if one is not equal[0].whole)
+    rivals = (*equal[0].halves, *others)
+    return FoundDrive(chosen.model, chosen.structure.name, misfit, rivals)
+
+
+class _Tried(NamedTuple):
+    """A structure fitted to all samples and to each half, and what halves leave of the other."""
+
+    whole: Fitted
+    halves: tuple[DriveModel, DriveModel]
+    power: float
+
+
+def _fitted(samples: Samples, start: DriveModel) -> list[Fitted]:
+    """Return structures fitted to all samples.
+
+    One with one more pole, or with friction, is fitted only where those before it leave more than
+    noise would, as far as the steps before show.
+    """
+    fitted: list[Fitted] = []
+    for friction in (False, True):
+        for poles in sorted({one.poles for one in STRUCTURES}):
+            before = min((one.power for one in fitted), default=math.inf)
+            for structure in (one for one in STRUCTURES if one.poles == poles):
+                # Friction may have led those without it far astray.
+                near = [one for one in fitted if one.structure.friction == friction]
+                best = min(near, key=_by_power) if near else None
+                # Two poles may have found a long delay, where a third one has no place.
+                starts = [best.model, near[0].model] if best else [start]
+                if best is None or best is near[0] or best.power < QUIET**2:
+                    starts = starts[:1]
+                wanted = structure._replace(friction=friction)
+                found = [search(samples, wanted, begin) for begin in starts]
+                fitted.append(min(found, key=_by_power))
+            if min(one.power for one in fitted) > BETTER * before:
+                break
+        if min(one.power for one in fitted) < QUIET**2:
+            break
+    return fitted
+
+
+def _by_power(one: Fitted) -> float:
+    return one.power
+
+
+def _tried(samples: Samples, whole: Fitted) -> _Tried:
+    """Return how well a structure that is fitted to each half predicts the other."""
+    first, second = (search(samples, whole.structure, whole.model, half) for half in samples.halves)
+    power = 0.5 * (
+        power_left(samples, second, samples.halves[0])
+        + power_left(samples, first, samples.halves[1])
+    )
+    return _Tried(whole, (first.model, second.model), power)
+
+
+def _power_between_lines(samples: Samples, start: DriveModel) -> float:
+    """Return what simple drives leave whose command went straight from sample to sample."""
+    sent, size = samples.command, len(samples.command)
+    place = np.arange(FINER * (size - 1)) / FINER
+    time_s = np.interp(place, np.arange(size), sent.time_s)
+    middle = np.interp(place + 0.5 / FINER, np.arange(size), sent.values)
+    finer = samples._replace(
+        command=Channel(sent.name, time_s, middle), interval_s=samples.interval_s / FINER
+    )
+    return min(search(finer, one, start).power for one in STRUCTURES if one.poles == 2)
+
+
+def _samples(epoch: Epoch) -> Samples | None:
+    """Return what the drive is identified from; None where there is too little."""
     command = epoch.channels.get("velocity_command_rad_s")
     velocity = epoch.channels.get("velocity_rad_s")
     if command is None or velocity is None or len(command) < 100:
         return None
-    tick_s = 1.0 / command.mean_rate_hz
-    if np.ptp(np.diff(command.time_s)) > 0.5 * tick_s:
+    interval_s = 1.0 / command.mean_rate_hz
+    if np.ptp(np.diff(command.time_s)) > 0.5 * interval_s:
         return None  # ticks that were missed would be taken for a slower drive
-    fastest_hz = 0.45 / tick_s
-    if not 0.5 < start.bandwidth_hz < fastest_hz:
+    start_s = command.time_s[0] + SETTLED_S
+    inside = (velocity.time_s >= start_s) & (velocity.time_s <= command.time_s[-1])
+    time_s = velocity.time_s[inside][:MOST_SAMPLES]
+    measured = velocity.values[inside][:MOST_SAMPLES]
+    if time_s.size < FEWEST_SAMPLES or np.std(measured) == 0.0:
         return None
-    inside = (velocity.time_s >= command.time_s[0]) & (velocity.time_s <= command.time_s[-1])
-    time_s, measured = velocity.time_s[inside], velocity.values[inside]
-    scale = float(np.std(measured))
-    if time_s.size < 50 or scale == 0.0:
-        return None
-
-    def model(x: Array) -> DriveModel:
-        return DriveModel(math.exp(x[0]), float(x[1]), float(x[2]))
-
-    def misfit(x: Array) -> Array:
-        left = driven(model(x), command, time_s).velocity_rad_s - measured
-        return np.asarray(left / scale, dtype=np.float64)
-
-    # From between two ticks, where a stamp that is nearly a tick's is not yet taken for it.
-    delay_s = max(start.delay_s, 0.5 * tick_s)
-    found = least_squares(
-        misfit,
-        [math.log(start.bandwidth_hz), start.damping_ratio, delay_s],
-        bounds=([math.log(0.5), 0.05, 0.0], [math.log(fastest_hz), 0.999, 0.1]),
-        x_scale=[0.1, 0.1, tick_s],
-    )
-    fitted = model(found.x)
-    at_bound = fitted.damping_ratio > 0.99 or fitted.bandwidth_hz > 0.98 * fastest_hz
-    if at_bound or float(np.sqrt(np.mean(found.fun**2))) > LARGEST_MISFIT:
-        return None
-    # A session records what was sent at every tick; of another file that is not known.
-    if epoch.excitation_hz is None and fitted.bandwidth_hz * tick_s > LARGEST_RATIO:
-        return None
-    return fitted
+    ticks = int(np.searchsorted(command.time_s, time_s[-1], side="right"))
+    used = Channel(command.name, command.time_s[:ticks], command.values[:ticks])
+    sign = _mean_sign(np.interp(used.time_s, velocity.time_s, velocity.values))
+    return Samples(used, sign, interval_s, time_s, measured, float(np.std(measured)))
 
 
-def loop_of(settings: Settings, torque_rate_hz: float, drive: DriveModel) -> Loop:
-    """Return the loop that settings describe, with a drive that was fitted or assumed.
-
-    Instruments made from a wrong loop are weaker, not wrong: whatever they are, they follow from
-    the perturbation alone.
-    """
-    rig = settings.rig
-    # To the digits that stamps are good for, so that epochs of one rig have equal loops.
-    torque = rig.torque.model_copy(update={"rate_hz": float(f"{torque_rate_hz:.4g}")})
-    measured = {
-        "torque": torque,
-        "drive_bandwidth_hz": drive.bandwidth_hz,
-        "drive_damping_ratio": drive.damping_ratio,
-    }
-    return Loop(settings.controller, rig.model_copy(update=measured), drive.delay_s)
+def _mean_sign(values: Array) -> Array:
+    """Return the mean sign, over each tick, of what goes straight from value to value."""
+    after = np.append(values[1:], values[-1])
+    larger = np.abs(values) + np.abs(after)
+    return np.asarray((values + after) / np.where(larger > 0, larger, 1.0))

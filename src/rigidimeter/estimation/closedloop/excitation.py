@@ -119,7 +119,7 @@ def excitation(perturbation: Channel, loop: Loop, grid: Grid) -> Excitation:
     circle = on_circle(loop, n, rate_hz, 1)
     opened, size = circle.loop, circle.length
     command = circle.to(perturbation.values) * opened.admittance
-    gain, motion = opened.forward * opened.read, opened.motion
+    gain, motion = opened.forward * opened.read, opened.sensed
     steps = _steps(perturbation, grid)
     if steps is None:
         raising = 1 / circle.damping

@@ -53,12 +53,15 @@ T = TypeVar("T")
 class Problem(NamedTuple):
     """The linear problem of one epoch at given parameters.
 
-    `instruments` and `regressors` have shape (m, p), `target` (m,).
+    `instruments` and `regressors` have shape (m, p), `target` (m,). `otherwise` holds regressors
+    and target as they would be without what the drive tells of the motion between the samples, and
+    then with other drives that explain the velocity as well.
     """
 
     instruments: Complex
     regressors: Complex
     target: Complex
+    otherwise: tuple[tuple[Complex, Complex], ...] = ()
 
 
 Linearise = Callable[[Sequence[Observation], Array], list[Problem]]
@@ -75,7 +78,15 @@ def instrumental(observations: Sequence[Observation], values: Array) -> list[Pro
     J, B, K = np.maximum(values, LEAST).tolist()
     made = _of_each(observations, lambda excitation: excitation.motion_lines((J, B, K)))
     return [
-        Problem(instruments, observation.lines.motion, observation.lines.torque_nm)
+        Problem(
+            instruments,
+            observation.lines.motion,
+            observation.lines.torque_nm,
+            tuple(
+                (observation.lines.motion + more, observation.lines.torque_nm)
+                for more in observation.otherwise
+            ),
+        )
         for observation, instruments in zip(observations, made, strict=True)
     ]
 
@@ -96,7 +107,12 @@ def output_error(observations: Sequence[Observation], values: Array) -> list[Pro
     J, B, K = used.tolist()
     made = _of_each(observations, lambda excitation: excitation.sensed_lines((J, B, K)))
     return [
-        Problem(slope, slope, observation.lines.torque_nm - simulated + slope @ used)
+        Problem(
+            slope,
+            slope,
+            target := observation.lines.torque_nm - simulated + slope @ used,
+            tuple((slope, target - more @ used) for more in observation.otherwise),
+        )
         for observation, (simulated, slope) in zip(observations, made, strict=True)
     ]
 
@@ -111,6 +127,10 @@ def holding(linearise: Linearise, inertia_kg_m2: float) -> Linearise:
                 problem.instruments[:, 1:],
                 problem.regressors[:, 1:],
                 problem.target - inertia_kg_m2 * problem.regressors[:, 0],
+                tuple(
+                    (motion[:, 1:], torque - inertia_kg_m2 * motion[:, 0])
+                    for motion, torque in problem.otherwise
+                ),
             )
             for problem in full
         ]

@@ -10,15 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from rigidimeter.dynamics import DriveModel
+from rigidimeter.dynamics import DriveModel, Loop
 from rigidimeter.estimation.bandlimited import band_hz
-from rigidimeter.estimation.closedloop.drive_fit import loop_of
+from rigidimeter.estimation.closedloop.between_samples import (
+    TorqueFilter,
+    command_at,
+    seen_beyond_samples,
+)
 from rigidimeter.estimation.closedloop.excitation import Excitation, excitation
 from rigidimeter.estimation.closedloop.spectral_lines import Grid, Lines, epoch_grid, epoch_lines
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import motion_channels
 from rigidimeter.records import Channel, Epoch
-from rigidimeter.settings import USABLE_FRACTION_OF_RATE
+from rigidimeter.settings import USABLE_FRACTION_OF_RATE, Settings
+
+Complex = NDArray[np.complex128]
 
 REPEATS = 0.999
 """The correlation of a perturbation with itself one period later, at least."""
@@ -38,6 +44,9 @@ class Observation(NamedTuple):
         The lines at which a periodic perturbation has power; all where it is not periodic.
     response_key : hashable
         Epochs with the same one have the same response to the perturbation.
+    otherwise : tuple of complex array, shape (m, 3)
+        What would add to the motion if the samples were taken as they are, and what other drives
+        would add that explain the velocity as well; empty where the drive is unknown.
     """
 
     lines: Lines
@@ -45,6 +54,7 @@ class Observation(NamedTuple):
     excitation: Excitation | None
     excited: NDArray[np.bool_]
     response_key: Hashable
+    otherwise: tuple[Complex, ...] = ()
 
 
 def closed_loop_obstacle(epoch: Epoch) -> str:
@@ -100,7 +110,7 @@ def observe_motion(prepared: PreparedEpoch) -> Observation:
     epoch, estimation = prepared.epoch, prepared.settings.estimation
     grid = epoch_grid(epoch, band_hz(epoch, estimation), estimation.trim_s)
     everywhere = np.ones(grid.line.size, dtype=np.bool_)
-    lines = epoch_lines(epoch, grid, None)
+    lines = epoch_lines(epoch, grid, None, _torque_filter(prepared.settings))
     return Observation(lines, epoch.channels["torque_nm"], None, everywhere, None)
 
 
@@ -176,12 +186,10 @@ def _grid(prepared: PreparedEpoch, samples: Callable[[int, float], int] | None) 
 def _observed(
     prepared: PreparedEpoch, perturbation: Channel, grid: Grid, excited: NDArray[np.bool_]
 ) -> Observation:
-    epoch, rig = prepared.epoch, prepared.settings.rig
-    drive = prepared.source.drive
-    assumed = drive or DriveModel(
-        min(rig.drive_bandwidth_hz, 0.45 * perturbation.mean_rate_hz), rig.drive_damping_ratio
-    )
-    loop = loop_of(prepared.settings, epoch.channels["torque_nm"].rate_hz, assumed)
+    epoch = prepared.epoch
+    found = prepared.source.drive
+    drive = found.model if found is not None else None
+    loop = loop_of(prepared.settings, epoch.channels["torque_nm"].rate_hz, drive)
     key = (
         hashlib.sha256(perturbation.values.tobytes()).digest(),
         loop,
@@ -192,4 +200,44 @@ def _observed(
         int(grid.line[-1]),
     )
     made = prepared.source.once(key, lambda: excitation(perturbation, loop, grid))
-    return Observation(epoch_lines(epoch, grid, drive), perturbation, made, excited, key)
+    lines = epoch_lines(epoch, grid, drive, _torque_filter(prepared.settings))
+    return Observation(lines, perturbation, made, excited, key, _otherwise(prepared, grid))
+
+
+def _otherwise(prepared: PreparedEpoch, grid: Grid) -> tuple[Complex, ...]:
+    """Return what no drive and the rivals of the drive would add to the motion."""
+    found = prepared.source.drive
+    command = prepared.epoch.channels.get("velocity_command_rad_s")
+    if found is None or command is None:
+        return ()
+    sent = grid.transform(command_at(command, grid.time_s))[:, None]
+    ours, *others = (
+        seen_beyond_samples(
+            drive, _torque_filter(prepared.settings), command, grid.omega_rad_s, grid.time_s
+        )
+        for drive in (found.model, *found.rivals)
+    )
+    return tuple(np.asarray((other - ours) * sent) for other in (np.zeros_like(ours), *others))
+
+
+def _torque_filter(settings: Settings) -> TorqueFilter | None:
+    cutoff_hz = settings.estimation.torque_lowpass_hz
+    return TorqueFilter(cutoff_hz, settings.estimation.torque_lowpass_order) if cutoff_hz else None
+
+
+def loop_of(settings: Settings, torque_rate_hz: float, drive: DriveModel | None) -> Loop:
+    """Return the loop that settings describe, with the drive that a recording shows.
+
+    Instruments made from a wrong loop are weaker, not wrong: whatever they are, they follow from
+    the perturbation alone.
+    """
+    rig, estimation = settings.rig, settings.estimation
+    # To the digits that stamps are good for, so that epochs of one rig have equal loops.
+    torque = rig.torque.model_copy(update={"rate_hz": float(f"{torque_rate_hz:.4g}")})
+    return Loop(
+        settings.controller,
+        rig.model_copy(update={"torque": torque}),
+        drive,
+        estimation.torque_lowpass_hz,
+        estimation.torque_lowpass_order,
+    )

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.estimation.closedloop.between_doubt import moved_elsewhere
 from rigidimeter.estimation.closedloop.line_noise import Smoother, drawn_lines, line_covariance
 from rigidimeter.estimation.closedloop.linear_problems import Linearise, Problem
 from rigidimeter.estimation.closedloop.observation import Observation
@@ -82,6 +83,8 @@ class LineFit:
     condition_number : float
         Of the whitened instruments, each scaled to unit length.
     shape : Shape
+    between : array, shape (p,)
+        How far each parameter may be elsewhere for what is not known of the drive.
     drawn : array, shape (draws, p), or None
         Parameters drawn by bootstrap, if that was asked for.
     """
@@ -92,6 +95,7 @@ class LineFit:
     bound: Array
     condition_number: float
     shape: Shape
+    between: Array
     drawn: Array | None = None
 
     @property
@@ -166,6 +170,7 @@ def fit_single(
         _bound([problem], [lines], Shape(lines.grid.omega_rad_s, own)),
         _condition([problem], [lines], weight_from),
         weight_from,
+        moved_elsewhere([problem], [weight_from.at(lines)], values),
         values + drawn_lines(inverse, weighted, residual, _rng(), draws) if draws else None,
     )
 
@@ -214,6 +219,7 @@ def fit_pooled(
         bound,
         _condition(problems, everything, shape),
         shape,
+        moved_elsewhere(problems, [shape.at(lines) for lines in everything], values),
         values + errors if draws else None,
     )
     return fit, problems

@@ -27,7 +27,15 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from rigidimeter.dynamics import DriveModel
-from rigidimeter.estimation.closedloop.drive_fit import driven
+from rigidimeter.estimation.closedloop.between_samples import (
+    TorqueFilter,
+    behind,
+    command_at,
+    filtered,
+    in_step,
+    seen_beyond_samples,
+)
+from rigidimeter.estimation.closedloop.drive_motion import driven
 from rigidimeter.estimation.signals import Array, kinematics, motion_channels, spline, uniform_grid
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import FEWEST_LINES
@@ -169,7 +177,12 @@ def _layout(
     return window, slope, line, omega, energy, spectrum
 
 
-def epoch_lines(epoch: Epoch, grid: Grid, drive: DriveModel | None) -> Lines:
+def epoch_lines(
+    epoch: Epoch,
+    grid: Grid,
+    drive: DriveModel | None,
+    torque_filter: TorqueFilter | None = None,
+) -> Lines:
     """Return torque and motion at the lines.
 
     Parameters
@@ -179,30 +192,47 @@ def epoch_lines(epoch: Epoch, grid: Grid, drive: DriveModel | None) -> Lines:
         From `epoch_grid` for this epoch or one with the same stamps.
     drive : DriveModel or None
         If given, what the command did between the samples of the motion is taken into account.
+    torque_filter : TorqueFilter or None
+        That the torque went through; the motion is sent through it too.
     """
     torque = grid.transform(_at(epoch.channels["torque_nm"], grid.time_s))
     command = epoch.channels.get("velocity_command_rad_s")
+    if drive is not None and command is not None:
+        motion = _between_samples(epoch, grid, drive, command, torque_filter)
+    else:
+        motion = _spectra(grid, *_motion(epoch, grid.time_s))
+        motion *= filtered(torque_filter, grid.omega_rad_s)
+    return Lines(grid, torque, motion)
+
+
+def _between_samples(
+    epoch: Epoch,
+    grid: Grid,
+    drive: DriveModel,
+    command: Channel,
+    torque_filter: TorqueFilter | None,
+) -> Complex:
+    """Return the motion that the torque saw, for commands that were held from tick to tick."""
     angle, velocity = (
         _sampled(epoch.channels.get(name), grid.time_s) for name in ("angle_rad", "velocity_rad_s")
     )
-    if angle is not None and velocity is not None:
-        # Torque and motion were sampled together, at the ticks if there is a command at all.
-        motion = _spectra(grid, angle, velocity)
-        if drive is not None and command is not None:
-            motion[:, 0] *= drive.sampled_derivative(grid.omega_rad_s, _interval_s(command))
-        return Lines(grid, torque, motion)
-    if drive is None or command is None:
-        return Lines(grid, torque, _spectra(grid, *_motion(epoch, grid.time_s)))
+    if angle is not None and velocity is not None and in_step(command, grid.time_s):
+        omega, time_s = grid.omega_rad_s, grid.time_s
+        beyond = seen_beyond_samples(drive, torque_filter, command, omega, time_s)
+        sent = grid.transform(command_at(command, time_s))
+        sampled = _spectra(grid, angle, velocity) * filtered(torque_filter, omega)
+        return np.asarray(sampled + beyond * sent[:, None])
     # What the sensors saw beyond the motion that the command causes, at their own stamps.
-    beyond = dict(epoch.channels)
+    rest = dict(epoch.channels)
     for channel in motion_channels(epoch):
         caused = driven(drive, command, channel.time_s)
         seen = caused.angle_rad if channel.name == "angle_rad" else caused.velocity_rad_s
-        beyond[channel.name] = Channel(channel.name, channel.time_s, channel.values - seen)
-    motion = _spectra(grid, *_motion(replace(epoch, channels=beyond), grid.time_s))
-    for column, part in enumerate(driven(drive, command, grid.time_s)):
+        rest[channel.name] = Channel(channel.name, channel.time_s, channel.values - seen)
+    motion = _spectra(grid, *_motion(replace(epoch, channels=rest), grid.time_s))
+    motion *= filtered(torque_filter, grid.omega_rad_s)
+    for column, part in enumerate(driven(behind(drive, torque_filter), command, grid.time_s)):
         motion[:, column] += grid.transform(part)
-    return Lines(grid, torque, motion)
+    return motion
 
 
 def _spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array) -> Complex:
@@ -237,10 +267,6 @@ def _sampled(channel: Channel | None, time_s: Array) -> Array | None:
     if stamps.size < time_s.size or np.max(np.abs(stamps - time_s)) > close_s:
         return None
     return channel.values[first : first + time_s.size]
-
-
-def _interval_s(command: Channel) -> float:
-    return 1.0 / command.mean_rate_hz
 
 
 def _times(torque: Channel, used: list[Channel]) -> tuple[Array, float]:

@@ -70,7 +70,7 @@ def checked(prepared: PreparedEpoch, fit: Fit) -> Fit:
     outcome = fit.outcome
     if grave and outcome.included:
         outcome = Outcome("excluded", f"{grave[0].text}; {grave[0].remedy}")
-    return replace(fit, outcome=outcome, findings=tuple(failed))
+    return replace(fit, outcome=outcome, findings=(*fit.findings, *failed))
 
 
 def _case(prepared: PreparedEpoch, parameters: Array) -> Case:

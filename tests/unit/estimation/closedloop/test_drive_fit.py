@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rigidimeter.dynamics import DriveModel, DriveState, drive, drive_step
-from rigidimeter.estimation.closedloop.drive_fit import driven, fit_drive
+from rigidimeter.estimation.closedloop.drive_fit import fit_drive
+from rigidimeter.estimation.closedloop.drive_motion import driven
 from rigidimeter.records import Channel, Epoch
 
 
@@ -20,7 +21,7 @@ def stepped(commands, bandwidth_hz=40.0, ratio=0.8, interval_s=1e-3):
 def test_driven_motion_is_the_rigs_to_rounding():
     commands = np.random.default_rng(0).standard_normal(300)
     command = Channel("velocity_command_rad_s", np.arange(300) / 1000.0, commands)
-    found = driven(DriveModel(40.0, 0.8), command, command.time_s)
+    found = driven(DriveModel.second_order(40.0, 0.8), command, command.time_s)
     expected = stepped(commands)
     np.testing.assert_allclose(found.angle_rad, expected[:, 0], atol=1e-12)
     np.testing.assert_allclose(found.velocity_rad_s, expected[:, 1], atol=1e-11)
@@ -36,15 +37,15 @@ def test_between_ticks_it_is_exact_too():
     closed = 0.3 * (
         1 - np.exp(-sigma * t) * (np.cos(omega_d * t) + sigma / omega_d * np.sin(omega_d * t))
     )
-    found = driven(DriveModel(40.0, 0.8), command, t)
+    found = driven(DriveModel.second_order(40.0, 0.8), command, t)
     np.testing.assert_allclose(found.velocity_rad_s, closed, atol=1e-12)
 
 
 def test_a_delay_moves_everything():
     commands = np.random.default_rng(2).standard_normal(200)
     command = Channel("velocity_command_rad_s", np.arange(200) / 1000.0, commands)
-    late = driven(DriveModel(40.0, 0.8, 0.0035), command, command.time_s[50:])
-    there = driven(DriveModel(40.0, 0.8), command, command.time_s[50:] - 0.0035)
+    late = driven(DriveModel.second_order(40.0, 0.8, 0.0035), command, command.time_s[50:])
+    there = driven(DriveModel.second_order(40.0, 0.8), command, command.time_s[50:] - 0.0035)
     np.testing.assert_array_equal(late.velocity_rad_s, there.velocity_rad_s)
 
 
@@ -53,15 +54,17 @@ def test_the_drive_is_found_from_command_and_velocity(delay_s):
     commands = np.cumsum(np.random.default_rng(3).standard_normal(4000)) * 0.01
     command = Channel("velocity_command_rad_s", np.arange(4000) / 1000.0, commands)
     stamps = np.arange(0.1, 3.9, 0.0201)
-    velocity = driven(DriveModel(23.0, 0.6, delay_s), command, stamps).velocity_rad_s
+    velocity = driven(DriveModel.second_order(23.0, 0.6, delay_s), command, stamps).velocity_rad_s
     channels = {
         "velocity_command_rad_s": command,
         "velocity_rad_s": Channel("velocity_rad_s", stamps, velocity),
     }
-    found = fit_drive(Epoch("file", "1", channels), DriveModel(50.0, 0.7071))
-    assert found.bandwidth_hz == pytest.approx(23.0, rel=1e-3)
-    assert found.damping_ratio == pytest.approx(0.6, rel=1e-3)
-    assert found.delay_s == pytest.approx(delay_s, abs=1e-5)
+    found = fit_drive(Epoch("file", "1", channels), DriveModel.second_order(50.0, 0.7071))
+    assert found.structure == "second order"
+    (pole,) = found.model.poles_rad_s
+    assert abs(pole) == pytest.approx(2 * math.pi * 23.0, rel=1e-3)
+    assert -pole.real / abs(pole) == pytest.approx(0.6, rel=1e-3)
+    assert found.model.delay_s == pytest.approx(delay_s, abs=1e-5)
 
 
 def test_a_velocity_that_the_command_does_not_explain_gives_no_drive():
@@ -71,4 +74,4 @@ def test_a_velocity_that_the_command_does_not_explain_gives_no_drive():
         "velocity_command_rad_s": Channel("velocity_command_rad_s", t, rng.standard_normal(2000)),
         "velocity_rad_s": Channel("velocity_rad_s", t, rng.standard_normal(2000)),
     }
-    assert fit_drive(Epoch("file", "1", channels), DriveModel(50.0, 0.7071)) is None
+    assert fit_drive(Epoch("file", "1", channels), DriveModel.second_order(50.0, 0.7071)) is None

@@ -1,0 +1,106 @@
+"""Whether J, B and K hang on what the drive did between the samples, where nothing was measured.
+
+The drive is known by how it explains the velocity at its samples. Drives that explain it as well
+give other parameters where the samples are too few to tell them apart. The largest change is δ;
+where it is more than a tenth of the parameter, what the drive tells is itself in doubt, its sign
+included, and δ is at least twice what it changes. δ is added to both ends of the interval,
+
+    low = p̂ − t s − δ        high = p̂ + t s + δ
+
+with s the standard error and t Student's quantile; pooled epochs share the drive, so δ does not
+fall with their number. Where δ is more than a share of the parameter, the estimate is doubted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigidimeter.estimation.closedloop.linear_problems import Problem
+from rigidimeter.estimation.closedloop.observation import Observation
+from rigidimeter.estimation.signals import Array
+from rigidimeter.records import Epoch, Finding
+from rigidimeter.settings import DiagnosticsSettings
+
+REMEDY = (
+    "sample the torque faster, or filter it before it is sampled and set "
+    "estimation.torque_lowpass_hz to the corner; give the drive a lower bandwidth; or hold J at a "
+    "value from a better recording"
+)
+
+
+UNSETTLED = 0.1
+"""A parameter that another drive changes by more than this share hangs on the drive."""
+
+
+def moved_elsewhere(problems: Sequence[Problem], powers: Sequence[Array], values: Array) -> Array:
+    """Return δ, shape (p,).
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+    powers : sequence of array, shape (m,)
+        Of the noise at the lines.
+    values : array, shape (p,)
+        The solution of the problems.
+    """
+    changes = []
+    for other in range(max(len(problem.otherwise) for problem in problems)):
+        gram, moment = np.zeros((values.size, values.size)), np.zeros(values.size)
+        for problem, power in zip(problems, powers, strict=True):
+            weighted = (problem.instruments / power[:, None]).conj().T
+            regressors, target = problem.regressors, problem.target
+            if other < len(problem.otherwise):
+                regressors, target = problem.otherwise[other]
+            gram += (weighted @ regressors).real
+            moment += (weighted @ target).real
+        size = np.sqrt(np.abs(np.diag(gram)))
+        found = np.linalg.lstsq(gram / np.outer(size, size), moment / size)[0] / size
+        changes.append(np.abs(found - values))
+    if not changes:
+        return np.zeros(values.size)
+    without, *others = changes
+    most = np.max(others, axis=0)
+    return np.asarray(
+        np.where(most > UNSETTLED * np.abs(values), np.maximum(most, 2 * without), most)
+    )
+
+
+def between_samples(
+    epoch: Epoch,
+    observation: Observation,
+    values: Array,
+    between: Array,
+    settings: DiagnosticsSettings,
+) -> tuple[Finding, ...]:
+    """Return the finding `between_samples` of a fit; none where it hangs on nothing unknown.
+
+    Parameters
+    ----------
+    epoch : Epoch
+    observation : Observation
+    values, between : array, shape (p,)
+        The parameters, J first unless it was held, and how far they may be elsewhere.
+    settings : DiagnosticsSettings
+    """
+    level, most = settings.levels.between_samples, settings.between_samples_most_percent
+    if not observation.otherwise:
+        if not {"velocity_command_rad_s", "velocity_rad_s"} <= set(epoch.channels):
+            return ()
+        text = (
+            "no drive explains the velocity by the command, so how the joint moved between the "
+            "samples is not known, and J may be far too low"
+        )
+        remedy = f"record the command at every tick at which it is sent; {REMEDY}"
+        return (Finding("between_samples", level, np.nan, most, text, remedy),)
+    share = 100.0 * between / np.abs(values)
+    worst = int(np.argmax(share))
+    if share[worst] <= most:
+        return ()
+    name = "JBK"[len("JBK") - values.size :][worst]
+    text = (
+        f"drives that explain the velocity equally well give {name} up to {share[worst]:.2g} % "
+        f"away (at most {most:g} %): the samples do not show how the joint moved between them"
+    )
+    return (Finding("between_samples", level, float(share[worst]), most, text, REMEDY),)

@@ -1,0 +1,34 @@
+"""The motion that a recorded command causes, at any times."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.dynamics import EVEN, SAME_TIME_S, ArmMotion, DriveModel
+from rigidimeter.estimation.signals import Array
+from rigidimeter.records import Channel
+
+
+def driven(drive: DriveModel, command: Channel, time_s: Array) -> ArmMotion:
+    """Return the motion under a recorded command, from rest, at any times; exact between ticks."""
+    interval_s = 1.0 / command.mean_rate_hz
+    tick, after_s = since_ticks(command, time_s, drive.delay_s)
+    return drive.motion(command.values, interval_s, tick, after_s)
+
+
+def since_ticks(
+    command: Channel, time_s: Array, delay_s: float, even: float = EVEN
+) -> tuple[NDArray[np.intp], Array]:
+    """Return the last tick whose command acts at the times, and for how long it has."""
+    # From the first tick on: on a clock that counts from 1970 a delay is below the rounding.
+    origin_s, interval_s = command.time_s[0], 1.0 / command.mean_rate_hz
+    ticks_s = command.time_s - origin_s
+    then_s = (time_s - origin_s) - delay_s
+    # A stamp that is a rounding error early belongs to the tick it names.
+    near_s = max(even * interval_s, SAME_TIME_S)
+    tick = np.searchsorted(ticks_s, then_s + near_s, side="right") - 1
+    tick = np.clip(tick, 0, ticks_s.size - 1)
+    after_s = np.maximum(then_s - ticks_s[tick], 0.0)
+    after_s[after_s < near_s] = 0.0
+    return tick, after_s

@@ -1,0 +1,247 @@
+"""The drive of one structure that explains the velocity best.
+
+For given poles and delay the velocity is linear in the numerator, so only poles and delay are
+searched (variable projection, Golub and Pereyra 1973). A drive with dry friction answers the sign
+of its velocity as well as the command, with the same poles and a numerator of its own.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from rigidimeter.dynamics import DriveModel, with_conjugates
+from rigidimeter.dynamics.drive_model import state_after
+from rigidimeter.estimation.closedloop.drive_motion import since_ticks
+from rigidimeter.estimation.signals import Array
+from rigidimeter.records import Channel
+
+Complex = NDArray[np.complex128]
+
+FASTEST, SLOWEST = 6.0, 5e-4
+"""In rad a tick: poles are sought between; a faster one leaves nothing to see at the ticks."""
+
+LONGEST_S, LONGEST_TICKS = 0.1, 4.0
+"""The longest delay of a drive, the larger of both."""
+
+EARLIEST = -0.5
+"""In ticks. The search may pass through delays below zero; none is the answer."""
+
+DOUBLE = 1e-4
+"""Two poles that are this close, as a share of their size, are taken for so far apart."""
+
+MOST_TRIES = 80
+"""Steps of a search; one that takes longer is on its way to poles without an end."""
+
+EVERYTHING = slice(None)
+
+
+class Structure(NamedTuple):
+    """A family of drives.
+
+    Attributes
+    ----------
+    name : str
+    poles, zeros : int
+    beside : float
+        Where the search for a further pole starts, in times the bandwidth.
+    friction : bool
+        The velocity also answers its own sign, as with dry friction in the drive.
+    """
+
+    name: str
+    poles: int
+    zeros: int
+    beside: float = 0.0
+    friction: bool = False
+
+
+class Samples(NamedTuple):
+    """What a drive is identified from.
+
+    Attributes
+    ----------
+    command : Channel
+    sign : array, shape (ticks,)
+        Mean sign of the velocity in each tick.
+    interval_s : float
+        Of the ticks.
+    time_s, measured : array, shape (n,)
+        The velocity at its stamps.
+    scale : float
+        Its SD.
+    """
+
+    command: Channel
+    sign: Array
+    interval_s: float
+    time_s: Array
+    measured: Array
+    scale: float
+
+    def inputs(self, friction: bool) -> tuple[Array, ...]:
+        """Return what acts on the drive at each tick: the command, the sign of the velocity."""
+        return (self.command.values, self.sign) if friction else (self.command.values,)
+
+    @property
+    def halves(self) -> tuple[slice, slice]:
+        """The first half of the velocity's samples, and the second."""
+        middle = self.measured.size // 2
+        return slice(middle), slice(middle, None)
+
+
+class Fitted(NamedTuple):
+    """A structure that was fitted to some of the samples.
+
+    Attributes
+    ----------
+    structure : Structure
+    model : DriveModel
+    rubbing : tuple of complex
+        Residues of the answer to the sign of the velocity; empty without friction.
+    power : float
+        What is left of the velocity, as a share of its variance.
+    interval_s : float
+        Of the ticks.
+    """
+
+    structure: Structure
+    model: DriveModel
+    rubbing: tuple[complex, ...]
+    power: float
+    interval_s: float
+
+    @property
+    def too_fast(self) -> bool:
+        """Whether a pole ended where nothing of it is seen."""
+        return max(map(abs, self.model.poles_rad_s)) * self.interval_s > 0.99 * FASTEST
+
+
+def search(
+    samples: Samples, structure: Structure, start: DriveModel, part: slice = EVERYTHING
+) -> Fitted:
+    """Return the drive of a structure that explains a part of the samples best."""
+    interval_s, time_s = samples.interval_s, samples.time_s[part]
+    measured = samples.measured[part] / samples.scale
+    degrees = np.array(([1.0, 2.0] * structure.poles)[: structure.poles])
+    lower, upper = degrees * math.log(SLOWEST), degrees * math.log(FASTEST)
+    longest = max(LONGEST_S / interval_s, LONGEST_TICKS)
+
+    def solved(x: Array, delay_ticks: float) -> tuple[Fitted, Array]:
+        poles = _poles(np.clip(x, lower, upper), interval_s)
+        delay_s = float(np.clip(delay_ticks, EARLIEST, longest)) * interval_s
+        # Friction acts behind the controller, whose zeros are not its own.
+        shapes = [_shapes(poles, n) for n in (structure.zeros, structure.poles - 1)]
+        columns = [
+            _columns(samples, values, poles, shape, delay_s, time_s)
+            for values, shape in zip(samples.inputs(structure.friction), shapes, strict=False)
+        ]
+        table = np.concatenate(columns)
+        size = np.sqrt(np.einsum("ij,ij->i", table, table)) + np.finfo(np.float64).tiny
+        gram = (table @ table.T) / np.outer(size, size)
+        numerator = np.linalg.lstsq(gram, table @ measured / size)[0] / size
+        parts = np.split(samples.scale * numerator, [structure.zeros + 1])
+        residues, rubbing = (
+            tuple((shape[:, : part.size] @ part).tolist())
+            for shape, part in zip(shapes, parts, strict=True)
+        )
+        left = numerator @ table - measured
+        drive = DriveModel(poles, residues, delay_s)
+        power = float(np.mean(left**2))
+        answer = rubbing if structure.friction else ()
+        return Fitted(structure, drive, answer, power, interval_s), left
+
+    def found(x: Array, misfit: Callable[[Array], Array]) -> Array:
+        scale = np.append(0.1 * degrees, 0.1)[: x.size]
+        done = least_squares(
+            misfit, x, method="lm", x_scale=scale, ftol=1e-6, xtol=1e-6, max_nfev=MOST_TRIES
+        )
+        return np.asarray(done.x)
+
+    x = found(_coordinates(structure, start, interval_s), lambda x: solved(x[:-1], x[-1])[1])
+    if x[-1] > 0.0:
+        return solved(x[:-1], x[-1])[0]
+    return solved(found(x[:-1], lambda x: solved(x, 0.0)[1]), 0.0)[0]
+
+
+def _coordinates(structure: Structure, start: DriveModel, interval_s: float) -> Array:
+    """Return the logarithms of the coefficients of (s + a) or (s² + a s + b), and the delay.
+
+    In units of the tick. Two real poles and a conjugate pair are the same to the coefficients.
+    """
+    everyone = [pole * interval_s for pole in with_conjugates(start.poles_rad_s)]
+    if len(everyone) < structure.poles:
+        size = math.sqrt(abs(everyone[0] * everyone[1]))
+        everyone += [complex(-size * structure.beside)] * (structure.poles - len(everyone))
+    found = []
+    for a, b in zip(everyone[::2], everyone[1::2], strict=False):
+        found += [math.log(-(a + b).real), math.log((a * b).real)]
+    if structure.poles % 2:
+        found.append(math.log(-everyone[-1].real))
+    return np.array([*found, max(start.delay_s / interval_s, 0.1)])
+
+
+def _poles(coordinates: Array, interval_s: float) -> tuple[complex, ...]:
+    """Return the poles, of a conjugate pair the one with the positive imaginary part."""
+    poles: list[complex] = []
+    coefficients = np.exp(coordinates)
+    for a, b in zip(coefficients[::2], coefficients[1::2], strict=False):
+        root = cmath.sqrt(a * a / 4 - b)
+        if abs(root) < DOUBLE * a:
+            root = complex(DOUBLE * a)
+        if root.imag:
+            poles.append(complex(-a / 2, abs(root.imag)))
+        else:
+            poles += [complex(-a / 2 - root.real), complex(-b / (a / 2 + root.real))]
+    if coefficients.size % 2:
+        poles.append(complex(-coefficients[-1]))
+    return tuple(pole / interval_s for pole in poles)
+
+
+def _shapes(poles: tuple[complex, ...], zeros: int) -> Complex:
+    """Return the residues of s^j / Π(s − λ), s in units of the first pole, shape (poles, j)."""
+    unit = abs(poles[0])
+    everyone = with_conjugates(poles)
+    rows = []
+    for pole in poles:
+        rest = math.prod(((pole - p) / unit for p in everyone if p != pole), start=complex(1))
+        rows.append([unit * (pole / unit) ** j / rest for j in range(zeros + 1)])
+    return np.array(rows)
+
+
+def _columns(
+    samples: Samples,
+    values: Array,
+    poles: tuple[complex, ...],
+    shapes: Complex,
+    delay_s: float,
+    time_s: Array,
+) -> Array:
+    """Return the velocity that each term of a numerator makes of an input, shape (j, n)."""
+    tick, after_s = since_ticks(samples.command, time_s, delay_s, even=0.0)
+    columns = np.zeros((shapes.shape[1], time_s.size))
+    for pole, weights in zip(poles, shapes, strict=True):
+        state = state_after(pole, values, samples.interval_s, tick, after_s)
+        columns += (1 + (pole.imag != 0)) * (weights[:, None] * state).real
+    return columns
+
+
+def power_left(samples: Samples, fitted: Fitted, part: slice) -> float:
+    """Return the power that is left of a part of the velocity, as a share of its variance."""
+    model = fitted.model
+    answers = [model.residues, *([fitted.rubbing] if fitted.rubbing else [])]
+    time_s = samples.time_s[part]
+    inputs = samples.inputs(fitted.structure.friction)
+    there = sum(
+        _columns(samples, values, model.poles_rad_s, np.array(row)[:, None], model.delay_s, time_s)[
+            0
+        ]
+        for values, row in zip(inputs, answers, strict=True)
+    )
+    return float(np.mean(((there - samples.measured[part]) / samples.scale) ** 2))
