@@ -46,9 +46,21 @@ DRIVE = "the search for the drive, which the delay is counted from, ends within 
 CANCELLED = "a difference of nearly equal numbers, which agree to 1e-10 themselves"
 RATE = "filters take the sampling rate to 12 digits, without the rounding of time stamps"
 """Of 100.00000000000001 samples/s, say. With the exact rate they are equal to the bit."""
+BETWEEN = (
+    "the drive is chosen among several structures, and what is not known of it widens intervals"
+)
+"""The motion between samples of the default drive then differs by some 1e-5 of its size: J, B and K
+by less than a tenth of a standard error. Delays are counted from that of the drive."""
 ZERO = "a number that is zero but for rounding"
 
 EXPLANATIONS = (
+    Explanation("estimate", "*/delays/delay_s", 0.2, BETWEEN),
+    Explanation("estimate", "*_low", 5e-3, BETWEEN),
+    Explanation("estimate", "*_high", 5e-3, BETWEEN),
+    Explanation("estimate", "paper-rates/*/condition_number", 3e-2, BETWEEN),
+    Explanation("estimate", "*", 6e-3, BETWEEN),
+    Explanation("methods", "*/delays/delay_s", 0.1, BETWEEN),
+    Explanation("methods", "*", 6e-3, BETWEEN),
     Explanation("estimate", "paper-rates/delays/delay_s", 5e-3, LOOP),
     Explanation("estimate", "paper-rates/delays/delay_s_se", 1e-5, LOOP),
     Explanation("estimate", "paper-rates/*_bound", 4e-4, LOOP),

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigidimeter.dynamics import DriveModel, Loop
+from rigidimeter.dynamics import Loop
 from rigidimeter.estimation.bandlimited import bandlimited_signals
-from rigidimeter.estimation.closedloop.drive_fit import loop_of
+from rigidimeter.estimation.closedloop.observation import loop_of
 from rigidimeter.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
@@ -90,8 +90,8 @@ def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
 
 def _loop(prepared: PreparedEpoch) -> Loop:
     """Return the loop that the settings describe, with the drive that the recording shows."""
-    rig = prepared.settings.rig
-    drive = prepared.source.drive or DriveModel(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
+    found = prepared.source.drive
+    drive = found.model if found is not None else None
     return loop_of(prepared.settings, prepared.epoch.channels["torque_nm"].rate_hz, drive)
 
 

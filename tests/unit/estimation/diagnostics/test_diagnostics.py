@@ -153,10 +153,11 @@ def test_every_level_that_can_be_set_belongs_to_a_check(sound):
     )  # fmt: skip
     findings = diagnose(case)
     names = [finding.name for finding in findings]
-    # What several epochs show together is found where they are fitted together; what varies within
-    # one is looked for in a prepared epoch (test_varying).
+    # What is found where epochs are fitted; what varies within one is looked for in a prepared
+    # epoch (test_varying).
     varying = [name for name in DiagnosticLevels.model_fields if name.startswith("varying_")]
-    assert sorted([*names, "lack_of_fit", *varying]) == sorted(DiagnosticLevels.model_fields)
+    of_fits = ["lack_of_fit", "between_samples", *varying]
+    assert sorted([*names, *of_fits]) == sorted(DiagnosticLevels.model_fields)
 
 
 def test_what_was_not_recorded_is_not_checked(sound):
