@@ -43,16 +43,37 @@ def rows(found: Found, names: Sequence[str], methods: Sequence[str]) -> dict[tup
     }
 
 
+def chosen(words: Sequence[str]) -> list[str]:
+    """Return the scenarios of those names, or whose names hold one of the words."""
+    return [
+        name
+        for name in SCENARIOS
+        if any(word == name or (word not in SCENARIOS and word in name) for word in words)
+    ]
+
+
+def fewest(found: Found, name: str, methods: Sequence[str]) -> int:
+    """Return how many recordings of a scenario are kept by each of the methods."""
+    return min(len(found.get(name, {}).get(method, [])) for method in methods)
+
+
 def main() -> None:
     """Measure, print, and write the page if it is whole."""
     parser = argparse.ArgumentParser(description="estimates and findings, scenario by scenario")
     parser.add_argument("--recordings", type=int, default=50)
-    parser.add_argument("--only", nargs="+", default=[""], help="rows whose name holds a word")
+    parser.add_argument(
+        "--only", nargs="+", default=[""], help="names of rows, or words that names of rows hold"
+    )
     parser.add_argument("--methods", default=",".join(METHODS))
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--keep", type=Path, help="file of the recordings' results")
+    parser.add_argument(
+        "--more",
+        action="store_true",
+        help="so many recordings more than are kept, of the same code",
+    )
     options = parser.parse_args()
-    names = [name for name in SCENARIOS if any(word in name for word in options.only)]
+    names = chosen(options.only)
     methods = options.methods.split(",")
     if not names or not set(methods) <= set(METHODS):
         parser.error(f"no scenario, or a method that is none of {', '.join(METHODS)}")
@@ -60,10 +81,15 @@ def main() -> None:
     if options.keep and options.keep.exists():
         found = json.loads(options.keep.read_text("utf-8"))
     begun_s = time.monotonic()
-    for name, by_method in measure(
-        names if options.recordings else [], options.recordings, methods, options.jobs
-    ):
-        found.setdefault(name, {}).update(by_method)
+    numbers = {
+        name: range(begin, begin + options.recordings)
+        for name in names
+        for begin in [fewest(found, name, methods) if options.more else 0]
+    }
+    for name, by_method in measure(numbers, methods, options.jobs):
+        own = found.setdefault(name, {})
+        for method, recordings in by_method.items():
+            own[method] = own.get(method, [])[: numbers[name].start] + recordings
         if options.keep:
             options.keep.write_text(json.dumps(found), encoding="utf-8")
         print("\n".join(table(rows(found, [name], methods))[2:]), flush=True)

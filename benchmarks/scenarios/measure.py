@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
@@ -23,15 +23,25 @@ Kept = dict[str, Any]
 
 
 def measure(
-    names: Sequence[str], recordings: int, methods: Sequence[str], jobs: int
+    numbers: Mapping[str, range], methods: Sequence[str], jobs: int
 ) -> Iterator[tuple[str, dict[str, list[Kept]]]]:
-    """Yield each scenario with its recordings by method, a scenario at a time."""
-    tasks = [(name, number, tuple(methods)) for name in names for number in range(recordings)]
+    """Yield each scenario with its recordings by method, a scenario at a time.
+
+    Parameters
+    ----------
+    numbers : mapping of str to range
+        The recordings of each scenario; a number always gives the same one.
+    methods : sequence of str
+    jobs : int
+        Processes.
+    """
+    tasks = [(name, number, tuple(methods)) for name in numbers for number in numbers[name]]
     with ProcessPoolExecutor(jobs) as pool:
         found = map(_one, tasks) if jobs == 1 else pool.map(_one, tasks)
-        for name in names:
-            both = [next(found) for _ in range(recordings)]
-            yield name, {method: [kept[method] for kept in both] for method in methods}
+        for name in numbers:
+            both = [next(found) for _ in numbers[name]]
+            if both:
+                yield name, {method: [kept[method] for kept in both] for method in methods}
 
 
 def _one(task: tuple[str, int, tuple[str, ...]]) -> dict[str, Kept]:

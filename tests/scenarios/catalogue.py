@@ -61,7 +61,7 @@ def _stiffness() -> Iterator[Scenario]:
 
 
 def _terms() -> Iterator[Scenario]:
-    for delay_s, gain in ((0.035, 0.05), (0.045, 0.15), (0.06, 0.3)):
+    for delay_s, gain in ((0.035, 0.05), (0.035, 0.15), (0.045, 0.15), (0.06, 0.15), (0.06, 0.3)):
         yield another(
             f"reflex {1e3 * delay_s:.0f} ms, {gain}",
             TERM,
