@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 from tests.scenarios.catalogue import SCENARIOS
-from tests.scenarios.recordings import without_perturbation
+from tests.scenarios.recordings import measured_alone
 
 from rigidimeter.records import Fit
 from rigidimeter.study.analysis import Preparation, analyse_prepared
 
 EPOCHS = 4
 METHODS = {"iv": "iv", "bandlimited": "bandlimited", "blind": "bandlimited"}
-"""What is asked for, and the estimator: ``blind`` has no column of the perturbation."""
+"""What is asked for, and the estimator: ``blind`` has torque and motion alone."""
 
 Kept = dict[str, Any]
 """One recording by one method: the truth, its fits, the pooled fit."""
@@ -56,7 +56,7 @@ def _one(task: tuple[str, int, tuple[str, ...]]) -> dict[str, Kept]:
         hidden = method == "blind"
         with np.errstate(all="ignore"):
             analysis = analyse_prepared(
-                Preparation(map(without_perturbation, epochs), settings) if hidden else known,
+                Preparation(map(measured_alone, epochs), settings) if hidden else known,
                 METHODS[method],
             )
         found[method] = {

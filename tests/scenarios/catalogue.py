@@ -14,10 +14,10 @@ from tests.scenarios.limbs import LIMBS
 from tests.scenarios.plant import POSITION_LOOP, VELOCITY_PI
 from tests.scenarios.scenario import Scenario, scenario
 
-OWN = ("voluntary_torque", "active_movement", "residual_perturbation", "tremor")
+OWN = ("voluntary_torque", "active_movement", "residual_perturbation", "tremor", "loop_bias")
 """The subject's own torque."""
 
-TERM = ("missing_term", "lack_of_fit", "residual_perturbation")
+TERM = ("missing_term", "lack_of_fit", "residual_perturbation", "loop_bias")
 """The joint is not J, B and K alone."""
 
 DRIVE = ("drive", "lack_of_fit")
@@ -40,7 +40,7 @@ def _subject() -> Iterator[Scenario]:
 
 
 def _stiffness() -> Iterator[Scenario]:
-    varying = ("varying",)
+    varying = ("varying", "loop_bias")
     for course in ("step", "drift"):
         yield another(
             f"K {course} 0.7 to 1.3",

@@ -16,6 +16,7 @@ from tests.scenarios.subject import Subject, courses
 from rigidimeter.records import Channel, Epoch
 
 Array = NDArray[np.float64]
+MEASURED = ("torque_nm", "angle_rad", "velocity_rad_s")
 
 
 @dataclass(frozen=True)
@@ -52,9 +53,9 @@ def simulate(setup: Setup, n_epochs: int, seed: np.random.SeedSequence) -> Simul
     return Simulated([epoch for epoch, _ in both], np.array([truth for _, truth in both]))
 
 
-def without_perturbation(epoch: Epoch) -> Epoch:
-    """Return the epoch as a file without a column of the perturbation holds it."""
-    channels = {k: v for k, v in epoch.channels.items() if k != "perturbation_nm"}
+def measured_alone(epoch: Epoch) -> Epoch:
+    """Return the epoch as a file of torque and motion holds it: no perturbation, no command."""
+    channels = {k: epoch.channels[k] for k in MEASURED if k in epoch.channels}
     return Epoch(epoch.source, epoch.label, channels, epoch.condition, epoch.task)
 
 

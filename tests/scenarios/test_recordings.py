@@ -8,7 +8,7 @@ import numpy as np
 from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.motion import STIFFNESS, SUBJECT
 from tests.scenarios.perturbations import Perturbation, perturbation_nm
-from tests.scenarios.recordings import simulate, without_perturbation
+from tests.scenarios.recordings import measured_alone, simulate
 from tests.scenarios.scenario import scenario
 from tests.scenarios.session import write_session
 from tests.scenarios.subject import Subject, courses
@@ -94,10 +94,10 @@ def test_a_recording_follows_from_its_number() -> None:
     assert not np.array_equal(torque[0], torque[2])
 
 
-def test_a_file_without_a_perturbation_says_nothing_of_it() -> None:
+def test_a_file_of_torque_and_motion_says_nothing_of_the_perturbation() -> None:
     (epoch,), _ = simulate(scenario("x", perturbation=SHORT).setup, 1, np.random.SeedSequence(3))
-    blind = without_perturbation(epoch)
-    assert "perturbation_nm" not in blind.channels
+    blind = measured_alone(epoch)
+    assert sorted(blind.channels) == ["angle_rad", "torque_nm", "velocity_rad_s"]
     assert blind.excitation_hz is None
 
 
