@@ -20,8 +20,11 @@ OWN = ("voluntary_torque", "active_movement", "residual_perturbation", "tremor",
 TERM = ("missing_term", "lack_of_fit", "residual_perturbation", "loop_bias")
 """The joint is not J, B and K alone."""
 
-DRIVE = ("drive", "lack_of_fit")
-CLOCK = ("velocity_delay", "delay", "drive", "lack_of_fit")
+DRIVE = ("between_samples", "lack_of_fit")
+"""What the drive does between the samples is not known."""
+
+CLOCK = ("velocity_delay", *DRIVE)
+"""Stamps, rates and filters."""
 
 another = partial(scenario, other_model=True)
 """A joint that is not one J, B and K."""
