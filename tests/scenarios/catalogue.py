@@ -85,7 +85,7 @@ def _terms() -> Iterator[Scenario]:
             f"friction in the joint {torque_nm} N·m", TERM, joint={"coulomb_nm": torque_nm}
         )
     yield another("damping 3:1 by direction", TERM, joint={"damping_asymmetry": 0.5})
-    yield another("cubic stiffness 40 N·m/rad³", TERM, joint={"cubic_nm_rad3": 40.0})
+    yield another("cubic stiffness 40 N·m/rad³", (*TERM, "varying"), joint={"cubic_nm_rad3": 40.0})
     yield another(
         "gravity 0.5 N·m at 45°",
         TERM,
