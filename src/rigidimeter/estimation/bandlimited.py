@@ -6,7 +6,8 @@ A linear time-invariant filter F commutes with Eq. 3:
 
 so filtering *every* signal alike leaves J, B and K where they are, while filtering one of them does
 not. Drift below the band and sensor noise above it are removed from both sides. The first and last
-second are dropped after filtering: there the filter saw no neighbours.
+second are dropped after filtering: there the filter saw no neighbours. So is a second on each side
+of what is left out (`estimation.stretches`).
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from rigidimeter.estimation.signals import (
     spline,
     uniform_grid,
 )
+from rigidimeter.estimation.stretches import sound
 from rigidimeter.records import Epoch
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE, EstimationSettings
 
@@ -100,7 +102,8 @@ def bandlimited_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
     inner = slice(edge, full.size - edge)
     time_s = full[inner]
     trim = max(round(settings.trim_s * rate_hz) - edge, 0)
-    keep = slice(trim, time_s.size - trim)
+    keep = sound(epoch, time_s, settings.trim_s)
+    keep[:trim] = keep[time_s.size - trim :] = False
     return Signals(
         time_s=time_s[keep],
         torque_nm=zero_phase_band(spline(torque)(time_s), rate_hz, band)[keep],

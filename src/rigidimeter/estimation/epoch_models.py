@@ -11,6 +11,7 @@ from rigidimeter.estimation.diagnostics import checked
 from rigidimeter.estimation.methods import choose_method, method_named
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import motion_channels
+from rigidimeter.estimation.stretches import longest_part
 from rigidimeter.estimation.terms import Comparison, compare_models, fit_model, wideband_signals
 from rigidimeter.records import Finding, Fit
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE
@@ -65,7 +66,7 @@ def model_epoch(
         slowest_hz = min(channel.rate_hz for channel in used)
         band = (0.0, min(high_hz, USABLE_FRACTION_OF_RATE * slowest_hz))
     fit = _estimate(prepared)
-    motion = wideband_signals(epoch, band[1])
+    motion = wideband_signals(longest_part(epoch), band[1])
     if not compare:
         rows = (fit_model(motion, model, band, estimation.trim_s) for model in models)
         return EpochModels(band, Comparison(tuple(rows), None, ""), fit.findings)

@@ -12,6 +12,7 @@ from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.published_method import PUBLISHED
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.signals import Signals
+from rigidimeter.estimation.stretches import bridged
 from rigidimeter.records import Epoch, Fit
 from rigidimeter.settings import EstimationSettings, Settings
 
@@ -74,7 +75,7 @@ def epoch_signals(epoch: Epoch, method: str, settings: EstimationSettings) -> Si
     obstacle = before_fit(epoch, settings)
     if obstacle:
         raise ValueError(obstacle)
-    return (method_named(method).signals or bandlimited_signals)(epoch, settings)
+    return (method_named(method).signals or bandlimited_signals)(bridged(epoch), settings)
 
 
 def fit_epochs(

@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 from rigidimeter.dynamics import DriveModel
+from rigidimeter.estimation.bad_stretches import without_bad_stretches
 from rigidimeter.estimation.closedloop.drive_fit import FoundDrive, fit_drive
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.signals import Signals
@@ -109,9 +110,19 @@ class PreparedEpoch:
         return other
 
 
-def prepare(epochs: Iterable[Epoch], settings: Settings) -> list[PreparedEpoch]:
-    """Return the epochs ready to be fitted; those of one recording share their `Source`."""
-    everything = list(epochs)
+def prepare(
+    epochs: Iterable[Epoch], settings: Settings, *, screen: bool = True
+) -> list[PreparedEpoch]:
+    """Return the epochs ready to be fitted; those of one recording share their `Source`.
+
+    Parameters
+    ----------
+    epochs : iterable of Epoch
+    settings : Settings
+    screen : bool
+        Leave out the stretches in which a sensor did not measure.
+    """
+    everything = [without_bad_stretches(e, settings) if screen else e for e in epochs]
     by_source: dict[str, list[Epoch]] = {}
     for epoch in everything:
         by_source.setdefault(epoch.source, []).append(epoch)

@@ -21,6 +21,7 @@ from scipy import signal
 from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares, intervals_text
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.signals import Array, Signals, kinematics, motion_channels, uniform_grid
+from rigidimeter.estimation.stretches import sound
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import EstimationSettings
 
@@ -59,12 +60,13 @@ def published_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
     )
     angle = signal.sosfilt(highpass, angle)
     n = acceleration.size  # the last sample has no forward difference
+    keep = sound(epoch, time_s[:n], settings.trim_s)
     return Signals(
-        time_s=time_s[:n],
-        torque_nm=np.interp(time_s[:n], torque.time_s, torque.values),
-        acceleration_rad_s2=acceleration,
-        velocity_rad_s=velocity[:n],
-        angle_rad=angle[:n],
+        time_s=time_s[:n][keep],
+        torque_nm=np.interp(time_s[:n][keep], torque.time_s, torque.values),
+        acceleration_rad_s2=acceleration[keep],
+        velocity_rad_s=velocity[:n][keep],
+        angle_rad=angle[:n][keep],
         rate_hz=rate_hz,
         band_hz=(0.0, rate_hz / 2),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimeter.estimation.signals import motion_channels
+from rigidimeter.estimation.stretches import too_little
 from rigidimeter.records import Epoch, Outcome
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE, EstimationSettings
 
@@ -53,6 +54,8 @@ def before_fit(epoch: Epoch, settings: EstimationSettings) -> str:
             f"it lasts {stop - start:.3g} s, which leaves less than 1 s after trimming "
             f"{settings.trim_s:g} s at each end (estimation.trim_s)"
         )
+    if reason := too_little(epoch, settings):
+        return reason
     for channel in (torque, *motion):
         largest = float(np.max(np.abs(channel.values)))
         if largest > LARGEST_VALUE:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -126,6 +126,25 @@ class Notice:
     text: str
 
 
+class LeftOut(NamedTuple):
+    """A stretch of an epoch that is not used, ends included.
+
+    Attributes
+    ----------
+    start_s, stop_s : float
+        On the clock of the epoch's channels.
+    reason : str
+        What was seen there, or what the user said of it; may be empty.
+    check : str
+        The check that found it; empty where the user named it.
+    """
+
+    start_s: float
+    stop_s: float
+    reason: str = ""
+    check: str = ""
+
+
 @dataclass(frozen=True)
 class Epoch:
     """A stretch of recording in which one perturbation ran.
@@ -151,6 +170,8 @@ class Epoch:
         How the epoch ended when it was recorded: `included` for success.
     virtual : bool
         Whether a simulation made it.
+    left_out : tuple of LeftOut
+        What of it is not used.
     """
 
     source: str
@@ -162,6 +183,7 @@ class Epoch:
     excitation_hz: tuple[float, float] | None = None
     closed: Outcome = field(default_factory=Outcome)
     virtual: bool = False
+    left_out: tuple[LeftOut, ...] = ()
 
     @property
     def name(self) -> str:

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from rigidimeter.estimation import aligned
 from rigidimeter.estimation.prepared import PreparedEpoch, prepare
+from rigidimeter.estimation.stretches import longest_part
 from rigidimeter.records import Epoch, Fit, Score
 from rigidimeter.reporting.numbers import short_names
 from rigidimeter.study import StudyResult
@@ -42,10 +43,15 @@ def representative_fits(result: StudyResult) -> list[Fit]:
 
 
 def analysed_epoch(result: StudyResult, one: Fit | Score) -> Epoch | None:
-    """Return the epoch of a fit or score as it was analysed: with its delay corrected."""
+    """Return the epoch of a fit or score as it was analysed.
+
+    Its delay is corrected, and what is left out is left out.
+    """
+    if isinstance(one, Fit) and result.prepared:
+        return prepared_epochs(result)[one.source, one.epoch].epoch
     for epoch in result.epochs:
         if (epoch.source, epoch.label) == (one.source, one.epoch):
-            return aligned(epoch, result.analysis.delays)
+            return aligned(longest_part(epoch), result.analysis.delays)
     return None
 
 

@@ -101,6 +101,7 @@ class DiagnosticLevels(Section):
     varying_between_epochs: Level = "doubt"
     saturation: Level = "exclude"
     frozen: Level = "exclude"
+    left_out: Level = "note"
     velocity_scale: Level = "exclude"
     velocity_delay: Level = "doubt"
     guard_limited: Level = "doubt"
@@ -142,6 +143,7 @@ class DiagnosticsSettings(Section):
     varying_chance: float = quantity(0.01, "1", 0.0, 1.0, above=True)
     saturated_most_percent: float = quantity(0.5, "%", 0.0, 100.0)
     frozen_most_s: float = quantity(0.1, "s", 0.0, 60.0)
+    left_out_most_percent: float = quantity(50.0, "%", 0.0, 100.0)
     velocity_scale_most_percent: float = quantity(10.0, "%", 0.1, 1000.0)
     velocity_delay_most_ms: float = quantity(5.0, "ms", 0.01, 1000.0)
     limited_most_percent: float = quantity(1.0, "%", 0.0, 100.0)

@@ -25,6 +25,7 @@ from rigidimeter.estimation.diagnostics import checked
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.estimation.screening import before_fit
+from rigidimeter.estimation.stretches import longest_part
 from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Delay, Epoch, Fit, Task
 from rigidimeter.settings import Settings, settings_from
@@ -89,7 +90,9 @@ class Preparation:
         tasks = [task_of(epoch, settings) for epoch in self.epochs]
         both = list(zip(self.epochs, tasks, strict=True))
         self._perturbed = prepare((e for e, task in both if task == "prbs"), settings)
-        self._imposed = prepare((e for e, task in both if task == "sinusoid"), settings)
+        # A sinusoid is scored over whole cycles, and rests at its turning points.
+        imposed = (longest_part(epoch) for epoch, task in both if task == "sinusoid")
+        self._imposed = prepare(imposed, settings, screen=False)
         self._delays: tuple[Delay, ...] | None = None
         self._aligned: dict[int, PreparedEpoch] = {}
 

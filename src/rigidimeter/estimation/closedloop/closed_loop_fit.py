@@ -259,7 +259,7 @@ def _epoch_fit(
         vaf_percent=100.0 * (1.0 - share),
         condition_number=fit.condition_number,
         residual_sd_nm=float(residual_sd),
-        n_samples=grid.time_s.size,
+        n_samples=int(np.count_nonzero(grid.window)),
         band_hz=grid.band_hz,
         **found._asdict(),
     )

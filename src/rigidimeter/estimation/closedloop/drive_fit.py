@@ -27,6 +27,7 @@ from rigidimeter.estimation.closedloop.drive_search import (
     search,
 )
 from rigidimeter.estimation.signals import Array
+from rigidimeter.estimation.stretches import sound
 from rigidimeter.records import Channel, Epoch
 
 STRUCTURES = (
@@ -199,6 +200,7 @@ def _samples(epoch: Epoch) -> Samples | None:
         return None  # ticks that were missed would be taken for a slower drive
     start_s = command.time_s[0] + SETTLED_S
     inside = (velocity.time_s >= start_s) & (velocity.time_s <= command.time_s[-1])
+    inside &= sound(epoch, velocity.time_s)
     time_s = velocity.time_s[inside][:MOST_SAMPLES]
     measured = velocity.values[inside][:MOST_SAMPLES]
     if time_s.size < FEWEST_SAMPLES or np.std(measured) == 0.0:

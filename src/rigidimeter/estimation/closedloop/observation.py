@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Hashable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from rigidimeter.estimation.closedloop.excitation import Excitation, excitation
 from rigidimeter.estimation.closedloop.spectral_lines import Grid, Lines, epoch_grid, epoch_lines
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import motion_channels
+from rigidimeter.estimation.stretches import longest_part
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE, Settings
 
@@ -93,7 +95,9 @@ def observe_periods(prepared: PreparedEpoch) -> Observation:
     ValueError
         If the epoch cannot be used, or does not hold two whole periods; the text says why.
     """
-    perturbation = _perturbation(prepared)
+    # A window with a hole would spread the excited lines over those between them.
+    part = replace(prepared, epoch=longest_part(prepared.epoch))
+    perturbation = _perturbation(part)
     periods = 0
 
     def samples(available: int, rate_hz: float) -> int:
@@ -101,8 +105,8 @@ def observe_periods(prepared: PreparedEpoch) -> Observation:
         periods, count = whole_periods(perturbation, rate_hz, available)
         return count
 
-    grid = _grid(prepared, samples)
-    return _observed(prepared, perturbation, grid, grid.line % periods == 0)
+    grid = _grid(part, samples)
+    return _observed(part, perturbation, grid, grid.line % periods == 0)
 
 
 def observe_motion(prepared: PreparedEpoch) -> Observation:
@@ -198,6 +202,7 @@ def _observed(
         round(1e6 * grid.rate_hz),
         int(grid.line[0]),
         int(grid.line[-1]),
+        prepared.epoch.left_out,
     )
     made = prepared.source.once(key, lambda: excitation(perturbation, loop, grid))
     lines = epoch_lines(epoch, grid, drive, _torque_filter(prepared.settings))

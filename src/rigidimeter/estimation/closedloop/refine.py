@@ -160,18 +160,21 @@ def fit_single(
     covariance, degrees = line_covariance(
         inverse, weighted, residual, smoother, weight_from.at(lines)
     )
+    spread = lines.grid.spread
     # The epoch's own level on the common shape.
     common = weight_from.at(lines)
     own = common * smoother(np.abs(residual) ** 2 / common)
     return LineFit(
         values,
-        covariance,
-        degrees,
+        spread * covariance,
+        degrees / spread,
         _bound([problem], [lines], Shape(lines.grid.omega_rad_s, own)),
         _condition([problem], [lines], weight_from),
         weight_from,
         moved_elsewhere([problem], [weight_from.at(lines)], values),
-        values + drawn_lines(inverse, weighted, residual, _rng(), draws) if draws else None,
+        values + np.sqrt(spread) * drawn_lines(inverse, weighted, residual, _rng(), draws)
+        if draws
+        else None,
     )
 
 
@@ -258,10 +261,11 @@ def _pooled_covariance(
         part, degrees = line_covariance(
             inverse, weighted, residual, _smoother([lines]), shape.at(lines)
         )
-        of_lines += part
-        squares += np.diag(part) ** 2 / degrees
+        spread = lines.grid.spread
+        of_lines += spread * part
+        squares += (spread * np.diag(part)) ** 2 / (degrees / spread)
         if draws and count < ENOUGH_EPOCHS:
-            errors += drawn_lines(inverse, weighted, residual, rng, draws)
+            errors += np.sqrt(spread) * drawn_lines(inverse, weighted, residual, rng, draws)
     between = inverse @ (moments.T @ moments) @ inverse.T * (count / max(count - 1, 1))
     if draws and count >= ENOUGH_EPOCHS:  # each epoch is a block
         times = rng.multinomial(count, np.full(count, 1.0 / count), size=draws)
@@ -307,7 +311,7 @@ def _bound(problems: Sequence[Problem], everything: Sequence[Lines], shape: Shap
     information = np.zeros((p, p))
     for problem, lines in zip(problems, everything, strict=True):
         weighted = problem.instruments / shape.at(lines)[:, None]
-        information += 2 * (weighted.conj().T @ problem.instruments).real
+        information += 2 * (weighted.conj().T @ problem.instruments).real / lines.grid.spread
     return _inverse(information)
 
 

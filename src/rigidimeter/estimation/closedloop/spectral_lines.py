@@ -64,6 +64,9 @@ class Grid:
         Σ w²: white noise of unit variance puts this much power into every line.
     window_lines : complex array, shape (m,)
         Σ w e^(−iωt): what a constant would leave at the lines.
+    spread : float
+        What is left out makes neighbouring lines alike. By this factor the variance of an estimate
+        is then larger than independent lines would have it (`_spread`).
     """
 
     time_s: Array
@@ -74,6 +77,7 @@ class Grid:
     omega_rad_s: Array
     energy: float
     window_lines: Complex
+    spread: float = 1.0
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -151,13 +155,23 @@ def epoch_grid(
     else:
         n = fft.prev_fast_len(time_s.size, real=True) if time_s.size else 0
         time_s = time_s[:n]
-    return Grid(time_s, rate_hz, *_layout(n, float(f"{rate_hz:.9g}"), band_hz, taper_s))
+    if n == 0:
+        return Grid(time_s, rate_hz, *_layout(n, float(f"{rate_hz:.9g}"), band_hz, taper_s, ()))
+    holes = tuple(
+        (round(stretch.start_s - float(time_s[0]), 9), round(stretch.stop_s - float(time_s[0]), 9))
+        for stretch in epoch.left_out
+    )
+    return Grid(time_s, rate_hz, *_layout(n, float(f"{rate_hz:.9g}"), band_hz, taper_s, holes))
 
 
 @lru_cache(maxsize=32)
 def _layout(
-    n: int, rate_hz: float, band_hz: tuple[float, float], taper_s: float
-) -> tuple[Array, Array, NDArray[np.intp], Array, float, Complex]:
+    n: int,
+    rate_hz: float,
+    band_hz: tuple[float, float],
+    taper_s: float,
+    holes_s: tuple[tuple[float, float], ...],
+) -> tuple[Array, Array, NDArray[np.intp], Array, float, Complex, float]:
     """Return what does not depend on where an epoch begins; epochs of a session share it."""
     low, high = band_hz
     duration_s = n / rate_hz
@@ -168,13 +182,17 @@ def _layout(
             f"{duration_s:.3g} s hold {line.size} spectral lines from {low:g} to {high:g} Hz; "
             f"at least {FEWEST_LINES} are needed"
         )
-    window, slope = _taper(n, rate_hz, taper_s)
+    whole, slope = _taper(n, rate_hz, taper_s)
+    window = whole
+    for hole_s in holes_s:
+        window, slope = _with_hole(window, slope, rate_hz, taper_s, hole_s)
     spectrum = np.asarray(fft.rfft(window)[line], dtype=np.complex128)
     energy = float(np.sum(window * window))
     omega = np.asarray(2 * np.pi * line / duration_s, dtype=np.float64)
     for part in (window, slope, line, omega, spectrum):
         part.setflags(write=False)
-    return window, slope, line, omega, energy, spectrum
+    spread = _spread(window) / _spread(whole) if holes_s else 1.0
+    return window, slope, line, omega, energy, spectrum, spread
 
 
 def epoch_lines(
@@ -289,9 +307,37 @@ def _times(torque: Channel, used: list[Channel]) -> tuple[Array, float]:
 def _taper(n: int, rate_hz: float, taper_s: float) -> tuple[Array, Array]:
     """Return a window with raised-cosine ends, and its slope."""
     centre_s = (np.arange(n) + 0.5) / rate_hz
-    edge_s = np.minimum(centre_s, n / rate_hz - centre_s)
-    phase = np.pi * np.minimum(edge_s / taper_s, 1.0) if taper_s > 0 else np.full(n, np.pi)
-    window = 0.5 - 0.5 * np.cos(phase)
-    steep = 0.5 * np.pi / taper_s * np.sin(phase) if taper_s > 0 else np.zeros(n)
+    window, steep = _edge(np.minimum(centre_s, n / rate_hz - centre_s), taper_s)
     rising = np.arange(n) < n / 2
     return window, np.where(rising, steep, -steep)
+
+
+def _with_hole(
+    window: Array, slope: Array, rate_hz: float, taper_s: float, hole_s: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Return a window times one that is zero in a hole and rises from it, and its slope."""
+    at_s = np.arange(window.size) / rate_hz
+    start_s, stop_s = hole_s
+    factor, steep = _edge(np.maximum(np.maximum(start_s - at_s, at_s - stop_s), 0.0), taper_s)
+    factor[(at_s >= start_s) & (at_s <= stop_s)] = 0.0
+    signed = np.where(at_s < start_s, -steep, steep)
+    return window * factor, slope * factor + window * signed
+
+
+def _edge(distance_s: Array, taper_s: float) -> tuple[Array, Array]:
+    """Return a raised cosine of the distance from an edge, and its slope."""
+    n = distance_s.size
+    phase = np.pi * np.minimum(distance_s / taper_s, 1.0) if taper_s > 0 else np.full(n, np.pi)
+    steep = 0.5 * np.pi / taper_s * np.sin(phase) if taper_s > 0 else np.zeros(n)
+    return 0.5 - 0.5 * np.cos(phase), steep
+
+
+def _spread(window: Array) -> float:
+    """Return n Σ w⁴ / (Σ w²)².
+
+    Noise and signal are both seen through the window, so the sum of their products over the lines
+    is one over time weighted by w⁴ (Parseval), while independent lines of noise with the power
+    Σ w² would give (Σ w²)² / n.
+    """
+    square = window * window
+    return float(window.size * np.sum(square * square) / np.sum(square) ** 2)

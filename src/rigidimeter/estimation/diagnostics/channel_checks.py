@@ -1,8 +1,9 @@
 """Whether the sensors measured, belong together, and the arm had room.
 
-A sensor at the end of its range repeats its extreme value; one that hangs repeats whatever it had.
-A living signal does neither for long: it has noise. A joint at the position limit, or a command
-that the guard changed, is not the perturbation as designed.
+Where a sensor hung or was at the end of its range (`estimation.bad_stretches`), that stretch is
+left out and the check notes it; where too little would be left, the check speaks of the whole
+epoch. A joint at the position limit, or a command that the guard changed, is not the perturbation
+as designed.
 
 The velocity belongs to the angle in scale and in time. Over any stretch of length T, a velocity
 that is g times too small and stamped τ too late obeys
@@ -17,26 +18,32 @@ velocity that a filter made late gives τ.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigidimeter.estimation.bad_stretches import FITTED, longest_repetition, share_at_extremes
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_most
 from rigidimeter.estimation.signals import Array
-from rigidimeter.records import Channel, Epoch
+from rigidimeter.estimation.stretches import left_out_s, sound
+from rigidimeter.records import Channel, Epoch, LeftOut
 from rigidimeter.settings import DiagnosticsSettings
 
-FITTED = ("torque_nm", "angle_rad", "velocity_rad_s")
-FEWEST_AT_EXTREME = 3
-"""An extreme reached by chance is not repeated three times in a row."""
+MOST_SHOWN = 3
 
 
 def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return the largest share of samples in which a channel repeats its extreme value."""
-    shares = {c.name: 100.0 * _share_at_extremes(c) for c in _fitted(epoch)}
+    most = settings.saturated_most_percent
+    left_out = _left_out(epoch, "saturation")
+    if left_out:
+        value = 100.0 * _seconds(left_out) / _length_s(epoch)
+        fact = f"{_channels(left_out)} in {value:.2g} % of the time (at most {most:g} %)"
+        return Look(value, most, True, fact)
+    shares = {c.name: 100.0 * share_at_extremes(epoch, c, settings) for c in _fitted(epoch)}
     worst = max(shares, key=lambda name: shares[name])
-    value, most = shares[worst], settings.saturated_most_percent
+    value = shares[worst]
     return at_most(
         value,
         most,
@@ -46,13 +53,67 @@ def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
 
 def frozen(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return the longest time for which a channel repeats one value."""
-    found = {channel.name: _longest_repetition(channel) for channel in _fitted(epoch)}
-    worst = max(found, key=lambda name: found[name][0])
-    (value, start_s), most = found[worst], settings.frozen_most_s
-    when = f", from {start_s:.3g} s" if value > 0 else ""
-    return at_most(
-        value, most, f"{worst} repeats one value for {value:.2g} s (at most {most:g} s){when}"
-    )
+    most = settings.frozen_most_s
+    left_out = _left_out(epoch, "frozen")
+    if left_out:
+        longest = max(left_out, key=lambda stretch: stretch.stop_s - stretch.start_s)
+        value, start_s, what = longest.stop_s - longest.start_s, longest.start_s, longest.reason
+    else:
+        found = {c.name: longest_repetition(epoch, c, settings) for c in _fitted(epoch)}
+        worst = max(found, key=lambda name: found[name][0])
+        (value, start_s), what = found[worst], f"{worst} repeats one value"
+    when = f", from {start_s:.4g} s" if value > 0 else ""
+    return at_most(value, most, f"{what} for {value:.2g} s (at most {most:g} s){when}")
+
+
+def left_out(epoch: Epoch) -> Look:
+    """Return for how long the user left parts of the epoch out, in s."""
+    found = _left_out(epoch, "")
+    if not found:
+        return Look(0.0, 0.0, False, "nothing is left out by hand")
+    value = _seconds(found)
+    reasons = "; ".join(dict.fromkeys(stretch.reason for stretch in found if stretch.reason))
+    fact = f"{value:.3g} s are left out by hand, {_spans(found)}"
+    return Look(value, 0.0, True, fact, f"{reasons or 'no reason was given'}; {_rest(epoch)}")
+
+
+def said_left_out(check: str) -> Callable[[Case], str]:
+    """Return what says that the stretches which a check found are left out; else nothing."""
+
+    def said(case: Case) -> str:
+        found = _left_out(case.epoch, check)
+        return f"left out, {_spans(found)}; {_rest(case.epoch)}" if found else ""
+
+    return said
+
+
+def _left_out(epoch: Epoch, check: str) -> list[LeftOut]:
+    return [stretch for stretch in epoch.left_out if stretch.check == check]
+
+
+def _channels(stretches: Sequence[LeftOut]) -> str:
+    return " and ".join(dict.fromkeys(stretch.reason for stretch in stretches))
+
+
+def _seconds(stretches: Sequence[LeftOut]) -> float:
+    return sum(stretch.stop_s - stretch.start_s for stretch in stretches)
+
+
+def _spans(stretches: Sequence[LeftOut]) -> str:
+    spans = [f"from {s.start_s:.4g} to {s.stop_s:.4g} s" for s in stretches[:MOST_SHOWN]]
+    more = len(stretches) - MOST_SHOWN
+    return " and ".join(spans) + (f" and {more} more" if more > 0 else "")
+
+
+def _length_s(epoch: Epoch) -> float:
+    torque = epoch.channels["torque_nm"]
+    return float(torque.time_s[-1] - torque.time_s[0])
+
+
+def _rest(epoch: Epoch) -> str:
+    """Say what of an epoch is used."""
+    whole_s = _length_s(epoch)
+    return f"{whole_s - left_out_s(epoch):.3g} of {whole_s:.3g} s are used"
 
 
 def guard_limited(limited: ArrayLike, settings: DiagnosticsSettings) -> Look:
@@ -89,28 +150,6 @@ def _fitted(epoch: Epoch) -> list[Channel]:
     return [epoch.channels[name] for name in FITTED if name in epoch.channels]
 
 
-def _runs(values: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return first rows and lengths of the stretches of equal values."""
-    starts = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0) + 1))
-    return starts, np.diff(starts, append=values.size)
-
-
-def _share_at_extremes(channel: Channel) -> float:
-    starts, lengths = _runs(channel.values)
-    level = channel.values[starts]
-    extreme = (level == np.max(level)) | (level == np.min(level))
-    return float(np.sum(lengths[extreme & (lengths >= FEWEST_AT_EXTREME)])) / len(channel)
-
-
-def _longest_repetition(channel: Channel) -> tuple[float, float]:
-    """Return how long the longest stretch lasts, and when it begins, in s."""
-    starts, lengths = _runs(channel.values)
-    stops = starts + lengths - 1
-    spans = channel.time_s[stops] - channel.time_s[starts]
-    longest = int(np.argmax(spans))
-    return float(spans[longest]), float(channel.time_s[starts[longest]])
-
-
 STRETCH_S = 0.25
 
 
@@ -123,6 +162,8 @@ def velocity_fit(epoch: Epoch) -> tuple[float, float]:
     low = max(angle.time_s[0], velocity.time_s[0])
     high = min(angle.time_s[-1], velocity.time_s[-1])
     starts = angle.time_s[(angle.time_s >= low) & (angle.time_s <= high - STRETCH_S)]
+    # Neither a stretch that is left out nor one that reaches into it.
+    starts = starts[sound(epoch, starts, STRETCH_S)]
     if starts.size < 3:
         return np.nan, np.nan
     time_s, values = velocity.time_s, velocity.values
@@ -188,13 +229,23 @@ CHANNEL_CHECKS = (
         "the sensor or its amplifier was at the end of its range",
         "choose a larger range or a smaller perturbation, and repeat",
         of_fit=False,
+        harmless=said_left_out("saturation"),
     ),
     Check(
         "frozen",
         (),
         lambda c: frozen(c.epoch, c.settings),
         "the sensor hung, or the joint was held",
-        "check the sensor's cable and its rate; leave that stretch out",
+        "check the sensor's cable and its rate",
+        of_fit=False,
+        harmless=said_left_out("frozen"),
+    ),
+    Check(
+        "left_out",
+        (),
+        lambda c: left_out(c.epoch),
+        "",
+        "see whether the estimate changes when it is used",
         of_fit=False,
     ),
     Check(

@@ -1,0 +1,114 @@
+"""What is left of an epoch without the stretches that are left out.
+
+Least squares filters the whole epoch and then leaves out the rows within `trim_s` of a stretch, as
+it does at the ends. So that what a sensor said there does not come out of the filter seconds later,
+torque and motion are bridged first by a straight line. The methods of the closed loop use a window
+that falls to zero at a stretch and rises after it; what was measured there counts for nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.estimation.signals import Array, motion_channels
+from rigidimeter.records import Channel, Epoch
+from rigidimeter.settings import EstimationSettings
+
+LEAST_USED_S = 1.0
+
+
+def sound(epoch: Epoch, time_s: Array, margin_s: float = 0.0) -> NDArray[np.bool_]:
+    """Return at which times nothing within `margin_s` is left out."""
+    kept = np.ones(time_s.size, dtype=np.bool_)
+    for stretch in epoch.left_out:
+        kept &= (time_s < stretch.start_s - margin_s) | (time_s > stretch.stop_s + margin_s)
+    return kept
+
+
+def bridged(epoch: Epoch) -> Epoch:
+    """Return the epoch with torque and motion on a straight line over what is left out.
+
+    Command and perturbation stay: they are causes, and what follows the stretch depends on them.
+    """
+    if not epoch.left_out:
+        return epoch
+    channels = dict(epoch.channels)
+    for channel in _fitted(epoch):
+        kept = sound(epoch, channel.time_s)
+        if not np.any(kept):
+            continue  # nothing to hang a line on; the epoch is refused for what is left of it
+        line = np.interp(channel.time_s, channel.time_s[kept], channel.values[kept])
+        values = np.where(kept, channel.values, line)
+        channels[channel.name] = Channel(channel.name, channel.time_s, values)
+    return replace(epoch, channels=channels)
+
+
+def longest_part(epoch: Epoch) -> Epoch:
+    """Return the longest part of the epoch in which nothing is left out, as an epoch of its own.
+
+    Command and perturbation stay whole: what was before the part has caused some of its motion.
+    """
+    if not epoch.left_out:
+        return epoch
+    start_s, stop_s = _span(epoch)
+    best = at_s = start_s
+    length_s = -np.inf
+    for stretch in sorted(epoch.left_out):
+        if stretch.start_s - at_s > length_s:
+            best, length_s = at_s, stretch.start_s - at_s
+        at_s = max(at_s, stretch.stop_s)
+    if stop_s - at_s > length_s:
+        best, length_s = at_s, stop_s - at_s
+    channels = dict(epoch.channels)
+    for channel in _fitted(epoch):
+        # The ends of a stretch are left out with it.
+        rows = (channel.time_s >= best) & (channel.time_s <= best + length_s)
+        rows &= sound(epoch, channel.time_s)
+        channels[channel.name] = Channel(channel.name, channel.time_s[rows], channel.values[rows])
+    return replace(epoch, channels=channels, left_out=())
+
+
+def used_s(epoch: Epoch, trim_s: float) -> tuple[float, float]:
+    """Return for how long an epoch can be used, and for how long it could with nothing left out."""
+    start_s, stop_s = _span(epoch)
+    length_s = max(stop_s - start_s - 2 * trim_s, 0.0)
+    edges = [start_s + trim_s, stop_s - trim_s]
+    left_s, at_s = 0.0, edges[0]
+    for stretch in sorted(epoch.left_out):
+        left_s += max(min(stretch.start_s - trim_s, edges[1]) - at_s, 0.0)
+        at_s = max(at_s, stretch.stop_s + trim_s)
+    return left_s + max(edges[1] - at_s, 0.0), length_s
+
+
+def left_out_s(epoch: Epoch) -> float:
+    """Return for how long something is left out, without the margins."""
+    start_s, stop_s = _span(epoch)
+    return stop_s - start_s - used_s(epoch, 0.0)[0]
+
+
+def too_little(epoch: Epoch, settings: EstimationSettings) -> str:
+    """Return why what is not left out cannot be used, or an empty text."""
+    if not epoch.left_out:
+        return ""
+    left_s, _ = used_s(epoch, settings.trim_s)
+    least_s = max(settings.shortest_epoch_s - 2 * settings.trim_s, LEAST_USED_S)
+    if left_s >= least_s * (1 - 1e-3):
+        return ""
+    return (
+        f"what is left out, with {settings.trim_s:g} s at each side of it, leaves {left_s:.3g} s; "
+        f"at least {least_s:g} s are needed"
+    )
+
+
+def _fitted(epoch: Epoch) -> list[Channel]:
+    torque = epoch.channels.get("torque_nm")
+    return ([] if torque is None else [torque]) + motion_channels(epoch)
+
+
+def _span(epoch: Epoch) -> tuple[float, float]:
+    used = [channel for channel in _fitted(epoch) if len(channel)]
+    start_s = max(float(channel.time_s[0]) for channel in used)
+    return start_s, min(float(channel.time_s[-1]) for channel in used)
