@@ -90,8 +90,10 @@ class DiagnosticLevels(Section):
     lack_of_fit: Level = "doubt"
     between_samples: Level = "doubt"
     held_out_vaf: Level = "exclude"
+    missing_term: Level = "doubt"
     r_squared: Level = "doubt"
     voluntary_torque: Level = "doubt"
+    tremor: Level = "doubt"
     active_movement: Level = "doubt"
     loop_bias: Level = "doubt"
     emg_activity: Level = "doubt"
@@ -115,6 +117,7 @@ class DiagnosticsSettings(Section):
 
     ascending: ClassVar = (
         ("voluntary_low_hz", "voluntary_high_hz"),
+        ("tremor_low_hz", "tremor_high_hz"),
         ("inertia_least_kg_m2", "inertia_most_kg_m2"),
     )
 
@@ -132,6 +135,9 @@ class DiagnosticsSettings(Section):
     voluntary_low_hz: float = quantity(0.3, "Hz", 0.01, 20.0)
     voluntary_high_hz: float = quantity(4.0, "Hz", 0.05, 50.0)
     voluntary_share_most_percent: float = quantity(15.0, "%", 0.0, 100.0)
+    tremor_low_hz: float = quantity(4.0, "Hz", 1.0, 50.0)
+    tremor_high_hz: float = quantity(12.0, "Hz", 1.0, 50.0)
+    tremor_share_most_percent: float = quantity(3.0, "%", 0.0, 100.0)
     loop_bias_most_percent: float = quantity(50.0, "%", 0.0, 1000.0)
     active_torque_nm: float = quantity(0.1, "N·m", 0.0, 100.0, above=True)
     active_share_percent: float = quantity(50.0, "%", 0.0, 1000.0)

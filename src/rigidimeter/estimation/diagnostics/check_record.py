@@ -69,7 +69,8 @@ class Case:
     loop : Loop, optional
         In which the joint was moved, as the settings and the recording say.
     prepared : PreparedEpoch, optional
-        The epoch with what was made of it; without it nothing is said of a joint that varies.
+        The epoch with what was made of it; without it nothing is said of a joint that varies,
+        nor of terms that are missing.
     """
 
     epoch: Epoch

@@ -14,8 +14,10 @@ from rigidimeter.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
+from rigidimeter.estimation.diagnostics.missing_term import MISSING_TERM_CHECKS
 from rigidimeter.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
 from rigidimeter.estimation.diagnostics.torque_checks import TORQUE_CHECKS
+from rigidimeter.estimation.diagnostics.tremor_check import TREMOR_CHECKS
 from rigidimeter.estimation.diagnostics.varying_checks import VARYING_CHECKS
 from rigidimeter.estimation.methods import method_named
 from rigidimeter.estimation.prepared import PreparedEpoch
@@ -28,7 +30,9 @@ CHECKS: list[Check] = [
     *EXCITATION_CHECKS,
     *TORQUE_CHECKS,
     *RESIDUAL_CHECKS,
+    *MISSING_TERM_CHECKS,
     *MOVEMENT_CHECKS,
+    *TREMOR_CHECKS,
     *VARYING_CHECKS,
     *PARAMETER_CHECKS,
 ]
@@ -62,7 +66,11 @@ def checked(prepared: PreparedEpoch, fit: Fit) -> Fit:
     if fit.n_samples == 0 or prepared.obstacle:
         return fit  # the fit has said why
     case = replace(
-        _case(prepared, fit.value), fit=fit, method=method_named(fit.method), loop=_loop(prepared)
+        _case(prepared, fit.value),
+        fit=fit,
+        method=method_named(fit.method),
+        loop=_loop(prepared),
+        prepared=prepared,
     )
     findings = diagnose(case, prepared.once(_seen_without_fit))
     failed = [finding for finding in findings if finding.remedy]

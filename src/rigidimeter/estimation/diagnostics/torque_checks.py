@@ -19,8 +19,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_least
-from rigidimeter.estimation.signals import Signals, spline
-from rigidimeter.records import Epoch
+from rigidimeter.estimation.signals import Array, Signals
+from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings
 
 
@@ -30,7 +30,7 @@ def static_torque(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings)
     # Noise above the band is nobody's torque. A filter without overshoot keeps the function.
     length = max(round(signals.rate_hz / (2.0 * signals.band_hz[1])), 1)
     angle, torque = (
-        uniform_filter1d(spline(epoch.channels[name])(time_s), length)
+        uniform_filter1d(_at(epoch.channels[name], time_s), length)
         for name in ("angle_rad", "torque_nm")
     )
     steps = np.diff(torque[np.argsort(angle, kind="stable")])
@@ -43,6 +43,10 @@ def static_torque(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings)
         f"{value:.2g} % of the torque's variance is not a function of the angle (at least "
         f"{least:g} %)",
     )
+
+
+def _at(channel: Channel, time_s: Array) -> Array:
+    return np.interp(time_s, channel.time_s, channel.values)
 
 
 def _static_torque(case: Case) -> Look:

@@ -43,11 +43,12 @@ NOTHING = 1e-3
 
 @dataclass(frozen=True)
 class Solution:
-    """Coefficients of a fit to the lines, shape (p,), their covariance, and what is left."""
+    """Coefficients of a fit to the lines, shape (p,), their covariance, what is left and its ν."""
 
     values: Array
     covariance: Array
     residual: Complex
+    degrees: float
 
     @property
     def standard_errors(self) -> Array:
@@ -67,11 +68,15 @@ class BeyondLinear:
         Of the lines, as many to each stretch.
     torque : complex array, shape (m,)
         What is left of the torque; the mean of |torque|² is 1.
+    torque_lines, linear : complex arrays, shapes (m,) and (m, 3)
+        The torque, and acceleration, velocity and angle, as they are.
     """
 
     motion: Signals
     frequency_hz: Array
     torque: Complex
+    torque_lines: Complex
+    linear: Complex
     _window: Array
     _first: int
     _basis: Complex
@@ -93,19 +98,31 @@ class BeyondLinear:
         nonlinear : sequence of float
             The parameters inside the reflexes, in the order of the names.
         """
+        found = [self._white(lines) for lines in self.terms_lines(names, nonlinear)]
+        return np.stack(found, axis=1) if found else np.zeros((self.torque.size, 0), complex)
+
+    def terms_lines(self, names: Sequence[str], nonlinear: Sequence[float] = ()) -> list[Complex]:
+        """Return the lines of terms as they are, for each linear parameter shape (m,)."""
         found: list[Complex] = []
         used = 0
         for name in names:
-            if name not in REFLEXES:
-                found.append(self._left(name))
-                continue
-            one = kernel(name)
-            own = np.asarray(nonlinear[used : used + len(one.nonlinear)], dtype=np.float64)
-            used += own.size
-            # The gains of the path change slowly over a stretch, as the filter that is free there.
-            stretch = self._stretch_lines(name)
-            found += [self._white(stretch * gain) for gain in one.transfer(self.frequency_hz, own)]
-        return np.stack(found, axis=1) if found else np.zeros((self.torque.size, 0), complex)
+            count = len(kernel(name).nonlinear) if name in REFLEXES else 0
+            found += self._term_lines(name, nonlinear[used : used + count])
+            used += count
+        return found
+
+    def _term_lines(self, name: str, inner: Sequence[float] = ()) -> list[Complex]:
+        term = term_named(name)
+        if term is not None:
+            if name not in self._made:
+                self._made[name] = self.lines(term.regressor(self.motion))
+            return [self._made[name]]
+        side = "stretch" + name[-1]
+        if side not in self._made:
+            self._made[side] = self.lines(stretch_velocity(self.motion, name))
+        # The gains of the path change slowly over a stretch, as the filter that is free there.
+        gains = kernel(name).transfer(self.frequency_hz, np.asarray(inner, dtype=np.float64))
+        return [self._made[side] * gain for gain in gains]
 
     def grid(self, names: Sequence[str]) -> list[tuple[float, ...]]:
         """Return the points at which the parameters inside the reflexes are tried."""
@@ -140,35 +157,23 @@ class BeyondLinear:
         rows = np.concatenate([columns.real, columns.imag])
         target = np.concatenate([self.torque.real, self.torque.imag])
         lengths = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
-        inverse = np.linalg.pinv(rows / lengths, rcond=1e-8)
+        # By way of R, since the lines are many and the columns few.
+        left, upper = np.linalg.qr(rows / lengths)
+        inverse = np.linalg.pinv(upper, rcond=1e-8) @ left.T
         values = inverse @ target / lengths
         residual = self.torque - columns @ values
         free = rows.shape[0] * (1 - self._basis.shape[2] / self._basis.shape[1]) - values.size
         variance = float(np.sum(np.abs(residual) ** 2)) / free * self.taper_loss
         root = inverse / lengths[:, None]
-        return Solution(values, variance * (root @ root.T), residual)
-
-    def _left(self, name: str) -> Complex:
-        term = term_named(name)
-        assert term is not None
-        if name not in self._made:
-            self._made[name] = self._white(self._lines(term.regressor(self.motion)))
-        return self._made[name]
-
-    def _stretch_lines(self, name: str) -> Complex:
-        side = "stretch" + name[-1]
-        if side not in self._made:
-            self._made[side] = self._lines(stretch_velocity(self.motion, name))
-        return self._made[side]
+        return Solution(values, variance * (root @ root.T), residual, free)
 
     def _share(self, name: str) -> float:
-        term = term_named(name)
-        assert term is not None
-        lines = self._lines(term.regressor(self.motion))
+        (lines,) = self._term_lines(name)
         whole = float(np.linalg.norm(lines / np.repeat(self._size_nm, self._basis.shape[1])))
-        return float(np.linalg.norm(self._left(name))) / whole if whole > 0 else 0.0
+        return float(np.linalg.norm(self._white(lines))) / whole if whole > 0 else 0.0
 
-    def _lines(self, values: Array) -> Complex:
+    def lines(self, values: Array) -> Complex:
+        """Return the lines of a signal in time, shape (n,)."""
         return _lines(values, self._window, self._first, self.frequency_hz.size)
 
     def _white(self, lines: Complex) -> Complex:
@@ -225,6 +230,8 @@ def beyond_linear(
         motion,
         np.arange(first, first + used) / duration_s,
         np.asarray((left / size_nm[:, None]).ravel()),
+        torque.ravel(),
+        np.stack(linear, axis=2).reshape(used, 3),
         window,
         first,
         np.asarray(basis),

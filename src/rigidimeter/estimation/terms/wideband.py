@@ -44,12 +44,13 @@ def wideband_from_angle(
         Where the low-pass has half its gain, well above the band of the fit; at or above half the
         rate nothing is cut.
     """
+    angle, velocity, acceleration = _derivatives(angle_rad, (0, 1, 2), rate_hz, wide_hz)
     return Signals(
         time_s=np.arange(angle_rad.size) / rate_hz,
-        torque_nm=_derivative(torque_nm, 0, rate_hz, wide_hz),
-        acceleration_rad_s2=_derivative(angle_rad, 2, rate_hz, wide_hz),
-        velocity_rad_s=_derivative(angle_rad, 1, rate_hz, wide_hz),
-        angle_rad=_derivative(angle_rad, 0, rate_hz, wide_hz),
+        torque_nm=_lowpassed(torque_nm, rate_hz, wide_hz),
+        acceleration_rad_s2=acceleration,
+        velocity_rad_s=velocity,
+        angle_rad=angle,
         rate_hz=rate_hz,
         band_hz=(0.0, min(wide_hz, rate_hz / 2)),
     )
@@ -65,6 +66,8 @@ def wideband_signals(epoch: Epoch, high_hz: float) -> Signals:
     slowest = min(channel.rate_hz for channel in used)
     wide_hz = max(high_hz, min(WIDE_OVER_BAND * high_hz, USABLE_FRACTION_OF_RATE * slowest))
     time_s = uniform_grid(used, rate_hz)
+    if time_s.size > 2:
+        time_s = time_s[: fft.prev_fast_len(time_s.size - 1) + 1]  # of the period below
     torque = spline(epoch.channels["torque_nm"])(time_s)
     if "velocity_rad_s" not in epoch.channels:
         angle = spline(epoch.channels["angle_rad"])(time_s)
@@ -72,10 +75,10 @@ def wideband_signals(epoch: Epoch, high_hz: float) -> Signals:
     angle, velocity, acceleration = kinematics(epoch, time_s)
     return Signals(
         time_s=time_s,
-        torque_nm=_derivative(torque, 0, rate_hz, wide_hz),
-        acceleration_rad_s2=_derivative(acceleration, 0, rate_hz, wide_hz),
-        velocity_rad_s=_derivative(velocity, 0, rate_hz, wide_hz),
-        angle_rad=_derivative(angle, 0, rate_hz, wide_hz),
+        torque_nm=_lowpassed(torque, rate_hz, wide_hz),
+        acceleration_rad_s2=_lowpassed(acceleration, rate_hz, wide_hz),
+        velocity_rad_s=_lowpassed(velocity, rate_hz, wide_hz),
+        angle_rad=_lowpassed(angle, rate_hz, wide_hz),
         rate_hz=rate_hz,
         band_hz=(0.0, min(wide_hz, rate_hz / 2)),
     )
@@ -99,7 +102,13 @@ def banded(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> Array
     return np.asarray(passed, dtype=np.float64)
 
 
-def _derivative(values: Array, order: int, rate_hz: float, wide_hz: float) -> Array:
+def _lowpassed(values: Array, rate_hz: float, wide_hz: float) -> Array:
+    return _derivatives(values, (0,), rate_hz, wide_hz)[0]
+
+
+def _derivatives(
+    values: Array, orders: tuple[int, ...], rate_hz: float, wide_hz: float
+) -> list[Array]:
     # The line between the ends is taken out and its derivative put back, and the rest continued by
     # its point reflection: position and velocity then have no step where the period closes.
     n = values.size
@@ -110,8 +119,15 @@ def _derivative(values: Array, order: int, rate_hz: float, wide_hz: float) -> Ar
     rest = values - line
     whole = np.concatenate((rest, -rest[-2:0:-1]))
     frequency_hz = fft.rfftfreq(whole.size, 1.0 / rate_hz)
-    gain = (2j * np.pi * frequency_hz) ** order
+    spectrum = fft.rfft(whole)
     if wide_hz < rate_hz / 2:
-        gain = gain / (1.0 + (frequency_hz / wide_hz) ** 8)
-    passed = fft.irfft(gain * fft.rfft(whole), whole.size)[:n]
-    return np.asarray(passed + (line, np.full(n, slope), np.zeros(n))[order], dtype=np.float64)
+        spectrum = spectrum / (1.0 + (frequency_hz / wide_hz) ** 8)
+    back = (line, np.full(n, slope), np.zeros(n))
+    return [
+        np.asarray(
+            fft.irfft((2j * np.pi * frequency_hz) ** order * spectrum, whole.size)[:n]
+            + back[order],
+            dtype=np.float64,
+        )
+        for order in orders
+    ]

@@ -24,12 +24,14 @@ from rigidimeter.estimation.diagnostics import (
     reconstructed_torque_nm,
 )
 from rigidimeter.estimation.diagnostics.movement_checks import active_seconds, emg_envelope_v
+from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import (
     ControllerSettings,
     DiagnosticLevels,
     DiagnosticsSettings,
     EstimationSettings,
+    Settings,
     RigSettings,
 )
 
@@ -148,8 +150,9 @@ def test_every_level_that_can_be_set_belongs_to_a_check(sound):
     epoch, signals, parameters = sound
     emg = with_channel(epoch, "emg_v", 1e-5 * np.random.default_rng(1).standard_normal(N))
     fit = fit_inertia_damping_stiffness(signals)
+    (prepared,) = prepare([emg], Settings())
     case = Case(
-        emg, signals, parameters, SETTINGS, np.zeros(N), 1.0, fit, BANDLIMITED, LOOP
+        emg, signals, parameters, SETTINGS, np.zeros(N), 1.0, fit, BANDLIMITED, LOOP, prepared
     )  # fmt: skip
     findings = diagnose(case)
     names = [finding.name for finding in findings]

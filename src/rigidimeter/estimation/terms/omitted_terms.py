@@ -1,0 +1,173 @@
+"""Which terms a torque needs beside J, B and K: one test for each, on what no linear loop explains.
+
+With the columns z of a term at the lines of `beyond_linear`, beside those of the terms already
+found, and with residual sums R₀ without and R₁ with them,
+
+    F = (R₀ − R₁)/k ÷ (R₁/ν)        ÷ the loss of the taper
+
+has Fisher's distribution with k and ν degrees of freedom if the term is not there: the lines are
+independent and of one variance, whatever the colour of the residual. A reflex has a column for each
+of several delays, and of several speeds of the muscle. The probabilities are adjusted for the
+number of terms by Holm's method. The term that explains most is taken first and the others are
+tested again beside it, since a reflex also looks somewhat like a damping that differs between
+directions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from rigidimeter.estimation.signals import Array
+from rigidimeter.estimation.terms.beyond_linear import BeyondLinear, Complex, Solution
+from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
+from rigidimeter.estimation.terms.reflex import kernel, pass_through, stretch_velocity
+
+TESTED = ("coulomb", "damping+", "cubic", "quadratic", "reflex+")
+
+REFLEX_COLUMNS = (
+    *(("reflex+", (delay_s,)) for delay_s in (0.03, 0.05, 0.07, 0.1, 0.13)),
+    *(("reflex-second-order+", (0.045, hz, 1.0)) for hz in (1.0, 2.0, 4.0)),
+)
+"""With which a reflex is tested: |v| changes little between them."""
+
+DYNAMICS = 10.0
+"""How much more a muscle of second order must explain than a delay alone, σ² being 1, to be named
+instead of it."""
+
+EARLIEST_S = 0.025
+"""No stretch reflex is faster; a velocity that is hardly late is damping."""
+
+CHANCE = 1e-3
+"""Probability, adjusted for the number of terms, below which a term is there.
+
+A recording has many epochs, and a term that matters has far less.
+"""
+
+
+class OmittedTerm(NamedTuple):
+    """A term that is in the torque and not in the model.
+
+    Attributes
+    ----------
+    name : str
+        With the direction of a reflex decided.
+    value, standard_error : float
+        Its coefficient from what no linear loop explains.
+    p : float
+        Probability of as much by chance, adjusted for the number of terms.
+    inner : tuple of float
+        The parameters inside a reflex, its delay in s first.
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    p: float
+    inner: tuple[float, ...] = ()
+
+    def torque(self, beyond: BeyondLinear) -> Array:
+        """Return its torque in time, shape (n,), in N·m, its linear part included."""
+        term = term_named(self.name)
+        if term is not None:
+            return self.value * term.regressor(beyond.motion)
+        stretch, inner = stretch_velocity(beyond.motion, self.name), np.asarray(self.inner)
+        passed = pass_through(stretch, beyond.motion.rate_hz, kernel(self.name), inner)
+        return self.value * passed[0]
+
+
+class _Found(NamedTuple):
+    name: str
+    inner: tuple[float, ...]
+
+
+def omitted_terms(beyond: BeyondLinear) -> tuple[OmittedTerm, ...]:
+    """Return the terms that are there, the one that explains most first."""
+    found: list[_Found] = []
+    chances: list[float] = []
+    left = list(TESTED)
+    while left:
+        base = beyond.solve(_columns(beyond, found))
+        adjusted = holm([_p(beyond, found, name, base) for name in left])
+        fits = [
+            (*_best(beyond, found, name), float(p))
+            for name, p in zip(left, adjusted, strict=True)
+            if p < CHANCE
+        ]
+        fits = [fit for fit in fits if not _pushes(fit[0].name, fit[1].values[-1])]
+        if not fits:
+            break
+        term, _, p = min(fits, key=lambda fit: _power(fit[1].residual))
+        found.append(term)
+        chances.append(p)
+        left.remove("reflex+" if term.name in REFLEXES else term.name)
+    if not found:
+        return ()
+    whole = beyond.solve(_columns(beyond, found))
+    return tuple(
+        _named(term, float(value), float(error), p)
+        for term, value, error, p in zip(
+            found, whole.values, whole.standard_errors, chances, strict=True
+        )
+    )
+
+
+def holm(p: Sequence[float]) -> Array:
+    """Return probabilities adjusted for their number by Holm's method, shape (n,).
+
+    That of statsmodels collects all garbage first, which takes longer than all tests of an epoch.
+    """
+    values = np.asarray(p)
+    order = np.argsort(values)
+    stepped = np.maximum.accumulate(values[order] * np.arange(values.size, 0, -1))
+    adjusted = np.empty(values.size)
+    adjusted[order] = np.minimum(stepped, 1.0)
+    return adjusted
+
+
+def _named(term: _Found, value: float, error: float, p: float) -> OmittedTerm:
+    """Give a reflex the direction in which it resists: |v| has the other sign in the other."""
+    if term.name in REFLEXES and value < 0:
+        return OmittedTerm(term.name[:-1] + "-", -value, error, p, term.inner)
+    return OmittedTerm(term.name, value, error, p, term.inner)
+
+
+def _p(beyond: BeyondLinear, found: Sequence[_Found], name: str, base: Solution) -> float:
+    more = [_Found(*one) for one in (REFLEX_COLUMNS if name in REFLEXES else ((name, ()),))]
+    solved = beyond.solve(_columns(beyond, [*found, *more]))
+    rest = _power(solved.residual)
+    gained = max(_power(base.residual) - rest, 0.0) / len(more) / beyond.taper_loss
+    ratio = gained / (rest / solved.degrees) if rest > 0 else np.inf
+    return float(stats.f.sf(ratio, len(more), solved.degrees))
+
+
+def _best(beyond: BeyondLinear, found: Sequence[_Found], name: str) -> tuple[_Found, Solution]:
+    """Return the term, a reflex with its delay of least residual."""
+    if name not in REFLEXES:
+        term = _Found(name, ())
+        return term, beyond.solve(_columns(beyond, [*found, term]))
+    fits = []
+    for kind in ("reflex+", "reflex-second-order+"):
+        tried = [_Found(kind, inner) for inner in beyond.grid([kind]) if inner[0] >= EARLIEST_S]
+        solved = [(term, beyond.solve(_columns(beyond, [*found, term]))) for term in tried]
+        fits.append(min(solved, key=lambda fit: _power(fit[1].residual)))
+    late, slow = fits
+    gained = _power(late[1].residual) - _power(slow[1].residual)
+    return slow if gained > DYNAMICS else late
+
+
+def _columns(beyond: BeyondLinear, terms: Sequence[_Found]) -> Complex:
+    inner = [value for term in terms for value in term.inner]
+    return beyond.columns([term.name for term in terms], inner)
+
+
+def _pushes(name: str, value: float) -> bool:
+    term = term_named(name)
+    return term is not None and term.resists and value < 0
+
+
+def _power(lines: Complex) -> float:
+    return float(np.sum(np.abs(lines) ** 2))
