@@ -31,8 +31,8 @@ from rigidimeter.settings import (
     DiagnosticLevels,
     DiagnosticsSettings,
     EstimationSettings,
-    Settings,
     RigSettings,
+    Settings,
 )
 
 SETTINGS = DiagnosticsSettings()
