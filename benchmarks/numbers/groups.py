@@ -150,7 +150,8 @@ def terms(work: Workspace) -> Numbers:
     return _named(
         {
             "relaxed": models_numbers(work.document("model-relaxed", *relaxed)),
-            "pushing": models_numbers(work.document("model-pushing", *pushing)),
+            # No model may be recommended, which the status says.
+            "pushing": models_numbers(work.document("model-pushing", *pushing, statuses=(0, 1))),
         }
     )
 
@@ -168,7 +169,7 @@ def ankle(work: Workspace) -> Numbers:
     reflexes = [OFFSET, f"{OFFSET},reflex-fir+", f"{OFFSET},reflex-second-order", f"{JBK},reflex"]
     compared = ("--band-hz", 0, 40, "--compare", *_terms(*reflexes))
     found["models"] = models_numbers(
-        work.document("ankle-models", "model", *files, *ANKLE, *compared)
+        work.document("ankle-models", "model", *files, *ANKLE, *compared, statuses=(0, 1))
     )
     return _named(found)
 
