@@ -99,6 +99,7 @@ def _lines(found: ModelledEpoch) -> list[str]:
     low, high = found.models.band_hz
     compared = found.models.compared
     heading = f"{found.epoch.name}, {low:.4g} to {high:.4g} Hz"
+    heading += f"\n  {found.clock}" if found.clock else ""
     findings = [
         line
         for finding in found.models.findings

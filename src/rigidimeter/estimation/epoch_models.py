@@ -57,14 +57,8 @@ def model_epoch(
     ValueError
         If the epoch cannot be used; the text says why.
     """
-    if prepared.obstacle:
-        raise ValueError(prepared.obstacle)
+    band = _band_hz(prepared, high_hz)
     epoch, estimation = prepared.epoch, prepared.settings.estimation
-    band = band_hz(epoch, estimation)
-    if high_hz is not None:
-        used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
-        slowest_hz = min(channel.rate_hz for channel in used)
-        band = (0.0, min(high_hz, USABLE_FRACTION_OF_RATE * slowest_hz))
     fit = _estimate(prepared)
     motion = wideband_signals(longest_part(epoch), band[1])
     if not compare:
@@ -75,6 +69,61 @@ def model_epoch(
     if refused and compared.recommended is not None:
         compared = replace(compared, recommended=None, reason=refused)
     return EpochModels(band, compared, fit.findings)
+
+
+def clock_of_models(
+    aligned: PreparedEpoch,
+    recorded: PreparedEpoch,
+    models: Sequence[Sequence[str]],
+    *,
+    high_hz: float | None = None,
+) -> tuple[PreparedEpoch, str]:
+    """Return the epoch on the clock on which its models explain more of the torque, and a remark.
+
+    The delay of the torque is found with J, B and K alone. Friction and a reflex look like a delay
+    to them, so where terms are asked for that may be what was taken for one, both clocks are tried.
+
+    Parameters
+    ----------
+    aligned, recorded : PreparedEpoch
+        With the delay corrected, and as recorded; the same object where there is none.
+    models, high_hz
+        As for `model_epoch`.
+
+    Raises
+    ------
+    ValueError
+        If the epoch cannot be used; the text says why.
+    """
+    if aligned is recorded:
+        return aligned, ""
+    vaf_percent = []
+    for prepared in (aligned, recorded):
+        band = _band_hz(prepared, high_hz)
+        motion = wideband_signals(prepared.epoch, band[1])
+        trim_s = prepared.settings.estimation.trim_s
+        fits = [fit_model(motion, model, band, trim_s).fit for model in models]
+        vaf_percent.append(max((fit.vaf_percent for fit in fits if fit), default=0.0))
+    if vaf_percent[0] >= vaf_percent[1]:
+        return aligned, ""
+    first_s = recorded.epoch.channels["torque_nm"].time_s[0]
+    delay_ms = 1e3 * (first_s - aligned.epoch.channels["torque_nm"].time_s[0])
+    left = [f"{100 - one:.2g} %" for one in vaf_percent]
+    return recorded, (
+        f"torque as recorded: J, B and K alone would have it {delay_ms:.2g} ms late, but these "
+        f"terms leave {left[1]} of its variance as recorded and {left[0]} if it is moved"
+    )
+
+
+def _band_hz(prepared: PreparedEpoch, high_hz: float | None) -> tuple[float, float]:
+    if prepared.obstacle:
+        raise ValueError(prepared.obstacle)
+    epoch = prepared.epoch
+    if high_hz is None:
+        return band_hz(epoch, prepared.settings.estimation)
+    used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
+    slowest_hz = min(channel.rate_hz for channel in used)
+    return (0.0, min(high_hz, USABLE_FRACTION_OF_RATE * slowest_hz))
 
 
 def _estimate(prepared: PreparedEpoch) -> Fit:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigidimeter.errors import UserError
-from rigidimeter.estimation.epoch_models import EpochModels, model_epoch
+from rigidimeter.estimation.epoch_models import EpochModels, clock_of_models, model_epoch
 from rigidimeter.estimation.terms import ModelRow, TermsFit
 from rigidimeter.recording import Recording
 from rigidimeter.records import Epoch
@@ -30,12 +30,15 @@ class ModelledEpoch:
         Why it cannot be used.
     compared : bool
         Whether the models were compared, or each was asked for by its terms.
+    clock : str
+        Where the torque is taken as recorded though J, B and K alone would move it, why.
     """
 
     epoch: Epoch
     models: EpochModels | None
     problem: str
     compared: bool
+    clock: str = ""
 
     @property
     def unfitted(self) -> tuple[str, ...]:
@@ -74,15 +77,18 @@ def model_recording(
     UserError
         If every epoch is an imposed sinusoid.
     """
+    preparation = Preparation(recording.epochs, recording.settings)
+    both = zip(preparation.perturbed(), preparation.perturbed(as_recorded=True), strict=True)
     found = []
-    for prepared in Preparation(recording.epochs, recording.settings).perturbed():
-        epoch = prepared.epoch
+    for aligned, recorded in both:
+        epoch = aligned.epoch
         try:
+            prepared, remark = clock_of_models(aligned, recorded, models, high_hz=high_hz)
             fits = model_epoch(prepared, models, compare=compare, grow=grow, high_hz=high_hz)
         except ValueError as error:
             found.append(ModelledEpoch(epoch, None, str(error), compare))
         else:
-            found.append(ModelledEpoch(epoch, fits, "", compare))
+            found.append(ModelledEpoch(epoch, fits, "", compare, remark))
     if not found:
         raise UserError("every epoch is an imposed sinusoid; a model needs a perturbed one")
     return tuple(found)
@@ -111,6 +117,7 @@ def _epoch_values(found: ModelledEpoch) -> dict[str, Any]:
         "outcome": epoch.closed.kind,
         "reason": epoch.closed.reason,
         "band_hz": list(found.models.band_hz),
+        "clock": found.clock,
         "findings": [vars(finding) for finding in found.models.findings],
     }
     if found.compared:

@@ -84,6 +84,16 @@ class BeyondLinear:
     _made: dict[str, Complex] = field(default_factory=dict, init=False, repr=False)
 
     @property
+    def line_size_nm(self) -> Array:
+        """The size of what is left of the torque, by which each line is divided, shape (m,)."""
+        return np.repeat(self._size_nm, self._basis.shape[1])
+
+    @property
+    def free_gains(self) -> int:
+        """Real numbers that the free filter takes."""
+        return int(2 * self._basis.shape[0] * self._basis.shape[2])
+
+    @property
     def taper_loss(self) -> float:
         """By how much the taper enlarges a variance."""
         squares = self._window**2
@@ -169,7 +179,7 @@ class BeyondLinear:
 
     def _share(self, name: str) -> float:
         (lines,) = self._term_lines(name)
-        whole = float(np.linalg.norm(lines / np.repeat(self._size_nm, self._basis.shape[1])))
+        whole = float(np.linalg.norm(lines / self.line_size_nm))
         return float(np.linalg.norm(self._white(lines))) / whole if whole > 0 else 0.0
 
     def lines(self, values: Array) -> Complex:

@@ -1,0 +1,139 @@
+"""What is linear in the motion and is not J, B and K: a soft coupling, a reflex of both directions.
+
+The torque at the lines of `beyond_linear` is held against the angle x in three ways, each line
+divided by the size of what no linear filter explains: by J, B and K, with the sum of squares R₀; by
+the free filter, R; and by J, B and K with one linear term,
+
+    soft coupling of stiffness k     M = P x / (1 + P/k),    P = J s² + B s + K,    s = jω
+    reflex of both directions        M = P x + g e^(−sτ) s x
+
+Where the free filter explains more than J, B and K by more than chance (Fisher's distribution), and
+one of the terms explains nearly all of that, it is named. Torque of the subject's own comes back as
+motion too, but at its own frequencies, which weigh little; a delay or a filter of the torque, or
+both terms at once, look like neither.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import optimize, stats
+
+from rigidimeter.estimation.signals import Array
+from rigidimeter.estimation.terms.beyond_linear import BeyondLinear, Complex
+from rigidimeter.estimation.terms.omitted_terms import CHANCE
+
+NEARLY_ALL = 0.9
+"""Of what J, B and K leave to a free filter, that a term must explain."""
+
+DELAYS_S = np.arange(0.025, 0.151, 0.005)
+SOFTEST = 0.05, 0.2
+"""Compliances of the coupling with which the search begins, times that of the joint."""
+
+
+class LinearTerm(NamedTuple):
+    """A linear term.
+
+    Attributes
+    ----------
+    name : {"coupling", "reflex"}
+    value : float
+        k in N·m/rad, or g in N·m·s/rad.
+    delay_s : float
+        τ; 0 for a coupling.
+    joint : array, shape (3,)
+        J, B and K beside it.
+    share : float
+        How much it explains of what J, B and K leave to a free filter.
+    p : float
+        Probability that chance leaves as much to the free filter.
+    """
+
+    name: str
+    value: float
+    delay_s: float
+    joint: Array
+    share: float
+    p: float
+
+    def torque(self, motion: Complex, omega_rad_s: Array) -> Complex:
+        """Return the lines of its torque, for acceleration, velocity and angle, shape (m, 3)."""
+        if self.name == "reflex":
+            delayed = np.exp(-1j * omega_rad_s * self.delay_s) * motion[:, 1]
+            return np.asarray(self.value * delayed)
+        path = _impedance(self.joint, omega_rad_s)
+        return np.asarray((path / (1 + path / self.value) - path) * motion[:, 2])
+
+
+def linear_term(beyond: BeyondLinear) -> LinearTerm | None:
+    """Return the linear term that is there; None where there is none, or none that is known."""
+    size = beyond.line_size_nm
+    omega = 2 * np.pi * beyond.frequency_hz
+    target = _stacked(beyond.torque_lines / size)
+    motion = beyond.linear / size[:, None]
+    joint, rest = _solved(_stacked(motion), target)
+    free = float(np.sum(np.abs(beyond.torque) ** 2))
+    taken = beyond.free_gains - 3
+    left = target.size - beyond.free_gains
+    ratio = (rest - free) / taken / beyond.taper_loss / (free / left)
+    p = float(stats.f.sf(ratio, taken, left))
+    if not p < CHANCE:
+        return None
+    found = [
+        _coupling(joint, omega, motion[:, 2], target),
+        _both_directions(motion, omega, target),
+    ]
+    (name, value, delay_s, values), remains = min(found, key=lambda one: one[1])
+    share = (rest - remains) / (rest - free)
+    if share < NEARLY_ALL or not value > 0:
+        return None
+    return LinearTerm(name, value, delay_s, values, share, p)
+
+
+Found = tuple[tuple[str, float, float, Array], float]
+"""Name, value, delay and J, B, K; and what is left."""
+
+
+def _coupling(joint: Array, omega: Array, angle: Complex, target: Array) -> Found:
+    start = np.maximum(np.abs(joint), 1e-12)
+
+    def residual(values: Array) -> Array:
+        path = _impedance(values[:3] * start, omega)
+        return target - _stacked(path / (1 + values[3] / start[2] * path) * angle)
+
+    tried = [
+        optimize.least_squares(residual, [1.0, 1.0, 1.0, softness], max_nfev=30)
+        for softness in SOFTEST
+    ]
+    best = min(tried, key=lambda one: float(one.cost))
+    softness = float(best.x[3]) / float(start[2])
+    value = 1.0 / softness if softness != 0 else np.inf
+    return ("coupling", value, 0.0, np.asarray(best.x[:3] * start)), 2.0 * float(best.cost)
+
+
+def _both_directions(motion: Complex, omega: Array, target: Array) -> Found:
+    fits = []
+    for delay_s in DELAYS_S.tolist():
+        late = np.exp(-1j * omega * delay_s) * motion[:, 1]
+        values, rest = _solved(_stacked(np.column_stack([motion, late])), target)
+        fits.append((("reflex", float(values[3]), delay_s, values[:3]), rest))
+    return min(fits, key=lambda one: one[1])
+
+
+def _solved(columns: Array, target: Array) -> tuple[Array, float]:
+    """Return the least-squares solution and the sum of squares that it leaves."""
+    scale = np.linalg.norm(columns, axis=0)
+    left, upper = np.linalg.qr(columns / scale)
+    products = left.T @ target
+    values = np.linalg.lstsq(upper, products)[0] / scale
+    return np.asarray(values), float(target @ target - products @ products)
+
+
+def _impedance(joint: Array, omega_rad_s: Array) -> Complex:
+    J, B, K = joint
+    return np.asarray(K - J * omega_rad_s**2 + 1j * omega_rad_s * B)
+
+
+def _stacked(lines: Complex) -> Array:
+    return np.concatenate([lines.real, lines.imag])
