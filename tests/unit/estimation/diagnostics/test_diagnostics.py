@@ -24,7 +24,6 @@ from rigidimeter.estimation.diagnostics import (
     reconstructed_torque_nm,
 )
 from rigidimeter.estimation.diagnostics.movement_checks import active_seconds, emg_envelope_v
-from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import (
     ControllerSettings,
@@ -32,7 +31,6 @@ from rigidimeter.settings import (
     DiagnosticsSettings,
     EstimationSettings,
     RigSettings,
-    Settings,
 )
 
 SETTINGS = DiagnosticsSettings()
@@ -150,16 +148,15 @@ def test_every_level_that_can_be_set_belongs_to_a_check(sound):
     epoch, signals, parameters = sound
     emg = with_channel(epoch, "emg_v", 1e-5 * np.random.default_rng(1).standard_normal(N))
     fit = fit_inertia_damping_stiffness(signals)
-    (prepared,) = prepare([emg], Settings())
     case = Case(
-        emg, signals, parameters, SETTINGS, np.zeros(N), 1.0, fit, BANDLIMITED, LOOP, prepared
+        emg, signals, parameters, SETTINGS, np.zeros(N), 1.0, fit, BANDLIMITED, LOOP
     )  # fmt: skip
     findings = diagnose(case)
     names = [finding.name for finding in findings]
-    # What is found where epochs are fitted; what varies within one is looked for in a prepared
-    # epoch (test_varying).
+    # What is found where epochs are fitted; what varies within one, and terms that are missing, are
+    # looked for in a prepared epoch (test_varying, test_missing_term).
     varying = [name for name in DiagnosticLevels.model_fields if name.startswith("varying_")]
-    of_fits = ["lack_of_fit", "between_samples", *varying]
+    of_fits = ["lack_of_fit", "between_samples", "missing_term", *varying]
     assert sorted([*names, *of_fits]) == sorted(DiagnosticLevels.model_fields)
 
 
