@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from tests.scenarios.recordings import without_perturbation
+from tests.scenarios.recordings import measured_alone
 from tests.scenarios.scenario import Scenario, scenario
 
 from rigidimeter.estimation.epoch_models import model_epoch
@@ -114,7 +114,7 @@ def main() -> None:
         why: Counter[str] = Counter()
         for number in range(options.epochs):
             epoch = epoch_of(number)
-            epoch = epoch if options.perturbation else without_perturbation(epoch)
+            epoch = epoch if options.perturbation else measured_alone(epoch)
             (prepared,) = prepare([epoch], one.analysed_with())
             compared = model_epoch(prepared, models, compare=True, grow=True).compared
             if compared.recommended is None:

@@ -1,12 +1,15 @@
 """The checks on a measured ankle: nothing to exclude, and faults that are put in are found."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rigidimeter.estimation import epoch_signals, fit_inertia_damping_stiffness
-from rigidimeter.estimation.diagnostics import Case, diagnose
+from rigidimeter.estimation import epoch_signals, fit_inertia_damping_stiffness, method_named
+from rigidimeter.estimation.diagnostics import Case, checked, diagnose
+from rigidimeter.estimation.prepared import prepare
+from rigidimeter.estimation.terms import fit_terms, wideband_signals
 from rigidimeter.estimation.uncertainty import block_bootstrap, hac_covariance
 from rigidimeter.recording.formats.readers import read_recording
 from rigidimeter.recording.formats.table_epochs import ReadOptions
@@ -16,15 +19,18 @@ from rigidimeter.settings import Settings
 SETTINGS = Settings()
 
 
-@pytest.fixture(scope="module")
-def ankle(shared_data):
+def epochs_of(shared_data, name):
     options = ReadOptions(
         columns={"angle_rad": "position_rad", "torque_nm": "torque_Nm"},
         reaction=True,
         epoch_length_s=20.0,
     )
-    epochs, _ = read_recording(shared_data / "ankle" / "z_df.npz", options)
-    return epochs[0]
+    return read_recording(shared_data / "ankle" / f"{name}.npz", options)[0]
+
+
+@pytest.fixture(scope="module")
+def ankle(shared_data):
+    return epochs_of(shared_data, "z_df")[0]
 
 
 def diagnosed(epoch):
@@ -66,3 +72,27 @@ def test_intervals_for_a_coloured_residual_are_wider_than_those_for_a_white_one(
     drawn = block_bootstrap(A, signals.torque_nm, np.random.default_rng(0), draws=400)
     ratio = np.sqrt(np.diag(drawn.covariance)) / coloured.standard_errors
     assert np.all((ratio > 0.5) & (ratio < 2.0)), ratio
+
+
+@pytest.mark.parametrize("name", ["z_df", "z_df2", "z_pf"])
+def test_the_reflex_that_is_left_out_is_named_with_what_it_does_to_k(shared_data, name):
+    named = 0
+    for prepared in prepare(epochs_of(shared_data, name), SETTINGS):
+        (fit,), _ = method_named("bandlimited").fit([prepared], None, lambda _: None, False)
+        (finding,) = (f for f in checked(prepared, fit).findings if f.name == "missing_term")
+        found = re.findall(r"(reflex\S*[+-]): .*?K by ([^ ]+) %", finding.text)
+        if not found:
+            continue
+        named += 1
+        assert finding.level == "doubt"
+        term, share = found[0]
+        band_hz = fit.band_hz
+        included = fit_terms(
+            wideband_signals(prepared.epoch, band_hz[1]),
+            f"inertia,damping,stiffness,{term}",
+            band_hz,
+        )
+        changed = 100 * (included["stiffness"].value / fit.stiffness_nm_rad - 1)
+        print(name, term, share, changed)
+        assert 0.5 < float(share) / changed < 2.0
+    assert named >= 2

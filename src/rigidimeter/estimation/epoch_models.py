@@ -12,7 +12,13 @@ from rigidimeter.estimation.methods import choose_method, method_named
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import motion_channels
 from rigidimeter.estimation.stretches import longest_part
-from rigidimeter.estimation.terms import Comparison, compare_models, fit_model, wideband_signals
+from rigidimeter.estimation.terms import (
+    Comparison,
+    compare_models,
+    fit_model,
+    fit_models,
+    wideband_signals,
+)
 from rigidimeter.records import Finding, Fit
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE
 
@@ -62,8 +68,8 @@ def model_epoch(
     fit = _estimate(prepared)
     motion = wideband_signals(longest_part(epoch), band[1])
     if not compare:
-        rows = (fit_model(motion, model, band, estimation.trim_s) for model in models)
-        return EpochModels(band, Comparison(tuple(rows), None, ""), fit.findings)
+        fitted = fit_models(motion, models, band, estimation.trim_s)
+        return EpochModels(band, fitted, fit.findings)
     compared = compare_models(motion, models, band, estimation.trim_s, grow=grow)
     refused = _refused(fit)
     if refused and compared.recommended is not None:
@@ -100,7 +106,7 @@ def clock_of_models(
     vaf_percent = []
     for prepared in (aligned, recorded):
         band = _band_hz(prepared, high_hz)
-        motion = wideband_signals(prepared.epoch, band[1])
+        motion = wideband_signals(longest_part(prepared.epoch), band[1])
         trim_s = prepared.settings.estimation.trim_s
         fits = [fit_model(motion, model, band, trim_s).fit for model in models]
         vaf_percent.append(max((fit.vaf_percent for fit in fits if fit), default=0.0))

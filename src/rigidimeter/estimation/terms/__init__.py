@@ -7,6 +7,7 @@ from rigidimeter.estimation.terms.model_comparison import (
     candidates,
     compare_models,
     fit_model,
+    fit_models,
 )
 from rigidimeter.estimation.terms.term_fit import TermsFit, fit_terms
 from rigidimeter.estimation.terms.term_gains import TermGain
@@ -22,6 +23,7 @@ __all__ = [
     "candidates",
     "compare_models",
     "fit_model",
+    "fit_models",
     "fit_terms",
     "parse_terms",
     "term_names",

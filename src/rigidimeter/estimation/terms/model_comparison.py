@@ -134,6 +134,23 @@ def compare_models(
     return Comparison(tuple(rows), chosen, reason)
 
 
+def fit_models(
+    motion: Signals,
+    models: Sequence[Sequence[str]],
+    band_hz: tuple[float, float],
+    trim_s: float = 1.0,
+) -> Comparison:
+    """Fit each model to all of the data; none is recommended."""
+    rows = [fit_model(motion, model, band_hz, trim_s) for model in models]
+    try:
+        beyond = beyond_linear(motion, band_hz, trim_s)
+    except ValueError:  # too few lines, or no noise: the coefficients of the fit have to do
+        return Comparison(tuple(rows), None, "")
+    gains = [() if row.fit is None else directed(beyond, row.terms)[1] for row in rows]
+    both = zip(rows, gains, strict=True)
+    return Comparison(tuple(replace(row, beyond=found) for row, found in both), None, "")
+
+
 def fit_model(
     motion: Signals, terms: Sequence[str], band_hz: tuple[float, float], trim_s: float = 1.0
 ) -> ModelRow:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.scenarios.recordings import without_perturbation
+from tests.scenarios.recordings import measured_alone
 from tests.scenarios.scenario import scenario
 
 from rigidimeter.estimation.diagnostics import checked
@@ -30,7 +30,7 @@ def fitted(method, joint=None, subject=None, seed=1):
     made = scenario("one", joint=joint or {}, subject=subject or {})
     (epoch,), (truth,) = made.simulated(seed, 1)
     if method == "bandlimited":
-        epoch = without_perturbation(epoch)
+        epoch = measured_alone(epoch)
     (prepared,) = prepare([epoch], made.analysed_with())
     (fit,), _ = method_named(method).fit([prepared], None, lambda _: None, False)
     found = {finding.name: finding for finding in checked(prepared, fit).findings}
