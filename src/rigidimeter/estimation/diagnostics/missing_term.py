@@ -16,6 +16,7 @@ from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.estimation.diagnostics.omitted_bias import moved
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array, motion_channels
+from rigidimeter.estimation.stretches import longest_part
 from rigidimeter.estimation.terms.beyond_linear import BeyondLinear, beyond_linear
 from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
 from rigidimeter.estimation.terms.linear_misfit import LinearTerm, linear_term
@@ -41,7 +42,7 @@ class _Found:
     """The terms of one epoch, which every method shares."""
 
     def __init__(self, prepared: PreparedEpoch) -> None:
-        epoch, estimation = prepared.epoch, prepared.settings.estimation
+        epoch, estimation = longest_part(prepared.epoch), prepared.settings.estimation
         used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
         usable_hz = USABLE_FRACTION_OF_RATE * min(channel.rate_hz for channel in used)
         high_hz = min(estimation.band_high_unknown_hz, usable_hz)

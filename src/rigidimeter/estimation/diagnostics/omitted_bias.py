@@ -23,6 +23,7 @@ from rigidimeter.estimation.closedloop.observation import observe
 from rigidimeter.estimation.diagnostics.check_record import Case
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.terms.beyond_linear import BeyondLinear, Complex
+from rigidimeter.estimation.terms.catalogue import REFLEXES
 from rigidimeter.estimation.terms.linear_misfit import LinearTerm
 from rigidimeter.estimation.terms.omitted_terms import OmittedTerm
 
@@ -48,7 +49,7 @@ def moved(
         residual = problem.target - problem.regressors @ case.parameters
         power = Smoother.over(grid.line, 4, 0.1)(np.abs(residual) ** 2)
         weighted = problem.instruments / np.maximum(power, 1e-300)[:, None]
-        lines = grid.transform(np.interp(grid.time_s, beyond.motion.time_s, torque))
+        lines = grid.transform(np.interp(grid.time_s, beyond.motion.time_s, torque, 0.0, 0.0))
         if linear is not None:
             lines = lines + linear.torque(problem.regressors, grid.omega_rad_s)
         return _added(weighted, problem.regressors, lines)[None]
@@ -72,19 +73,30 @@ def _refitted(
     beyond: BeyondLinear, terms: Sequence[OmittedTerm], inside: NDArray[np.bool_]
 ) -> Array:
     """Return J, B and K by least squares with the terms, shape (3,)."""
+    plain = [term.name for term in terms if term.name not in REFLEXES]
+    reflexes = [term.name for term in terms if term.name in REFLEXES]
+    fixed = beyond.terms_lines(plain)
+    columns = _stacked(np.column_stack([beyond.linear, *fixed])[inside])
     target = _stacked(beyond.torque_lines[inside])
-    names = [term.name for term in terms]
-    best, values = np.inf, np.zeros(3)
-    for inner in beyond.grid(names):
-        more = [line[inside] for line in beyond.terms_lines(names, inner)]
-        columns = _stacked(np.column_stack([beyond.linear[inside], *more]))
-        scale = np.linalg.norm(columns, axis=0)
-        left, upper = np.linalg.qr(columns / scale)
-        products = left.T @ target
-        rest = float(target @ target - products @ products)
-        if rest < best:
-            best, values = rest, np.linalg.lstsq(upper, products)[0][:3] / scale[:3]
-    return values
+    if not reflexes:
+        return _solved(columns, target)[:3]
+    # One reflex at most is looked for: its direction is decided by what is not linear.
+    late = _stacked(
+        np.column_stack([beyond.terms_lines(reflexes, q)[0] for q in beyond.grid(reflexes)])[inside]
+    )
+    scale = np.linalg.norm(columns, axis=0)
+    basis, _ = np.linalg.qr(columns / scale)
+    rest = target - basis @ (basis.T @ target)
+    beside = late - basis @ (basis.T @ late)
+    explained = (rest @ beside) ** 2 / np.maximum(np.sum(beside**2, axis=0), 1e-300)
+    best = late[:, int(np.argmax(explained))]
+    return _solved(np.column_stack([columns, best]), target)[:3]
+
+
+def _solved(columns: Array, target: Array) -> Array:
+    scale = np.linalg.norm(columns, axis=0)
+    left, upper = np.linalg.qr(columns / scale)
+    return np.asarray(np.linalg.lstsq(upper, left.T @ target)[0] / scale)
 
 
 def _stacked(lines: Complex) -> Array:

@@ -149,14 +149,25 @@ def _best(beyond: BeyondLinear, found: Sequence[_Found], name: str) -> tuple[_Fo
     if name not in REFLEXES:
         term = _Found(name, ())
         return term, beyond.solve(_columns(beyond, [*found, term]))
+    base = _columns(beyond, found)
+    rest = beyond.solve(base).residual
+    basis, _ = np.linalg.qr(_stacked(base))
     fits = []
     for kind in ("reflex+", "reflex-second-order+"):
-        tried = [_Found(kind, inner) for inner in beyond.grid([kind]) if inner[0] >= EARLIEST_S]
-        solved = [(term, beyond.solve(_columns(beyond, [*found, term]))) for term in tried]
-        fits.append(min(solved, key=lambda fit: _power(fit[1].residual)))
+        inners = [inner for inner in beyond.grid([kind]) if inner[0] >= EARLIEST_S]
+        tried = _stacked(np.column_stack([beyond.columns([kind], inner) for inner in inners]))
+        # What one more column explains is its projection beside those that are there.
+        tried = tried - basis @ (basis.T @ tried)
+        explained = (_stacked(rest) @ tried) ** 2 / np.maximum(np.sum(tried**2, axis=0), 1e-300)
+        term = _Found(kind, inners[int(np.argmax(explained))])
+        fits.append((term, beyond.solve(_columns(beyond, [*found, term]))))
     late, slow = fits
     gained = _power(late[1].residual) - _power(slow[1].residual)
     return slow if gained > DYNAMICS else late
+
+
+def _stacked(lines: Complex) -> Array:
+    return np.concatenate([lines.real, lines.imag])
 
 
 def _columns(beyond: BeyondLinear, terms: Sequence[_Found]) -> Complex:
