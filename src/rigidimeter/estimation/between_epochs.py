@@ -34,6 +34,7 @@ from rigidimeter.settings import DiagnosticsSettings
 
 FEWEST_EPOCHS = 3
 NAME = "varying_between_epochs"
+LEAST_P = 1e-6
 INERTIA, STIFFNESS = 0, 2
 
 
@@ -159,15 +160,20 @@ def _sentence(one: Scatter) -> str:
     low, high = int(np.argmin(one.drawn)), int(np.argmax(one.drawn))
     trend = (
         f"{'rising' if one.trend_percent > 0 else 'falling'} by {abs(one.trend_percent):.0f} % "
-        f"from the first to the last (p = {one.trend_p:.1g})"
+        f"from the first to the last ({p_text(one.trend_p)})"
         if one.trend_p < 0.05
         else "without a trend"
     )
     return (
         f"{symbol} goes from {one.drawn[low]:.3g} {unit} in the {_ordinal(low)} epoch to "
         f"{one.drawn[high]:.3g} {unit} in the {_ordinal(high)}, a range of {one.percent:.0f} % of "
-        f"the mean, SD {one.sd:.2g} {unit} beyond the errors (by chance p = {one.p:.1g}), {trend}"
+        f"the mean, SD {one.sd:.2g} {unit} beyond the errors, by chance {p_text(one.p)}, {trend}"
     )
+
+
+def p_text(p: float) -> str:
+    """Return a probability as text, a small one as a limit: no assumption is as good as that."""
+    return f"p = {p:.2g}" if p >= LEAST_P else f"p < {LEAST_P:g}"
 
 
 def _ordinal(index: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
+from rigidimeter.estimation.between_epochs import p_text
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.estimation.diagnostics.varying_selection import Change, Variation
 from rigidimeter.records import PARAMETERS
@@ -23,9 +24,8 @@ def varying_look(name: str, found: Variation, settings: DiagnosticsSettings) -> 
     most = settings.varying_most_percent
     changes = sorted(found.changes.get(name, []), key=lambda change: -change.percent)
     if not changes:
-        fact = (
-            f"no change of the joint with {WITH[name]} is beyond chance (p = {found.p[name]:.2g})"
-        )
+        p = p_text(found.p[name])
+        fact = f"no change of J, B or K with {WITH[name]} is beyond chance ({p})"
         return Look(0.0, most, False, fact)
     large = [change for change in changes if change.percent > most]
     text = "; ".join(_sentence(change) for change in large or changes[:1])
@@ -42,7 +42,7 @@ def _sentence(change: Change) -> str:
     return (
         f"{symbol} goes from {change.low:.3g} ± {change.low_half:.2g} {unit} {change.low_at} to "
         f"{change.high:.3g} ± {change.high_half:.2g} {unit} {change.high_at}, a range of "
-        f"{change.percent:.0f} % of the mean (by chance p = {change.p:.1g})"
+        f"{change.percent:.0f} % of the mean, by chance {p_text(change.p)}"
     )
 
 

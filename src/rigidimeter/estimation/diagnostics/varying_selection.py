@@ -34,7 +34,7 @@ from rigidimeter.estimation.signals import Array
 SHORTEST_S = 5.0
 """Fewer than ten blocks say nothing of the level of a test."""
 
-INERTIA, STIFFNESS = 0, 2
+STIFFNESS = 2
 
 
 class Change(NamedTuple):
