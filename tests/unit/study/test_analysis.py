@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.errors import UserError
 from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Channel, Epoch, Fit, Outcome, Score
@@ -16,6 +17,7 @@ from rigidimeter.study import (
     estimate,
     task_of,
 )
+from rigidimeter.virtual.batch import simulate_epochs
 
 
 def fit(condition, B=0.1, K=1.0, J=0.004, outcome=None):
@@ -158,3 +160,15 @@ def test_what_no_joint_can_be_is_doubted():
     assert "--reaction" in notice.text
     bad = fit("OFF", J=-0.1, outcome=Outcome("excluded", "limit"))
     assert analysis_warnings(analysis([bad])) == ()
+
+
+def test_epochs_whose_stiffness_differs_are_named_in_the_pooled_fit():
+    settings = parse_settings({"subject": {"OFF": {"voluntary_sd_nm": 0.02}}})
+    factors = (0.7, 1.3, 0.8, 1.1)
+    joints = [JointDynamics(0.0045, 0.1368, 1.751 * factor) for factor in factors]
+    batch = simulate_epochs(settings, 4, joints=joints, conditions="OFF", seed=2)
+    analysis = estimate([batch.epoch(i) for i in range(4)], "iv", settings=settings)
+    (finding,) = (f for f in analysis.pooled[0].findings if f.name == "varying_between_epochs")
+    assert finding.value == pytest.approx(60 / 0.975, rel=0.05)
+    assert "N·m/rad in the 1st epoch to 2.2" in finding.text
+    assert any("the pooled estimate is a mean" in one.text for one in analysis_warnings(analysis))
