@@ -137,7 +137,9 @@ def _terms(lines: VaryingLines, shapes: Shapes) -> _Terms:
     def columns(functions: Array, j: int) -> Columns:
         return Columns(*(_whitened(lines, part[:, [j]] * functions) for part in (caused, moving)))
 
-    of = tuple(columns(shapes.functions, j) for j in range(3))
+    of = tuple(
+        columns(shapes.functions * (shapes.elastic if j == STIFFNESS else 1.0), j) for j in range(3)
+    )
     return _Terms(shapes, of, lambda j: columns(shapes.finer, j), _whitened(lines, beside))
 
 

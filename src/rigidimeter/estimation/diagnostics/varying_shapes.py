@@ -4,9 +4,10 @@ Each is a few smooth functions of time. Polynomials of degree 3 follow a drift a
 step; of degree 2 a stiffness that rises to one side or to both; two harmonics what happens within a
 cycle.
 
-The torque that holds the joint where it slowly goes is no stiffness about that place, and neither
-is the torque that a movement takes. Both are fitted beside, as smooth functions of the slow angle
-or of the phase, and the motion that is multiplied is the fast one alone.
+The torque that an imposed movement takes is no stiffness about it, and neither is the torque that
+holds the joint where it slowly goes, unless the perturbation brought it there. Both are fitted
+beside, as smooth functions of the phase or of the slow angle, and the motion that is multiplied is
+the fast one alone.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from rigidimeter.estimation.signals import Array
 
 TIME_DEGREE, FINER_TIME_DEGREE = 3, 20
 SLOW_HZ = 0.5
-"""The angle below this is where the joint is; above, how it is perturbed there."""
+"""The angle below this is where the joint is; above, how it moves there."""
 
-LEAST_SLOW_RANGE_RAD = math.radians(5.0)
+LEAST_RANGE_RAD = math.radians(5.0)
 """Between the 5th and the 95th percentile. Over less, what torque and angle have in common
 beyond proportion is a reflex or the fibres' own (short-range) stiffness, not the joint's angle."""
 
@@ -68,6 +69,8 @@ class Shapes(NamedTuple):
         From the index of a place to words.
     beside : array, shape (n, r)
         Functions whose torque is fitted beside.
+    elastic : array, shape (q,)
+        What the functions are multiplied by in the torque of a stiffness.
     """
 
     name: str
@@ -76,6 +79,7 @@ class Shapes(NamedTuple):
     at: Array
     place: Callable[[int], str]
     beside: Array
+    elastic: Array
 
 
 def with_time(lines: VaryingLines, movement: Shapes | None) -> Shapes:
@@ -95,25 +99,35 @@ def with_time(lines: VaryingLines, movement: Shapes | None) -> Shapes:
         polynomials(place, TIME_DEGREE),
         lambda i: f"at {begin_s + place[i] * lines.duration_s:.1f} s",
         np.empty((lines.time_s.size, 0)) if movement is None else movement.beside,
+        np.ones(TIME_DEGREE),
     )
 
 
 def with_angle(lines: VaryingLines) -> Shapes | None:
-    """Return polynomials of the slow angle; None where it hardly changes."""
-    slow = lines.slow_part(lines.angle_rad, SLOW_HZ)
-    low, high = np.quantile(slow, INNER_ANGLE).tolist()
-    if high - low < LEAST_SLOW_RANGE_RAD:
+    """Return polynomials of the angle; None where it hardly changes.
+
+    Where the perturbation is the instrument, the torque of a stiffness K₀ + c₁ θ + c₂ θ² is its
+    integral over the angle, θ (K₀ + c₁ θ/2 + c₂ θ²/3). Without it the angle is the slow one.
+    """
+    angle = lines.angle_rad
+    if not lines.by_perturbation:
+        angle = lines.slow_part(angle, SLOW_HZ)
+    low, high = np.quantile(angle, INNER_ANGLE).tolist()
+    if high - low < LEAST_RANGE_RAD:
         return None
-    centre, half = (high + low) / 2, (high - low) / 2
-    place = np.linspace(-1.0, 1.0, POINTS)
-    scaled = (slow - centre) / half
+    half = (high - low) / 2
+    place = np.linspace(low, high, POINTS)
+    powers = _powers(angle / half, FINER_ANGLE_DEGREE)
     return Shapes(
         "varying_with_angle",
-        _powers(scaled, ANGLE_DEGREE)[:, 1:],
-        _powers(scaled, FINER_ANGLE_DEGREE)[:, 1:],
-        _powers(place, ANGLE_DEGREE)[:, 1:],
-        lambda i: f"at {math.degrees(centre + place[i] * half):+.1f} deg from the mean angle",
-        _powers(scaled, ANGLE_DEGREE + 1),
+        powers[:, :ANGLE_DEGREE],
+        powers,
+        _powers(place / half, ANGLE_DEGREE),
+        lambda i: f"at {math.degrees(place[i]):+.1f} deg from the mean angle",
+        np.empty((angle.size, 0))
+        if lines.by_perturbation
+        else np.column_stack([np.ones_like(angle), powers[:, : ANGLE_DEGREE + 1]]),
+        1 / (2.0 + np.arange(ANGLE_DEGREE)) if lines.by_perturbation else np.ones(ANGLE_DEGREE),
     )
 
 
@@ -131,6 +145,7 @@ def with_phase(lines: VaryingLines) -> Shapes | None:
         _harmonics(place, PHASE_HARMONICS),
         lambda i: f"at {math.degrees(place[i]):.0f} deg of the cycle of {period_s:.3g} s",
         np.column_stack([np.ones_like(phase), _harmonics(phase, MOVEMENT_HARMONICS)]),
+        np.ones(2 * PHASE_HARMONICS),
     )
 
 
@@ -167,7 +182,8 @@ def _phase(lines: VaryingLines, frequency_hz: float) -> Array:
 
 
 def _powers(values: Array, degree: int) -> Array:
-    return np.asarray(legendre.legvander(values, degree))
+    """Return the first to the last power, shape (n, degree)."""
+    return np.asarray(values[:, None] ** np.arange(1, degree + 1))
 
 
 def _harmonics(phase: Array, count: int) -> Array:

@@ -12,10 +12,11 @@ subject who pushes now and then makes some of them large (White 1980; Bell and M
 
     S = (Σ g_b)ᵀ (Σ g_b g_bᵀ)⁻¹ (Σ g_b)
 
-only the signs of the g_b are chance if the joint does not vary. Under signs drawn at random S has
-the mean q and the variance 2 (q − Σ h_b⁴), h_b = |(Σ g gᵀ)^(−½) g_b|. For n equal Gaussian blocks
-S/n has a beta distribution with q/2 and (n − q)/2; that of the same variance is taken (n fewer
-where few blocks hold the scores).
+only the signs of the g_b are chance if the joint does not vary, however uneven their sizes, so the
+probability is the share of random signs under which S is as large: a randomisation test (Canay,
+Romano and Shaikh 2017, Econometrica 85:1013). Signs are drawn only where S is large: n Gaussian
+blocks of one size give S/n a beta distribution with q/2 and (n − q)/2, and while that is far from
+unlikely, so is S.
 
 No torque of the subject's enters a score by the instruments of the perturbation. Without a
 perturbation the motion is its own instrument, and S also counts what the subject moves.
@@ -24,6 +25,7 @@ perturbation the motion is its own instrument, and S also counts what the subjec
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +35,12 @@ from rigidimeter.estimation.diagnostics.varying_lines import VaryingLines
 from rigidimeter.estimation.signals import Array
 
 BLOCK_S = 0.5
+UNLIKELY = 0.05
+DRAWS = 20_000
+"""The least probability is one in so many."""
+
+SIGNS_SEED = 1
+"""The same epoch gives the same probability every time."""
 
 
 class Columns(NamedTuple):
@@ -95,7 +103,6 @@ def score_test(lines: VaryingLines, target: Array, others: Columns, tested: Colu
         Of the terms that the model has anyway.
     tested : Columns
     """
-    q = tested.instruments.shape[1]
     gram = others.instruments.T @ others.regressors
     both = np.column_stack([target, tested.regressors])
     free = both - others.regressors @ np.linalg.solve(gram, others.instruments.T @ both)
@@ -103,16 +110,35 @@ def score_test(lines: VaryingLines, target: Array, others: Columns, tested: Colu
     shared = np.linalg.solve(gram.T, others.regressors.T @ tested.instruments)
     instruments = tested.instruments - others.instruments @ shared
     blocks = _block_scores(lines, instruments, residual)
-    whitened = np.linalg.solve(np.linalg.cholesky(blocks.T @ blocks), blocks.T).T
-    statistic = float(np.sum(whitened.sum(axis=0) ** 2))
-    uneven = float(np.sum(np.sum(whitened**2, axis=1) ** 2)) / q
-    equal = _equal_blocks(uneven, q)
-    # All blocks of one sign are the most that can be seen.
-    least = 2.0 ** (1 - len(blocks))
-    beyond = special.betainc((equal - q) / 2, q / 2, max(1 - statistic / equal, 0.0))
-    p = max(float(beyond), least)
+    p = sign_p(blocks)
     own = np.linalg.solve(instruments.T @ regressors, instruments.T @ residual)
     return Score(p, float(np.sum((residual - regressors @ own) ** 2)))
+
+
+def sign_p(blocks: Array) -> float:
+    """Return the probability of so large an S if only the signs of the blocks are chance.
+
+    Parameters
+    ----------
+    blocks : array, shape (n, q)
+    """
+    count, q = blocks.shape
+    whitened = np.linalg.solve(np.linalg.cholesky(blocks.T @ blocks), blocks.T)
+    statistic = float(np.sum(whitened.sum(axis=1) ** 2))
+    even = float(special.betainc((count - q) / 2, q / 2, max(1 - statistic / count, 0.0)))
+    if even > UNLIKELY:
+        return even
+    drawn = np.sum((whitened @ _signs(count)) ** 2, axis=0)
+    return float(1 + np.count_nonzero(drawn >= statistic * (1 - 1e-9))) / (DRAWS + 1)
+
+
+@lru_cache(maxsize=4)
+def _signs(count: int) -> Array:
+    """Return random signs, the same every time, shape (count, DRAWS)."""
+    drawn = np.random.default_rng(SIGNS_SEED).integers(0, 2, (count, DRAWS))
+    signs = np.asarray(2.0 * drawn - 1.0)
+    signs.setflags(write=False)
+    return signs
 
 
 def effect(
@@ -156,8 +182,3 @@ def _block_scores(lines: VaryingLines, instruments: Array, residual: Array) -> A
     scores = in_time[:, :-1] * in_time[:, -1:]
     count = int(lines.duration_s / BLOCK_S)
     return np.asarray(np.add.reduceat(scores, np.arange(count) * len(scores) // count, axis=0))
-
-
-def _equal_blocks(uneven: float, q: int) -> float:
-    """Return how many equal Gaussian blocks would scatter S as much."""
-    return max((q + 2 * (1 - uneven)) / uneven, q + 1.0)
