@@ -27,7 +27,7 @@ def fits_of(rig: DriveRig, epochs: int = 2):
         DriveRig("PI", 500.0, edge_s=0.0004),
         DriveRig("PI with lag", 200.0, lowpass_hz=100.0),
         DriveRig("position loop", 333.0),
-        DriveRig("friction", 1000.0),
+        DriveRig("friction", 1000.0, lowpass_hz=100.0),
         DriveRig("PI", 200.0, lowpass_hz=30.0),
     ],
     ids=str,

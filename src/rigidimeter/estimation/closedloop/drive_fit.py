@@ -23,8 +23,10 @@ from rigidimeter.estimation.closedloop.drive_search import (
     Fitted,
     Samples,
     Structure,
+    mean_sign,
     power_left,
     search,
+    with_sign_of,
 )
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.stretches import sound
@@ -43,8 +45,9 @@ STRUCTURES = (
 """From simple to complicated."""
 
 
-FEWEST_SAMPLES, MOST_SAMPLES = 50, 3000
-"""Of the velocity; more do not make a drive known any better that is not quite linear."""
+FEWEST_SAMPLES, MOST_SAMPLES, MOST_TICKS = 50, 3000, 8000
+"""Of the velocity and of the command; more do not make a drive known any better that is not quite
+linear."""
 
 SETTLED_S = 0.3
 """An epoch may begin in motion, and the model begins at rest."""
@@ -54,16 +57,23 @@ LARGEST_MISFIT = 0.1
 
 AS_GOOD, RIVAL = 1.05, 4.0
 """A structure that leaves this many times the power of the best predicts as well; one that leaves
-no more than the second of them might be there."""
+no more than the second of them might be there. With friction the second holds for both: what is
+then left is not noise, and further poles are bent to it."""
 
 UNSEEN = 2e-5
 """Structures that differ by less than this share of the velocity's SD are alike."""
+
+OTHERS = 1.1
+"""Of samples it was not fitted to, a structure may leave this much more."""
 
 BETTER = 0.98
 """A pole more is worth a try where the last one brought the power down to this share."""
 
 QUIET = 3e-4
 """What is left below this share of the velocity's SD needs no friction."""
+
+RUBS = 0.8
+"""Friction must explain so much of the power that is left without it."""
 
 FINER, STAIRS = 4, 0.5
 """A command that was logged more slowly than it was sent goes on between its samples: if lines
@@ -108,22 +118,27 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
     samples = _samples(epoch)
     if samples is None:
         return None
-    everyone = _fitted(samples, start)
+    samples, everyone = _fitted(samples, start)
     fitted = [one for one in everyone if not one.too_fast]
     if not fitted:
         return None
     least = min(one.power for one in fitted)
     if least > QUIET**2 and _power_between_lines(samples, fitted[0].model) < STAIRS * least:
         return None
-    tried = [_tried(samples, one) for one in fitted if one.power <= AS_GOOD * least + UNSEEN**2]
-    best = min(one.power for one in tried)
-    equal = [one for one in tried if one.power <= AS_GOOD * best + UNSEEN**2]
-    chosen, misfit = equal[0].whole, math.sqrt(equal[0].power)
+    as_good = RIVAL if min(fitted, key=_by_power).structure.friction else AS_GOOD
+    simple = (one for one in fitted if one.power <= as_good * least + UNSEEN**2)
+    # What is left of samples that a structure was fitted to is never more than of others.
+    tried: list[_Tried] = []
+    for one in simple:
+        tried.append(_tried(samples, one))
+        if tried[-1].power <= as_good * OTHERS * least + UNSEEN**2:
+            break
+    best = min(tried, key=lambda one: one.power)
+    chosen, misfit = best.whole, math.sqrt(best.power)
     if misfit > LARGEST_MISFIT or not 0.5 < chosen.model.gain < 2.0:
         return None
-    near = (one for one in everyone if one.power <= RIVAL * least + UNSEEN**2)
-    others = (one.model for one in near if one is not equal[0].whole)
-    rivals = (*equal[0].halves, *others)
+    near = (one for one in fitted if one.power <= RIVAL * least + UNSEEN**2)
+    rivals = (*best.halves, *(one.model for one in near if one is not chosen))
     return FoundDrive(chosen.model, chosen.structure.name, misfit, rivals)
 
 
@@ -135,30 +150,40 @@ class _Tried(NamedTuple):
     power: float
 
 
-def _fitted(samples: Samples, start: DriveModel) -> list[Fitted]:
-    """Return structures fitted to all samples.
+def _fitted(samples: Samples, start: DriveModel) -> tuple[Samples, list[Fitted]]:
+    """Return structures fitted to all samples, and the samples with the sign of the velocity.
 
     One with one more pole, or with friction, is fitted only where those before it leave more than
     noise would, as far as the steps before show.
     """
+    smooth = _climbed(samples, start, friction=False)
+    least = min(smooth, key=_by_power).power
+    if least < QUIET**2:
+        return samples, smooth
+    # The first of these may show no more than where the velocity changed its sign.
+    rubbing = STRUCTURES[1]._replace(friction=True)
+    first = min((search(samples, rubbing, one.model) for one in smooth[:2]), key=_by_power)
+    if first.power > RUBS * least:
+        return samples, smooth
+    samples = with_sign_of(samples, first)
+    return samples, [*smooth, *_climbed(samples, first.model, friction=True)]
+
+
+def _climbed(samples: Samples, start: DriveModel, friction: bool) -> list[Fitted]:
+    """Return structures of one kind, with ever more poles as long as that is worth a try."""
     fitted: list[Fitted] = []
-    for friction in (False, True):
-        for poles in sorted({one.poles for one in STRUCTURES}):
-            before = min((one.power for one in fitted), default=math.inf)
-            for structure in (one for one in STRUCTURES if one.poles == poles):
-                # Friction may have led those without it far astray.
-                near = [one for one in fitted if one.structure.friction == friction]
-                best = min(near, key=_by_power) if near else None
-                # Two poles may have found a long delay, where a third one has no place.
-                starts = [best.model, near[0].model] if best else [start]
-                if best is None or best is near[0] or best.power < QUIET**2:
-                    starts = starts[:1]
-                wanted = structure._replace(friction=friction)
-                found = [search(samples, wanted, begin) for begin in starts]
-                fitted.append(min(found, key=_by_power))
-            if min(one.power for one in fitted) > BETTER * before:
-                break
-        if min(one.power for one in fitted) < QUIET**2:
+    for poles in sorted({one.poles for one in STRUCTURES}):
+        before = min((one.power for one in fitted), default=math.inf)
+        for structure in (one for one in STRUCTURES if one.poles == poles):
+            best = min(fitted, key=_by_power) if fitted else None
+            # Two poles may have found a long delay, where a third one has no place.
+            starts = [best.model, fitted[0].model] if best else [start]
+            if best is None or best is fitted[0] or best.power < QUIET**2 or friction:
+                starts = starts[:1]
+            wanted = structure._replace(friction=friction)
+            found = [search(samples, wanted, begin) for begin in starts]
+            fitted.append(min(found, key=_by_power))
+        if min(one.power for one in fitted) > BETTER * before:
             break
     return fitted
 
@@ -179,14 +204,20 @@ def _tried(samples: Samples, whole: Fitted) -> _Tried:
 
 def _power_between_lines(samples: Samples, start: DriveModel) -> float:
     """Return what simple drives leave whose command went straight from sample to sample."""
-    sent, size = samples.command, len(samples.command)
-    place = np.arange(FINER * (size - 1)) / FINER
-    time_s = np.interp(place, np.arange(size), sent.time_s)
-    middle = np.interp(place + 0.5 / FINER, np.arange(size), sent.values)
+    sent = samples.command
+    time_s = _finer(sent.time_s)
+    half_s = 0.5 * (time_s[1] - time_s[0])
+    middle = np.interp(time_s + half_s, sent.time_s, sent.values)
     finer = samples._replace(
         command=Channel(sent.name, time_s, middle), interval_s=samples.interval_s / FINER
     )
     return min(search(finer, one, start).power for one in STRUCTURES if one.poles == 2)
+
+
+def _finer(ticks_s: Array) -> Array:
+    """Return times that divide each tick evenly."""
+    place = np.arange(FINER * (ticks_s.size - 1) + 1) / FINER
+    return np.interp(place, np.arange(ticks_s.size), ticks_s)
 
 
 def _samples(epoch: Epoch) -> Samples | None:
@@ -199,7 +230,8 @@ def _samples(epoch: Epoch) -> Samples | None:
     if np.ptp(np.diff(command.time_s)) > 0.5 * interval_s:
         return None  # ticks that were missed would be taken for a slower drive
     start_s = command.time_s[0] + SETTLED_S
-    inside = (velocity.time_s >= start_s) & (velocity.time_s <= command.time_s[-1])
+    last_s = command.time_s[:MOST_TICKS][-1]
+    inside = (velocity.time_s >= start_s) & (velocity.time_s <= last_s)
     inside &= sound(epoch, velocity.time_s)
     time_s = velocity.time_s[inside][:MOST_SAMPLES]
     measured = velocity.values[inside][:MOST_SAMPLES]
@@ -207,12 +239,6 @@ def _samples(epoch: Epoch) -> Samples | None:
         return None
     ticks = int(np.searchsorted(command.time_s, time_s[-1], side="right"))
     used = Channel(command.name, command.time_s[:ticks], command.values[:ticks])
-    sign = _mean_sign(np.interp(used.time_s, velocity.time_s, velocity.values))
+    sign_s = _finer(used.time_s)
+    sign = mean_sign(sign_s, np.interp(sign_s, velocity.time_s, velocity.values))
     return Samples(used, sign, interval_s, time_s, measured, float(np.std(measured)))
-
-
-def _mean_sign(values: Array) -> Array:
-    """Return the mean sign, over each tick, of what goes straight from value to value."""
-    after = np.append(values[1:], values[-1])
-    larger = np.abs(values) + np.abs(after)
-    return np.asarray((values + after) / np.where(larger > 0, larger, 1.0))

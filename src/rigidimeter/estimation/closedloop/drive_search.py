@@ -68,8 +68,8 @@ class Samples(NamedTuple):
     Attributes
     ----------
     command : Channel
-    sign : array, shape (ticks,)
-        Mean sign of the velocity in each tick.
+    sign : Channel
+        Mean sign of the velocity, in steps shorter than a tick.
     interval_s : float
         Of the ticks.
     time_s, measured : array, shape (n,)
@@ -79,15 +79,15 @@ class Samples(NamedTuple):
     """
 
     command: Channel
-    sign: Array
+    sign: Channel
     interval_s: float
     time_s: Array
     measured: Array
     scale: float
 
-    def inputs(self, friction: bool) -> tuple[Array, ...]:
-        """Return what acts on the drive at each tick: the command, the sign of the velocity."""
-        return (self.command.values, self.sign) if friction else (self.command.values,)
+    def inputs(self, friction: bool) -> tuple[Channel, ...]:
+        """Return what acts on the drive: the command, and the sign of the velocity."""
+        return (self.command, self.sign) if friction else (self.command,)
 
     @property
     def halves(self) -> tuple[slice, slice]:
@@ -139,8 +139,10 @@ def search(
         # Friction acts behind the controller, whose zeros are not its own.
         shapes = [_shapes(poles, n) for n in (structure.zeros, structure.poles - 1)]
         columns = [
-            _columns(samples, values, poles, shape, delay_s, time_s)
-            for values, shape in zip(samples.inputs(structure.friction), shapes, strict=False)
+            _columns(acting, poles, shape, late_s, time_s)
+            for acting, shape, late_s in zip(
+                samples.inputs(structure.friction), shapes, (delay_s, 0.0), strict=False
+            )
         ]
         table = np.concatenate(columns)
         size = np.sqrt(np.einsum("ij,ij->i", table, table)) + np.finfo(np.float64).tiny
@@ -216,32 +218,47 @@ def _shapes(poles: tuple[complex, ...], zeros: int) -> Complex:
 
 
 def _columns(
-    samples: Samples,
-    values: Array,
-    poles: tuple[complex, ...],
-    shapes: Complex,
-    delay_s: float,
-    time_s: Array,
+    acting: Channel, poles: tuple[complex, ...], shapes: Complex, late_s: float, time_s: Array
 ) -> Array:
     """Return the velocity that each term of a numerator makes of an input, shape (j, n)."""
-    tick, after_s = since_ticks(samples.command, time_s, delay_s, even=0.0)
+    interval_s = 1.0 / acting.mean_rate_hz
+    tick, after_s = since_ticks(acting, time_s, late_s, even=0.0)
     columns = np.zeros((shapes.shape[1], time_s.size))
     for pole, weights in zip(poles, shapes, strict=True):
-        state = state_after(pole, values, samples.interval_s, tick, after_s)
+        state = state_after(pole, acting.values, interval_s, tick, after_s)
         columns += (1 + (pole.imag != 0)) * (weights[:, None] * state).real
     return columns
 
 
+def explained(samples: Samples, fitted: Fitted, time_s: Array) -> Array:
+    """Return the velocity of a fitted drive, its answer to friction included."""
+    model = fitted.model
+    answers = ((model.residues, model.delay_s), (fitted.rubbing, 0.0))
+    inputs = samples.inputs(fitted.structure.friction)
+    columns = [
+        _columns(acting, model.poles_rad_s, np.array(row)[:, None], late_s, time_s)[0]
+        for acting, (row, late_s) in zip(inputs, answers, strict=False)
+    ]
+    return np.asarray(np.sum(columns, axis=0))
+
+
 def power_left(samples: Samples, fitted: Fitted, part: slice) -> float:
     """Return the power that is left of a part of the velocity, as a share of its variance."""
-    model = fitted.model
-    answers = [model.residues, *([fitted.rubbing] if fitted.rubbing else [])]
-    time_s = samples.time_s[part]
-    inputs = samples.inputs(fitted.structure.friction)
-    there = sum(
-        _columns(samples, values, model.poles_rad_s, np.array(row)[:, None], model.delay_s, time_s)[
-            0
-        ]
-        for values, row in zip(inputs, answers, strict=True)
-    )
-    return float(np.mean(((there - samples.measured[part]) / samples.scale) ** 2))
+    left = explained(samples, fitted, samples.time_s[part]) - samples.measured[part]
+    return float(np.mean((left / samples.scale) ** 2))
+
+
+def with_sign_of(samples: Samples, fitted: Fitted) -> Samples:
+    """Return the samples with the sign that the velocity has between them, by a fitted drive."""
+    time_s = samples.sign.time_s
+    left = samples.measured - explained(samples, fitted, samples.time_s)
+    velocity = explained(samples, fitted, time_s) + np.interp(time_s, samples.time_s, left)
+    return samples._replace(sign=mean_sign(time_s, velocity))
+
+
+def mean_sign(time_s: Array, velocity_rad_s: Array) -> Channel:
+    """Return the mean sign, from each time to the next, of what goes straight between them."""
+    after = np.append(velocity_rad_s[1:], velocity_rad_s[-1])
+    larger = np.abs(velocity_rad_s) + np.abs(after)
+    sign = (velocity_rad_s + after) / np.where(larger > 0, larger, 1.0)
+    return Channel("velocity_rad_s", time_s, sign)
