@@ -145,20 +145,27 @@ class DriveModel:
         return np.asarray(motion * z ** float(whole))
 
     def motion(
-        self, command_rad_s: Array, interval_s: float, tick: NDArray[np.intp], after_s: Array
+        self,
+        command_rad_s: Array,
+        interval_s: float,
+        tick: NDArray[np.intp],
+        after_s: Array,
+        late_s: Array | None = None,
     ) -> ArmMotion:
         """Return the motion under held commands, from rest, so long after ticks of given numbers.
 
         `after_s` is from 0 up to the interval, or beyond it where nothing more was sent; the delay
-        is not taken into account. After 0 s the edge of the command has not come yet.
+        is not taken into account. After 0 s the edge of the command has not come yet. `late_s` is
+        by how much each tick came later than evenly, if they did not come evenly.
         """
         sent = command_rad_s[tick]
         before = np.where(tick > 0, command_rad_s[np.maximum(tick - 1, 0)], 0.0)
         acceleration = self.jump * np.where(after_s > 0, sent, before)
-        summed = np.concatenate(([0.0], np.cumsum(command_rad_s[:-1]))) * interval_s
+        lengths_s = interval_s if late_s is None else interval_s + np.diff(late_s)
+        summed = np.concatenate(([0.0], np.cumsum(command_rad_s[:-1] * lengths_s)))
         velocity, angle = np.zeros(tick.size), self.gain * (summed[tick] + after_s * sent)
         for pole, residue, pair in self._modes():
-            state = state_after(pole, command_rad_s, interval_s, tick, after_s)
+            state = state_after(pole, command_rad_s, interval_s, tick, after_s, late_s)
             weight = residue * (1 + pair)
             acceleration += (weight * pole * state).real
             velocity += (weight * state).real
@@ -217,15 +224,26 @@ def state_after(
     interval_s: float,
     tick: NDArray[np.intp],
     after_s: Array,
+    late_s: Array | None = None,
 ) -> Complex:
-    """Return x of x' = λ x + c, from rest, so long after the ticks of given numbers."""
+    """Return x of x' = λ x + c, from rest, so long after the ticks of given numbers.
+
+    A command that came ε late is one in time, and a pulse of c_(k−1) − c_k for ε.
+    """
     decay = cmath.exp(pole * interval_s)
-    push = [0.0, (decay - 1) / pole]
-    state = scipy.signal.lfilter(push, [1.0, -decay], command_rad_s)[tick]
+    held = (decay - 1) / pole * command_rad_s
+    before = np.concatenate(([0.0], command_rad_s[:-1]))
+    grown = np.ones(1) if late_s is None else np.exp(pole * late_s)
+    if late_s is not None:
+        held = held + decay * (1 - 1 / grown) / pole * (before - command_rad_s)
+    at_even = scipy.signal.lfilter([0.0, 1.0], [1.0, -decay], held)
+    state = at_even[tick]
+    if late_s is not None:
+        state = grown[tick] * state + (grown[tick] - 1) / pole * before[tick]
     if after_s.size and np.ptp(after_s) < SAME_TIME_S:
         if after_s[0] == 0.0:
             return np.asarray(state)
-        grown = cmath.exp(pole * float(np.mean(after_s)))
+        passed = cmath.exp(pole * float(np.mean(after_s)))
     else:
-        grown = np.exp(pole * after_s)
-    return np.asarray(grown * state + (grown - 1) / pole * command_rad_s[tick])
+        passed = np.exp(pole * after_s)
+    return np.asarray(passed * state + (passed - 1) / pole * command_rad_s[tick])

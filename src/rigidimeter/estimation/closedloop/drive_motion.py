@@ -9,12 +9,23 @@ from rigidimeter.dynamics import EVEN, SAME_TIME_S, ArmMotion, DriveModel
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel
 
+UNEVEN = 1e-3
+"""Ticks that differ by less than this share of one came evenly."""
+
 
 def driven(drive: DriveModel, command: Channel, time_s: Array) -> ArmMotion:
     """Return the motion under a recorded command, from rest, at any times; exact between ticks."""
     interval_s = 1.0 / command.mean_rate_hz
     tick, after_s = since_ticks(command, time_s, drive.delay_s)
-    return drive.motion(command.values, interval_s, tick, after_s)
+    return drive.motion(command.values, interval_s, tick, after_s, lateness_s(command))
+
+
+def lateness_s(command: Channel) -> Array | None:
+    """Return by how much each tick came later than evenly, at least 0; None where all were even."""
+    interval_s = 1.0 / command.mean_rate_hz
+    late_s = command.time_s - command.time_s[0] - interval_s * np.arange(len(command))
+    late_s -= np.min(late_s)
+    return late_s if np.max(late_s) > UNEVEN * interval_s else None
 
 
 def since_ticks(

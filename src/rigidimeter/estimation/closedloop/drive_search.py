@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 
 from rigidimeter.dynamics import DriveModel, with_conjugates
 from rigidimeter.dynamics.drive_model import state_after
-from rigidimeter.estimation.closedloop.drive_motion import since_ticks
+from rigidimeter.estimation.closedloop.drive_motion import lateness_s, since_ticks
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel
 
@@ -32,6 +32,9 @@ LONGEST_S, LONGEST_TICKS = 0.1, 4.0
 
 EARLIEST = -0.5
 """In ticks. The search may pass through delays below zero; none is the answer."""
+
+LATER = 0.5
+"""In ticks: where a search begins again that came to no delay at first."""
 
 DOUBLE = 1e-4
 """Two poles that are this close, as a share of their size, are taken for so far apart."""
@@ -166,10 +169,15 @@ def search(
         )
         return np.asarray(done.x)
 
-    x = found(_coordinates(structure, start, interval_s), lambda x: solved(x[:-1], x[-1])[1])
+    begin = _coordinates(structure, start, interval_s)
+    x = found(begin, lambda x: solved(x[:-1], x[-1])[1])
     if x[-1] > 0.0:
         return solved(x[:-1], x[-1])[0]
-    return solved(found(x[:-1], lambda x: solved(x, 0.0)[1]), 0.0)[0]
+    at_once = solved(found(x[:-1], lambda x: solved(x, 0.0)[1]), 0.0)[0]
+    # A short delay may lie behind a ridge.
+    x = found(np.append(begin[:-1], LATER), lambda x: solved(x[:-1], x[-1])[1])
+    later = solved(x[:-1], x[-1])[0]
+    return later if x[-1] > 0.0 and later.power < at_once.power else at_once
 
 
 def _coordinates(structure: Structure, start: DriveModel, interval_s: float) -> Array:
@@ -223,9 +231,10 @@ def _columns(
     """Return the velocity that each term of a numerator makes of an input, shape (j, n)."""
     interval_s = 1.0 / acting.mean_rate_hz
     tick, after_s = since_ticks(acting, time_s, late_s, even=0.0)
+    uneven_s = lateness_s(acting)
     columns = np.zeros((shapes.shape[1], time_s.size))
     for pole, weights in zip(poles, shapes, strict=True):
-        state = state_after(pole, acting.values, interval_s, tick, after_s)
+        state = state_after(pole, acting.values, interval_s, tick, after_s, uneven_s)
         columns += (1 + (pole.imag != 0)) * (weights[:, None] * state).real
     return columns
 

@@ -248,8 +248,12 @@ def _between_samples(
         rest[channel.name] = Channel(channel.name, channel.time_s, channel.values - seen)
     motion = _spectra(grid, *_motion(replace(epoch, channels=rest), grid.time_s))
     motion *= filtered(torque_filter, grid.omega_rad_s)
-    for column, part in enumerate(driven(behind(drive, torque_filter), command, grid.time_s)):
-        motion[:, column] += grid.transform(part)
+    # At the stamps of the torque, and from there like the torque.
+    torque = epoch.channels["torque_nm"]
+    seen_motion = driven(behind(drive, torque_filter), command, torque.time_s)
+    for column, part in enumerate(seen_motion):
+        caused = Channel(torque.name, torque.time_s, part)
+        motion[:, column] += grid.transform(_at(caused, grid.time_s))
     return motion
 
 

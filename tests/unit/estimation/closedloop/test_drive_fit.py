@@ -75,3 +75,55 @@ def test_a_velocity_that_the_command_does_not_explain_gives_no_drive():
         "velocity_rad_s": Channel("velocity_rad_s", t, rng.standard_normal(2000)),
     }
     assert fit_drive(Epoch("file", "1", channels), DriveModel.second_order(50.0, 0.7071)) is None
+
+
+def test_ticks_that_do_not_come_evenly_are_exact_too():
+    rng = np.random.default_rng(5)
+    ticks_s = np.arange(400) / 1000.0 + rng.uniform(0.0, 4e-4, 400)
+    commands = rng.standard_normal(400)
+    command = Channel("velocity_command_rad_s", ticks_s, commands)
+    state, states = DriveState(), []
+    for one, length_s in zip(commands, np.diff(ticks_s, append=ticks_s[-1] + 1e-3), strict=True):
+        states.append(state)
+        state = drive_step(drive(40.0, 0.8, length_s), state, one)
+    found = driven(DriveModel.second_order(40.0, 0.8), command, ticks_s)
+    expected = np.array(states)
+    np.testing.assert_allclose(found.angle_rad, expected[:, 0], atol=1e-12)
+    np.testing.assert_allclose(found.velocity_rad_s, expected[:, 1], atol=1e-11)
+    np.testing.assert_allclose(found.acceleration_rad_s2, expected[:, 2], atol=1e-8)
+
+
+def recorded(commands, velocity, interval_s):
+    t = interval_s * np.arange(len(commands))
+    channels = {
+        "velocity_command_rad_s": Channel("velocity_command_rad_s", t, commands),
+        "velocity_rad_s": Channel("velocity_rad_s", t, velocity),
+    }
+    return Epoch("file", "1", channels)
+
+
+def smooth_commands(n, seed=6):
+    return np.cumsum(np.random.default_rng(seed).standard_normal(n)) * 0.01
+
+
+def test_a_pi_drive_is_told_from_one_of_second_order():
+    # H = ((p + q) s + p q) / ((s + p)(s + q)), whose acceleration jumps by p + q per command.
+    model = DriveModel((complex(-220.0), complex(-90.0)), (complex(372.3), complex(-62.3)), 2e-4)
+    assert model.gain == pytest.approx(1.0, rel=1e-3)
+    commands = smooth_commands(3000)
+    command = Channel("velocity_command_rad_s", np.arange(3000) / 500.0, commands)
+    noise = 1e-5 * np.random.default_rng(7).standard_normal(3000)
+    velocity = driven(model, command, command.time_s).velocity_rad_s + noise
+    found = fit_drive(recorded(commands, velocity, 0.002), DriveModel.second_order(50.0, 0.7071))
+    assert found.structure == "velocity PI"
+    assert found.model.jump == pytest.approx(310.0, rel=0.01)
+    assert found.model.delay_s == pytest.approx(2e-4, abs=1e-5)
+
+
+def test_a_command_that_was_logged_more_slowly_than_it_was_sent_gives_no_drive():
+    fine = np.interp(np.arange(20000) / 10, np.arange(2000), smooth_commands(2000))
+    command = Channel("velocity_command_rad_s", np.arange(20000) / 2000.0, fine)
+    model = DriveModel.second_order(20.0, 0.7)
+    velocity = driven(model, command, command.time_s).velocity_rad_s[::10]
+    epoch = recorded(fine[::10], velocity, 0.005)
+    assert fit_drive(epoch, DriveModel.second_order(50.0, 0.7071)) is None
