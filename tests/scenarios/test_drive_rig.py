@@ -45,3 +45,10 @@ def test_what_cannot_be_known_is_doubted_with_an_interval_that_covers(rig):
         assert finding.level == "doubt"
         assert "torque_lowpass_hz" in finding.remedy
         assert np.all((fit.low <= TRUTH) & (fit.high >= TRUTH))
+
+
+def test_least_squares_says_what_j_loses_between_the_samples():
+    found = estimate([run(DriveRig("PI", 1000.0), 1)], "bandlimited").fits[0]
+    (finding,) = (one for one in found.findings if one.name == "between_samples")
+    lost = 100 * (1 - found.value[0] / TRUTH[0])
+    assert finding.value == pytest.approx(lost, abs=3.0)

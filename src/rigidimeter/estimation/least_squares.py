@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
+from rigidimeter.estimation.closedloop.as_sampled import between_samples_as_they_are
 from rigidimeter.estimation.closedloop.line_noise import Smoother
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch
@@ -154,6 +155,7 @@ def fit_least_squares(
                 condition=epoch.condition,
                 method=method,
                 outcome=after_fit(epoch, found.r_squared, found.condition_number),
+                findings=between_samples_as_they_are(prepared) if inertia_kg_m2 is None else (),
             )
             fits.append(fit)
             if fit.outcome.included:

@@ -27,6 +27,10 @@ from rigidimeter.records import Channel
 Complex = NDArray[np.complex128]
 
 
+LOW = 0.01
+"""In rad a tick: slow enough that what sampling does no longer depends on it."""
+
+
 class TorqueFilter(NamedTuple):
     """A Butterworth low-pass between the torque and its samples."""
 
@@ -72,6 +76,20 @@ def seen_beyond_samples(
     _, velocity, angle = drive.transfer(z, interval_s, after)
     sampled = np.stack([1j * omega_rad_s * velocity, velocity, angle])
     return np.asarray(seen.T - filtered(torque_filter, omega_rad_s) * sampled.T)
+
+
+def acceleration_seen(drive: DriveModel, command: Channel, time_s: Array) -> float:
+    """Return the acceleration at the torque's samples as a share of its mean, at low frequency."""
+    interval_s = 1.0 / command.mean_rate_hz
+    _, after_s = since_ticks(command, time_s, 0.0)
+    omega = np.array([LOW / interval_s])
+    z = np.exp(1j * omega * interval_s)
+    _, velocity, _ = drive.transfer(z, interval_s)
+    # Samples that do not keep step with the ticks see it at many times.
+    times_s = np.quantile(after_s, np.linspace(0.05, 0.95, 10))
+    seen = [drive.transfer(z, interval_s, after)[0] for after in times_s.tolist()]
+    turn = np.exp(-1j * omega * np.mean(times_s))
+    return float(np.mean((np.array(seen).mean(axis=0) * turn / (1j * omega * velocity)).real))
 
 
 def command_at(command: Channel, time_s: Array) -> Array:

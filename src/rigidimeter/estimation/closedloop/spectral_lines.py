@@ -252,8 +252,8 @@ def _between_samples(
     torque = epoch.channels["torque_nm"]
     seen_motion = driven(behind(drive, torque_filter), command, torque.time_s)
     for column, part in enumerate(seen_motion):
-        caused = Channel(torque.name, torque.time_s, part)
-        motion[:, column] += grid.transform(_at(caused, grid.time_s))
+        there = Channel(torque.name, torque.time_s, part)
+        motion[:, column] += grid.transform(_at(there, grid.time_s))
     return motion
 
 
