@@ -1,7 +1,8 @@
 """How often the guard's laws of consistency stop a rig that is in order, in simulated hours.
 
-PRBS epochs of every kind of subject run on the compiled batch, with two sizes of joint and two
-rates of the torque sensor: the paper's 100 samples/s, and 1000. What is recorded then passes
+PRBS epochs of every kind of subject run on the compiled batch, with two sizes of joint, at 1000
+ticks/s with the torque sensor at 1000 and at the paper's 100 samples/s, and at 100 and 50 ticks/s.
+What is recorded then passes
 `guard.consistency`, compiled with what it calls from their own sources. Epochs start from rest, so
 each one also is a beginning. A cause of the guard's own limits (torque, power, energy, a second at
 the position limit) that ends an epoch early is counted apart: it is no false alarm. `not following`
@@ -13,6 +14,7 @@ is the guard's own too, and counts as one.
     tremor     3 N·m at 4, 5 and 6 Hz in turn
     hanging    next to no stiffness or damping
     rigid      ten times the stiffness, six times the damping
+    heavy      three times the inertia, as with a heavier cuff, and hanging
     resisting  3.5 N·m (SD), so 5 N·m and more for a seventh of the time, 0.05 to 1 Hz; the limits
                of torque, power and energy are raised, or they would end most epochs
 
@@ -41,6 +43,7 @@ from rigidimeter.guard import (
     consistency_state,
     consistency_step,
     torque_answer,
+    torque_sign,
     watch,
 )
 from rigidimeter.settings import Settings, parse_settings
@@ -65,6 +68,7 @@ KINDS: dict[str, tuple[tuple[float, float, float], dict[str, float]]] = {
     "tremor": ((1.0, 1.0, 1.0), {"tremor_amplitude_nm": 3.0}),
     "hanging": ((1.0, 0.15, 0.03), {}),
     "rigid": ((1.0, 6.0, 10.0), {}),
+    "heavy": ((3.0, 0.15, 0.03), {}),
     "resisting": (
         (1.0, 1.0, 1.0),
         {"voluntary_sd_nm": 3.5, "voluntary_low_hz": 0.05, "voluntary_high_hz": 1.0},
@@ -76,7 +80,14 @@ RESISTED = {
     "power_limit_w": 100.0,
     "energy_limit_j": 60.0,
 }
-RATES_HZ = (100.0, 1000.0)
+RATES: tuple[tuple[float, float, dict[str, Any], dict[str, Any]], ...] = (
+    (1000.0, 1000.0, {}, {}),
+    (1000.0, 100.0, {}, {}),
+    (100.0, 100.0, {"reaction_time_s": 0.05}, {}),
+    (50.0, 50.0, {"reaction_time_s": 0.1}, {"torque_cutoff_hz": 10.0}),
+)
+"""Ticks/s, torques/s, and what such ticks need of guard and controller."""
+
 OWN = {
     *(Cause.NONE, Cause.TORQUE_HIGH, Cause.TORQUE_TOO_HIGH, Cause.POWER_HIGH, Cause.ENERGY_HIGH),
     Cause.HELD_AT_LIMIT,
@@ -89,6 +100,7 @@ class Kind(NamedTuple):
 
     size: str
     name: str
+    tick_rate_hz: float
     torque_rate_hz: float
     settings: Settings
 
@@ -111,21 +123,25 @@ def kinds() -> Iterator[Kind]:
                 zip(("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"), joint, strict=True)
             )
             spread = {f"{what}_cv_percent": 20.0 for what in ("inertia", "damping", "stiffness")}
-            for rate_hz in RATES_HZ:
+            for tick_hz, torque_hz, guard, controller in RATES:
                 frequencies = (4.0, 5.0, 6.0) if name == "tremor" else (5.0,)
                 for frequency_hz in frequencies:
                     whole = {**values, **spread, **subject, "tremor_frequency_hz": frequency_hz}
                     settings = parse_settings(
                         {
                             "subject": {"OFF": whole},
-                            "controller": given["controller"],
+                            "controller": {**given["controller"], **controller},
                             "prbs": given["prbs"],
-                            "guard": RESISTED if name == "resisting" else {},
-                            "rig": {"torque": {"rate_hz": rate_hz}},
+                            "guard": {**guard, **(RESISTED if name == "resisting" else {})},
+                            "rig": {
+                                "tick_rate_hz": tick_hz,
+                                "torque": {"rate_hz": torque_hz},
+                                "motion": {"rate_hz": tick_hz},
+                            },
                         }
                     )
                     label = f"{name} {frequency_hz:g} Hz" if name == "tremor" else name
-                    yield Kind(size, label, rate_hz, settings)
+                    yield Kind(size, label, tick_hz, torque_hz, settings)
 
 
 def first_cause(
@@ -168,13 +184,20 @@ def compiled() -> Callable[..., tuple[int, int]]:
         return njit(with_helpers(function, helpers), error_model="numpy", nogil=True)
 
     causes = numbers(Cause)
+    sign = made(
+        torque_sign.sign_is_wrong,
+        table=made(torque_sign.table),
+        explained=made(torque_sign.explained, solved_for=made(torque_sign.solved_for)),
+        without=made(torque_sign.without),
+        least_of_each_sign=made(torque_sign.least_of_each_sign, solved=made(torque_sign.solved)),
+    )
     answer = made(
         torque_answer.answer_step,
         Cause=causes,
         lowpassed=made(torque_answer.lowpassed),
-        sign_is_wrong=made(
-            torque_answer.sign_is_wrong,
-            fitted=made(torque_answer.fitted, solved=made(torque_answer.solved)),
+        keep_row=made(torque_answer.keep_row),
+        a_window_shows_the_wrong_sign=made(
+            torque_answer.a_window_shows_the_wrong_sign, sign_is_wrong=sign
         ),
     )
     means = made(
@@ -237,15 +260,15 @@ def main() -> None:
     find, began_s = compiled(), time.monotonic()
     total = Counter[str]()
     hours = 0.0
-    print("| size | subject | torque Hz | hours | epochs | ended by a limit | false alarms |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    print("| size | subject | ticks/s | torques/s | hours | epochs | ended by a limit | alarms |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for number, kind in enumerate(rows):
         wanted = given.hours * 3600.0 / len(rows)
         counted = count(kind, wanted, given.seed + number, find)
         alarms = ", ".join(f"{n} {name}" for name, n in sorted(counted.alarms.items())) or "0"
         print(
-            f"| {kind.size} | {kind.name} | {kind.torque_rate_hz:g} | {counted.hours:.2f} "
-            f"| {counted.epochs} | {counted.stopped} | {alarms} |",
+            f"| {kind.size} | {kind.name} | {kind.tick_rate_hz:g} | {kind.torque_rate_hz:g} "
+            f"| {counted.hours:.2f} | {counted.epochs} | {counted.stopped} | {alarms} |",
             flush=True,
         )
         hours += counted.hours

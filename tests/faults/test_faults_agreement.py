@@ -92,8 +92,15 @@ def test_fault_25_a_velocity_that_is_not_the_angles(rig, gain, tmp_path, measure
         measured(25, rig, case, trial, AGREE_S)
 
 
+SIGN_S = {"virtual": 0.5, CANOPEN: 0.5, ASCII: 1.1}
+"""A wrong sign shows once a window of 24 rows of 16 ms is full, over a slow line one of 48 rows of
+20 ms; up to 6 rows more until the next look."""
+
+TURNED_S = {"virtual": 0.7, CANOPEN: 0.7, ASCII: 1.25}
+"""A sign that turns in a run: 5 rows more, and 6 of the fast ones."""
+
 UNTRUE = {
-    "sign": (Wrong("sensor", "gain", -1.0), (Cause.TORQUE_SIGN,), 1.1),
+    "sign": (Wrong("sensor", "gain", -1.0), (Cause.TORQUE_SIGN,), SIGN_S["virtual"]),
     "gain 0": (Wrong("sensor", "gain", 0.0), (Cause.TORQUE_SILENT,), 0.75),
     "last bit toggles": (Wrong("sensor", "toggles"), (Cause.TORQUE_SILENT,), 0.75),
     "axis constant": (Wrong("sensor", "axis_constant"), (Cause.TORQUE_SILENT,), 0.75),
@@ -101,20 +108,29 @@ UNTRUE = {
 }
 
 
-@pytest.mark.parametrize(
-    ("case", "rig"),
-    # At 50 Hz the lag of a serial drive leaves the instruments too little of the motion to judge
-    # the sign by; the daily check does.
-    [(case, rig) for case in UNTRUE for rig in RIGS if (case, rig) != ("sign", ASCII)],
-)
+@pytest.mark.parametrize("rig", RIGS)
+@pytest.mark.parametrize("case", UNTRUE)
 def test_fault_26_a_torque_that_does_not_answer(rig, case, tmp_path, measured):
     wrong, causes, within_s = UNTRUE[case]
+    if case == "sign":
+        within_s = SIGN_S[rig]
     with bench(rig, **LONG) as made:
         trial = run(made, tmp_path / "s", wrong, at_s=0.0, task="prbs")
         assert_recorded(trial, assert_found(trial, causes, within_s))
         assert np.degrees(np.abs(trial.trace[:, 1])).max() < 20.0
         deg = moved_deg(trial, trial.fault_s + trial.rest_s)
         measured(26, rig, f"{case}: {deg:.1f} deg", trial, within_s)
+
+
+@pytest.mark.parametrize("rig", RIGS)
+@pytest.mark.parametrize("at_s", [0.9, 1.3])
+def test_fault_26_a_sign_that_turns_in_a_run(rig, at_s, tmp_path, measured):
+    wrong, causes, _ = UNTRUE["sign"]
+    with bench(rig, **LONG) as made:
+        trial = run(made, tmp_path / "s", wrong, at_s=at_s, task="prbs")
+        assert_recorded(trial, assert_found(trial, causes, TURNED_S[rig]))
+        deg = moved_deg(trial, trial.fault_s + trial.rest_s)
+        measured(26, rig, f"sign, after {at_s:g} s: {deg:.1f} deg", trial, TURNED_S[rig])
 
 
 @pytest.mark.parametrize(

@@ -153,6 +153,7 @@ def means_step(
     torque_old_share: float,
     motion_old_share: float,
     elapsed_s: float,
+    before_s: float = 0.0,
 ) -> tuple[MeansState, int]:
     """Look at the means of the ticks since the last ones; return the state and a `Cause`.
 
@@ -168,6 +169,8 @@ def means_step(
         Of these ticks, those in which a reading was old.
     elapsed_s : float
         The time of the ticks.
+    before_s : float
+        How long before the torque the motion was taken. The joint has gone on since.
     """
     answer, before, speed_before, since_s, moved, reported, apart, both = state[:8]
     pace, energy, torque_old, motion_old = state[8:]
@@ -192,8 +195,9 @@ def means_step(
     else:
         since_s += elapsed_s
     energy = energy_after(energy, torque_nm * pace, elapsed_s)
+    angle_then_rad = angle_rad + velocity_rad_s * before_s
     answer, cause = answer_step(
-        limits.answer, answer, perturbation_nm, torque_nm, angle_rad, elapsed_s
+        limits.answer, answer, perturbation_nm, torque_nm, angle_then_rad, elapsed_s
     )
 
     # The first law that is broken is named; a number that is none breaks no law.

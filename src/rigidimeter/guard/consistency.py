@@ -32,7 +32,7 @@ class ConsistencyState(NamedTuple):
     `still_s` is how long zero has been commanded, `held_rad` where the joint was when it had
     settled (NaN before). The others are of the ticks since the last mean: how many passed, in how
     many of them the readings were old, how many were read and perturbed; sums of what was read,
-    the stamps from the last mean on.
+    the stamps from the last mean on, and by how much the motion was taken before the torque.
     """
 
     means: MeansState
@@ -48,6 +48,7 @@ class ConsistencyState(NamedTuple):
     angle_rad: float = 0.0
     velocity_rad_s: float = 0.0
     stamp_s: float = 0.0
+    before_s: float = 0.0
 
 
 def consistency_state(limits: ConsistencyLimits) -> ConsistencyState:
@@ -55,7 +56,7 @@ def consistency_state(limits: ConsistencyLimits) -> ConsistencyState:
 
     A joint that moves at once would else be taken for one that was at rest where it then is.
     """
-    means = MeansState(answer_state(limits.answer))
+    means = MeansState(answer_state())
     return ConsistencyState(means, ticks=limits.mean_of_ticks - 1)
 
 
@@ -102,6 +103,7 @@ def consistency_step(
         angle,
         velocity,
         stamp_s,
+        before_s,
     ) = state
     if elapsed_ticks < 1:
         elapsed_ticks = 1
@@ -112,7 +114,7 @@ def consistency_step(
         motion_old += elapsed_ticks
     still_s = still_s + elapsed_ticks * limits.interval_s if sent_rad_s == 0.0 else 0.0
     found = _NO_CAUSE
-    one_sum = perturbation_nm + torque_nm + angle_rad + velocity_rad_s + age_s
+    one_sum = perturbation_nm + torque_nm + angle_rad + velocity_rad_s + age_s + torque_age_s
     if one_sum - one_sum == 0.0:  # not so where one of them is infinite or no number
         if still_s <= limits.settle_s + max(age_s, 0.0):
             held = math.nan
@@ -128,6 +130,7 @@ def consistency_step(
         angle += angle_rad
         velocity += velocity_rad_s
         stamp_s += ticks * limits.interval_s - age_s
+        before_s += age_s - torque_age_s
     if ticks < limits.mean_of_ticks or readings == 0:
         return (
             ConsistencyState(
@@ -144,6 +147,7 @@ def consistency_step(
                 angle,
                 velocity,
                 stamp_s,
+                before_s,
             ),
             found,
         )
@@ -159,6 +163,7 @@ def consistency_step(
         torque_old / ticks,
         motion_old / ticks,
         ticks * limits.interval_s,
+        before_s * share,
     )
-    after = ConsistencyState(means, still_s, held, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    after = ConsistencyState(means, still_s, held, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     return after, found if found != _NO_CAUSE else unlike

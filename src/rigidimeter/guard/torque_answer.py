@@ -15,22 +15,12 @@ size    A joint that is accelerated needs torque. The mean of (H L² M)², with 
         that come a second late (for the first second of a motion) are below it. It holds for any
         motion, perturbed or imposed, while J₀ a is above what resolution and noise explain.
 
-sign    While the perturbation runs, what the controller would do with it alone, without any
-        torque, is known: J_c θ_p'' + B_c θ_p' = M_p. It has nothing to do with the subject. So
-        (a_p, v_p, q_p) are instruments z for x = (a, v, q), and from one second of ticks
+sign    While the perturbation runs, a row of the same signals, through one low-pass more, is kept
+        every 16 ms or so, and every tenth of a second `torque_sign` looks at the last ones.
 
-            (J, B, K) = (Σ z xᵀ)⁻¹ Σ z M
-
-        Were the sign of M wrong, J and B would be negative. By chance they are in a fifth of all
-        seconds in which a subject pushes, so they count only where both sides are known: the fit
-        leaves less than 3 % of the torque's mean square, and the instruments alone less than 12 %
-        of that of a. A relaxed joint leaves less than 2 % and 8 %. A subject who pushes as hard as
-        the perturbation leaves more of the one, a stronger one more of the other: then nothing can
-        be said, and nothing is. `benchmarks.false_alarms` counts how often something was.
-
-Windows of one second begin every half second. A step takes the mean of a few ticks: a mean leaves
-out what filters of 5 Hz would only alias, and costs a fraction of a step each tick. It only adds,
-multiplies, divides and compares. The window is written in place: a state is used once.
+A step takes the mean of a few ticks: a mean leaves out what filters of 5 Hz would only alias, and
+costs a fraction of a step each tick. It only adds, multiplies, divides and compares. The window is
+written in place: a state is used once.
 """
 
 from __future__ import annotations
@@ -43,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.guard.causes import Cause
+from rigidimeter.guard.torque_sign import BEFORE, COLUMNS, Left, most_left, sign_is_wrong
 from rigidimeter.settings import Settings
 from rigidimeter.units import rad_from_deg
 
@@ -50,16 +41,27 @@ FILTER_RAD_S = 2.0 * math.pi * 5.0
 """w: above voluntary motion, below the bandwidth of drive and sensors."""
 
 SHOWN_MEMORY_S = 0.25
-WINDOW_S = 1.0
 MEAN_OF_S = 0.008
 """A step is of the mean over so long, or over a tick where that is longer."""
+
+ROW_S = 0.016
+"""A row of the window is kept after so long, or after a step where that is longer."""
 
 LONGEST_S = 0.06
 """However late a step comes, the filters go on by no more than this: they do not overshoot."""
 
+ROWS = (24, 48, 96)
+"""Of the windows. The shortest shows a relaxed joint, the longer ones a less plain answer."""
 
-FIT_LEAVES, INSTRUMENTS_LEAVE = 0.03, 0.12
-"""Of the mean squares of torque and a, at most, where the sign is believed to be wrong."""
+ROWS_A_LOOK = 6
+
+SETTLED = 0.75 * math.pi
+"""A step of the command has an acceleration of its own sense until ζ ω t = π, with ω/2π the
+drive's bandwidth and ζ its damping ratio. With ticks further apart than this, torques read at them
+need not show the inertia."""
+
+HARDLY_SHOWN = 0.3
+"""The part of J₀ then asked of the torque: some acceleration is left in it, and some damping."""
 
 UNSHOWN_NM = 0.0003
 """A torque so small may hide in the sensor's noise."""
@@ -70,31 +72,36 @@ _NO_CAUSE = int(Cause.NONE)
 class AnswerLimits(NamedTuple):
     """Controller and thresholds.
 
-    `rate_per_s` is B_c/J_c of the controller. `half_steps` go into half a window. `inertia_kg_m2`
-    is J₀; at 0 the size is not looked at. `unshown_nm` is the torque below which it is not.
+    `rate_per_s` is B_c/J_c of the controller. `steps_a_row` steps make a row. `left` is what a
+    joint may leave of each of the windows, `shows_inertia` whether torques read at the ticks do.
+    `inertia_kg_m2` is J₀; at 0 the size is not looked at. `least_part` is the part of J₀ a that the
+    torque must show, `unshown_nm` the J₀ a below which the size is not looked at.
     """
 
     rate_per_s: float = 0.0
-    half_steps: int = 62
+    steps_a_row: int = 2
+    left: tuple[Left, Left, Left] = (Left(), Left(), Left())
+    shows_inertia: bool = True
     inertia_kg_m2: float = 0.0
+    least_part: float = 1.0
     unshown_nm: float = math.inf
 
 
-Filtered = tuple[float, float, float, float]
-"""A signal and what three equal low-passes in a row make of it."""
+Filtered = tuple[float, float, float, float, float]
+"""A signal and what four equal low-passes in a row make of it."""
 
-NOTHING_YET: Filtered = (math.nan, 0.0, 0.0, 0.0)
-AT_REST: Filtered = (0.0, 0.0, 0.0, 0.0)
+NOTHING_YET: Filtered = (math.nan, 0.0, 0.0, 0.0, 0.0)
+AT_REST: Filtered = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class AnswerState(NamedTuple):
     """What is remembered.
 
-    `window` has a row of (a_p, v_p, q_p, a, v, q, M) for each step, the oldest of which is
-    overwritten; `steps` counts those since the perturbation began. `torque`, `angle` and `alone`
-    are M, θ and θ_p filtered. `alone_per_s` is θ_p', `perturbation_nm` what drove it last; θ_p is
-    that of J_c = 1, as only ratios are used. `shown_nm2` and `moved2` are the means of the filtered
-    M² and a².
+    `window` has a row of (q_p, v_p, j, a, v, q, M) for each of the last moments, twice, so that
+    the last ones are always in one piece; `steps` counts those since the perturbation began.
+    `torque`, `angle` and `alone` are M, θ and θ_p filtered. `alone_per_s` is θ_p',
+    `perturbation_nm` what drove it last; θ_p is that of J_c = 1, as its size does not matter.
+    `shown_nm2` and `moved2` are the means of the filtered M² and a².
     """
 
     window: NDArray[np.float64]
@@ -117,19 +124,25 @@ def answer_limits(settings: Settings) -> AnswerLimits:
     """Return the limits for the loop's tick."""
     rig, controller = settings.rig, settings.controller
     step_s = mean_of_ticks(rig.tick_rate_hz) / rig.tick_rate_hz
+    decay_per_s = rig.drive_damping_ratio * 2.0 * math.pi * rig.drive_bandwidth_hz
+    shows_inertia = decay_per_s <= SETTLED * rig.tick_rate_hz
     inertia = settings.guard.least_inertia_kg_m2
     steps_rad_s2 = 2.0 * rad_from_deg(rig.motion.angle_resolution_deg) * FILTER_RAD_S**2
+    short, middle, long = (most_left(rows) for rows in ROWS)
     return AnswerLimits(
         rate_per_s=controller.damping_nm_s_rad / controller.inertia_kg_m2,
-        half_steps=round(0.5 * WINDOW_S / step_s),
+        steps_a_row=max(round(ROW_S / step_s), 1),
+        left=(short, middle, long),
+        shows_inertia=shows_inertia,
         inertia_kg_m2=inertia,
+        least_part=1.0 if shows_inertia else HARDLY_SHOWN,
         unshown_nm=UNSHOWN_NM + rig.torque.resolution_nm + inertia * steps_rad_s2,
     )
 
 
-def answer_state(limits: AnswerLimits) -> AnswerState:
+def answer_state() -> AnswerState:
     """Return the state before the first tick."""
-    return AnswerState(np.zeros((2 * limits.half_steps, 7)))
+    return AnswerState(np.zeros((2 * (ROWS[-1] + BEFORE), COLUMNS)))
 
 
 def answer_step(
@@ -162,17 +175,20 @@ def answer_step(
     torque = lowpassed(blend, torque, torque_nm)
     angle = lowpassed(blend, angle, angle_rad)
     m = torque[2] - torque[3]
-    value, once, twice, thrice = angle
+    value, once, twice, thrice, _ = angle
     a = w * w * (value - 3.0 * (once - twice) - thrice)
     weight = elapsed_s / SHOWN_MEMORY_S
     shown += (m * m - shown) * weight
     moved += (a * a - moved) * weight
     cause = _NO_CAUSE
     needed = limits.inertia_kg_m2 * limits.inertia_kg_m2 * moved
-    if needed > limits.unshown_nm * limits.unshown_nm and shown < needed:
+    part = limits.least_part * limits.least_part
+    if needed > limits.unshown_nm * limits.unshown_nm and shown < part * needed:
         cause = int(Cause.TORQUE_SILENT)
 
     if perturbation_nm == 0.0:  # nothing perturbs: the next window begins with the next epoch
+        if steps > 0:
+            window[:] = 0.0
         alone, alone_per_s, pushed_nm, steps = AT_REST, 0.0, 0.0, 0
     else:
         # The controller alone, trapezoidal as the filters are, so that both are late by the same.
@@ -181,89 +197,58 @@ def answer_step(
         before, pushed_nm = alone_per_s, perturbation_nm
         alone_per_s = (alone_per_s * (1.0 - drag) + push) / (1.0 + drag)
         alone = lowpassed(blend, alone, alone[0] + 0.5 * (before + alone_per_s) * elapsed_s)
-        there, first, second, third = alone
-        row = window[steps % window.shape[0]]
-        row[0] = w * w * (there - 3.0 * (first - second) - third)
-        row[1] = w * (first - 2.0 * second + third)
-        row[2] = second - third
-        row[3] = a
-        row[4] = w * (once - 2.0 * twice + thrice)
-        row[5] = twice - thrice
-        row[6] = m
         steps += 1
-        ended = steps >= window.shape[0] and steps % limits.half_steps == 0
-        if ended and cause == _NO_CAUSE and sign_is_wrong(window):
-            cause = int(Cause.TORQUE_SIGN)
+        if steps % limits.steps_a_row == 0:
+            rows = steps // limits.steps_a_row
+            keep_row(window, rows, torque, angle, alone)
+            looked = rows % ROWS_A_LOOK == 0 and cause == _NO_CAUSE
+            if looked and a_window_shows_the_wrong_sign(limits, window, rows):
+                cause = int(Cause.TORQUE_SIGN)
     after = AnswerState(window, torque, angle, alone, alone_per_s, pushed_nm, shown, moved, steps)
     return after, cause
 
 
 def lowpassed(blend: float, before: Filtered, value: float) -> Filtered:
-    """Return the next step of three low-passes; trapezoidal, so that none adds a delay."""
-    value_before, once_before, twice_before, thrice_before = before
+    """Return the next step of four low-passes; trapezoidal, so that none adds a delay."""
+    value_before, once_before, twice_before, thrice_before, last_before = before
     if isnan(value_before):
-        return value, value, value, value
+        return value, value, value, value, value
     kept = 1.0 - 2.0 * blend
     once = kept * once_before + blend * (value + value_before)
     twice = kept * twice_before + blend * (once + once_before)
-    return value, once, twice, kept * thrice_before + blend * (twice + twice_before)
+    thrice = kept * thrice_before + blend * (twice + twice_before)
+    return value, once, twice, thrice, kept * last_before + blend * (thrice + thrice_before)
 
 
-def sign_is_wrong(window: NDArray[np.float64]) -> bool:
-    """Return whether a window shows the wrong sign, as far as it shows a joint at all."""
-    j, b, _, torque_left, motion_left = fitted(window)
-    if not (j < 0.0 and b < 0.0):
-        return False
-    return torque_left < FIT_LEAVES and motion_left < INSTRUMENTS_LEAVE
+def keep_row(
+    window: NDArray[np.float64], rows: int, torque: Filtered, angle: Filtered, alone: Filtered
+) -> None:
+    """Write row number `rows` into the window, at its place in each half."""
+    w = FILTER_RAD_S
+    half = window.shape[0] // 2
+    row = window[rows % half]
+    _, _, twice, thrice, last = alone
+    row[0] = thrice - last
+    row[1] = w * (twice - 2.0 * thrice + last)
+    value, once, twice, thrice, last = angle
+    row[2] = w * w * w * (value - 4.0 * (once + thrice) + 6.0 * twice + last)
+    row[3] = w * w * (once - 3.0 * (twice - thrice) - last)
+    row[4] = w * (twice - 2.0 * thrice + last)
+    row[5] = thrice - last
+    row[6] = torque[3] - torque[4]
+    window[rows % half + half] = row
 
 
-def fitted(window: NDArray[np.float64]) -> tuple[float, float, float, float, float]:
-    """Return J, B, K and what fit and instruments leave of the mean squares of torque and a.
-
-    A row of the window is (z, x, M). Where a square is nothing, its share is NaN.
-    """
-    s = (window[:, :, None] * window[:, None, :]).sum(axis=0)
-    power, accelerated = s[6, 6], s[3, 3]
-    j, b, k = solved(
-        *(s[0, 3], s[0, 4], s[0, 5], s[1, 3], s[1, 4], s[1, 5], s[2, 3], s[2, 4], s[2, 5]),
-        *(s[0, 6], s[1, 6], s[2, 6]),
-    )
-    square = j * j * accelerated + b * b * s[4, 4] + k * k * s[5, 5]
-    square += 2.0 * (j * b * s[3, 4] + j * k * s[3, 5] + b * k * s[4, 5])
-    left = power - 2.0 * (j * s[3, 6] + b * s[4, 6] + k * s[5, 6]) + square
-    g1, g2, g3 = solved(
-        *(s[0, 0], s[0, 1], s[0, 2], s[1, 0], s[1, 1], s[1, 2], s[2, 0], s[2, 1], s[2, 2]),
-        *(s[0, 3], s[1, 3], s[2, 3]),
-    )
-    moved = accelerated - (g1 * s[0, 3] + g2 * s[1, 3] + g3 * s[2, 3])
-    return (
-        float(j),
-        float(b),
-        float(k),
-        float(left / power) if power > 0.0 else math.nan,
-        float(moved / accelerated) if accelerated > 0.0 else math.nan,
-    )
-
-
-def solved(
-    a: float,
-    b: float,
-    c: float,
-    d: float,
-    e: float,
-    f: float,
-    g: float,
-    h: float,
-    i: float,
-    p: float,
-    q: float,
-    r: float,
-) -> tuple[float, float, float]:
-    """Solve [[a b c] [d e f] [g h i]] x = (p, q, r) by Cramer's rule; zeros where none is."""
-    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-    if not abs(determinant) > 0.0:
-        return 0.0, 0.0, 0.0
-    x = p * (e * i - f * h) - b * (q * i - f * r) + c * (q * h - e * r)
-    y = a * (q * i - f * r) - p * (d * i - f * g) + c * (d * r - q * g)
-    z = a * (e * r - q * h) - b * (d * r - q * g) + p * (d * h - e * g)
-    return x / determinant, y / determinant, z / determinant
+def a_window_shows_the_wrong_sign(
+    limits: AnswerLimits, window: NDArray[np.float64], rows: int
+) -> bool:
+    """Return whether one of the windows that end with row number `rows` shows the wrong sign."""
+    half = window.shape[0] // 2
+    end = rows % half + half + 1
+    for which in range(len(ROWS)):
+        first = end - ROWS[which] - BEFORE
+        if rows >= ROWS[which] and sign_is_wrong(
+            window[first:end], limits.shows_inertia, limits.left[which]
+        ):
+            return True
+    return False

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rigidimeter.guard import AnswerLimits, Cause, ConsistencyLimits, consistency_limits
+from rigidimeter.guard import Cause, ConsistencyLimits, consistency_limits
 from rigidimeter.guard.agreement import MeansState, means_step
 from rigidimeter.guard.torque_answer import answer_state
 from rigidimeter.settings import parse_settings
@@ -14,7 +14,7 @@ LIMITS = ConsistencyLimits(0.001, old_memory_s=0.5)
 
 
 def state(**values):
-    return MeansState(answer_state(AnswerLimits()))._replace(**values)
+    return MeansState(answer_state())._replace(**values)
 
 
 def step(
@@ -112,3 +112,10 @@ def test_what_is_at_a_limit_is_allowed_and_what_is_above_is_not(law, cause):
     for at, expected in ((1.0, Cause.NONE), (1.001, cause)):
         limits, before = allowed(law, at)
         assert step(before, limits=limits, elapsed_s=0.0)[1] == expected
+
+
+def test_the_torque_answers_the_angle_of_its_own_time():
+    """Motion taken 10 ms before the torque, at 2 rad/s: the joint is 0.02 rad further."""
+    after, _ = means_step(LIMITS, state(), 0.0, 0.0, 0.5, 2.0, 0.0, 0.0, 0.0, STEP_S, 0.01)
+    assert after.angle_rad == 0.5
+    assert after.answer.angle[0] == pytest.approx(0.52)

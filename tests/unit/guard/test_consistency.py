@@ -91,7 +91,7 @@ def test_a_drive_at_rest_and_a_reading_that_is_no_number_show_nothing():
 
 @pytest.mark.parametrize("passed_s", [0.01, 0.04])
 def test_one_mean_after_another_is_what_the_equations_say(passed_s):
-    answer = answer_state(NOTHING.answer)
+    answer = answer_state()
     before = MeansState(answer, 0.2, 1.0, 0.0, 0.3, 0.1, 0.05, 0.06, 0.5)
     after, cause = means_step(NOTHING, before, 0, 0, 0.3, 2.0, passed_s, 0, 0, passed_s + 0.001)
     kept = 1.0 - passed_s / 0.05
@@ -181,8 +181,8 @@ def test_the_first_tick_is_a_mean_of_its_own_where_the_filters_begin():
     for k in range(9):
         state, _ = consistency_step(NOTHING, state, 1.0, 0.0, 1.0 + k, 0.1 * k, 1.0, 0.003, 0.0)
         if k == 0:
-            assert state.means.answer.torque == (1.0,) * 4
-            assert state.means.answer.angle == (0.0,) * 4
+            assert state.means.answer.torque == (1.0,) * 5
+            assert state.means.answer.angle == (0.003,) * 5  # 3 ms later, at the torque's time
             assert state.means.since_s == pytest.approx(0.003)
     assert (state.means.angle_rad, state.means.since_s) == pytest.approx((0.45, 0.0065))
     assert state.ticks == 0
@@ -205,7 +205,7 @@ def test_a_mean_is_of_the_ticks_with_readings_over_the_time_of_all():
     assert (state.means.angle_rad, state.means.velocity_rad_s) == pytest.approx((0.5 / 3, 1.0))
     # Read 1, 7 and 8 ms after the last mean, so 5.33 ms after it, 2.67 ms before its own end.
     assert state.means.since_s == pytest.approx(0.008 / 3)
-    assert state[3:] == (0,) * 5 + (0.0,) * 5
+    assert state[3:] == (0,) * 5 + (0.0,) * 6
 
 
 def test_no_reading_in_all_the_ticks_makes_no_mean():
@@ -303,6 +303,18 @@ def test_the_figures_of_the_laws_and_what_they_begin_with():
     state = consistency_state(NOTHING)
     assert state.still_s == 0.0
     assert math.isnan(state.held_rad)
-    assert state[3:] == (7, 0, 0, 0, 0) + (0.0,) * 5
+    assert state[3:] == (7, 0, 0, 0, 0) + (0.0,) * 6
     assert math.isnan(state.means.angle_rad)
     assert state.means[2:] == (0.0,) * 10
+
+
+def test_what_is_summed_of_the_ticks_is_how_long_before_the_torque_the_motion_was_taken():
+    """2 and 4 ms before it in turn: 3 ms, at 5 rad/s."""
+    state = consistency_state(NOTHING)
+    for k in range(9):
+        ages = 0.003 + 0.002 * (k % 2), 0.001
+        state, _ = consistency_step(NOTHING, state, 1.0, 0.0, 0.0, 0.2, 5.0, *ages)
+    # Of the first tick, and of the mean of eight.
+    assert state.means.answer.angle[0] == pytest.approx(0.2 + 5.0 * 0.003)
+    state, _ = consistency_step(NOTHING, state, 1.0, 0.0, 0.0, 0.2, 5.0, 0.003, math.inf)
+    assert (state.readings, state.before_s) == (0, 0.0)
