@@ -62,7 +62,9 @@ class CanWire:
             self._mouth.send(message)
 
     def seen(self) -> list[Seen]:
-        return [_frame(m) for m in iter(lambda: self._ear.recv(0.02), None)]
+        """Return what arrived so far. The bus keeps the order, and is never quiet."""
+        self.mark("seen")
+        return list(iter(lambda: _frame(self._ear.recv(1.0)), Seen("seen")))
 
     def close(self) -> None:
         self._open = False
