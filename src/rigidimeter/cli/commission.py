@@ -145,7 +145,8 @@ def claimed(
         present=not yes,
         **known,
     )
-    echo(str(prepare_loop_process()), err=True)
+    for line in str(prepare_loop_process()).splitlines():
+        echo(line, err=True)
     clock = DeadlineClock()
     with rigfile.claim() as lock, interrupted_once(record, again):
         rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, lock=lock)

@@ -85,10 +85,8 @@ def keep_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:
 
 def say(notices: Iterable[Notice]) -> None:
     """Print notices to the standard error, one sentence a line."""
-    from rigidimeter.documents.escaping import visible
-
     for notice in notices:
-        echo(f"{notice.level}: {visible(notice.text)}", err=True)
+        echo(f"{notice.level}: {notice.text}", err=True)
 
 
 def _say_failed(analysis: Analysis) -> bool:

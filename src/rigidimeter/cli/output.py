@@ -11,14 +11,15 @@ from typer.core import TyperGroup
 
 
 def echo(text: str = "", *, err: bool = False) -> None:
-    """Print lines to the standard output, or error; control characters are shown as escapes.
+    """Print lines to the standard output, or one message to the standard error.
 
-    Names of files, conditions and examiners come from other people's files: an ESC in one could
-    clear the screen or change what is read there.
+    Control characters are shown as escapes, in a message also line feeds. Names of files,
+    conditions and examiners come from other people's files: an ESC in one could clear the screen or
+    change what is read there, and a line feed would break a message in two.
     """
     from rigidimeter.documents.escaping import visible
 
-    typer.echo(visible(text, lines=True), err=err)
+    typer.echo(visible(text, lines=not err), err=err)
 
 
 class VisibleErrors(TyperGroup):

@@ -64,6 +64,8 @@ def run(
     commissioned (`rigidimeter commission`) and checked within a day (`rigidimeter check`). Fit
     mechanical stops and a hardware enable before you rely on this program.
 
+    The exit status is 1 if a planned epoch did not end with success, nor did its repetition.
+
     \b
     For example:
       rigidimeter run --out session
@@ -78,7 +80,7 @@ def run(
     from rigidimeter.commissioning import check_record, require_daily_check, with_measured_floor
     from rigidimeter.console import Terminal
     from rigidimeter.devices.rigfile import load_rig
-    from rigidimeter.recording.resume import count_epochs
+    from rigidimeter.recording.resume import count_epochs, require_all
 
     for line in complete_left():
         echo(line, err=True)
@@ -119,6 +121,7 @@ def run(
             f"{folder}: the session ended with {ended.outcome or 'no outcome'}: "
             f"{ended.reason}{again}"
         )
+    require_all(folder, good, of)
 
 
 def _planned(

@@ -45,6 +45,8 @@ def simulate(
     Uses the same loop, guard and recorder as on hardware, with a simulated drive, arm, subject and
     sensors. Without settings: four PRBS and four sinusoidal epochs in OFF.
 
+    The exit status is 1 if a planned epoch did not end with success, nor did its repetition.
+
     \b
     For example:
       rigidimeter simulate --out session
@@ -52,6 +54,7 @@ def simulate(
       rigidimeter simulate --out session --task prbs --condition DBS --epochs 12 --paper-rates
     """
     from rigidimeter.cli.progress import Meter
+    from rigidimeter.recording.resume import count_epochs, require_all
     from rigidimeter.settings import changed_settings, load_settings
     from rigidimeter.virtual.study_design import PAPER_RATES
     from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s
@@ -73,10 +76,8 @@ def simulate(
     chosen = changed_settings(chosen, changes, "the options")
     with Meter("simulate", session_length_s(chosen)) as meter:
         result = run_virtual_session(chosen, out, real_time=real_time, progress=meter.reach)
-    echo(f"{result.epochs_good} of {result.epochs_run} epochs ended with success; session in {out}")
-    if result.epochs_run and not result.epochs_good:
-        raise UserError(
-            f"{out}: no epoch ended with success; events.jsonl holds the reason of each"
-        )
+    good, of = count_epochs(out)
+    echo(f"{good} of {of} epochs ended with success; session in {out}")
     if result.outcome != "success":
         raise UserError(f"{out}: the session ended with {result.outcome}: {result.reason}")
+    require_all(out, good, of)

@@ -119,6 +119,21 @@ def count_epochs(folder: Path) -> tuple[int, int]:
     return good, len(read_manifest(folder)["protocol"])
 
 
+def require_all(folder: Path, good: int, planned: int) -> None:
+    """Refuse a session in which an epoch ended without success, as did its repetition.
+
+    Raises
+    ------
+    UserError
+        Says how many, and where the reasons are.
+    """
+    if good < planned:
+        raise UserError(
+            f"{folder}: {planned - good} of {planned} epochs did not end with success; "
+            "events.jsonl holds the reason of each"
+        )
+
+
 def _events(folder: Path, manifest: dict[str, Any]) -> list[dict[str, Any]]:
     """Return the events of a session that nobody is recording any more."""
     path = folder / EVENTS

@@ -234,14 +234,17 @@ def test_a_report_is_not_written_into_a_session(rigidimeter, simulate):
     assert sorted(folder.rglob("*")) == before
 
 
-def test_a_session_without_a_good_epoch_fails(rigidimeter, tmp_path):
+def test_a_session_in_which_an_epoch_failed_is_recorded_and_ends_with_1(rigidimeter, tmp_path):
+    """The perturbation moves the arm to the position limit, the imposed sinusoid does not."""
     (tmp_path / "tight.toml").write_text(
         "[guard]\nposition_limit_deg = 6.0\n[sinusoid]\namplitude_deg = 5.0\n"
-        '[protocol]\nrests_s = [1.0]\nreturn_s = 1.0\nblocks = [{task = "prbs", epochs = 1}]\n'
+        "[protocol]\nrests_s = [1.0]\nreturn_s = 1.0\n"
+        'blocks = [{task = "prbs", epochs = 1}, {task = "sinusoid", epochs = 1}]\n'
     )
     ran = rigidimeter("simulate", "--settings", tmp_path / "tight.toml", "--out", tmp_path / "s")
     assert ran.status == 1
-    assert "no epoch ended with success" in ran.err
+    assert "1 of 2 epochs ended with success" in ran.out
+    assert "1 of 2 epochs did not end with success; events.jsonl holds the reason" in ran.err
 
 
 def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(rigidimeter, tmp_path):

@@ -47,6 +47,12 @@ def test_a_refusal_shows_a_name_without_commands(rigidimeter, tmp_path):
     assert "\\x1b[2Ja.csv: there is no such file" in ran.err
 
 
+def test_a_message_stays_one_line(rigidimeter, tmp_path):
+    ran = rigidimeter("estimate", tmp_path / "a\nwarning: b.csv")
+    assert ran.err.count("\n") == 1
+    assert "a\\nwarning: b.csv: there is no such file" in ran.err
+
+
 @pytest.mark.parametrize(
     "given",
     [

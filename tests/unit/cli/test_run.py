@@ -94,6 +94,28 @@ def test_a_session_that_began_nowhere_leaves_the_home_to_the_rig_file(seen, resu
     assert "origin_rad" not in seen.continues
 
 
+@pytest.mark.parametrize(("outcome", "status"), [("success", 0), ("fail", 1)])
+def test_a_run_ends_with_1_where_a_planned_epoch_has_no_success(
+    tmp_path, monkeypatch, rigidimeter, outcome, status
+):
+    """The second epoch ended like this; the session as a whole went to its end."""
+    settings = parse_settings({})
+    planned = plan(settings.protocol, settings.prbs, settings.sinusoid, 1).epochs[:2]
+    writer = SessionWriter(tmp_path / "s", settings, list(map(asdict, planned)), {}, virtual=True)
+    for epoch, ending in zip(planned, ("success", outcome), strict=True):
+        ended = {"time_s": 1.0, "outcome": ending, "reason": ""}
+        writer.event("epoch_ended", epoch=epoch.number, **ended)
+    writer.close(1.0, "success", "")
+    result = SimpleNamespace(folder=tmp_path / "s", outcome="success", reason="", remarks=())
+    monkeypatch.setattr(
+        "rigidimeter.acquisition.processes.supervise.supervise", lambda *_, **__: result
+    )
+    ran = rigidimeter("run", "--out", tmp_path / "new", "--unattended")
+    assert ran.status == status
+    assert f"{2 - status} of 2 epochs ended with success" in ran.out
+    assert ("1 of 2 epochs did not end with success" in ran.err) == (status == 1)
+
+
 def test_a_rig_without_a_record_is_refused_before_any_process_starts(
     tmp_path, monkeypatch, rigidimeter
 ):
