@@ -17,7 +17,8 @@ from rigidimeter.estimation.terms import TERMS
 
 ROOT = Path(__file__).parents[3]
 HOW_TO = ROOT / "docs" / "how-to" / "add-an-estimator.md"
-ESTIMATOR, CHECK, TERM = re.findall(r"```python\n(.*?)```", HOW_TO.read_text("utf-8"), re.S)
+EXAMPLES = re.findall(r"```python\n(.*?)```", HOW_TO.read_text("utf-8"), re.S)
+ESTIMATOR, CHECK, HARMLESS, TERM = EXAMPLES
 
 
 @pytest.fixture(autouse=True)
@@ -89,6 +90,23 @@ def test_a_check_is_one_entry(rigidimeter, recording, tmp_path):
     assert found["level"] == "doubt"
     assert found["text"].endswith("the sensor may have been at the end of its range")
     assert "Remedy: use a smaller perturbation" in " ".join(ran.out.split())
+
+
+@pytest.mark.parametrize(("where", "level"), [("if case", "doubt"), ("if not case", "note")])
+def test_a_check_may_say_where_its_failure_is_harmless(
+    rigidimeter, recording, tmp_path, where, level
+):
+    """The recording has no perturbation, so that only the second of the two says a reason."""
+    check = CHECK.replace("9.0", "0.001").replace(
+        "meaning=", "harmless=harmless,\n        meaning="
+    )
+    (tmp_path / "near_range.py").write_text(HARMLESS.replace("if case", where) + check)
+    out = tmp_path / "e.json"
+    ran = rigidimeter("--load", tmp_path / "near_range.py", "estimate", recording, "--json", out)
+    assert ran.status == 0, ran.err
+    (epoch,) = json.loads(out.read_text())["epochs"]
+    (found,) = (found for found in epoch["findings"] if found["name"] == "near_range")
+    assert found["level"] == level
 
 
 def test_a_term_of_the_torque_is_one_entry(rigidimeter, recording, tmp_path):
