@@ -24,7 +24,7 @@ demo: install
 
 test: install
 	$(BIN)/python -m pytest -n auto --dist loadfile -m 'not slow and not realtime'
-	$(BIN)/python -m pytest -n 2 -m 'not slow and realtime'
+	$(BIN)/python -m pytest -n 3 -m 'not slow and realtime' tests/faults tests/wire tests/unit/acquisition
 
 check: install
 	$(BIN)/ruff format --check .

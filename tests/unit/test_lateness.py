@@ -1,11 +1,14 @@
 """The probe beside the tests by the clock: it sees a machine that stands still, and says so."""
 
 import os
+import re
 import signal
 import time
+from pathlib import Path
 
 import pytest
 from tests import lateness
+from tests.conftest import REALTIME
 from tests.lateness import ATTEMPTS, LatenessProbe
 
 
@@ -75,3 +78,17 @@ def test_a_machine_that_stood_still_is_no_judge(pytester, monkeypatch, body, sti
     ran.assert_outcomes(**{outcome: 1})
     assert (pytester.path / "ran").read_text() == "x" * runs
     assert ("too busy to judge" in ran.stdout.str()) == (runs == ATTEMPTS)
+
+
+def test_make_test_looks_for_tests_in_real_time_wherever_there_are_some():
+    root = Path(__file__).parents[2]
+    (folders,) = re.findall(r"'not slow and realtime' (.*)", (root / "Makefile").read_text("utf-8"))
+    marked = [
+        path.relative_to(root).as_posix()
+        for path in (root / "tests").rglob("test_*.py")
+        if re.search("^@pytest.mark.realtime", path.read_text("utf-8"), re.MULTILINE)
+    ]
+    assert marked
+    assert [
+        each for each in (*marked, *REALTIME) if not each.startswith(tuple(folders.split()))
+    ] == []
