@@ -130,7 +130,8 @@ class LatenessProbe:
         worst_s = 0.0
         for start in self._starts:
             (count,) = struct.unpack_from("q", self._view, start)
-            worst_s = max(worst_s, time.monotonic() - self._due_s(start))  # it may be late just now
+            due_s = max(self._due_s(start), since_s)
+            worst_s = max(worst_s, time.monotonic() - due_s)  # it may be late just now
             rows = self._view[start + 16 : start + 16 + 16 * min(count, ROWS)]
             for due_s, woken_s in struct.iter_unpack("dd", rows):
                 if woken_s > since_s:
