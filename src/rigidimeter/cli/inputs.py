@@ -19,7 +19,15 @@ if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Notice, Score
     from rigidimeter.study import StudyResult
 
-_OF_RECORDINGS = ("column", "rate_hz", "reaction", "epoch_length_s", "condition", "task")
+_OF_RECORDINGS = (
+    "column",
+    "rate_hz",
+    "reaction",
+    "epoch_length_s",
+    "condition",
+    "task",
+    "leave_out",
+)
 """Options that say how to read a single recording."""
 
 

@@ -152,6 +152,15 @@ class Recordings:
             help="Fit J, B and K (prbs) or score (sinusoid). Default: found from the motion.",
         ),
     ] = None
+    leave_out: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--leave-out",
+            metavar='"[NAME=]START:STOP REASON"',
+            help="Seconds on the recording's clock that no estimate uses, for example "
+            '"12.3:14.0 cough"; NAME is a recording, where there are several. Repeat as needed.',
+        ),
+    ] = None
     band_hz: Annotated[
         tuple[float, float] | None,
         typer.Option(
@@ -192,6 +201,7 @@ class Recordings:
             epoch_length_s=self.epoch_length_s,
             condition=self.condition,
             task=cast("Task | None", self.task),
+            leave_out=self.leave_out or (),
             settings=self.settings,
         )
         return replace(recording, settings=self.adjust(recording.settings))

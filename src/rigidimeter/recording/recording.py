@@ -11,6 +11,7 @@ from typing import Any
 from rigidimeter.documents import noted_digests
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import ReadOptions, read_recording, reader_of
+from rigidimeter.recording.leave_out import with_left_out
 from rigidimeter.records import Epoch, Notice, Task
 from rigidimeter.settings import Settings, load_settings, settings_from
 
@@ -57,6 +58,7 @@ def read(
     epoch_length_s: float | None = None,
     condition: str | Sequence[str] | None = None,
     task: Task | None = None,
+    leave_out: Sequence[str] = (),
     settings: Settings | str | Path | Mapping[str, Any] | None = None,
 ) -> Recording:
     """Read session folders and files into one recording.
@@ -79,6 +81,9 @@ def read(
         Condition of files without a condition column: one for all, or one for each path.
     task : {"prbs", "sinusoid"}, optional
         Task of files without a task column.
+    leave_out : sequence of str
+        What no estimate uses: ``START:STOP REASON``, in s on the recording's clock, with ``NAME=``
+        before it where there are several recordings. The reason may be left away.
     settings : Settings, path or mapping, optional
         Settings for the analysis, or a TOML file of them. Default: those with which the first
         session folder was recorded, else the built-in ones.
@@ -118,6 +123,8 @@ def read(
         notices += remarks
     if not epochs:
         raise UserError(" / ".join(n.text for n in notices) or "no epoch was found")
+    epochs, remarks = with_left_out(epochs, leave_out)
+    notices += remarks
     return Recording(
         tuple(epochs),
         tuple(notices),
