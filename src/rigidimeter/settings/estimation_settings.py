@@ -84,6 +84,7 @@ class DiagnosticLevels(Section):
     coherence: Level = "doubt"
     band_share: Level = "doubt"
     imposed_sinusoid: Level = "exclude"
+    computed_torque: Level = "exclude"
     static_torque: Level = "exclude"
     residual_whiteness: Level = "note"
     residual_perturbation: Level = "doubt"
@@ -106,6 +107,7 @@ class DiagnosticLevels(Section):
     left_out: Level = "note"
     velocity_scale: Level = "exclude"
     velocity_delay: Level = "doubt"
+    velocity_shape: Level = "doubt"
     guard_limited: Level = "doubt"
     position_limit: Level = "doubt"
     negative_parameters: Level = "doubt"
@@ -125,6 +127,7 @@ class DiagnosticsSettings(Section):
     coherence_least: float = quantity(0.5, "1", 0.0, 1.0)
     band_share_least_percent: float = quantity(50.0, "%", 0.0, 100.0)
     single_frequency_most_percent: float = quantity(85.0, "%", 1.0, 100.0)
+    computed_torque_least_percent: float = quantity(1e-3, "%", 0.0, 100.0)
     static_torque_least_percent: float = quantity(0.5, "%", 0.0, 100.0)
     residual_flatness_least: float = quantity(0.7, "1", 0.0, 1.0)
     residual_perturbation_most_percent: float = quantity(10.0, "%", 0.0, 100.0)
@@ -152,6 +155,7 @@ class DiagnosticsSettings(Section):
     left_out_most_percent: float = quantity(50.0, "%", 0.0, 100.0)
     velocity_scale_most_percent: float = quantity(10.0, "%", 0.1, 1000.0)
     velocity_delay_most_ms: float = quantity(5.0, "ms", 0.01, 1000.0)
+    velocity_shape_most_percent: float = quantity(5.0, "%", 0.0, 1000.0)
     limited_most_percent: float = quantity(1.0, "%", 0.0, 100.0)
     position_most_percent: float = quantity(98.0, "%", 1.0, 100.0)
     inertia_least_kg_m2: float = quantity(1e-5, "kg·m²", 0.0, 10.0)

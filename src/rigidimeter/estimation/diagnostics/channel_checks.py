@@ -1,18 +1,9 @@
-"""Whether the sensors measured, belong together, and the arm had room.
+"""Whether the sensors measured, and the arm had room.
 
 Where a sensor hung or was at the end of its range (`estimation.bad_stretches`), that stretch is
 left out and the check notes it; where too little would be left, the check speaks of the whole
 epoch. A joint at the position limit, or a command that the guard changed, is not the perturbation
 as designed.
-
-The velocity belongs to the angle in scale and in time. Over any stretch of length T, a velocity
-that is g times too small and stamped τ too late obeys
-
-    θ(t + T) − θ(t) = g ∫ v dt + τ (v(t + T) − v(t))
-
-to the first order in τ, with the integral over the stretch. Both follow from one least-squares fit
-over many stretches. Degrees for radians give g = 57.3 or 0.0175, a wrong sign gives g = −1; a
-velocity that a filter made late gives τ.
 """
 
 from __future__ import annotations
@@ -25,8 +16,7 @@ from numpy.typing import ArrayLike
 
 from rigidimeter.estimation.bad_stretches import FITTED, longest_repetition, share_at_extremes
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_most
-from rigidimeter.estimation.signals import Array
-from rigidimeter.estimation.stretches import left_out_s, sound
+from rigidimeter.estimation.stretches import left_out_s
 from rigidimeter.records import Channel, Epoch, LeftOut
 from rigidimeter.settings import DiagnosticsSettings
 
@@ -150,75 +140,10 @@ def _fitted(epoch: Epoch) -> list[Channel]:
     return [epoch.channels[name] for name in FITTED if name in epoch.channels]
 
 
-STRETCH_S = 0.25
-
-
-def velocity_fit(epoch: Epoch) -> tuple[float, float]:
-    """Return the scale g and the delay τ in s of the velocity against the angle.
-
-    NaN where the epoch does not move or is too short.
-    """
-    angle, velocity = epoch.channels["angle_rad"], epoch.channels["velocity_rad_s"]
-    low = max(angle.time_s[0], velocity.time_s[0])
-    high = min(angle.time_s[-1], velocity.time_s[-1])
-    starts = angle.time_s[(angle.time_s >= low) & (angle.time_s <= high - STRETCH_S)]
-    # Neither a stretch that is left out nor one that reaches into it.
-    starts = starts[sound(epoch, starts, STRETCH_S)]
-    if starts.size < 3:
-        return np.nan, np.nan
-    time_s, values = velocity.time_s, velocity.values
-    areas = 0.5 * (values[1:] + values[:-1]) * np.diff(time_s)
-    travelled = np.concatenate(([0.0], np.cumsum(areas)))
-
-    def over(of_s: Array, signal: Array) -> Array:
-        after = np.interp(starts + STRETCH_S, of_s, signal)
-        return np.asarray(after - np.interp(starts, of_s, signal), dtype=np.float64)
-
-    regressors = np.column_stack([over(time_s, travelled), over(time_s, values)])
-    scales = np.linalg.norm(regressors, axis=0)
-    if not scales.all():
-        return np.nan, np.nan
-    solution = np.linalg.lstsq(regressors / scales, over(angle.time_s, angle.values))[0] / scales
-    return float(solution[0]), float(solution[1])
-
-
-def velocity_scale(fitted: tuple[float, float], settings: DiagnosticsSettings) -> Look:
-    """Return by how much the velocity's scale is off, in %."""
-    value, most = 100.0 * abs(fitted[0] - 1.0), settings.velocity_scale_most_percent
-    return at_most(
-        value,
-        most,
-        (
-            f"angle_rad changes {fitted[0]:.3g} times as much as velocity_rad_s says (within "
-            f"{most:g} % of 1)"
-        ),
-    )
-
-
-def velocity_delay(fitted: tuple[float, float], settings: DiagnosticsSettings) -> Look:
-    """Return how late the velocity is against the angle, in ms; negative where it is early."""
-    scale, delay_s = fitted
-    value, most = 1e3 * delay_s / scale, settings.velocity_delay_most_ms
-    return Look(
-        value,
-        most,
-        not abs(value) <= most,
-        f"velocity_rad_s lags angle_rad by {value:.2g} ms (at most {most:g} ms)",
-    )
-
-
 def _position_limit(case: Case) -> Look | None:
     if case.position_limit_rad is None:
         return None
     return position_limit(case.epoch.channels["angle_rad"], case.position_limit_rad, case.settings)
-
-
-def _velocity(
-    case: Case, check: Callable[[tuple[float, float], DiagnosticsSettings], Look]
-) -> Look | None:
-    fitted = velocity_fit(case.epoch)
-    # What does not move is found by other checks.
-    return check(fitted, case.settings) if np.isfinite(fitted).all() else None
 
 
 CHANNEL_CHECKS = (
@@ -246,22 +171,6 @@ CHANNEL_CHECKS = (
         lambda c: left_out(c.epoch),
         "",
         "see whether the estimate changes when it is used",
-        of_fit=False,
-    ),
-    Check(
-        "velocity_scale",
-        ("angle_rad", "velocity_rad_s"),
-        lambda c: _velocity(c, velocity_scale),
-        "one of them is in another unit, has another sign, or is another joint's",
-        "check the units and signs of both channels",
-        of_fit=False,
-    ),
-    Check(
-        "velocity_delay",
-        ("angle_rad", "velocity_rad_s"),
-        lambda c: _velocity(c, velocity_delay),
-        "a filter or a buffer moved one of them, and B and K take each other's part",
-        "correct the stamps, or leave velocity_rad_s out: it is made from the angle then",
         of_fit=False,
     ),
     Check(

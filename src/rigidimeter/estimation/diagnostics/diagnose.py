@@ -15,6 +15,7 @@ from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.estimation.diagnostics.missing_term import MISSING_TERM_CHECKS
+from rigidimeter.estimation.diagnostics.motion_checks import MOTION_CHECKS
 from rigidimeter.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
 from rigidimeter.estimation.diagnostics.torque_checks import TORQUE_CHECKS
 from rigidimeter.estimation.diagnostics.tremor_check import TREMOR_CHECKS
@@ -27,6 +28,7 @@ from rigidimeter.units import rad_from_deg
 
 CHECKS: list[Check] = [
     *CHANNEL_CHECKS,
+    *MOTION_CHECKS,
     *EXCITATION_CHECKS,
     *TORQUE_CHECKS,
     *RESIDUAL_CHECKS,

@@ -9,19 +9,32 @@ next,
 
 is 1 for a torque that has nothing to do with the angle (von Neumann 1941), and 0 for a function of
 it. What inertia and damping add to the torque of a joint is in this share.
+
+A torque that somebody computed from the recorded motion, with whatever differences for velocity and
+acceleration, or from the perturbation, is a weighted sum of samples of these from two before to two
+after, to the digits that it was written with. A sensor's noise is not.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_least
-from rigidimeter.estimation.signals import Array, Signals
+from rigidimeter.estimation.diagnostics.excitation_checks import perturbation_nm
+from rigidimeter.estimation.signals import Array, Signals, motion_channels, spline
+from rigidimeter.estimation.stretches import sound
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings
+
+REACH = 2
+"""Samples to each side: as far as a second difference of central differences reaches."""
+
+ROWS, FEWEST_ROWS = 4000, 100
+"""So many rows show whether a sum is exact; fewer than the second say nothing."""
 
 
 def static_torque(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Look:
@@ -49,11 +62,75 @@ def _at(channel: Channel, time_s: Array) -> Array:
     return np.interp(time_s, channel.time_s, channel.values)
 
 
+def computed_torque(epoch: Epoch, settings: DiagnosticsSettings) -> Look | None:
+    """Return how much of the torque is no sum of samples of the motion or of the perturbation.
+
+    In % of the torque's standard deviation, the smaller of the two. None for a simulation, whose
+    sensors may be free of noise.
+    """
+    if epoch.virtual:
+        return None
+    shares = {
+        "the motion": _not_a_sum(epoch, motion_channels(epoch)),
+        "the perturbation": _not_a_sum(
+            epoch, [c for name, c in epoch.channels.items() if name == "perturbation_nm"]
+        ),
+    }
+    origin = min(shares, key=lambda name: shares[name])
+    value, least = 100.0 * shares[origin], settings.computed_torque_least_percent
+    if not math.isfinite(value):
+        return None
+    return at_least(
+        value,
+        least,
+        f"{value:.2g} % of the torque's SD is not a sum of samples of {origin} (at least "
+        f"{least:g} %)",
+        f"the torque was computed from {origin}, or simulated without noise",
+    )
+
+
+def _not_a_sum(epoch: Epoch, channels: Sequence[Channel]) -> float:
+    """Return the share of the torque's SD that samples of the channels nearby do not give."""
+    torque = epoch.channels["torque_nm"]
+    channels = [c for c in channels if len(c) > 1 and float(np.ptp(c.values)) > 0]
+    if not channels:
+        return math.inf
+    at = np.arange(REACH, len(torque) - REACH)
+    start_s = max(float(channel.time_s[0]) for channel in channels)
+    stop_s = min(float(channel.time_s[-1]) for channel in channels)
+    at = at[(torque.time_s[at - REACH] >= start_s) & (torque.time_s[at + REACH] <= stop_s)]
+    at = at[sound(epoch, torque.time_s[at], 0.1)]
+    at = at[:: max(at.size // ROWS, 1)]
+    if at.size < FEWEST_ROWS:
+        return math.inf
+    columns = [np.ones(at.size)]
+    for channel in channels:
+        held = channel.name == "perturbation_nm"
+        values = perturbation_nm(channel, torque.time_s) if held else spline(channel)(torque.time_s)
+        columns += [values[at + lag] for lag in range(-REACH, REACH + 1)]
+    regressors = np.column_stack(columns)
+    lengths = np.linalg.norm(regressors, axis=0)
+    regressors = regressors / np.where(lengths > 0, lengths, 1.0)
+    target = torque.values[at] - np.mean(torque.values[at])
+    left = target - regressors @ np.linalg.lstsq(regressors, target, rcond=None)[0]
+    sd = float(np.std(target))
+    return float(np.sqrt(np.mean(left**2))) / sd if sd > 0 else math.inf
+
+
 def _static_torque(case: Case) -> Look:
     return static_torque(case.epoch, case.signals, case.settings)
 
 
 TORQUE_CHECKS = (
+    Check(
+        "computed_torque",
+        (),
+        lambda c: computed_torque(c.epoch, c.settings),
+        "the torque was not measured",
+        "record what the torque sensor measured; for a simulation set "
+        '[diagnostics.levels] computed_torque = "note"',
+        of_fit=False,
+    ),
     Check(
         "static_torque",
         ("angle_rad",),

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.estimation.diagnostics.channel_checks import (
+from rigidimeter.estimation.diagnostics.motion_checks import (
     velocity_delay,
     velocity_fit,
     velocity_scale,
+    velocity_shape,
 )
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings
@@ -57,3 +58,42 @@ def test_a_delay_is_found_and_doubted(delay_s):
 def test_what_does_not_move_says_nothing_of_scale():
     still = [Channel(n, TIME_S, np.zeros(TIME_S.size)) for n in ("angle_rad", "velocity_rad_s")]
     assert np.isnan(velocity_fit(Epoch("made", "1", {c.name: c for c in still}))).all()
+
+
+def joint(worse=None, share=0.15):
+    """A joint's torque, angle and velocity, and in one of them a ripple of this share."""
+    rng = np.random.default_rng(3)
+    made = epoch()
+    angle, velocity = (made.channels[n].values for n in ("angle_rad", "velocity_rad_s"))
+    acceleration = np.gradient(velocity, TIME_S)
+    torque = 0.005 * acceleration + 0.14 * velocity + 1.8 * angle
+    w = 2 * math.pi * np.array([2.3, 4.7, 8.1])
+    phase = np.outer(TIME_S, w)
+    size = share * np.std(velocity) / math.sqrt(1.5)
+    if worse == "velocity_rad_s":
+        velocity = velocity + size * np.sin(phase).sum(axis=1)
+    if worse == "angle_rad":
+        angle = angle - (size * np.cos(phase) / w).sum(axis=1)
+    values = {
+        "torque_nm": torque + 1e-3 * rng.standard_normal(TIME_S.size),
+        "angle_rad": angle,
+        "velocity_rad_s": velocity,
+    }
+    return Epoch("made", "1", {name: Channel(name, TIME_S, x) for name, x in values.items()})
+
+
+@pytest.mark.parametrize(
+    ("worse", "said"),
+    [("velocity_rad_s", "so the velocity is wrong"), ("angle_rad", "so the angle is wrong")],
+)
+def test_a_ripple_in_one_of_them_is_found_and_the_torque_says_in_which(worse, said):
+    look = velocity_shape(joint(worse), (0.15, 50.0), SETTINGS)
+    assert look.failed
+    assert look.value == pytest.approx(15.0, rel=0.1)
+    assert said in look.meaning
+    assert f"leave {worse} out" in look.remedy
+
+
+def test_scale_delay_and_noise_are_no_other_shape():
+    for of in (joint(), epoch(scale=1.2), epoch(delay_s=0.005), epoch(noise=0.02)):
+        assert velocity_shape(of, (0.15, 50.0), SETTINGS).value < 3.0
