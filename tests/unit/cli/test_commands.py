@@ -184,10 +184,12 @@ def test_two_files_of_one_condition_each_are_compared(rigidimeter, tmp_path):
     f = np.arange(0.2, 8.0, 0.35)
     w = 2 * np.pi * f
     A = 0.03 / (1 + f)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(t.size)  # else it was not measured
     for name, stiffness in (("before", 2.0), ("after", 1.0)):
         x = A @ np.sin(np.outer(w, t) + (f * 7)[:, None])
         v = (A * w) @ np.cos(np.outer(w, t) + (f * 7)[:, None])
-        rows = zip(t, x, v, stiffness * x + 0.1 * v, strict=True)
+        a = -(A * w**2) @ np.sin(np.outer(w, t) + (f * 7)[:, None])
+        rows = zip(t, x, v, stiffness * x + 0.1 * v + 0.005 * a + noise, strict=True)
         text = "".join(",".join(map(repr, map(float, row))) + "\n" for row in rows)
         (tmp_path / f"{name}.csv").write_text("time_s,angle_rad,velocity_rad_s,torque_nm\n" + text)
     files = (tmp_path / "before.csv", tmp_path / "after.csv")
