@@ -170,7 +170,7 @@ CHANNEL_CHECKS = (
         (),
         lambda c: left_out(c.epoch),
         "",
-        "see whether the estimate changes when it is used",
+        "see whether the estimate changes with them",
         of_fit=False,
     ),
     Check(

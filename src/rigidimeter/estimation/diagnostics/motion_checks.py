@@ -145,11 +145,11 @@ def _better(epoch: Epoch, band_hz: tuple[float, float]) -> tuple[str, str]:
         )
     if by_angle > by_velocity:
         return (
-            f"{both}, so the velocity is wrong, and J and B with it",
+            f"{both}, so the velocity is wrong, and J and B are made from it",
             "leave velocity_rad_s out: it is made from the angle then",
         )
     return (
-        f"{both}, so the angle is wrong, and K with it",
+        f"{both}, so the angle is wrong, and K is made from it",
         "leave angle_rad out: it is made from the velocity then",
     )
 
