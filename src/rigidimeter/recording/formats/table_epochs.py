@@ -44,20 +44,11 @@ from rigidimeter.recording.formats.gaps import (
     kept_rows,
     make_signal,
 )
+from rigidimeter.recording.formats.plausible_units import about_units
 from rigidimeter.recording.formats.table import Table, nearest
 from rigidimeter.records import CHANNEL_UNITS, Channel, Epoch, Notice, Task
 
 _FEWEST = 2
-_DEGREES = "degrees: divide by 57.2958 to have rad"
-_PLAUSIBLE: Mapping[str, tuple[float, str]] = {
-    "angle_rad": (2 * math.pi, _DEGREES),
-    "velocity_rad_s": (50.0, f"{_DEGREES}/s"),
-    "velocity_command_rad_s": (50.0, f"{_DEGREES}/s"),
-    "emg_v": (20.0, "microvolts: divide by 1e6 to have V"),
-}
-"""The largest plausible value of a channel, and what a larger one looks like. Amplifiers of EMG
-give at most ±10 V or so."""
-_LARGEST_STEP_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -125,7 +116,7 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
     clock = Rows.of(time_stamps(table, names.get("time_s"), options.rate_hz, n_rows))
     _check_rate(table.source, names.get("time_s"), clock)
     signals, notices = _signals(table, names, clock, options.reaction)
-    notices += _about_units(table.source, signals, clock.step_s)
+    notices += about_units(table.source, signals, clock.step_s)
     labels = {name: _label_column(table, names[name], n_rows) for name in LABELS if name in names}
     stretches, more = _stretches(table, clock, labels.get("epoch"), options.epoch_length_s)
     notices += more
@@ -325,21 +316,3 @@ def _pieces(
 
 def _spoken(standard: str, name: str) -> str:
     return standard if standard == name else f"{standard} (column {name})"
-
-
-def _about_units(source: str, signals: Mapping[str, Signal], step_s: float) -> list[Notice]:
-    """Warn of values that only make sense in degrees, in microvolts, or in milliseconds."""
-    notices = []
-    for name in (name for name in signals if name in _PLAUSIBLE):
-        limit, right = _PLAUSIBLE[name]
-        largest = float(np.max(np.abs(signals[name].values)))
-        if largest > limit:
-            text = f"{source}: {name} reaches {largest:.4g}, which looks like {right}"
-            notices.append(Notice("warning", text))
-    if step_s > _LARGEST_STEP_S:
-        text = (
-            f"{source}: the rows are {seconds(step_s)} apart, which looks like milliseconds: "
-            "divide by 1000 to have s"
-        )
-        notices.append(Notice("warning", text))
-    return notices
