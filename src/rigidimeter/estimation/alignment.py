@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigidimeter.estimation.closedloop.delay import SCAN_STEP_S, estimate_delay
+from rigidimeter.estimation.closedloop.delay_or_term import CLEAR, likeliest_term
 from rigidimeter.estimation.closedloop.linear_problems import (
     direct,
     instrumental,
@@ -25,6 +26,7 @@ from rigidimeter.estimation.closedloop.observation import (
 )
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, torque_earlier
+from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Delay, Epoch
 
 MOST_EPOCHS = 12
@@ -96,7 +98,7 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
     estimation = used[0].settings.estimation
     longest_s = estimation.longest_delay_s
     try:
-        total_s, error_s = _settled(used, perturbed=bool(known))
+        total_s, error_s, values = _settled(used, perturbed=bool(known))
         if not np.isfinite(total_s) or abs(total_s) > longest_s - SCAN_STEP_S / 2:
             return Delay(
                 source,
@@ -112,7 +114,7 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
             )
         if abs(total_s) < max(SIGNIFICANT * error_s, LEAST_S):
             return replace(found, remark="not corrected: not significantly different from zero")
-        half_s, half_error_s = _settled([_in_half_the_band(one) for one in used], perturbed=True)
+        half_s, half_error_s, _ = _settled([_in_half_the_band(one) for one in used], perturbed=True)
     except ValueError as error:
         return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
     apart_s, allowed_s = abs(half_s - total_s), SIGNIFICANT * np.hypot(error_s, half_error_s)
@@ -122,13 +124,23 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
             remark=f"not corrected: in the lower half of the band it is {1e3 * half_s:.3g} ms; a "
             "delay is the same at all frequencies, a soft cuff between drive and joint is not",
         )
+    moved = [one.moved(total_s) for one in used]
+    rival = likeliest_term(used, moved, values)
+    if rival.better_by > -CLEAR:
+        than = "explains it better" if rival.better_by > CLEAR else "explains it as well"
+        return replace(
+            found,
+            remark=f"not corrected: {rival.name} {than}, by {rival.better_by:.2g} standard "
+            "deviations of what both leave of lines that were not fitted; `rigidimeter model "
+            "--compare` fits such terms",
+        )
     if not estimation.correct_delay:
         return replace(found, remark="not corrected: estimation.correct_delay is false")
     return replace(found, corrected=True)
 
 
-def _settled(epochs: Sequence[PreparedEpoch], *, perturbed: bool) -> tuple[float, float]:
-    """Return the delay at which none is left, and its standard error, in s.
+def _settled(epochs: Sequence[PreparedEpoch], *, perturbed: bool) -> tuple[float, float, Array]:
+    """Return the delay at which none is left, its standard error, in s, and J, B and K with it.
 
     The zero of what is left is sought by secants: between coarse samples moving the torque by what
     is left takes only part of it away. Where the perturbation is not known, least squares gives a
@@ -155,7 +167,12 @@ def _settled(epochs: Sequence[PreparedEpoch], *, perturbed: bool) -> tuple[float
         total_s += step_s
         if abs(left_s) < SETTLED_S or abs(total_s) > longest_s:
             break
-    return total_s, error_s
+    if perturbed and abs(total_s) <= longest_s and abs(left_s) > max(error_s, LEAST_S):
+        raise ValueError(
+            f"it did not settle in {ROUNDS} rounds: {1e3 * left_s:.2g} ms are left at "
+            f"{1e3 * total_s:.3g} ms"
+        )
+    return total_s, error_s, fit.values[:-1]
 
 
 def _in_half_the_band(prepared: PreparedEpoch) -> PreparedEpoch:

@@ -90,18 +90,25 @@ class Excitation:
         J, B, K = parameters
         return np.asarray(1 + (J * self.gain[0] + B * self.gain[1] + K * self.gain[2]))
 
+    def windowed_motion(self, parameters: Parameters) -> Array:
+        """Return the motion that the perturbation causes, times the window, shape (3, n)."""
+        return self._windowed(self.motion * (self.command / self._around(parameters)))
+
     def _lines(self, spectra: Complex) -> Complex:
         """Return the lines of signals whose spectra on the damped circle are given."""
+        windowed = self._windowed(spectra)
+        lines = fft.rfft(windowed, axis=1)[:, self.grid.line]
+        mean = np.add.reduce(windowed * self.grid.window, axis=1) / self.grid.energy
+        return np.asarray((lines - mean[:, None] * self.grid.window_lines).T)
+
+    def _windowed(self, spectra: Complex) -> Array:
         # The inverse FFT gives only the samples that are wanted, where their number allows it.
         folds = self.stride if self.stride % 2 == 0 and self.size % (2 * self.stride) == 0 else 1
         signals = fft.irfft(_folded(spectra, folds), self.size // folds, axis=1)
         if self.ticks_s is not None and self.raising is not None:
             raised = signals[:, : self.raising.size] * self.raising
             signals = CubicSpline(self.ticks_s, raised, axis=1)(self.grid.time_s)
-        windowed = signals[:, :: self.stride // folds][:, : self.weight.size] * self.weight
-        lines = fft.rfft(windowed, axis=1)[:, self.grid.line]
-        mean = np.add.reduce(windowed * self.grid.window, axis=1) / self.grid.energy
-        return np.asarray((lines - mean[:, None] * self.grid.window_lines).T)
+        return np.asarray(signals[:, :: self.stride // folds][:, : self.weight.size] * self.weight)
 
 
 def excitation(perturbation: Channel, loop: Loop, grid: Grid) -> Excitation:

@@ -43,6 +43,25 @@ def test_no_delay_changes_nothing(simulated):
     assert aligned(epochs[0], [found]) is epochs[0]
 
 
+def rubbing(epoch, friction_nm):
+    """Add friction of the joint to the recorded torque."""
+    torque, velocity = (epoch.channels[name] for name in ("torque_nm", "velocity_rad_s"))
+    there = np.interp(torque.time_s, velocity.time_s, velocity.values)
+    more = Channel("torque_nm", torque.time_s, torque.values + friction_nm * np.sign(there))
+    return replace(epoch, channels={**epoch.channels, "torque_nm": more})
+
+
+@pytest.mark.parametrize("voluntary_sd_nm", [0.0, 0.1])
+def test_friction_is_not_taken_for_a_delay(simulated, voluntary_sd_nm):
+    settings, epochs = simulated(2, voluntary_sd_nm=voluntary_sd_nm)
+    rubbed = [rubbing(epoch, 0.1) for epoch in epochs]
+    (found,) = estimate_delays({"file": prepare(rubbed, settings)})
+    assert not found.corrected
+    if not voluntary_sd_nm:
+        assert found.delay_s > 0.002
+        assert "not corrected: friction explains it better" in found.remark
+
+
 def test_without_the_perturbation_it_is_said_and_not_corrected(simulated):
     settings, (epoch,) = simulated()
     kept = {k: c for k, c in epoch.channels.items() if k != "perturbation_nm"}
