@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -27,7 +28,7 @@ UNBOUNDED = (
 
 def comparison_lines(found: StudyResult) -> list[str]:
     """Return everything that was concluded."""
-    from rigidimeter.study import TEST
+    from rigidimeter.study import TEST, doubt_sentence
 
     lines = []
     if found.source:
@@ -52,6 +53,8 @@ def comparison_lines(found: StudyResult) -> list[str]:
                 f" {mark}{row.measure.title}, {row.method}, J {row.inertia}: shift "
                 f"{row.shift:.4g}, p {number_text(row.p)}, by days {number_text(row.p_day)}"
             )
+    for sentence in doubt_sentence(found.analysis):
+        lines += ["", *textwrap.wrap(sentence, 100)]
     return [*lines, *_exclusions(found)] if found.sessions else lines
 
 

@@ -127,12 +127,12 @@ def _findings(analysis: Analysis) -> list[str]:
     lines = []
     for first, found_in in analysis.findings:
         fits = [fit for fit in found_in if fit.epoch != "pooled"]
-        if not fits:
-            continue
-        where = "1 epoch" if len(fits) == 1 else f"{len(fits)} epochs"
+        where = "all epochs together"
+        if fits:
+            count = "1 epoch" if len(fits) == 1 else f"{len(fits)} epochs"
+            where = f"{count} of {len(analysis.fits)}, first epoch {fits[0].epoch}"
         lines += wrapped(
-            f"{first.level}: {where} of {len(analysis.fits)}, first epoch {fits[0].epoch}: "
-            f"{first.text}. Remedy: {first.remedy}.",
+            f"{first.level}, {first.name}: {where}: {first.text}. Remedy: {first.remedy}.",
             " ",
         )
     return ["What the checks found (the JSON file has all of it)", *lines] if lines else []

@@ -134,7 +134,7 @@ def _band_hz(prepared: PreparedEpoch, high_hz: float | None) -> tuple[float, flo
 
 def _estimate(prepared: PreparedEpoch) -> Fit:
     """Return J, B and K as `estimate` gives them, with what the checks found."""
-    name, _ = choose_method([prepared.epoch])
+    name, _ = choose_method([prepared])
     (fit,), _ = method_named(name).fit([prepared], None, lambda _: None, False)
     return checked(prepared, fit)
 

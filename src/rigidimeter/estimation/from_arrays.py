@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimeter.estimation.alignment import aligned_prepared, estimate_delays
-from rigidimeter.estimation.diagnostics import checked
+from rigidimeter.estimation.diagnostics import checked, checked_together
 from rigidimeter.estimation.methods import choose_method, method_named
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.signals import Array
@@ -96,17 +96,18 @@ def identify(
     stamps = _stamps(size, rate_hz, time_s)
     channels = {name: Channel(name, stamps, values) for name, values in arrays.items()}
     epoch = Epoch("arrays", "1", channels, task="prbs")
-    chosen = method_named(choose_method([epoch])[0] if method == "auto" else method)
+    (prepared,) = prepare([epoch], settings)
+    chosen = method_named(choose_method([prepared])[0] if method == "auto" else method)
     lacking = [name for name in chosen.needs if name not in channels]
     if lacking:
         raise ValueError(f"method {chosen.name} needs {' and '.join(lacking)}")
-    (prepared,) = prepare([epoch], settings)
     if not chosen.as_recorded:
         prepared = aligned_prepared(prepared, estimate_delays({epoch.source: [prepared]}))
     (fit,), _ = chosen.fit([prepared], None, lambda _: None, False)
     if fit.outcome.kind == "failed":
         raise ValueError(f"method {chosen.name}: {fit.outcome.reason}")
-    return checked(prepared, fit)
+    (fit,), _ = checked_together([prepared], [checked(prepared, fit)], [], chosen)
+    return fit
 
 
 def _array(name: str, values: ArrayLike) -> Array:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from rigidimeter.estimation.bandlimited import BANDLIMITED, bandlimited_signals
-from rigidimeter.estimation.closedloop.observation import closed_loop_obstacle
+from rigidimeter.estimation.closedloop.observation import closed_loop_obstacle, observe
+from rigidimeter.estimation.closedloop.periodic_response import follows_perturbation
 from rigidimeter.estimation.closedloop.perturbation_methods import IV, ML, SPECTRAL
 from rigidimeter.estimation.method_record import Method
-from rigidimeter.estimation.prepared import prepare
+from rigidimeter.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.estimation.published_method import PUBLISHED
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.signals import Signals
@@ -18,6 +19,9 @@ from rigidimeter.settings import EstimationSettings, Settings
 
 METHODS: list[Method] = [PUBLISHED, BANDLIMITED, IV, SPECTRAL, ML]
 """Every estimator. Code from outside the package may append its own."""
+
+MOST_TRIED = 5
+"""From this many epochs it is known whether the motion follows the perturbation."""
 
 
 def method_names() -> tuple[str, ...]:
@@ -41,27 +45,47 @@ def method_named(name: str) -> Method:
     return found[0]
 
 
-def choose_method(epochs: Sequence[Epoch]) -> tuple[str, str]:
+def choose_method(epochs: Sequence[PreparedEpoch]) -> tuple[str, str]:
     """Return the method that suits what was recorded, and why.
 
-    With the perturbation, instrumental variables, which a subject who pushes does not bias. An
-    epoch that lacks it then fails, unless most do. Without it only least squares is possible.
+    With a perturbation that the motion follows, instrumental variables, which a subject who pushes
+    does not bias. An epoch that lacks it then fails, unless most do. Without it only least squares
+    is possible.
     """
     if not epochs:
         return "bandlimited", "there is no epoch to fit"
-    obstacles = [obstacle for epoch in epochs if (obstacle := closed_loop_obstacle(epoch))]
+    obstacles = [
+        obstacle for prepared in epochs if (obstacle := closed_loop_obstacle(prepared.epoch))
+    ]
+    least_squares = (
+        "so least squares is used: torque that a subject adds biases it in a closed loop"
+    )
     if 2 * len(obstacles) > len(epochs):
-        return (
-            "bandlimited",
-            f"{obstacles[0]} (in {len(obstacles)} of {len(epochs)} epochs), so least squares is "
-            "used: a subject who pushes in a closed loop biases the estimate",
+        found = f"{obstacles[0]} (in {len(obstacles)} of {len(epochs)} epochs)"
+        return "bandlimited", f"{found}, {least_squares}"
+    tried = [p for p in epochs if not p.obstacle and not closed_loop_obstacle(p.epoch)]
+    unanswered = [p for p in tried[:MOST_TRIED] if not p.once(_answered)]
+    if 2 * len(unanswered) > min(len(tried), MOST_TRIED):
+        return "bandlimited", (
+            f"the motion does not follow perturbation_nm (in {len(unanswered)} of "
+            f"{min(len(tried), MOST_TRIED)} epochs that were tried; first epoch "
+            f"{unanswered[0].epoch.label}), {least_squares}. Check which column holds the "
+            "perturbation, and that it and the motion have one clock; --method iv uses it "
+            "all the same"
         )
     where = f" in {len(epochs) - len(obstacles)} of {len(epochs)} epochs" if obstacles else ""
     return (
         "iv",
-        f"the perturbation was recorded{where}, so the motion that it causes is the instrument: a "
-        "subject who pushes does not bias the estimate",
+        f"the perturbation was recorded{where}, so the motion that it causes is the instrument: "
+        "torque that a subject adds does not bias the estimate",
     )
+
+
+def _answered(prepared: PreparedEpoch) -> bool:
+    try:
+        return follows_perturbation(prepared.once(observe))
+    except ValueError:
+        return True  # the fit says why
 
 
 def epoch_signals(epoch: Epoch, method: str, settings: EstimationSettings) -> Signals:

@@ -61,6 +61,7 @@ class Analysis:
         An analysis of sinusoids alone gives a row for each score.
         """
         rows = []
+        together = {fit.condition: fit.findings for fit in self.pooled}
         for fit, fixed in zip(self.fits, self.fixed_inertia, strict=True):
             held = {f"fixed_inertia_{name}": getattr(fixed, name) for name in FIT_NUMBERS}
             for ending in ("_se", "_low", "_high", "_bound"):  # of a J that was held
@@ -68,7 +69,8 @@ class Analysis:
             rows.append(
                 fit.row()
                 | {
-                    "findings": " / ".join(finding.text for finding in fit.findings),
+                    "findings": " / ".join(map(_in_a_cell, fit.findings)),
+                    "pooled_findings": " / ".join(map(_in_a_cell, together.get(fit.condition, ()))),
                     "band_low_hz": fit.band_hz[0],
                     "band_high_hz": fit.band_hz[1],
                 }
@@ -84,6 +86,10 @@ class Analysis:
 
     def _repr_html_(self) -> str:
         return _html(self)
+
+
+def _in_a_cell(finding: Finding) -> str:
+    return f"{finding.level}, {finding.name}: {finding.text}"
 
 
 def _html(analysis: Analysis) -> str:

@@ -19,6 +19,7 @@ from rigidimeter.study import (
     StudyResult,
     Verdict,
     dependences,
+    doubt_sentence,
     leader,
     verdict,
 )
@@ -33,10 +34,10 @@ def verdict_sentence(result: StudyResult) -> str:
         prefix += "Blinded: the names of the conditions are codes. "
     found = verdict(result)
     if found is None:
-        return prefix + _medians(result)
+        return prefix + " ".join([_medians(result), *doubt_sentence(result.analysis)])
     by_days = found.basis == "days"
     sentences = _by_days(result, found) if by_days else [_by_epochs(result, found)]
-    return prefix + " ".join([*sentences, *_largest(result)])
+    return prefix + " ".join([*sentences, *_largest(result), *doubt_sentence(result.analysis)])
 
 
 def _medians(result: StudyResult) -> str:

@@ -112,6 +112,8 @@ class DiagnosticLevels(Section):
     position_limit: Level = "doubt"
     negative_parameters: Level = "doubt"
     implausible_parameters: Level = "doubt"
+    controller_misfit: Level = "doubt"
+    unstable_loop: Level = "doubt"
 
 
 class DiagnosticsSettings(Section):
@@ -158,6 +160,7 @@ class DiagnosticsSettings(Section):
     velocity_shape_most_percent: float = quantity(5.0, "%", 0.0, 1000.0)
     limited_most_percent: float = quantity(1.0, "%", 0.0, 100.0)
     position_most_percent: float = quantity(98.0, "%", 1.0, 100.0)
+    controller_misfit_most_percent: float = quantity(20.0, "%", 0.0, 1000.0)
     inertia_least_kg_m2: float = quantity(1e-5, "kg·m²", 0.0, 10.0)
     inertia_most_kg_m2: float = quantity(1.0, "kg·m²", 0.0, 100.0, above=True)
     damping_most_nm_s_rad: float = quantity(50.0, "N·m·s/rad", 0.0, 1000.0, above=True)

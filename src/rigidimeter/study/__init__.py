@@ -27,7 +27,15 @@ from rigidimeter.study.results import (
 )
 from rigidimeter.study.study_analysis import analyse_study, read_study
 from rigidimeter.study.tables import comparison_document, result_tables, table_csv
-from rigidimeter.study.verdict import Dependence, Leader, Verdict, dependences, leader, verdict
+from rigidimeter.study.verdict import (
+    Dependence,
+    Leader,
+    Verdict,
+    dependences,
+    doubt_sentence,
+    leader,
+    verdict,
+)
 from rigidimeter.study.warnings import analysis_warnings
 
 __all__ = [
@@ -60,6 +68,7 @@ __all__ = [
     "comparison_document",
     "conditions",
     "dependences",
+    "doubt_sentence",
     "estimate",
     "keep",
     "leader",

@@ -21,7 +21,7 @@ from rigidimeter.estimation import (
 )
 from rigidimeter.estimation.alignment import MOST_EPOCHS, aligned_prepared
 from rigidimeter.estimation.between_epochs import between_epochs
-from rigidimeter.estimation.diagnostics import checked
+from rigidimeter.estimation.diagnostics import checked, checked_together
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.estimation.screening import before_fit
@@ -165,7 +165,7 @@ def analyse_prepared(
     """
     reason = ""
     if method == "auto":
-        method, reason = choose_method([p.epoch for p in preparation.perturbed(as_recorded=True)])
+        method, reason = choose_method(preparation.perturbed(as_recorded=True))
     estimator = method_named(method)
     as_recorded, costs = estimator.as_recorded, preparation.costs
 
@@ -196,6 +196,7 @@ def analyse_prepared(
         _, pooled = estimator.fit(counted, None, lambda _: None, True)
     by_perturbation = estimator.uses_perturbation
     pooled = [_with_differences(fit, fits, by_perturbation, preparation.settings) for fit in pooled]
+    fits, pooled = checked_together(fitted, fits, pooled, estimator)
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
     if included:

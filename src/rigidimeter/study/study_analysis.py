@@ -229,7 +229,7 @@ def _analysed(
     reason = ""
     if method == "auto":
         everything = [p for own in subjects.values() for p in own.perturbed(as_recorded=True)]
-        method, reason = choose_method([prepared.epoch for prepared in everything])
+        method, reason = choose_method(everything)
     parts = {
         subject: analyse_prepared(own, method, fits_alone=fits_alone, progress=progress)
         for subject, own in subjects.items()

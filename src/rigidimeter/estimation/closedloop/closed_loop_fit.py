@@ -7,7 +7,7 @@ epoch says of J, B and K is its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,7 +15,6 @@ import numpy as np
 from scipy.stats import t as student
 
 from rigidimeter.estimation.closedloop.between_doubt import between_samples
-from rigidimeter.estimation.closedloop.lack_of_fit import misfits, worst_misfit
 from rigidimeter.estimation.closedloop.linear_problems import (
     Linearise,
     Problem,
@@ -34,7 +33,7 @@ from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.screening import after_fit, unusable
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.uncertainty import Estimate
-from rigidimeter.records import Epoch, Finding, Fit
+from rigidimeter.records import Epoch, Fit
 from rigidimeter.settings import Settings
 
 WORST_R_SQUARED = -10.0
@@ -133,7 +132,6 @@ def _fit_condition(
     # Few epochs do not know the shape of their noise together any better than each alone.
     share = shared if len(good) >= SHARED_FROM else None
     fits: dict[int, Fit] = {}
-    singles: dict[int, LineFit] = {}
     for place, epoch, observation in members:
         try:
             fit = fit_single(
@@ -152,17 +150,14 @@ def _fit_condition(
                 epoch, observation, fit.values, fit.between, settings.diagnostics
             )
             fits[place] = replace(found, findings=doubt)
-            singles[place] = fit
         progress(1.0 - POOLED_SHARE)
     if shared is None:
         return fits, []
-    finding = _misfit(good, made, singles, settings)
     together = _pooled_fit(method.name, condition, shared, good, inertia_kg_m2)
     doubt = between_samples(
         good[0].epoch, good[0].observation, shared.values, shared.between, settings.diagnostics
     )
-    findings = doubt if finding is None else (finding, *doubt)
-    return fits, [replace(together, findings=findings)]
+    return fits, [replace(together, findings=doubt)]
 
 
 def _fit_all(
@@ -195,26 +190,6 @@ def _start(members: Sequence[_Member], inertia_kg_m2: float | None) -> Array:
 def _draws(settings: Settings) -> int:
     estimation = settings.estimation
     return estimation.bootstrap_draws if estimation.intervals == "bootstrap" else 0
-
-
-def _misfit(
-    good: Sequence[_Member],
-    made: Mapping[int, Problem],
-    singles: Mapping[int, LineFit],
-    settings: Settings,
-) -> Finding | None:
-    """Return what the epochs of the commonest sequence leave of their response to it."""
-    groups: dict[Hashable, list[_Member]] = {}
-    for member in good:
-        if member.place in singles:
-            groups.setdefault(member.observation.response_key, []).append(member)
-    most = max(groups.values(), key=len, default=[])
-    parts = misfits(
-        [member.observation for member in most],
-        [made[member.place] for member in most],
-        [singles[member.place] for member in most],
-    )
-    return worst_misfit(parts, settings.diagnostics)
 
 
 def _estimate(fit: LineFit, inertia_kg_m2: float | None) -> Estimate:

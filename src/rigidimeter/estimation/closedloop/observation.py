@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -44,8 +44,6 @@ class Observation(NamedTuple):
         The loop that the epoch ran in; None where the perturbation is not known.
     excited : array of bool, shape (m,)
         The lines at which a periodic perturbation has power; all where it is not periodic.
-    response_key : hashable
-        Epochs with the same one have the same response to the perturbation.
     otherwise : tuple of complex array, shape (m, 3)
         What would add to the motion if the samples were taken as they are, and what other drives
         would add that explain the velocity as well; empty where the drive is unknown.
@@ -55,7 +53,6 @@ class Observation(NamedTuple):
     perturbation: Channel
     excitation: Excitation | None
     excited: NDArray[np.bool_]
-    response_key: Hashable
     otherwise: tuple[Complex, ...] = ()
 
 
@@ -115,7 +112,7 @@ def observe_motion(prepared: PreparedEpoch) -> Observation:
     grid = epoch_grid(epoch, band_hz(epoch, estimation), estimation.trim_s)
     everywhere = np.ones(grid.line.size, dtype=np.bool_)
     lines = epoch_lines(epoch, grid, None, _torque_filter(prepared.settings))
-    return Observation(lines, epoch.channels["torque_nm"], None, everywhere, None)
+    return Observation(lines, epoch.channels["torque_nm"], None, everywhere)
 
 
 def period_s(perturbation: Channel) -> float | None:
@@ -206,7 +203,7 @@ def _observed(
     )
     made = prepared.source.once(key, lambda: excitation(perturbation, loop, grid))
     lines = epoch_lines(epoch, grid, drive, _torque_filter(prepared.settings))
-    return Observation(lines, perturbation, made, excited, key, _otherwise(prepared, grid))
+    return Observation(lines, perturbation, made, excited, _otherwise(prepared, grid))
 
 
 def _otherwise(prepared: PreparedEpoch, grid: Grid) -> tuple[Complex, ...]:

@@ -18,10 +18,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.estimation.closedloop.lack_of_fit import Answer, proportional
 from rigidimeter.estimation.closedloop.observation import Observation
 from rigidimeter.estimation.signals import Array
 
 Complex = NDArray[np.complex128]
+
+CHANCE = 1e-6
+"""A motion that answers with a larger probability by chance does not follow the perturbation."""
 
 
 class Impedance(NamedTuple):
@@ -61,12 +65,29 @@ def impedance(observations: Sequence[Observation]) -> Impedance:
     return Impedance(frequency_hz, np.asarray(torque / angle), np.clip(1 - noise / power, 0.0, 1.0))
 
 
-def _toward_zero_phase(observation: Observation) -> Complex:
-    """Return what turns each line so that the perturbation has phase zero in it."""
+def perturbation_lines(observation: Observation) -> Complex:
+    """Return the perturbation at the lines, held from tick to tick, shape (m,)."""
     grid, cause = observation.lines.grid, observation.perturbation
     # A hundredth of a tick of rounding must not hold the level before.
     stamps = cause.time_s - 0.01 / cause.mean_rate_hz
     level = cause.values[np.maximum(np.searchsorted(stamps, grid.time_s, side="right") - 1, 0)]
-    there = grid.transform(level)
+    return grid.transform(level)
+
+
+def follows_perturbation(observation: Observation) -> bool:
+    """Return whether any of the motion answers the perturbation, beyond chance.
+
+    The velocity is regressed on the perturbation in groups of neighbouring lines, so a perturbation
+    with stamps of another clock, or of another epoch, has no answer.
+    """
+    lines = observation.lines
+    answer = Answer(lines.grid, perturbation_lines(observation), lines.motion[:, 1])
+    parts = proportional([answer])
+    return min(part.p for part in parts) * len(parts) < CHANCE
+
+
+def _toward_zero_phase(observation: Observation) -> Complex:
+    """Return what turns each line so that the perturbation has phase zero in it."""
+    there = perturbation_lines(observation)
     size = np.abs(there)
     return np.asarray(np.where(size > 0, there.conj() / np.where(size > 0, size, 1.0), 1.0))

@@ -69,5 +69,6 @@ ML = Method(
     "loop",
     fit=partial(fit_closed_loop, CLOSED_LOOP["ml"]),
     intervals_text=_intervals_text,
+    assumes_controller=True,
     pooled_text=_POOLED_TEXT,
 )

@@ -9,6 +9,7 @@ from rigidimeter.estimation.diagnostics.check_record import (
     reconstructed_torque_nm,
 )
 from rigidimeter.estimation.diagnostics.diagnose import CHECKS, checked, diagnose
+from rigidimeter.estimation.diagnostics.together import checked_together
 
 __all__ = [
     "CHECKS",
@@ -18,6 +19,7 @@ __all__ = [
     "at_least",
     "at_most",
     "checked",
+    "checked_together",
     "diagnose",
     "reconstructed_torque_nm",
 ]

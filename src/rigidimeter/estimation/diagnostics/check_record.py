@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from rigidimeter.dynamics import Loop
 from rigidimeter.estimation.diagnostics.varying_lines import varying_lines
 from rigidimeter.estimation.diagnostics.varying_selection import Variation, variation
-from rigidimeter.estimation.least_squares_bias import compensated
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array, Signals
@@ -24,6 +23,12 @@ DEFAULT_LEVELS = DiagnosticLevels()
 
 UNKNOWN_WIDTH = 0.1
 """The share of a parameter that stands for half its interval where a method gives none."""
+
+
+def half_widths(fit: Fit) -> Array:
+    """Return half the 95 % intervals of J, B and K; without intervals `UNKNOWN_WIDTH` of them."""
+    half = 0.5 * (fit.high - fit.low)
+    return np.where(np.isfinite(half), half, np.abs(fit.value) * UNKNOWN_WIDTH)
 
 
 def push_harmless(case: Case) -> str:
@@ -68,6 +73,9 @@ class Case:
         That made it.
     loop : Loop, optional
         In which the joint was moved, as the settings and the recording say.
+    unbiased : array, shape (3,), optional
+        For least squares: J, B and K without the bias that torque of the subject causes by the
+        loop, NaN where it is too much to be told.
     prepared : PreparedEpoch, optional
         The epoch with what was made of it; without it nothing is said of a joint that varies,
         nor of terms that are missing.
@@ -82,6 +90,7 @@ class Case:
     fit: Fit | None = None
     method: Method | None = None
     loop: Loop | None = None
+    unbiased: Array | None = None
     prepared: PreparedEpoch | None = None
 
     @property
@@ -89,33 +98,26 @@ class Case:
         """Whether the perturbation is the instrument of the method used."""
         return self.method is not None and self.method.uses_perturbation
 
-    @cached_property
+    @property
     def loop_bias(self) -> Array | None:
         """By how much J, B and K are off because torque of the subject comes back by the loop.
 
-        Shape (3,), NaN where it is too much to be told; None where this cannot be: for a method
-        that it does not bias, or where the loop is unknown.
+        Shape (3,), NaN where it is too much to be told; None where `unbiased` is.
         """
-        if self.loop is None or self.fit is None or self.uses_perturbation:
-            return None
-        without = compensated(self.signals, self.loop)
-        return np.full(3, np.nan) if without is None else np.asarray(self.parameters - without)
+        return None if self.unbiased is None else np.asarray(self.parameters - self.unbiased)
 
-    @cached_property
+    @property
     def half_widths(self) -> Array:
         """Half the 95 % intervals of J, B and K; `UNKNOWN_WIDTH` of them where there are none."""
-        width = np.abs(self.parameters) * UNKNOWN_WIDTH
         if self.fit is None:
-            return width
-        half = 0.5 * (self.fit.high - self.fit.low)
-        return np.where(np.isfinite(half), half, width)
+            return np.abs(self.parameters) * UNKNOWN_WIDTH
+        return half_widths(self.fit)
 
-    @cached_property
+    @property
     def loop_bias_percent(self) -> float | None:
         """`loop_bias` in % of `half_widths`, the largest of the three."""
-        if self.loop_bias is None:
-            return None
-        return 100.0 * float(np.max(np.abs(self.loop_bias) / self.half_widths))
+        bias = self.loop_bias
+        return None if bias is None else 100.0 * float(np.max(np.abs(bias) / self.half_widths))
 
     @cached_property
     def variation(self) -> Variation | None:

@@ -12,6 +12,7 @@ from rigidimeter.estimation.bandlimited import bandlimited_signals
 from rigidimeter.estimation.closedloop.observation import loop_of
 from rigidimeter.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
+from rigidimeter.estimation.diagnostics.controller_checks import CONTROLLER_CHECKS
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.estimation.diagnostics.missing_term import MISSING_TERM_CHECKS
@@ -20,6 +21,7 @@ from rigidimeter.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
 from rigidimeter.estimation.diagnostics.torque_checks import TORQUE_CHECKS
 from rigidimeter.estimation.diagnostics.tremor_check import TREMOR_CHECKS
 from rigidimeter.estimation.diagnostics.varying_checks import VARYING_CHECKS
+from rigidimeter.estimation.least_squares_bias import compensated
 from rigidimeter.estimation.methods import method_named
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array
@@ -37,6 +39,7 @@ CHECKS: list[Check] = [
     *TREMOR_CHECKS,
     *VARYING_CHECKS,
     *PARAMETER_CHECKS,
+    *CONTROLLER_CHECKS,
 ]
 """Every check of an epoch. Code from outside the package may append its own."""
 
@@ -44,8 +47,8 @@ CHECKS: list[Check] = [
 def diagnose(case: Case, seen: Mapping[str, Look | None] | None = None) -> tuple[Finding, ...]:
     """Run every check for which there is something to look at; passed ones are among the findings.
 
-    The checks of several epochs, `lack_of_fit` and `varying_between_epochs`, are made where these
-    are fitted together.
+    What several epochs show together is found by `together.checked_together` and, for
+    `varying_between_epochs`, where they are fitted together.
 
     Parameters
     ----------
@@ -67,13 +70,9 @@ def checked(prepared: PreparedEpoch, fit: Fit) -> Fit:
     """Return the fit with what the checks found, excluded if one of them says so."""
     if fit.n_samples == 0 or prepared.obstacle:
         return fit  # the fit has said why
-    case = replace(
-        _case(prepared, fit.value),
-        fit=fit,
-        method=method_named(fit.method),
-        loop=_loop(prepared),
-        prepared=prepared,
-    )
+    method = method_named(fit.method)
+    by_loop = None if method.uses_perturbation else prepared.once(unbiased)
+    case = replace(_case(prepared, fit.value), fit=fit, method=method, unbiased=by_loop)
     findings = diagnose(case, prepared.once(_seen_without_fit))
     failed = [finding for finding in findings if finding.remedy]
     grave = [finding for finding in failed if finding.level == "exclude"]
@@ -94,8 +93,18 @@ def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
         parameters,
         settings.diagnostics,
         position_limit_rad=limit_rad,
+        loop=_loop(prepared),
         prepared=prepared,
     )
+
+
+def unbiased(prepared: PreparedEpoch) -> Array:
+    """Return J, B and K by least squares without the bias of the loop; NaN where it is too large.
+
+    The loop is the one that the settings describe, with the drive that the recording shows.
+    """
+    found = compensated(prepared.signals(bandlimited_signals), _loop(prepared))
+    return np.full(3, np.nan) if found is None else found
 
 
 def _loop(prepared: PreparedEpoch) -> Loop:

@@ -90,7 +90,7 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
         ),
         meaning=(
             f"only {100 * value:.0f} % of the {weaker}'s power follows the perturbation; the rest "
-            "is the subject, noise, or a joint that is not linear"
+            "is torque from a subject, noise, or a joint that is not linear"
         ),
     )
 
@@ -209,8 +209,8 @@ EXCITATION_CHECKS = (
         "coherence",
         ("perturbation_nm",),
         lambda c: coherence(c.epoch, c.signals, c.settings),
-        "the rest is the subject, noise, or a joint that is not linear",
-        "ask the subject to relax, perturb more strongly, or pool epochs with instruments",
+        "the rest is torque from a subject, noise, or a joint that is not linear",
+        "perturb more strongly, pool epochs by iv, or repeat with a subject who relaxes",
         of_fit=False,
         harmless=push_harmless,
     ),

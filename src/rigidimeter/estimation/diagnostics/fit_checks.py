@@ -184,7 +184,7 @@ RESIDUAL_CHECKS = (
         (),
         lambda c: residual_whiteness(-c.voluntary_nm, c.signals, c.settings),
         (
-            "the residual is coloured, by the subject's own torque or by what the model lacks, and "
+            "the residual is coloured, by torque from a subject or by what the model lacks, and "
             "standard errors for white noise are too small"
         ),
         "use the intervals for coloured residuals; see the residual's spectrum",
@@ -197,7 +197,7 @@ RESIDUAL_CHECKS = (
         "the model lacks something that the perturbation causes",
         (
             "look for a delay between torque and motion, for a reflex, for stiffness that changes "
-            "with the angle; the subject's own torque biases least squares in this way too"
+            "with the angle; torque that a subject adds biases least squares in this way too"
         ),
         harmless=push_harmless,
     ),
@@ -206,7 +206,7 @@ RESIDUAL_CHECKS = (
         (),
         lambda c: held_out_vaf(c.signals, c.settings),
         "the fit does not foresee torque that it has not seen",
-        "look for movement of the subject's own, and for a change during the epoch",
+        "look for torque from elsewhere than the robot, and for a change during the epoch",
         of_fit=False,
         harmless=push_harmless,
     ),
@@ -218,14 +218,14 @@ PARAMETER_CHECKS = (
         (),
         lambda c: r_squared(c.fit.r_squared, c.settings) if c.fit is not None else None,
         "most of the torque is not J, B and K, and least squares puts a part of it into them",
-        "look for movement of the subject's own; record the perturbation and use iv",
+        "look for torque from elsewhere than the robot; record the perturbation and use iv",
         harmless=push_harmless,
     ),
     Check(
         "negative_parameters",
         (),
         lambda c: negative_parameters(c.parameters),
-        "the subject may have pushed, or the channels are delayed relative to each other",
+        "a subject may have pushed, or the channels are delayed relative to each other",
         "check the stamps of torque and motion, and see the voluntary torque",
     ),
     Check(

@@ -19,11 +19,12 @@ from rigidimeter.estimation.diagnostics.check_record import (
     Check,
     Look,
     at_most,
+    half_widths,
     push_harmless,
 )
 from rigidimeter.estimation.diagnostics.excitation_checks import lines_inside, power_lines
 from rigidimeter.estimation.signals import Array, Signals
-from rigidimeter.records import Channel
+from rigidimeter.records import Channel, Fit
 from rigidimeter.settings import DiagnosticsSettings
 
 WINDOW_S = 1.0
@@ -45,9 +46,9 @@ def voluntary_torque(voluntary_nm: Array, signals: Signals, settings: Diagnostic
         value,
         most,
         (
-            f"the subject's own torque has an SD of {np.std(voluntary_nm):.3g} N·m; its power from "
-            f"{low:g} to {high:g} Hz, {power:.2g} N²m², is {value:.2g} % of the torque's variance "
-            f"(at most {most:g} %)"
+            f"the torque beyond J, B and K has an SD of {np.std(voluntary_nm):.3g} N·m; its power "
+            f"from {low:g} to {high:g} Hz, {power:.2g} N²m², is {value:.2g} % of the torque's "
+            f"variance (at most {most:g} %)"
         ),
     )
 
@@ -91,30 +92,37 @@ def active_movement(voluntary_nm: Array, signals: Signals, settings: Diagnostics
         value,
         most,
         (
-            f"the subject's own torque passes {above_nm:.2g} N·m in {value:.0f} % of the seconds "
-            f"(at most {most:g} %)" + (f", from {when}{more}" if when else "")
+            f"the torque beyond J, B and K passes {above_nm:.2g} N·m in {value:.0f} % of the "
+            f"seconds (at most {most:g} %)" + (f", from {when}{more}" if when else "")
         ),
     )
 
 
-def loop_bias(case: Case) -> Look | None:
+def loop_bias(fit: Fit, unbiased: Array, settings: DiagnosticsSettings) -> Look:
     """Return how far the loop pulls least squares from the joint, in % of half the intervals."""
-    bias, value = case.loop_bias, case.loop_bias_percent
-    if bias is None or value is None:
-        return None
-    most = case.settings.loop_bias_most_percent
+    bias = fit.value - unbiased
+    value = 100.0 * float(np.max(np.abs(bias) / half_widths(fit)))
+    most = settings.loop_bias_most_percent
     if not np.isfinite(value):
-        fact = "no J, B and K go with this torque in this loop"
-    else:
-        shares = 100.0 * bias / np.abs(case.parameters)
-        of_each = ", ".join(
-            f"{name} by {share:+.2g} %" for name, share in zip("JBK", shares, strict=True)
-        )
-        fact = (
-            f"torque of the subject that comes back as motion by the loop moves {of_each}, at most "
+        return at_most(value, most, "no J, B and K go with this torque in this loop")
+    shares = 100.0 * bias / np.abs(fit.value)
+    of_each = ", ".join(
+        f"{name} by {share:+.2g} %" for name, share in zip("JBK", shares, strict=True)
+    )
+    return at_most(
+        value,
+        most,
+        (
+            f"torque beyond J, B and K, which the loop turns into motion, moves {of_each}, at most "
             f"{value:.2g} % of half their intervals (at most {most:g} %)"
-        )
-    return at_most(value, most, fact)
+        ),
+    )
+
+
+def _loop_bias(case: Case) -> Look | None:
+    if case.fit is None or case.unbiased is None:
+        return None
+    return loop_bias(case.fit, case.unbiased, case.settings)
 
 
 def emg_envelope_v(emg: Channel, window_s: float) -> Array:
@@ -147,9 +155,9 @@ MOVEMENT_CHECKS = (
     Check(
         "loop_bias",
         (),
-        loop_bias,
+        _loop_bias,
         "least squares takes it for the joint, and the intervals do not include that",
-        "record the perturbation and use iv, or ask the subject to relax and repeat",
+        "record the perturbation and use iv; or repeat with a subject who relaxes",
     ),
     Check(
         "voluntary_torque",
@@ -166,8 +174,8 @@ MOVEMENT_CHECKS = (
         "active_movement",
         (),
         lambda c: active_movement(c.voluntary_nm, c.signals, c.settings),
-        "the subject moved, and the estimate is of a joint that is not at rest",
-        "ask the subject to relax and repeat, or leave these seconds out",
+        "something other than the robot moved it, and what was measured was not at rest",
+        "repeat with a subject who relaxes, or leave these seconds out",
         harmless=push_harmless,
     ),
     Check(

@@ -30,7 +30,7 @@ BY = ("protocol", "check", "estimate", "operator")
 
 
 def _findings(result: StudyResult) -> Iterator[Block]:
-    found = [(fit, finding) for fit in result.analysis.fits for finding in fit.findings]
+    found = _of_fits(result)
     if found:
         yield paragraph(
             Markup(
@@ -76,6 +76,19 @@ def _findings(result: StudyResult) -> Iterator[Block]:
     )
 
 
+def _of_fits(result: StudyResult) -> list[tuple[Fit, Finding]]:
+    """Return every finding of an epoch, and of epochs together what no epoch carries."""
+    analysis = result.analysis
+    found = [(fit, finding) for fit in analysis.fits for finding in fit.findings]
+    carried = {finding for _, finding in found}
+    return found + [
+        (fit, finding)
+        for fit in analysis.pooled
+        for finding in fit.findings
+        if finding not in carried
+    ]
+
+
 def _kinds(result: StudyResult, found: list[tuple[Fit, Finding]]) -> Iterator[dict[str, Any]]:
     """Yield each kind of finding: the gravest first, then the most frequent."""
     kinds: dict[tuple[str, str], list[tuple[Fit, Finding]]] = {}
@@ -98,6 +111,8 @@ def _kinds(result: StudyResult, found: list[tuple[Fit, Finding]]) -> Iterator[di
 def _where(result: StudyResult, fits: list[Fit]) -> str:
     """Return the epochs by source, at most `MOST_LABELS`."""
     names = short_names(fit.source for fit in result.analysis.fits)
+    if any(fit.epoch == "pooled" for fit in fits):
+        return "all epochs together"
     by_source: dict[str, list[str]] = {}
     for fit in fits[:MOST_LABELS]:
         by_source.setdefault(fit.source, []).append(fit.epoch)

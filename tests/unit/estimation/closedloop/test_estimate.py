@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.estimation import choose_method, fit_epochs
+from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Channel, Outcome
 from rigidimeter.settings import ControllerSettings
 from rigidimeter.virtual.study_design import PAPER_RATES
@@ -143,12 +144,33 @@ def test_spectral_needs_two_periods(simulated):
 
 
 def test_auto_chooses_by_what_was_recorded(simulated):
-    _, (epoch,) = simulated()
-    assert choose_method([epoch])[0] == "iv"
+    settings, (epoch,) = simulated()
+
+    def chosen(*epochs):
+        return choose_method(prepare(epochs, settings))
+
+    assert chosen(epoch)[0] == "iv"
     bare = without(epoch, "perturbation_nm")
-    method, why = choose_method([epoch, epoch, bare])
+    method, why = chosen(epoch, epoch, bare)
     assert method == "iv"
     assert "in 2 of 3 epochs" in why
-    method, why = choose_method([epoch, bare, bare])
+    method, why = chosen(epoch, bare, bare)
     assert method == "bandlimited"
     assert "perturbation_nm was not recorded (in 2 of 3 epochs)" in why
+
+
+@pytest.mark.parametrize("voluntary_sd_nm", [0.0, 0.5])
+def test_auto_needs_a_motion_that_follows_the_perturbation(simulated, voluntary_sd_nm):
+    settings, (epoch,) = simulated(voluntary_sd_nm=voluntary_sd_nm)
+    assert choose_method(prepare([epoch], settings))[0] == "iv"
+    cause = epoch.channels["perturbation_nm"]
+    others = {
+        "of another epoch": np.random.default_rng(3).permutation(cause.values),
+        "of another clock": np.roll(cause.values, 2345),
+    }
+    for values in others.values():
+        channels = {**epoch.channels, cause.name: Channel(cause.name, cause.time_s, values)}
+        method, why = choose_method(prepare([replace(epoch, channels=channels)], settings))
+        assert method == "bandlimited"
+        assert "the motion does not follow perturbation_nm" in why
+        assert "--method iv uses it all the same" in why

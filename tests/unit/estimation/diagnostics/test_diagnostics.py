@@ -147,10 +147,18 @@ def test_a_sound_epoch_passes_every_check(sound):
 def test_every_level_that_can_be_set_belongs_to_a_check(sound):
     epoch, signals, parameters = sound
     emg = with_channel(epoch, "emg_v", 1e-5 * np.random.default_rng(1).standard_normal(N))
-    fit = fit_inertia_damping_stiffness(signals)
     case = Case(
-        emg, signals, parameters, SETTINGS, np.zeros(N), 1.0, fit, BANDLIMITED, LOOP
-    )  # fmt: skip
+        with_channel(emg, "velocity_command_rad_s", emg.channels["velocity_rad_s"].values),
+        signals,
+        parameters,
+        SETTINGS,
+        np.zeros(N),
+        1.0,
+        fit=fit_inertia_damping_stiffness(signals),
+        method=BANDLIMITED,
+        loop=LOOP,
+        unbiased=TRUTH,
+    )
     findings = diagnose(case)
     names = [finding.name for finding in findings]
     # What is found where epochs are fitted; what varies within one, and terms that are missing, are

@@ -206,7 +206,7 @@ def test_a_lone_sample_between_gaps_is_left_out_aloud():
 @pytest.mark.parametrize(
     ("name", "factor", "warned"),
     [
-        ("angle_rad", 6.2, False), ("angle_rad", 6.4, True), ("velocity_rad_s", 49, False),
+        ("angle_rad", 6.4, False), ("angle_rad", 40, True), ("velocity_rad_s", 49, False),
         ("velocity_rad_s", 51, True), ("torque_nm", 80, False),
     ],
 )  # fmt: skip

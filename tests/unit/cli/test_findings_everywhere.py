@@ -1,0 +1,83 @@
+"""The findings of a recording are the same wherever they are shown."""
+
+import csv
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import rigidimeter as rm
+from rigidimeter.records import Channel
+from rigidimeter.study import estimate
+
+PUSHING = {"OFF": {"voluntary_sd_nm": 0.2}}
+
+
+@pytest.fixture
+def shown(simulate, rigidimeter, tmp_path):
+    """Return what each output of a recording with findings holds."""
+
+    def run(method):
+        session = simulate(epochs=2, subject=PUSHING)
+        files = tmp_path / "out.json", tmp_path / "out.csv"
+        out = rigidimeter(
+            "estimate", session, "--method", method, "--json", files[0], "--csv", files[1]
+        ).out
+        assert (
+            rigidimeter("report", session, "--method", method, "--out", tmp_path / "r").status == 0
+        )
+        with files[1].open(encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        with (tmp_path / "r" / "tables" / "findings.csv").open(encoding="utf-8") as file:
+            table = list(csv.DictReader(file))
+        page = (tmp_path / "r" / "report.html").read_text("utf-8")
+        return json.loads(files[0].read_text("utf-8")), rows, out, table, page
+
+    return run
+
+
+@pytest.mark.parametrize("method", ["iv", "bandlimited"])
+def test_every_output_has_every_finding(shown, method):
+    document, rows, terminal, table, page = shown(method)
+    found = [(e["epoch"], f) for e in document["epochs"] for f in e["findings"]]
+    assert len(found) > 3
+    in_json = {(epoch, f["level"], f["name"]) for epoch, f in found}
+    in_csv = {
+        (row["epoch"], *re.match(r"(\w+), (\w+): ", one).groups())
+        for row in rows
+        for one in row["findings"].split(" / ")
+    }
+    assert in_csv == in_json
+    assert {
+        (r["epoch"], r["level"], r["check"]) for r in table if r["epoch"] != "pooled"
+    } == in_json
+    pooled = {(f["level"], f["name"]) for f in document["pooled"]["findings"]}
+    kinds = {(level, name) for _, level, name in in_json} | pooled
+    assert set(re.findall(r"^ (\w+), (\w+): ", terminal, re.M)) == kinds
+    assert "The checks found nothing" not in page
+    for _, name in kinds:
+        assert f">{name}<" in page
+    assert ("Checks cast doubt on" in page) == any(level != "note" for level, _ in kinds)
+
+
+def names_and_levels(epochs, method, settings):
+    fits = estimate(epochs, method, settings=settings).fits
+    return [sorted((f.name, f.level) for f in fit.findings) for fit in fits]
+
+
+def test_a_tenth_of_a_millisecond_of_jitter_changes_no_finding(simulate):
+    recording = rm.read(simulate(epochs=2, subject={"OFF": {"voluntary_sd_nm": 0.35}}))
+    rng = np.random.default_rng(1)
+    moved = []
+    for epoch in recording.epochs:
+        channels = {}
+        for name, c in epoch.channels.items():
+            stamps = c.time_s + rng.uniform(-5e-5, 5e-5, len(c))
+            channels[name] = Channel(name, stamps, c.values)
+        moved.append(replace(epoch, channels=channels))
+    for method in ("auto", "bandlimited"):
+        before = names_and_levels(recording.epochs, method, recording.settings)
+        assert before == names_and_levels(moved, method, recording.settings)
+        assert any(before)
