@@ -5,8 +5,8 @@ is put in the place of the delay, as one more column T beside J, B and K:
 
     friction    sgn θ'
     reflex      θ', max(θ', 0) or max(−θ', 0), later by 30, 45 or 60 ms
-    soft cuff   −Z² θ, with Z = K + iωB − ω²J: Z θ / (1 + Z/k) to the first order in 1/k, for a
-                cuff of k N·m/rad
+    soft cuff   Z θ / (1 + Z/k), with Z = K + iωB − ω²J, for a cuff of k N·m/rad: at some k, and to
+                the first order in 1/k about each
 
 Both models are fitted by instrumental variables to one half of the lines, in groups of neighbours,
 and judged by what they leave of the others; S is the smooth power of that. The sum of the
@@ -20,6 +20,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import fft
 
 from rigidimeter.estimation.closedloop.line_noise import Smoother
@@ -30,6 +31,9 @@ from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array, kinematics
 
 REFLEX_DELAYS_S = (0.03, 0.045, 0.06)
+CUFF_RATIOS = (5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0)
+"""Stiffness of a cuff over that of the joint."""
+
 GROUP_LINES = 8
 
 CLEAR = 3.0
@@ -57,22 +61,16 @@ def likeliest_term(
     """
     J, B, K = np.maximum(values, LEAST).tolist()
     with_delay = [_of_joint(epoch.once(observe), (J, B, K)) for epoch in moved]
-    plain, terms = [], []
-    for epoch in epochs:
-        observation = epoch.once(observe)
-        plain.append(_of_joint(observation, (J, B, K)))
-        terms.append(dict(_columns(epoch, observation, (J, B, K))))
-    found = []
-    for name in terms[0]:
-        with_term = [
-            Problem(
-                np.column_stack([problem.instruments, columns[name][0]]),
-                np.column_stack([problem.regressors, columns[name][1]]),
-                problem.target,
-            )
-            for problem, columns in zip(plain, terms, strict=True)
-        ]
-        found.append(Rival(name.split(",")[0], _better(with_term, with_delay)))
+    plain = [_of_joint(epoch.once(observe), (J, B, K)) for epoch in epochs]
+    without = np.maximum(_solved(plain), LEAST)
+    rivals = [
+        dict(_rivals(epoch, problem, (J, B, K), without))
+        for epoch, problem in zip(epochs, plain, strict=True)
+    ]
+    found = [
+        Rival(name.split(",")[0], _better([own[name] for own in rivals], with_delay))
+        for name in rivals[0]
+    ]
     return max(found, key=lambda rival: rival.better_by)
 
 
@@ -82,26 +80,49 @@ def _of_joint(observation: Observation, joint: tuple[float, float, float]) -> Pr
     return Problem(instruments, observation.lines.motion, observation.lines.torque_nm)
 
 
-def _columns(
-    prepared: PreparedEpoch, observation: Observation, joint: tuple[float, float, float]
-) -> Iterator[tuple[str, tuple[Complex, Complex]]]:
-    """Yield the column of each term, from the simulated and from the measured motion."""
+def _rivals(
+    prepared: PreparedEpoch,
+    plain: Problem,
+    joint: tuple[float, float, float],
+    without_delay: Array,
+) -> Iterator[tuple[str, Problem]]:
+    """Yield the problem with each term, from the simulated and from the measured motion.
+
+    `without_delay` are J, B and K of the fit without delay or term.
+    """
+    observation = prepared.once(observe)
     assert observation.excitation is not None
-    J, B, K = joint
-    grid, lines = observation.lines.grid, observation.lines
+    grid = observation.lines.grid
     omega = grid.omega_rad_s
     measured = kinematics(prepared.epoch, grid.time_s)[1] * grid.window
     both = observation.excitation.windowed_motion(joint)[1], measured
-    yield "friction", _pair(grid, *(grid.window * np.sign(velocity) for velocity in both))
+    rubbing = _pair(grid, *(grid.window * np.sign(velocity) for velocity in both))
+    yield "friction", _beside(plain, rubbing)
     for side, sign in (("+", 1.0), ("-", -1.0), ("both", 0.0)):
         stretch = _pair(grid, *(v if sign == 0.0 else np.maximum(sign * v, 0.0) for v in both))
         for delay_s in REFLEX_DELAYS_S:
             late = np.exp(-1j * omega * delay_s)
-            yield f"a reflex,{side},{delay_s}", (stretch[0] * late, stretch[1] * late)
+            yield (
+                f"a reflex,{side},{delay_s}",
+                _beside(plain, (stretch[0] * late, stretch[1] * late)),
+            )
+    J, B, K = without_delay.tolist()
     impedance = K + 1j * omega * B - omega**2 * J
-    caused = observation.excitation.motion_lines(joint) @ np.array(joint)
-    through = lines.motion @ np.array(joint)
-    yield "a soft cuff", (-impedance * caused, -impedance * through)
+    for ratio in CUFF_RATIOS:
+        soft = (1.0 / (1.0 + impedance / (ratio * K)))[:, None]
+        through = Problem(plain.instruments * soft, plain.regressors * soft, plain.target)
+        softer = -(impedance**2 * soft[:, 0] ** 2)
+        column = (plain.instruments[:, 2] * softer, plain.regressors[:, 2] * softer)
+        yield f"a soft cuff,{ratio}", _beside(through, column)
+
+
+def _beside(problem: Problem, column: tuple[Complex, Complex]) -> Problem:
+    """Return the problem with one more column."""
+    return Problem(
+        np.column_stack([problem.instruments, column[0]]),
+        np.column_stack([problem.regressors, column[1]]),
+        problem.target,
+    )
 
 
 def _pair(grid: Grid, simulated: Array, measured: Array) -> tuple[Complex, Complex]:
@@ -132,23 +153,36 @@ def _left_out(problems: Sequence[Problem]) -> list[Array]:
     left = [np.zeros(problem.target.size) for problem in problems]
     weights = [_weight(problem) for problem in problems]
     for half in (0, 1):
-        p = problems[0].regressors.shape[1]
-        gram, moment = np.zeros((p, p)), np.zeros(p)
-        for problem, weight in zip(problems, weights, strict=True):
-            used = _half(problem) == half
-            weighted = problem.instruments[used] * weight[used, None]
-            gram += (weighted.conj().T @ problem.regressors[used]).real
-            moment += (weighted.conj().T @ problem.target[used]).real
-        scale = np.sqrt(np.maximum(np.abs(np.diag(gram)), np.finfo(np.float64).tiny))
-        solution = np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale
-        for own, problem in zip(left, problems, strict=True):
-            unseen = _half(problem) != half
-            residual = problem.target[unseen] - problem.regressors[unseen] @ solution
-            own[unseen] = np.abs(residual) ** 2
+        used = [_half(problem) == half for problem in problems]
+        solution = _solved(
+            [_part(problem, rows) for problem, rows in zip(problems, used, strict=True)],
+            [weight[rows] for weight, rows in zip(weights, used, strict=True)],
+        )
+        for own, problem, rows in zip(left, problems, used, strict=True):
+            residual = problem.target[~rows] - problem.regressors[~rows] @ solution
+            own[~rows] = np.abs(residual) ** 2
     return left
 
 
-def _half(problem: Problem) -> Array:
+def _solved(problems: Sequence[Problem], weights: Sequence[Array] | None = None) -> Array:
+    """Return the parameters by instrumental variables."""
+    p = problems[0].regressors.shape[1]
+    gram, moment = np.zeros((p, p)), np.zeros(p)
+    for place, problem in enumerate(problems):
+        weight = weights[place] if weights is not None else _weight(problem)
+        weighted = problem.instruments * weight[:, None]
+        gram += (weighted.conj().T @ problem.regressors).real
+        moment += (weighted.conj().T @ problem.target).real
+    scale = np.sqrt(np.maximum(np.abs(np.diag(gram)), np.finfo(np.float64).tiny))
+    solution = np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale
+    return np.asarray(solution, dtype=np.float64)
+
+
+def _part(problem: Problem, rows: NDArray[np.bool_]) -> Problem:
+    return Problem(problem.instruments[rows], problem.regressors[rows], problem.target[rows])
+
+
+def _half(problem: Problem) -> NDArray[np.intp]:
     return np.asarray(np.arange(problem.target.size) // GROUP_LINES % 2)
 
 
