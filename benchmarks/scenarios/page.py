@@ -26,6 +26,7 @@ def summary(rows: Rows) -> list[str]:
             f"- `{method}`: {breaks.count('')} of {len(own)} rows keep the rule; "
             f"{breaks.count('silent, off')} are off by more than 10 % and silent, "
             f"{breaks.count('silent, too sure')} too sure and silent, "
+            f"{breaks.count('misnamed')} doubted by another finding, "
             f"{breaks.count('false doubt')} doubt in vain."
         )
     return lines
@@ -107,8 +108,9 @@ share of 95 % intervals that hold it. A doubt is a finding of level doubt or exc
 
 The rule: an answer is wrong if the mean error of J, B or K exceeds 10 % or an interval covers less
 than 80 %, in single epochs or pooled. It must then come with the right finding in at least 90 % of
-the recordings; if not, the row is **silent, off** or, within 10 %, **silent, too sure**. A right
-answer may be doubted in at most 5 % of the recordings, or it is a **false doubt**. Where the joint
-is not one J, B and K (it changes, or has another term), to say so is never false.
+the recordings; if not, the row is **silent, off** or, within 10 %, **silent, too sure**, and
+**misnamed** where other findings doubt it that often. A right answer may be doubted in at most 5 %
+of the recordings, or it is a **false doubt**. Where the joint is not one J, B and K (it changes, or
+has another term), to say so is never false. `tests/scenarios/catalogue.py` has the right findings.
 
 """

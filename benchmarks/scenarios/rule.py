@@ -78,6 +78,8 @@ class Row(NamedTuple):
             return "" if self.in_vain <= MOST_DOUBTED else "false doubt"
         if self.raised >= LEAST_RAISED:
             return ""
+        if self.doubted >= LEAST_RAISED:
+            return "misnamed"
         return "silent, off" if self.epochs.off or self.pooled.off else "silent, too sure"
 
 

@@ -28,7 +28,7 @@ def recording(error: float = 0.0, half_width: float = 0.05, doubts=(), pooled_do
         (recording(doubts=["tremor"]), "false doubt"),
         (recording(error=0.2, half_width=0.3), "silent, off"),
         (recording(error=0.02, half_width=0.01), "silent, too sure"),
-        (recording(error=0.2, doubts=["coherence"]), "silent, off"),
+        (recording(error=0.2, doubts=["coherence"]), "misnamed"),
         (recording(error=0.2, pooled_doubts=["tremor_line"]), ""),
     ],
 )
