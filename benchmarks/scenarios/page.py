@@ -111,6 +111,8 @@ than 80 %, in single epochs or pooled. It must then come with the right finding 
 the recordings; if not, the row is **silent, off** or, within 10 %, **silent, too sure**, and
 **misnamed** where other findings doubt it that often. A right answer may be doubted in at most 5 %
 of the recordings, or it is a **false doubt**. Where the joint is not one J, B and K (it changes, or
-has another term), to say so is never false. `tests/scenarios/catalogue.py` has the right findings.
+has another term), to say so is never false. A share breaks a limit where chance alone, from a true
+share at the limit, would do so in less than 1 of 20 cases. Which findings are right for a scenario
+is in `tests/scenarios/catalogue.py`.
 
 """

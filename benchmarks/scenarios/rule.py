@@ -4,6 +4,9 @@ The answer of a row is wrong if the mean error of J, B or K exceeds 10 %, or if 
 the 95 % intervals hold the truth, in single epochs or pooled. A wrong answer must come with the
 right finding in at least 90 % of the recordings; a right one may be doubted in at most 5 %. Where
 the joint is not one J, B and K, to say so is no false doubt even if their means are right.
+
+A share is above or below a limit where chance, if the true share were the limit, would take it that
+far in less than 1 of 20 cases (binomial): of a few recordings, one alone says little.
 """
 
 from __future__ import annotations
@@ -14,20 +17,36 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binom
 
 Array = NDArray[np.float64]
 LARGEST_ERROR = 0.10
 LEAST_COVERAGE = 0.80
 LEAST_RAISED = 0.90
 MOST_DOUBTED = 0.05
+CHANCE = 0.05
+
+
+def below(share: float, limit: float, n: int) -> bool:
+    """Whether a share of n is below a limit by more than chance."""
+    return bool(share < limit and binom.cdf(round(share * n), n, limit) < CHANCE)
+
+
+def above(share: float, limit: float, n: int) -> bool:
+    """Whether a share of n is above a limit by more than chance."""
+    return below(1.0 - share, 1.0 - limit, n)
 
 
 class Answer(NamedTuple):
-    """What estimates were, as shares of the truth, each of shape (3,); NaN without any."""
+    """What estimates were, as shares of the truth, each of shape (3,); NaN without any.
+
+    `count` is how many there were.
+    """
 
     bias: Array
     scatter: Array
     coverage: Array
+    count: int
 
     @property
     def off(self) -> bool:
@@ -37,7 +56,7 @@ class Answer(NamedTuple):
     @property
     def wrong(self) -> bool:
         """Whether J, B or K is off or its intervals do not hold; no answer is not wrong."""
-        return self.off or bool(np.any(self.coverage < LEAST_COVERAGE))
+        return self.off or any(below(x, LEAST_COVERAGE, self.count) for x in self.coverage)
 
 
 class Row(NamedTuple):
@@ -75,10 +94,10 @@ class Row(NamedTuple):
     def breaks(self) -> str:
         """How the row breaks the rule; empty where it does not."""
         if not self.wrong:
-            return "" if self.in_vain <= MOST_DOUBTED else "false doubt"
-        if self.raised >= LEAST_RAISED:
+            return "false doubt" if above(self.in_vain, MOST_DOUBTED, self.recordings) else ""
+        if not below(self.raised, LEAST_RAISED, self.recordings):
             return ""
-        if self.doubted >= LEAST_RAISED:
+        if not below(self.doubted, LEAST_RAISED, self.recordings):
             return "misnamed"
         return "silent, off" if self.epochs.off or self.pooled.off else "silent, too sure"
 
@@ -122,15 +141,15 @@ def row(kept: Sequence[dict[str, Any]], right: Sequence[str], other_model: bool 
 
 def _answer(fits: Sequence[dict[str, Any]], truth: Array) -> Answer:
     if not fits:
-        return Answer(*np.full((3, 3), np.nan))
+        return Answer(*np.full((3, 3), np.nan), 0)
     value, low, high = (
         np.array([fit[key] for fit in fits], dtype=float) for key in ("value", "low", "high")
     )
     there = np.isfinite(value).all(axis=1)
     if not there.any():
-        return Answer(*np.full((3, 3), np.nan))
+        return Answer(*np.full((3, 3), np.nan), 0)
     value, low, high, truth = value[there], low[there], high[there], truth[there]
     error = value / truth - 1.0
     # An interval that is not known holds nothing.
     held = (low <= truth) & (truth <= high)
-    return Answer(error.mean(axis=0), error.std(axis=0), held.mean(axis=0))
+    return Answer(error.mean(axis=0), error.std(axis=0), held.mean(axis=0), len(error))
