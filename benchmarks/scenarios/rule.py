@@ -25,6 +25,8 @@ LEAST_COVERAGE = 0.80
 LEAST_RAISED = 0.90
 MOST_DOUBTED = 0.05
 CHANCE = 0.05
+NOT_ONE_JOINT = ("varying", "missing_term", "lack_of_fit", "residual_perturbation", "loop_bias")
+"""What findings begin with that are never false where the joint is not one J, B and K."""
 
 
 def below(share: float, limit: float, n: int) -> bool:
@@ -122,9 +124,8 @@ def row(kept: Sequence[dict[str, Any]], right: Sequence[str], other_model: bool 
         {name for fit in (*one["fits"], *one["pooled"]) for name in fit["doubts"]} for one in kept
     ]
     said = [{name for name in names if name.startswith(tuple(right))} for names in found]
-    vain = [
-        names - known if other_model else names for names, known in zip(found, said, strict=True)
-    ]
+    true = (*right, *NOT_ONE_JOINT) if other_model else ()
+    vain = [{name for name in names if not name.startswith(true)} for names in found]
     counts = Counter(name for names in found for name in names)
     n = len(kept)
     return Row(

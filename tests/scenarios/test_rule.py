@@ -59,6 +59,8 @@ def test_to_say_that_a_joint_changed_is_no_false_doubt() -> None:
     said = recording(doubts=["varying_stiffness"])
     assert row([said] * 20, ["varying"]).breaks == "false doubt"
     assert row([said] * 20, ["varying"], other_model=True).breaks == ""
+    also = recording(doubts=["varying_stiffness", "lack_of_fit"])
+    assert row([also] * 20, ["varying"], other_model=True).breaks == ""
     both = recording(doubts=["varying_stiffness", "saturation"])
     assert row([both] * 20, ["varying"], other_model=True).breaks == "false doubt"
 
