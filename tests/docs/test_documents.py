@@ -120,7 +120,8 @@ def test_a_command_line_is_one_that_exists(where: str, words: list[str]) -> None
     if words[0] == "make":
         assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text("utf-8"), re.M), where
     elif words[:2] == ["python", "-m"]:
-        assert (ROOT / f"{words[2].replace('.', '/')}.py").is_file(), where
+        module = ROOT / words[2].replace(".", "/")
+        assert module.with_suffix(".py").is_file() or (module / "__main__.py").is_file(), where
     elif words[0] == "python":
         assert (ROOT / words[1]).is_file(), where
     elif words[0] == "rigidimeter":
