@@ -27,6 +27,9 @@ Complex = NDArray[np.complex128]
 FASTEST, SLOWEST = 6.0, 5e-4
 """In rad a tick: poles are sought between; a faster one leaves nothing to see at the ticks."""
 
+QUICKEST = 3.0
+"""In rad a tick: an oscillation beyond π a tick looks like a slower one at the ticks."""
+
 LONGEST_S, LONGEST_TICKS = 0.1, 4.0
 """The longest delay of a drive, the larger of both."""
 
@@ -171,13 +174,16 @@ def search(
 
     begin = _coordinates(structure, start, interval_s)
     x = found(begin, lambda x: solved(x[:-1], x[-1])[1])
-    if x[-1] > 0.0:
+    if 0.0 < x[-1] < LATER:
         return solved(x[:-1], x[-1])[0]
-    at_once = solved(found(x[:-1], lambda x: solved(x, 0.0)[1]), 0.0)[0]
-    # A short delay may lie behind a ridge.
-    x = found(np.append(begin[:-1], LATER), lambda x: solved(x[:-1], x[-1])[1])
-    later = solved(x[:-1], x[-1])[0]
-    return later if x[-1] > 0.0 and later.power < at_once.power else at_once
+    # No delay, a short one and a long one are valleys of their own.
+    valleys = [solved(found(begin[:-1], lambda x: solved(x, 0.0)[1]), 0.0)[0]]
+    if x[-1] <= 0.0:
+        valleys.append(solved(found(x[:-1], lambda x: solved(x, 0.0)[1]), 0.0)[0])
+        x = found(np.append(begin[:-1], LATER), lambda x: solved(x[:-1], x[-1])[1])
+    if x[-1] > 0.0:
+        valleys.append(solved(x[:-1], x[-1])[0])
+    return min(valleys, key=lambda one: one.power)
 
 
 def _coordinates(structure: Structure, start: DriveModel, interval_s: float) -> Array:
@@ -206,7 +212,7 @@ def _poles(coordinates: Array, interval_s: float) -> tuple[complex, ...]:
         if abs(root) < DOUBLE * a:
             root = complex(DOUBLE * a)
         if root.imag:
-            poles.append(complex(-a / 2, abs(root.imag)))
+            poles.append(complex(-a / 2, min(abs(root.imag), QUICKEST)))
         else:
             poles += [complex(-a / 2 - root.real), complex(-b / (a / 2 + root.real))]
     if coefficients.size % 2:
