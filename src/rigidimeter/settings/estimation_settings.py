@@ -151,7 +151,7 @@ class DiagnosticsSettings(Section):
     emg_baseline_factor: float = quantity(3.0, "1", 1.0, 1000.0, above=True)
     emg_active_most_percent: float = quantity(20.0, "%", 0.0, 100.0)
     varying_most_percent: float = quantity(10.0, "%", 0.0, 1000.0)
-    varying_chance: float = quantity(0.01, "1", 0.001, 0.5)
+    varying_chance: float = quantity(0.005, "1", 0.001, 0.5)
     saturated_most_percent: float = quantity(0.5, "%", 0.0, 100.0)
     frozen_most_s: float = quantity(0.1, "s", 0.0, 60.0)
     left_out_most_percent: float = quantity(50.0, "%", 0.0, 100.0)
