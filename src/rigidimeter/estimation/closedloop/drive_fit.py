@@ -4,7 +4,7 @@ Command and velocity are known almost without noise, so they show how the drive 
 does between the samples follows from that: the command is held from tick to tick, and the poles
 that the samples show go on between them. It matters because a torque that is sampled at the ticks
 sees the acceleration at the ticks, not its mean: with a drive of second order and 50 Hz at 1 kHz
-it is 0.8 % smaller than the samples of the velocity suggest, with a PI drive 12 %, and all of that
+it is 0.8 % smaller than the samples of the velocity suggest, with a PI drive 14 %, and all of that
 would be taken from J.
 
 No form of the drive is assumed. Those of `STRUCTURES` are fitted to one half of the samples and
