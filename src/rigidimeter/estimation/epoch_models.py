@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from rigidimeter.estimation.bandlimited import band_hz
 from rigidimeter.estimation.diagnostics import checked
-from rigidimeter.estimation.methods import choose_method, method_named
+from rigidimeter.estimation.methods import method_named
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import motion_channels
 from rigidimeter.estimation.stretches import longest_part
@@ -133,9 +133,12 @@ def _band_hz(prepared: PreparedEpoch, high_hz: float | None) -> tuple[float, flo
 
 
 def _estimate(prepared: PreparedEpoch) -> Fit:
-    """Return J, B and K as `estimate` gives them, with what the checks found."""
-    name, _ = choose_method([prepared])
-    (fit,), _ = method_named(name).fit([prepared], None, lambda _: None, False)
+    """Return J, B and K by least squares, as the models are fitted, with what the checks found.
+
+    By `iv` they would not be biased by torque of the subject's own, and checks would say so of
+    models that are.
+    """
+    (fit,), _ = method_named("bandlimited").fit([prepared], None, lambda _: None, False)
     return checked(prepared, fit)
 
 
