@@ -12,13 +12,13 @@ from rigidimeter.estimation.bandlimited import bandlimited_signals
 from rigidimeter.estimation.closedloop.observation import loop_of
 from rigidimeter.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
+from rigidimeter.estimation.diagnostics.computed_torque_checks import TORQUE_CHECKS
 from rigidimeter.estimation.diagnostics.controller_checks import CONTROLLER_CHECKS
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.estimation.diagnostics.missing_term import MISSING_TERM_CHECKS
 from rigidimeter.estimation.diagnostics.motion_checks import MOTION_CHECKS
 from rigidimeter.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
-from rigidimeter.estimation.diagnostics.torque_checks import TORQUE_CHECKS
 from rigidimeter.estimation.diagnostics.tremor_check import TREMOR_CHECKS
 from rigidimeter.estimation.diagnostics.varying_checks import VARYING_CHECKS
 from rigidimeter.estimation.least_squares_bias import compensated

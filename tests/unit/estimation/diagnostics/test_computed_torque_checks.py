@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.estimation import epoch_signals
-from rigidimeter.estimation.diagnostics.torque_checks import computed_torque, static_torque
+from rigidimeter.estimation.diagnostics.computed_torque_checks import computed_torque, static_torque
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings, EstimationSettings
 
