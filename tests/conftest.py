@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import gc
 import json
 import os
 import shutil
@@ -28,15 +27,6 @@ Simulate = Callable[..., Path]
 # The same examples in every run: a failure is the change's, not the day's.
 hypothesis.settings.register_profile("fixed", derandomize=True)
 hypothesis.settings.load_profile("fixed")
-
-
-def pytest_collection_finish() -> None:
-    """Leave what was imported out of later collections of garbage.
-
-    `statsmodels` collects at every adjustment of p values, 0.1 s in a process with all tests in it.
-    """
-    gc.collect()
-    gc.freeze()
 
 
 @pytest.fixture(scope="session")

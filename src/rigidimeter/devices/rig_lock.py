@@ -15,6 +15,7 @@ import hashlib
 import os
 import stat
 from collections.abc import Iterable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Self
 
@@ -51,12 +52,11 @@ class RigLock:
         UserError
             If another process holds one of them; says which, and what process that is.
         """
-        try:
+        with ExitStack() as on_failure:
+            on_failure.callback(self.close)
             for name in sorted({*names} - {*self._held}):
                 self._held[name] = self._locked(name)
-        except BaseException:
-            self.close()
-            raise
+            on_failure.pop_all()
 
     def close(self) -> None:
         """Give everything back; safe when repeated."""

@@ -11,7 +11,7 @@ import re
 import stat
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -55,22 +55,19 @@ def open_regular(path: Path, most_bytes: int) -> BinaryIO:
     try:
         _check(path, os.stat(path), most_bytes)
         # Another file may have this name by now; without O_NONBLOCK a pipe waits for its writer.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-        try:
-            _check(path, os.fstat(descriptor), most_bytes)
-        except BaseException:
-            os.close(descriptor)
-            raise
-        file = os.fdopen(descriptor, "rb")
-        try:
+        with ExitStack() as on_failure:
+            file = on_failure.enter_context(open(path, "rb", opener=_without_waiting))
+            _check(path, os.fstat(file.fileno()), most_bytes)
             _note(path, file)
-        except BaseException:
-            file.close()
-            raise
+            on_failure.pop_all()
         return file
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         reason = getattr(error, "strerror", None) or error
         raise UserError(f"{path}: cannot be read ({reason})") from None
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 @contextmanager

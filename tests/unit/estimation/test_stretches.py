@@ -12,11 +12,12 @@ from rigidimeter.estimation.bad_stretches import (
     saturated_stretches,
     without_bad_stretches,
 )
-from rigidimeter.estimation.closedloop.spectral_lines import _spread, epoch_grid
+from rigidimeter.estimation.closedloop.spectral_lines import epoch_grid
 from rigidimeter.estimation.diagnostics import checked
 from rigidimeter.estimation.methods import method_named
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.stretches import bridged, longest_part, sound, used_s
+from rigidimeter.estimation.window import repetition
 from rigidimeter.records import Channel, Epoch, LeftOut
 from rigidimeter.settings import Settings, parse_settings
 
@@ -204,9 +205,9 @@ def test_lines_do_not_see_what_is_left_out():
 def test_half_a_window_doubles_the_variance():
     """As many independent samples as the window holds, however many lines they are spread over."""
     window = np.ones(1000)
-    assert _spread(window) == pytest.approx(1.0)
+    assert repetition(window) == pytest.approx(1.0)
     window[::2] = 0.0
-    assert _spread(window) == pytest.approx(2.0)
+    assert repetition(window) == pytest.approx(2.0)
     assert epoch_grid(an_epoch(), (0.15, 20.0), 1.0).spread == 1.0
     half = replace(an_epoch(), left_out=(LeftOut(5.0, 15.0),))
     assert epoch_grid(half, (0.15, 20.0), 1.0).spread > 1.9

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.stats import bootstrap as scipy_bootstrap
+from statsmodels.stats.multitest import multipletests
 
 from rigidimeter.statistics import (
     compare_effects,
@@ -198,6 +199,11 @@ def test_holm_orders_and_keeps_what_is_no_test() -> None:
     assert holm([0.9, 0.8]) == (1.0, 1.0)
     assert holm([]) == ()
     assert math.isnan(holm([math.nan])[0])
+
+
+def test_holms_adjustment_is_that_of_statsmodels() -> None:
+    p = np.random.default_rng(0).uniform(size=9) ** 3
+    assert holm(p) == pytest.approx(multipletests(p, method="holm")[1])
 
 
 def test_what_cannot_be_resampled_is_refused() -> None:

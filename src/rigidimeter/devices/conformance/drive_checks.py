@@ -6,6 +6,7 @@ import itertools
 import math
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 
 from rigidimeter.devices.base import MotionSample, VelocityDrive
 from rigidimeter.devices.conformance.fixture import (
@@ -223,13 +224,12 @@ def drive_restarts_at_rest(fixture: DriveFixture) -> None:
 
 def _enabled(fixture: DriveFixture) -> VelocityDrive:
     drive = fixture.make()
-    try:
+    with ExitStack() as on_failure:
+        on_failure.callback(drive.close)
         drive.connect()
         drive.configure()
         drive.enable()
-    except BaseException:
-        drive.close()
-        raise
+        on_failure.pop_all()
     return drive
 
 

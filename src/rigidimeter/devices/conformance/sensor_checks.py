@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 
 from rigidimeter.devices.base import TorqueSample, TorqueSensor
 from rigidimeter.devices.conformance.fixture import (
@@ -114,13 +115,12 @@ def sensor_connects_again(fixture: SensorFixture) -> None:
 
 def _sampling(fixture: SensorFixture) -> TorqueSensor:
     sensor = fixture.make()
-    try:
+    with ExitStack() as on_failure:
+        on_failure.callback(sensor.close)
         sensor.connect()
         sensor.configure()
         wait_for(lambda: math.isfinite(sensor.read().torque_nm), fixture, "a first sample arrives")
-    except BaseException:
-        sensor.close()
-        raise
+        on_failure.pop_all()
     return sensor
 
 

@@ -37,6 +37,7 @@ from rigidimeter.estimation.closedloop.between_samples import (
 )
 from rigidimeter.estimation.closedloop.drive_motion import driven
 from rigidimeter.estimation.signals import Array, kinematics, motion_channels, spline, uniform_grid
+from rigidimeter.estimation.window import repetition, tapered_ends, with_hole
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import FEWEST_LINES
 
@@ -66,7 +67,7 @@ class Grid:
         Σ w e^(−iωt): what a constant would leave at the lines.
     spread : float
         What is left out makes neighbouring lines alike. By this factor the variance of an estimate
-        is then larger than independent lines would have it (`_spread`).
+        is then larger than independent lines would have it (`window.repetition`).
     """
 
     time_s: Array
@@ -182,16 +183,16 @@ def _layout(
             f"{duration_s:.3g} s hold {line.size} spectral lines from {low:g} to {high:g} Hz; "
             f"at least {FEWEST_LINES} are needed"
         )
-    whole, slope = _taper(n, rate_hz, taper_s)
+    whole, slope = tapered_ends(n, rate_hz, taper_s)
     window = whole
     for hole_s in holes_s:
-        window, slope = _with_hole(window, slope, rate_hz, taper_s, hole_s)
+        window, slope = with_hole(window, slope, rate_hz, taper_s, hole_s)
     spectrum = np.asarray(fft.rfft(window)[line], dtype=np.complex128)
     energy = float(np.sum(window * window))
     omega = np.asarray(2 * np.pi * line / duration_s, dtype=np.float64)
     for part in (window, slope, line, omega, spectrum):
         part.setflags(write=False)
-    spread = _spread(window) / _spread(whole) if holes_s else 1.0
+    spread = repetition(window) / repetition(whole) if holes_s else 1.0
     return window, slope, line, omega, energy, spectrum, spread
 
 
@@ -306,42 +307,3 @@ def _times(torque: Channel, used: list[Channel]) -> tuple[Array, float]:
         if np.max(np.abs(own - even)) < SAME_TIME / rate_hz:
             return own, (own.size - 1) / float(own[-1] - own[0])
     return uniform_grid(used, rate_hz), rate_hz
-
-
-def _taper(n: int, rate_hz: float, taper_s: float) -> tuple[Array, Array]:
-    """Return a window with raised-cosine ends, and its slope."""
-    centre_s = (np.arange(n) + 0.5) / rate_hz
-    window, steep = _edge(np.minimum(centre_s, n / rate_hz - centre_s), taper_s)
-    rising = np.arange(n) < n / 2
-    return window, np.where(rising, steep, -steep)
-
-
-def _with_hole(
-    window: Array, slope: Array, rate_hz: float, taper_s: float, hole_s: tuple[float, float]
-) -> tuple[Array, Array]:
-    """Return a window times one that is zero in a hole and rises from it, and its slope."""
-    at_s = np.arange(window.size) / rate_hz
-    start_s, stop_s = hole_s
-    factor, steep = _edge(np.maximum(np.maximum(start_s - at_s, at_s - stop_s), 0.0), taper_s)
-    factor[(at_s >= start_s) & (at_s <= stop_s)] = 0.0
-    signed = np.where(at_s < start_s, -steep, steep)
-    return window * factor, slope * factor + window * signed
-
-
-def _edge(distance_s: Array, taper_s: float) -> tuple[Array, Array]:
-    """Return a raised cosine of the distance from an edge, and its slope."""
-    n = distance_s.size
-    phase = np.pi * np.minimum(distance_s / taper_s, 1.0) if taper_s > 0 else np.full(n, np.pi)
-    steep = 0.5 * np.pi / taper_s * np.sin(phase) if taper_s > 0 else np.zeros(n)
-    return 0.5 - 0.5 * np.cos(phase), steep
-
-
-def _spread(window: Array) -> float:
-    """Return n Σ w⁴ / (Σ w²)².
-
-    Noise and signal are both seen through the window, so the sum of their products over the lines
-    is one over time weighted by w⁴ (Parseval), while independent lines of noise with the power
-    Σ w² would give (Σ w²)² / n.
-    """
-    square = window * window
-    return float(window.size * np.sum(square * square) / np.sum(square) ** 2)

@@ -67,10 +67,11 @@ def left_out(epoch: Epoch) -> Look:
     return Look(value, 0.0, True, fact, f"{reasons or 'no reason was given'}; {_rest(epoch)}")
 
 
-def said_left_out(check: str) -> Callable[[Case], str]:
+def said_left_out(check: str) -> Callable[[Case, Look], str]:
     """Return what says that the stretches which a check found are left out; else nothing."""
 
-    def said(case: Case) -> str:
+    def said(case: Case, look: Look) -> str:
+        del look
         found = _left_out(case.epoch, check)
         return f"left out, {_spans(found)}; {_rest(case.epoch)}" if found else ""
 

@@ -31,8 +31,9 @@ def half_widths(fit: Fit) -> Array:
     return np.where(np.isfinite(half), half, np.abs(fit.value) * UNKNOWN_WIDTH)
 
 
-def push_harmless(case: Case) -> str:
+def push_harmless(case: Case, look: Look) -> str:
     """Return why torque of the subject's own does not bias the estimate; empty where it does."""
+    del look
     if case.uses_perturbation and case.method is not None:
         return (
             f"{case.method.name} uses the motion that the perturbation causes alone, so J, B and K "
@@ -44,9 +45,9 @@ def push_harmless(case: Case) -> str:
     return ""
 
 
-def never(case: Case) -> str:
+def never(case: Case, look: Look) -> str:
     """Return that a failed check is not harmless."""
-    del case
+    del case, look
     return ""
 
 
@@ -191,7 +192,7 @@ class Check:
     meaning: str
     remedy: str
     of_fit: bool = True
-    harmless: Callable[[Case], str] = never
+    harmless: Callable[[Case, Look], str] = never
 
     def looks(self, case: Case) -> Look | None:
         """Return what the check sees, or None where it lacks what it needs."""

@@ -91,13 +91,13 @@ def _command_rad_s(epoch: Epoch, loop: Loop, ticks_s: Array, rate_hz: float) -> 
     return np.asarray(signal.lfilter([gain], [1.0, -decay], asked), dtype=np.float64)
 
 
-def _harmless(case: Case) -> str:
+def _harmless(case: Case, look: Look) -> str:
     """Return why a wrong controller does not bias the estimate; empty where it does."""
     if case.method is not None and case.method.assumes_controller:
         return ""
     if case.uses_perturbation and case.method is not None:
         return f"{case.method.name} is less precise with it, not biased"
-    return push_harmless(case)
+    return push_harmless(case, look)
 
 
 CONTROLLER_CHECKS = (

@@ -61,7 +61,7 @@ def diagnose(case: Case, seen: Mapping[str, Look | None] | None = None) -> tuple
     for check in CHECKS:
         look = seen[check.name] if check.name in seen else check.looks(case)
         if look is not None:
-            reason = check.harmless(case) if look.failed else ""
+            reason = check.harmless(case, look) if look.failed else ""
             found.append(check.finding(look, case.settings, reason))
     return tuple(found)
 

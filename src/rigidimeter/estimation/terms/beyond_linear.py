@@ -30,6 +30,7 @@ from scipy import fft
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
 from rigidimeter.estimation.terms.reflex import kernel, stretch_velocity
+from rigidimeter.estimation.window import tapered_ends
 
 Complex = NDArray[np.complex128]
 
@@ -223,7 +224,7 @@ def beyond_linear(
         )
     each = count // stretches
     used = each * stretches
-    window = _taper(n, rate_hz, taper_s)
+    window, _ = tapered_ends(n, rate_hz, taper_s)
     linear = [
         _lines(values, window, first, used).reshape(stretches, each)
         for values in (motion.acceleration_rad_s2, motion.velocity_rad_s, motion.angle_rad)
@@ -257,10 +258,3 @@ def _without(parts: Complex, basis: Complex) -> Complex:
 def _lines(values: Array, window: Array, first: int, count: int) -> Complex:
     spectrum = fft.rfft(window * (values - np.mean(values)))
     return np.asarray(spectrum[first : first + count], dtype=np.complex128)
-
-
-def _taper(n: int, rate_hz: float, taper_s: float) -> Array:
-    centre_s = (np.arange(n) + 0.5) / rate_hz
-    edge_s = np.minimum(centre_s, n / rate_hz - centre_s)
-    phase = np.minimum(edge_s / taper_s, 1.0) if taper_s > 0 else np.ones(n)
-    return np.asarray(0.5 - 0.5 * np.cos(np.pi * phase), dtype=np.float64)

@@ -2,8 +2,9 @@
 
 The record is cut into blocks in a row; each is predicted by a fit to the others, without a gap at
 each side of it, over which filters and reflexes remember. Two models are compared by the
-differences of their squared errors, block by block: what is difficult for both then cancels
-(Diebold and Mariano 1995). The mean difference has an interval by Student's t.
+ratio R of their squared errors, summed over the blocks, each block with its pair: what is difficult
+for both then cancels (Diebold and Mariano 1995). The gain is 1 − R. ln R has an interval by the
+jackknife over the blocks with Student's t, so that no gain can pass 100 %.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ BLOCK_S = 1.0
 FEWEST_BLOCKS, MOST_BLOCKS = 8, 24
 LARGEST_GAP = 1.0
 """Of a block: a short record must keep something to fit."""
+
+SMALLEST_RATIO = 1e-12
+"""Of squared errors: less is rounding."""
 
 
 class Gain(NamedTuple):
@@ -98,9 +102,10 @@ def gain(smaller: Array, larger: Array, comparisons: int = 1) -> Gain:
     comparisons : int
         The interval is one of so many that hold together with 95 % (Bonferroni).
     """
-    scale = 100.0 / float(np.mean(smaller))
-    difference = scale * (smaller - larger)
-    spread = float(np.std(difference, ddof=1)) / np.sqrt(difference.size)
-    half = float(stats.t.ppf(1 - 0.025 / comparisons, difference.size - 1)) * spread
-    middle = float(np.mean(difference))
-    return Gain(middle, middle - half, middle + half)
+    total, rest = np.sum(smaller), np.sum(larger)
+    blocks_used = smaller.size
+    without = np.log(np.maximum((rest - larger) / (total - smaller), SMALLEST_RATIO))
+    spread = np.sqrt((blocks_used - 1) / blocks_used * np.sum((without - np.mean(without)) ** 2))
+    half = float(stats.t.ppf(1 - 0.025 / comparisons, blocks_used - 1) * spread)
+    ratio = max(float(rest / total), SMALLEST_RATIO)
+    return Gain(*(100.0 * (1.0 - ratio * np.exp(power)) for power in (0.0, half, -half)))

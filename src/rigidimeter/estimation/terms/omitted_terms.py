@@ -25,6 +25,7 @@ from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.terms.beyond_linear import BeyondLinear, Complex, Solution
 from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
 from rigidimeter.estimation.terms.reflex import kernel, pass_through, stretch_velocity
+from rigidimeter.statistics import holm
 
 TESTED = ("coulomb", "damping+", "cubic", "quadratic", "reflex+")
 
@@ -93,7 +94,7 @@ def omitted_terms(beyond: BeyondLinear) -> tuple[OmittedTerm, ...]:
         base = beyond.solve(_columns(beyond, found))
         adjusted = holm([_p(beyond, found, name, base) for name in left])
         fits = [
-            (*_best(beyond, found, name), float(p))
+            (*_best(beyond, found, name), p)
             for name, p in zip(left, adjusted, strict=True)
             if p < CHANCE
         ]
@@ -113,19 +114,6 @@ def omitted_terms(beyond: BeyondLinear) -> tuple[OmittedTerm, ...]:
             found, whole.values, whole.standard_errors, chances, strict=True
         )
     )
-
-
-def holm(p: Sequence[float]) -> Array:
-    """Return probabilities adjusted for their number by Holm's method, shape (n,).
-
-    That of statsmodels collects all garbage first, which takes longer than all tests of an epoch.
-    """
-    values = np.asarray(p)
-    order = np.argsort(values)
-    stepped = np.maximum.accumulate(values[order] * np.arange(values.size, 0, -1))
-    adjusted = np.empty(values.size)
-    adjusted[order] = np.minimum(stepped, 1.0)
-    return adjusted
 
 
 def _named(term: _Found, value: float, error: float, p: float) -> OmittedTerm:

@@ -112,13 +112,23 @@ class TestHeldOut:
         assert errors[0] == pytest.approx(100 * 4.0)
         assert errors[1:] == pytest.approx(np.full(7, 100 * (2 / 7) ** 2))
 
-    def test_a_gain_is_the_mean_difference_with_its_interval(self):
+    def test_a_gain_is_what_is_left_of_the_error_with_its_interval(self):
         smaller, larger = np.array([4.0, 4.0, 4.0, 4.0]), np.array([3.0, 2.0, 2.0, 1.0])
         found = gain(smaller, larger)
         assert found.percent == pytest.approx(50.0)
-        # Student's t with 3 degrees of freedom: 3.182; the SD of 25, 50, 50, 75 is 20.41.
-        assert found.low_percent == pytest.approx(50.0 - 3.1824 * 20.412 / 2, rel=1e-3)
+        # Without each block in turn 5, 6, 6 and 7 of 12 are left; Student's t, 3 degrees: 3.182.
+        left = np.log(np.array([5, 6, 6, 7]) / 12)
+        half = 3.1824 * np.sqrt(3 / 4 * np.sum((left - left.mean()) ** 2))
+        assert found.low_percent == pytest.approx(100 - 50 * np.exp(half), rel=1e-3)
+        assert found.high_percent == pytest.approx(100 - 50 * np.exp(-half), rel=1e-3)
         assert gain(smaller, larger, 5).low_percent < found.low_percent
+
+    def test_no_gain_passes_100_percent(self):
+        """Blocks of very different size: their mean difference would have a wide interval."""
+        smaller = np.array([900.0, 2.0, 1.0, 30.0, 5.0, 2.0, 400.0, 1.0])
+        found = gain(smaller, 5e-4 * smaller)
+        assert found == pytest.approx((99.95, 99.95, 99.95))
+        assert gain(smaller, np.zeros(8)).high_percent <= 100
 
 
 class TestRecommended:

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from statsmodels.stats.multitest import multipletests
 
 from rigidimeter.estimation import Signals
 from rigidimeter.estimation.terms.beyond_linear import beyond_linear
-from rigidimeter.estimation.terms.omitted_terms import holm, omitted_terms
+from rigidimeter.estimation.terms.omitted_terms import omitted_terms
 
 RATE_HZ = 200.0
 BAND_HZ = (0.3, 20.0)
@@ -98,8 +97,3 @@ def test_a_direction_is_that_of_the_motion_and_not_of_the_name():
     )
     (found,) = omitted_terms(beyond_linear(turned, BAND_HZ))
     assert found.name == "reflex-"
-
-
-def test_holms_adjustment_is_that_of_statsmodels():
-    p = np.random.default_rng(0).uniform(size=9) ** 3
-    np.testing.assert_allclose(holm(p), multipletests(p, method="holm")[1])
