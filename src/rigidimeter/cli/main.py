@@ -22,6 +22,7 @@ from rigidimeter.cli.compare import compare
 from rigidimeter.cli.design import design
 from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
+from rigidimeter.cli.export import export
 from rigidimeter.cli.model import model
 from rigidimeter.cli.options import RegistryCommand
 from rigidimeter.cli.output import VisibleErrors, echo
@@ -109,6 +110,7 @@ for command in (
     compare,
     ratings,
     report,
+    export,
     reproduce,
     recover,
     demo,

@@ -42,6 +42,11 @@ class RegistryCommand(TyperCommand):
                     "auto (iv where the perturbation was recorded, else bandlimited), or one of: "
                     f"{known}."
                 )
+            if isinstance(parameter, TyperOption) and "--to" in parameter.opts:
+                from rigidimeter.exporting import FORMATS
+
+                known = ", ".join(f"{each.name} ({each.title})" for each in FORMATS)
+                parameter.help = f"The format: {known}."
             if isinstance(parameter, TyperOption) and "--terms" in parameter.opts:
                 from rigidimeter.estimation.terms import term_names
 

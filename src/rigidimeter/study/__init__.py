@@ -25,7 +25,7 @@ from rigidimeter.study.results import (
     SessionEntry,
     StudyResult,
 )
-from rigidimeter.study.study_analysis import analyse_study, read_study
+from rigidimeter.study.study_analysis import analyse_study, estimate_study, read_study
 from rigidimeter.study.tables import comparison_document, result_tables, table_csv
 from rigidimeter.study.verdict import (
     Dependence,
@@ -70,6 +70,7 @@ __all__ = [
     "dependences",
     "doubt_sentence",
     "estimate",
+    "estimate_study",
     "keep",
     "leader",
     "provenance",

@@ -205,6 +205,23 @@ def analyse_study(
     )
 
 
+def estimate_study(
+    read: StudyRead, progress: Progress = lambda _: None
+) -> tuple[Analysis, list[Notice]]:
+    """Estimate and score every epoch of a study, without comparing anything.
+
+    Parameters
+    ----------
+    read : StudyRead
+    progress : callable
+        Called with the share of the work that was done since, 1 in all.
+    """
+    sessions = {s.entry.source: s.entry for s in read.gathered.sessions}
+    subjects = _by_subject(read.epochs, sessions, read.settings)
+    work = sum(own.work([read.method]) for own in subjects.values()) or 1.0
+    return _analysed(subjects, read.method, lambda done: progress(done / work))
+
+
 def _by_subject(
     epochs: Sequence[Epoch], sessions: Mapping[str, SessionEntry], settings: Settings
 ) -> dict[str, Preparation]:

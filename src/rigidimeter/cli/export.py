@@ -1,0 +1,114 @@
+"""`rigidimeter export`: recordings and studies in the formats of archives and other programs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rigidimeter.cli.inputs import analyse_recordings, say, study_of
+from rigidimeter.cli.options import KeyOption, Recordings, reads_recordings
+from rigidimeter.cli.output import echo
+from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.recording.exported_session import ExportedSession
+
+
+@reads_recordings
+def export(
+    recordings: Recordings,
+    to: Annotated[str, typer.Option("--to", metavar="FORMAT", help="The format.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", metavar="PATH", help="What to write: one file, or a folder of several."
+        ),
+    ],
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace files of the same name.")
+    ] = False,
+    estimates: Annotated[
+        bool,
+        typer.Option("--estimates/--no-estimates", help="Whether J, B, K and scores travel along."),
+    ] = True,
+    subject: Annotated[
+        str, typer.Option("--subject", metavar="NAME", help="The subject of single recordings.")
+    ] = "",
+    day: Annotated[
+        str, typer.Option("--day", metavar="NAME", help="The day of single recordings.")
+    ] = "",
+    key: KeyOption = None,
+) -> None:
+    """Write session folders, recordings or a study in another format.
+
+    Each sensor keeps its own clock, values are in SI units, and settings, stimulation, ratings,
+    exclusions, estimates with intervals and the version of the software travel along. A recording
+    that was simulated says so. Of a study folder every session that counts is written, with codes
+    in place of conditions where there is no key.
+
+    \b
+    For example:
+      rigidimeter export session --to parquet --out session-parquet
+      rigidimeter export demo-study --to mat --out matlab
+      rigidimeter export elbow.csv --epoch-length-s 20 --to mat --out elbow.mat --subject S1
+    """
+    from rigidimeter.cli.progress import Meter
+    from rigidimeter.exporting import export_sessions, format_named
+
+    format_named(to)
+    if any((folder / "manifest.json").exists() for folder in (out, *out.resolve().parents)):
+        raise UserError(f"--out {out}: is or lies in a session folder, which never changes again")
+    study = study_of(recordings, key)
+    if study is not None:
+        for option, value in (("--subject", subject), ("--day", day)):
+            if value:
+                raise UserError(f"{option} {value}: is for single recordings; a study has its own")
+        sessions, status = _of_study(study, recordings, key, estimates=estimates)
+    else:
+        sessions, status = _of_recordings(recordings, subject, day, estimates=estimates)
+    with Meter("export", 1.0) as meter:
+        written = export_sessions(sessions, to, out, overwrite=overwrite, progress=meter.advance)
+    several = "" if len(sessions) == 1 else f"{len(sessions)} sessions, "
+    n_bytes = sum(path.stat().st_size for path in written)
+    files = "1 file" if len(written) == 1 else f"{len(written)} files"
+    echo(f"{out}: {several}{files}, {n_bytes / 1e6:.3g} MB")
+    raise typer.Exit(status)
+
+
+def _of_recordings(
+    recordings: Recordings, subject: str, day: str, *, estimates: bool
+) -> tuple[list[ExportedSession], int]:
+    from rigidimeter.exporting import sessions_of_recording
+
+    if estimates:
+        read, analysis, status = analyse_recordings(recordings)
+        return sessions_of_recording(read, analysis, subject=subject, day=day), status
+    read = recordings.read()
+    say(read.notices)
+    return sessions_of_recording(read, None, subject=subject, day=day), int(read.failed)
+
+
+def _of_study(
+    folder: Path, recordings: Recordings, key: Path | None, *, estimates: bool
+) -> tuple[list[ExportedSession], int]:
+    from rigidimeter.cli.progress import Meter
+    from rigidimeter.exporting import sessions_of_study
+    from rigidimeter.settings import load_settings
+    from rigidimeter.study import estimate_study, read_study
+
+    chosen = load_settings(recordings.settings) if recordings.settings is not None else None
+    with Meter("read", 1.0) as meter:
+        read = read_study(
+            folder, key=key, settings=chosen, method=recordings.method, progress=meter.advance
+        )
+    read = replace(read, settings=recordings.adjust(read.settings))
+    notices, analysis = list(read.notices), None
+    if estimates:
+        with Meter("estimate", 1.0) as meter:
+            analysis, found = estimate_study(read, meter.advance)
+        notices += found
+    say(notices)
+    return sessions_of_study(read, analysis), int(any(n.level == "error" for n in notices))

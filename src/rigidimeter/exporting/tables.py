@@ -1,0 +1,60 @@
+"""Folders of tables: a CSV or Parquet file for each clock, others for epochs and estimates.
+
+`session.json` holds the whole document.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+
+from rigidimeter.documents import csv_text, write_json, write_text
+from rigidimeter.exporting.document_tables import document_tables
+from rigidimeter.recording.exported_session import DOCUMENT, ExportedSession, Stream
+
+
+def write_csv(session: ExportedSession, folder: Path) -> None:
+    """Write a folder of CSV tables; a number that is missing is an empty cell."""
+    options = pa.csv.WriteOptions(quoting_style="none")
+
+    def write(table: pa.Table, path: Path) -> None:
+        pa.csv.write_csv(table, path, write_options=options)
+
+    _write(session, folder, ".csv", write)
+
+
+def write_parquet(session: ExportedSession, folder: Path) -> None:
+    """Write a folder of Parquet tables, each column with its unit in the schema."""
+    _write(session, folder, ".parquet", lambda table, path: pa.parquet.write_table(table, path))
+
+
+def _write(
+    session: ExportedSession,
+    folder: Path,
+    suffix: str,
+    write: Callable[[pa.Table, Path], None],
+) -> None:
+    folder.mkdir()
+    for stream in session.streams:
+        write(stream_table(stream, session.about["units"]), folder / f"{stream.name}{suffix}")
+    for name, rows in document_tables(session.about).items():
+        columns = list(dict.fromkeys(key for row in rows for key in row))
+        write_text(folder / f"{name}.csv", csv_text(columns, rows))
+    write_json(folder / DOCUMENT, session.about)
+
+
+def stream_table(stream: Stream, units: Mapping[str, Any]) -> pa.Table:
+    """Return a stream as an Arrow table; a missing number is null, a unit metadata of its field."""
+    columns = {"time_s": stream.time_s, **stream.columns}
+    known = {"time_s": "s", **units}
+    fields, arrays = [], []
+    for name, values in columns.items():
+        array = pa.array(values, from_pandas=True)
+        fields.append(pa.field(name, array.type, metadata={"unit": str(known.get(name, "1"))}))
+        arrays.append(array)
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
