@@ -4,57 +4,36 @@ A documented experiment on the virtual rig, per-degree controller, from fixed se
 
     python -m benchmarks.accuracy
 
-about half an hour on a busy core; the tables go to `docs/reference/accuracy.md`. With a number it
-takes that fraction of the runs, for a quick look that writes nothing.
+about half an hour on a busy core; the tables go to `docs/reference/accuracy.md`.
+
+    python -m benchmarks.accuracy --share 0.1               # fewer runs; writes nothing
+    python -m benchmarks.accuracy --only relaxed delay      # these sections of the page alone
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Iterator, Sequence
+import argparse
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rigidimeter.dynamics.joint import JointDynamics
+from benchmarks.known_joint import TRUTH, array, sessions, settings_with
 from rigidimeter.estimation import estimate_delays, fit_epochs
 from rigidimeter.estimation.closedloop.linear_problems import least_squares_start
 from rigidimeter.estimation.closedloop.perturbation_methods import CLOSED_LOOP
 from rigidimeter.estimation.closedloop.refine import fit_pooled
 from rigidimeter.estimation.prepared import PreparedEpoch, Source, prepare
+from rigidimeter.experiment import prbs_nm, predicted_precision
 from rigidimeter.records import Channel, Epoch, Fit
-from rigidimeter.settings import EstimationSettings, Settings, parse_settings
-from rigidimeter.virtual.batch import simulate_chunks
+from rigidimeter.settings import USABLE_FRACTION_OF_RATE, Settings
 from rigidimeter.virtual.study_design import PAPER_RATES
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "accuracy.md"
-NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
-JOINT = JointDynamics(0.0045, 0.1368, 1.751)
-TRUTH = np.array([JOINT.inertia_kg_m2, JOINT.damping_nm_s_rad, JOINT.stiffness_nm_rad])
-SESSION = 25
-"""Epochs that are fitted together, as those of a session would be."""
-
-
-def settings_with(voluntary_sd_nm: float = 0.0, **rig: Any) -> Settings:
-    """Return the defaults with a subject of known joint."""
-    return parse_settings(
-        {
-            "subject": {"OFF": {"voluntary_sd_nm": voluntary_sd_nm}},
-            "protocol": {"blocks": [{"epochs": 1}]},
-            "rig": rig,
-        }
-    )
-
-
-def sessions(settings: Settings, n: int, seed: int) -> Iterator[list[Epoch]]:
-    """Yield epochs in sessions."""
-    joints = [JOINT] * n
-    for batch in simulate_chunks(
-        settings, n, chunk=SESSION, joints=joints, conditions="OFF", seed=seed, workers=2
-    ):
-        yield [batch.epoch(i) for i in range(len(batch))]
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
@@ -70,11 +49,6 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
 def percent(values: Iterable[float], digits: int = 2) -> list[str]:
     """Return shares as percentages with a sign."""
     return [f"{100 * value:+.{digits}f}" for value in values]
-
-
-def array(fits: Sequence[Fit], ending: str = "") -> np.ndarray:
-    """Return one number of each parameter, shape (fits, 3)."""
-    return np.array([[getattr(fit, name + ending) for name in NAMES] for fit in fits])
 
 
 def pooled_bias(n: int) -> list[str]:
@@ -126,58 +100,67 @@ def pooled_bias(n: int) -> list[str]:
     ]
 
 
-def efficiency(n: int) -> list[str]:
-    """Scatter against the bound, bias in SDs, coverage; white noise, then voluntary torque."""
-    out = [
-        "## Scatter, bias and coverage of single epochs",
+def bounds(settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+    """Return the Cramér–Rao bound over all frequencies, and what the end of the band costs.
+
+    That is the predicted standard error of `iv` within its band over that up to the highest
+    frequency that the torque's rate allows. Each has shape (3,).
+    """
+
+    def predicted(high_hz: float) -> Any:
+        estimation = settings.estimation.model_copy(update={"band_high_closed_loop_hz": high_hz})
+        within = settings.model_copy(update={"estimation": estimation})
+        torque_nm = prbs_nm(within.prbs, within.rig.tick_rate_hz)
+        return predicted_precision(torque_nm, within, within.subject["OFF"])
+
+    cut = predicted(settings.estimation.band_high_closed_loop_hz)
+    uncut = predicted(USABLE_FRACTION_OF_RATE * settings.rig.torque.rate_hz)
+    return np.array(cut.bound.free), np.array(cut.iv.free) / np.array(uncut.iv.free)
+
+
+def efficiency(title: str, voluntary_sd_nm: float, methods: Sequence[str], n: int) -> list[str]:
+    """Scatter against the bounds, bias in SDs, coverage."""
+    settings = settings_with(voluntary_sd_nm)
+    fits: dict[str, list[Fit]] = {method: [] for method in methods}
+    alone: list[Fit] = []
+    for epochs in sessions(settings, n, 12):
+        for method in methods:
+            fits[method] += fit_epochs(epochs, method, settings)[0]
+        alone += [fit_epochs([epoch], "iv", settings)[0][0] for epoch in epochs]
+    bound = np.median(array(fits["iv"], "_bound"), 0)
+    everywhere, cost = bounds(settings)
+    rows = []
+    for method, found in [*fits.items(), ("iv, each epoch alone", alone)]:
+        good = [fit for fit in found if fit.n_samples]
+        values = array(good)
+        spread = values.std(0, ddof=1)
+        covered = (array(good, "_low") <= TRUTH) & (array(good, "_high") >= TRUTH)
+        rows.append(
+            [
+                method,
+                " ".join(f"{x:.2f}" for x in spread / bound),
+                " ".join(f"{x:.2f}" for x in spread / everywhere),
+                " ".join(f"{x:+.2f}" for x in (values.mean(0) - TRUTH) / spread),
+                " ".join(f"{100 * x:.1f}" for x in covered.mean(0)),
+                " ".join(f"{100 * x:.3g}" for x in spread / TRUTH),
+            ]
+        )
+    return [
+        f"### {title}, {n} runs",
         "",
-        f"Sessions of {SESSION} epochs of 20 s. SD relative to the Cramér–Rao bound within the "
-        f"band of iv, {EstimationSettings().band_high_closed_loop_hz:g} Hz (`rigidimeter design` "
-        "prints the bound over all frequencies); bias in SDs of an "
-        "epoch; coverage of 95 % intervals in %. Each for J, B, K.",
+        f"Bound within the band: {_shares(bound)}; over all frequencies: {_shares(everywhere)}. "
+        f"The end of the band at {settings.estimation.band_high_closed_loop_hz:g} Hz makes the "
+        f"predicted standard errors of iv {cost[0]:.2f}, {cost[1]:.2f} and {cost[2]:.2f} times "
+        "those without it.",
         "",
-    ]
-    for title, sd, methods, draws in (
-        (
-            "White sensor noise of 5 mN·m, 1 kHz",
-            0.0,
-            ("iv", "ml", "spectral", "bandlimited", "published"),
-            n,
+        *table(
+            ["method", "SD / bound", "SD / bound, all", "bias / SD", "coverage (%)", "SD (%)"], rows
         ),
-        ("Voluntary torque of 0.2 N·m", 0.2, ("iv", "ml", "spectral", "bandlimited"), n),
-        ("Voluntary torque of 0.5 N·m", 0.5, ("iv", "ml"), n),
-    ):
-        settings = settings_with(sd)
-        fits: dict[str, list[Fit]] = {method: [] for method in methods}
-        alone: list[Fit] = []
-        for epochs in sessions(settings, draws, 12):
-            for method in methods:
-                fits[method] += fit_epochs(epochs, method, settings)[0]
-            alone += [fit_epochs([epoch], "iv", settings)[0][0] for epoch in epochs]
-        bound = np.median(array(fits["iv"], "_bound"), 0)
-        rows = []
-        for method, found in [*fits.items(), ("iv, each epoch alone", alone)]:
-            good = [fit for fit in found if fit.n_samples]
-            values = array(good)
-            spread = values.std(0, ddof=1)
-            covered = (array(good, "_low") <= TRUTH) & (array(good, "_high") >= TRUTH)
-            rows.append(
-                [
-                    method,
-                    " ".join(f"{x:.2f}" for x in spread / bound),
-                    " ".join(f"{x:+.2f}" for x in (values.mean(0) - TRUTH) / spread),
-                    " ".join(f"{100 * x:.1f}" for x in covered.mean(0)),
-                    " ".join(f"{100 * x:.3g}" for x in spread / TRUTH),
-                ]
-            )
-        out += [
-            f"### {title}, {draws} runs",
-            "",
-            "Bound: " + ", ".join(f"{100 * x:.3g} %" for x in bound / TRUTH) + ".",
-            "",
-            *table(["method", "SD / bound", "bias / SD", "coverage (%)", "SD (%)"], rows),
-        ]
-    return out
+    ]
+
+
+def _shares(values: np.ndarray) -> str:
+    return ", ".join(f"{100 * x:.3g} %" for x in values / TRUTH)
 
 
 def delay(n: int) -> list[str]:
@@ -228,7 +211,7 @@ def paper_rates(n: int) -> list[str]:
     rows = []
     kept: dict[str, list[Fit]] = {}
     for epochs in sessions(settings, n, 14):
-        for method in ("iv", "ml", "spectral", "bandlimited"):
+        for method in ("iv", "spectral", "bandlimited"):
             kept.setdefault(method, []).extend(fit_epochs(epochs, method, settings)[0])
     for method, fits in kept.items():
         error = array(fits) / TRUTH - 1
@@ -290,31 +273,56 @@ def section_3_4(n: int) -> list[str]:
     ]
 
 
+PARTS: Mapping[str, tuple[Callable[[int], list[str]], int]] = {
+    "pooled": (pooled_bias, 1000),
+    "relaxed": (
+        partial(
+            efficiency,
+            "White sensor noise of 5 mN·m, 1 kHz",
+            0.0,
+            ("iv", "spectral", "bandlimited", "published"),
+        ),
+        500,
+    ),
+    "voluntary-0.2": (
+        partial(efficiency, "Voluntary torque of 0.2 N·m", 0.2, ("iv", "spectral", "bandlimited")),
+        500,
+    ),
+    "voluntary-0.5": (
+        partial(efficiency, "Voluntary torque of 0.5 N·m", 0.5, ("iv", "spectral")),
+        500,
+    ),
+    "delay": (delay, 50),
+    "rates": (paper_rates, 100),
+    "section-3.4": (section_3_4, 100),
+}
+"""The sections of the page, each with its runs."""
+
+
 def main() -> None:
-    """Run all of it and write the page."""
-    share = float(sys.argv[1]) if len(sys.argv) > 1 else 1.0
+    """Measure what is asked for, and bring the page up to date."""
+    parser = argparse.ArgumentParser(description="bias, scatter, coverage and delay")
+    parser.add_argument("--share", type=float, default=1.0, help="of the runs of each section")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS))
+    options = parser.parse_args()
+    page = TABLE.read_text(encoding="utf-8")
+    for name in options.only:
+        part, runs = PARTS[name]
+        lines = part(max(round(runs * options.share), 2))
+        print("\n".join(lines), flush=True)
+        if options.share == 1.0:
+            page = replaced(page, lines)
+            TABLE.write_text(page, encoding="utf-8")
 
-    def runs(n: int) -> int:
-        return max(round(n * share), 2)
 
-    lines = [
-        "# Accuracy",
-        "",
-        "Measured on the virtual rig with `python -m benchmarks.accuracy`; J 0.0045 kg·m², "
-        "B 0.1368 N·m·s/rad, K 1.751 N·m/rad, controller per degree, fixed seeds.",
-        "",
-    ]
-    for part in (
-        pooled_bias(runs(1000)),
-        efficiency(runs(500)),
-        delay(runs(50)),
-        paper_rates(runs(100)),
-        section_3_4(runs(100)),
-    ):
-        print("\n".join(part), flush=True)
-        lines += part
-    if share == 1.0:
-        TABLE.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+def replaced(page: str, lines: Sequence[str]) -> str:
+    """Return the page with the section of that heading replaced."""
+    heading = re.escape(lines[0])
+    section = re.compile(rf"^{heading}$.*?(?=^##|\Z)", re.M | re.S)
+    text = "\n".join(lines).rstrip() + "\n\n"
+    if not section.search(page):
+        raise SystemExit(f"{TABLE}: there is no section {lines[0]!r}")
+    return section.sub(lambda _: text, page).rstrip() + "\n"
 
 
 if __name__ == "__main__":

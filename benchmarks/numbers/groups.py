@@ -24,7 +24,7 @@ from benchmarks.numbers.inputs import RATED, Workspace, shared_data
 
 __all__ = ["GROUPS", "Absent", "Group"]
 
-METHODS = ("iv", "spectral", "ml", "bandlimited", "published")
+METHODS = ("iv", "spectral", "bandlimited", "published")
 JBK = "inertia,damping,stiffness"
 OFFSET = f"{JBK},offset"
 PLANNED = """\

@@ -296,11 +296,18 @@ def test_a_description_that_is_wrong(compared, study, edit, old, new, told) -> N
     assert found is None
 
 
-def test_an_unknown_method(compared, study) -> None:
+@pytest.mark.parametrize(
+    ("method", "told"),
+    [
+        ("ivv", "ivv: there is no such method; the nearest is iv"),
+        ("ml", "ml: maximum likelihood was removed"),
+    ],
+)
+def test_an_unknown_method(compared, study, method, told) -> None:
     with (study / "study.toml").open("a") as file:
-        file.write('[analysis]\nmethod = "ivv"\n')
+        file.write(f'[analysis]\nmethod = "{method}"\n')
     (line,) = errors(compared()[0].err)
-    assert "ivv: there is no such method; the nearest is iv" in line
+    assert told in line
 
 
 def test_no_session_is_left(compared, study) -> None:

@@ -45,14 +45,13 @@ def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysis, int
         If there is no such method, an option is wrong, or no input can be read.
     """
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.estimation import method_names
+    from rigidimeter.estimation import method_names, no_such_method
     from rigidimeter.study import analysis_warnings, estimate
 
     read = recordings.read()
     say(read.notices)
     if recordings.method not in method_names():
-        known = ", ".join(method_names())
-        raise UserError(f"--method {recordings.method}: there is no such method; known: {known}")
+        raise UserError(f"--method {recordings.method}: {no_such_method(recordings.method)}")
     with Meter("estimate", 1.0) as meter:
         analysis = estimate(read, recordings.method, progress=meter.advance)
     say(analysis_warnings(analysis))

@@ -172,7 +172,7 @@ class Recordings:
             "--band-hz",
             metavar="LOW HIGH",
             help="Band of the fit. Default: bandlimited 0.15 to 10 where the perturbation is "
-            "known, else to 50; iv, spectral and ml 0.15 to 30; at most 0.4 times the slowest "
+            "known, else to 50; iv and spectral 0.15 to 30; at most 0.4 times the slowest "
             "channel's rate.",
         ),
     ] = None

@@ -13,6 +13,7 @@ from rigidimeter.estimation.methods import (
     fit_epochs,
     method_named,
     method_names,
+    no_such_method,
 )
 from rigidimeter.estimation.scores import (
     Cycles,
@@ -40,6 +41,7 @@ __all__ = [
     "identify",
     "method_named",
     "method_names",
+    "no_such_method",
     "score_epoch",
     "scoring_cycles",
     "single_frequency_share",

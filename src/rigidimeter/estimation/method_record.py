@@ -75,8 +75,6 @@ class Method:
         What the intervals of the pooled estimates hold for.
     as_recorded : bool
         Fit the channels as they are, without correcting the delay of the torque.
-    assumes_controller : bool
-        Whether the estimate is wrong where the settings do not have the controller that was used.
     in_sensitivity : bool
         Whether every study is analysed by it, beside the method chosen.
     """
@@ -93,7 +91,6 @@ class Method:
     )
     pooled_text: str = "Those of all epochs together are its own too"
     as_recorded: bool = False
-    assumes_controller: bool = False
     in_sensitivity: bool = False
 
     @property

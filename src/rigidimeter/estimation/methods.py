@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Sequence
 
 from rigidimeter.estimation.bandlimited import BANDLIMITED, bandlimited_signals
 from rigidimeter.estimation.closedloop.observation import closed_loop_obstacle, observe
 from rigidimeter.estimation.closedloop.periodic_response import follows_perturbation
-from rigidimeter.estimation.closedloop.perturbation_methods import IV, ML, SPECTRAL
+from rigidimeter.estimation.closedloop.perturbation_methods import IV, SPECTRAL
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.estimation.published_method import PUBLISHED
@@ -17,8 +18,14 @@ from rigidimeter.estimation.stretches import bridged
 from rigidimeter.records import Epoch, Fit
 from rigidimeter.settings import EstimationSettings, Settings
 
-METHODS: list[Method] = [PUBLISHED, BANDLIMITED, IV, SPECTRAL, ML]
+METHODS: list[Method] = [PUBLISHED, BANDLIMITED, IV, SPECTRAL]
 """Every estimator. Code from outside the package may append its own."""
+
+REMOVED = {
+    "ml": "maximum likelihood was removed, as it was no more precise than instrumental variables "
+    "and a wrong controller biased it: use iv"
+}
+"""Estimators that there were, and what to use instead."""
 
 MOST_TRIED = 5
 """From this many epochs it is known whether the motion follows the perturbation."""
@@ -27,6 +34,15 @@ MOST_TRIED = 5
 def method_names() -> tuple[str, ...]:
     """Return what `--method` takes: ``auto``, the default, and the name of each estimator."""
     return ("auto", *(method.name for method in METHODS))
+
+
+def no_such_method(name: str) -> str:
+    """Return why `--method` cannot be `name`, and what it may be."""
+    known = method_names()
+    if name in REMOVED:
+        return f"{REMOVED[name]} (known: {', '.join(known)})"
+    (near,) = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
+    return f"there is no such method; the nearest is {near} (known: {', '.join(known)})"
 
 
 def method_named(name: str) -> Method:
@@ -39,7 +55,7 @@ def method_named(name: str) -> Method:
     """
     found = [method for method in METHODS if method.name == name]
     if not found:
-        raise ValueError(f"there is no such method; known: {', '.join(method_names())}")
+        raise ValueError(no_such_method(name))
     if len(found) > 1:
         raise ValueError(f"two methods have the name {name}; rename the one that was added")
     return found[0]

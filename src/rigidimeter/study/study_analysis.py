@@ -6,7 +6,6 @@ the analysis of all. Methods of the sensitivity analysis run once each.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rigidimeter.errors import UserError
-from rigidimeter.estimation import choose_method, method_named, method_names
+from rigidimeter.estimation import choose_method, method_named, method_names, no_such_method
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.recording.study_folder import Row, StudyFolder, read_study_folder
 from rigidimeter.records import Analysis, Epoch, Notice
@@ -96,14 +95,9 @@ def read_study(
     """
     read = read_study_folder(folder, key)
     chosen = method if method != "auto" else read.about.analysis.method
-    known = method_names()
-    if chosen not in known:
-        near = difflib.get_close_matches(chosen, known, n=1, cutoff=0.0)[0]
+    if chosen not in method_names():
         where = "--method" if method != "auto" else f"{folder / 'study.toml'}: analysis.method ="
-        raise UserError(
-            f"{where} {chosen}: there is no such method; the nearest is {near} (known: "
-            f"{', '.join(known)})"
-        )
+        raise UserError(f"{where} {chosen}: {no_such_method(chosen)}")
     names, said = naming(read)
     if pair != (None, None):
         wanted = pair[0] or names.pair[0], pair[1] or names.pair[1]

@@ -76,6 +76,11 @@ def test_a_document_of_the_first_version_is_still_read(tmp_path):
     assert analysis.pooled == ()
 
 
+def test_estimates_by_a_method_that_was_removed_are_still_read(tmp_path):
+    write_estimates_json(tmp_path / "e.json", replace(ANALYSIS, method="ml"))
+    assert {fit.method for fit in read_estimates(tmp_path / "e.json").fits} == {"ml"}
+
+
 def test_one_condition_is_pooled_once(tmp_path):
     only = replace(ANALYSIS, pooled=(POOLED,))
     write_estimates_json(tmp_path / "e.json", only)

@@ -53,14 +53,11 @@ class LineMethod(NamedTuple):
         Makes the lines of an epoch.
     linearise : callable
         Makes the linear problems at given parameters.
-    keeps_problem : bool
-        Single epochs use the problem of the pooled estimate as it is.
     """
 
     name: str
     observe: Callable[[PreparedEpoch], Observation]
     linearise: Linearise
-    keeps_problem: bool = True
 
 
 class _Member(NamedTuple):
@@ -139,7 +136,7 @@ def _fit_condition(
                 linearise,
                 shared.values if shared is not None else start,
                 share.shape if share is not None else None,
-                made.get(place) if share is not None and method.keeps_problem else None,
+                made.get(place) if share is not None else None,
                 draws,
             )
         except ValueError as error:

@@ -71,21 +71,6 @@ class Excitation:
         """Return acceleration, velocity and angle that the perturbation causes, shape (m, 3)."""
         return self._lines(self.motion * (self.command / self._around(parameters)))
 
-    def sensed_lines(self, parameters: Parameters) -> tuple[Complex, Complex]:
-        """Return the torque that the perturbation causes, and how it changes with J, B and K.
-
-        ∂M/∂J = S a and so on, with the sensitivity S = 1 / (1 + gain): in the loop a stiffer joint
-        also moves less.
-
-        Returns
-        -------
-        torque_nm : complex array, shape (m,)
-        slope : complex array, shape (m, 3)
-        """
-        around = self._around(parameters)
-        motion = self.motion * (self.command / around)
-        return self._lines(motion) @ np.array(parameters), self._lines(motion / around)
-
     def _around(self, parameters: Parameters) -> Complex:
         J, B, K = parameters
         return np.asarray(1 + (J * self.gain[0] + B * self.gain[1] + K * self.gain[2]))

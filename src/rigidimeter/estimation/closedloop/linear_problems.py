@@ -4,7 +4,7 @@ With instruments Z, regressors Φ and target Y at the lines of an epoch, the est
 
     p = (Σ Re(Z^H Φ / S))⁻¹ Σ Re(Z^H Y / S)
 
-with S the power of the noise (`refine`). The methods differ in Z, Φ and Y alone.
+with S the power of the noise (`refine`). The methods differ in Z alone.
 
 Instrumental variables (``iv``). A subject who pushes moves the joint through the loop, so the
 motion carries the push that is also in the torque, and least squares takes it for the joint's own:
@@ -17,17 +17,6 @@ as precise as maximum likelihood from the same response to the perturbation.
 
 The lines of a periodic perturbation (``spectral``). The same at the excited lines alone; the lines
 between them hold nothing but noise and set S.
-
-Maximum likelihood (``ml``). The whole loop is simulated from the perturbation alone, and J, B, K
-are those that make the simulated torque Ŷ(p) most likely, given a disturbance of unknown colour:
-
-    minimise Σ |Y − Ŷ(p)|² / S + log S
-
-(the Whittle likelihood), by Gauss-Newton steps with the slopes ∂Ŷ/∂p. Only the torque is used, so
-the motion sensor's noise, rate and delay do not matter; but the controller and the drive must be
-what the settings say or what the recording shows, for a wrong controller is taken for the joint.
-The alternative, whitening the equation error of torque against measured motion, is no more precise
-and biased for K when the subject pushes slowly: see docs/explanation/closed-loop.md.
 """
 
 from __future__ import annotations
@@ -98,22 +87,6 @@ def periodic(observations: Sequence[Observation], values: Array) -> list[Problem
         for observation, problem in zip(
             observations, instrumental(observations, values), strict=True
         )
-    ]
-
-
-def output_error(observations: Sequence[Observation], values: Array) -> list[Problem]:
-    """Return the problems of one Gauss-Newton step at the given J, B and K."""
-    used = np.maximum(values, LEAST)
-    J, B, K = used.tolist()
-    made = _of_each(observations, lambda excitation: excitation.sensed_lines((J, B, K)))
-    return [
-        Problem(
-            slope,
-            slope,
-            target := observation.lines.torque_nm - simulated + slope @ used,
-            tuple((slope, target - more @ used) for more in observation.otherwise),
-        )
-        for observation, (simulated, slope) in zip(observations, made, strict=True)
     ]
 
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from functools import partial
 
 from rigidimeter.estimation.closedloop.closed_loop_fit import LineMethod, fit_closed_loop
-from rigidimeter.estimation.closedloop.linear_problems import instrumental, output_error, periodic
+from rigidimeter.estimation.closedloop.linear_problems import instrumental, periodic
 from rigidimeter.estimation.closedloop.observation import observe, observe_periods
 from rigidimeter.estimation.closedloop.refine import ENOUGH_EPOCHS
 from rigidimeter.estimation.method_record import Method
@@ -18,7 +18,6 @@ from rigidimeter.settings import EstimationSettings
 CLOSED_LOOP: Mapping[str, LineMethod] = {
     "iv": LineMethod("iv", observe, instrumental),
     "spectral": LineMethod("spectral", observe_periods, periodic),
-    "ml": LineMethod("ml", observe, output_error, keeps_problem=False),
 }
 """The methods that need the perturbation."""
 
@@ -59,16 +58,5 @@ SPECTRAL = Method(
     methods_text="by instrumental variables at the lines of the periodic perturbation",
     fit=partial(fit_closed_loop, CLOSED_LOOP["spectral"]),
     intervals_text=_intervals_text,
-    pooled_text=_POOLED_TEXT,
-)
-ML = Method(
-    name="ml",
-    title="maximum likelihood of the torque that the perturbation causes in the whole loop",
-    needs=("perturbation_nm",),
-    methods_text="by maximum likelihood of the torque that the perturbation causes in the whole "
-    "loop",
-    fit=partial(fit_closed_loop, CLOSED_LOOP["ml"]),
-    intervals_text=_intervals_text,
-    assumes_controller=True,
     pooled_text=_POOLED_TEXT,
 )

@@ -93,8 +93,6 @@ def _command_rad_s(epoch: Epoch, loop: Loop, ticks_s: Array, rate_hz: float) -> 
 
 def _harmless(case: Case, look: Look) -> str:
     """Return why a wrong controller does not bias the estimate; empty where it does."""
-    if case.method is not None and case.method.assumes_controller:
-        return ""
     if case.uses_perturbation and case.method is not None:
         return f"{case.method.name} is less precise with it, not biased"
     return push_harmless(case, look)

@@ -158,7 +158,7 @@ def _main_settings(s: Settings) -> list[tuple[str, str, float, str]]:
         ("Estimation", "band from", s.estimation.band_low_hz, "Hz"),
         ("Estimation", "band to, perturbation known", s.estimation.band_high_hz, "Hz"),
         ("Estimation", "band to, perturbation unknown", s.estimation.band_high_unknown_hz, "Hz"),
-        ("Estimation", "band to, iv, spectral and ml", s.estimation.band_high_closed_loop_hz, "Hz"),
+        ("Estimation", "band to, iv and spectral", s.estimation.band_high_closed_loop_hz, "Hz"),
         ("Scores", "band from", s.scores.band_low_hz, "Hz"),
         ("Scores", "band to", s.scores.band_high_hz, "Hz"),
         ("Scores", "cycles", s.scores.cycles, "cycles"),
