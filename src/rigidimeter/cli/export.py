@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -40,6 +42,19 @@ def export(
     day: Annotated[
         str, typer.Option("--day", metavar="NAME", help="The day of single recordings.")
     ] = "",
+    joint: Annotated[
+        str,
+        typer.Option("--joint", metavar="NAME", help="The joint of single recordings, as elbow."),
+    ] = "",
+    started: Annotated[
+        datetime | None,
+        typer.Option(
+            "--started",
+            metavar="TIME",
+            formats=["%Y-%m-%dT%H:%M:%S%z", "%Y-%m-%dT%H:%M%z"],
+            help="When single recordings began that do not say so, as 2026-03-01T10:30+0100.",
+        ),
+    ] = None,
     key: KeyOption = None,
 ) -> None:
     """Write session folders, recordings or a study in another format.
@@ -62,13 +77,22 @@ def export(
     if any((folder / "manifest.json").exists() for folder in (out, *out.resolve().parents)):
         raise UserError(f"--out {out}: is or lies in a session folder, which never changes again")
     study = study_of(recordings, key)
+    said = {
+        "subject": subject,
+        "day": day,
+        "joint": joint,
+        "started": "" if started is None else started.isoformat(),
+    }
     if study is not None:
-        for option, value in (("--subject", subject), ("--day", day)):
+        for option, value in said.items():
             if value:
-                raise UserError(f"{option} {value}: is for single recordings; a study has its own")
+                raise UserError(
+                    f"--{option} {value}: is for single recordings; a study says this in its "
+                    "study.toml and sessions.csv"
+                )
         sessions, status = _of_study(study, recordings, key, estimates=estimates)
     else:
-        sessions, status = _of_recordings(recordings, subject, day, estimates=estimates)
+        sessions, status = _of_recordings(recordings, said, estimates=estimates)
     with Meter("export", 1.0) as meter:
         written = export_sessions(sessions, to, out, overwrite=overwrite, progress=meter.advance)
     several = "" if len(sessions) == 1 else f"{len(sessions)} sessions, "
@@ -79,16 +103,26 @@ def export(
 
 
 def _of_recordings(
-    recordings: Recordings, subject: str, day: str, *, estimates: bool
+    recordings: Recordings, said: Mapping[str, str], *, estimates: bool
 ) -> tuple[list[ExportedSession], int]:
     from rigidimeter.exporting import sessions_of_recording
 
+    analysis = None
     if estimates:
         read, analysis, status = analyse_recordings(recordings)
-        return sessions_of_recording(read, analysis, subject=subject, day=day), status
-    read = recordings.read()
-    say(read.notices)
-    return sessions_of_recording(read, None, subject=subject, day=day), int(read.failed)
+    else:
+        read = recordings.read()
+        say(read.notices)
+        status = int(read.failed)
+    sessions = sessions_of_recording(
+        read,
+        analysis,
+        subject=said["subject"],
+        day=said["day"],
+        joint=said["joint"],
+        started_utc=said["started"],
+    )
+    return sessions, status
 
 
 def _of_study(

@@ -14,6 +14,7 @@ from pathlib import Path
 from rigidimeter.errors import UserError
 from rigidimeter.exporting.mat import write_mat
 from rigidimeter.exporting.names import stems
+from rigidimeter.exporting.nwb import write_nwb
 from rigidimeter.exporting.tables import write_csv, write_parquet
 from rigidimeter.recording.exported_session import ExportedSession
 
@@ -48,6 +49,7 @@ class Format:
 
 
 FORMATS: list[Format] = [
+    Format("nwb", "Neurodata Without Borders", write_nwb, ".nwb", extra="nwb"),
     Format("parquet", "Apache Parquet", write_parquet),
     Format("csv", "CSV tables", write_csv),
     Format("mat", "MATLAB file, version 5", write_mat, ".mat"),

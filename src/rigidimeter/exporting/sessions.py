@@ -25,6 +25,7 @@ from rigidimeter.recording.exported_session import (
 )
 from rigidimeter.recording.sample_log import SAMPLE_UNITS
 from rigidimeter.recording.session_files import read_session_files
+from rigidimeter.recording.study_toml import SubjectTable
 from rigidimeter.records import CHANNEL_UNITS, Analysis, Delay, Epoch, Fit, Score
 from rigidimeter.settings import Settings, dump_settings
 from rigidimeter.study.results import Condition
@@ -65,6 +66,10 @@ class Described:
     ----------
     subject, day, condition, part : str
         Empty where unknown.
+    joint : str
+        Such as ``elbow``; empty where unknown.
+    started_utc : str
+        When the recording began, ISO 8601, where it does not say so itself.
     facts : mapping
         Of its study, as the document holds them.
     blinded : bool
@@ -75,12 +80,20 @@ class Described:
     day: str = ""
     condition: str = ""
     part: str = ""
+    joint: str = ""
+    started_utc: str = ""
     facts: Mapping[str, Any] | None = None
     blinded: bool = False
 
 
 def sessions_of_recording(
-    recording: Recording, analysis: Analysis | None, *, subject: str = "", day: str = ""
+    recording: Recording,
+    analysis: Analysis | None,
+    *,
+    subject: str = "",
+    day: str = "",
+    joint: str = "",
+    started_utc: str = "",
 ) -> list[ExportedSession]:
     """Return what is given away of each source of a recording.
 
@@ -89,8 +102,10 @@ def sessions_of_recording(
     recording : Recording
     analysis : Analysis or None
         The estimates that travel along.
-    subject, day : str
+    subject, day, joint : str
         What they are called; empty where unknown.
+    started_utc : str
+        When recordings began that do not say so themselves, ISO 8601.
     """
     found = []
     for source, epochs in _by_source(recording.epochs).items():
@@ -98,7 +113,7 @@ def sessions_of_recording(
         settings = session_settings(path) if is_session(path) else recording.settings
         conditions = {epoch.condition for epoch in epochs}
         condition = conditions.pop() if len(conditions) == 1 else ""
-        described = Described(subject, day, condition)
+        described = Described(subject, day, condition, "", joint, started_utc)
         found.append(_exported(path, source, epochs, settings, analysis, described))
     return found
 
@@ -128,9 +143,19 @@ def sessions_of_study(read: StudyRead, analysis: Analysis | None) -> list[Export
             "ratings": ratings,
             "rating_scale": about.rating.model_dump(mode="json"),
             "operator_exclusions": exclusions,
+            "participant": about.subjects.get(entry.subject, SubjectTable()).model_dump(
+                mode="json"
+            ),
+            "archive": about.archive.model_dump(mode="json"),
         }
         described = Described(
-            entry.subject, entry.day, entry.condition, session.row["part"], facts, names.blinded
+            entry.subject,
+            entry.day,
+            entry.condition,
+            session.row["part"],
+            about.archive.joint,
+            facts=facts,
+            blinded=names.blinded,
         )
         path = read.folder.folder / entry.path
         settings = session.settings or read.settings
@@ -179,12 +204,15 @@ def _exported(
         recorded["events"] = [_event(each, described) for each in files.log.events]
     else:
         streams = _epoch_streams(epochs)
+    if "created_utc" not in recorded and described.started_utc:
+        recorded["created_utc"] = described.started_utc
     about = {
         "schema": EXPORT_SCHEMA,
         "software": f"rigidimeter {__version__}",
         "source": name,
         "virtual": any(epoch.virtual for epoch in epochs),
         **{key: getattr(described, key) for key in ("subject", "day", "condition", "part")},
+        "joint": described.joint or ("elbow" if "session_id" in recorded else "joint"),
         **(described.facts or {}),
         "recorded": recorded,
         "settings": dumped,
@@ -195,7 +223,7 @@ def _exported(
             column: SAMPLE_UNITS[column]
             for each in streams
             for column in each.columns
-            if recorded and column not in UNITS
+            if column in SAMPLE_UNITS and column not in UNITS
         },
         "estimates": None if analysis is None else _estimates(analysis, source, name),
     }

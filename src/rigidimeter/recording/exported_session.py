@@ -21,6 +21,8 @@ from rigidimeter.settings import Settings, parse_settings
 EXPORT_SCHEMA = "rigidimeter.export/1"
 DOCUMENT = "session.json"
 """The name of the document in formats that are folders."""
+ROUNDING_S = 1e-9
+"""A format may hold a first stamp and a rate in place of even stamps."""
 
 _TYPES: Mapping[str, type] = {
     "virtual": bool,
@@ -146,8 +148,8 @@ def _channels(
         stream = next((each for each in streams if name in each.columns), None)
         if stream is None:
             return {}, f"there is no {name}"
-        low = int(np.searchsorted(stream.time_s, float(first_s), "left"))
-        high = int(np.searchsorted(stream.time_s, float(last_s), "right"))
+        low = int(np.searchsorted(stream.time_s, float(first_s) - ROUNDING_S, "left"))
+        high = int(np.searchsorted(stream.time_s, float(last_s) + ROUNDING_S, "right"))
         if high - low != int(count):
             return {}, f"{name} has {high - low} samples in place of {count}"
         channels[name] = Channel(name, stream.time_s[low:high], stream.columns[name][low:high])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -69,6 +69,25 @@ class RatingTable(Section):
         return self
 
 
+class SubjectTable(Section):
+    """``[subjects.NAME]``: what archives ask about a subject."""
+
+    age_years: float | None = _optional("years", 0.0, 130.0)
+    sex: Literal["F", "M", "O", "U"] = "U"
+    species: str = _text("Homo sapiens")
+
+
+class ArchiveTable(Section):
+    """``[archive]``: what archives ask about a data set; nothing is computed from it."""
+
+    joint: str = _text("elbow", 1, 40)
+    authors: list[str] = Field(default_factory=list, max_length=200)
+    institution: str = _text("", 0)
+    lab: str = _text("", 0)
+    license: str = _text("", 0)
+    keywords: list[str] = Field(default_factory=list, max_length=50)
+
+
 class AnalysisTable(Section):
     """``[analysis]``: how the study is analysed.
 
@@ -96,6 +115,8 @@ class StudyToml(Section):
     key: str = _text("key.csv")
     conditions: dict[str, ConditionTable] = Field(default_factory=dict)
     rating: RatingTable = RatingTable()
+    subjects: dict[str, SubjectTable] = Field(default_factory=dict)
+    archive: ArchiveTable = ArchiveTable()
     analysis: AnalysisTable = AnalysisTable()
 
     @model_validator(mode="after")

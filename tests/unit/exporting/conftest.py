@@ -41,3 +41,14 @@ def assert_same_epochs(found: Sequence[Epoch], expected: Sequence[Epoch]) -> Non
         for field in dataclasses.fields(Epoch):
             if field.name not in ("channels", "source"):
                 assert getattr(one, field.name) == getattr(other, field.name), field.name
+
+
+def with_jitter(session: ExportedSession, seed: int = 1) -> ExportedSession:
+    """Return a session whose stamps are not even, and whose epochs are as they were."""
+    rng = np.random.default_rng(seed)
+    shifts = [rng.uniform(-2e-4, 2e-4, stream.time_s.size) for stream in session.streams]
+    streams = tuple(
+        dataclasses.replace(stream, time_s=stream.time_s + shift)
+        for stream, shift in zip(session.streams, shifts, strict=True)
+    )
+    return ExportedSession(session.about, streams)
