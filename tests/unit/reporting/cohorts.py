@@ -44,7 +44,10 @@ LEFT_OUT = Outcome("excluded", "the arm touched the position limit")
 def _channels(
     frequencies_hz: Sequence[float], size_rad: float, span_s: float
 ) -> dict[str, Channel]:
-    """Return the motion that is a sum of sines, and the torque that Eq. 3 asks for it."""
+    """Return the motion that is a sum of sines, and the torque that Eq. 3 asks for it.
+
+    Without the command: the drive would be identified from it anew for each page, which takes long.
+    """
     stamps = np.arange(0, span_s, 0.01)
     angle, velocity, acceleration = (np.zeros_like(stamps) for _ in range(3))
     for k, frequency in enumerate(frequencies_hz, start=1):
@@ -58,7 +61,6 @@ def _channels(
         "torque_nm": J * acceleration + B * velocity + K * angle,
         "angle_rad": angle,
         "velocity_rad_s": velocity,
-        "velocity_command_rad_s": velocity,
         "perturbation_nm": np.where(np.sin(7.3 * stamps) + np.sin(3.1 * stamps) > 0, 1.0, -1.0),
     }
     return {name: Channel(name, stamps, samples) for name, samples in values.items()}
