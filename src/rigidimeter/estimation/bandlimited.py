@@ -26,8 +26,8 @@ from rigidimeter.estimation.signals import (
     grid_rate_hz,
     kinematics,
     motion_channels,
-    spline,
     uniform_grid,
+    values_at,
 )
 from rigidimeter.estimation.stretches import sound
 from rigidimeter.records import Epoch
@@ -106,7 +106,7 @@ def bandlimited_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
     keep[:trim] = keep[time_s.size - trim :] = False
     return Signals(
         time_s=time_s[keep],
-        torque_nm=zero_phase_band(spline(torque)(time_s), rate_hz, band)[keep],
+        torque_nm=zero_phase_band(values_at(torque, time_s), rate_hz, band)[keep],
         acceleration_rad_s2=zero_phase_band(acceleration[inner], rate_hz, band)[keep],
         velocity_rad_s=zero_phase_band(velocity[inner], rate_hz, band)[keep],
         angle_rad=zero_phase_band(angle[inner], rate_hz, band)[keep],

@@ -20,7 +20,13 @@ from scipy import signal
 
 from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares, intervals_text
 from rigidimeter.estimation.method_record import Method
-from rigidimeter.estimation.signals import Array, Signals, kinematics, motion_channels, uniform_grid
+from rigidimeter.estimation.signals import (
+    Array,
+    Signals,
+    motion_channels,
+    uniform_grid,
+    velocity_at,
+)
 from rigidimeter.estimation.stretches import sound
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import EstimationSettings
@@ -43,10 +49,7 @@ def published_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
     others = [command] if command is not None else motion_channels(epoch)
     rate_hz = torque.rate_hz
     time_s = uniform_grid([torque, *others], rate_hz)
-    if command is not None:
-        velocity = _held(command, time_s)
-    else:
-        _, velocity, _ = kinematics(epoch, time_s)
+    velocity = velocity_at(epoch, time_s) if command is None else _held(command, time_s)
     dt = 1.0 / rate_hz
     acceleration = np.diff(velocity) / dt
     # The sum starts from θ(0) = 0, so the first velocity does not enter it.

@@ -22,11 +22,11 @@ from scipy.interpolate import CubicSpline
 from rigidimeter.estimation.screening import before_fit, unusable
 from rigidimeter.estimation.signals import (
     Array,
+    angle_at,
     grid_rate_hz,
-    kinematics,
     motion_channels,
-    spline,
     uniform_grid,
+    values_at,
 )
 from rigidimeter.records import Epoch, Motion, Outcome, Score
 from rigidimeter.settings import EstimationSettings, ScoreSettings
@@ -95,7 +95,7 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
         )
     rate_hz = grid_rate_hz(used, settings.band_high_hz)
     grid = uniform_grid(used, rate_hz)
-    angle, _, _ = kinematics(epoch, grid)
+    angle = angle_at(epoch, grid)
     bandpass = signal.butter(
         2, [settings.band_low_hz, settings.band_high_hz], "bandpass", fs=rate_hz, output="sos"
     )
@@ -107,7 +107,7 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
         )
     moving = _moving_at_ends(angle, round(rate_hz / motion.frequency_hz))
     padding_s = 3 / settings.band_low_hz  # the slowest part of the filter settles in that time
-    torque = spline(used[0])(grid)
+    torque = values_at(used[0], grid)
     start = max(motion.start_s + settings.discard_s, float(grid[0]))
     stop = min(motion.start_s + motion.duration_s - settings.discard_s, float(grid[-1]))
     available = int(np.floor((stop - start) * motion.frequency_hz + 1e-6))
@@ -240,7 +240,7 @@ def single_frequency_share(epoch: Epoch) -> float:
 def _angle(epoch: Epoch) -> tuple[Array, Array]:
     used = motion_channels(epoch)
     time_s = uniform_grid(used, grid_rate_hz(used, HIGHEST_HZ / 2))
-    angle, _, _ = kinematics(epoch, time_s)
+    angle = angle_at(epoch, time_s)
     return time_s, np.asarray(signal.detrend(angle), dtype=np.float64)
 
 

@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
-from rigidimeter.estimation.signals import grid_rate_hz, kinematics, uniform_grid
+from rigidimeter.estimation.signals import (
+    grid_rate_hz,
+    kinematics,
+    sampled,
+    spline_slopes,
+    uniform_grid,
+    values_and_slopes,
+)
 from rigidimeter.records import Channel, Epoch
 
 
@@ -35,6 +43,28 @@ def test_jittered_stamps_are_read_as_they_are():
     # Taken as equally spaced, the same samples would be off by far more.
     spaced = np.interp(grid, np.arange(t.size) / 50.0, v)
     assert np.abs(spaced - w * np.cos(w * grid)).max() > 0.02 * w
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 200])
+def test_slopes_are_those_of_the_spline(n):
+    t, x, _, _ = sine(50.0, jitter_s=0.01)
+    expected = CubicSpline(t[:n], x[:n]).derivative()(t[:n])
+    np.testing.assert_allclose(spline_slopes(t[:n], x[:n]), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_samples_at_the_times_asked_for_need_no_spline():
+    t, x, _, _ = sine(100.0)
+    channel = Channel("angle_rad", t + 7.0, x)
+    inner = channel.time_s[20:60]
+    assert sampled(channel, inner) == slice(20, 60)
+    for late_s in (1e-9, 1e-6):  # rounding of a clock, and a time of its own
+        values, slopes = values_and_slopes(channel, inner + late_s)
+        found = CubicSpline(channel.time_s, x)
+        np.testing.assert_allclose(values, found(inner + late_s), atol=1e-7)
+        np.testing.assert_allclose(slopes, found.derivative()(inner + late_s), atol=1e-6)
+        assert (sampled(channel, inner + late_s) is None) == (late_s == 1e-6)
+    assert sampled(channel, channel.time_s[20:60:2]) is None
+    assert sampled(channel, t) is None
 
 
 def test_a_missing_angle_is_the_integral_of_the_velocity():

@@ -28,7 +28,7 @@ from rigidimeter.estimation.closedloop.linear_problems import LEAST, Problem
 from rigidimeter.estimation.closedloop.observation import Observation, observe
 from rigidimeter.estimation.closedloop.spectral_lines import Complex, Grid
 from rigidimeter.estimation.prepared import PreparedEpoch
-from rigidimeter.estimation.signals import Array, kinematics
+from rigidimeter.estimation.signals import Array, velocity_at
 
 REFLEX_DELAYS_S = (0.03, 0.045, 0.06)
 CUFF_RATIOS = (5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0)
@@ -94,7 +94,7 @@ def _rivals(
     assert observation.excitation is not None
     grid = observation.lines.grid
     omega = grid.omega_rad_s
-    measured = kinematics(prepared.epoch, grid.time_s)[1] * grid.window
+    measured = velocity_at(prepared.epoch, grid.time_s) * grid.window
     both = observation.excitation.windowed_motion(joint)[1], measured
     rubbing = _pair(grid, *(grid.window * np.sign(velocity) for velocity in both))
     yield "friction", _beside(plain, rubbing)

@@ -36,7 +36,15 @@ from rigidimeter.estimation.closedloop.between_samples import (
     seen_beyond_samples,
 )
 from rigidimeter.estimation.closedloop.drive_motion import driven
-from rigidimeter.estimation.signals import Array, kinematics, motion_channels, spline, uniform_grid
+from rigidimeter.estimation.signals import (
+    Array,
+    angle_at,
+    motion_channels,
+    sampled,
+    uniform_grid,
+    values_at,
+    velocity_at,
+)
 from rigidimeter.estimation.window import repetition, tapered_ends, with_hole
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import FEWEST_LINES
@@ -214,7 +222,7 @@ def epoch_lines(
     torque_filter : TorqueFilter or None
         That the torque went through; the motion is sent through it too.
     """
-    torque = grid.transform(_at(epoch.channels["torque_nm"], grid.time_s))
+    torque = grid.transform(values_at(epoch.channels["torque_nm"], grid.time_s, SAME_TIME))
     command = epoch.channels.get("velocity_command_rad_s")
     if drive is not None and command is not None:
         motion = _between_samples(epoch, grid, drive, command, torque_filter)
@@ -254,7 +262,7 @@ def _between_samples(
     seen_motion = driven(behind(drive, torque_filter), command, torque.time_s)
     for column, part in enumerate(seen_motion):
         there = Channel(torque.name, torque.time_s, part)
-        motion[:, column] += grid.transform(_at(there, grid.time_s))
+        motion[:, column] += grid.transform(values_at(there, grid.time_s, SAME_TIME))
     return motion
 
 
@@ -269,27 +277,14 @@ def _motion(epoch: Epoch, time_s: Array) -> tuple[Array, Array]:
     """Return angle and velocity at the times."""
     angle, velocity = epoch.channels.get("angle_rad"), epoch.channels.get("velocity_rad_s")
     if angle is not None and velocity is not None:
-        return _at(angle, time_s), _at(velocity, time_s)
-    found = kinematics(epoch, time_s)
-    return found[0], found[1]
-
-
-def _at(channel: Channel, time_s: Array) -> Array:
-    """Return a channel at the times; without interpolation where it was sampled at them."""
-    values = _sampled(channel, time_s)
-    return values if values is not None else np.asarray(spline(channel)(time_s), dtype=np.float64)
+        return values_at(angle, time_s, SAME_TIME), values_at(velocity, time_s, SAME_TIME)
+    return angle_at(epoch, time_s), velocity_at(epoch, time_s)
 
 
 def _sampled(channel: Channel | None, time_s: Array) -> Array | None:
     """Return a channel at the times if it was sampled at just these, else None."""
-    if channel is None:
-        return None
-    close_s = SAME_TIME / channel.mean_rate_hz
-    first = int(np.searchsorted(channel.time_s, time_s[0] - close_s))
-    stamps = channel.time_s[first : first + time_s.size]
-    if stamps.size < time_s.size or np.max(np.abs(stamps - time_s)) > close_s:
-        return None
-    return channel.values[first : first + time_s.size]
+    place = None if channel is None else sampled(channel, time_s, SAME_TIME)
+    return None if place is None or channel is None else channel.values[place]
 
 
 def _times(torque: Channel, used: list[Channel]) -> tuple[Array, float]:

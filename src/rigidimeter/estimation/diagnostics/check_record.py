@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimeter.dynamics import Loop
-from rigidimeter.estimation.diagnostics.varying_lines import varying_lines
-from rigidimeter.estimation.diagnostics.varying_selection import Variation, variation
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.records import Epoch, Finding, Fit
 from rigidimeter.settings import DiagnosticLevels, DiagnosticsSettings, Level
+
+T = TypeVar("T")
 
 DEFAULT_LEVELS = DiagnosticLevels()
 
@@ -93,6 +93,7 @@ class Case:
     loop: Loop | None = None
     unbiased: Array | None = None
     prepared: PreparedEpoch | None = None
+    _made: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def uses_perturbation(self) -> bool:
@@ -120,16 +121,12 @@ class Case:
         bias = self.loop_bias
         return None if bias is None else 100.0 * float(np.max(np.abs(bias) / self.half_widths))
 
-    @cached_property
-    def variation(self) -> Variation | None:
-        """What varies within the epoch; None where that cannot be tested."""
-        if self.prepared is None:
-            return None
-        try:
-            lines = varying_lines(self.prepared, self.parameters)
-            return variation(lines, self.settings.varying_chance)
-        except ValueError:
-            return None
+    def once(self, make: Callable[[Case], T]) -> T:
+        """Return ``make(self)``, made when the first check asks for it."""
+        if make not in self._made:
+            self._made[make] = make(self)
+        found: T = self._made[make]
+        return found
 
     @cached_property
     def voluntary_nm(self) -> Array:

@@ -25,7 +25,7 @@ from scipy.ndimage import uniform_filter1d
 
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_least
 from rigidimeter.estimation.diagnostics.excitation_checks import perturbation_nm
-from rigidimeter.estimation.signals import Array, Signals, motion_channels, spline
+from rigidimeter.estimation.signals import Array, Signals, motion_channels, values_at
 from rigidimeter.estimation.stretches import sound
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings
@@ -105,8 +105,8 @@ def _not_a_sum(epoch: Epoch, channels: Sequence[Channel]) -> float:
         return math.inf
     columns = [np.ones(at.size)]
     for channel in channels:
-        held = channel.name == "perturbation_nm"
-        values = perturbation_nm(channel, torque.time_s) if held else spline(channel)(torque.time_s)
+        at_times = perturbation_nm if channel.name == "perturbation_nm" else values_at
+        values = at_times(channel, torque.time_s)
         columns += [values[at + lag] for lag in range(-REACH, REACH + 1)]
     regressors = np.column_stack(columns)
     lengths = np.linalg.norm(regressors, axis=0)

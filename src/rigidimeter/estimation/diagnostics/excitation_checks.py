@@ -24,7 +24,7 @@ from rigidimeter.estimation.diagnostics.check_record import (
     push_harmless,
 )
 from rigidimeter.estimation.scores import single_frequency_share
-from rigidimeter.estimation.signals import Array, Signals, kinematics, spline
+from rigidimeter.estimation.signals import Array, Signals, values_at, velocity_at
 from rigidimeter.records import PARAMETERS, Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings
 
@@ -97,8 +97,8 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
 
 def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return how much of the recorded torque and velocity lies in the band of the fit."""
-    _, velocity, _ = kinematics(epoch, signals.time_s)
-    torque = spline(epoch.channels["torque_nm"])(signals.time_s)
+    torque = values_at(epoch.channels["torque_nm"], signals.time_s)
+    velocity = velocity_at(epoch, signals.time_s)
     shares = {
         "torque": _share(torque, signals.rate_hz, signals.band_hz),
         "velocity": _share(velocity, signals.rate_hz, signals.band_hz),

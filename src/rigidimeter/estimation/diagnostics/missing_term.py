@@ -11,9 +11,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy import fft
 
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
-from rigidimeter.estimation.diagnostics.omitted_bias import moved
+from rigidimeter.estimation.diagnostics.omitted_bias import moved, moved_by_linear
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array, motion_channels
 from rigidimeter.estimation.stretches import longest_part
@@ -49,6 +50,7 @@ class _Found:
         motion = wideband_signals(epoch, high_hz)
         # Stiffness is that at the mean posture, and what is not linear is so about it.
         motion = replace(motion, angle_rad=motion.angle_rad - np.mean(motion.angle_rad))
+        motion = motion.part(slice(fft.prev_fast_len(motion.time_s.size)))
         self.beyond: BeyondLinear | None = None
         self.terms: tuple[OmittedTerm, ...] = ()
         self.linear: LinearTerm | None = None
@@ -71,9 +73,9 @@ def missing_term(case: Case) -> Look | None:
         return _linear(case, found.beyond, found.linear)
     if not found.terms:
         return Look(0.0, 100.0, False, "no further term is in the torque")
-    added = moved(case, found.beyond, found.terms)
+    *alone, added = moved(case, found.beyond, [*((term,) for term in found.terms), found.terms])
     value = _share_percent(case, added)
-    named = "; ".join(_text(term, case, found.beyond) for term in found.terms)
+    named = "; ".join(_text(*one, case) for one in zip(found.terms, alone, strict=True))
     together = f"; all of them change {_changes(case, added)}" if len(found.terms) > 1 else ""
     asked = ",".join(["inertia", "damping", "stiffness", *(WORDS[t.name][1] for t in found.terms)])
     # The whole damping and its two halves are one too many.
@@ -88,7 +90,7 @@ def missing_term(case: Case) -> Look | None:
 
 
 def _linear(case: Case, beyond: BeyondLinear, term: LinearTerm) -> Look:
-    added = moved(case, beyond, (), term)
+    added = moved_by_linear(case, beyond, term)
     value = _share_percent(case, added)
     if term.name == "coupling":
         what = f"coupling: between sensor and joint something gives, with {term.value:.3g} N·m/rad"
@@ -115,7 +117,7 @@ def _share_percent(case: Case, added: Array) -> float:
     return 100.0 * float(np.max(largest))
 
 
-def _text(term: OmittedTerm, case: Case, beyond: BeyondLinear) -> str:
+def _text(term: OmittedTerm, moved: Array, case: Case) -> str:
     words, _ = WORDS[term.name]
     plain = term_named(term.name)
     unit = "N·m·s/rad" if plain is None else plain.unit
@@ -123,7 +125,7 @@ def _text(term: OmittedTerm, case: Case, beyond: BeyondLinear) -> str:
     return (
         f"{term.name}: the torque holds a {words} of {term.value:.3g} ± "
         f"{term.standard_error:.2g} {unit}{late} (p = {term.p:.1g}, below {CHANCE:g}); included, "
-        f"it changes {_changes(case, moved(case, beyond, [term]))}"
+        f"it changes {_changes(case, moved)}"
     )
 
 

@@ -24,7 +24,7 @@ import numpy as np
 from rigidimeter.estimation.bandlimited import bandlimited_signals, zero_phase_band
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_most
 from rigidimeter.estimation.least_squares import fit_inertia_damping_stiffness
-from rigidimeter.estimation.signals import Array, grid_rate_hz, spline, uniform_grid
+from rigidimeter.estimation.signals import Array, grid_rate_hz, uniform_grid, values_and_slopes
 from rigidimeter.estimation.stretches import sound
 from rigidimeter.records import Epoch
 from rigidimeter.settings import DiagnosticsSettings, EstimationSettings
@@ -109,10 +109,8 @@ def velocity_shape(
         return None
     kept = sound(epoch, time_s, 1.0)
     kept[:trim] = kept[time_s.size - trim :] = False
-    derived, measured, changing = (
-        zero_phase_band(values(time_s), rate_hz, band)[kept]
-        for values in (spline(angle).derivative(), spline(velocity), spline(velocity).derivative())
-    )
+    signals = (values_and_slopes(angle, time_s)[1], *values_and_slopes(velocity, time_s))
+    derived, measured, changing = (zero_phase_band(one, rate_hz, band)[kept] for one in signals)
     size = float(np.linalg.norm(derived))
     if not (size > 0 and np.any(measured)):
         return None
@@ -167,10 +165,14 @@ def _r_squared(epoch: Epoch, band_hz: tuple[float, float], without: str) -> floa
         return float("nan")  # that motion cannot tell J, B and K apart
 
 
+def _velocity_fit(case: Case) -> tuple[float, float]:
+    return velocity_fit(case.epoch)
+
+
 def _velocity(
     case: Case, check: Callable[[tuple[float, float], DiagnosticsSettings], Look]
 ) -> Look | None:
-    fitted = velocity_fit(case.epoch)
+    fitted = case.once(_velocity_fit)
     # What does not move is found by other checks.
     return check(fitted, case.settings) if np.isfinite(fitted).all() else None
 

@@ -18,48 +18,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.estimation.closedloop.line_noise import Smoother
-from rigidimeter.estimation.closedloop.linear_problems import instrumental
+from rigidimeter.estimation.closedloop.linear_problems import Problem, instrumental
 from rigidimeter.estimation.closedloop.observation import observe
+from rigidimeter.estimation.closedloop.spectral_lines import Grid
 from rigidimeter.estimation.diagnostics.check_record import Case
+from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.terms.beyond_linear import BeyondLinear, Complex
 from rigidimeter.estimation.terms.catalogue import REFLEXES
 from rigidimeter.estimation.terms.linear_misfit import LinearTerm
-from rigidimeter.estimation.terms.omitted_terms import OmittedTerm
+from rigidimeter.estimation.terms.omitted_terms import OmittedTerm, strongest
 
 
-def moved(
-    case: Case,
-    beyond: BeyondLinear,
-    terms: Sequence[OmittedTerm],
-    linear: LinearTerm | None = None,
-) -> Array:
-    """Return what the terms add to J, B and K while they are left out, shape (1 or 2, 3).
+def moved(case: Case, beyond: BeyondLinear, groups: Sequence[Sequence[OmittedTerm]]) -> list[Array]:
+    """Return what each group of terms adds to J, B and K while left out, shape (1 or 2, 3) each.
 
     For least squares by a fit with them, which a loop with torque of the subject's own biases, and
     by their coefficients from what is not linear, which it does not.
     """
-    torque = np.zeros(beyond.motion.time_s.size)
-    for term in terms:
-        torque = torque + term.torque(beyond)
+    torques = {term: term.torque(beyond) for group in groups for term in group}
+    together = [np.sum([torques[term] for term in group], axis=0) for group in groups]
     if case.uses_perturbation and case.prepared is not None:
-        observation = case.prepared.once(observe)
-        grid = observation.lines.grid
-        (problem,) = instrumental([observation], case.parameters)
-        residual = problem.target - problem.regressors @ case.parameters
-        power = Smoother.over(grid.line, 4, 0.1)(np.abs(residual) ** 2)
-        weighted = problem.instruments / np.maximum(power, 1e-300)[:, None]
-        lines = grid.transform(np.interp(grid.time_s, beyond.motion.time_s, torque, 0.0, 0.0))
-        if linear is not None:
-            lines = lines + linear.torque(problem.regressors, grid.omega_rad_s)
-        return _added(weighted, problem.regressors, lines)[None]
+        weighted, problem, grid = _weighted(case, case.prepared)
+        here = beyond.motion.time_s
+        lines = (grid.transform(np.interp(grid.time_s, here, one, 0.0, 0.0)) for one in together)
+        return [_added(weighted, problem.regressors, one)[None] for one in lines]
     low, high = case.signals.band_hz
     inside = (beyond.frequency_hz >= low) & (beyond.frequency_hz <= high)
     motion = beyond.linear[inside]
-    if linear is not None:
-        return (case.parameters - linear.joint)[None]
-    refitted = case.parameters - _refitted(beyond, terms, inside)
-    return np.stack([refitted, _added(motion, motion, beyond.lines(torque)[inside])])
+    return [
+        np.stack(
+            [
+                case.parameters - _refitted(beyond, group, inside),
+                _added(motion, motion, beyond.lines(one)[inside]),
+            ]
+        )
+        for group, one in zip(groups, together, strict=True)
+    ]
+
+
+def moved_by_linear(case: Case, beyond: BeyondLinear, term: LinearTerm) -> Array:
+    """Return what a linear term adds to J, B and K while it is left out, shape (1, 3)."""
+    if not case.uses_perturbation or case.prepared is None:
+        return (case.parameters - term.joint)[None]
+    weighted, problem, grid = _weighted(case, case.prepared)
+    lines = term.torque(problem.regressors, grid.omega_rad_s)
+    return _added(weighted, problem.regressors, lines)[None]
+
+
+def _weighted(case: Case, prepared: PreparedEpoch) -> tuple[Complex, Problem, Grid]:
+    """Return the instruments over the power of the residual, the problem, and its lines."""
+    observation = prepared.once(observe)
+    grid = observation.lines.grid
+    (problem,) = instrumental([observation], case.parameters)
+    residual = problem.target - problem.regressors @ case.parameters
+    power = Smoother.over(grid.line, 4, 0.1)(np.abs(residual) ** 2)
+    return problem.instruments / np.maximum(power, 1e-300)[:, None], problem, grid
 
 
 def _added(weighted: Complex, regressors: Complex, torque: Complex) -> Array:
@@ -75,22 +89,14 @@ def _refitted(
     """Return J, B and K by least squares with the terms, shape (3,)."""
     plain = [term.name for term in terms if term.name not in REFLEXES]
     reflexes = [term.name for term in terms if term.name in REFLEXES]
-    fixed = beyond.terms_lines(plain)
-    columns = _stacked(np.column_stack([beyond.linear, *fixed])[inside])
+    columns = _stacked(np.column_stack([beyond.linear, beyond.terms_lines(plain)])[inside])
     target = _stacked(beyond.torque_lines[inside])
-    if not reflexes:
-        return _solved(columns, target)[:3]
-    # One reflex at most is looked for: its direction is decided by what is not linear.
-    late = _stacked(
-        np.column_stack([beyond.terms_lines(reflexes, q)[0] for q in beyond.grid(reflexes)])[inside]
-    )
-    scale = np.linalg.norm(columns, axis=0)
-    basis, _ = np.linalg.qr(columns / scale)
-    rest = target - basis @ (basis.T @ target)
-    beside = late - basis @ (basis.T @ late)
-    explained = (rest @ beside) ** 2 / np.maximum(np.sum(beside**2, axis=0), 1e-300)
-    best = late[:, int(np.argmax(explained))]
-    return _solved(np.column_stack([columns, best]), target)[:3]
+    if reflexes:
+        # One reflex at most is looked for: its direction is decided by what is not linear.
+        (name,) = reflexes
+        late = _stacked(beyond.reflex_lines(name, beyond.grid([name]))[inside])
+        columns = np.column_stack([columns, late[:, strongest(columns, late, target)]])
+    return _solved(columns, target)[:3]
 
 
 def _solved(columns: Array, target: Array) -> Array:

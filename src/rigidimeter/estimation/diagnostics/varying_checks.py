@@ -6,7 +6,8 @@ from functools import partial
 
 from rigidimeter.estimation.between_epochs import p_text
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
-from rigidimeter.estimation.diagnostics.varying_selection import Change, Variation
+from rigidimeter.estimation.diagnostics.varying_lines import varying_lines
+from rigidimeter.estimation.diagnostics.varying_selection import Change, Variation, variation
 from rigidimeter.records import PARAMETERS
 from rigidimeter.settings import DiagnosticsSettings
 
@@ -46,8 +47,19 @@ def _sentence(change: Change) -> str:
     )
 
 
+def _variation(case: Case) -> Variation | None:
+    """Return what varies within the epoch; None where that cannot be tested."""
+    if case.prepared is None:
+        return None
+    try:
+        lines = varying_lines(case.prepared, case.parameters)
+        return variation(lines, case.settings.varying_chance)
+    except ValueError:
+        return None
+
+
 def _look(case: Case, name: str) -> Look | None:
-    found = case.variation
+    found = case.once(_variation)
     return None if found is None else varying_look(name, found, case.settings)
 
 

@@ -29,7 +29,7 @@ from scipy import fft
 
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
-from rigidimeter.estimation.terms.reflex import kernel, stretch_velocity
+from rigidimeter.estimation.terms.reflex import kernel
 from rigidimeter.estimation.window import tapered_ends
 
 Complex = NDArray[np.complex128]
@@ -37,6 +37,9 @@ Complex = NDArray[np.complex128]
 STRETCH_HZ = 1.0
 FEWEST_LINES = 9
 """Lines of a stretch, three for each of angle, velocity and acceleration."""
+
+COLLINEAR = 1e-8
+"""Of the largest singular value: columns that differ by less are one."""
 
 NOTHING = 1e-3
 """A term of which less than this share of the size is left is linear."""
@@ -95,6 +98,11 @@ class BeyondLinear:
         return int(2 * self._basis.shape[0] * self._basis.shape[2])
 
     @property
+    def free_values(self) -> float:
+        """Real numbers that the free filter leaves."""
+        return 2 * self.torque.size - self.free_gains
+
+    @property
     def taper_loss(self) -> float:
         """By how much the taper enlarges a variance."""
         squares = self._window**2
@@ -109,31 +117,39 @@ class BeyondLinear:
         nonlinear : sequence of float
             The parameters inside the reflexes, in the order of the names.
         """
-        found = [self._white(lines) for lines in self.terms_lines(names, nonlinear)]
-        return np.stack(found, axis=1) if found else np.zeros((self.torque.size, 0), complex)
+        return self.white(self.terms_lines(names, nonlinear))
 
-    def terms_lines(self, names: Sequence[str], nonlinear: Sequence[float] = ()) -> list[Complex]:
-        """Return the lines of terms as they are, for each linear parameter shape (m,)."""
-        found: list[Complex] = []
+    def terms_lines(self, names: Sequence[str], nonlinear: Sequence[float] = ()) -> Complex:
+        """Return the lines of terms as they are, shape (m, p)."""
+        found = [np.zeros((self.torque.size, 0), dtype=np.complex128)]
         used = 0
         for name in names:
             count = len(kernel(name).nonlinear) if name in REFLEXES else 0
-            found += self._term_lines(name, nonlinear[used : used + count])
+            found.append(self._term_lines(name, nonlinear[used : used + count]))
             used += count
-        return found
+        return np.concatenate(found, axis=1)
 
-    def _term_lines(self, name: str, inner: Sequence[float] = ()) -> list[Complex]:
-        term = term_named(name)
-        if term is not None:
-            if name not in self._made:
-                self._made[name] = self.lines(term.regressor(self.motion))
-            return [self._made[name]]
-        side = "stretch" + name[-1]
-        if side not in self._made:
-            self._made[side] = self.lines(stretch_velocity(self.motion, name))
-        # The gains of the path change slowly over a stretch, as the filter that is free there.
-        gains = kernel(name).transfer(self.frequency_hz, np.asarray(inner, dtype=np.float64))
-        return [self._made[side] * gain for gain in gains]
+    def reflex_lines(self, name: str, inners: Sequence[Sequence[float]]) -> Complex:
+        """Return the lines of a reflex of one gain as they are, a column for each of `inners`."""
+        # A delay and the muscle alike in every column: shape (1, q) for each parameter inside.
+        parts = np.asarray(inners, dtype=np.float64).T[:, None, :]
+        (gains,) = kernel(name).transfer(self.frequency_hz[:, None], parts)
+        return self._stretch(name) * gains
+
+    def _term_lines(self, name: str, inner: Sequence[float] = ()) -> Complex:
+        if name in REFLEXES:
+            # Its gains change slowly over a stretch, as the filter that is free there.
+            gains = kernel(name).transfer(self.frequency_hz, np.asarray(inner, dtype=np.float64))
+            return self._stretch(name) * np.stack(gains, axis=1)
+        if name not in self._made:
+            term = term_named(name)
+            assert term is not None  # names are known
+            self._made[name] = self.lines(term.regressor(self.motion))[:, None]
+        return self._made[name]
+
+    def _stretch(self, name: str) -> Complex:
+        """Return the lines of the velocity that stretches, that of the damping of one direction."""
+        return self._term_lines(f"damping{name[-1]}")
 
     def grid(self, names: Sequence[str]) -> list[tuple[float, ...]]:
         """Return the points at which the parameters inside the reflexes are tried."""
@@ -170,26 +186,28 @@ class BeyondLinear:
         lengths = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
         # By way of R, since the lines are many and the columns few.
         left, upper = np.linalg.qr(rows / lengths)
-        inverse = np.linalg.pinv(upper, rcond=1e-8) @ left.T
+        inverse = np.linalg.pinv(upper, rcond=COLLINEAR) @ left.T
         values = inverse @ target / lengths
         residual = self.torque - columns @ values
-        free = rows.shape[0] * (1 - self._basis.shape[2] / self._basis.shape[1]) - values.size
+        free = self.free_values - values.size
         variance = float(np.sum(np.abs(residual) ** 2)) / free * self.taper_loss
         root = inverse / lengths[:, None]
         return Solution(values, variance * (root @ root.T), residual, free)
 
     def _share(self, name: str) -> float:
-        (lines,) = self._term_lines(name)
-        whole = float(np.linalg.norm(lines / self.line_size_nm))
-        return float(np.linalg.norm(self._white(lines))) / whole if whole > 0 else 0.0
+        lines = self._term_lines(name)
+        whole = float(np.linalg.norm(lines[:, 0] / self.line_size_nm))
+        return float(np.linalg.norm(self.white(lines))) / whole if whole > 0 else 0.0
 
     def lines(self, values: Array) -> Complex:
         """Return the lines of a signal in time, shape (n,)."""
         return _lines(values, self._window, self._first, self.frequency_hz.size)
 
-    def _white(self, lines: Complex) -> Complex:
-        parts = lines.reshape(self._basis.shape[:2])
-        return np.asarray((_without(parts, self._basis) / self._size_nm[:, None]).ravel())
+    def white(self, lines: Complex) -> Complex:
+        """Return what is left of lines, shape (m, p), as of the torque."""
+        parts = lines.reshape(*self._basis.shape[:2], lines.shape[1])
+        left = _without(parts, self._basis) / self._size_nm[:, None, None]
+        return np.asarray(left.reshape(lines.shape))
 
 
 def beyond_linear(
@@ -233,7 +251,7 @@ def beyond_linear(
     columns /= np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), 1e-300)
     basis, _ = np.linalg.qr(columns)
     torque = _lines(motion.torque_nm, window, first, used).reshape(stretches, each)
-    left = _without(torque, basis)
+    left = _without(torque[:, :, None], basis)[:, :, 0]
     size_nm = np.sqrt(np.sum(np.abs(left) ** 2, axis=1) / (each - 3))
     if not np.all(size_nm > 1e-12 * float(np.sqrt(np.mean(np.abs(torque) ** 2)))):
         raise ValueError("the motion explains the torque to the last digit")
@@ -251,8 +269,8 @@ def beyond_linear(
 
 
 def _without(parts: Complex, basis: Complex) -> Complex:
-    gains = np.einsum("bmk,bm->bk", basis.conj(), parts)
-    return np.asarray(parts - np.einsum("bmk,bk->bm", basis, gains))
+    """Return lines of each stretch, shape (b, m, p), without what is in the basis."""
+    return np.asarray(parts - basis @ (basis.conj().transpose(0, 2, 1) @ parts))
 
 
 def _lines(values: Array, window: Array, first: int, count: int) -> Complex:

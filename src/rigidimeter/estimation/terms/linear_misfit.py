@@ -22,7 +22,7 @@ from scipy import optimize, stats
 
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.terms.beyond_linear import BeyondLinear, Complex
-from rigidimeter.estimation.terms.omitted_terms import CHANCE
+from rigidimeter.estimation.terms.omitted_terms import CHANCE, strongest
 
 NEARLY_ALL = 0.9
 """Of what J, B and K leave to a free filter, that a term must explain."""
@@ -97,13 +97,27 @@ Found = tuple[tuple[str, float, float, Array], float]
 
 def _coupling(joint: Array, omega: Array, angle: Complex, target: Array) -> Found:
     start = np.maximum(np.abs(joint), 1e-12)
+    s = 1j * omega
+    # Of the impedance, by J, B and K as shares of their start.
+    slopes: Complex = np.stack([s**2, s, np.ones_like(s)], axis=1) * start
+
+    def through(values: Array) -> tuple[Complex, Complex]:
+        path = slopes @ values[:3]
+        soft = 1 / (1 + values[3] / start[2] * path)
+        return path, soft
 
     def residual(values: Array) -> Array:
-        path = _impedance(values[:3] * start, omega)
-        return target - _stacked(path / (1 + values[3] / start[2] * path) * angle)
+        path, soft = through(values)
+        return target - _stacked(path * soft * angle)
+
+    def jacobian(values: Array) -> Array:
+        path, soft = through(values)
+        passed = soft**2 * angle
+        by_softness = -(path**2) * passed / start[2]
+        return -_stacked(np.column_stack([slopes * passed[:, None], by_softness]))
 
     tried = [
-        optimize.least_squares(residual, [1.0, 1.0, 1.0, softness], max_nfev=30)
+        optimize.least_squares(residual, [1.0, 1.0, 1.0, softness], jacobian, max_nfev=30)
         for softness in SOFTEST
     ]
     best = min(tried, key=lambda one: float(one.cost))
@@ -113,12 +127,12 @@ def _coupling(joint: Array, omega: Array, angle: Complex, target: Array) -> Foun
 
 
 def _both_directions(motion: Complex, omega: Array, target: Array) -> Found:
-    fits = []
-    for delay_s in DELAYS_S.tolist():
-        late = np.exp(-1j * omega * delay_s) * motion[:, 1]
-        values, rest = _solved(_stacked(np.column_stack([motion, late])), target)
-        fits.append((("reflex", float(values[3]), delay_s, values[:3]), rest))
-    return min(fits, key=lambda one: one[1])
+    turns = np.exp(-1j * omega[:, None] * DELAYS_S)
+    late = _stacked(turns * motion[:, [1]])
+    columns = _stacked(motion)
+    best = strongest(columns, late, target)
+    values, rest = _solved(np.column_stack([columns, late[:, best]]), target)
+    return ("reflex", float(values[3]), float(DELAYS_S[best]), values[:3]), rest
 
 
 def _solved(columns: Array, target: Array) -> tuple[Array, float]:

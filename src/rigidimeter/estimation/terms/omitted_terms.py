@@ -22,7 +22,7 @@ import numpy as np
 from scipy import stats
 
 from rigidimeter.estimation.signals import Array
-from rigidimeter.estimation.terms.beyond_linear import BeyondLinear, Complex, Solution
+from rigidimeter.estimation.terms.beyond_linear import COLLINEAR, BeyondLinear, Complex
 from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
 from rigidimeter.estimation.terms.reflex import kernel, pass_through, stretch_velocity
 from rigidimeter.statistics import holm
@@ -85,23 +85,38 @@ class _Found(NamedTuple):
     inner: tuple[float, ...]
 
 
+class _Fit(NamedTuple):
+    """What a least-squares fit leaves, as a sum of squares, and its coefficients, shape (p,)."""
+
+    left: float
+    values: Array
+
+
+class _Test(NamedTuple):
+    """A term, its probability by chance, and the fit with it and all that was found."""
+
+    name: str
+    p: float
+    fit: _Fit
+
+
 def omitted_terms(beyond: BeyondLinear) -> tuple[OmittedTerm, ...]:
     """Return the terms that are there, the one that explains most first."""
     found: list[_Found] = []
     chances: list[float] = []
     left = list(TESTED)
     while left:
-        base = beyond.solve(_columns(beyond, found))
-        adjusted = holm([_p(beyond, found, name, base) for name in left])
+        tests = _tests(beyond, found, left)
+        adjusted = holm([test.p for test in tests])
         fits = [
-            (*_best(beyond, found, name), p)
-            for name, p in zip(left, adjusted, strict=True)
+            (*_best(beyond, found, test), p)
+            for test, p in zip(tests, adjusted, strict=True)
             if p < CHANCE
         ]
         fits = [fit for fit in fits if not _pushes(fit[0].name, fit[1].values[-1])]
         if not fits:
             break
-        term, _, p = min(fits, key=lambda fit: _power(fit[1].residual))
+        term, _, p = min(fits, key=lambda fit: fit[1].left)
         found.append(term)
         chances.append(p)
         left.remove("reflex+" if term.name in REFLEXES else term.name)
@@ -123,35 +138,68 @@ def _named(term: _Found, value: float, error: float, p: float) -> OmittedTerm:
     return OmittedTerm(term.name, value, error, p, term.inner)
 
 
-def _p(beyond: BeyondLinear, found: Sequence[_Found], name: str, base: Solution) -> float:
-    more = [_Found(*one) for one in (REFLEX_COLUMNS if name in REFLEXES else ((name, ()),))]
-    solved = beyond.solve(_columns(beyond, [*found, *more]))
-    rest = _power(solved.residual)
-    gained = max(_power(base.residual) - rest, 0.0) / len(more) / beyond.taper_loss
-    ratio = gained / (rest / solved.degrees) if rest > 0 else np.inf
-    return float(stats.f.sf(ratio, len(more), solved.degrees))
+def _tests(beyond: BeyondLinear, found: Sequence[_Found], left: Sequence[str]) -> list[_Test]:
+    """Test each of the terms that are left beside those that were found."""
+    groups = [
+        [_Found(*one) for one in REFLEX_COLUMNS] if name in REFLEXES else [_Found(name, ())]
+        for name in left
+    ]
+    everything = [*found, *(term for group in groups for term in group)]
+    upper = _triangle(_columns(beyond, everything), beyond.torque)
+    base = upper[:, : len(found)]
+    before = _fit(base, upper[:, -1])
+    tests, at = [], len(found)
+    for name, group in zip(left, groups, strict=True):
+        more = len(group)
+        fit = _fit(np.column_stack([base, upper[:, at : at + more]]), upper[:, -1])
+        at += more
+        degrees = beyond.free_values - len(found) - more
+        gained = max(before.left - fit.left, 0.0) / more / beyond.taper_loss
+        ratio = gained / (fit.left / degrees) if fit.left > 0 else np.inf
+        tests.append(_Test(name, float(stats.f.sf(ratio, more, degrees)), fit))
+    return tests
 
 
-def _best(beyond: BeyondLinear, found: Sequence[_Found], name: str) -> tuple[_Found, Solution]:
-    """Return the term, a reflex with its delay of least residual."""
-    if name not in REFLEXES:
-        term = _Found(name, ())
-        return term, beyond.solve(_columns(beyond, [*found, term]))
+def _best(beyond: BeyondLinear, found: Sequence[_Found], test: _Test) -> tuple[_Found, _Fit]:
+    """Return the term and its fit, a reflex with its delay of least residual."""
+    if test.name not in REFLEXES:
+        return _Found(test.name, ()), test.fit
     base = _columns(beyond, found)
-    rest = beyond.solve(base).residual
-    basis, _ = np.linalg.qr(_stacked(base))
     fits = []
     for kind in ("reflex+", "reflex-second-order+"):
         inners = [inner for inner in beyond.grid([kind]) if inner[0] >= EARLIEST_S]
-        tried = _stacked(np.column_stack([beyond.columns([kind], inner) for inner in inners]))
-        # What one more column explains is its projection beside those that are there.
-        tried = tried - basis @ (basis.T @ tried)
-        explained = (_stacked(rest) @ tried) ** 2 / np.maximum(np.sum(tried**2, axis=0), 1e-300)
-        term = _Found(kind, inners[int(np.argmax(explained))])
-        fits.append((term, beyond.solve(_columns(beyond, [*found, term]))))
+        tried = beyond.white(beyond.reflex_lines(kind, inners))
+        best = strongest(_stacked(base), _stacked(tried), _stacked(beyond.torque))
+        upper = _triangle(np.column_stack([base, tried[:, best]]), beyond.torque)
+        fits.append((_Found(kind, inners[best]), _fit(upper[:, :-1], upper[:, -1])))
     late, slow = fits
-    gained = _power(late[1].residual) - _power(slow[1].residual)
-    return slow if gained > DYNAMICS else late
+    return slow if late[1].left - slow[1].left > DYNAMICS else late
+
+
+def strongest(base: Array, tried: Array, target: Array) -> int:
+    """Return which of the columns tried explains most of the target beside those of the base."""
+    basis, _ = np.linalg.qr(base / np.maximum(np.linalg.norm(base, axis=0), 1e-300))
+    # What one more column explains is its projection beside those that are there.
+    beside = tried - basis @ (basis.T @ tried)
+    explained = (target @ beside) ** 2 / np.maximum(np.sum(beside**2, axis=0), 1e-300)
+    return int(np.argmax(explained))
+
+
+def _triangle(columns: Complex, target: Complex) -> Array:
+    """Return R of the columns with the target as the last: few rows that hold every fit."""
+    whole = _stacked(np.column_stack([columns, target]))
+    lengths = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    return np.asarray(np.linalg.qr(whole / lengths, mode="r") * lengths)
+
+
+def _fit(columns: Array, target: Array) -> _Fit:
+    """Fit columns by singular values; collinear ones share their coefficient."""
+    lengths = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    left, singular, right = np.linalg.svd(columns / lengths, full_matrices=False)
+    kept = singular > COLLINEAR * np.max(singular, initial=0.0)
+    products = left[:, kept].T @ target
+    values = right[kept].T @ (products / singular[kept]) / lengths
+    return _Fit(float(target @ target - products @ products), np.asarray(values))
 
 
 def _stacked(lines: Complex) -> Array:
@@ -166,7 +214,3 @@ def _columns(beyond: BeyondLinear, terms: Sequence[_Found]) -> Complex:
 def _pushes(name: str, value: float) -> bool:
     term = term_named(name)
     return term is not None and term.resists and value < 0
-
-
-def _power(lines: Complex) -> float:
-    return float(np.sum(np.abs(lines) ** 2))

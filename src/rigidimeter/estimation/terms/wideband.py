@@ -11,6 +11,7 @@ the frequency domain, where they are exact up to that low-pass:
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import fft, signal
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
@@ -20,11 +21,13 @@ from rigidimeter.estimation.signals import (
     grid_rate_hz,
     kinematics,
     motion_channels,
-    spline,
     uniform_grid,
+    values_at,
 )
 from rigidimeter.records import Epoch
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE
+
+Complex = NDArray[np.complex128]
 
 WIDE_OVER_BAND = 3.0
 """How far above the band the noise is cut before a term bends the signal."""
@@ -45,9 +48,10 @@ def wideband_from_angle(
         rate nothing is cut.
     """
     angle, velocity, acceleration = _derivatives(angle_rad, (0, 1, 2), rate_hz, wide_hz)
+    (torque,) = _derivatives(torque_nm, (0,), rate_hz, wide_hz)
     return Signals(
         time_s=np.arange(angle_rad.size) / rate_hz,
-        torque_nm=_lowpassed(torque_nm, rate_hz, wide_hz),
+        torque_nm=torque,
         acceleration_rad_s2=acceleration,
         velocity_rad_s=velocity,
         angle_rad=angle,
@@ -68,17 +72,18 @@ def wideband_signals(epoch: Epoch, high_hz: float) -> Signals:
     time_s = uniform_grid(used, rate_hz)
     if time_s.size > 2:
         time_s = time_s[: fft.prev_fast_len(time_s.size - 1) + 1]  # of the period below
-    torque = spline(epoch.channels["torque_nm"])(time_s)
+    torque = values_at(epoch.channels["torque_nm"], time_s)
     if "velocity_rad_s" not in epoch.channels:
-        angle = spline(epoch.channels["angle_rad"])(time_s)
+        angle = values_at(epoch.channels["angle_rad"], time_s)
         return wideband_from_angle(torque, angle, rate_hz, wide_hz)
-    angle, velocity, acceleration = kinematics(epoch, time_s)
+    everything = np.stack([torque, *kinematics(epoch, time_s)])
+    torque, angle, velocity, acceleration = _derivatives(everything, (0,), rate_hz, wide_hz)[0]
     return Signals(
         time_s=time_s,
-        torque_nm=_lowpassed(torque, rate_hz, wide_hz),
-        acceleration_rad_s2=_lowpassed(acceleration, rate_hz, wide_hz),
-        velocity_rad_s=_lowpassed(velocity, rate_hz, wide_hz),
-        angle_rad=_lowpassed(angle, rate_hz, wide_hz),
+        torque_nm=torque,
+        acceleration_rad_s2=acceleration,
+        velocity_rad_s=velocity,
+        angle_rad=angle,
         rate_hz=rate_hz,
         band_hz=(0.0, min(wide_hz, rate_hz / 2)),
     )
@@ -102,32 +107,33 @@ def banded(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> Array
     return np.asarray(passed, dtype=np.float64)
 
 
-def _lowpassed(values: Array, rate_hz: float, wide_hz: float) -> Array:
-    return _derivatives(values, (0,), rate_hz, wide_hz)[0]
-
-
 def _derivatives(
     values: Array, orders: tuple[int, ...], rate_hz: float, wide_hz: float
 ) -> list[Array]:
+    """Return derivatives of signals, shape (..., n), along their last axis."""
     # The line between the ends is taken out and its derivative put back, and the rest continued by
     # its point reflection: position and velocity then have no step where the period closes.
-    n = values.size
+    n = values.shape[-1]
     if n < 2:
         raise ValueError(f"{n} sample(s) have no derivative")
-    line = np.linspace(values[0], values[-1], n)
-    slope = (values[-1] - values[0]) / (n - 1) * rate_hz
+    first, last = values[..., :1], values[..., -1:]
+    line = first + (last - first) * np.linspace(0.0, 1.0, n)
     rest = values - line
-    whole = np.concatenate((rest, -rest[-2:0:-1]))
-    frequency_hz = fft.rfftfreq(whole.size, 1.0 / rate_hz)
+    whole = np.concatenate((rest, -rest[..., -2:0:-1]), axis=-1)
+    frequency_hz = fft.rfftfreq(whole.shape[-1], 1.0 / rate_hz)
     spectrum = fft.rfft(whole)
     if wide_hz < rate_hz / 2:
-        spectrum = spectrum / (1.0 + (frequency_hz / wide_hz) ** 8)
-    back = (line, np.full(n, slope), np.zeros(n))
+        fourth = ((frequency_hz / wide_hz) ** 2) ** 2
+        spectrum *= 1.0 / (1.0 + fourth * fourth)
+    back = (line, (last - first) * (rate_hz / (n - 1)), 0.0)
     return [
-        np.asarray(
-            fft.irfft((2j * np.pi * frequency_hz) ** order * spectrum, whole.size)[:n]
-            + back[order],
-            dtype=np.float64,
-        )
+        np.asarray(fft.irfft(_differentiated(spectrum, order, frequency_hz), whole.shape[-1]))[
+            ..., :n
+        ]
+        + back[order]
         for order in orders
     ]
+
+
+def _differentiated(spectrum: Complex, order: int, frequency_hz: Array) -> Complex:
+    return spectrum * (2j * np.pi * frequency_hz) ** order if order else spectrum
