@@ -64,7 +64,7 @@ def _for_python(function: Callable[..., Any]) -> Callable[..., Any]:
         try:
             found = function(*values, **named)
         except UserError as error:
-            raise UserError(arguments_named(str(error))) from error.__cause__
+            raise UserError(*map(arguments_named, error.lines)) from error.__cause__
         if not (notices := getattr(found, "notices", ())):
             return found
         texts = (arguments_named(notice.text) for notice in notices)

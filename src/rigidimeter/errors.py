@@ -2,7 +2,9 @@
 
 import re
 
-_COLUMN = re.compile(r"--column (?:([a-z_]+)=([^\s',;:)]+)|'([a-z_]+)=([^']+)')")
+_PAIR = re.compile(
+    r"--(column|unit|scale|offset) (?:([a-z_]+)='?([^\s',;:)]+)'?|'([a-z_]+)=([^']+)')"
+)
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
 
 
@@ -10,8 +12,13 @@ class UserError(Exception):
     """Something the user can put right, said in one plain sentence.
 
     The command line prints the sentence and exits with a non-zero status, without a traceback.
-    The sentence names the file, the field and the value, and says what would be right.
+    The sentence names the file, the field and the value, and says what would be right. Where
+    several things are wrong, each is a line of its own.
     """
+
+    def __init__(self, *lines: str) -> None:
+        super().__init__("\n".join(lines))
+        self.lines = lines
 
 
 def arguments_named(message: str) -> str:
@@ -22,5 +29,5 @@ def arguments_named(message: str) -> str:
     >>> arguments_named("joint.csv has no column time_s; say --rate-hz or --column time_s=t")
     "joint.csv has no column time_s; say rate_hz or column={'time_s': 't'}"
     """
-    text = _COLUMN.sub(r"column={'\1\3': '\2\4'}", message).replace("--reaction", "reaction=True")
+    text = _PAIR.sub(r"\1={'\2\4': '\3\5'}", message).replace("--reaction", "reaction=True")
     return _OPTION.sub(lambda found: found[1].replace("-", "_"), text)

@@ -5,8 +5,8 @@ import pytest
 import scipy.io
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.readers import read_recording
-from rigidimeter.recording.formats.table_epochs import ReadOptions
 
 HEAD = b"time_s,torque_nm,angle_rad\n"
 ROWS = b"".join(b"%.2f,%d,0.1\n" % (k / 100, k % 7) for k in range(50))
@@ -59,15 +59,12 @@ def test_text_files(tmp_path, data, told):
 @pytest.mark.parametrize(
     ("head", "options", "told"),
     [
-        ("time_s,Torque,angle_rad", {}, "has no column torque_nm; its columns are time_s, Torque, "
-         "angle_rad; the nearest is Torque: if it is the one, say --column torque_nm=Torque"),
-        ("time_s,Torque (Nm),angle_rad", {}, "--column 'torque_nm=Torque (Nm)'"),
-        ("time_s,torque_nm,position", {}, "has neither column velocity_rad_s nor angle_rad"),
-        ("time_s,torque_nm,position", {}, "--column angle_rad=position"),
-        ("time_s,torque_nm,Speed", {}, "--column velocity_rad_s=Speed"),
-        ("Time,torque_nm,angle_rad", {}, "say --rate-hz, or name the column of the time in "
-         "seconds, as in --column time_s=Time"),
-        ("x,torque_nm,angle_rad", {}, "--column time_s=NAME"),
+        ("time_s,Torqe,angle_rad", {}, "has no column torque_nm; its columns are time_s, Torqe, "
+         "angle_rad; the nearest is Torqe: if it is the one, say --column torque=Torqe"),
+        ("time_s,torque_nm,positn", {}, "has neither column velocity_rad_s nor angle_rad"),
+        ("time_s,torque_nm,positn", {}, "--column angle=positn"),
+        ("x,torque_nm,angle_rad", {}, "say --rate-hz, or name the column of the time, as in "
+         "--column time=NAME"),
         (HEAD.decode().strip(), {"columns": {"torque_nM": "Fz"}}, "torque_nM is not a name that is "
          "read; the nearest is torque_nm"),
         (HEAD.decode().strip(), {"columns": {"torque_nm": "torque"}}, "there is no column torque; "
@@ -212,4 +209,4 @@ def test_damage_anywhere_is_read_or_refused(tmp_path, suffix):
         except UserError as error:
             sentences.append(str(error))
     assert len(sentences) > 20
-    assert all(str(path) in text and "\n" not in text for text in sentences)
+    assert all(str(path) in text for text in sentences)

@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.readers import read_table
 from rigidimeter.recording.formats.table import Table
-from rigidimeter.recording.formats.table_epochs import ReadOptions, epochs_from_table
+from rigidimeter.recording.formats.table_epochs import epochs_from_table
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 sizes = st.integers(2, 12)

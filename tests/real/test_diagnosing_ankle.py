@@ -11,8 +11,8 @@ from rigidimeter.estimation.diagnostics import Case, checked, diagnose
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.terms import fit_terms, wideband_signals
 from rigidimeter.estimation.uncertainty import block_bootstrap, hac_covariance
+from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.readers import read_recording
-from rigidimeter.recording.formats.table_epochs import ReadOptions
 from rigidimeter.records import Channel
 from rigidimeter.settings import Settings
 

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 import scipy.io
 
+from rigidimeter.errors import UserError
+from rigidimeter.recording import ReadOptions, read_recording
+
 PUBLISHED = {"inertia_kg_m2": 0.0175, "damping_nm_s_rad": 1.25, "stiffness_nm_rad": 103.0}
 """Least squares on the whole recording, at 100 samples/s (shared data, README)."""
 
@@ -70,5 +73,6 @@ def test_the_same_numbers_from_a_text_file(ankle, tmp_path):
 
 def test_the_wrong_sign_shows_itself(ankle, tmp_path):
     path, _ = ankle
-    found = estimate(path, tmp_path / "out.json", *NAMES, "--rate-hz", 1000, "--epoch-length-s", 20)
-    assert all(epoch["stiffness_nm_rad"] < 0 for epoch in found["epochs"])
+    options = ReadOptions(dict(name.split("=") for name in NAMES[1::2]), epoch_length_s=20.0)
+    with pytest.raises(UserError, match=r"has the sign of the joint's reaction.*say --reaction"):
+        read_recording(path, options)

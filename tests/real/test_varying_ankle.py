@@ -8,8 +8,8 @@ import pytest
 from rigidimeter.estimation import fit_epochs
 from rigidimeter.estimation.diagnostics import checked
 from rigidimeter.estimation.prepared import prepare
+from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.readers import read_recording
-from rigidimeter.recording.formats.table_epochs import ReadOptions
 from rigidimeter.records import Channel
 from rigidimeter.settings import Settings
 

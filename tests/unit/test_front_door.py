@@ -26,10 +26,10 @@ def test_each_name_is_a_function_with_a_docstring() -> None:
 
 def test_messages_name_arguments_and_not_options(tmp_path) -> None:
     bad, good = tmp_path / "bad.csv", tmp_path / "good.csv"
-    rows = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(4000))
-    bad.write_text("t,torque_nm,angle_rad\n" + rows)
+    rows = "".join(f"{k / 100},{k % 7},{k % 5 / 100}\n" for k in range(4000))
+    bad.write_text("x,torque_nm,angle_rad\n" + rows)
     good.write_text("time_s,torque_nm,angle_rad\n" + rows)
-    wanted = r"say rate_hz, or .* as in column={'time_s': 't'} "
+    wanted = r"say rate_hz, or .* as in column={'time': 'NAME'} "
     with pytest.raises(UserError, match=wanted) as raised:
         rigidimeter.read(bad)
     assert "--" not in str(raised.value)

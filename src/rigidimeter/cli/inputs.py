@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 _OF_RECORDINGS = (
     "column",
+    "unit",
+    "scale",
+    "offset",
     "rate_hz",
     "reaction",
     "epoch_length_s",

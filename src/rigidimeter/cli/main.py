@@ -141,7 +141,8 @@ def main() -> None:
     try:
         app()
     except UserError as error:
-        echo(f"rigidimeter: {error}", err=True)
+        for index, line in enumerate(error.lines):
+            echo(line if index else f"rigidimeter: {line}", err=True)
         sys.exit(1)
     except MemoryError:
         echo(

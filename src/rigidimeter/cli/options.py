@@ -114,8 +114,34 @@ class Recordings:
         typer.Option(
             "--column",
             metavar="NAME=COLUMN",
-            help="What the file calls a standard column, for example torque_nm=Fz; repeat as "
-            "needed.",
+            help="What the file calls a quantity, for example torque=Fz; torque_nm=Fz says that it "
+            "is in N·m. Repeat as needed.",
+        ),
+    ] = None
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--unit",
+            metavar="NAME=UNIT",
+            help="The unit of a column, where the file does not state it, for example angle=deg or "
+            "time=ms; repeat as needed.",
+        ),
+    ] = None
+    scale: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--scale",
+            metavar="NAME=FACTOR",
+            help='What a column is multiplied by, for example "torque=2.5 Nm/V", or "torque=0.25 '
+            'm" for a force with a lever arm; repeat as needed.',
+        ),
+    ] = None
+    offset: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--offset",
+            metavar="NAME=VALUE",
+            help='What a column reads at zero, for example "torque=0.1 V"; repeat as needed.',
         ),
     ] = None
     rate_hz: Annotated[
@@ -200,7 +226,10 @@ class Recordings:
 
         recording = read(
             self.paths,
-            column=_columns(self.column or []),
+            column=_pairs("column", self.column, "torque=Fz"),
+            unit=_pairs("unit", self.unit, "angle=deg"),
+            scale=_pairs("scale", self.scale, "'torque=2.5 Nm/V'"),
+            offset=_pairs("offset", self.offset, "'torque=0.1 V'"),
             rate_hz=self.rate_hz,
             reaction=self.reaction,
             epoch_length_s=self.epoch_length_s,
@@ -267,15 +296,16 @@ def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:
     return with_options
 
 
-def _columns(pairs: list[str]) -> dict[str, str]:
-    columns: dict[str, str] = {}
-    for pair in pairs:
-        name, equals, column = pair.partition("=")
-        if not (name and equals and column):
+def _pairs(option: str, pairs: list[str] | None, example: str) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for pair in pairs or ():
+        name, equals, text = pair.partition("=")
+        if not (name and equals and text):
             raise UserError(
-                f"--column {pair}: write NAME=COLUMN, for example --column torque_nm=Fz"
+                f"--{option} {pair}: write NAME={'COLUMN' if option == 'column' else 'VALUE'}, for "
+                f"example --{option} {example}"
             )
-        if name in columns:
-            raise UserError(f"--column {pair}: {name} was already given as {columns[name]}")
-        columns[name] = column
-    return columns
+        if name in found:
+            raise UserError(f"--{option} {pair}: {name} was already given as {found[name]}")
+        found[name] = text
+    return found

@@ -59,6 +59,9 @@ def read(
     condition: str | Sequence[str] | None = None,
     task: Task | None = None,
     leave_out: Sequence[str] = (),
+    unit: Mapping[str, str] | None = None,
+    scale: Mapping[str, str] | None = None,
+    offset: Mapping[str, str] | None = None,
     settings: Settings | str | Path | Mapping[str, Any] | None = None,
 ) -> Recording:
     """Read session folders and files into one recording.
@@ -70,7 +73,8 @@ def read(
     paths : path or sequence of paths
         Session folders, or files of any format in `rigidimeter.recording.formats.READERS`.
     column : mapping of str to str, optional
-        Standard name to the file's own name of a column, as in ``{"torque_nm": "Fz"}``.
+        Quantity to the file's own name of a column, as in ``{"torque": "Fz"}``; ``torque_nm`` says
+        its unit too.
     rate_hz : float, optional
         Sampling rate in Hz of files without a time column.
     reaction : bool
@@ -84,6 +88,14 @@ def read(
     leave_out : sequence of str
         What no estimate uses: ``START:STOP REASON``, in s on the recording's clock, with ``NAME=``
         before it where there are several recordings. The reason may be left away.
+    unit : mapping of str to str, optional
+        Quantity to the unit of its column, as in ``{"angle": "deg"}``, where the file does not
+        state it.
+    scale : mapping of str to str, optional
+        What a column is multiplied by, as in ``{"torque": "2.5 Nm/V"}``, or ``"0.25 m"`` for
+        a force with a lever arm.
+    offset : mapping of str to str, optional
+        What a column reads at zero, as in ``{"torque": "0.1 V"}``.
     settings : Settings, path or mapping, optional
         Settings for the analysis, or a TOML file of them. Default: those with which the first
         session folder was recorded, else the built-in ones.
@@ -99,7 +111,16 @@ def read(
     """
     asked = _paths(paths)
     conditions = _conditions(condition, len(asked))
-    options = ReadOptions(_columns(column), rate_hz, reaction, epoch_length_s, task=task)
+    options = ReadOptions(
+        _by_name("column", column, "'torque': 'Fz'"),
+        rate_hz,
+        reaction,
+        epoch_length_s,
+        task=task,
+        units=_by_name("unit", unit, "'angle': 'deg'"),
+        scales=_by_name("scale", scale, "'torque': '2.5 Nm/V'"),
+        offsets=_by_name("offset", offset, "'torque': '0.1 V'"),
+    )
     chosen = None if settings is None else settings_from(settings)
     compared = _RECORDED_WITH if chosen is not None else (*_RECORDED_WITH, *_ANALYSED_WITH)
     first: Settings | None = None
@@ -113,7 +134,7 @@ def read(
                 recorded = None if reader.settings is None else reader.settings(path)
                 found, remarks = read_recording(path, replace(options, condition=name))
         except UserError as error:
-            notices.append(Notice("error", str(error)))
+            notices += [Notice("error", line) for line in error.lines]
             continue
         if recorded is not None:
             first = first or recorded
@@ -122,7 +143,7 @@ def read(
         epochs += found
         notices += remarks
     if not epochs:
-        raise UserError(" / ".join(n.text for n in notices) or "no epoch was found")
+        raise UserError(*[n.text for n in notices] or ["no epoch was found"])
     epochs, remarks = with_left_out(epochs, leave_out)
     notices += remarks
     return Recording(
@@ -156,14 +177,11 @@ def _paths(paths: object) -> list[Path]:
     return [Path(one) for one in given]
 
 
-def _columns(column: object) -> dict[str, str]:
-    given = {} if column is None else column
-    if not isinstance(given, Mapping) or not all(isinstance(n, str) for n in given.values()):
-        raise UserError(
-            "column maps standard names to the names in the file, as in {'torque_nm': 'Fz'}; "
-            f"got {column!r}"
-        )
-    return dict(given)
+def _by_name(argument: str, given: object, example: str) -> dict[str, str]:
+    found = {} if given is None else given
+    if not isinstance(found, Mapping) or not all(isinstance(n, str) for n in found.values()):
+        raise UserError(f"{argument} maps quantities to texts, as in {{{example}}}; got {given!r}")
+    return dict(found)
 
 
 def _conditions(condition: str | Sequence[str] | None, n_paths: int) -> list[str]:

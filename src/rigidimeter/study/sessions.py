@@ -124,7 +124,7 @@ def gather(
             with noted_digests() as noted:
                 session, said = _read(read, row, names, at, samples, digests, noted)
         except (_Refused, UserError) as error:
-            leave_out(row, str(error))
+            leave_out(row, " / ".join(str(error).splitlines()))
         except OSError as error:  # such as a path too long for the file system
             leave_out(row, f"{row['path']}: cannot be read ({error.strerror or error})")
         else:

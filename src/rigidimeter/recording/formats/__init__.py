@@ -1,5 +1,6 @@
 """The formats that are read: a file becomes a table, and a table becomes epochs."""
 
+from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.readers import (
     READERS,
     Reader,
@@ -9,7 +10,6 @@ from rigidimeter.recording.formats.readers import (
     reader_of,
 )
 from rigidimeter.recording.formats.table import Table
-from rigidimeter.recording.formats.table_epochs import ReadOptions
 from rigidimeter.recording.formats.text_table import TextTable, read_text_table
 
 __all__ = [

@@ -1,70 +1,22 @@
-"""The standard columns of a file: found by name, converted to numbers, with a time for each row.
-
-Files use names of their own. A column gets its standard name here, either because it has it
-already or because the user says so; every refusal names the option that helps.
-"""
+"""Columns of a file as numbers, and the time of each row; every refusal names what helps."""
 
 from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.formats.table import MISSING, Table, alike, nearest
-from rigidimeter.records import CHANNEL_UNITS
+from rigidimeter.recording.formats.table import MISSING, Table, nearest
 
-LABELS = ("epoch", "condition", "task")
-MOTION = ("velocity_rad_s", "angle_rad")
-STANDARD = ("time_s", *CHANNEL_UNITS, *LABELS)
 RATE_NAMES = ("rate_hz", "fs_hz", "fs", "sampling_rate_hz")
 """Single values of a file that are taken as its sampling rate."""
 STRAY_SHARE = 0.01
 """Up to this share of entries may be text in a column of numbers and still be left out singly."""
 _AGREEMENT = 0.01
-
-
-def find_columns(table: Table, wanted: Mapping[str, str]) -> dict[str, str]:
-    """Return the file's name of each standard column that is there.
-
-    Parameters
-    ----------
-    table : Table
-        The file.
-    wanted : mapping of str to str
-        Standard name to the file's name, as the user gave them; other columns go by their own
-        name.
-
-    Raises
-    ------
-    UserError
-        If a name is unknown on either side, or if the torque or the motion is missing.
-    """
-    for standard, name in wanted.items():
-        if standard not in STANDARD:
-            raise UserError(
-                f"--column {shlex.quote(f'{standard}={name}')}: {standard} is not a name that is "
-                f"read; the nearest is {nearest(standard, STANDARD)} (known are "
-                f"{', '.join(STANDARD)})"
-            )
-        if name not in table.columns and not (standard in LABELS and name in table.scalars):
-            raise UserError(_no_such_column(table, standard, name))
-    found = {
-        name: wanted.get(name, name)
-        for name in STANDARD
-        if name in wanted or name in table.columns or (name in LABELS and name in table.scalars)
-    }
-    if "torque_nm" not in found:
-        raise UserError(_missing(table, found, "has no column torque_nm", ("torque_nm",)))
-    if not any(name in found for name in MOTION):
-        raise UserError(
-            _missing(table, found, f"has neither column {MOTION[0]} nor {MOTION[1]}", MOTION)
-        )
-    _same_length(table, found)
-    return found
 
 
 def numbers(
@@ -108,7 +60,11 @@ def numbers(
 
 
 def time_stamps(
-    table: Table, time_name: str | None, rate_hz: float | None, n_rows: int
+    table: Table,
+    name: str,
+    values: NDArray[np.float64],
+    to_si: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    rate_hz: float | None,
 ) -> NDArray[np.float64]:
     """Return the time of each row in s, shape (n_rows,), strictly increasing.
 
@@ -116,27 +72,25 @@ def time_stamps(
     ----------
     table : Table
         The file.
-    time_name : str or None
-        The file's name of its time column, if it has one.
+    name : str
+        The file's name of its time column.
+    values : array, shape (n_rows,)
+        The column as it is.
+    to_si : callable
+        Turns it into seconds.
     rate_hz : float or None
         The sampling rate, if the user gave one.
-    n_rows : int
-        The length of the columns.
 
     Raises
     ------
     UserError
-        If there is neither time nor rate, if they disagree, or if the time does not increase.
+        If time and rate disagree, or if the time does not increase.
     """
-    if time_name is not None:
-        time_s = numbers(table, "time_s", time_name)
-        _increasing(table, time_name, time_s)
-        if rate_hz is not None:
-            _agreeing(table, time_name, time_s, rate_hz)
-        return time_s
-    if rate_hz is None:
-        rate_hz = _own_rate(table)
-    return np.arange(n_rows) / rate_hz
+    _increasing(table, name, values)
+    time_s = to_si(values)
+    if rate_hz is not None:
+        _agreeing(table, name, time_s, rate_hz)
+    return time_s
 
 
 def seconds(value: float) -> str:
@@ -144,36 +98,8 @@ def seconds(value: float) -> str:
     return f"{value:.4f}".rstrip("0").rstrip(".") + " s"
 
 
-def _no_such_column(table: Table, standard: str, name: str) -> str:
-    option = f"--column {shlex.quote(f'{standard}={name}')}"
-    if name in table.others:
-        return (
-            f"{table.source}: {option}: {name} is {table.others[name]}; a column has one "
-            "dimension and a real number or text for each sample"
-        )
-    if name in table.scalars:
-        return f"{table.source}: {option}: {name} is a single value, not a column of samples"
-    near = nearest(name, table.columns)
-    right = f"--column {shlex.quote(f'{standard}={near}')}"
-    return (
-        f"{table.source}: {option}: there is no column {name}; the nearest is {near}, so perhaps "
-        f"{right} (its columns are {table.listed})"
-    )
-
-
-def _missing(table: Table, found: Mapping[str, str], what: str, standards: tuple[str, ...]) -> str:
-    taken = set(found.values())
-    free = [name for name in table.columns if name not in taken]
-    text = f"{table.source} {what}; its columns are {table.listed}"
-    if not free:
-        return f"{text}, and none is left to be it"
-    ranked = [(alike(standard, name), standard, name) for standard in standards for name in free]
-    _, standard, name = max(ranked, key=lambda entry: entry[0])
-    option = shlex.quote(f"{standard}={name}")
-    return f"{text}; the nearest is {name}: if it is the one, say --column {option}"
-
-
-def _same_length(table: Table, found: Mapping[str, str]) -> None:
+def same_length(table: Table, found: Mapping[str, str]) -> None:
+    """Refuse columns, by standard name, of different lengths or of fewer than two samples."""
     first = found["torque_nm"]
     length = table.columns[first].size
     for name in found.values():
@@ -189,18 +115,30 @@ def _same_length(table: Table, found: Mapping[str, str]) -> None:
         )
 
 
-def _own_rate(table: Table) -> float:
-    found = {
+def own_rates(table: Table) -> dict[str, float]:
+    """Return the sampling rates that a file states, by its names of them."""
+    return {
         name: float(value)
         for name, value in table.scalars.items()
         if name.rsplit(".", 1)[-1] in RATE_NAMES and not isinstance(value, str)
     }
+
+
+def own_rate(table: Table) -> float:
+    """Return the sampling rate of a file without a column of the time.
+
+    Raises
+    ------
+    UserError
+        If it states none, several, or one that cannot be.
+    """
+    found = own_rates(table)
     if not found:
         near = nearest("time_s", table.columns, least=0.7) or "NAME"
-        option = shlex.quote(f"time_s={near}")
+        option = shlex.quote(f"time={near}")
         raise UserError(
-            f"{table.source} has neither a column time_s nor a sampling rate; say --rate-hz, or "
-            f"name the column of the time in seconds, as in --column {option} (its columns are "
+            f"{table.source} has neither a column of the time nor a sampling rate; say "
+            f"--rate-hz, or name the column of the time, as in --column {option} (its columns are "
             f"{table.listed})"
         )
     if len(set(found.values())) > 1:
@@ -221,7 +159,7 @@ def _increasing(table: Table, name: str, time_s: NDArray[np.float64]) -> None:
         row = int(bad[0])
         raise UserError(
             f"{table.where(row)}: {name} is {'missing' if np.isnan(time_s[row]) else 'infinite'}; "
-            "every row must have a time in seconds"
+            "every row must have a time"
         )
     back = np.flatnonzero(np.diff(time_s) <= 0)
     if back.size:

@@ -17,9 +17,10 @@ from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.mat_file import read_mat
 from rigidimeter.recording.formats.npz_file import read_npz
+from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.stored_arrays import Columns
 from rigidimeter.recording.formats.table import Table
-from rigidimeter.recording.formats.table_epochs import ReadOptions, epochs_from_table
+from rigidimeter.recording.formats.table_epochs import epochs_from_table
 from rigidimeter.recording.formats.text_table import read_text_recording
 from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
 from rigidimeter.records import Epoch, Notice

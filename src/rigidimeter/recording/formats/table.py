@@ -39,6 +39,8 @@ class Table:
         Entries that cannot be a column, and what they are instead.
     lines : array of int, shape (n,), or None
         The line of the file that each row came from; None for files without lines.
+    units : mapping of str to str
+        By column, where the file states them apart from the names.
     """
 
     source: str
@@ -46,6 +48,7 @@ class Table:
     scalars: Mapping[str, float | str] = field(default_factory=dict)
     others: Mapping[str, str] = field(default_factory=dict)
     lines: NDArray[np.int64] | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def where(self, row: int) -> str:
         """Name a row, counted from 0, as the user would find it in the file."""

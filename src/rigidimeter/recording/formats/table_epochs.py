@@ -7,10 +7,7 @@ joint, torque = −(J θ'' + B θ' + K θ), has the other sign: `ReadOptions.rea
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from numbers import Real
 from typing import Any, cast, get_args
 
 import numpy as np
@@ -18,14 +15,9 @@ from numpy.typing import NDArray
 
 from rigidimeter.documents.bounds import EPOCHS, MAGNITUDE, SAMPLING_RATE_HZ
 from rigidimeter.errors import UserError
-from rigidimeter.recording.formats.columns import (
-    LABELS,
-    MOTION,
-    find_columns,
-    numbers,
-    seconds,
-    time_stamps,
-)
+from rigidimeter.recording.channels.channels_of_table import TableChannels, channels_of_table
+from rigidimeter.recording.channels.choice import LABELS, MOTION
+from rigidimeter.recording.formats.columns import seconds
 from rigidimeter.recording.formats.cutting import (
     Stretch,
     by_label,
@@ -44,63 +36,11 @@ from rigidimeter.recording.formats.gaps import (
     kept_rows,
     make_signal,
 )
-from rigidimeter.recording.formats.plausible_units import about_units
+from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table, nearest
-from rigidimeter.records import CHANNEL_UNITS, Channel, Epoch, Notice, Task
+from rigidimeter.records import Channel, Epoch, Notice, Task
 
 _FEWEST = 2
-
-
-@dataclass(frozen=True)
-class ReadOptions:
-    """What a file does not say of itself.
-
-    Parameters
-    ----------
-    columns : mapping of str to str
-        Standard name to the file's name of a column.
-    rate_hz : float or None
-        The sampling rate, for files without a time column.
-    reaction : bool
-        The torque is the joint's reaction: its sign is turned.
-    epoch_length_s : float or None
-        Cut a file without an epoch column into epochs of this length.
-    condition : str
-        For files without a condition column.
-    task : {"prbs", "sinusoid"} or None
-        For files without a task column.
-
-    Raises
-    ------
-    UserError
-        If a value is out of its range.
-    """
-
-    columns: Mapping[str, str] = field(default_factory=dict)
-    rate_hz: float | None = None
-    reaction: bool = False
-    epoch_length_s: float | None = None
-    condition: str = ""
-    task: Task | None = None
-
-    def __post_init__(self) -> None:
-        positive = (
-            ("--rate-hz", self.rate_hz, "the sampling rate", "Hz"),
-            ("--epoch-length-s", self.epoch_length_s, "the length", "s"),
-        )
-        for option, value, what, unit in positive:
-            if value is not None and not isinstance(value, Real):
-                raise UserError(f"{option} {value!r}: {what} must be a number")
-            if value is not None and not 0 < value < math.inf:
-                raise UserError(f"{option} {value:g}: {what} must be greater than 0 {unit}")
-        low_hz, high_hz = SAMPLING_RATE_HZ
-        if self.rate_hz is not None and not low_hz <= self.rate_hz <= high_hz:
-            raise UserError(
-                f"--rate-hz {self.rate_hz:g}: the sampling rate must be from {low_hz:g} to "
-                f"{high_hz:g} Hz"
-            )
-        if self.task not in (None, *get_args(Task)):
-            raise UserError(f"--task {self.task}: must be {' or '.join(get_args(Task))}")
 
 
 def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], list[Notice]]:
@@ -111,12 +51,11 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
     UserError
         If the table cannot be read as a recording; the sentence says what would be right.
     """
-    names = find_columns(table, options.columns)
-    n_rows = table.columns[names["torque_nm"]].size
-    clock = Rows.of(time_stamps(table, names.get("time_s"), options.rate_hz, n_rows))
+    read = channels_of_table(table, options)
+    names, n_rows = read.names, read.time_s.size
+    clock = Rows.of(read.time_s)
     _check_rate(table.source, names.get("time_s"), clock)
-    signals, notices = _signals(table, names, clock, options.reaction)
-    notices += about_units(table.source, signals, clock.step_s)
+    signals, notices = _signals(table.source, read, clock)
     labels = {name: _label_column(table, names[name], n_rows) for name in LABELS if name in names}
     stretches, more = _stretches(table, clock, labels.get("epoch"), options.epoch_length_s)
     notices += more
@@ -174,33 +113,30 @@ def _check_rate(source: str, name: str | None, clock: Rows) -> None:
 
 
 def _signals(
-    table: Table, names: Mapping[str, str], clock: Rows, reaction: bool
+    source: str, read: TableChannels, clock: Rows
 ) -> tuple[dict[str, Signal], list[Notice]]:
-    """Read the columns of numbers; one without a single number is left out."""
+    """Take the samples of each channel; one without a single number is left out."""
     signals: dict[str, Signal] = {}
     empty: list[str] = []
-    strays: list[str] = []
-    for name in (name for name in CHANNEL_UNITS if name in names):
-        values = numbers(table, name, names[name], strays)
-        if reaction and name == "torque_nm":
-            values = -values
+    for name, values in read.values.items():
+        spoken = _spoken(name, read.names[name])
         signal = make_signal(name, clock, values)
-        _check_magnitude(table.source, _spoken(name, names[name]), signal)
+        _check_magnitude(source, spoken, signal)
         if signal.values.size:
             signals[name] = signal
         else:
-            empty.append(_spoken(name, names[name]))
+            empty.append(spoken)
     if "torque_nm" not in signals or not any(name in signals for name in MOTION):
         raise UserError(
-            f"{table.source}: {' and '.join(empty)} has no number in any row; an estimate needs "
+            f"{source}: {' and '.join(empty)} has no number in any row; an estimate needs "
             "the torque and the angle or its velocity"
         )
     return signals, [
         *(
-            Notice("error", f"{table.source}: {name} has no number in any row; it was left out")
+            Notice("error", f"{source}: {name} has no number in any row; it was left out")
             for name in empty
         ),
-        *(Notice("error", f"{text}; the entry was left out") for text in strays),
+        *read.notices,
     ]
 
 

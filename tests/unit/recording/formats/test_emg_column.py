@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import scipy.io
 
+from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.readers import read_recording
 from rigidimeter.recording.formats.table import Table
-from rigidimeter.recording.formats.table_epochs import ReadOptions, epochs_from_table
+from rigidimeter.recording.formats.table_epochs import epochs_from_table
 
 N = 400
 
@@ -68,4 +69,4 @@ def test_microvolts_are_told(columns):
     _, notices = epochs_from_table(Table("t", columns), ReadOptions())
     assert len(notices) == 1
     assert notices[0].level == "warning"
-    assert "looks like microvolts: divide by 1e6 to have V" in notices[0].text
+    assert "looks like microvolts: say --unit emg=uV" in notices[0].text

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
-from rigidimeter.recording.formats.table_epochs import ReadOptions, epochs_from_table
+from rigidimeter.recording.formats.table_epochs import epochs_from_table
 
 NAN = np.nan
 
@@ -201,21 +202,3 @@ def test_a_lone_sample_between_gaps_is_left_out_aloud():
     epochs, notices = read(table(time_s=time_s))
     assert lengths(epochs) == [("1a", 400), ("1b", 599)]
     assert any("fewer than 2 samples from 4.5 s to 4.5 s" in notice.text for notice in notices)
-
-
-@pytest.mark.parametrize(
-    ("name", "factor", "warned"),
-    [
-        ("angle_rad", 6.4, False), ("angle_rad", 40, True), ("velocity_rad_s", 49, False),
-        ("velocity_rad_s", 51, True), ("torque_nm", 80, False),
-    ],
-)  # fmt: skip
-def test_values_that_look_like_degrees(name, factor, warned):
-    _, notices = read(table(**{name: factor * np.cos(np.arange(1000) / 100)}))
-    assert [notice.level for notice in notices] == ["warning"] * warned
-    assert all(name in notice.text and "degrees" in notice.text for notice in notices)
-
-
-def test_a_time_in_milliseconds_is_pointed_out():
-    _, (notice,) = read(table(time_s=np.arange(1000.0)))
-    assert "milliseconds" in notice.text

@@ -5,8 +5,9 @@ import pytest
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.cutting import lettered
+from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
-from rigidimeter.recording.formats.table_epochs import ReadOptions, epochs_from_table
+from rigidimeter.recording.formats.table_epochs import epochs_from_table
 
 
 def table(n=300, *, rate_hz=100.0, start_s=0.0, **more):

@@ -1,0 +1,191 @@
+"""The channels of a table in SI: chosen, converted, and held against what a joint can do.
+
+All that is wrong with a file is said at once, a line each, with what would put it right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
+from rigidimeter.recording.channels.quantities import BY_STANDARD
+from rigidimeter.recording.channels.readings import (
+    doubts,
+    look_at,
+    options_text,
+    readings,
+    sign_fault,
+)
+from rigidimeter.recording.formats.columns import (
+    numbers,
+    own_rate,
+    own_rates,
+    same_length,
+    time_stamps,
+)
+from rigidimeter.recording.formats.read_options import ReadOptions
+from rigidimeter.recording.formats.table import Table
+from rigidimeter.records import Notice
+
+Array = NDArray[np.float64]
+
+LARGEST_EMG_V = 20.0
+"""Amplifiers of EMG give at most ±10 V or so."""
+
+
+@dataclass(frozen=True)
+class TableChannels:
+    """What is used of a table.
+
+    Parameters
+    ----------
+    names : mapping of str to str
+        Standard name to the file's, of channels, time and labels.
+    time_s : array, shape (n,)
+        Of the rows.
+    values : mapping of str to array, shape (n,)
+        In SI, by standard name, NaN where there is no number.
+    notices : tuple of Notice
+    """
+
+    names: Mapping[str, str]
+    time_s: Array
+    values: Mapping[str, Array]
+    notices: tuple[Notice, ...]
+
+
+def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
+    """Return the channels of a table.
+
+    Raises
+    ------
+    UserError
+        If it cannot be read as a recording: every fault in a line of its own.
+    """
+    has_rate = options.rate_hz is not None or bool(own_rates(table))
+    choice = choose(table, options.said, has_rate)
+    faults, strays = list(choice.faults), list[str]()
+    names = {standard: taken.column for standard, taken in choice.taken.items()}
+    if "torque_nm" not in names or not any(name in names for name in MOTION):
+        raise UserError(*faults)
+    same_length(table, names)
+    raw: dict[str, Array] = {}
+    for standard in (name for name in names if name in BY_STANDARD):
+        try:
+            exact = standard == "time_s"
+            raw[standard] = numbers(table, standard, names[standard], None if exact else strays)
+        except UserError as error:
+            faults.append(str(error))
+    time_s, rate_hz = np.empty(0), options.rate_hz
+    try:
+        if "time_s" not in names and rate_hz is None:
+            rate_hz = own_rate(table)
+        time_s = _time(table, choice, raw, rate_hz)
+    except UserError as error:
+        faults.append(str(error))
+    usable = (
+        "torque_nm" in raw
+        and any(name in raw for name in MOTION)
+        and "time_s" not in (set(names) - set(raw))
+    )
+    if choice.unstated:
+        faults += _unstated(table, choice, raw, rate_hz, usable=usable)
+    notices = [Notice("warning", text) for text in choice.unused]
+    if not faults and usable:
+        found, warned = _doubtful(table, choice.taken, raw, options, rate_hz)
+        faults += found
+        notices += [Notice("warning", text) for text in warned]
+    if faults:
+        raise UserError(*dict.fromkeys(faults))
+    values = {
+        standard: to_si(raw[standard])
+        for standard, taken in choice.taken.items()
+        if standard in raw and standard != "time_s" and (to_si := taken.to_si) is not None
+    }
+    notices += _about_emg(table, values)
+    if options.reaction:
+        values["torque_nm"] = -values["torque_nm"]
+    notices += [Notice("error", f"{text}; the entry was left out") for text in strays]
+    return TableChannels(names, time_s, values, tuple(notices))
+
+
+def _about_emg(table: Table, values: Mapping[str, Array]) -> list[Notice]:
+    emg = np.abs(values.get("emg_v", np.empty(0)))
+    largest = float(np.max(emg, initial=0.0, where=np.isfinite(emg)))
+    if largest <= LARGEST_EMG_V:
+        return []
+    text = (
+        f"{table.source}: emg_v reaches {largest:.4g} V, which looks like microvolts: say --unit "
+        "emg=uV"
+    )
+    return [Notice("warning", text)]
+
+
+def _time(table: Table, choice: Choice, raw: Mapping[str, Array], rate_hz: float | None) -> Array:
+    taken = choice.taken.get("time_s")
+    if taken is None:
+        first = choice.taken["torque_nm"].column
+        return np.arange(table.columns[first].size) / (rate_hz or 1.0)
+    if taken.to_si is None or "time_s" not in raw:
+        return np.empty(0)
+    return time_stamps(table, taken.column, raw["time_s"], taken.to_si, rate_hz)
+
+
+def _unstated(
+    table: Table,
+    choice: Choice,
+    raw: Mapping[str, Array],
+    rate_hz: float | None,
+    *,
+    usable: bool,
+) -> list[str]:
+    vary = [taken.standard for taken in choice.unstated]
+    columns = ", ".join(repr(taken.column) for taken in choice.unstated)
+    text = (
+        f"{table.source}: the unit of {columns} is stated nowhere, so nothing is estimated; say "
+        f"{options_text(vary)}"
+    )
+    return [text, *(readings(choice.taken, raw, rate_hz, vary) if usable else [])]
+
+
+def _doubtful(
+    table: Table,
+    taken: Mapping[str, Taken],
+    raw: Mapping[str, Array],
+    options: ReadOptions,
+    rate_hz: float | None,
+) -> tuple[list[str], list[str]]:
+    """Return faults and warnings about units and signs that the numbers contradict."""
+    signed = dict(raw)
+    if options.reaction:
+        signed["torque_nm"] = -raw["torque_nm"]
+    seen = look_at(taken, signed, rate_hz, {})
+    if seen is None:
+        return [], []
+    motion = next(name for name in reversed(MOTION) if name in taken)
+    columns = {"torque": taken["torque_nm"].column, BY_STANDARD[motion].name: taken[motion].column}
+    if wrong := sign_fault(seen, columns, reaction=options.reaction):
+        return [f"{table.source}: {wrong}"], []
+    faults: list[str] = []
+    warnings: list[str] = []
+    for doubt in doubts(seen):
+        one = taken.get(doubt.standard)
+        if one is None:
+            option = "check --rate-hz" if options.rate_hz is not None else "say --rate-hz"
+            text = f"{table.source}: {doubt.text} at the sampling rate of {rate_hz:g} Hz; {option}"
+            (faults if options.rate_hz is None else warnings).append(text)
+            continue
+        text = f"{table.source}: column {one.column!r} is in {one.unit}, but {doubt.text}"
+        if one.of_user:
+            warnings.append(f"{text}; it is read as the unit that was given says")
+            continue
+        faults += [
+            f"{text}; say {options_text([doubt.standard])}",
+            *readings(taken, signed, rate_hz, [doubt.standard]),
+        ]
+    return faults, warnings

@@ -1,0 +1,190 @@
+"""What a recording looks like under each reading of its units, and which readings cannot be.
+
+A unit that the user states is believed, with a warning; one that only the file states is not
+believed where the numbers contradict it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimeter.recording.channels.choice import Taken
+from rigidimeter.recording.channels.looks import Array, Look, RoughFit, look
+from rigidimeter.recording.channels.quantities import BY_STANDARD
+from rigidimeter.recording.channels.unit_text import factor
+
+LARGEST_RAD = 2 * math.pi
+LARGEST_SPEED_RAD_S = 20.0
+"""A thrown ball takes more, no measured arm does; 1,150 °/s."""
+LARGEST_POWER_W = 20.0
+"""Of an axis that turns on, the default of `guard.power_limit_w`."""
+LARGEST_TORQUE_NM = 1000.0
+SLOWEST_MOTION_HZ = 0.02
+SLOWEST_RATE_HZ = 5.0
+FASTEST_MOTION_HZ, FASTEST_RATE_HZ = 100.0, 5e4
+FEWEST = 100
+SHORTEST_S = 5.0
+"""What is shorter is not estimated."""
+_MOST_LINES = 8
+_CLEAR_R_SQUARED = 0.5
+_MUCH = 0.3
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Why a quantity's unit cannot be right; `usual` are the units to offer instead."""
+
+    standard: str
+    text: str
+
+
+def doubts(seen: Look) -> list[Doubt]:
+    """Return what cannot be right of a recording with torque and motion of a joint."""
+    if seen.n_samples < FEWEST:
+        return []
+    if seen.rate_hz < SLOWEST_RATE_HZ or seen.motion_hz < SLOWEST_MOTION_HZ:
+        text = f"{seen.rate_hz:.4g} samples/s and a motion of {seen.motion_hz:.2g} Hz are too slow"
+        return [Doubt("time_s", text)]
+    if seen.rate_hz > FASTEST_RATE_HZ and seen.motion_hz > FASTEST_MOTION_HZ:
+        text = f"{seen.rate_hz:.4g} samples/s and a motion of {seen.motion_hz:.2g} Hz are too fast"
+        return [Doubt("time_s", text)]
+    if seen.duration_s < SHORTEST_S:
+        return []
+    found = []
+    if seen.torque_nm > LARGEST_TORQUE_NM:
+        found.append(Doubt("torque_nm", f"a torque of {seen.torque_nm:.4g} N·m is too large"))
+    turns_on = seen.turned_rad >= 0.5 * seen.range_rad and seen.power_w <= LARGEST_POWER_W
+    if seen.largest_rad > LARGEST_RAD and not turns_on:
+        text = f"an angle of {seen.largest_rad:.4g} rad is more than one turn"
+        found.append(Doubt("angle_rad", text))
+    elif seen.speed_rad_s > LARGEST_SPEED_RAD_S and not turns_on:
+        name = "velocity_rad_s" if math.isnan(seen.largest_rad) else "angle_rad"
+        found.append(Doubt(name, f"a speed of {seen.speed_rad_s:.4g} rad/s is too fast for a limb"))
+    return found
+
+
+def sign_fault(seen: Look, columns: Mapping[str, str], *, reaction: bool) -> str:
+    """Say where torque and motion have signs, or names, that no joint has; nothing where not.
+
+    Parameters
+    ----------
+    seen : Look
+    columns : mapping of str to str
+        The columns of the torque and, second, of the motion.
+    reaction : bool
+        Whether the sign of the torque was turned.
+    """
+    fit, swapped = seen.fit, seen.swapped
+    if fit is None or seen.duration_s < SHORTEST_S:
+        return ""
+    signs = fit.significant
+    shown = " and ".join(repr(column) for column in columns.values())
+    if swapped is not None and _exchanged(fit, swapped):
+        exchanged = zip(columns, reversed([*columns.values()]), strict=True)
+        options = " ".join(
+            f"--column {shlex.quote(f'{name}={column}')}" for name, column in exchanged
+        )
+        return (
+            f"{shown} are exchanged: as they are, {_fit_text(seen)} with R² "
+            f"{fit.r_squared:.2f}; the other way round the signs are those of a joint, with R² "
+            f"{swapped.r_squared:.2f}; say {options} and the unit of each"
+        )
+    if np.all(signs < 0) and fit.r_squared > _CLEAR_R_SQUARED:
+        remedy = "leave out --reaction" if reaction else "say --reaction"
+        return (
+            f"{shown} give {_fit_text(seen)}: the torque has the sign of the joint's reaction, or "
+            f"the angle is reversed; {remedy}"
+        )
+    return ""
+
+
+def _exchanged(fit: RoughFit, swapped: RoughFit) -> bool:
+    """Whether the angle is explained by the torque as a torque is by the motion, and far better."""
+    left, left_swapped = 1.0 - fit.r_squared, 1.0 - swapped.r_squared
+    one_sign = abs(float(np.sum(swapped.significant))) == 3.0
+    return one_sign and left_swapped < _MUCH * left and swapped.r_squared > _CLEAR_R_SQUARED
+
+
+def readings(
+    taken: Mapping[str, Taken], raw: Mapping[str, Array], rate_hz: float | None, vary: Sequence[str]
+) -> list[str]:
+    """Return a line for each reading of the quantities in `vary` in their usual units.
+
+    Parameters
+    ----------
+    taken : mapping of str to Taken
+    raw : mapping of str to array, shape (n,)
+        The columns as they are, by standard name, of numbers or NaN.
+    rate_hz : float or None
+        Where there is no column of time.
+    vary : sequence of str
+    """
+    motion = "angle_rad" if "angle_rad" in raw else "velocity_rad_s"
+    varied = [name for name in ("time_s", "torque_nm", motion) if name in vary]
+    lines = []
+    for units in itertools.product(*(BY_STANDARD[name].usual for name in varied)):
+        as_units = dict(zip(varied, units, strict=True))
+        seen = look_at(taken, raw, rate_hz, as_units)
+        if seen is None:
+            continue
+        names = ", ".join(f"{BY_STANDARD[n].name} as {unit}" for n, unit in as_units.items())
+        doubt = "; ".join(one.text for one in doubts(seen))
+        lines.append(f"  {names}: {_look_text(seen)}" + (f" ({doubt})" if doubt else ""))
+    return lines[:_MOST_LINES]
+
+
+def look_at(
+    taken: Mapping[str, Taken],
+    raw: Mapping[str, Array],
+    rate_hz: float | None,
+    as_units: Mapping[str, str],
+) -> Look | None:
+    """Look at columns in the units that are stated, or in those of `as_units`; None if too few."""
+
+    def si(name: str) -> Array:
+        values = raw[name].astype(np.float64)
+        if name in as_units:
+            return values * (factor(as_units[name], name) or 1.0)
+        to_si = taken[name].to_si
+        return values if to_si is None else to_si(values)
+
+    motion = "angle_rad" if "angle_rad" in raw else "velocity_rad_s"
+    time_s = si("time_s") if "time_s" in raw else np.arange(raw[motion].size) / (rate_hz or 1.0)
+    signals = []
+    for name in ("torque_nm", motion):
+        values = si(name)
+        here = np.isfinite(values) & np.isfinite(time_s)
+        if np.count_nonzero(here) < 2:
+            return None
+        signals.append((time_s[here], values[here]))
+    return look(signals[0], signals[1], is_angle=motion == "angle_rad")
+
+
+def options_text(vary: Sequence[str]) -> str:
+    """Return the options that would state the units of some quantities."""
+    return "; ".join(
+        " or ".join(
+            f"--unit {BY_STANDARD[name].name}={shlex.quote(unit)}"
+            for unit in BY_STANDARD[name].usual
+        )
+        for name in vary
+    )
+
+
+def _look_text(seen: Look) -> str:
+    speed = f"peak speed {seen.speed_rad_s:.3g} rad/s"
+    rate = f"{seen.rate_hz:.4g} samples/s for {seen.duration_s:.4g} s"
+    return f"{rate}, {speed}, {_fit_text(seen)}"
+
+
+def _fit_text(seen: Look) -> str:
+    if seen.fit is None:
+        return "J, B and K cannot be told"
+    inertia, damping, stiffness = seen.fit.value
+    return f"J {inertia:.2g} kg·m², B {damping:.2g} N·m·s/rad, K {stiffness:.2g} N·m/rad"
