@@ -61,7 +61,7 @@ def text_at(row):
 BAD = {
     "missing column": (
         {"Fz" if k == "torque_nm" else k: v for k, v in recording().items()},
-        ["no column torque_nm", "--column torque_nm=Fz"],
+        ["the unit of 'Fz' is stated nowhere", "--unit torque=Nm"],
     ),
     "no motion": ({k: v for k, v in recording().items() if k != "angle_rad"}, ["angle_rad"]),
     "text in a number column": (text_at(99), ["torque_nm", "oops", "line 101"]),
@@ -123,12 +123,12 @@ def test_a_gap_ends_an_epoch_and_is_said_without_failing(rigidimeter, tmp_path):
     assert len(json.loads(out.read_text())["epochs"]) == 2
 
 
-def test_degrees_given_as_radians_are_warned_of(rigidimeter, tmp_path):
+def test_degrees_given_as_radians_are_refused(rigidimeter, tmp_path):
     columns = recording()
     write(tmp_path / "deg.csv", columns | {"angle_rad": np.rad2deg(columns["angle_rad"])})
     ran = rigidimeter("estimate", tmp_path / "deg.csv")
-    assert ran.status == 0
-    assert "degrees" in ran.err
+    assert ran.status == 1
+    assert "is more than one turn; say --unit angle=rad or --unit angle=deg" in ran.err
 
 
 def test_jittered_stamps_are_resampled_by_their_stamps(rigidimeter, tmp_path):

@@ -31,6 +31,7 @@ FASTEST_MOTION_HZ, FASTEST_RATE_HZ = 100.0, 5e4
 FEWEST = 100
 SHORTEST_S = 5.0
 """What is shorter is not estimated."""
+RARE_TIME_UNITS = ("us", "days")
 _MOST_LINES = 8
 _CLEAR_R_SQUARED = 0.5
 _MUCH = 0.3
@@ -127,8 +128,11 @@ def readings(
     """
     motion = "angle_rad" if "angle_rad" in raw else "velocity_rad_s"
     varied = [name for name in ("time_s", "torque_nm", motion) if name in vary]
+    usual = {name: BY_STANDARD[name].usual for name in varied}
+    if "time_s" in vary:
+        usual["time_s"] = _time_units(taken, raw)
     lines = []
-    for units in itertools.product(*(BY_STANDARD[name].usual for name in varied)):
+    for units in itertools.product(*usual.values()):
         as_units = dict(zip(varied, units, strict=True))
         seen = look_at(taken, raw, rate_hz, as_units)
         if seen is None:
@@ -137,6 +141,15 @@ def readings(
         doubt = "; ".join(one.text for one in doubts(seen))
         lines.append(f"  {names}: {_look_text(seen)}" + (f" ({doubt})" if doubt else ""))
     return lines[:_MOST_LINES]
+
+
+def _time_units(taken: Mapping[str, Taken], raw: Mapping[str, Array]) -> tuple[str, ...]:
+    """Return s and ms, and where neither can be also µs and days."""
+    usual = BY_STANDARD["time_s"].usual
+    seen = [look_at(taken, raw, None, {"time_s": unit}) for unit in usual]
+    if all(one is not None and any(d.standard == "time_s" for d in doubts(one)) for one in seen):
+        return (*usual, *RARE_TIME_UNITS)
+    return usual
 
 
 def look_at(
