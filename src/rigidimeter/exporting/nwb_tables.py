@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rigidimeter.exporting.document_tables import columns_of, document_tables
+from rigidimeter.exporting.exclusions import exclusion_reasons
 
 if TYPE_CHECKING:
     from pynwb import NWBFile
@@ -23,7 +24,7 @@ def add_trials(file: NWBFile, about: Mapping[str, Any]) -> None:
     }.items():
         file.add_trial_column(name, text)
     rest = {"task": "", "condition": "", "epoch": "", "excluded": False, "exclusion_reason": ""}
-    reasons = _exclusions(about)
+    reasons = exclusion_reasons(about)
     before_s: float | None = None
     for epoch in sorted(about["epochs"], key=lambda each: each["start_s"]):
         start_s, stop_s = epoch["start_s"], epoch["stop_s"]
@@ -41,19 +42,6 @@ def add_trials(file: NWBFile, about: Mapping[str, Any]) -> None:
             rest=False,
         )
         before_s = stop_s
-
-
-def _exclusions(about: Mapping[str, Any]) -> dict[str, str]:
-    """Return why epochs do not count, by label: as they ended, or as the estimation found."""
-    estimates = about.get("estimates") or {}
-    results = [*estimates.get("epochs", ()), *estimates.get("scores", ())]
-    found = [(each["epoch"], each) for each in results]
-    found += [(each["label"], each) for each in about["epochs"]]
-    return {
-        name: str(each["reason"]) or str(each["outcome"])
-        for name, each in found
-        if each["outcome"] != "included"
-    }
 
 
 def add_stimulation(file: NWBFile, about: Mapping[str, Any]) -> None:
