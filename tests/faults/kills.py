@@ -38,13 +38,11 @@ from typing import Any
 
 import can
 import numpy as np
-from numpy.typing import NDArray
 from tests.faults.running_session import alive
 from tests.faults.session import VIRTUAL, settings_for
+from tests.faults.written_ring import Ring
 from tests.wire.rig_process import RigProcess
 
-from rigidimeter.acquisition.processes.ring import ROW
-from rigidimeter.acquisition.processes.shared_memory import WHERE
 from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.sample_reading import read_samples
 
@@ -53,19 +51,14 @@ SIGNALS = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM, signal.SIGQUIT)
 SINGLE = ("CONSOLE", "LOOP", "RECORDER")
 TARGETS = (*((one,) for one in SINGLE), *itertools.combinations(SINGLE, 2), SINGLE)
 CASES = tuple(itertools.product(SIGNALS, TARGETS))
-
 MOVES_RAD_S = 0.02
 STOPPED_S = 4.0
 """What was stopped is continued after that time, if it has not been ended."""
 ALL_OVER_S = 30.0
 WATCH_S = 0.3
 """For so long the bus and the arm are watched after the last process has ended."""
-
 SERVOS_OWN = {0x081, 0x181, 0x281, 0x381, 0x481, 0x581, 0x701}
 """What the emulated servo itself sends; all else on the bus is of the session."""
-
-WRITTEN_WORD = 8  # of a ring's header
-HEADER_BYTES = 512
 
 
 @dataclass
@@ -94,28 +87,6 @@ class Killed:
 
 class EndedItselfError(Exception):
     """The session had ended before the signal: on a busy machine the emulated devices are late."""
-
-
-class Ring:
-    """The loop's ring of samples, looked at from outside without holding it."""
-
-    def __init__(self, stem: str) -> None:
-        self._stem = stem
-        self._bytes: NDArray[np.uint8] = np.memmap(WHERE / f"{stem}-samples", np.uint8, "r")
-
-    def left(self) -> list[Path]:
-        """Return what is left of the session in shared memory."""
-        return sorted(WHERE.glob(f"{self._stem}-*"))
-
-    @property
-    def written(self) -> int:
-        return int(self._bytes[: 8 * (WRITTEN_WORD + 1)].view(np.int64)[WRITTEN_WORD])
-
-    def newest(self) -> np.void:
-        """Return the newest sample."""
-        rows = self._bytes[HEADER_BYTES:].view(ROW)
-        newest: np.void = rows[(self.written - 1) % rows.size]
-        return newest
 
 
 def start(rig: Path, folder: Path) -> tuple[subprocess.Popen[bytes], dict[str, int], Ring]:

@@ -17,13 +17,13 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+from tests.faults.spoiled_rig import SpoiledRig
 
 from rigidimeter.acquisition.clock import DeadlineClock, SimulatedClock
 from rigidimeter.devices import SimulatedRig
@@ -42,12 +42,9 @@ from rigidimeter.settings import Settings, parse_settings
 CANOPEN, ASCII = "rdt_canopen", "rdt_ascii"
 WIRES = (CANOPEN, ASCII)
 RIGS = ("virtual", *WIRES)
-
 SLACK_S = 0.03
 """What a busy machine may add on a wire: three emulators' threads and a loop in one process."""
-
 JOINT = JointDynamics(0.0045, 0.1368, 1.751)
-
 _EPOCH = {
     "sinusoid": {
         "amplitude_deg": 10.0,
@@ -59,7 +56,6 @@ _EPOCH = {
     "prbs": {"duration_s": 1.0},
     "protocol": {"blocks": [{"task": "sinusoid", "epochs": 1}], "rests_s": [0.5], "return_s": 0.5},
 }
-
 SETTINGS: dict[str, dict[str, Any]] = {
     "virtual": _EPOCH,
     CANOPEN: {
@@ -86,7 +82,6 @@ SETTINGS: dict[str, dict[str, Any]] = {
     },
 }
 """The speed at which a fault finds the arm is 126 deg/s; on the slow serial line 50 deg/s."""
-
 CANOPEN_DRIVE: dict[str, Any] = {
     # A drive must brake at least as hard as the guard thinks it does: 6000 deg/s² = 105 rad/s².
     "acceleration_rad_s2": 120.0,
@@ -98,7 +93,6 @@ CANOPEN_DRIVE: dict[str, Any] = {
     "enable_timeout_s": 0.3,
 }
 ASCII_DRIVE: dict[str, Any] = {"counts_per_turn": 360_000.0}
-
 _channels = itertools.count()
 
 
@@ -120,133 +114,6 @@ class WatchedArm(EmulatedArm):
     def _advance(self) -> None:
         super()._advance()
         self.trace.append((self._at_s, self._state.angle_rad, self._state.velocity_rad_s))
-
-
-class SpoiledRig:
-    """The virtual rig, and what can be wrong with it."""
-
-    origin_rad = 0.0
-
-    def __init__(self, inner: SimulatedRig) -> None:
-        self.inner = inner
-        self.habits: dict[str, Any] = {}
-        self.trace: list[tuple[float, float, float]] = []
-        self._held: Any = None
-        self._sent: Any = None
-        self._past: deque[float] = deque()
-        self._constant_nm = math.nan
-        self._ticks, self.rate_hz = 0, 1.0 / inner._interval_s
-        self._angle_held = math.nan
-        self.connect, self.configure = inner.connect, inner.configure
-        self.zero, self.stop = inner.zero, inner.stop
-        self.powered = False
-
-    def enable(self) -> None:
-        if "refuse enable" in self.habits:
-            raise DeviceError("drive: did not come up; its supply voltage must be on")
-        self.powered = True
-        self.inner.enable()
-
-    def disable(self) -> None:
-        self.powered = False
-        self.inner.disable()
-
-    def close(self) -> None:
-        self.disable()
-
-    @property
-    def counts(self) -> dict[str, int]:
-        return {}
-
-    def read(self, elapsed_ticks: int = 1) -> Any:
-        for _ in range(elapsed_ticks - 1):
-            self._see(self.inner.read())
-        true = self._see(self.inner.read())
-        reading, habits = true, self.habits
-        if "push" in habits:
-            # The drive is stiff: what the subject does shows in the torque and nowhere else.
-            reading = reading._replace(torque_nm=reading.torque_nm - habits["push"])
-        if "tremor" in habits:
-            amplitude_nm, frequency_hz = habits["tremor"]
-            phase = 2 * math.pi * frequency_hz * true.torque_time_s
-            reading = reading._replace(torque_nm=reading.torque_nm + amplitude_nm * math.sin(phase))
-        if "torque is" in habits:
-            reading = reading._replace(torque_nm=habits["torque is"])
-        if "angle is" in habits:
-            reading = reading._replace(angle_rad=habits["angle is"])
-        if "velocity is" in habits:
-            reading = reading._replace(velocity_rad_s=habits["velocity is"])
-        if "velocity gain" in habits:
-            reading = reading._replace(
-                velocity_rad_s=habits["velocity gain"] * reading.velocity_rad_s
-            )
-        reading = self._untrue(reading)
-        if "torque stops" in habits:
-            self._held = self._held or reading
-            reading = reading._replace(
-                torque_nm=self._held.torque_nm, torque_time_s=self._held.torque_time_s
-            )
-        if "motion stops" in habits:
-            self._held = self._held or reading
-            reading = self._held._replace(
-                torque_nm=reading.torque_nm, torque_time_s=reading.torque_time_s
-            )
-        if "encoder frozen" in habits:
-            if math.isnan(self._angle_held):
-                self._angle_held = true.angle_rad
-            reading = reading._replace(angle_rad=self._angle_held)
-        if "encoder jump" in habits:
-            reading = reading._replace(angle_rad=reading.angle_rad + habits["encoder jump"])
-        if "encoder sign" in habits:
-            reading = reading._replace(
-                angle_rad=-reading.angle_rad, velocity_rad_s=-reading.velocity_rad_s
-            )
-        if "reports" in habits:
-            reading = reading._replace(cause=int(habits["reports"]))
-        if "raises" in habits:
-            raise habits["raises"]
-        return reading
-
-    def _untrue(self, reading: Any) -> Any:
-        """Spoil the torque as the emulated sensor does."""
-        habits, torque_nm = self.habits, reading.torque_nm
-        self._ticks += 1
-        if "late" in habits:
-            self._past.append(torque_nm)
-            ready = len(self._past) > habits["late"] * self.rate_hz
-            torque_nm = self._past.popleft() if ready else self._past[0]
-        torque_nm *= habits.get("gain", 1.0)
-        if "toggles" in habits:
-            torque_nm = 0.0005 * (self._ticks % 2)
-        if "axis_constant" in habits:
-            self._constant_nm = torque_nm if math.isnan(self._constant_nm) else self._constant_nm
-            torque_nm = self._constant_nm
-        reading = reading._replace(torque_nm=torque_nm)
-        for name, sends_s in (("pauses", habits.get("pauses", 0.0)), ("bursts", 0.005)):
-            if name in habits and self._sent is not None:
-                phase_s = (self._ticks / self.rate_hz) % (sends_s + habits[name])
-                if phase_s >= sends_s:
-                    reading = reading._replace(
-                        torque_nm=self._sent.torque_nm, torque_time_s=self._sent.torque_time_s
-                    )
-        self._sent = reading
-        return reading
-
-    def _see(self, reading: Any) -> Any:
-        self.trace.append((reading.motion_time_s, reading.angle_rad, reading.velocity_rad_s))
-        return reading
-
-    def write(self, velocity_rad_s: float) -> float:
-        if "does not follow" in self.habits:
-            self.inner.write(0.0)
-            return velocity_rad_s
-        if "runs away" in self.habits:
-            self.inner.write(self.habits["runs away"])
-            return velocity_rad_s if self.powered else 0.0
-        if "drifts" in self.habits:
-            self.inner.write(velocity_rad_s + self.habits["drifts"])
-            return velocity_rad_s if self.powered else 0.0
-        return self.inner.write(velocity_rad_s)
 
 
 class Line:

@@ -1,123 +1,20 @@
-"""Faults 11, 12 and 18 to 23 as far as one process goes: time, operator, program, record."""
+"""Faults 18 and 20 to 23 as far as one process goes: operator, program, record."""
 
 import errno
 import math
 import os
 import signal
-import time
 
 import numpy as np
 import pytest
-from tests.faults.rigs import ASCII, RIGS, WIRES, Line, Wrong, bench
-from tests.faults.trials import (
-    AT_S,
-    Desk,
-    assert_came_to_rest,
-    assert_stopped,
-    assert_whole,
-    run,
-)
+from tests.faults.rigs import ASCII, RIGS, Line, Wrong, bench
+from tests.faults.trials import AT_S, Desk, assert_came_to_rest, assert_stopped, assert_whole, run
 
-from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.sink import SharedSupervision
-from rigidimeter.acquisition.processes.status_values import Role
-from rigidimeter.acquisition.run_states import NOTHING, Command, Order
+from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.devices.base import DeviceError
 from rigidimeter.devices.composed import ComposedRig
 from rigidimeter.guard import Cause, Reaction
 from rigidimeter.units import rad_from_deg
-
-
-def late_from_now(made, seconds, ticks=1):
-    """Make the next ticks late."""
-    now = round(made.clock.now_s() * made.rate_hz)
-    for k in range(2, 2 + ticks):
-        made.clock.late[now + k] = seconds
-
-
-def assert_no_catch_up(trial):
-    """Assert that no tick was run before its time, and none twice."""
-    due_s = trial.samples["tick"] * trial.tick_s
-    assert np.all(trial.samples["time_s"] >= due_s - 1e-6)
-    assert np.all(np.diff(trial.samples["tick"]) >= 1)
-
-
-@pytest.mark.parametrize("rig", RIGS)
-def test_fault_11_one_deadline_missed(rig, tmp_path):
-    with bench(rig) as made:
-        tick_s = 1.0 / made.rate_hz
-        trial = run(made, tmp_path / "s", lambda: late_from_now(made, 2.5 * tick_s))
-        assert trial.result.outcome == "success", trial.result
-        assert_whole(trial)
-        assert trial.of("epoch_ended")[0]["missed_ticks"] >= 2
-        assert_no_catch_up(trial)
-        sent = trial.samples["velocity_command_rad_s"]
-        limit = math.radians(made.settings.guard.acceleration_limit_deg_s2) * tick_s
-        if rig != ASCII:  # which skips a command when its line is busy
-            assert np.abs(np.diff(sent)).max() <= limit * 1.01 + 1e-3
-
-
-@pytest.mark.parametrize("rig", RIGS)
-def test_fault_11_deadlines_missed_in_a_row(rig, tmp_path, measured):
-    in_a_row = 20 if rig != ASCII else 5
-    with bench(rig, loop={"missed_in_a_row": in_a_row}) as made:
-        tick_s = 1.0 / made.rate_hz
-        trial = run(made, tmp_path / "s", lambda: late_from_now(made, 1.2 * tick_s, 100))
-        bound_s = (2 * in_a_row + 2) * tick_s
-        assert_stopped(trial, Cause.DEADLINES_MISSED, bound_s)
-        measured(11, rig, f"{in_a_row} in a row", trial, bound_s)
-
-
-@pytest.mark.parametrize("rig", RIGS)
-def test_fault_11_stall(rig, tmp_path, measured):
-    stall_s = 0.15
-    with bench(rig, loop={"stall_s": 0.1}) as made:
-        trial = run(made, tmp_path / "s", lambda: late_from_now(made, stall_s))
-        bound_s = stall_s + 3 / made.rate_hz
-        # On the wires the drive has stopped itself meanwhile; the stall is named, not its effect.
-        assert_stopped(trial, Cause.STALLED, bound_s)
-        row = trial.first
-        assert trial.samples["velocity_command_rad_s"][row] == 0.0  # nothing is set going again
-        assert_no_catch_up(trial)
-        measured(11, rig, f"stall of {stall_s:g} s", trial, bound_s)
-
-
-@pytest.mark.parametrize("rig", WIRES)
-def test_fault_11_enabling_is_no_stall(rig, tmp_path):
-    """A device may take long to come up; the first tick is on time all the same."""
-    with bench(rig, loop={"stall_s": 0.1}) as made:
-        time.sleep(0.3)
-        desk = Desk(causes={round(0.1 * made.rate_hz): Cause.SIGNAL})
-        trial = run(made, tmp_path / "s", desk=desk)
-        assert trial.result.cause is Cause.SIGNAL
-        assert trial.samples["lateness_s"][0] < 0.1
-
-
-@pytest.mark.parametrize("rig", RIGS)
-def test_fault_12_wall_clock_jumps(rig, tmp_path, monkeypatch, measured):
-    true_time, true_ns = time.time, time.time_ns
-    jump_s = 0.0
-
-    def jump(by_s):
-        nonlocal jump_s
-        jump_s = by_s
-
-    monkeypatch.setattr(time, "time", lambda: true_time() + jump_s)
-    monkeypatch.setattr(time, "time_ns", lambda: true_ns() + round(1e9 * jump_s))
-    with bench(rig) as made:
-        back = {0.7: lambda: jump(-3600.0)}
-        trial = run(made, tmp_path / "s", lambda: jump(3600.0), then=back)
-        assert trial.result.outcome == "success", trial.result
-        assert_whole(trial)
-        assert not trial.samples["cause"].any()
-        age_s = trial.samples["time_s"] - trial.samples["motion_time_s"]
-        assert age_s.max() < made.settings.guard.stale_s
-    if rig == "virtual":
-        with bench(rig) as again:
-            plain = run(again, tmp_path / "plain")
-        for name, values in plain.samples.items():
-            np.testing.assert_array_equal(trial.samples[name], values)
-    measured(12, rig, "an hour on, an hour back: no effect")
 
 
 @pytest.mark.parametrize("rig", RIGS)
@@ -136,114 +33,6 @@ def test_fault_18_emergency_stop(rig, tmp_path, measured):
             assert made.line.opened_s - trial.fault_s <= tick_s + trial.slack_s
         power_s = trial.disabled_s - trial.fault_s
         measured(18, rig, trial=trial, bound_s=tick_s, power_off_s=power_s)
-
-
-class SharedDesk:
-    """The shared memory as the loop sees them, on the clock of the trial."""
-
-    def __init__(self, made, **options):
-        self.shared = SessionMemory.create(made.rate_hz, ring_s=100_000 / made.rate_hz)
-        self.shared_status, self.ring = self.shared.status, self.shared.samples
-        now_ns = lambda: 10**9 + round(1e9 * made.clock.now_s())  # noqa: E731
-        self.shared_status._now_ns = now_ns
-        self.suspended_s = 0.0
-        self.supervision = SharedSupervision(
-            self.shared,
-            now_ns=now_ns,
-            boot_ns=lambda: now_ns() + round(1e9 * self.suspended_s),
-            **options,
-        )
-        self.attended = False
-        self.alive = {Role.CONSOLE, Role.RECORDER}
-        self.records = True
-
-    def cause(self, now_s):
-        for role in self.alive:
-            self.shared_status.beat(role)
-        if self.records:
-            self.ring.recorded = self.ring.written
-        return self.supervision.cause(now_s)
-
-    def order(self):
-        return NOTHING
-
-    def sink(self, writer):
-        """Put every sample into the ring as well."""
-        take = writer.sample
-
-        def sample(row):
-            take(row)
-            self.ring.push(row)
-
-        writer.sample = sample
-        return writer
-
-    def close(self):
-        self.shared.unlink()
-        self.shared.close()
-
-
-@pytest.fixture
-def shared_desk():
-    made = []
-
-    def make(*arguments, **options):
-        made.append(SharedDesk(*arguments, **options))
-        return made[-1]
-
-    yield make
-    for desk in made:
-        desk.close()
-
-
-@pytest.mark.parametrize("rig", RIGS)
-def test_fault_11_suspended(rig, tmp_path, shared_desk, measured):
-    """The computer sleeps for a minute: no tick is late, for the loop's clock slept too."""
-    with bench(rig) as made:
-        desk = shared_desk(made)
-        trial = run(made, tmp_path / "s", lambda: setattr(desk, "suspended_s", 60.0), desk=desk)
-        bound_s = 1 / made.rate_hz
-        assert_stopped(trial, Cause.STALLED, bound_s)
-        # The drive has stopped by itself meanwhile: nothing is set going again.
-        assert trial.samples["velocity_command_rad_s"][trial.first] == 0.0
-        measured(11, rig, "suspended for 60 s", trial, bound_s)
-
-
-@pytest.mark.parametrize("rig", RIGS)
-def test_fault_19_console_lost(rig, tmp_path, shared_desk, measured):
-    with bench(rig) as made:
-        desk = shared_desk(made, console_lost_s=0.2)
-        trial = run(made, tmp_path / "s", lambda: desk.alive.discard(Role.CONSOLE), desk=desk)
-        bound_s = 0.2 + 1 / made.rate_hz
-        assert_stopped(trial, Cause.CONSOLE_LOST, bound_s)
-        measured(19, rig, "heartbeat limit 0.2 s", trial, bound_s)
-
-
-@pytest.mark.parametrize("rig", RIGS)
-def test_fault_21_recorder_hangs(rig, tmp_path, shared_desk, measured):
-    with bench(rig) as made:
-        desk = shared_desk(made, recorder_lost_s=0.2)
-        trial = run(made, tmp_path / "s", lambda: desk.alive.discard(Role.RECORDER), desk=desk)
-        bound_s = 0.2 + 1 / made.rate_hz
-        assert_stopped(trial, Cause.RECORDER_LOST, bound_s)
-        measured(21, rig, "recorder silent, limit 0.2 s", trial, bound_s)
-
-
-@pytest.mark.parametrize("rig", RIGS)
-def test_fault_21_record_overflows(rig, tmp_path, shared_desk, measured):
-    with bench(rig) as made:
-        most = round(0.2 * made.rate_hz)
-        desk = shared_desk(made, most_lag=most)
-        trial = run(
-            made,
-            tmp_path / "s",
-            lambda: setattr(desk, "records", False),
-            desk=desk,
-            sink=desk.sink,
-        )
-        bound_s = (most + 2) / made.rate_hz
-        assert_stopped(trial, Cause.RECORD_OVERFLOW, bound_s)
-        measured(21, rig, f"{most} samples wait", trial, bound_s)
 
 
 @pytest.mark.parametrize("rig", RIGS)

@@ -1,10 +1,9 @@
-"""The ledger: its rule, its schema, and the numbers of each contradiction."""
+"""The paper's ledger: its schema, and the numbers of each contradiction."""
 
 from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +28,6 @@ from rigidimeter.paper import (
     render_page,
     write_ledger,
 )
-from rigidimeter.paper.comparison_table import bounded, near, rounded, within_percent
 from rigidimeter.paper.controller import position_sd_deg
 from rigidimeter.paper.highpass import highpass_errors_percent
 from rigidimeter.paper.paper_page import drawn
@@ -68,50 +66,6 @@ def check_of(row: Row, what: str) -> Check:
     return next(check for check in row.checks if check.what.startswith(what))
 
 
-# The rule ---------------------------------------------------------------------------------------
-
-
-def row_with(*checks: Check, **changes: object) -> Row:
-    return replace(
-        Row("o", (near("x", "m", 1.0, 1.0, 0.1),)),
-        checks=checks,
-        **changes,
-    )
-
-
-def test_a_verdict_follows_from_the_numbers() -> None:
-    inside = within_percent("x", "m", 4.0, 4.6, 50.0)
-    assert (inside.low, inside.high) == (2.0, 6.0)
-    outside = replace(inside, ours=6.1)
-    assert row_with(inside).verdict == AGREES
-    assert row_with(outside).verdict == DIFFERS
-    assert row_with(inside, outside).verdict == DIFFERS
-    assert row_with(replace(inside, ours=math.nan)).verdict == DIFFERS
-    assert row_with(inside, unpublished="no data").verdict == UNPUBLISHED
-
-
-def test_the_reason_goes_with_the_verdict() -> None:
-    check = near("x", "m", 1.0, 1.05, 0.1)
-    row = row_with(check, agrees="Alike.")
-    assert row.reason == "Alike."
-    turned = replace(row, checks=(replace(check, ours=2.0),))
-    assert turned.verdict == DIFFERS
-    assert turned.reason == "x: 2.000 m is outside what would agree (0.9000 to 1.100)."
-
-
-def test_rounding_allows_half_of_the_last_digit() -> None:
-    assert rounded("r", "1", 0.35, 0.3549, 0.01).within
-    assert rounded("r", "1", 0.35, 0.355, 0.01).within
-    assert not rounded("r", "1", 0.35, 0.3551, 0.01).within
-    assert bounded("y", "%", -3.0, high=-0.5).within
-    assert not bounded("y", "%", 0.0, high=-0.5).within
-
-
-def test_a_row_needs_something_that_decides() -> None:
-    with pytest.raises(ValueError, match="neither a check"):
-        Row("o")
-
-
 def test_another_paper_would_get_another_verdict(
     context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -137,9 +91,6 @@ def test_another_paper_would_get_another_verdict(
         "sec-3.4-sd": AGREES,
         "sec-3.4-noise": AGREES,
     }
-
-
-# The ledger -------------------------------------------------------------------------------------
 
 
 def test_every_row_has_its_place_on_the_page() -> None:
@@ -235,9 +186,6 @@ def test_every_measure_of_the_virtual_study_has_its_day_test(context: Context) -
 def test_an_unknown_row_is_refused_with_the_names() -> None:
     with pytest.raises(UserError, match="--only fig-9: there is no such row; the rows are eq-1"):
         make_rows(Context(), ["fig-9"])
-
-
-# The contradictions, as numbers -----------------------------------------------------------------
 
 
 @pytest.mark.parametrize("clock_hz", [20.0, 22.6])

@@ -1,95 +1,26 @@
 """The sensor's driver against a sensor on a true wire, doing everything wrong in turn."""
 
 import itertools
-import socket
-import struct
 import time
 
 import pytest
+from tests.wire.rdt_wire import (
+    NOISE_NM,
+    TORQUE_NM,
+    arm,
+    bad_counts,
+    emulator,
+    first_cause,
+    newest,
+    sensor,
+    sensor_of,
+    watch,
+)
 
-from rigidimeter.devices.ati.rdt import AtiRdt
-from rigidimeter.devices.base import DeviceError
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.emulation.rdt.rdt_emulator import MISBEHAVIOURS, RdtEmulator
 from rigidimeter.guard import Cause
 
-ANGLE_RAD = 0.3
-STIFFNESS_NM_RAD = 2.0
-TORQUE_NM = STIFFNESS_NM_RAD * ANGLE_RAD
-NOISE_NM = 0.005
-
-
-@pytest.fixture
-def arm():
-    arm = EmulatedArm(JointDynamics(0.08, 0.8, STIFFNESS_NM_RAD), noise_sd_nm=NOISE_NM)
-    arm.place(ANGLE_RAD)
-    return arm
-
-
-@pytest.fixture
-def emulator(arm):
-    with RdtEmulator(arm) as emulator:
-        yield emulator
-
-
-@pytest.fixture
-def sensor_of():
-    """Make a driver of an emulator; all are closed in the end."""
-    made = []
-
-    def make(emulator, now=time.monotonic, **settings):
-        # A busy machine may hold a thread up for longer than a real sensor ever is.
-        values = {"timeout_s": 1.0, "tolerated_packets": 5, "frozen_s": 0.1, **settings}
-        sensor = AtiRdt(
-            AtiRdt.Settings(
-                address="127.0.0.1", port=emulator.port, http_port=emulator.http_port, **values
-            ),
-            now,
-        )
-        made.append(sensor)
-        sensor.connect()
-        return sensor
-
-    yield make
-    for sensor in made:
-        sensor.close()
-
-
-@pytest.fixture
-def sensor(emulator, sensor_of):
-    sensor = sensor_of(emulator)
-    sensor.configure()
-    return sensor
-
-
-def watch(sensor, duration_s):
-    """Read at 1 kHz; return the samples."""
-    samples = []
-    until_s = time.monotonic() + duration_s
-    while time.monotonic() < until_s:
-        samples.append(sensor.read())
-        time.sleep(0.001)
-    return samples
-
-
-def first_cause(sensor, within_s=2.0):
-    """Read at 1 kHz until there is a cause; return it with the time that took."""
-    start_s = time.monotonic()
-    while (elapsed_s := time.monotonic() - start_s) < within_s:
-        cause = sensor.read().cause
-        if cause:
-            return Cause(cause), elapsed_s
-        time.sleep(0.001)
-    return Cause.NONE, elapsed_s
-
-
-def newest(samples):
-    return samples[-1].torque_nm
-
-
-def bad_counts(sensor):
-    return {name: n for name, n in sensor.counts.items() if n and name != "received"}
+__all__ = ["arm", "emulator", "sensor", "sensor_of"]
 
 
 def test_what_arrives_is_what_was_sent_to_the_count(emulator, sensor):
@@ -126,14 +57,6 @@ def test_lever_arms_weigh_the_forces(emulator, sensor_of, sign):
         fx, _, fz, _, ty, tz = (count / 1e6 for count in sample.raw)
         expected_nm = sign * (0.25 * fx - 0.5 * fz + ty + 0.5 * tz)
         assert sample.torque_nm == pytest.approx(expected_nm, abs=1e-12)
-
-
-def test_what_the_sensor_says_of_itself_is_kept(emulator, sensor_of):
-    facts = sensor_of(emulator).configure()
-    assert (facts.model, facts.serial) == ("Emulated Net F/T", "FT00001")
-    assert facts.fastest_tick_rate_hz == 1000.0
-    assert facts.values["counts_per_torque"] == 1e6
-    assert facts.values["torque_unit"] == "Nm"
 
 
 def test_configuring_waits_for_the_first_sample_and_closing_stops_the_stream(
@@ -344,131 +267,11 @@ def test_the_sequence_wraps_around_without_loss(arm, sensor_of):
         assert bad_counts(sensor) == {}
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "words"),
-    [
-        ("unknown_units", None, "scfgtu.*'cubit-stone'.*Nm, Nmm"),
-        ("rdt_disabled", None, "comrdte.*'Disabled'"),
-        ("page_status", None, "analog board supply too low"),
-        ("http_silent", None, "no answer within 0.3 s"),
-        ("http_slow", 1.0, "no answer within 0.3 s"),
-        ("http_drip", 0.05, "does not end within 0.3 s"),
-        ("http_error", None, "answers 500"),
-        ("http_garbage", None, "not the page of a Net F/T"),
-        ("deaf", None, "no sample from 127.0.0.1"),
-        ("silent", None, "no sample from 127.0.0.1"),
-        ("delay", 0.15, r"the first sample came 0\.1\d s after each request, not .* within 0\.1 s"),
-        ("delay", 1.0, "no sample from 127.0.0.1"),
-        ("short", 1, "no sample.*'short': [1-9]"),
-        ("foreign", None, None),
-        ("serious_status", None, "analog board supply too low"),
-        ("saturated", None, "saturated"),
-    ],
-)
-def test_a_sensor_that_cannot_be_used_is_refused(emulator, sensor_of, lateness, name, value, words):
-    emulator.misbehave(name, value)
-    sensor = sensor_of(emulator, timeout_s=0.8 if name == "delay" else 0.3)
-    if words is None:
-        sensor.configure()
-        return
-    began_s = time.monotonic()
-    with pytest.raises(DeviceError, match=words) as refused:
-        sensor.configure()
-    assert str(refused.value).startswith("torque sensor at 127.0.0.1: ")
-    assert time.monotonic() - began_s < 1.0 + lateness.worst_s(began_s)
-    emulator.behave()
-    sensor.configure()  # and it can be used when it is right again
-
-
 def test_every_misbehaviour_is_tried():
     elsewhere = {"changed_units", "changed_calibration", "changed_bias"}
     pages = {"unknown_units", "rdt_disabled", "page_status", "deaf"}
     http = {name for name in MISBEHAVIOURS if name.startswith("http_")}
     assert {name for name, *_ in RUNNING} | elsewhere | pages | http == set(MISBEHAVIOURS)
-
-
-def test_no_web_server_and_no_sensor_are_refused(arm, sensor_of):
-    with RdtEmulator(arm) as emulator:
-        pass
-    sensor = sensor_of(emulator, timeout_s=0.3)
-    with pytest.raises(DeviceError, match=r"no answer.*check the sensor's power"):
-        sensor.configure()
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("changed_units", "torque_unit 'Nm' became 'lbf-in'"),
-        ("changed_calibration", "serial 'FT00001' became 'FT99999', calibration 0 became 7"),
-        ("changed_bias", "bias"),
-    ],
-)
-def test_a_sensor_that_comes_back_changed_is_refused(emulator, sensor_of, sensor, name, words):
-    sensor.close()
-    emulator.misbehave(name)
-    sensor.connect()
-    with pytest.raises(DeviceError, match=f"came back changed.*{words}"):
-        sensor.configure()
-    sensor_of(emulator).configure()  # a new session looks at it with fresh eyes
-    emulator.behave()
-    sensor.connect()
-    sensor.configure()
-    assert sensor.read().cause == Cause.NONE
-
-
-def test_a_sensor_that_was_refused_is_not_started_again(emulator, sensor):
-    """Enabling a rig asks for the samples anew; that must not pass by what configuring found."""
-    sensor.restart()  # as it is, it may
-    assert sensor.read().sequence >= 0
-    sensor.close()
-    emulator.misbehave("changed_units")
-    sensor.connect()
-    with pytest.raises(DeviceError, match="came back changed"):
-        sensor.configure()
-    asked = len(emulator.requests)
-    with pytest.raises(DeviceError, match="it is not configured; configure it first"):
-        sensor.restart()
-    assert len(emulator.requests) == asked
-    assert sensor.read().sequence < 0
-    emulator.behave()
-    with pytest.raises(DeviceError, match="it is not configured"):  # well again, not looked at
-        sensor.restart()
-    sensor.configure()
-    sensor.restart()
-    assert sensor.read().cause == Cause.NONE
-
-
-def test_a_sensor_that_gave_no_sample_is_not_started_again(emulator, sensor_of):
-    sensor = sensor_of(emulator)
-    emulator.misbehave("deaf")
-    for _ in range(2):
-        with pytest.raises(DeviceError, match="no sample"):
-            sensor.configure()
-        with pytest.raises(DeviceError, match="it is not configured"):
-            sensor.restart()
-
-
-@pytest.mark.parametrize(
-    ("expected", "words"),
-    [
-        ({"expected_serial": "FT2"}, "serial is 'FT00001' where expected_serial is 'FT2'"),
-        ({"expected_calibration": 3}, "calibration is 0 where"),
-        ({"expected_torque_unit": "Nmm"}, "torque_unit is 'Nm' where"),
-        ({"expected_force_unit": "lbf"}, "force_unit is 'N' where"),
-        ({"expected_rate_hz": 7000.0}, "rate_hz is 1000.0 where"),
-    ],
-)
-def test_a_sensor_that_is_not_the_expected_one_is_refused(emulator, sensor_of, expected, words):
-    sensor = sensor_of(emulator, **expected)
-    with pytest.raises(DeviceError, match=words):
-        sensor.configure()
-    assert not emulator.requests  # it was never asked to send
-
-
-def test_the_expected_sensor_is_taken_however_its_unit_is_spelled(emulator, sensor_of):
-    sensor_of(
-        emulator, expected_serial="FT00001", expected_calibration=0, expected_torque_unit="N-m"
-    ).configure()
 
 
 WITHHOLDS = {"silent", "deaf", "backlog", "restart", "frozen_record"}
@@ -507,42 +310,3 @@ def test_a_wire_that_is_taken_away_does_not_raise(emulator, sensor):
     assert causes[-1] == Cause.TORQUE_PACKETS
     assert sensor.read().time_s == before.time_s
     sensor.close()
-
-
-def test_the_emulator_ignores_what_is_no_request(emulator):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-        for data in (b"", b"x" * 8, struct.pack(">HHI", 0x4321, 2, 0), b"x" * 60):
-            stranger.sendto(data, ("127.0.0.1", emulator.port))
-    time.sleep(0.05)
-    assert not emulator.requests
-    assert not emulator.sent
-    with pytest.raises(ValueError, match="no misbehaviour"):
-        emulator.misbehave("sulk")
-
-
-@pytest.mark.parametrize("unit", ["Nm", "Nmm"])
-def test_a_client_that_others_wrote_sees_the_same_torque(arm, sensor_of, unit):
-    pynetft = pytest.importorskip("pynetft")
-    to_nm = {"N-m": 1.0, "N-mm": 1e-3}
-    with RdtEmulator(arm, torque_unit=unit) as theirs, RdtEmulator(arm, seed=2) as emulator:
-        config = pynetft.Config(
-            sensor_host="127.0.0.1", rdt_port=theirs.port, http_port=theirs.http_port
-        )
-        sensor = sensor_of(emulator)
-        sensor.configure()
-        ours, seen = [], []
-        with pynetft.Client(config, queue_size=1000) as client:
-            for sample in client.samples(timeout=2.0):
-                scale = to_nm[sample.torque_unit.value]
-                seen.append((sample.rdt_sequence, -sample.torque[2] * scale))
-                ours.append(sensor.read().torque_nm)
-                if len(seen) == 200:
-                    break
-            health = client.health()
-        sent = dict(theirs.sent)
-        for sequence, torque_nm in seen:
-            assert torque_nm == pytest.approx(sent[sequence], abs=0.51e-6)
-        mean, their_mean = sum(ours) / 200, sum(torque for _, torque in seen) / 200
-        assert their_mean == pytest.approx(TORQUE_NM, abs=NOISE_NM)
-        assert mean == pytest.approx(their_mean, abs=NOISE_NM)
-        assert (health.lost_count, health.malformed_count, health.device_error_count) == (0, 0, 0)

@@ -1,0 +1,138 @@
+"""Studies whose description, method, options or output are wrong; and those that are sound."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from tests.faults.compared_study import compared, errors, only_error
+from tests.small_study import edit, scored_study, study
+
+__all__ = ["compared", "edit", "scored_study", "study"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("title =", "titel =", "titel is not a setting; the nearest is title"),
+        ("frequency_hz = 130.0", "frequency_hz = -1", "at least 0 Hz and at most 1000 Hz"),
+        ("frequency_hz = 130.0", "frequency_hz = nan", "at least 0 Hz and at most 1000 Hz"),
+        ("[conditions.OFF]", "[rating]\nscale = [0, nan]\n[conditions.OFF]", "must be two numbers"),
+        ("[conditions.OFF]", "[conditions]\nON = 5\n[conditions.OFF]", "be a table, as in [cond"),
+        ('title = "Small study"', 'title = "T"\nratings = "/r.csv"', "outside the study folder"),
+        ('title = "Small study"', 'title = "T"\nsessions = "../s.csv"', "name a file in it"),
+        ("amplitude_ma = 0.32", "amplitude_ma = 0.3\namplitude_v = 2.0", "are both given"),
+        ('other = "DBS"', 'other = "OFF"', "reference and other are both 'OFF'"),
+        ('other = "DBS"', 'other = "DSB"', "there is no [conditions.DSB]"),
+        ("study/1", "study/9", "this version reads 'rigidimeter.study/1'"),
+        ('schema = "rigidimeter.study/1"\n', "", "schema is missing"),
+        ('title = "Small study"', 'title = "', "is not valid TOML"),
+        ('title = "Small study"', 'title = "T"\nratings = "r.csv"', "r.csv: there is no such file"),
+    ],
+)
+def test_a_description_that_is_wrong(compared, study, edit, old, new, told) -> None:
+    edit(study / "study.toml", old, new)
+    ran, found = compared()
+    (line,) = errors(ran.err)
+    assert told in line
+    assert ran.status == 1
+    assert found is None
+
+
+@pytest.mark.parametrize(
+    ("method", "told"),
+    [
+        ("ivv", "ivv: there is no such method; the nearest is iv"),
+        ("ml", "ml: maximum likelihood was removed"),
+    ],
+)
+def test_an_unknown_method(compared, study, method, told) -> None:
+    with (study / "study.toml").open("a") as file:
+        file.write(f'[analysis]\nmethod = "{method}"\n')
+    (line,) = errors(compared()[0].err)
+    assert told in line
+
+
+def test_no_session_is_left(compared, study) -> None:
+    shutil.rmtree(study / "sessions")
+    ran, _ = compared()
+    assert ran.status == 1
+    assert "no session is left to analyse" in errors(ran.err)[0]
+
+
+def test_a_study_beside_other_inputs(rigidimeter, study) -> None:
+    ran = rigidimeter("compare", study, study / "sessions/1-OFF")
+    assert ran.status == 1
+    assert "is a study folder and names its own recordings" in ran.err
+
+
+def test_an_option_of_recordings(compared) -> None:
+    ran, _ = compared("--condition", "OFF")
+    assert ran.status == 1
+    assert "--condition: is for single recordings" in ran.err
+
+
+def test_a_key_without_a_study(rigidimeter, study) -> None:
+    ran = rigidimeter("compare", study / "sessions/1-OFF", "--key", study / "key.csv")
+    assert ran.status == 1
+    assert "is for a study folder" in ran.err
+
+
+def test_a_folder_that_cannot_be_written_loses_no_result(compared, study) -> None:
+    (study / "analysis").write_text("a file in its place")
+    ran, _ = compared()
+    only_error(ran, "the analysis is not kept", "analysis: cannot be written")
+    assert "comparison.json and tables" not in ran.out
+
+
+@pytest.mark.parametrize("name", ["study.toml", "ratings.csv", "analysis/comparison.json"])
+def test_the_studys_own_files_are_never_written_over(compared, study, name) -> None:
+    compared()
+    before = (study / name).read_bytes()
+    ran, _ = compared("--json", study / name)
+    assert ran.status == 1
+    assert f"{name}: is read or written already" in ran.err
+    assert (study / name).read_bytes() == before
+
+
+def test_one_offset_a_day_is_chosen_in_the_description(compared, study) -> None:
+    ran, each = compared()
+    assert "an offset for each day and each condition within a day (" in ran.out
+    with (study / "study.toml").open("a") as file:
+        file.write("\n[analysis]\none_offset_a_day = true\n")
+    ran, one = compared()
+    assert "an offset for each day (" in ran.out
+    assert [row["days"]["df"] for row in one["comparisons"]] != [
+        row["days"]["df"] for row in each["comparisons"]
+    ]
+
+
+def test_the_comparison_as_json_is_the_kept_one(compared, study, tmp_path) -> None:
+    _, found = compared("--json", tmp_path / "out.json")
+    assert json.loads((tmp_path / "out.json").read_text()) == found
+
+
+def test_a_report_of_a_study(rigidimeter, study, tmp_path) -> None:
+    ran = rigidimeter("report", study, "--out", tmp_path / "page")
+    assert ran.status == 0
+    assert (tmp_path / "page/report.html").is_file()
+    assert "Small study" in (tmp_path / "page/report.html").read_text()
+    ran = rigidimeter("report", study, "--out", study)
+    assert ran.status == 1
+    assert "name another folder" in ran.err
+
+
+def test_a_new_study_is_complete_and_never_written_over(rigidimeter, tmp_path: Path) -> None:
+    folder = tmp_path / "fresh"
+    assert rigidimeter("study", "new", folder, "--title", 'A "title"').status == 0
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "exclusions.csv", "ratings.csv", "sessions.csv", "study.toml",
+    ]  # fmt: skip
+    before = (folder / "study.toml").read_bytes()
+    ran = rigidimeter("study", "new", folder)
+    assert ran.status == 1
+    assert "is there already" in ran.err
+    assert (folder / "study.toml").read_bytes() == before
+    ran = rigidimeter("compare", folder)
+    assert ran.status == 1
+    assert "sessions.csv: holds no session" in ran.err
