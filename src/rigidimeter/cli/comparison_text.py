@@ -28,11 +28,12 @@ UNBOUNDED = (
 
 def comparison_lines(found: StudyResult) -> list[str]:
     """Return everything that was concluded."""
-    from rigidimeter.study import TEST, doubt_sentence
+    from rigidimeter.reporting.verdict_text import verdict_sentence
+    from rigidimeter.study import TEST
 
-    lines = []
+    lines = [*textwrap.wrap(verdict_sentence(found), 100), ""]
     if found.source:
-        lines = [f"{found.source} by {found.by}: {found.reference} − {found.other}"]
+        lines.append(f"{found.source} by {found.by}: {found.reference} − {found.other}")
     lines += [TEST, ""]
     several = sum(c.test is not None for c in found.comparisons) > 1
     for c in found.comparisons:
@@ -53,8 +54,6 @@ def comparison_lines(found: StudyResult) -> list[str]:
                 f" {mark}{row.measure.title}, {row.method}, J {row.inertia}: shift "
                 f"{row.shift:.4g}, p {number_text(row.p)}, by days {number_text(row.p_day)}"
             )
-    for sentence in doubt_sentence(found.analysis):
-        lines += ["", *textwrap.wrap(sentence, 100)]
     return [*lines, *_exclusions(found)] if found.sessions else lines
 
 

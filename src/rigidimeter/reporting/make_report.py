@@ -12,7 +12,14 @@ from rigidimeter.recording import Recording, read
 from rigidimeter.recording.study_folder import is_study
 from rigidimeter.records import Analysis
 from rigidimeter.reporting.page import write_report
-from rigidimeter.study import StudyResult, compare, compare_analysis, estimate, provenance
+from rigidimeter.study import (
+    StudyResult,
+    analysis_warnings,
+    compare,
+    compare_analysis,
+    estimate,
+    provenance,
+)
 
 TITLE = "Joint rigidity"
 
@@ -86,6 +93,6 @@ def recording_result(recording: Recording, analysis: Analysis, command: str = ""
         compare_analysis(analysis, resamples=0),
         settings=recording.settings,
         epochs=recording.epochs,
-        notices=recording.notices,
+        notices=(*recording.notices, *analysis_warnings(analysis)),
         provenance=provenance(recording.paths, recording.digests, recording.settings, command),
     )

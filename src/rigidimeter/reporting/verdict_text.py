@@ -3,41 +3,82 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Literal
 
 from rigidimeter.reporting.numbers import (
     condition_name,
     interval,
     number,
-    p_and_r,
     p_value,
     series,
 )
 from rigidimeter.study import (
     Comparison,
+    Conclusion,
+    Conclusions,
     Dependence,
     SensitivityRow,
     StudyResult,
-    Verdict,
+    conclude,
     dependences,
     doubt_sentence,
     leader,
-    verdict,
 )
+
+_SIDES: tuple[Literal["lower", "higher"], ...] = ("lower", "higher")
+_WITHHELD: dict[Literal["not supported", "cannot be decided"], str] = {
+    "not supported": "A difference was found but is not supported in",
+    "cannot be decided": "It cannot be decided whether the conditions differ in",
+}
 
 
 def verdict_sentence(result: StudyResult) -> str:
-    """Return which differences are shown, and which effect is the largest."""
+    """Return what is shown and what is not, and which effect is the largest."""
     prefix = ""
     if result.virtual or any(epoch.virtual for epoch in result.epochs):
         prefix = "Virtual data. "
     if result.blinded:
         prefix += "Blinded: the names of the conditions are codes. "
-    found = verdict(result)
-    if found is None:
+    concluded = conclude(result)
+    if concluded is None:
         return prefix + " ".join([_medians(result), *doubt_sentence(result.analysis)])
-    by_days = found.basis == "days"
-    sentences = _by_days(result, found) if by_days else [_by_epochs(result, found)]
-    return prefix + " ".join([*sentences, *_largest(result), *doubt_sentence(result.analysis)])
+    sentences = _sentences(result, concluded)
+    if concluded.of("lower", "higher"):
+        sentences += _largest(result)
+    return prefix + " ".join([*sentences, *doubt_sentence(result.analysis)])
+
+
+def _sentences(result: StudyResult, concluded: Conclusions) -> list[str]:
+    reference, other = condition_name(result.reference), condition_name(result.other)
+    shown = [
+        f"{other} is {side} than {reference} in {series(_with_p(members))}"
+        for side in _SIDES
+        if (members := concluded.of(side))
+    ]
+    none = concluded.of("no difference shown")
+    if none:
+        shown.append(f"no difference is shown in {series(_with_p(none))}")
+    found = []
+    if shown:
+        adjusted = f" (p adjusted by Holm’s method for {concluded.tested} measures)"
+        found.append(
+            f"Tested by {concluded.basis}{adjusted if concluded.tested > 1 else ''}: "
+            f"{'; '.join(shown)}."
+        )
+    for verdict, heading in _WITHHELD.items():
+        by_reason: dict[str, list[Conclusion]] = {}
+        for one in concluded.of(verdict):
+            by_reason.setdefault(one.reason, []).append(one)
+        for reason, withheld in by_reason.items():
+            titles = [_lower_first(one.comparison) for one in withheld]
+            if verdict == "not supported":
+                titles = _with_p(withheld)
+            found.append(f"{heading} {series(titles)}: {reason}.")
+    return found
+
+
+def _with_p(members: Iterable[Conclusion]) -> list[str]:
+    return [f"{_lower_first(one.comparison)} ({_p(one.p)})" for one in members]
 
 
 def _medians(result: StudyResult) -> str:
@@ -54,51 +95,6 @@ def _medians(result: StudyResult) -> str:
     if not parts:
         return "No epoch could be included; the reasons are listed under “Exclusions”."
     return f"No comparison of conditions. Medians: {'; '.join(parts)}."
-
-
-def _by_epochs(result: StudyResult, found: Verdict) -> str:
-    groups = {
-        "lower": found.lower,
-        "higher": found.higher,
-        "no difference shown in": found.undecided,
-    }
-    parts = [
-        f"{heading} {', '.join(_with_test(c) for c in members)}"
-        for heading, members in groups.items()
-        if members
-    ]
-    return (
-        f"{condition_name(result.other)} compared with {condition_name(result.reference)}: "
-        f"{'; '.join(parts)}."
-    )
-
-
-def _with_test(c: Comparison) -> str:
-    return f"{_lower_first(c)} ({p_and_r(c.test.p, c.test.r)})" if c.test else _lower_first(c)
-
-
-def _by_days(result: StudyResult, found: Verdict) -> list[str]:
-    untested = [*found.untested]
-    if not found.tested:
-        remarks = list(dict.fromkeys(c.days.remark for c in untested if c.days and c.days.remark))
-        return [f"The conditions could not be tested by days: {'; '.join(remarks)}."]
-    reference, other = condition_name(result.reference), condition_name(result.other)
-    parts = [
-        f"{other} is {side} than {reference} in {series(_with_p(members))}"
-        for side, members in (("lower", found.lower), ("higher", found.higher))
-        if members
-    ]
-    if found.undecided:
-        parts.append(f"no difference is shown in {series(_with_p(found.undecided))}")
-    adjusted = f" (p adjusted by Holm’s method for {found.tested} measures)"
-    sentences = [f"Tested by days{adjusted if found.tested > 1 else ''}: {'; '.join(parts)}."]
-    if untested:
-        sentences.append(f"Not tested by days: {series([_lower_first(c) for c in untested])}.")
-    return sentences
-
-
-def _with_p(members: Iterable[Comparison]) -> list[str]:
-    return [f"{_lower_first(c)} ({_p(c.days_p_holm)})" for c in members]
 
 
 def _p(p: float) -> str:

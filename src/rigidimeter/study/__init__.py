@@ -13,6 +13,10 @@ from rigidimeter.study.comparison import (
     compare_measures,
     split_pooled,
 )
+from rigidimeter.study.conclusions import Conclusion, Conclusions, conclude, conclusion_rows
+from rigidimeter.study.dependence import Dependence, dependences
+from rigidimeter.study.doubts import doubt_sentence
+from rigidimeter.study.leading_effect import Leader, leader
 from rigidimeter.study.measures import MEASURES, RATING, Measure, Observation, conditions
 from rigidimeter.study.provenance import provenance
 from rigidimeter.study.ratings_found import RatingMean, RatingsFound
@@ -27,15 +31,6 @@ from rigidimeter.study.results import (
 )
 from rigidimeter.study.study_analysis import analyse_study, estimate_study, read_study
 from rigidimeter.study.tables import comparison_document, result_tables, table_csv
-from rigidimeter.study.verdict import (
-    Dependence,
-    Leader,
-    Verdict,
-    dependences,
-    doubt_sentence,
-    leader,
-    verdict,
-)
 from rigidimeter.study.warnings import analysis_warnings
 
 __all__ = [
@@ -44,6 +39,8 @@ __all__ = [
     "TEST",
     "UNCHANGED",
     "Comparison",
+    "Conclusion",
+    "Conclusions",
     "Condition",
     "DayMedian",
     "Dependence",
@@ -59,13 +56,14 @@ __all__ = [
     "SensitivityRow",
     "SessionEntry",
     "StudyResult",
-    "Verdict",
     "analyse_study",
     "analysis_warnings",
     "compare",
     "compare_analysis",
     "compare_measures",
     "comparison_document",
+    "conclude",
+    "conclusion_rows",
     "conditions",
     "dependences",
     "doubt_sentence",
@@ -79,5 +77,4 @@ __all__ = [
     "split_pooled",
     "table_csv",
     "task_of",
-    "verdict",
 ]

@@ -143,6 +143,27 @@ def ratings_days(found: RatingsFound) -> DayDifference:
     return replace(none, estimate=c.estimate, se=se, low=low, high=high, p=c.p_kenward_roger, df=df)
 
 
+def rated_one_condition(found: RatingsFound) -> tuple[str, ...]:
+    """Return the examiners who rated one of the two conditions alone."""
+    pair = {found.reference, found.other}
+    rated: dict[str, set[str]] = {}
+    for row in found.rows:
+        if row.condition in pair:
+            rated.setdefault(row.examiner, set()).add(row.condition)
+    return tuple(examiner for examiner, conditions in rated.items() if conditions != pair)
+
+
+def without_examiners(found: RatingsFound, examiners: Sequence[str]) -> DayDifference:
+    """Return the test by days without some examiners; NaN and a remark where there is none."""
+    rows = [row for row in found.rows if row.examiner not in examiners]
+    random, pair = tuple(found.fit.offsets), (found.reference, found.other)
+    try:
+        rest = fit_ratings(found.source, rows, random, pair)
+    except (ValueError, ArithmeticError) as error:
+        return no_days(0, 0, str(error))
+    return ratings_days(replace(rest, contrast_days=_with_days(rows, random, pair)))
+
+
 def model_ratings(
     table: TextTable,
     columns: Mapping[str, str],

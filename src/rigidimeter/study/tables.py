@@ -13,6 +13,7 @@ from typing import Any
 from rigidimeter.documents import csv_text, plain_values
 from rigidimeter.recording import estimates_document
 from rigidimeter.study.compared import Comparison, comparison_rows, comparison_values, measure_names
+from rigidimeter.study.conclusions import conclusion_rows
 from rigidimeter.study.ratings_found import (
     rating_contrast,
     rating_offsets,
@@ -45,6 +46,7 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
         "method_reason": analysis.method_reason,
         "inertia_kg_m2": analysis.inertia_kg_m2,
         "inertia_by_subject": result.several_subjects,
+        "conclusion": conclusion_rows(result),
         "comparisons": [comparison_values(comparison) for comparison in result.comparisons],
         "days": tables["days"],
         "effect_differences": tables["effect_differences"],

@@ -141,7 +141,10 @@ def test_a_measure_that_days_cannot_test_says_why(study: StudyResult) -> None:
     page = shown(untested(study, "work_j", "there is one day in each condition"))
     (row,) = (r for r in page.table("OFF against DBS: days") if r[0].startswith("Work"))
     assert row[-1] == "there is one day in each condition"
-    assert "Not tested by days: work." in page.words()
+    assert (
+        "It cannot be decided whether the conditions differ in work: there is one day in each "
+        "condition."
+    ) in page.words()
 
 
 def test_a_blinded_study_keeps_its_codes_and_shows_no_stimulation() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.unit.reporting.cohorts import Design, altered, made_study, sensitivity_row, untested
 
-from rigidimeter.records import Outcome
+from rigidimeter.records import Finding, Outcome
 from rigidimeter.reporting.verdict_text import dependence_sentences, verdict_sentence
 from rigidimeter.statistics import two_groups
 from rigidimeter.study import Comparison, Measure, SensitivityRow, StudyResult
@@ -109,7 +109,9 @@ def test_prefixes_and_missing_tests(study: StudyResult) -> None:
         "Virtual data. Blinded: the names of the conditions are codes. Tested by days"
     )
     lacking = untested(study, "work_j", "one day in each condition")
-    assert "Not tested by days: work." in verdict_sentence(lacking)
+    assert (
+        "It cannot be decided whether the conditions differ in work: one day in each condition."
+    ) in verdict_sentence(lacking)
     alone = dataclasses.replace(study, comparisons=())
     assert "No epoch could be included" in verdict_sentence(alone)
 
@@ -174,17 +176,31 @@ def test_opposite_signs_and_held_inertia(study: StudyResult) -> None:
     assert "“iv” (J fixed) shows a difference, “iv” (J free) does not." in text
 
 
-def test_verdict_says_which_way(make_study, make_analysis) -> None:
-    made = make_study([], analysis=make_analysis({"OFF": 40, "DBS": 40}))
-    assert verdict_sentence(made).startswith("DBS compared with OFF: ")
-    stiffness = {c.measure.name: c for c in made.comparisons}["stiffness_nm_rad"]
-    assert stiffness.test is not None
-    assert f"p\xa0=\xa0{stiffness.test.p:.3g}" in verdict_sentence(made)
-
-
-def test_verdict_of_a_lower_stiffness(make_study, epochs) -> None:
+def test_reasons_that_measures_share_are_said_once(make_study, make_analysis, epochs) -> None:
+    """One recording in each condition: what a difference comes from cannot be known."""
     text = verdict_sentence(make_study(epochs))
-    assert text.index("lower") < text.index("stiffness K")
+    assert text.startswith(
+        "It cannot be decided whether the conditions differ in inertia J, viscous damping B, "
+        "stiffness K, angular impulse and work: there is one recording in each condition, so "
+        "recording and condition cannot be separated."
+    )
+    text = verdict_sentence(make_study([], analysis=make_analysis({"OFF": 40, "DBS": 40})))
+    assert "there is only one recording" in text
+
+
+def test_what_was_found_and_is_not_supported(study: StudyResult) -> None:
+    finding = Finding("tremor", "doubt", 2.0, 1.0, "a tremor", "repeat it at rest")
+    fits = tuple(
+        dataclasses.replace(fit, findings=(finding,)) if fit.condition == "DBS" else fit
+        for fit in study.analysis.fits
+    )
+    shaken = dataclasses.replace(
+        study, sensitivity=(), analysis=dataclasses.replace(study.analysis, fits=fits)
+    )
+    text = verdict_sentence(shaken)
+    assert "DBS is lower than OFF in angular impulse" in text
+    assert "A difference was found but is not supported in viscous damping B (p" in text
+    assert ": tremor casts doubt on 0 of 23 epochs in OFF and 19 of 19 epochs in DBS" in text
 
 
 def test_verdict_without_comparison_gives_medians(make_study, make_analysis) -> None:
