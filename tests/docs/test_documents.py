@@ -18,6 +18,7 @@ from rigidimeter import __version__
 from rigidimeter.cli.main import app
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.choice import LABELS
+from rigidimeter.recording.channels.mapping_file import MAPPING_SCHEMA, read_mapping
 from rigidimeter.recording.study_toml import read_study_toml
 from rigidimeter.records import CHANNEL_UNITS
 from rigidimeter.settings import load_settings, parse_settings
@@ -135,6 +136,9 @@ def test_a_toml_example_is_accepted(block: Block, tmp_path: Path) -> None:
     if block.text.startswith('schema = "rigidimeter.study/1"'):
         (tmp_path / "study.toml").write_text(block.text, "utf-8")
         read_study_toml(tmp_path / "study.toml")
+    elif block.text.startswith(f'schema = "{MAPPING_SCHEMA}"'):
+        (tmp_path / "lab.toml").write_text(block.text, "utf-8")
+        assert read_mapping(tmp_path / "lab.toml").said.units["torque_nm"] == "mV"
     else:
         parse_settings(tomllib.loads(block.text))
 

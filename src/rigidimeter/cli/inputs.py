@@ -24,6 +24,7 @@ _OF_RECORDINGS = (
     "unit",
     "scale",
     "offset",
+    "mapping",
     "rate_hz",
     "reaction",
     "epoch_length_s",
@@ -145,7 +146,7 @@ def study_of(recordings: Recordings, key: Path | None) -> Path | None:
         if getattr(recordings, name):
             raise UserError(
                 f"--{name.replace('_', '-')}: is for single recordings; those of a study folder "
-                "are session folders, or files with the standard names"
+                "are session folders or files that a mapping in study.toml describes"
             )
     return studies[0]
 

@@ -23,6 +23,7 @@ from rigidimeter.cli.design import design
 from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
 from rigidimeter.cli.export import export
+from rigidimeter.cli.inspect import inspect
 from rigidimeter.cli.model import model
 from rigidimeter.cli.options import RegistryCommand
 from rigidimeter.cli.output import VisibleErrors, echo
@@ -106,6 +107,7 @@ for command in (
     check,
     emulate,
     estimate,
+    inspect,
     model,
     compare,
     ratings,

@@ -144,6 +144,15 @@ class Recordings:
             help='What a column reads at zero, for example "torque=0.1 V"; repeat as needed.',
         ),
     ] = None
+    mapping: Annotated[
+        Path | None,
+        typer.Option(
+            "--mapping",
+            metavar="FILE",
+            help="A mapping file, which says columns, units and the like for the files of one "
+            "laboratory; `rigidimeter inspect` writes one.",
+        ),
+    ] = None
     rate_hz: Annotated[
         float | None,
         typer.Option(
@@ -226,19 +235,32 @@ class Recordings:
 
         recording = read(
             self.paths,
-            column=_pairs("column", self.column, "torque=Fz"),
-            unit=_pairs("unit", self.unit, "angle=deg"),
-            scale=_pairs("scale", self.scale, "'torque=2.5 Nm/V'"),
-            offset=_pairs("offset", self.offset, "'torque=0.1 V'"),
-            rate_hz=self.rate_hz,
-            reaction=self.reaction,
-            epoch_length_s=self.epoch_length_s,
             condition=self.condition,
-            task=cast("Task | None", self.task),
             leave_out=self.leave_out or (),
             settings=self.settings,
+            **self.of_files(),
         )
         return replace(recording, settings=self.adjust(recording.settings))
+
+    def of_files(self) -> dict[str, Any]:
+        """Return the arguments of `recording.read` that say how a file is read.
+
+        Raises
+        ------
+        UserError
+            If an option is not written as NAME=VALUE.
+        """
+        return {
+            "column": _pairs("column", self.column, "torque=Fz"),
+            "unit": _pairs("unit", self.unit, "angle=deg"),
+            "scale": _pairs("scale", self.scale, "'torque=2.5 Nm/V'"),
+            "offset": _pairs("offset", self.offset, "'torque=0.1 V'"),
+            "rate_hz": self.rate_hz,
+            "reaction": self.reaction,
+            "epoch_length_s": self.epoch_length_s,
+            "task": cast("Task | None", self.task),
+            "mapping": self.mapping,
+        }
 
     def adjust(self, settings: Settings) -> Settings:
         """Return settings with the band and the controller of the options.

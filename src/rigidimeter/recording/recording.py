@@ -10,6 +10,7 @@ from typing import Any
 
 from rigidimeter.documents import noted_digests
 from rigidimeter.errors import UserError
+from rigidimeter.recording.channels.mapping_file import merged, read_mapping
 from rigidimeter.recording.formats import ReadOptions, read_recording, reader_of
 from rigidimeter.recording.leave_out import with_left_out
 from rigidimeter.records import Epoch, Notice, Task
@@ -62,6 +63,7 @@ def read(
     unit: Mapping[str, str] | None = None,
     scale: Mapping[str, str] | None = None,
     offset: Mapping[str, str] | None = None,
+    mapping: str | Path | None = None,
     settings: Settings | str | Path | Mapping[str, Any] | None = None,
 ) -> Recording:
     """Read session folders and files into one recording.
@@ -96,6 +98,8 @@ def read(
         a force with a lever arm.
     offset : mapping of str to str, optional
         What a column reads at zero, as in ``{"torque": "0.1 V"}``.
+    mapping : path, optional
+        A mapping file, which says all of this but the conditions; an argument comes before it.
     settings : Settings, path or mapping, optional
         Settings for the analysis, or a TOML file of them. Default: those with which the first
         session folder was recorded, else the built-in ones.
@@ -111,15 +115,16 @@ def read(
     """
     asked = _paths(paths)
     conditions = _conditions(condition, len(asked))
-    options = ReadOptions(
-        _by_name("column", column, "'torque': 'Fz'"),
-        rate_hz,
-        reaction,
-        epoch_length_s,
+    options = read_options(
+        column=column,
+        rate_hz=rate_hz,
+        reaction=reaction,
+        epoch_length_s=epoch_length_s,
         task=task,
-        units=_by_name("unit", unit, "'angle': 'deg'"),
-        scales=_by_name("scale", scale, "'torque': '2.5 Nm/V'"),
-        offsets=_by_name("offset", offset, "'torque': '0.1 V'"),
+        unit=unit,
+        scale=scale,
+        offset=offset,
+        mapping=mapping,
     )
     chosen = None if settings is None else settings_from(settings)
     compared = _RECORDED_WITH if chosen is not None else (*_RECORDED_WITH, *_ANALYSED_WITH)
@@ -153,6 +158,38 @@ def read(
         tuple(dict.fromkeys(asked)),
         digests,
     )
+
+
+def read_options(
+    *,
+    column: Mapping[str, str] | None = None,
+    rate_hz: float | None = None,
+    reaction: bool = False,
+    epoch_length_s: float | None = None,
+    task: Task | None = None,
+    unit: Mapping[str, str] | None = None,
+    scale: Mapping[str, str] | None = None,
+    offset: Mapping[str, str] | None = None,
+    mapping: str | Path | None = None,
+) -> ReadOptions:
+    """Return arguments of `read` as options, with those of the mapping file behind them.
+
+    Raises
+    ------
+    UserError
+        If one is wrong.
+    """
+    options = ReadOptions(
+        _by_name("column", column, "'torque': 'Fz'"),
+        rate_hz,
+        reaction,
+        epoch_length_s,
+        task=task,
+        units=_by_name("unit", unit, "'angle': 'deg'"),
+        scales=_by_name("scale", scale, "'torque': '2.5 Nm/V'"),
+        offsets=_by_name("offset", offset, "'torque': '0.1 V'"),
+    )
+    return options if mapping is None else merged(read_mapping(Path(mapping)), options)
 
 
 def _about_settings(

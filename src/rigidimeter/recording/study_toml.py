@@ -113,6 +113,7 @@ class StudyToml(Section):
     ratings: str = _text("ratings.csv")
     exclusions: str = _text("exclusions.csv")
     key: str = _text("key.csv")
+    mapping: str | None = Field(None, min_length=1, max_length=200)
     conditions: dict[str, ConditionTable] = Field(default_factory=dict)
     rating: RatingTable = RatingTable()
     subjects: dict[str, SubjectTable] = Field(default_factory=dict)
@@ -127,6 +128,14 @@ class StudyToml(Section):
                     f"{name} = {getattr(self, name)!r} is outside the study folder; name a file "
                     f'in it, as in {name} = "{name}.csv"'
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _mapping_below(self) -> Self:
+        if self.mapping is not None and is_outside(self.mapping):
+            raise ValueError(
+                f"mapping = {self.mapping!r} is outside the study folder; copy the file into it"
+            )
         return self
 
     @model_validator(mode="after")

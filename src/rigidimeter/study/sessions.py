@@ -18,6 +18,7 @@ from rigidimeter.documents import noted_digests, open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording import ReadOptions, is_session, read_recording, session_settings
+from rigidimeter.recording.channels.mapping_file import read_mapping
 from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES
 from rigidimeter.recording.study_folder import Row, StudyFolder
@@ -191,7 +192,7 @@ def _read(
                 f"{path}: the session was interrupted and never closed; close it with "
                 f"`rigidimeter recover {path}`"
             )
-    epochs, said = read_recording(path, ReadOptions())
+    epochs, said = read_recording(path, _options(read, row, noted, digests))
     said = [*said, *_agrees(path, row, condition, epochs, names)]
     tasks = [task_of(epoch, settings or Settings()) for epoch in epochs]
     entry = SessionEntry(
@@ -202,6 +203,20 @@ def _read(
         for epoch, task in zip(epochs, tasks, strict=True)
     )
     return Session(row, entry, kept, settings), said
+
+
+def _options(
+    read: StudyFolder, row: Row, noted: Mapping[Path, str], digests: dict[str, str]
+) -> ReadOptions:
+    """Return how a recording is read: by its own mapping file, or that of the study."""
+    named = row["mapping"] or read.about.mapping
+    if not named:
+        return ReadOptions()
+    if is_outside(named):
+        raise _Refused(f"mapping is {named}, outside the study folder; copy the file into it")
+    options = read_mapping(read.folder / named)
+    digests[source_of(named)] = noted[read.folder / named]
+    return options
 
 
 def _agrees(

@@ -68,11 +68,16 @@ class Taken:
 
 @dataclass
 class Choice:
-    """The columns that are taken, and what is wrong with the others."""
+    """The columns that are taken, and what is wrong with the others.
+
+    `faults` are of what an estimate needs, `unused` of what it does not; `several` has the columns
+    of a quantity that could be more than one.
+    """
 
     taken: dict[str, Taken] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
     unused: list[str] = field(default_factory=list)
+    several: dict[str, list[str]] = field(default_factory=dict)
 
     @property
     def unstated(self) -> list[Taken]:
@@ -100,14 +105,13 @@ def choose(table: Table, said: Said, has_rate: bool = False) -> Choice:
         if name in table.columns or name in table.scalars:
             choice.taken[label] = Taken(label, name)
     used = set(said.columns.values())
-    several: dict[str, list[str]] = {}
     for quantity in QUANTITIES:
         candidates = _candidates(table, quantity.standard, headers, said, used)
         if len(candidates) > 1:
-            several[quantity.standard] = candidates
+            choice.several[quantity.standard] = candidates
         elif candidates:
             _take(table, choice, quantity.standard, candidates[0], headers[candidates[0]], said)
-    _settle(table, choice, said, several, has_rate)
+    _settle(table, choice, said, has_rate)
     return choice
 
 
@@ -187,11 +191,10 @@ def _not_needed(choice: Choice, has_rate: bool) -> set[str]:
     return free | ({"time_s"} if has_rate else set())
 
 
-def _settle(
-    table: Table, choice: Choice, said: Said, several: Mapping[str, list[str]], has_rate: bool
-) -> None:
+def _settle(table: Table, choice: Choice, said: Said, has_rate: bool) -> None:
     """Leave out what is in doubt and not needed; what is in doubt and needed is a fault."""
     free = _not_needed(choice, has_rate)
+    several = choice.several
     for standard, candidates in several.items():
         text = _several(table, standard, candidates)
         if standard in free:

@@ -139,7 +139,7 @@ def readings(
             continue
         names = ", ".join(f"{BY_STANDARD[n].name} as {unit}" for n, unit in as_units.items())
         doubt = "; ".join(one.text for one in doubts(seen))
-        lines.append(f"  {names}: {_look_text(seen)}" + (f" ({doubt})" if doubt else ""))
+        lines.append(f"  {names}: {look_text(seen)}" + (f" ({doubt})" if doubt else ""))
     return lines[:_MOST_LINES]
 
 
@@ -190,7 +190,8 @@ def options_text(vary: Sequence[str]) -> str:
     )
 
 
-def _look_text(seen: Look) -> str:
+def look_text(seen: Look) -> str:
+    """Return a look as one line: rate, duration, speed, and J, B and K."""
     speed = f"peak speed {seen.speed_rad_s:.3g} rad/s"
     rate = f"{seen.rate_hz:.4g} samples/s for {seen.duration_s:.4g} s"
     return f"{rate}, {speed}, {_fit_text(seen)}"

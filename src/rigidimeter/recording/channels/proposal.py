@@ -1,0 +1,163 @@
+"""How a table should be read: what its numbers decide, and what only a person can say.
+
+The numbers decide a unit where every other usual one is impossible, the torque among several
+columns where one alone belongs to the motion, and its sign. The unit of a torque, a lever arm and a
+calibration they never decide.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.channels.channels_of_table import channels_of_table
+from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
+from rigidimeter.recording.channels.looks import Array, Look
+from rigidimeter.recording.channels.quantities import BY_STANDARD
+from rigidimeter.recording.channels.readings import doubts, look_at
+from rigidimeter.recording.formats.columns import numbers, own_rate, own_rates
+from rigidimeter.recording.formats.read_options import ReadOptions
+from rigidimeter.recording.formats.table import Table
+
+_BELONGS, _DOES_NOT = 0.8, 0.5
+"""Of the share of a torque that the motion explains."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What to say of a table so that it is read.
+
+    Parameters
+    ----------
+    options : ReadOptions
+    reasons : tuple of str
+        Why, for what was added to the options that were given.
+    unsaid : tuple of str
+        What is still wrong then, and only a person can know; empty where it is read.
+    choice : Choice
+        The columns that are taken then.
+    seen : Look or None
+        How the recording looks then.
+    """
+
+    options: ReadOptions
+    reasons: tuple[str, ...]
+    unsaid: tuple[str, ...]
+    choice: Choice
+    seen: Look | None
+
+
+def propose(table: Table, options: ReadOptions) -> Proposal:
+    """Return how a table should be read, with the options that are given already."""
+    reasons: list[str] = []
+    options = _torque_of_several(table, options, reasons)
+    options = _units(table, options, reasons)
+    choice = _chosen(table, options)
+    raw, rate_hz = _raw(table, choice, options)
+    seen = _seen(choice.taken, raw, rate_hz, {})
+    fit = None if seen is None or options.reaction else seen.fit
+    if fit is not None and np.all(fit.significant < 0):
+        options = replace(options, reaction=True)
+        reasons.append("J, B and K are negative without --reaction")
+        seen = _seen(choice.taken, raw | {"torque_nm": -raw["torque_nm"]}, rate_hz, {})
+    unsaid: tuple[str, ...] = ()
+    try:
+        channels_of_table(table, options)
+    except UserError as error:
+        unsaid = error.lines
+    return Proposal(options, tuple(reasons), unsaid, choice, seen)
+
+
+def _torque_of_several(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOptions:
+    candidates = _chosen(table, options).several.get("torque_nm", [])
+    explained: dict[str, float] = {}
+    for column in candidates:
+        tried = replace(options, columns={**options.columns, "torque": column})
+        choice = _chosen(table, tried)
+        seen = _seen(choice.taken, *_raw(table, choice, tried), {})
+        if seen is not None and seen.fit is not None:
+            explained[column] = seen.fit.r_squared
+    ranked = sorted(explained, key=lambda column: -explained[column])
+    if len(ranked) < 2 or explained[ranked[0]] < _BELONGS or explained[ranked[1]] > _DOES_NOT:
+        return options
+    shown = ", ".join(f"{explained[column]:.2f} of {column!r}" for column in ranked[:4])
+    reasons.append(f"the motion explains {shown} of the torque")
+    return replace(options, columns={**options.columns, "torque": ranked[0]})
+
+
+def _units(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOptions:
+    """Add the units that are the only possible ones, of time and motion."""
+    choice = _chosen(table, options)
+    raw, rate_hz = _raw(table, choice, options)
+    vary = [one.standard for one in choice.unstated if one.standard in ("time_s", *MOTION)]
+    seen = _seen(choice.taken, raw, rate_hz, {})
+    if not vary and seen is not None:
+        vary = [
+            doubt.standard
+            for doubt in doubts(seen)
+            if (taken := choice.taken.get(doubt.standard)) is not None and not taken.of_user
+        ]
+    vary = [name for name in vary if name != "torque_nm"]
+    if not vary:
+        return options
+    possible = []
+    for units in itertools.product(*(BY_STANDARD[name].usual for name in vary)):
+        as_units = dict(zip(vary, units, strict=True))
+        looked = _seen(choice.taken, raw, rate_hz, as_units)
+        if looked is not None and not doubts(looked):
+            possible.append(as_units)
+    for name in vary:
+        units_left = {as_units[name] for as_units in possible}
+        if len(units_left) == 1:
+            (unit,) = units_left
+            spoken = BY_STANDARD[name].name
+            reasons.append(
+                f"{spoken} can only be in {unit} (of {', '.join(BY_STANDARD[name].usual)})"
+            )
+            options = replace(options, units={**options.units, spoken: unit})
+    return options
+
+
+def _chosen(table: Table, options: ReadOptions) -> Choice:
+    has_rate = options.rate_hz is not None or bool(own_rates(table))
+    return choose(table, options.said, has_rate)
+
+
+def _raw(
+    table: Table, choice: Choice, options: ReadOptions
+) -> tuple[dict[str, Array], float | None]:
+    """Return the columns as they are, of those that hold numbers, and the sampling rate."""
+    raw: dict[str, Array] = {}
+    rate_hz = options.rate_hz
+    for standard, taken in choice.taken.items():
+        if standard in BY_STANDARD:
+            try:
+                raw[standard] = numbers(table, standard, taken.column, [])
+            except UserError:
+                continue
+    if rate_hz is None and "time_s" not in choice.taken:
+        try:
+            rate_hz = own_rate(table)
+        except UserError:
+            rate_hz = None
+    sizes = {values.size for values in raw.values()}
+    if options.reaction and "torque_nm" in raw:
+        raw["torque_nm"] = -raw["torque_nm"]
+    return (raw, rate_hz) if len(sizes) == 1 else ({}, rate_hz)
+
+
+def _seen(
+    taken: Mapping[str, Taken],
+    raw: Mapping[str, Array],
+    rate_hz: float | None,
+    as_units: Mapping[str, str],
+) -> Look | None:
+    if "torque_nm" not in raw or not any(name in raw for name in MOTION):
+        return None
+    if rate_hz is None and "time_s" not in raw:
+        return None
+    return look_at(taken, raw, rate_hz, as_units)

@@ -1,0 +1,71 @@
+"""`inspect` on the command line; mapping files wherever recordings are read."""
+
+import json
+import shlex
+
+import numpy as np
+import pytest
+from tests.known_joint import STIFFNESS_NM_RAD, angle_rad, torque_nm
+
+TIME_S = np.arange(2400) / 100.0
+
+
+@pytest.fixture
+def path(tmp_path):
+    columns = (TIME_S, torque_nm(TIME_S) / 2.5, np.degrees(angle_rad(TIME_S)))
+    lists = (column.tolist() for column in columns)
+    rows = "".join(f"{a};{b};{c}\n" for a, b, c in zip(*lists, strict=True))
+    path = tmp_path / "elbow.csv"
+    path.write_text("Zeit [s];Sensor [V];Winkel [°]\n" + rows, "utf-8")
+    return path
+
+
+SAID = ("--column", "torque=Sensor [V]", "--scale", "torque=2.5 Nm/V")
+
+
+def stiffness(out):
+    return json.loads(out.read_text())["epochs"][0]["stiffness_nm_rad"]
+
+
+def test_inspect_then_the_command_and_the_mapping_that_it_gives(path, tmp_path, rigidimeter):
+    asked = rigidimeter("inspect", path)
+    assert asked.status == 1
+    assert "has no column torque_nm" in asked.out
+    lab, image = tmp_path / "lab.toml", tmp_path / "elbow.png"
+    ran = rigidimeter("inspect", path, *SAID, "--write-mapping", lab, "--plot", image)
+    assert ran.status == 0, ran.err
+    assert image.read_bytes()[:4] == b"\x89PNG"
+    (line,) = [line for line in ran.out.splitlines() if line.startswith("reads it: ")]
+    words = shlex.split(line.removeprefix("reads it: "))
+    for command in (words[1:], ["estimate", path, "--mapping", lab]):
+        out = tmp_path / "out.json"
+        assert rigidimeter(*command, "--json", out).status == 0
+        assert stiffness(out) == pytest.approx(STIFFNESS_NM_RAD, rel=0.02)
+
+
+def test_a_study_reads_its_recordings_by_a_mapping(path, tmp_path, rigidimeter):
+    study = tmp_path / "study"
+    assert rigidimeter("study", "new", study, "--title", "a").status == 0
+    for name in ("off", "dbs"):
+        (study / f"{name}.csv").write_bytes(path.read_bytes() + b"\n" * (name == "dbs"))
+    lab = study / "lab.toml"
+    assert rigidimeter("inspect", path, *SAID, "--write-mapping", lab).status == 0
+    (study / "sessions.csv").write_text(
+        "path,subject,day,condition,mapping\noff.csv,S,1,OFF,\ndbs.csv,S,1,DBS,lab.toml\n"
+    )
+    refused = rigidimeter("compare", study)
+    assert "off.csv has no column torque_nm" in refused.err
+    assert "dbs.csv" not in refused.err
+    toml = study / "study.toml"
+    text = toml.read_text("utf-8").replace("\n\n", '\nmapping = "lab.toml"\n\n', 1)
+    toml.write_text(text, "utf-8")
+    ran = rigidimeter("compare", study)
+    assert ".csv" not in ran.err  # the only error is that of one epoch a condition
+    assert "lab.toml" in json.loads((study / "analysis" / "inputs.json").read_text())["files"]
+
+
+def test_a_session_folder_is_inspected_too(rigidimeter, simulate):
+    folder = simulate()
+    ran = rigidimeter("inspect", folder)
+    assert ran.status == 0
+    assert "session folder with 1 epochs" in ran.out

@@ -1,0 +1,97 @@
+"""What is proposed for a file, and mapping files that say it."""
+
+import numpy as np
+import pytest
+from tests.known_joint import angle_rad, torque_nm
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.channels.channels_of_table import channels_of_table
+from rigidimeter.recording.channels.inspection import column_rows, inspect_table, option_words
+from rigidimeter.recording.channels.mapping_file import mapping_text, merged, read_mapping
+from rigidimeter.recording.formats.read_options import ReadOptions
+from rigidimeter.recording.formats.table import Table
+
+TIME_S = np.arange(9000) / 200.0
+TORQUE_NM, ANGLE_RAD = torque_nm(TIME_S), angle_rad(TIME_S)
+ANGLE_DEG = np.degrees(ANGLE_RAD)
+
+
+def inspected(options=None, **columns):
+    return inspect_table(Table("r.csv", columns), options or ReadOptions())
+
+
+def test_what_the_numbers_decide_is_proposed_and_reads_the_file():
+    found = inspected(time=1e3 * TIME_S, torque_nm=-TORQUE_NM, angle=ANGLE_DEG * 3)
+    assert found.proposal.unsaid == ()
+    assert option_words(found) == [
+        "--unit", "time=ms", "--unit", "angle=deg", "--reaction", "--epoch-length-s", "20",
+    ]  # fmt: skip
+    read = channels_of_table(found.table, found.options)
+    np.testing.assert_allclose(read.values["angle_rad"], 3 * ANGLE_RAD, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("columns", "told"),
+    [
+        ({"time_s": TIME_S, "torque": TORQUE_NM, "angle_rad": ANGLE_RAD}, "--unit torque=Nm"),
+        ({"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle": ANGLE_RAD}, "--unit angle=rad or"),
+        ({"time_s": TIME_S, "F (N)": TORQUE_NM, "angle_rad": ANGLE_RAD}, "lever arm"),
+    ],
+)
+def test_what_only_a_person_can_know_is_not_decided(columns, told):
+    found = inspected(**columns)
+    assert told in found.proposal.unsaid[0]
+
+
+def test_the_one_torque_that_belongs_to_the_motion_is_found():
+    rng = np.random.default_rng(2)
+    other = {f"M{axis} [Nm]": rng.normal(size=TIME_S.size) for axis in "xy"}
+    columns = {"t [s]": TIME_S, **other, "Mz [Nm]": TORQUE_NM, "angle_deg": ANGLE_DEG}
+    found = inspected(**columns)
+    assert found.options.columns == {"torque": "Mz [Nm]"}
+    assert "the motion explains 1.00 of 'Mz [Nm]'" in found.proposal.reasons[0]
+    both = inspected(**columns | {"Mx [Nm]": TORQUE_NM})
+    assert "3 columns may be the torque" in both.proposal.unsaid[0]
+
+
+def test_the_screen_has_rate_gaps_and_role_of_each_column():
+    angle = ANGLE_DEG.copy()
+    angle[2000:2040] = np.nan
+    rows = column_rows(inspected(**{"t [s]": TIME_S, "M [Nm]": TORQUE_NM, "Winkel [°]": angle}))
+    assert rows[3] == ("Winkel [°]", "°", "200", "0.0 %", "1", "40", rows[3][6], "angle_rad")
+
+
+def test_a_mapping_says_what_the_options_said(tmp_path):
+    options = ReadOptions(
+        {"torque": 'F "z"', "angle_rad": "θ", "epoch": "Trial"}, None, True, 20.0, task="prbs",
+        units={"torque": "mV"}, scales={"torque": "2.5 Nm/V"}, offsets={"torque_nm": "12 mV"},
+    )  # fmt: skip
+    path = tmp_path / "lab.toml"
+    path.write_text(mapping_text(options), "utf-8")
+    found = read_mapping(path)
+    assert found.said.columns == options.said.columns
+    assert found.said.units == {"torque_nm": "mV", "angle_rad": "rad"}
+    assert (found.said.scales, found.said.offsets) == (options.said.scales, options.said.offsets)
+    assert (found.reaction, found.epoch_length_s, found.task) == (True, 20.0, "prbs")
+    over = merged(found, ReadOptions(units={"torque_nm": "V"}, epoch_length_s=5.0))
+    assert over.said.units["torque_nm"] == "V"
+    assert (over.epoch_length_s, over.reaction) == (5.0, True)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", 'schema is missing; the first line of a mapping must be schema = "rigidimeter.map'),
+        ('schema = "rigidimeter.mapping/9"', "schema is 'rigidimeter.mapping/9'"),
+        ('schema = "rigidimeter.mapping/1"\n[torqe]\ncolumn = "a"', "the nearest is torque"),
+        ('schema = "rigidimeter.mapping/1"\n[torque]\nunits = "a"', "the nearest is torque.unit"),
+        ('schema = "rigidimeter.mapping/1"\nrate_hz = 0.0', "greater than 0 Hz"),
+        ('schema = "rigidimeter.mapping/1"\nrate_hz = 1e300', "must be from 0.001 to 1e"),
+    ],
+)
+def test_a_wrong_mapping_is_refused(tmp_path, text, told):
+    path = tmp_path / "lab.toml"
+    path.write_text(text)
+    with pytest.raises(UserError, match=r"^.*lab\.toml: ") as caught:
+        read_mapping(path)
+    assert told in str(caught.value)
