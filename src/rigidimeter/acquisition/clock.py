@@ -73,6 +73,11 @@ class DeadlineClock:
         self._sleep: Sleep = _absolute_sleep() or _relative_sleep
         self._start_ns = time.monotonic_ns()
 
+    @property
+    def origin_s(self) -> float:
+        """The session's start on CLOCK_MONOTONIC, which all programs of the machine share."""
+        return 1e-9 * self._start_ns
+
     def now_s(self) -> float:
         """Return the seconds since the session's start."""
         return 1e-9 * (time.monotonic_ns() - self._start_ns)

@@ -83,6 +83,7 @@ def _run(
         facts = rig.configure()
         not_tried = approve(facts)
         side.sink.event("rig_configured", **facts)
+        side.sink.event("clock_started", monotonic_s=clock.origin_s)
         if not_tried:
             what = ", ".join(not_tried)
             echo(f"Not tried when the rig was commissioned: {what}.", err=True)

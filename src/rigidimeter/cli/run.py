@@ -77,6 +77,7 @@ def run(
     from rigidimeter.acquisition.processes.recorder import Recording
     from rigidimeter.acquisition.processes.supervise import supervise
     from rigidimeter.cli.realtime_rig import run_loop
+    from rigidimeter.cli.sharing import require_packages, write_nwb_beside
     from rigidimeter.commissioning import check_record, require_daily_check, with_measured_floor
     from rigidimeter.console import Terminal
     from rigidimeter.devices.rigfile import load_rig
@@ -85,6 +86,7 @@ def run(
     for line in complete_left():
         echo(line, err=True)
     settings, planned, continues = _planned(protocol, resume, seed, virtual=rig is None)
+    require_packages(settings)
     home_rad = continues.get("origin_rad") if rig is not None else None
     _offer(out)
     if rig is not None:
@@ -115,6 +117,8 @@ def run(
     folder = ended.folder if ended.folder != out.absolute() else out
     good, of = count_epochs(folder)
     echo(f"{good} of {of} epochs ended with success; session in {folder}")
+    if settings.sharing.nwb_at_close:
+        echo(write_nwb_beside(folder))
     if ended.outcome != "success":
         again = f"; continue it with `{_resume_command(folder, rig)}`" if good < of else ""
         raise UserError(

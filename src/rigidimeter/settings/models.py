@@ -41,6 +41,7 @@ from rigidimeter.settings.rig_settings import (
     TorqueSensorSettings,
 )
 from rigidimeter.settings.section import Section
+from rigidimeter.settings.sharing_settings import SharingSettings
 
 
 class Settings(Section):
@@ -69,6 +70,7 @@ class Settings(Section):
     diagnostics: DiagnosticsSettings = DiagnosticsSettings()
     online: OnlineSettings = OnlineSettings()
     commissioning: CommissioningSettings = CommissioningSettings()
+    sharing: SharingSettings = SharingSettings()
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -52,6 +52,7 @@ class Reader(IntEnum):
     RECORDER = 0
     CONSOLE = 1
     ESTIMATOR = 2
+    STREAM = 3
 
 
 class _Ring:
@@ -181,17 +182,22 @@ class SampleReader:
         self._ring = ring
         self._at = _CURSORS + 8 * reader
 
-    def read(self, most: int | None = None) -> tuple[NDArray[np.void], int]:
+    def read(
+        self, most: int | None = None, *, recorded: bool = False
+    ) -> tuple[NDArray[np.void], int]:
         """Return the rows since the last call, and how many before them were missed.
 
         Parameters
         ----------
         most : int or None
             Skip to the newest `most` rows; those skipped count as missed.
+        recorded : bool
+            Of those alone that are in the file.
         """
         ring, words = self._ring, self._ring.memory.words
-        before, written = words[self._at], ring.written
-        first = max(before, written - ring.capacity + 1)
+        before = words[self._at]
+        written = ring.recorded if recorded else ring.written
+        first = min(max(before, ring.written - ring.capacity + 1), written)
         if most is not None:
             first = max(first, written - most)
         rows = ring.rows(first, written)

@@ -4,6 +4,7 @@
     loop       the rig, the control loop, nothing else. It stops the rig when the console is silent.
     recorder   from the rings into the session folder. It ends when the session is closed.
     estimator  J, B and K for the operator's eyes. The session goes on without it.
+    lsl        what is recorded, as streams for other programs, where settings ask for it. The same.
 
 They share two rings and a page of status, and nothing that could make one wait for another. A
 process that is left completes the session: the recorder if the loop dies, the loop if the recorder
@@ -128,8 +129,12 @@ def supervise(
             estimator = None
             if realtime.live_estimate:
                 online, stopping_s = recording.settings.online, patience.stopping_s
-                last = (online, rig.tick_rate_hz, shared.names, stopping_s, me)
-                estimator = start("estimator", _estimator_main, *last)
+                estimating = (online, rig.tick_rate_hz, shared.names, stopping_s, me)
+                estimator = start("estimator", _estimator_main, *estimating)
+            streamer = None
+            if recording.settings.sharing.lsl:
+                sending = (recording.settings, shared.names, patience.stopping_s, me)
+                streamer = start("lsl", _streamer_main, *sending)
             look = _Look(status, console)
             remarks = _see_through(loop, recorder, status, patience, look)
             recorder_watch = WatchedProcess(recorder.pid or 0)
@@ -137,8 +142,8 @@ def supervise(
                 remarks += complete(shared, recording, recorder_watch, patience, look)
             finally:
                 recorder_watch.close()
-            if estimator is not None:
-                _end(estimator, 2.0)
+            for process in filter(None, (estimator, streamer)):
+                _end(process, 2.0)
             folder = status.folder() or recording.folder
             outcome, reason, recovered = _outcome(folder)
             if shared.samples.refused:
@@ -266,3 +271,10 @@ def _estimator_main(*arguments: Any) -> None:
     from rigidimeter.acquisition.processes.live_estimate import estimator_main
 
     estimator_main(*arguments)
+
+
+def _streamer_main(*arguments: Any) -> None:
+    """Send what is recorded as streams; what that needs is loaded in its own process alone."""
+    from rigidimeter.acquisition.processes.lsl_streams import streamer_main
+
+    streamer_main(*arguments)
