@@ -230,20 +230,21 @@ def state_after(
 
     A command that came ε late is one in time, and a pulse of c_(k−1) − c_k for ε.
     """
-    decay = cmath.exp(pole * interval_s)
-    held = (decay - 1) / pole * command_rad_s
-    before = np.concatenate(([0.0], command_rad_s[:-1]))
-    grown = np.ones(1) if late_s is None else np.exp(pole * late_s)
-    if late_s is not None:
-        held = held + decay * (1 - 1 / grown) / pole * (before - command_rad_s)
-    at_even = scipy.signal.lfilter([0.0, 1.0], [1.0, -decay], held)
-    state = at_even[tick]
-    if late_s is not None:
-        state = grown[tick] * state + (grown[tick] - 1) / pole * before[tick]
+    growth = pole if pole.imag else pole.real  # numbers that are real take half the time
+    decay = np.exp(growth * interval_s)
+    held = (decay - 1) / growth * command_rad_s
+    if late_s is None:
+        state = scipy.signal.lfilter([0.0, 1.0], [1.0, -decay], held)[tick]
+    else:
+        before = np.concatenate(([0.0], command_rad_s[:-1]))
+        grown = np.exp(growth * late_s)
+        held = held + decay * (1 - 1 / grown) / growth * (before - command_rad_s)
+        state = scipy.signal.lfilter([0.0, 1.0], [1.0, -decay], held)[tick]
+        state = grown[tick] * state + (grown[tick] - 1) / growth * before[tick]
     if after_s.size and np.ptp(after_s) < SAME_TIME_S:
         if after_s[0] == 0.0:
             return np.asarray(state)
-        passed = cmath.exp(pole * float(np.mean(after_s)))
+        passed = np.exp(growth * np.mean(after_s))
     else:
-        passed = np.exp(pole * after_s)
-    return np.asarray(passed * state + (passed - 1) / pole * command_rad_s[tick])
+        passed = np.exp(growth * after_s)
+    return np.asarray(passed * state + (passed - 1) / growth * command_rad_s[tick])

@@ -41,6 +41,10 @@ error into the epoch.
 """
 
 
+SHORT_MEMORY = 15
+"""Samples over which a signal is continued for the low-pass."""
+
+
 def band_hz(epoch: Epoch, settings: EstimationSettings) -> tuple[float, float]:
     """Return the band for an epoch.
 
@@ -65,21 +69,41 @@ def zero_phase_band(values: Array, rate_hz: float, band: tuple[float, float]) ->
     reflection, scipy's default, would hang that memory on a single sample with its noise: at the
     paper's rates it tripled the scatter of K.
     """
+    if values.size <= SHORT_MEMORY:
+        raise ValueError(
+            f"{values.size} samples are too few for a filter; it needs {SHORT_MEMORY + 1}"
+        )
     low, high = band
     lowpass, highpass = _filters(low, high, float(f"{rate_hz:.12g}"))
-    memory = min(values.size - 1, round(rate_hz / low))
-    smooth = signal.sosfiltfilt(lowpass, values - np.mean(values), padtype="even")
-    passed = signal.sosfiltfilt(highpass, smooth, padtype="even", padlen=memory)
-    return np.asarray(passed, dtype=np.float64)
+    smooth = _both_ways(lowpass, values - np.mean(values), SHORT_MEMORY)
+    return _both_ways(highpass, smooth, round(rate_hz / low))
+
+
+_Filter = tuple[Array, Array]
+"""Second-order sections, and their state after a constant of 1."""
 
 
 @lru_cache(maxsize=16)
-def _filters(low_hz: float, high_hz: float, rate_hz: float) -> tuple[Array, Array]:
+def _filters(low_hz: float, high_hz: float, rate_hz: float) -> tuple[_Filter, _Filter]:
     """Return low-pass and high-pass; to design them takes longer than to filter an epoch."""
-    return (
-        signal.butter(4, high_hz, "lowpass", fs=rate_hz, output="sos"),
-        signal.butter(2, low_hz, "highpass", fs=rate_hz, output="sos"),
-    )
+    lowpass = signal.butter(4, high_hz, "lowpass", fs=rate_hz, output="sos")
+    highpass = signal.butter(2, low_hz, "highpass", fs=rate_hz, output="sos")
+    return (lowpass, signal.sosfilt_zi(lowpass)), (highpass, signal.sosfilt_zi(highpass))
+
+
+def _both_ways(through: _Filter, values: Array, memory: int) -> Array:
+    """Filter forwards and backwards, as `scipy.signal.sosfiltfilt` does with even padding.
+
+    That finds the state after a constant anew for each signal, which takes as long as to filter it.
+    """
+    sections, settled = through
+    past = min(values.size - 1, memory)
+    # The mirror image at each end.
+    whole = np.concatenate((values[past:0:-1], values, values[-2 : -past - 2 : -1]))
+    for _ in range(2):
+        passed, _ = signal.sosfilt(sections, whole, zi=settled * whole[0])
+        whole = np.ascontiguousarray(passed[::-1])
+    return whole[past : past + values.size]
 
 
 def bandlimited_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:

@@ -19,6 +19,7 @@ import numpy as np
 from scipy import optimize, signal
 from scipy.interpolate import CubicSpline
 
+from rigidimeter.estimation.power_lines import power_lines
 from rigidimeter.estimation.screening import before_fit, unusable
 from rigidimeter.estimation.signals import (
     Array,
@@ -247,7 +248,7 @@ def _angle(epoch: Epoch) -> tuple[Array, Array]:
 def _spectral_peak(time_s: Array, angle: Array) -> tuple[float, float]:
     """Return the frequency of the strongest line and its share of the power."""
     rate_hz = 1.0 / float(time_s[1] - time_s[0])
-    frequency_hz, power = signal.periodogram(angle, rate_hz, window="hann", nfft=4 * angle.size)
+    frequency_hz, power = power_lines(angle, rate_hz, tapered=True, longer=4)
     inside = (frequency_hz >= LOWEST_HZ) & (frequency_hz <= HIGHEST_HZ)
     if not np.any(power[inside] > 0):
         raise ValueError("the joint does not move")

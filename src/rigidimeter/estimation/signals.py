@@ -76,6 +76,19 @@ def uniform_grid(channels: list[Channel], rate_hz: float) -> Array:
     return np.minimum(start + np.arange(count) / rate_hz, stop)
 
 
+def thinned(channel: Channel, highest_hz: float) -> Channel:
+    """Return the means of a channel over stretches that keep `GRID_POINTS_PER_CYCLE`."""
+    step = int(channel.rate_hz / (GRID_POINTS_PER_CYCLE * highest_hz) + 1e-6)
+    if step < 2:
+        return channel
+    count = len(channel) // step
+    time_s, values = (
+        part[: count * step].reshape(count, step).mean(axis=1)
+        for part in (channel.time_s, channel.values)
+    )
+    return Channel(channel.name, time_s, values)
+
+
 def spline(channel: Channel) -> CubicSpline:
     """Return the cubic spline through a channel's samples at its own stamps."""
     return CubicSpline(channel.time_s, channel.values)

@@ -47,6 +47,8 @@ MOST_TRIES = 80
 
 EVERYTHING = slice(None)
 
+TINY = float(np.finfo(np.float64).tiny)
+
 
 class Structure(NamedTuple):
     """A family of drives.
@@ -129,6 +131,16 @@ class Fitted(NamedTuple):
         return max(map(abs, self.model.poles_rad_s)) * self.interval_s > 0.99 * FASTEST
 
 
+class _Solved(NamedTuple):
+    """Poles and delay of a drive, the numerator that suits them best, and what it leaves."""
+
+    poles: tuple[complex, ...]
+    shapes: list[Complex]
+    delay_s: float
+    numerator: Array
+    left: Array
+
+
 def search(
     samples: Samples, structure: Structure, start: DriveModel, part: slice = EVERYTHING
 ) -> Fitted:
@@ -138,51 +150,58 @@ def search(
     degrees = np.array(([1.0, 2.0] * structure.poles)[: structure.poles])
     lower, upper = degrees * math.log(SLOWEST), degrees * math.log(FASTEST)
     longest = max(LONGEST_S / interval_s, LONGEST_TICKS)
+    inputs = [_Acting(one, time_s) for one in samples.inputs(structure.friction)]
 
-    def solved(x: Array, delay_ticks: float) -> tuple[Fitted, Array]:
-        poles = _poles(np.clip(x, lower, upper), interval_s)
-        delay_s = float(np.clip(delay_ticks, EARLIEST, longest)) * interval_s
+    def solved(x: Array, delay_ticks: float) -> _Solved:
+        poles = _poles(np.minimum(np.maximum(x, lower), upper), interval_s)
+        delay_s = min(max(float(delay_ticks), EARLIEST), longest) * interval_s
         # Friction acts behind the controller, whose zeros are not its own.
         shapes = [_shapes(poles, n) for n in (structure.zeros, structure.poles - 1)]
         columns = [
-            _columns(acting, poles, shape, late_s, time_s)
-            for acting, shape, late_s in zip(
-                samples.inputs(structure.friction), shapes, (delay_s, 0.0), strict=False
-            )
+            acting.columns(poles, shape, late_s)
+            for acting, shape, late_s in zip(inputs, shapes, (delay_s, 0.0), strict=False)
         ]
-        table = np.concatenate(columns)
-        size = np.sqrt(np.einsum("ij,ij->i", table, table)) + np.finfo(np.float64).tiny
+        table = np.concatenate(columns) if len(columns) > 1 else columns[0]
+        size = np.sqrt(np.einsum("ij,ij->i", table, table)) + TINY
         gram = (table @ table.T) / np.outer(size, size)
         numerator = np.linalg.lstsq(gram, table @ measured / size)[0] / size
+        return _Solved(poles, shapes, delay_s, numerator, numerator @ table - measured)
+
+    def misfit(x: Array) -> Array:
+        return solved(x[:-1], x[-1]).left
+
+    def undelayed(x: Array) -> Array:
+        return solved(x, 0.0).left
+
+    def fitted(x: Array, delay_ticks: float) -> Fitted:
+        poles, shapes, delay_s, numerator, left = solved(x, delay_ticks)
         parts = np.split(samples.scale * numerator, [structure.zeros + 1])
         residues, rubbing = (
             tuple((shape[:, : part.size] @ part).tolist())
             for shape, part in zip(shapes, parts, strict=True)
         )
-        left = numerator @ table - measured
-        drive = DriveModel(poles, residues, delay_s)
-        power = float(np.mean(left**2))
         answer = rubbing if structure.friction else ()
-        return Fitted(structure, drive, answer, power, interval_s), left
+        drive = DriveModel(poles, residues, delay_s)
+        return Fitted(structure, drive, answer, float(np.mean(left**2)), interval_s)
 
-    def found(x: Array, misfit: Callable[[Array], Array]) -> Array:
+    def found(x: Array, left: Callable[[Array], Array]) -> Array:
         scale = np.append(0.1 * degrees, 0.1)[: x.size]
         done = least_squares(
-            misfit, x, method="lm", x_scale=scale, ftol=1e-6, xtol=1e-6, max_nfev=MOST_TRIES
+            left, x, method="lm", x_scale=scale, ftol=1e-6, xtol=1e-6, max_nfev=MOST_TRIES
         )
         return np.asarray(done.x)
 
     begin = _coordinates(structure, start, interval_s)
-    x = found(begin, lambda x: solved(x[:-1], x[-1])[1])
+    x = found(begin, misfit)
     if 0.0 < x[-1] < LATER:
-        return solved(x[:-1], x[-1])[0]
+        return fitted(x[:-1], x[-1])
     # No delay, a short one and a long one are valleys of their own.
-    valleys = [solved(found(begin[:-1], lambda x: solved(x, 0.0)[1]), 0.0)[0]]
+    valleys = [fitted(found(begin[:-1], undelayed), 0.0)]
     if x[-1] <= 0.0:
-        valleys.append(solved(found(x[:-1], lambda x: solved(x, 0.0)[1]), 0.0)[0])
-        x = found(np.append(begin[:-1], LATER), lambda x: solved(x[:-1], x[-1])[1])
+        valleys.append(fitted(found(x[:-1], undelayed), 0.0))
+        x = found(np.append(begin[:-1], LATER), misfit)
     if x[-1] > 0.0:
-        valleys.append(solved(x[:-1], x[-1])[0])
+        valleys.append(fitted(x[:-1], x[-1]))
     return min(valleys, key=lambda one: one.power)
 
 
@@ -231,18 +250,30 @@ def _shapes(poles: tuple[complex, ...], zeros: int) -> Complex:
     return np.array(rows)
 
 
-def _columns(
-    acting: Channel, poles: tuple[complex, ...], shapes: Complex, late_s: float, time_s: Array
-) -> Array:
-    """Return the velocity that each term of a numerator makes of an input, shape (j, n)."""
-    interval_s = 1.0 / acting.mean_rate_hz
-    tick, after_s = since_ticks(acting, time_s, late_s, even=0.0)
-    uneven_s = lateness_s(acting)
-    columns = np.zeros((shapes.shape[1], time_s.size))
-    for pole, weights in zip(poles, shapes, strict=True):
-        state = state_after(pole, acting.values, interval_s, tick, after_s, uneven_s)
-        columns += (1 + (pole.imag != 0)) * (weights[:, None] * state).real
-    return columns
+class _Acting:
+    """An input at the times of the velocity, with what does not change in a search."""
+
+    def __init__(self, channel: Channel, time_s: Array) -> None:
+        self._channel, self._time_s = channel, time_s
+        self._interval_s = 1.0 / channel.mean_rate_hz
+        self._uneven_s = lateness_s(channel)
+        self._late_s = math.nan
+
+    def columns(self, poles: tuple[complex, ...], shapes: Complex, late_s: float) -> Array:
+        """Return the velocity that each term of a numerator makes of the input, shape (j, n)."""
+        if late_s != self._late_s:  # a search moves the poles more often than the delay
+            self._since = since_ticks(self._channel, self._time_s, late_s, even=0.0)
+            self._late_s = late_s
+        columns = np.zeros((shapes.shape[1], self._time_s.size))
+        for pole, weights in zip(poles, shapes, strict=True):
+            values = self._channel.values
+            state = state_after(pole, values, self._interval_s, *self._since, self._uneven_s)
+            if pole.imag:
+                weights = 2 * weights
+                columns += np.outer(weights.real, state.real) - np.outer(weights.imag, state.imag)
+            else:
+                columns += np.outer(weights.real, state)
+        return columns
 
 
 def explained(samples: Samples, fitted: Fitted, time_s: Array) -> Array:
@@ -251,7 +282,7 @@ def explained(samples: Samples, fitted: Fitted, time_s: Array) -> Array:
     answers = ((model.residues, model.delay_s), (fitted.rubbing, 0.0))
     inputs = samples.inputs(fitted.structure.friction)
     columns = [
-        _columns(acting, model.poles_rad_s, np.array(row)[:, None], late_s, time_s)[0]
+        _Acting(acting, time_s).columns(model.poles_rad_s, np.array(row)[:, None], late_s)[0]
         for acting, (row, late_s) in zip(inputs, answers, strict=False)
     ]
     return np.asarray(np.sum(columns, axis=0))

@@ -13,8 +13,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import signal
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy import fft, signal
 
 from rigidimeter.estimation.diagnostics.check_record import (
     Check,
@@ -23,6 +23,7 @@ from rigidimeter.estimation.diagnostics.check_record import (
     at_most,
     push_harmless,
 )
+from rigidimeter.estimation.power_lines import lines_inside, power_lines
 from rigidimeter.estimation.scores import single_frequency_share
 from rigidimeter.estimation.signals import Array, Signals, values_at, velocity_at
 from rigidimeter.records import PARAMETERS, Channel, Epoch
@@ -51,7 +52,8 @@ def conditioning(signals: Signals, settings: DiagnosticsSettings) -> Look:
             f"the condition number of the motion is infinite (at most {most:g})",
             "the joint did not move",
         )
-    _, singular, right = np.linalg.svd(regressors / lengths, full_matrices=False)
+    upper = np.linalg.qr(regressors / lengths, mode="r")
+    _, singular, right = np.linalg.svd(upper)
     value = float(singular[0] / singular[-1]) if singular[-1] > 0 else math.inf
     # The weakest direction adds and subtracts what cannot be told apart.
     first, second = sorted(np.argsort(np.abs(right[-1]))[-2:])
@@ -74,11 +76,8 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
     The value is the median over the lines of the band, for the weaker of the two.
     """
     cause = perturbation_nm(epoch.channels["perturbation_nm"], signals.time_s)
-    length = max(2 * signals.time_s.size // (SEGMENTS + 1), 8)
-    effects = np.stack([signals.torque_nm, signals.velocity_rad_s])
-    frequency, shared = signal.coherence(cause, effects, signals.rate_hz, nperseg=length)
-    medians = np.median(shared[:, lines_inside(frequency, signals.band_hz)], axis=1)
-    values = dict(zip(("torque", "velocity"), medians.tolist(), strict=True))
+    shared = _coherence(cause, np.stack([signals.torque_nm, signals.velocity_rad_s]), signals)
+    values = dict(zip(("torque", "velocity"), np.median(shared, axis=1).tolist(), strict=True))
     weaker = min(values, key=lambda name: values[name])
     value, least = values[weaker], settings.coherence_least
     return at_least(
@@ -93,6 +92,23 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
             "is torque from a subject, noise, or a joint that is not linear"
         ),
     )
+
+
+def _coherence(cause: Array, effects: Array, signals: Signals) -> Array:
+    """Return the coherence of a cause with each effect at the lines of the band, shape (2, m).
+
+    As `scipy.signal.coherence` has it with segments that overlap by half, but every spectrum once.
+    """
+    length = max(2 * signals.time_s.size // (SEGMENTS + 1), 8)
+    frequency = fft.rfftfreq(length, 1.0 / signals.rate_hz)
+    inside = lines_inside(frequency, signals.band_hz)
+    whole = np.concatenate([cause[None], effects])
+    parts = sliding_window_view(whole, length, axis=1)[:, :: length - length // 2]
+    parts = parts - np.mean(parts, axis=2, keepdims=True)
+    spectra = fft.rfft(parts * signal.windows.hann(length, sym=False))[:, :, inside]
+    power = np.mean(np.abs(spectra) ** 2, axis=1)
+    together = np.mean(spectra[0].conj() * spectra[1:], axis=1)
+    return np.asarray(np.abs(together) ** 2 / (power[0] * power[1:]))
 
 
 def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Look:
@@ -146,35 +162,6 @@ def _middle_hz(signals: Signals) -> tuple[float, float]:
     outside = (1.0 - MIDDLE_PERCENT / 100.0) / 2.0
     low, high = np.searchsorted(running, [outside, 1.0 - outside])
     return float(frequency[low]), float(frequency[min(high, frequency.size - 1)])
-
-
-def power_lines(values: Array, rate_hz: float, *, tapered: bool = False) -> tuple[Array, Array]:
-    """Return frequencies and the power at each; without a taper it sums to the variance.
-
-    Parameters
-    ----------
-    values : array, shape (n,)
-        Its mean is taken off.
-    rate_hz : float
-    tapered : bool
-        Through Hann's window, for signals whose slow part would leak into all other lines.
-    """
-    n = values.size
-    centred = values - np.mean(values)
-    if tapered:
-        centred = centred * np.hanning(n) * np.sqrt(8.0 / 3.0)
-    power = np.asarray(2.0 * np.abs(np.fft.rfft(centred)) ** 2 / n**2, dtype=np.float64)
-    power[0] /= 2.0
-    if n % 2 == 0:
-        power[-1] /= 2.0
-    frequency = np.asarray(np.fft.rfftfreq(n, 1.0 / rate_hz), dtype=np.float64)
-    return frequency, power
-
-
-def lines_inside(frequency_hz: Array, band_hz: tuple[float, float]) -> NDArray[np.intp]:
-    """Return which lines lie in a band, ends included, zero left out."""
-    low, high = band_hz
-    return np.flatnonzero((frequency_hz > 0) & (frequency_hz >= low) & (frequency_hz <= high))
 
 
 EXCITATION_CHECKS = (

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import signal
+from scipy import fft, signal
 from scipy.special import digamma
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
@@ -20,11 +20,8 @@ from rigidimeter.estimation.diagnostics.check_record import (
     at_least,
     push_harmless,
 )
-from rigidimeter.estimation.diagnostics.excitation_checks import (
-    lines_inside,
-    perturbation_nm,
-    power_lines,
-)
+from rigidimeter.estimation.diagnostics.excitation_checks import perturbation_nm
+from rigidimeter.estimation.power_lines import lines_inside, power_lines
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.records import Epoch
 from rigidimeter.settings import DiagnosticsSettings
@@ -97,14 +94,14 @@ def _chance_correlation(a: Array, b: Array, rate_hz: float, lag: int) -> float:
     1935). As the lag runs, a Gaussian correlation of rms frequency ν passes ±u standard deviations
     2 ν T exp(−u²/2) times on average (Rice 1944), which is set to 1/20.
     """
-    power_a, power_b = np.abs(np.fft.rfft(a)) ** 2, np.abs(np.fft.rfft(b)) ** 2
+    power_a, power_b = np.abs(fft.rfft(a)) ** 2, np.abs(fft.rfft(b)) ** 2
     power = power_a * power_b
     total = float(np.sum(power_a) * np.sum(power_b))
     if total == 0.0:
         return 0.0
     # One-sided sums hold half of each: ½ remains.
     deviation = math.sqrt(0.5 * float(np.sum(power)) / total)
-    frequency = np.fft.rfftfreq(a.size, 1.0 / rate_hz)
+    frequency = fft.rfftfreq(a.size, 1.0 / rate_hz)
     rms_hz = math.sqrt(float(np.sum(frequency**2 * power)) / float(np.sum(power)))
     crossings = max(2.0 * rms_hz * 2.0 * lag / rate_hz, 0.1)
     return deviation * math.sqrt(2.0 * math.log(crossings / 0.05))

@@ -24,7 +24,13 @@ import numpy as np
 from rigidimeter.estimation.bandlimited import bandlimited_signals, zero_phase_band
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_most
 from rigidimeter.estimation.least_squares import fit_inertia_damping_stiffness
-from rigidimeter.estimation.signals import Array, grid_rate_hz, uniform_grid, values_and_slopes
+from rigidimeter.estimation.signals import (
+    Array,
+    grid_rate_hz,
+    thinned,
+    uniform_grid,
+    values_and_slopes,
+)
 from rigidimeter.estimation.stretches import sound
 from rigidimeter.records import Epoch
 from rigidimeter.settings import DiagnosticsSettings, EstimationSettings
@@ -100,8 +106,10 @@ def velocity_shape(
     Both pass one band, which ends at 10 Hz. Scale and delay are other checks' business and are
     fitted first. None where the band is too narrow or nothing moves.
     """
-    angle, velocity = epoch.channels["angle_rad"], epoch.channels["velocity_rad_s"]
     band = band_hz[0], min(band_hz[1], SHAPE_HIGH_HZ)
+    angle, velocity = (
+        thinned(epoch.channels[name], band[1]) for name in ("angle_rad", "velocity_rad_s")
+    )
     rate_hz = grid_rate_hz([angle, velocity], band[1])
     time_s = uniform_grid([angle, velocity], rate_hz)
     trim = round(rate_hz)

@@ -22,7 +22,7 @@ from rigidimeter.estimation.diagnostics.check_record import (
     half_widths,
     push_harmless,
 )
-from rigidimeter.estimation.diagnostics.excitation_checks import lines_inside, power_lines
+from rigidimeter.estimation.power_lines import lines_inside, power_lines
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.records import Channel, Fit
 from rigidimeter.settings import DiagnosticsSettings

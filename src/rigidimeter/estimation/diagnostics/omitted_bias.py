@@ -89,12 +89,13 @@ def _refitted(
     """Return J, B and K by least squares with the terms, shape (3,)."""
     plain = [term.name for term in terms if term.name not in REFLEXES]
     reflexes = [term.name for term in terms if term.name in REFLEXES]
-    columns = _stacked(np.column_stack([beyond.linear, beyond.terms_lines(plain)])[inside])
+    plain_lines = [beyond.term_lines(name) for name in plain]
+    columns = _stacked(np.column_stack([beyond.linear, *plain_lines])[inside])
     target = _stacked(beyond.torque_lines[inside])
     if reflexes:
         # One reflex at most is looked for: its direction is decided by what is not linear.
         (name,) = reflexes
-        late = _stacked(beyond.reflex_lines(name, beyond.grid([name]))[inside])
+        late = _stacked(beyond.reflex_lines(name)[inside])
         columns = np.column_stack([columns, late[:, strongest(columns, late, target)]])
     return _solved(columns, target)[:3]
 

@@ -21,7 +21,7 @@ from rigidimeter.estimation.diagnostics.check_record import (
     push_harmless,
     reconstructed_torque_nm,
 )
-from rigidimeter.estimation.diagnostics.excitation_checks import power_lines
+from rigidimeter.estimation.power_lines import power_lines
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.settings import DiagnosticsSettings
 

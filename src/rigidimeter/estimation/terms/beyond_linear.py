@@ -19,8 +19,9 @@ times Σ w⁴ n / (Σ w²)² for the taper w.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache, partial
 from itertools import product
 
 import numpy as np
@@ -85,7 +86,7 @@ class BeyondLinear:
     _first: int
     _basis: Complex
     _size_nm: Array
-    _made: dict[str, Complex] = field(default_factory=dict, init=False, repr=False)
+    _made: dict[Hashable, Complex] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def line_size_nm(self) -> Array:
@@ -102,7 +103,7 @@ class BeyondLinear:
         """Real numbers that the free filter leaves."""
         return 2 * self.torque.size - self.free_gains
 
-    @property
+    @cached_property
     def taper_loss(self) -> float:
         """By how much the taper enlarges a variance."""
         squares = self._window**2
@@ -117,39 +118,42 @@ class BeyondLinear:
         nonlinear : sequence of float
             The parameters inside the reflexes, in the order of the names.
         """
-        return self.white(self.terms_lines(names, nonlinear))
-
-    def terms_lines(self, names: Sequence[str], nonlinear: Sequence[float] = ()) -> Complex:
-        """Return the lines of terms as they are, shape (m, p)."""
         found = [np.zeros((self.torque.size, 0), dtype=np.complex128)]
         used = 0
         for name in names:
             count = len(kernel(name).nonlinear) if name in REFLEXES else 0
-            found.append(self._term_lines(name, nonlinear[used : used + count]))
+            inner = tuple(nonlinear[used : used + count])
             used += count
+            found.append(self._once((name, inner), partial(self._white_term, name, inner)))
         return np.concatenate(found, axis=1)
 
-    def reflex_lines(self, name: str, inners: Sequence[Sequence[float]]) -> Complex:
-        """Return the lines of a reflex of one gain as they are, a column for each of `inners`."""
-        # A delay and the muscle alike in every column: shape (1, q) for each parameter inside.
-        parts = np.asarray(inners, dtype=np.float64).T[:, None, :]
-        (gains,) = kernel(name).transfer(self.frequency_hz[:, None], parts)
-        return self._stretch(name) * gains
+    def term_lines(self, name: str) -> Complex:
+        """Return the lines of a term that is no reflex as they are, shape (m, 1)."""
+        term = term_named(name)
+        assert term is not None  # names are known
+        return self._once(name, lambda: self.lines(term.regressor(self.motion))[:, None])
 
-    def _term_lines(self, name: str, inner: Sequence[float] = ()) -> Complex:
-        if name in REFLEXES:
-            # Its gains change slowly over a stretch, as the filter that is free there.
-            gains = kernel(name).transfer(self.frequency_hz, np.asarray(inner, dtype=np.float64))
-            return self._stretch(name) * np.stack(gains, axis=1)
-        if name not in self._made:
-            term = term_named(name)
-            assert term is not None  # names are known
-            self._made[name] = self.lines(term.regressor(self.motion))[:, None]
-        return self._made[name]
+    def reflex_lines(self, name: str) -> Complex:
+        """Return the lines of a reflex at each point of its grid as they are, shape (m, g)."""
+        duration_s = float(f"{self._window.size / self.motion.rate_hz:.9g}")
+        kind = kernel(name).kind
+        return self._stretch(name) * _gains(kind, self._first, self.frequency_hz.size, duration_s)
+
+    def _white_term(self, name: str, inner: tuple[float, ...]) -> Complex:
+        if name not in REFLEXES:
+            return self.white(self.term_lines(name))
+        # Its gains change slowly over a stretch, as the filter that is free there.
+        gains = kernel(name).transfer(self.frequency_hz, np.asarray(inner, dtype=np.float64))
+        return self.white(self._stretch(name) * np.stack(gains, axis=1))
 
     def _stretch(self, name: str) -> Complex:
         """Return the lines of the velocity that stretches, that of the damping of one direction."""
-        return self._term_lines(f"damping{name[-1]}")
+        return self.term_lines(f"damping{name[-1]}")
+
+    def _once(self, key: Hashable, make: Callable[[], Complex]) -> Complex:
+        if key not in self._made:
+            self._made[key] = make()
+        return self._made[key]
 
     def grid(self, names: Sequence[str]) -> list[tuple[float, ...]]:
         """Return the points at which the parameters inside the reflexes are tried."""
@@ -195,9 +199,8 @@ class BeyondLinear:
         return Solution(values, variance * (root @ root.T), residual, free)
 
     def _share(self, name: str) -> float:
-        lines = self._term_lines(name)
-        whole = float(np.linalg.norm(lines[:, 0] / self.line_size_nm))
-        return float(np.linalg.norm(self.white(lines))) / whole if whole > 0 else 0.0
+        whole = float(np.linalg.norm(self.term_lines(name)[:, 0] / self.line_size_nm))
+        return float(np.linalg.norm(self.columns([name]))) / whole if whole > 0 else 0.0
 
     def lines(self, values: Array) -> Complex:
         """Return the lines of a signal in time, shape (n,)."""
@@ -266,6 +269,17 @@ def beyond_linear(
         np.asarray(basis),
         size_nm,
     )
+
+
+@lru_cache(maxsize=8)
+def _gains(kind: str, first: int, count: int, duration_s: float) -> Complex:
+    """Return a reflex of gain 1 at each point of its grid, which epochs of one length share."""
+    found = kernel(kind)
+    # For each parameter inside a row of its values, shape (1, g).
+    inner = np.asarray(found.starts).T[:, None, :]
+    (gains,) = found.transfer((np.arange(first, first + count) / duration_s)[:, None], inner)
+    gains.setflags(write=False)
+    return gains
 
 
 def _without(parts: Complex, basis: Complex) -> Complex:

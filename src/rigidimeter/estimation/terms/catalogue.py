@@ -75,7 +75,7 @@ TERMS: list[Term] = [
         "cubic",
         "N·m/rad³",
         "Stiffness that grows with the square of the angle.",
-        lambda m: m.angle_rad**3,
+        lambda m: m.angle_rad * m.angle_rad**2,
     ),
     Term(
         "damping+",

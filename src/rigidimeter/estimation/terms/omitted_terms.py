@@ -167,13 +167,14 @@ def _best(beyond: BeyondLinear, found: Sequence[_Found], test: _Test) -> tuple[_
     base = _columns(beyond, found)
     fits = []
     for kind in ("reflex+", "reflex-second-order+"):
-        inners = [inner for inner in beyond.grid([kind]) if inner[0] >= EARLIEST_S]
-        tried = beyond.white(beyond.reflex_lines(kind, inners))
+        inners = beyond.grid([kind])
+        late = np.flatnonzero([inner[0] >= EARLIEST_S for inner in inners])
+        tried = beyond.white(beyond.reflex_lines(kind)[:, late])
         best = strongest(_stacked(base), _stacked(tried), _stacked(beyond.torque))
         upper = _triangle(np.column_stack([base, tried[:, best]]), beyond.torque)
-        fits.append((_Found(kind, inners[best]), _fit(upper[:, :-1], upper[:, -1])))
-    late, slow = fits
-    return slow if late[1].left - slow[1].left > DYNAMICS else late
+        fits.append((_Found(kind, inners[late[best]]), _fit(upper[:, :-1], upper[:, -1])))
+    delayed, slow = fits
+    return slow if delayed[1].left - slow[1].left > DYNAMICS else delayed
 
 
 def strongest(base: Array, tried: Array, target: Array) -> int:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from rigidimeter.estimation.diagnostics.excitation_checks import lines_inside, power_lines
+from rigidimeter.estimation.power_lines import lines_inside, power_lines
 
 
 @pytest.mark.parametrize("n", [1000, 1001])
