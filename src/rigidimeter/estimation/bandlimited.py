@@ -13,11 +13,19 @@ of what is left out (`estimation.stretches`).
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
 from scipy import signal
 
+from rigidimeter.dynamics import DriveModel
+from rigidimeter.estimation.closedloop.as_sampled import inertia_doubt
+from rigidimeter.estimation.closedloop.between_samples import (
+    driven_behind,
+    torque_filter_of,
+    without_driven,
+)
 from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares, intervals_text
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.signals import (
@@ -106,8 +114,13 @@ def _both_ways(through: _Filter, values: Array, memory: int) -> Array:
     return whole[past : past + values.size]
 
 
-def bandlimited_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
+def bandlimited_signals(
+    epoch: Epoch, settings: EstimationSettings, drive: DriveModel | None = None
+) -> Signals:
     """Return torque, acceleration, velocity and angle through the same band, edges trimmed.
+
+    The motion is that at the torque's samples where the drive is known, as far as the command
+    causes it.
 
     Parameters
     ----------
@@ -115,13 +128,15 @@ def bandlimited_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
         With `torque_nm` and `velocity_rad_s` or `angle_rad`.
     settings : EstimationSettings
         For the band and the trimming.
+    drive : DriveModel, optional
+        That carried out `velocity_command_rad_s`.
     """
     torque = epoch.channels["torque_nm"]
     band = band_hz(epoch, settings)
     used = [torque, *motion_channels(epoch)]
     rate_hz = grid_rate_hz(used, band[1])
     full = uniform_grid(used, rate_hz)
-    angle, velocity, acceleration = kinematics(epoch, full)
+    angle, velocity, acceleration = _motion(epoch, settings, drive, full)
     edge = math.ceil(EDGE_SAMPLES * rate_hz / min(channel.rate_hz for channel in used))
     inner = slice(edge, full.size - edge)
     time_s = full[inner]
@@ -139,12 +154,29 @@ def bandlimited_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
     )
 
 
+def _motion(
+    epoch: Epoch, settings: EstimationSettings, drive: DriveModel | None, time_s: Array
+) -> tuple[Array, Array, Array]:
+    """Return angle, velocity and acceleration as the torque saw them."""
+    command = epoch.channels.get("velocity_command_rad_s")
+    if drive is None or command is None:
+        return kinematics(epoch, time_s)
+    rest = kinematics(without_driven(epoch, drive, command), time_s)
+    torque = epoch.channels["torque_nm"]
+    caused = driven_behind(drive, torque_filter_of(settings), command, torque)
+    angle, velocity, acceleration = (
+        beyond + values_at(replace(torque, values=part), time_s)
+        for beyond, part in zip(rest, caused[::-1], strict=True)
+    )
+    return angle, velocity, acceleration
+
+
 BANDLIMITED = Method(
     name="bandlimited",
     title="least squares, all signals through one zero-phase band",
     needs=(),
     methods_text="by least squares of signals that passed one zero-phase filter",
-    fit=partial(fit_least_squares, "bandlimited", bandlimited_signals),
+    fit=partial(fit_least_squares, "bandlimited", bandlimited_signals, inertia_doubt),
     signals=bandlimited_signals,
     intervals_text=intervals_text,
     pooled_text=POOLED_TEXT,

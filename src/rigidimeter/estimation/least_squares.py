@@ -19,10 +19,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from rigidimeter.estimation.closedloop.as_sampled import between_samples_as_they_are
+from rigidimeter.estimation.closedloop.as_sampled import InertiaDoubt
 from rigidimeter.estimation.closedloop.line_noise import Smoother
 from rigidimeter.estimation.method_record import Progress
-from rigidimeter.estimation.prepared import PreparedEpoch
+from rigidimeter.estimation.prepared import PreparedEpoch, SignalsOf
 from rigidimeter.estimation.screening import after_fit, unusable
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.estimation.uncertainty import (
@@ -32,10 +32,8 @@ from rigidimeter.estimation.uncertainty import (
     hac_covariance,
     t_interval,
 )
-from rigidimeter.records import Epoch, Fit, Outcome
+from rigidimeter.records import Fit, Outcome
 from rigidimeter.settings import EstimationSettings
-
-SignalsOf = Callable[[Epoch, EstimationSettings], Signals]
 
 BOOTSTRAP_SEED = 1
 """The same epoch gives the same interval every time."""
@@ -60,6 +58,14 @@ def intervals_text(settings: EstimationSettings) -> str:
         f"Intervals hold for {_RESIDUALS[settings.intervals]}, and do not include bias: a "
         "subject who pushes in a closed loop pulls least squares away from the joint"
     )
+
+
+class _Kept(NamedTuple):
+    """An epoch that counts."""
+
+    fit: Fit
+    signals: Signals
+    doubt: InertiaDoubt
 
 
 class _Solved(NamedTuple):
@@ -126,6 +132,7 @@ def fit_inertia_damping_stiffness(
 def fit_least_squares(
     method: str,
     signals_of: SignalsOf,
+    doubt_of: Callable[[PreparedEpoch], InertiaDoubt],
     epochs: Sequence[PreparedEpoch],
     inertia_kg_m2: float | None = None,
     progress: Progress = lambda _: None,
@@ -133,10 +140,12 @@ def fit_least_squares(
 ) -> tuple[list[Fit], list[Fit]]:
     """Fit every epoch, and all epochs of a condition put one after the other.
 
-    `signals_of` prepares the signals of an epoch; for the rest see `method_record.FitEpochs`.
+    `signals_of` prepares the signals of an epoch, and `doubt_of` says how far its J hangs on what
+    the drive did between the samples; for the rest see `method_record.FitEpochs`.
     """
     fits = []
-    kept: dict[str, list[tuple[Fit, Signals]]] = {}
+    free = inertia_kg_m2 is None
+    kept: dict[str, list[_Kept]] = {}
     for prepared in epochs:
         epoch = prepared.epoch
         try:
@@ -148,18 +157,19 @@ def fit_least_squares(
             outcome = unusable(epoch, str(error))
             fits.append(Fit(epoch.source, epoch.label, epoch.condition, method, outcome))
         else:
+            doubt = doubt_of(prepared) if free else InertiaDoubt(0.0)
             fit = replace(
-                found,
+                _widened(found, doubt.share),
                 source=epoch.source,
                 epoch=epoch.label,
                 condition=epoch.condition,
                 method=method,
                 outcome=after_fit(epoch, found.r_squared, found.condition_number),
-                findings=between_samples_as_they_are(prepared) if inertia_kg_m2 is None else (),
+                findings=doubt.findings,
             )
             fits.append(fit)
             if fit.outcome.included:
-                kept.setdefault(epoch.condition, []).append((fit, signals))
+                kept.setdefault(epoch.condition, []).append(_Kept(fit, signals, doubt))
         progress(1.0)
     groups = list(kept.items()) if pooled else []
     if len(groups) > 1:
@@ -172,12 +182,12 @@ def fit_least_squares(
 
 def _pooled(
     condition: str,
-    members: Sequence[tuple[Fit, Signals]],
+    members: Sequence[_Kept],
     settings: EstimationSettings,
     inertia_kg_m2: float | None,
 ) -> Fit:
     """Return the fit to all epochs of a condition, put one after the other."""
-    fits, parts = zip(*members, strict=True)
+    fits, parts, doubts = zip(*members, strict=True)
     first = parts[0]
     together = replace(
         first,
@@ -187,13 +197,21 @@ def _pooled(
         velocity_rad_s=np.concatenate([part.velocity_rad_s for part in parts]),
         angle_rad=np.concatenate([part.angle_rad for part in parts]),
     )
+    found = fit_inertia_damping_stiffness(together, inertia_kg_m2, settings)
     return replace(
-        fit_inertia_damping_stiffness(together, inertia_kg_m2, settings),
+        _widened(found, doubts[0].share),
+        findings=doubts[0].findings,
         source=", ".join(dict.fromkeys(member.source for member in fits)),
         epoch="pooled",
         condition=condition,
         method=fits[0].method,
     )
+
+
+def _widened(fit: Fit, share: float) -> Fit:
+    """Return a fit whose J may be elsewhere by that share of it, whatever chance does."""
+    away = abs(float(fit.value[0])) * share * np.array([1.0, 0.0, 0.0])
+    return replace(fit, low=fit.low - away, high=fit.high + away)
 
 
 def _interval(

@@ -6,9 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from rigidimeter.estimation.prepared import PreparedEpoch
-from rigidimeter.estimation.signals import Signals
-from rigidimeter.records import Epoch, Fit
+from rigidimeter.estimation.prepared import PreparedEpoch, SignalsOf
+from rigidimeter.records import Fit
 from rigidimeter.settings import EstimationSettings
 
 Progress = Callable[[float], None]
@@ -85,7 +84,7 @@ class Method:
     methods_text: str
     fit: FitEpochs
     references: tuple[str, ...] = ()
-    signals: Callable[[Epoch, EstimationSettings], Signals] | None = None
+    signals: SignalsOf | None = None
     intervals_text: Callable[[EstimationSettings], str] = lambda _: (
         "Intervals are those that the method gives"
     )

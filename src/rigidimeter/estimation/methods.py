@@ -115,7 +115,7 @@ def epoch_signals(epoch: Epoch, method: str, settings: EstimationSettings) -> Si
     obstacle = before_fit(epoch, settings)
     if obstacle:
         raise ValueError(obstacle)
-    return (method_named(method).signals or bandlimited_signals)(bridged(epoch), settings)
+    return (method_named(method).signals or bandlimited_signals)(bridged(epoch), settings, None)
 
 
 def fit_epochs(

@@ -23,6 +23,8 @@ MOST_TRIED = 5
 
 T = TypeVar("T")
 
+SignalsOf = Callable[[Epoch, EstimationSettings, DriveModel | None], Signals]
+
 
 class Source:
     """The epochs of one recording, the drive that they show, and what they have in common."""
@@ -84,8 +86,8 @@ class PreparedEpoch:
         found: T = self._made[make]
         return found
 
-    def signals(self, of: Callable[[Epoch, EstimationSettings], Signals]) -> Signals:
-        """Return the signals that `of` makes of the epoch, made when they are first asked for.
+    def signals(self, of: SignalsOf) -> Signals:
+        """Return the signals that `of` makes of epoch, settings and drive, when first asked for.
 
         Raises
         ------
@@ -95,9 +97,11 @@ class PreparedEpoch:
         if self.obstacle:
             raise ValueError(self.obstacle)
         if of not in self._made:
-            self._made[of] = of(self.epoch, self.settings.estimation)
-        found: Signals = self._made[of]
-        return found
+            found = self.source.drive
+            drive = found.model if found is not None else None
+            self._made[of] = of(self.epoch, self.settings.estimation, drive)
+        signals: Signals = self._made[of]
+        return signals
 
     def moved(self, delay_s: float) -> PreparedEpoch:
         """Return the epoch with its torque this much earlier; nothing is made of it yet."""

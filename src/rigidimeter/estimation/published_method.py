@@ -18,6 +18,8 @@ from functools import partial
 import numpy as np
 from scipy import signal
 
+from rigidimeter.dynamics import DriveModel
+from rigidimeter.estimation.closedloop.as_sampled import as_they_are
 from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares, intervals_text
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.signals import (
@@ -32,7 +34,9 @@ from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import EstimationSettings
 
 
-def published_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
+def published_signals(
+    epoch: Epoch, settings: EstimationSettings, drive: DriveModel | None = None
+) -> Signals:
     """Return the regressors and the torque of Eq. 6, at the rate of the torque channel.
 
     Where no command was recorded, the measured velocity stands in for it.
@@ -43,7 +47,10 @@ def published_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
         With `torque_nm` and `velocity_command_rad_s` (or a measured motion channel).
     settings : EstimationSettings
         For the high-pass filter.
+    drive : DriveModel, optional
+        Not used: the paper takes the samples as they are.
     """
+    del drive
     torque = epoch.channels["torque_nm"]
     command = epoch.channels.get("velocity_command_rad_s")
     others = [command] if command is not None else motion_channels(epoch)
@@ -87,7 +94,7 @@ PUBLISHED = Method(
     title="least squares as the paper prints it",
     needs=(),
     methods_text="by ordinary least squares in the time domain, as published",
-    fit=partial(fit_least_squares, "published", published_signals),
+    fit=partial(fit_least_squares, "published", published_signals, as_they_are),
     references=("paper",),
     signals=published_signals,
     intervals_text=intervals_text,

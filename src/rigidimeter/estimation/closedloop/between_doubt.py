@@ -17,18 +17,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rigidimeter.estimation.closedloop.between_finding import doubt_of
 from rigidimeter.estimation.closedloop.linear_problems import Problem
 from rigidimeter.estimation.closedloop.observation import Observation
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Epoch, Finding
 from rigidimeter.settings import DiagnosticsSettings
-
-REMEDY = (
-    "sample the torque faster, or filter it before it is sampled and set "
-    "estimation.torque_lowpass_hz to the corner; give the drive a lower bandwidth; or hold J at a "
-    "value from a better recording"
-)
-
 
 UNSETTLED = 0.1
 """A parameter that another drive changes by more than this share hangs on the drive."""
@@ -84,23 +78,7 @@ def between_samples(
         The parameters, J first unless it was held, and how far they may be elsewhere.
     settings : DiagnosticsSettings
     """
-    level, most = settings.levels.between_samples, settings.between_samples_most_percent
-    if not observation.otherwise:
-        if not {"velocity_command_rad_s", "velocity_rad_s"} <= set(epoch.channels):
-            return ()
-        text = (
-            "no drive explains the velocity by the command, so how the joint moved between the "
-            "samples is not known, and J may be far too low"
-        )
-        remedy = f"record the command at every tick at which it is sent; {REMEDY}"
-        return (Finding("between_samples", level, np.nan, most, text, remedy),)
     share = 100.0 * between / np.abs(values)
     worst = int(np.argmax(share))
-    if share[worst] <= most:
-        return ()
     name = "JBK"[len("JBK") - values.size :][worst]
-    text = (
-        f"drives that explain the velocity equally well give {name} up to {share[worst]:.2g} % "
-        f"away (at most {most:g} %): the samples do not show how the joint moved between them"
-    )
-    return (Finding("between_samples", level, float(share[worst]), most, text, REMEDY),)
+    return doubt_of(epoch, name, float(share[worst]), observation.drive_known, settings)

@@ -14,18 +14,29 @@ keep step with the ticks, and its samples are taken as they are.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.dynamics import EVEN, DriveModel, lowpass
-from rigidimeter.estimation.closedloop.drive_motion import since_ticks
-from rigidimeter.estimation.signals import Array
-from rigidimeter.records import Channel
+from rigidimeter.dynamics import EVEN, ArmMotion, DriveModel, lowpass
+from rigidimeter.estimation.closedloop.drive_motion import driven, since_ticks
+from rigidimeter.estimation.signals import Array, motion_channels
+from rigidimeter.records import Channel, Epoch
+from rigidimeter.settings import EstimationSettings, RigSettings
 
 Complex = NDArray[np.complex128]
 
+
+INEXACT = 0.005
+"""No drive is quite linear and constant: what it tells of the motion between the samples is taken
+to be this share of itself uncertain. That matters where the torque saw little of the acceleration,
+and J is that little divided by a small share."""
+
+SCATTERED = 5.0
+"""Stamps keep step with the ticks if their mean direction is so many standard errors long."""
 
 LOW = 0.01
 """In rad a tick: slow enough that what sampling does no longer depends on it."""
@@ -36,6 +47,12 @@ class TorqueFilter(NamedTuple):
 
     cutoff_hz: float
     order: int
+
+
+def torque_filter_of(settings: EstimationSettings) -> TorqueFilter | None:
+    """Return the low-pass that the settings name; None for none."""
+    cutoff_hz = settings.torque_lowpass_hz
+    return TorqueFilter(cutoff_hz, settings.torque_lowpass_order) if cutoff_hz else None
 
 
 def behind(drive: DriveModel, torque_filter: TorqueFilter | None) -> DriveModel:
@@ -56,6 +73,7 @@ def seen_beyond_samples(
     command: Channel,
     omega_rad_s: Array,
     time_s: Array,
+    after_s: float | None = None,
 ) -> Complex:
     """Return what stands before C above, shape (m, 3).
 
@@ -67,29 +85,103 @@ def seen_beyond_samples(
     omega_rad_s : array, shape (m,)
     time_s : array, shape (n,)
         When torque and motion were sampled, as long after each tick.
+    after_s : float, optional
+        How long, instead of the mean by the stamps.
     """
     interval_s = 1.0 / command.mean_rate_hz
-    _, after_s = since_ticks(command, time_s, 0.0)
-    after = float(np.mean(after_s))
+    if after_s is None:
+        after_s = float(np.mean(since_ticks(command, time_s, 0.0)[1]))
     z = np.exp(1j * omega_rad_s * interval_s)
-    seen = behind(drive, torque_filter).transfer(z, interval_s, after)
-    _, velocity, angle = drive.transfer(z, interval_s, after)
+    seen = behind(drive, torque_filter).transfer(z, interval_s, after_s)
+    _, velocity, angle = drive.transfer(z, interval_s, after_s)
     sampled = np.stack([1j * omega_rad_s * velocity, velocity, angle])
     return np.asarray(seen.T - filtered(torque_filter, omega_rad_s) * sampled.T)
 
 
-def acceleration_seen(drive: DriveModel, command: Channel, time_s: Array) -> float:
-    """Return the acceleration at the torque's samples as a share of its mean, at low frequency."""
-    interval_s = 1.0 / command.mean_rate_hz
-    _, after_s = since_ticks(command, time_s, 0.0)
+def without_driven(epoch: Epoch, drive: DriveModel, command: Channel) -> Epoch:
+    """Return the epoch with what its motion sensors saw beyond the motion that the command causes.
+
+    Each at its own stamps.
+    """
+    rest = dict(epoch.channels)
+    for channel in motion_channels(epoch):
+        caused = driven(drive, command, channel.time_s)
+        seen = caused.angle_rad if channel.name == "angle_rad" else caused.velocity_rad_s
+        rest[channel.name] = Channel(channel.name, channel.time_s, channel.values - seen)
+    return replace(epoch, channels=rest)
+
+
+def driven_behind(
+    drive: DriveModel, torque_filter: TorqueFilter | None, command: Channel, torque: Channel
+) -> ArmMotion:
+    """Return the motion that the command causes, as the torque sensor sees it at its stamps."""
+    return driven(behind(drive, torque_filter), command, torque.time_s)
+
+
+def accelerations_seen(
+    drives: Sequence[DriveModel],
+    torque_filter: TorqueFilter | None,
+    interval_s: float,
+    times_s: Array,
+) -> Array:
+    """Return the acceleration at the torque's samples as a share of its mean, at low frequency.
+
+    Parameters
+    ----------
+    drives : sequence of DriveModel
+    torque_filter : TorqueFilter or None
+    interval_s : float
+        Of the ticks.
+    times_s : array
+        After the ticks, at which the torque was sampled; the mean over them is returned.
+
+    Returns
+    -------
+    array
+        For each drive.
+    """
     omega = np.array([LOW / interval_s])
     z = np.exp(1j * omega * interval_s)
-    _, velocity, _ = drive.transfer(z, interval_s)
-    # Samples that do not keep step with the ticks see it at many times.
-    times_s = np.quantile(after_s, np.linspace(0.05, 0.95, 10))
-    seen = [drive.transfer(z, interval_s, after)[0] for after in times_s.tolist()]
-    turn = np.exp(-1j * omega * np.mean(times_s))
-    return float(np.mean((np.array(seen).mean(axis=0) * turn / (1j * omega * velocity)).real))
+    turn = np.exp(-1j * omega * np.mean(times_s)) / filtered(torque_filter, omega)[:, 0]
+    found = []
+    for drive in drives:
+        _, velocity, _ = drive.transfer(z, interval_s)
+        sensed = behind(drive, torque_filter)
+        seen = np.mean([sensed.transfer(z, interval_s, s)[0] for s in times_s.tolist()], axis=0)
+        found.append((seen * turn / (1j * omega * velocity)).real.item())
+    return np.array(found)
+
+
+def acceleration_by_settings(rig: RigSettings, torque_filter: TorqueFilter | None) -> float:
+    """Return that share for the drive and the ticks that the settings name, at the ticks."""
+    drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
+    seen = accelerations_seen([drive], torque_filter, 1.0 / rig.tick_rate_hz, np.zeros(1))
+    return float(seen[0])
+
+
+def phases_s(command: Channel, time_s: Array) -> Array:
+    """Return after how long since a tick samples were taken: one time, or ten that stand for all.
+
+    Samples that do not keep step with the ticks see the acceleration at many times.
+    """
+    _, after_s = since_ticks(command, time_s, 0.0)
+    if np.ptp(after_s) * command.mean_rate_hz < 2 * EVEN:
+        return np.mean(after_s, keepdims=True)
+    return np.quantile(after_s, np.linspace(0.05, 0.95, 10))
+
+
+def step_kept_s(command: Channel, time_s: Array) -> float | None:
+    """Return the time after the ticks that stamps scatter about; None if they do not scatter so.
+
+    Then it is not known whether the samples came unevenly, or evenly and the stamps do not say so.
+    """
+    interval_s = 1.0 / command.mean_rate_hz
+    _, after_s = since_ticks(command, time_s, 0.0)
+    turns = np.exp(2j * np.pi * after_s / interval_s)
+    mean = complex(np.mean(turns))
+    if abs(mean) > 1.0 - EVEN**2 or abs(mean) < SCATTERED / np.sqrt(time_s.size):
+        return None
+    return float(np.angle(mean) / (2 * np.pi) % 1.0) * interval_s
 
 
 def command_at(command: Channel, time_s: Array) -> Array:

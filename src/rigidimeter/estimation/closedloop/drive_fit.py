@@ -20,14 +20,13 @@ import numpy as np
 
 from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.closedloop.drive_search import (
-    Fitted,
-    Samples,
-    Structure,
     mean_sign,
     power_left,
     search,
     with_sign_of,
 )
+from rigidimeter.estimation.closedloop.drive_terms import Fitted, Samples, Structure
+from rigidimeter.estimation.closedloop.drive_uncertainty import STANDARD_ERRORS, as_likely
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.stretches import sound
 from rigidimeter.records import Channel, Epoch
@@ -74,6 +73,9 @@ QUIET = 3e-4
 
 RUBS = 0.8
 """Friction must explain so much of the power that is left without it."""
+
+SIGNS = 3
+"""So many times the sign of the velocity is made from the drive, and the drive from the sign."""
 
 FINER, STAIRS = 4, 0.5
 """A command that was logged more slowly than it was sent goes on between its samples: if lines
@@ -122,6 +124,8 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
     fitted = [one for one in everyone if not one.too_fast]
     if not fitted:
         return None
+    enough = RIVAL * min(one.power for one in fitted) + UNSEEN**2
+    fitted = [_without_delay(samples, one) if one.power <= enough else one for one in fitted]
     least = min(one.power for one in fitted)
     if least > QUIET**2 and _power_between_lines(samples, fitted[0].model) < STAIRS * least:
         return None
@@ -138,7 +142,11 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
     if misfit > LARGEST_MISFIT or not 0.5 < chosen.model.gain < 2.0:
         return None
     near = (one for one in fitted if one.power <= RIVAL * least + UNSEEN**2)
-    rivals = (*best.halves, *(one.model for one in near if one is not chosen))
+    rivals = (
+        *best.halves,
+        *as_likely(samples, chosen),
+        *(one.model for one in near if one is not chosen),
+    )
     return FoundDrive(chosen.model, chosen.structure.name, misfit, rivals)
 
 
@@ -160,13 +168,18 @@ def _fitted(samples: Samples, start: DriveModel) -> tuple[Samples, list[Fitted]]
     least = min(smooth, key=_by_power).power
     if least < QUIET**2:
         return samples, smooth
-    # The first of these may show no more than where the velocity changed its sign.
     rubbing = STRUCTURES[1]._replace(friction=True)
-    first = min((search(samples, rubbing, one.model) for one in smooth[:2]), key=_by_power)
+    # Friction bends the poles of a drive that has none, and leaves them where they began.
+    begins = (start, *(one.model for one in smooth[:2]))
+    first = min((search(samples, rubbing, one, delayed=False) for one in begins), key=_by_power)
+    # The velocity's samples do not show when its sign changed; a drive does, and is found by it.
+    signed = samples
+    for _ in range(SIGNS):
+        signed = with_sign_of(signed, first)
+        first = search(signed, rubbing, first.model, delayed=False)
     if first.power > RUBS * least:
         return samples, smooth
-    samples = with_sign_of(samples, first)
-    return samples, [*smooth, *_climbed(samples, first.model, friction=True)]
+    return signed, [*smooth, *_climbed(signed, first.model, friction=True)]
 
 
 def _climbed(samples: Samples, start: DriveModel, friction: bool) -> list[Fitted]:
@@ -180,12 +193,26 @@ def _climbed(samples: Samples, start: DriveModel, friction: bool) -> list[Fitted
             starts = [best.model, fitted[0].model] if best else [start]
             if best is None or best is fitted[0] or best.power < QUIET**2 or friction:
                 starts = starts[:1]
+            if best is not None and best.too_fast:
+                starts = [start, best.model]  # a pole that is not seen leads to no other
             wanted = structure._replace(friction=friction)
             found = [search(samples, wanted, begin) for begin in starts]
             fitted.append(min(found, key=_by_power))
         if min(one.power for one in fitted) > BETTER * before:
             break
     return fitted
+
+
+def _without_delay(samples: Samples, one: Fitted) -> Fitted:
+    """Return the structure without a delay where the samples do not show one.
+
+    A short delay and faster poles look alike at few samples, and the search takes either.
+    """
+    if one.model.delay_s == 0.0:
+        return one
+    alone = search(samples, one.structure, one.model, delayed=False)
+    shown = 1.0 + STANDARD_ERRORS**2 / samples.measured.size
+    return alone if alone.power <= shown * one.power and not alone.too_fast else one
 
 
 def _by_power(one: Fitted) -> float:

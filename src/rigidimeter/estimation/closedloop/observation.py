@@ -14,9 +14,13 @@ from scipy import fft
 from rigidimeter.dynamics import DriveModel, Loop
 from rigidimeter.estimation.bandlimited import band_hz
 from rigidimeter.estimation.closedloop.between_samples import (
-    TorqueFilter,
+    INEXACT,
+    acceleration_by_settings,
     command_at,
+    phases_s,
     seen_beyond_samples,
+    step_kept_s,
+    torque_filter_of,
 )
 from rigidimeter.estimation.closedloop.excitation import Excitation, excitation
 from rigidimeter.estimation.closedloop.spectral_lines import Grid, Lines, epoch_grid, epoch_lines
@@ -46,7 +50,9 @@ class Observation(NamedTuple):
         The lines at which a periodic perturbation has power; all where it is not periodic.
     otherwise : tuple of complex array, shape (m, 3)
         What would add to the motion if the samples were taken as they are, and what other drives
-        would add that explain the velocity as well; empty where the drive is unknown.
+        would add that explain the velocity as well; where the drive is unknown, that of the
+        settings.
+    drive_known : bool
     """
 
     lines: Lines
@@ -54,6 +60,7 @@ class Observation(NamedTuple):
     excitation: Excitation | None
     excited: NDArray[np.bool_]
     otherwise: tuple[Complex, ...] = ()
+    drive_known: bool = False
 
 
 def closed_loop_obstacle(epoch: Epoch) -> str:
@@ -111,7 +118,7 @@ def observe_motion(prepared: PreparedEpoch) -> Observation:
     epoch, estimation = prepared.epoch, prepared.settings.estimation
     grid = epoch_grid(epoch, band_hz(epoch, estimation), estimation.trim_s)
     everywhere = np.ones(grid.line.size, dtype=np.bool_)
-    lines = epoch_lines(epoch, grid, None, _torque_filter(prepared.settings))
+    lines = epoch_lines(epoch, grid, None, torque_filter_of(prepared.settings.estimation))
     return Observation(lines, epoch.channels["torque_nm"], None, everywhere)
 
 
@@ -202,29 +209,38 @@ def _observed(
         prepared.epoch.left_out,
     )
     made = prepared.source.once(key, lambda: excitation(perturbation, loop, grid))
-    lines = epoch_lines(epoch, grid, drive, _torque_filter(prepared.settings))
-    return Observation(lines, perturbation, made, excited, _otherwise(prepared, grid))
+    lines = epoch_lines(epoch, grid, drive, torque_filter_of(prepared.settings.estimation))
+    otherwise = _otherwise(prepared, lines)
+    return Observation(lines, perturbation, made, excited, otherwise, drive is not None)
 
 
-def _otherwise(prepared: PreparedEpoch, grid: Grid) -> tuple[Complex, ...]:
-    """Return what no drive and the rivals of the drive would add to the motion."""
-    found = prepared.source.drive
+def _otherwise(prepared: PreparedEpoch, lines: Lines) -> tuple[Complex, ...]:
+    """Return what would add to the motion without a drive, and with others.
+
+    One that tells a little less, the rivals, and samples that kept step with the ticks where it may
+    be the stamps that did not.
+    """
+    found, grid = prepared.source.drive, lines.grid
     command = prepared.epoch.channels.get("velocity_command_rad_s")
+    torque_filter = torque_filter_of(prepared.settings.estimation)
     if found is None or command is None:
-        return ()
-    sent = grid.transform(command_at(command, grid.time_s))[:, None]
-    ours, *others = (
-        seen_beyond_samples(
-            drive, _torque_filter(prepared.settings), command, grid.omega_rad_s, grid.time_s
-        )
-        for drive in (found.model, *found.rivals)
-    )
-    return tuple(np.asarray((other - ours) * sent) for other in (np.zeros_like(ours), *others))
+        seen_share = acceleration_by_settings(prepared.settings.rig, torque_filter)
+        change = lines.motion * np.array([seen_share - 1.0, 0.0, 0.0])
+        return np.zeros_like(change), change
+    omega, time_s = grid.omega_rad_s, grid.time_s
+    stamps_s = prepared.epoch.channels["torque_nm"].time_s
 
+    def seen(drive: DriveModel, after_s: float | None = None) -> Complex:
+        return seen_beyond_samples(drive, torque_filter, command, omega, time_s, after_s)
 
-def _torque_filter(settings: Settings) -> TorqueFilter | None:
-    cutoff_hz = settings.estimation.torque_lowpass_hz
-    return TorqueFilter(cutoff_hz, settings.estimation.torque_lowpass_order) if cutoff_hz else None
+    ours = seen(found.model)
+    changes = [-ours, -INEXACT * ours, *(seen(drive) - ours for drive in found.rivals)]
+    kept_s = step_kept_s(command, stamps_s)
+    if kept_s is not None:
+        there = [seen(found.model, after) for after in phases_s(command, stamps_s).tolist()]
+        changes.append(seen(found.model, kept_s) - np.mean(there, axis=0))
+    sent = grid.transform(command_at(command, time_s))[:, None]
+    return tuple(np.asarray(change * sent) for change in changes)
 
 
 def loop_of(settings: Settings, torque_rate_hz: float, drive: DriveModel | None) -> Loop:

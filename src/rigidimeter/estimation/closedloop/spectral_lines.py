@@ -19,7 +19,7 @@ ticks bias the fit (`drive`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -29,13 +29,13 @@ from scipy import fft
 from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.closedloop.between_samples import (
     TorqueFilter,
-    behind,
     command_at,
+    driven_behind,
     filtered,
     in_step,
     seen_beyond_samples,
+    without_driven,
 )
-from rigidimeter.estimation.closedloop.drive_motion import driven
 from rigidimeter.estimation.signals import (
     Array,
     angle_at,
@@ -249,17 +249,12 @@ def _between_samples(
         sent = grid.transform(command_at(command, time_s))
         sampled = _spectra(grid, angle, velocity) * filtered(torque_filter, omega)
         return np.asarray(sampled + beyond * sent[:, None])
-    # What the sensors saw beyond the motion that the command causes, at their own stamps.
-    rest = dict(epoch.channels)
-    for channel in motion_channels(epoch):
-        caused = driven(drive, command, channel.time_s)
-        seen = caused.angle_rad if channel.name == "angle_rad" else caused.velocity_rad_s
-        rest[channel.name] = Channel(channel.name, channel.time_s, channel.values - seen)
-    motion = _spectra(grid, *_motion(replace(epoch, channels=rest), grid.time_s))
+    rest = without_driven(epoch, drive, command)
+    motion = _spectra(grid, *_motion(rest, grid.time_s))
     motion *= filtered(torque_filter, grid.omega_rad_s)
     # At the stamps of the torque, and from there like the torque.
     torque = epoch.channels["torque_nm"]
-    seen_motion = driven(behind(drive, torque_filter), command, torque.time_s)
+    seen_motion = driven_behind(drive, torque_filter, command, torque)
     for column, part in enumerate(seen_motion):
         there = Channel(torque.name, torque.time_s, part)
         motion[:, column] += grid.transform(values_at(there, grid.time_s, SAME_TIME))
