@@ -127,3 +127,36 @@ def test_a_command_that_was_logged_more_slowly_than_it_was_sent_gives_no_drive()
     velocity = driven(model, command, command.time_s).velocity_rad_s[::10]
     epoch = recorded(fine[::10], velocity, 0.005)
     assert fit_drive(epoch, DriveModel.second_order(50.0, 0.7071)) is None
+
+
+def drive_of(poles, numerator):
+    """Return the drive N(s) / Π(s − λ) of gain 1, with poles of a pair given both."""
+    numerator = np.poly1d(numerator) * (np.prod(np.negative(poles)).real / np.poly1d(numerator)(0))
+    residues = {p: numerator(p) / np.prod([p - q for q in poles if q != p]) for p in poles}
+    kept = [complex(p) for p in poles if p.imag >= 0]
+    return DriveModel(tuple(kept), tuple(complex(residues[p]) for p in kept))
+
+
+@pytest.mark.parametrize(
+    ("model", "rate_hz"),
+    [
+        # At 100/s two faster poles and a delay of 2 ms leave nearly as little.
+        (drive_of([-293 + 273j, -293 - 273j, -81.5 + 0j], [157.0, 9870.0]), 100.0),
+        # A bandwidth of 50 Hz leads two poles to one that is too fast to be seen.
+        (drive_of([-197 + 200j, -197 - 200j, -50 + 0j], [1.0]), 1000.0),
+    ],
+    ids=["PI with lag", "slow position loop"],
+)
+def test_three_poles_without_a_delay_are_found_as_such(model, rate_hz):
+    n = 2000
+    commands = smooth_commands(n)
+    command = Channel("velocity_command_rad_s", np.arange(n) / rate_hz, commands)
+    velocity = driven(model, command, command.time_s).velocity_rad_s
+    velocity = velocity + 1e-4 * np.std(velocity) * np.random.default_rng(8).standard_normal(n)
+    found = fit_drive(
+        recorded(commands, velocity, 1 / rate_hz), DriveModel.second_order(50.0, 0.7071)
+    )
+    assert found.model.delay_s < 2e-5
+    np.testing.assert_allclose(
+        sorted(found.model.poles_rad_s, key=abs), sorted(model.poles_rad_s, key=abs), rtol=0.02
+    )
