@@ -27,6 +27,9 @@ TINY = float(np.finfo(np.float64).tiny)
 FASTEST, SLOWEST = 6.0, 5e-4
 """In rad a tick: poles are sought between; a faster one leaves nothing to see at the ticks."""
 
+FORGOTTEN = 0.01
+"""A pole of which no more is left at the next tick is not seen."""
+
 QUICKEST = 3.0
 """In rad a tick: an oscillation beyond π a tick looks like a slower one at the ticks."""
 
@@ -112,7 +115,8 @@ class Fitted(NamedTuple):
     @property
     def too_fast(self) -> bool:
         """Whether a pole ended where nothing of it is seen."""
-        return max(map(abs, self.model.poles_rad_s)) * self.interval_s > 0.99 * FASTEST
+        fastest = max(-pole.real for pole in self.model.poles_rad_s)
+        return math.exp(-fastest * self.interval_s) < FORGOTTEN
 
 
 class Terms(NamedTuple):

@@ -35,6 +35,9 @@ STEP = 1e-4
 CURVED = 2.0
 """A move that changes the velocity by more times what the slopes say is too long."""
 
+LONGEST = 5.0
+"""Of a coordinate: poles that are not known to a factor of e to this are not known."""
+
 HALVINGS = 8
 
 
@@ -75,7 +78,8 @@ def as_likely(samples: Samples, fitted: Fitted) -> tuple[DriveModel, ...]:
         for move in (longest / size, -longest / size):
             for halved in range(HALVINGS):
                 by = move / 2**halved
-                if place[-1] + by[place.size - 1] < 0.0:
+                coordinates = place + by[: place.size]
+                if coordinates[-1] < 0.0 or np.max(np.abs(coordinates - place)) > LONGEST:
                     continue
                 there, numbers = moved(by)
                 if np.linalg.norm(numbers @ there.table - explained) <= most:
