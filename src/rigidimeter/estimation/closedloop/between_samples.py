@@ -166,7 +166,7 @@ def phases_s(command: Channel, time_s: Array) -> Array:
     """
     _, after_s = since_ticks(command, time_s, 0.0)
     if np.ptp(after_s) * command.mean_rate_hz < 2 * EVEN:
-        return np.mean(after_s, keepdims=True)
+        return np.asarray(np.mean(after_s, keepdims=True))
     return np.quantile(after_s, np.linspace(0.05, 0.95, 10))
 
 
