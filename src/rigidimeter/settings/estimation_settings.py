@@ -105,6 +105,7 @@ class DiagnosticLevels(Section):
     saturation: Level = "exclude"
     frozen: Level = "exclude"
     left_out: Level = "note"
+    gravity: Level = "note"
     velocity_scale: Level = "exclude"
     velocity_delay: Level = "doubt"
     velocity_shape: Level = "doubt"
@@ -117,7 +118,12 @@ class DiagnosticLevels(Section):
 
 
 class DiagnosticsSettings(Section):
-    """Thresholds of the checks. `_least` and `_most` are the ends of what is taken as sound."""
+    """Thresholds of the checks. `_least` and `_most` are the ends of what is taken as sound.
+
+    `gravity_nm` is m g l, the moment of the limb's weight about the axis when the limb is
+    horizontal; 0 where it is not known or the axis is vertical. `gravity_angle_deg` is the limb's
+    angle from hanging straight down where the angle that is recorded is 0, in its direction.
+    """
 
     ascending: ClassVar = (
         ("voluntary_low_hz", "voluntary_high_hz"),
@@ -155,6 +161,8 @@ class DiagnosticsSettings(Section):
     saturated_most_percent: float = quantity(0.5, "%", 0.0, 100.0)
     frozen_most_s: float = quantity(0.1, "s", 0.0, 60.0)
     left_out_most_percent: float = quantity(50.0, "%", 0.0, 100.0)
+    gravity_nm: float = quantity(0.0, "N·m", 0.0, 1000.0)
+    gravity_angle_deg: float = quantity(0.0, "deg", -180.0, 180.0)
     velocity_scale_most_percent: float = quantity(10.0, "%", 0.1, 1000.0)
     velocity_delay_most_ms: float = quantity(5.0, "ms", 0.01, 1000.0)
     velocity_shape_most_percent: float = quantity(5.0, "%", 0.0, 1000.0)

@@ -25,6 +25,7 @@ from rigidimeter.estimation.power_lines import lines_inside, power_lines
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.records import Epoch
 from rigidimeter.settings import DiagnosticsSettings
+from rigidimeter.units import rad_from_deg
 
 LINES_TOGETHER = 8
 LONGEST_LAG_S = 1.0
@@ -175,6 +176,28 @@ def implausible_parameters(parameters: Array, settings: DiagnosticsSettings) -> 
     )
 
 
+def gravity(
+    angle_rad: Array, stiffness_nm_rad: float, settings: DiagnosticsSettings
+) -> Look | None:
+    """Return K without the slope of the limb's weight; None where that is not in the settings.
+
+    A limb at the angle θ from hanging straight down takes the torque m g l sin θ, whose slope
+    m g l cos θ is in K.
+    """
+    if settings.gravity_nm == 0.0:
+        return None
+    hanging_rad = rad_from_deg(settings.gravity_angle_deg)
+    slope = settings.gravity_nm * float(np.mean(np.cos(hanging_rad + angle_rad)))
+    without = stiffness_nm_rad - slope
+    return Look(
+        without,
+        stiffness_nm_rad,
+        True,
+        f"K of {stiffness_nm_rad:.4g} N·m/rad includes {slope:.4g} of the limb's weight (m g l "
+        f"cos θ); without it K is {without:.4g}",
+    )
+
+
 RESIDUAL_CHECKS = (
     Check(
         "residual_whiteness",
@@ -210,6 +233,13 @@ RESIDUAL_CHECKS = (
 )
 
 PARAMETER_CHECKS = (
+    Check(
+        "gravity",
+        ("angle_rad",),
+        lambda c: gravity(c.epoch.channels["angle_rad"].values, c.parameters[2], c.settings),
+        "the weight is no property of muscle",
+        "state which of the two is given",
+    ),
     Check(
         "r_squared",
         (),

@@ -180,7 +180,9 @@ def _estimation(result: StudyResult, cite: Cited) -> list[str]:
     band = _band(analysis.fits)
     sentences = [
         f"Inertia J, viscous damping B and stiffness K of J θ″ + B θ′ + K θ = M were estimated "
-        f"epoch by epoch {_how(analysis.method, cite)}{band}."
+        f"epoch by epoch {_how(analysis.method, cite)}{band}.",
+        "K is the slope of all torque against the angle. Unless the axis is vertical it includes "
+        "that of the limb's weight, m g l cos θ with θ from hanging straight down.",
     ]
     corrected = [delay for delay in analysis.delays if delay.corrected]
     if corrected:
