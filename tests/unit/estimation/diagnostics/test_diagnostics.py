@@ -67,7 +67,7 @@ def test_every_level_that_can_be_set_belongs_to_a_check(sound):
         with_channel(emg, "velocity_command_rad_s", emg.channels["velocity_rad_s"].values),
         signals,
         parameters,
-        SETTINGS,
+        SETTINGS.model_copy(update={"gravity_nm": 0.1}),
         np.zeros(N),
         1.0,
         fit=fit_inertia_damping_stiffness(signals),
