@@ -85,7 +85,10 @@ def test_what_is_not_a_readable_file(tmp_path):
     assert "folder without manifest.json, so it is not a session folder" in refusal(tmp_path)
     assert "there is no such file" in refusal(tmp_path / "none.csv")
     (tmp_path / "r.xlsx").write_bytes(b"x")
-    assert "what can be read is .csv, .tsv, .txt, .npz or .mat" in refusal(tmp_path / "r.xlsx")
+    assert (
+        "what can be read is .csv, .tsv, .txt, .asc, .dat, .lvm, .sto, .mot, .npz or .mat"
+        in refusal(tmp_path / "r.xlsx")
+    )
     (tmp_path / "r").write_bytes(b"x")
     assert "without a suffix" in refusal(tmp_path / "r")
 

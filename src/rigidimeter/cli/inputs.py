@@ -25,6 +25,8 @@ _OF_RECORDINGS = (
     "scale",
     "offset",
     "mapping",
+    "skip_rows",
+    "names",
     "rate_hz",
     "reaction",
     "epoch_length_s",

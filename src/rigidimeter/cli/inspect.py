@@ -58,7 +58,7 @@ def inspect(
                 say(recording.notices)
                 echo(f"reads it: {command_for(path, [])}")
                 continue
-            table = read_table(path)
+            table = read_table(path, options)
             found = inspect_table(table, options)
         except UserError as error:
             for line in error.lines:

@@ -144,6 +144,20 @@ class Recordings:
             help='What a column reads at zero, for example "torque=0.1 V"; repeat as needed.',
         ),
     ] = None
+    skip_rows: Annotated[
+        int,
+        typer.Option(
+            "--skip-rows", metavar="N", min=0, help="Lines at the beginning of a text not to read."
+        ),
+    ] = 0
+    names: Annotated[
+        str | None,
+        typer.Option(
+            "--names",
+            metavar="A,B,...",
+            help="The names of the columns of a text that does not name them.",
+        ),
+    ] = None
     mapping: Annotated[
         Path | None,
         typer.Option(
@@ -259,6 +273,8 @@ class Recordings:
             "reaction": self.reaction,
             "epoch_length_s": self.epoch_length_s,
             "task": cast("Task | None", self.task),
+            "skip_rows": self.skip_rows,
+            "names": [name.strip() for name in self.names.split(",")] if self.names else (),
             "mapping": self.mapping,
         }
 

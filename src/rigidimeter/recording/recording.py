@@ -63,6 +63,8 @@ def read(
     unit: Mapping[str, str] | None = None,
     scale: Mapping[str, str] | None = None,
     offset: Mapping[str, str] | None = None,
+    skip_rows: int = 0,
+    names: Sequence[str] = (),
     mapping: str | Path | None = None,
     settings: Settings | str | Path | Mapping[str, Any] | None = None,
 ) -> Recording:
@@ -98,6 +100,10 @@ def read(
         a force with a lever arm.
     offset : mapping of str to str, optional
         What a column reads at zero, as in ``{"torque": "0.1 V"}``.
+    skip_rows : int
+        Lines at the beginning of a text file that are not read.
+    names : sequence of str
+        Of the columns of a text file that does not name them.
     mapping : path, optional
         A mapping file, which says all of this but the conditions; an argument comes before it.
     settings : Settings, path or mapping, optional
@@ -124,6 +130,8 @@ def read(
         unit=unit,
         scale=scale,
         offset=offset,
+        skip_rows=skip_rows,
+        names=names,
         mapping=mapping,
     )
     chosen = None if settings is None else settings_from(settings)
@@ -170,6 +178,8 @@ def read_options(
     unit: Mapping[str, str] | None = None,
     scale: Mapping[str, str] | None = None,
     offset: Mapping[str, str] | None = None,
+    skip_rows: int = 0,
+    names: Sequence[str] = (),
     mapping: str | Path | None = None,
 ) -> ReadOptions:
     """Return arguments of `read` as options, with those of the mapping file behind them.
@@ -188,6 +198,8 @@ def read_options(
         units=_by_name("unit", unit, "'angle': 'deg'"),
         scales=_by_name("scale", scale, "'torque': '2.5 Nm/V'"),
         offsets=_by_name("offset", offset, "'torque': '0.1 V'"),
+        skip_rows=skip_rows,
+        names=tuple(names),
     )
     return options if mapping is None else merged(read_mapping(Path(mapping)), options)
 

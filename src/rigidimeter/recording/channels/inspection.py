@@ -125,6 +125,10 @@ def option_words(found: Inspection) -> list[str]:
     for name, given in pairs:
         for key, text in given.items():
             words += [f"--{name}", f"{key}={text}"]
+    if options.skip_rows:
+        words += ["--skip-rows", str(options.skip_rows)]
+    if options.names:
+        words += ["--names", ",".join(options.names)]
     if options.rate_hz is not None:
         words += ["--rate-hz", f"{options.rate_hz:g}"]
     if options.reaction:

@@ -40,6 +40,8 @@ class MappingToml(Section):
     reaction: bool = False
     epoch_length_s: float | None = Field(None, gt=0.0, json_schema_extra={"unit": "s"})
     task: Literal["prbs", "sinusoid"] | None = None
+    skip_rows: int = Field(0, ge=0, le=1_000_000)
+    names: list[str] = Field(default_factory=list, max_length=2000)
     time: ColumnTable = ColumnTable()
     torque: ColumnTable = ColumnTable()
     angle: ColumnTable = ColumnTable()
@@ -85,6 +87,8 @@ def read_mapping(path: Path) -> ReadOptions:
             said.reaction,
             said.epoch_length_s,
             task=said.task,
+            skip_rows=said.skip_rows,
+            names=tuple(said.names),
             units={name: table.unit for name, table in tables.items() if table.unit},
             scales={name: table.scale for name, table in tables.items() if table.scale},
             offsets={name: table.offset for name, table in tables.items() if table.offset},
@@ -101,6 +105,8 @@ def mapping_text(options: ReadOptions) -> str:
         ("reaction", options.reaction or None),
         ("epoch_length_s", options.epoch_length_s),
         ("task", options.task),
+        ("skip_rows", options.skip_rows or None),
+        ("names", list(options.names) or None),
     ):
         if value is not None:
             lines.append(f"{name} = {_toml(value)}")

@@ -8,6 +8,7 @@ calibration they never decide.
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -16,9 +17,10 @@ import numpy as np
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.channels_of_table import channels_of_table
 from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
+from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.channels.looks import Array, Look
 from rigidimeter.recording.channels.quantities import BY_STANDARD
-from rigidimeter.recording.channels.readings import doubts, look_at
+from rigidimeter.recording.channels.readings import doubts, look_at, usual_units
 from rigidimeter.recording.formats.columns import numbers, own_rate, own_rates
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
@@ -101,11 +103,16 @@ def _units(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOption
             for doubt in doubts(seen)
             if (taken := choice.taken.get(doubt.standard)) is not None and not taken.of_user
         ]
-    vary = [name for name in vary if name != "torque_nm"]
+    vary = [
+        name
+        for name in vary
+        if name != "torque_nm" and not _unknown_unit(choice.taken[name].column)
+    ]
     if not vary:
         return options
     possible = []
-    for units in itertools.product(*(BY_STANDARD[name].usual for name in vary)):
+    usual = {name: usual_units(name, choice.taken, raw) for name in vary}
+    for units in itertools.product(*usual.values()):
         as_units = dict(zip(vary, units, strict=True))
         looked = _seen(choice.taken, raw, rate_hz, as_units)
         if looked is not None and not doubts(looked):
@@ -115,11 +122,14 @@ def _units(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOption
         if len(units_left) == 1:
             (unit,) = units_left
             spoken = BY_STANDARD[name].name
-            reasons.append(
-                f"{spoken} can only be in {unit} (of {', '.join(BY_STANDARD[name].usual)})"
-            )
+            reasons.append(f"{spoken} can only be in {unit} (of {', '.join(usual[name])})")
             options = replace(options, units={**options.units, spoken: unit})
     return options
+
+
+def _unknown_unit(column: str) -> bool:
+    """Whether a name states something in brackets that is no unit, such as gons or degrees."""
+    return bool(re.search(r"[\[(]", column)) and not read_header(column).unit
 
 
 def _chosen(table: Table, options: ReadOptions) -> Choice:

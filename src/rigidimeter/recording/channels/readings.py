@@ -128,9 +128,7 @@ def readings(
     """
     motion = "angle_rad" if "angle_rad" in raw else "velocity_rad_s"
     varied = [name for name in ("time_s", "torque_nm", motion) if name in vary]
-    usual = {name: BY_STANDARD[name].usual for name in varied}
-    if "time_s" in vary:
-        usual["time_s"] = _time_units(taken, raw)
+    usual = {name: usual_units(name, taken, raw) for name in varied}
     lines = []
     for units in itertools.product(*usual.values()):
         as_units = dict(zip(varied, units, strict=True))
@@ -143,9 +141,13 @@ def readings(
     return lines[:_MOST_LINES]
 
 
-def _time_units(taken: Mapping[str, Taken], raw: Mapping[str, Array]) -> tuple[str, ...]:
-    """Return s and ms, and where neither can be also µs and days."""
-    usual = BY_STANDARD["time_s"].usual
+def usual_units(
+    standard: str, taken: Mapping[str, Taken], raw: Mapping[str, Array]
+) -> tuple[str, ...]:
+    """Return the usual units of a quantity; of a time that is neither in s nor in ms, more."""
+    usual = BY_STANDARD[standard].usual
+    if standard != "time_s" or "time_s" not in raw:
+        return usual
     seen = [look_at(taken, raw, None, {"time_s": unit}) for unit in usual]
     if all(one is not None and any(d.standard == "time_s" for d in doubts(one)) for one in seen):
         return (*usual, *RARE_TIME_UNITS)

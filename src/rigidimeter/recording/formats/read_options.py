@@ -41,6 +41,10 @@ class ReadOptions:
     units, scales, offsets : mapping of str to str
         Quantity to the unit of its column, what its values are multiplied by (``2.5 Nm/V``), and
         what it reads at zero.
+    skip_rows : int
+        Lines at the beginning of a text that are not read.
+    names : tuple of str
+        Of the columns of a text that does not name them.
 
     Raises
     ------
@@ -57,6 +61,8 @@ class ReadOptions:
     units: Mapping[str, str] = field(default_factory=dict)
     scales: Mapping[str, str] = field(default_factory=dict)
     offsets: Mapping[str, str] = field(default_factory=dict)
+    skip_rows: int = 0
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         positive = (
@@ -74,6 +80,8 @@ class ReadOptions:
                 f"--rate-hz {self.rate_hz:g}: the sampling rate must be from {low_hz:g} to "
                 f"{high_hz:g} Hz"
             )
+        if not isinstance(self.skip_rows, int) or self.skip_rows < 0:
+            raise UserError(f"--skip-rows {self.skip_rows}: must be a whole number of at least 0")
         if self.task not in (None, *get_args(Task)):
             raise UserError(f"--task {self.task}: must be {' or '.join(get_args(Task))}")
         _ = self.said  # refuses what is not a quantity

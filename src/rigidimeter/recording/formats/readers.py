@@ -21,6 +21,7 @@ from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.stored_arrays import Columns
 from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.table_epochs import epochs_from_table
+from rigidimeter.recording.formats.text_head import Layout
 from rigidimeter.recording.formats.text_table import read_text_recording
 from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
 from rigidimeter.records import Epoch, Notice
@@ -42,6 +43,8 @@ class Reader:
     read : callable
         Turns a path into a `Table`, or into epochs and notices. It raises `UserError` with a
         sentence that begins with the path.
+    of_text : bool
+        `read` takes a `Layout` too: what the user says of the lines of a text.
     sniff : callable, optional
         Whether a path holds this format. It decides between readers of one suffix, and finds the
         reader of a path with an unknown suffix. A reader without it takes every file with one of
@@ -56,16 +59,22 @@ class Reader:
 
     name: str
     suffixes: tuple[str, ...]
-    read: Callable[[Path], Table | Epochs]
+    read: Callable[..., Table | Epochs]
     sniff: Callable[[Path], bool] | None = None
     settings: Callable[[Path], Settings] | None = None
     made_by: str = ""
     extra: str = ""
+    of_text: bool = False
 
 
 READERS: list[Reader] = [
     Reader("session folder", (), read_session, sniff=is_session, settings=session_settings),
-    Reader("text table", (".csv", ".tsv", ".txt"), read_text_recording),
+    Reader(
+        "text table",
+        (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".sto", ".mot"),
+        read_text_recording,
+        of_text=True,
+    ),
     Reader("NumPy archive", (".npz",), read_npz, made_by="numpy.savez"),
     Reader("MATLAB file", (".mat",), read_mat, made_by="save in MATLAB", extra="matlab73"),
 ]
@@ -118,11 +127,11 @@ def read_recording(path: Path, options: ReadOptions) -> Epochs:
     UserError
         If the path cannot be read as a recording; one sentence says why.
     """
-    found = _read(path)
+    found = _read(path, _layout(options))
     return epochs_from_table(found, options) if isinstance(found, Table) else found
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path, options: ReadOptions | None = None) -> Table:
     """Read the columns of a file.
 
     Raises
@@ -130,7 +139,7 @@ def read_table(path: Path) -> Table:
     UserError
         If there is no such file, or none that can be read as a table.
     """
-    found = _read(path)
+    found = _read(path, _layout(options or ReadOptions()))
     if not isinstance(found, Table):
         raise UserError(f"{path} is a {reader_of(path).name}, which holds epochs and no table")
     return found
@@ -145,7 +154,11 @@ def formats_text() -> str:
     return _any_of(shown)
 
 
-def _read(path: Path) -> Table | Epochs:
+def _layout(options: ReadOptions) -> Layout:
+    return Layout(options.skip_rows, tuple(options.names))
+
+
+def _read(path: Path, layout: Layout) -> Table | Epochs:
     reader = reader_of(path)
     if not path.is_dir():
         with open_regular(path, RECORDING_BYTES) as file:
@@ -154,7 +167,7 @@ def _read(path: Path) -> Table | Epochs:
                     f"{path} is empty; a recording in a {path.suffix} file was expected"
                 )
     try:
-        found = reader.read(path)
+        found = reader.read(path, layout) if reader.of_text else reader.read(path)
     except UserError:
         raise
     except ImportError as error:

@@ -1,15 +1,14 @@
 """Text tables: recordings, and the small tables of labels that a study keeps.
 
-Columns are separated by comma, semicolon or tab and named in the first line. Comment lines start
-with ``#``. Where the separator is not the comma, numbers may have a decimal comma. The text is
-UTF-8, UTF-16 with its byte order mark, or what Windows writes in western Europe.
+Columns are separated by comma, semicolon or tab and named in the first line; those of a recording
+also by bars or blanks, below a head of several lines. Comment lines start with ``#``. Where the
+separator is not the comma, numbers may have a decimal comma.
 """
 
 from __future__ import annotations
 
 import csv
 import io
-import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,22 +18,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.documents import as_read, open_regular
-from rigidimeter.documents.bounds import (
-    COLUMNS,
-    RECORDING_BYTES,
-    TABLE_BYTES,
-    TABLE_CELLS,
-    TABLE_ROWS,
-)
+from rigidimeter.documents import as_read
+from rigidimeter.documents.bounds import RECORDING_BYTES, TABLE_BYTES, TABLE_CELLS, TABLE_ROWS
 from rigidimeter.documents.escaping import NUMBER
 from rigidimeter.errors import UserError
+from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.formats.table import Table, printable
+from rigidimeter.recording.formats.text_head import (
+    HEAD_LINES,
+    Head,
+    Layout,
+    first_line_head,
+    found_head,
+)
+from rigidimeter.recording.formats.text_lines import content, read_utf8, records
+from rigidimeter.recording.formats.text_preambles import known_head
 
-_DELIMITERS = ("\t", ";", ",")
 _DECIMAL_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
-_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
-_HEAD_BYTES = 2**16
+_STAMP = re.compile(r"(\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d([.,]\d+)?")
+_FOOTER = 50
 _MISSING = {"", "na", "n/a", "#n/a", "nan", "null", "none", "-", "–", "."}
 
 
@@ -139,8 +141,8 @@ def read_text_table(path: Path, *, may_be_empty: bool = False) -> TextTable:
     return TextTable(text.source, columns, tuple(text.lines[kept].tolist()))
 
 
-def read_text_recording(path: Path) -> Table:
-    """Read a recording.
+def read_text_recording(path: Path, layout: Layout | None = None) -> Table:
+    """Read a recording, whose rows may have a head of several lines before them.
 
     Returns
     -------
@@ -152,7 +154,8 @@ def read_text_recording(path: Path) -> Table:
     UserError
         If it is not such a file; the sentence names the line where there is one.
     """
-    text = _open(path, "samples", "time_s,torque_nm,angle_rad", RECORDING_BYTES)
+    example = "time_s,torque_nm,angle_rad"
+    text = _open(path, "samples", example, RECORDING_BYTES, layout or Layout())
     if len(text.names) < 2:
         raise UserError(
             f"{text.source}: its first line, {text.names[0][:40]!r}, names fewer than two columns; "
@@ -176,7 +179,29 @@ def read_text_recording(path: Path) -> Table:
         if texts.str.startswith("'").any():
             texts = texts.map(as_read)
         columns[name] = texts.to_numpy(object)
-    return Table(text.source, columns, lines=text.lines)
+    units = dict(text.head.units)
+    for name in text.names:
+        if read_header(name).kind == "time" and (stamps := _stamps(columns[name])) is not None:
+            columns[name], units[name] = stamps, "s"
+    return Table(text.source, columns, text.head.scalars, lines=text.lines, units=units)
+
+
+def _stamps(column: NDArray[Any]) -> NDArray[np.float64] | None:
+    """Return dates and times of day as seconds since the first; None where they are none."""
+    if column.dtype != object or not column.size or not _STAMP.fullmatch(str(column[0]).strip()):
+        return None
+    import pandas as pd
+
+    texts = pd.Series(column).str.strip().str.replace(",", ".")
+    try:
+        if re.match(r"\d{1,2}:", texts[0]):
+            since = pd.to_timedelta(texts)
+        else:
+            when = pd.to_datetime(texts, format="ISO8601")
+            since = when - when[0]
+    except (ValueError, TypeError, OverflowError):
+        return None
+    return np.asarray(since.dt.total_seconds(), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -185,11 +210,15 @@ class _Text:
 
     source: str
     delimiter: str
-    names: list[str]
+    head: Head
     head_line: int
     body: bytes
     lines: NDArray[np.int64]
     rows_are: str
+
+    @property
+    def names(self) -> list[str]:
+        return self.head.names
 
     def without_rows(self) -> UserError:
         return UserError(
@@ -218,130 +247,86 @@ class _Text:
             ) from None
 
 
-def _open(path: Path, rows_are: str, example: str, most_bytes: int) -> _Text:
-    """Find the columns and rows of a text table, and check that every row has every column."""
+def _open(
+    path: Path, rows_are: str, example: str, most_bytes: int, layout: Layout | None = None
+) -> _Text:
+    """Find the columns and rows of a text table, and check that every row has every column.
+
+    Without a layout its first line names its columns.
+    """
     source = str(path)
-    with open_regular(path, most_bytes) as file:
-        try:
-            data = file.read(_HEAD_BYTES)
-            if len(data) == _HEAD_BYTES:
-                _refuse_zeros(source, data)  # before the rest of a large file
-                data += file.read(os.fstat(file.fileno()).st_size)
-        except OSError as error:
-            raise UserError(f"{source}: cannot be read ({error.strerror or error})") from None
-    data, lines = _content(_utf8(source, data))
-    head, _, body = data.partition(b"\n")
-    if not head.strip():
+    whole = read_utf8(path, most_bytes)
+    if layout is not None and layout.skip_rows:
+        parts = whole.split(b"\n", layout.skip_rows)
+        if len(parts) <= layout.skip_rows:
+            raise UserError(f"{source}: has fewer lines than --skip-rows {layout.skip_rows}")
+        whole = b"\n" * layout.skip_rows + parts[-1]  # so that lines keep their numbers
+    data, lines = content(whole)
+    if not data.strip():
         raise UserError(f"{source} is empty; its first line must name the columns")
-    delimiter, names = _header(source, head.decode("utf-8"), example)
+    head = _head(source, whole, data, example, layout)
+    body = data.split(b"\n", head.n_before)[head.n_before] if lines.size > head.n_before else b""
     if not body.strip():
         body = b""
+    if not head.delimiter:
+        body = re.sub(rb"(?m)^[ \t]+|[ \t]+$", b"", body)
+        body = re.sub(rb"[ \t]+", b"\t", body)
+    delimiter = head.delimiter or "\t"
     try:
-        starts, counts = _records(body, delimiter)
+        starts, counts = records(body, delimiter)
+        if layout is not None:
+            body, starts, counts = _trimmed(body, starts, counts, len(head.names), delimiter)
     except csv.Error as error:  # such as a quote that is never closed
         raise UserError(f"{source} is not a readable table: {error}") from None
-    wrong = np.flatnonzero(counts != len(names))
+    rest = lines[head.n_before :]
+    wrong = np.flatnonzero(counts != len(head.names))
     if wrong.size:
-        count, line = int(counts[wrong[0]]), int(lines[1:][starts[wrong[0]]])
+        count, line = int(counts[wrong[0]]), int(rest[starts[wrong[0]]])
         hint = ""
-        if delimiter == "," and count > len(names):
+        if delimiter == "," and count > len(head.names):
             hint = "; where numbers have a decimal comma, separate the columns by semicolons"
+        named = "first line names" if head.n_before == 1 else "head of the file names"
         raise UserError(
-            f"{source}, line {line} has {count} value{'' if count == 1 else 's'}, but the first "
-            f"line names {len(names)} columns{hint}"
+            f"{source}, line {line} has {count} value{'' if count == 1 else 's'}, but the {named} "
+            f"{len(head.names)} columns{hint}"
         )
-    return _Text(source, delimiter, names, int(lines[0]), body, lines[1:][starts], rows_are)
+    return _Text(source, delimiter, head, int(lines[0]), body, rest[starts], rows_are)
 
 
-def _utf8(source: str, data: bytes) -> bytes:
-    """Return the text as UTF-8 without its byte order mark, with line feeds as line ends."""
-    try:
-        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            data = data.decode("utf-16").encode()
-        data = data.removeprefix(b"\xef\xbb\xbf")
-        if not data.isascii():
-            data = _decoded(data).encode()
-    except UnicodeError:
-        raise UserError(
-            f"{source} is not a text file in UTF-8; in a spreadsheet, save it as CSV UTF-8"
-        ) from None
-    _refuse_zeros(source, data)
-    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+def _head(source: str, whole: bytes, data: bytes, example: str, layout: Layout | None) -> Head:
+    if layout is None:
+        return first_line_head(source, data.partition(b"\n")[0].decode("utf-8"), example)
+    first = [line.decode("utf-8") for line in data.split(b"\n", HEAD_LINES)[:HEAD_LINES]]
+    known = None if layout.names else known_head(source, first)
+    if known is not None:
+        return known
+    before, _, _ = whole.partition(data[: data.find(b"\n")] if b"\n" in data else data)
+    comments = [line[1:].strip() for line in before.decode("utf-8").splitlines() if line[:1] == "#"]
+    return found_head(source, first, comments[-1] if comments else "", layout.names, example)
 
 
-def _refuse_zeros(source: str, data: bytes) -> None:
-    if data[:2] not in (b"\xff\xfe", b"\xfe\xff") and b"\0" in data:
-        raise UserError(
-            f"{source} is not a text file: it holds zero bytes; a CSV file was expected"
-        )
-
-
-def _decoded(data: bytes) -> str:
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError:
-        text = data.decode("cp1252")
-        if _CONTROL.search(text):  # no text at all
-            raise
-        return text
-
-
-def _content(data: bytes) -> tuple[bytes, NDArray[np.int64]]:
-    """Leave out comments and blank lines; also return the number of each line that is kept."""
-    data = data.rstrip(b"\n")
-    if not data.startswith((b"\n", b" ", b"#")) and not any(
-        mark in data for mark in (b"\n#", b"\n\n", b"\n ")
-    ):
-        return data, np.arange(1, data.count(b"\n") + 2)
-    kept = [
-        (number, line)
-        for number, line in enumerate(data.split(b"\n"), start=1)
-        if (bare := line.strip(b" ")) and (bare[:1] != b"#" or bare.startswith(b"#N/A"))
-    ]
-    return b"\n".join(line for _, line in kept), np.array([n for n, _ in kept], np.int64)
-
-
-def _header(source: str, text: str, example: str) -> tuple[str, list[str]]:
-    """Return the delimiter and the names of the columns."""
-    delimiter = next((mark for mark in _DELIMITERS if mark in text), ",")
-    try:
-        fields = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))
-    except csv.Error:
-        fields = text.split(delimiter)
-    if len(fields) > COLUMNS:
-        raise UserError(
-            f"{source}: its first line names {len(fields)} columns; at most {COLUMNS} are read, so "
-            "leave out those that are not needed"
-        )
-    names = [printable(name.strip().strip("\"'").strip()) for name in fields]
-    if any(names) and all(NUMBER.fullmatch(name) for name in names if name):
-        raise UserError(
-            f"{source}: its first line holds numbers ({', '.join(names[:3])}"
-            f"{', ...' if len(names) > 3 else ''}), but it must name the columns, as in {example}"
-        )
-    names = [name or f"column {index}" for index, name in enumerate(names, start=1)]
-    twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
-    if twice is not None:
-        raise UserError(f"{source}: two columns are named {twice}; each must have its own name")
-    return delimiter, names
-
-
-def _records(body: bytes, delimiter: str) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the line in which each row begins, counted from 0, and its number of cells."""
-    if not body:
-        return np.empty(0, np.intp), np.empty(0, np.intp)
-    if b'"' not in body:
-        codes = np.frombuffer(body, np.uint8)
-        ends = np.append(np.flatnonzero(codes == ord("\n")), codes.size)
-        before = np.searchsorted(np.flatnonzero(codes == ord(delimiter)), ends)
-        return np.arange(ends.size), np.diff(before, prepend=0) + 1
-    reader = csv.reader(
-        io.StringIO(body.decode("utf-8"), newline="\n"), delimiter=delimiter, skipinitialspace=True
-    )
-    starts, counts = [], []
-    begins = 0
-    for cells in reader:
-        starts.append(begins)
-        counts.append(len(cells))
-        begins = reader.line_num
-    return np.array(starts), np.array(counts)
+def _trimmed(
+    body: bytes,
+    starts: NDArray[np.intp],
+    counts: NDArray[np.intp],
+    n_columns: int,
+    delimiter: str,
+) -> tuple[bytes, NDArray[np.intp], NDArray[np.intp]]:
+    """Leave out an empty last column that has no name, and lines of text after the last row."""
+    mark = delimiter.encode()
+    if counts.size and b'"' not in body:
+        lines = body.split(b"\n")
+        kept = len(lines)
+        while kept > 1 and len(lines) - kept < _FOOTER and counts[kept - 1] not in (
+            n_columns, n_columns + 1,
+        ) and not NUMBER.match(lines[kept - 1].decode("utf-8").strip()):  # fmt: skip
+            kept -= 1
+        if kept < len(lines):
+            body = b"\n".join(lines[:kept])
+            starts, counts = starts[:kept], counts[:kept]
+    if counts.size and np.all(counts == n_columns + 1):
+        bare = re.sub(rb"(?m)" + re.escape(mark) + rb"[ ]*$", b"", body)
+        starts, new_counts = records(bare, delimiter)
+        if np.all(new_counts == n_columns):
+            return bare, starts, new_counts
+    return body, starts, counts

@@ -114,10 +114,24 @@ def test_an_epoch_whose_condition_changes_is_lost_alone(tmp_path):
     assert "condition changes from OFF to DBS within epoch 1" in notice.text
 
 
+@pytest.mark.parametrize(
+    ("stamps", "first_s"),
+    [
+        (("12:30:00.5", "12:30:01.75"), 45000.5),
+        (("2024-03-01 12:30:00,5", "2024-03-01 12:30:01,75"), 0.0),
+    ],
+)
+def test_dates_and_times_of_day_are_seconds(tmp_path, stamps, first_s):
+    path = tmp_path / "r.csv"
+    path.write_text("time_s;torque_nm;angle_rad\n" + "".join(f"{s};1,5;2\n" for s in stamps))
+    (epoch,), _ = read_recording(path, ReadOptions())
+    np.testing.assert_array_equal(epoch.channels["torque_nm"].time_s, [first_s, first_s + 1.25])
+
+
 def test_a_date_in_a_column_of_numbers_is_text(tmp_path):
     path = tmp_path / "r.csv"
-    path.write_text("time_s,torque_nm,angle_rad\n12:30:00,1,2\n12:30:01,1,2\n")
-    with pytest.raises(UserError, match=r"line 2: time_s holds '12:30:00'"):
+    path.write_text("time_s,torque_nm,angle_rad\n0,12:30:00,2\n1,12:30:01,2\n")
+    with pytest.raises(UserError, match=r"line 2: torque_nm holds '12:30:00'"):
         read_recording(path, ReadOptions())
 
 

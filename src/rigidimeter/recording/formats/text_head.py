@@ -1,0 +1,237 @@
+"""Where the rows of a text recording begin, and what its columns are called.
+
+Mostly the first line names the columns. Other files have a block of lines before it, a row of units
+below it, their names in a comment, or no names at all.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rigidimeter.documents.bounds import COLUMNS
+from rigidimeter.documents.escaping import NUMBER
+from rigidimeter.errors import UserError
+from rigidimeter.recording.channels.unit_text import expression
+from rigidimeter.recording.formats.table import MISSING, printable
+
+DELIMITERS = ("\t", ";", ",", "|", "")
+"""The last one stands for blanks."""
+HEAD_LINES = 400
+_RUN = 5
+_FEW = 2
+_LABEL = re.compile(r"[^\W\d_][\w .-]*")
+_STAMP = re.compile(r"[\d:./T -]*:[\d:.,]+Z?")
+
+
+@dataclass(frozen=True)
+class Head:
+    """What comes before the rows.
+
+    Parameters
+    ----------
+    delimiter : str
+        Of the rows; nothing for blanks.
+    names : list of str
+    n_before : int
+        Lines before the first row, without comments and blank lines.
+    units : mapping of str to str
+        By name.
+    scalars : mapping of str to float or str
+        Such as a sampling rate.
+    """
+
+    delimiter: str
+    names: list[str]
+    n_before: int
+    units: Mapping[str, str] = field(default_factory=dict)
+    scalars: Mapping[str, float | str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the user says of the lines of a text recording.
+
+    Parameters
+    ----------
+    skip_rows : int
+        Lines at the beginning that are not read.
+    names : tuple of str
+        Of the columns, where the file has none.
+    """
+
+    skip_rows: int = 0
+    names: tuple[str, ...] = ()
+
+
+def first_line_head(source: str, text: str, example: str) -> Head:
+    """Return the head of a table whose first line names the columns.
+
+    Raises
+    ------
+    UserError
+        If it does not.
+    """
+    delimiter = next((mark for mark in DELIMITERS[:3] if mark in text), ",")
+    names = [name.strip().strip("\"'").strip() for name in cells_of(text, delimiter)]
+    if any(names) and all(NUMBER.fullmatch(name) for name in names if name):
+        raise UserError(
+            f"{source}: its first line holds numbers ({', '.join(names[:3])}"
+            f"{', ...' if len(names) > 3 else ''}), but it must name the columns, as in {example}; "
+            "or name them with --names"
+        )
+    return Head(delimiter, checked_names(source, names), 1)
+
+
+def checked_names(source: str, names: Sequence[str]) -> list[str]:
+    """Return names of columns as messages can show them, each once.
+
+    Raises
+    ------
+    UserError
+        If there are too many, or two of one name.
+    """
+    if len(names) > COLUMNS:
+        raise UserError(
+            f"{source}: its first line names {len(names)} columns; at most {COLUMNS} are read, so "
+            "leave out those that are not needed"
+        )
+    shown = [printable(name.strip().strip("\"'").strip()) for name in names]
+    shown = [name or f"column {index}" for index, name in enumerate(shown, start=1)]
+    twice = next((name for index, name in enumerate(shown) if name in shown[:index]), None)
+    if twice is not None:
+        raise UserError(f"{source}: two columns are named {twice}; each must have its own name")
+    return shown
+
+
+def found_head(
+    source: str, lines: Sequence[str], comment: str, names: Sequence[str], example: str
+) -> Head:
+    """Return the head of a recording.
+
+    Parameters
+    ----------
+    source : str
+    lines : sequence of str
+        The first `HEAD_LINES`, without comments and blank lines.
+    comment : str
+        The last comment before the first of them.
+    names : sequence of str
+        As the user gave them; empty where the file has them.
+    example : str
+
+    Raises
+    ------
+    UserError
+        If no row or no names are found.
+    """
+    if not names and (head := _standard(source, lines, example)) is not None:
+        return head
+    for start in range(len(lines)):
+        for delimiter in DELIMITERS:
+            count = _run_of_rows(lines[start : start + _RUN], delimiter)
+            if count >= 2:
+                return _named(source, lines, start, delimiter, count, comment, names, example)
+    return first_line_head(source, lines[0], example)
+
+
+def _standard(source: str, lines: Sequence[str], example: str) -> Head | None:
+    """Return the head where the first line, and at most a row of units below it, is no row."""
+    delimiter = next((mark for mark in DELIMITERS[:3] if mark in lines[0]), ",")
+    names = cells_of(lines[0], delimiter)
+    if len(names) < 2 or any(NUMBER.fullmatch(name.strip()) for name in names):
+        return None
+    units = units_row(lines[1], delimiter) if len(lines) > 1 else None
+    below = lines[2 if units else 1 :][:3]
+    for line in below:
+        cells = cells_of(line, delimiter)
+        if len(cells) != len(names) or not any(_is_number(cell) for cell in cells):
+            return None
+    head = first_line_head(source, lines[0], example)
+    if not units or len(units) != len(head.names):
+        return head
+    stated = {name: unit for name, unit in zip(head.names, units, strict=True) if unit}
+    return Head(delimiter, head.names, 2, stated)
+
+
+def _named(
+    source: str,
+    lines: Sequence[str],
+    start: int,
+    delimiter: str,
+    count: int,
+    comment: str,
+    names: Sequence[str],
+    example: str,
+) -> Head:
+    if names:
+        if len(names) != count:
+            raise UserError(
+                f"{source}: its rows have {count} columns, but --names gives {len(names)}"
+            )
+        return Head(delimiter, checked_names(source, names), start)
+    at = start - 1
+    units = units_row(lines[at], delimiter) if at >= 0 else None
+    if units is not None and len(units) == count and at > 0:
+        at -= 1
+    else:
+        units = None
+    for text in (lines[at] if at >= 0 else "", comment):
+        for mark in dict.fromkeys((delimiter, *DELIMITERS)):
+            found = cells_of(text, mark)
+            while len(found) > count and not found[-1].strip():
+                found.pop()
+            if len(found) == count and not any(_is_number(cell) for cell in found):
+                shown = checked_names(source, found)
+                stated = dict(zip(shown, units or [""] * count, strict=True))
+                return Head(delimiter, shown, start, {n: u for n, u in stated.items() if u})
+    if start <= _FEW:
+        return first_line_head(source, lines[0], example)
+    raise UserError(
+        f"{source}: the rows have {count} columns, but the line before them does not name as many; "
+        "name them with --names"
+    )
+
+
+def _run_of_rows(lines: Sequence[str], delimiter: str) -> int:
+    """Return how many cells each of some lines has, where all are rows of numbers; else 0."""
+    counts = {_row(line, delimiter) for line in lines}
+    return counts.pop() if len(counts) == 1 and len(lines) > 1 else 0
+
+
+def _row(line: str, delimiter: str) -> int:
+    cells = [cell.strip() for cell in cells_of(line, delimiter)]
+    while len(cells) > 2 and not cells[-1]:
+        cells.pop()
+    n_numbers = sum(_is_number(cell) for cell in cells)
+    if n_numbers < 2 or not (_is_number(cells[0]) or _STAMP.fullmatch(cells[0])):
+        return 0
+    fine = all(
+        _is_number(cell) or cell.lower() in MISSING or _LABEL.fullmatch(cell) for cell in cells[1:]
+    )
+    return len(cells) if fine else 0
+
+
+def units_row(line: str, delimiter: str) -> list[str] | None:
+    """Return the units that a line states, one a column; None where it holds anything else."""
+    units = [cell.strip().strip("[](){}\"'").strip() for cell in cells_of(line, delimiter)]
+    stated = [unit for unit in units if unit and unit != "-"]
+    if not stated or not all(expression(unit) for unit in stated):
+        return None
+    return ["" if unit == "-" else unit for unit in units]
+
+
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """Return the cells of one line."""
+    if not delimiter:
+        return line.split()
+    try:
+        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+    except csv.Error:
+        return line.split(delimiter)
+
+
+def _is_number(cell: str) -> bool:
+    return NUMBER.fullmatch(cell.strip()) is not None

@@ -1,0 +1,110 @@
+"""The lines of a text file: decoded, without comments and blank lines, and their cells counted.
+
+The text is UTF-8, UTF-16 with its byte order mark, or what Windows writes in western Europe.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.documents import open_regular
+from rigidimeter.errors import UserError
+
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+_HEAD_BYTES = 2**16
+
+
+def read_utf8(path: Path, most_bytes: int) -> bytes:
+    """Return the text of a file as UTF-8, with line feeds as line ends.
+
+    Raises
+    ------
+    UserError
+        If it cannot be read, is too large, or is not a text.
+    """
+    source = str(path)
+    with open_regular(path, most_bytes) as file:
+        try:
+            data = file.read(_HEAD_BYTES)
+            if len(data) == _HEAD_BYTES:
+                _refuse_zeros(source, data)  # before the rest of a large file
+                data += file.read(os.fstat(file.fileno()).st_size)
+        except OSError as error:
+            raise UserError(f"{source}: cannot be read ({error.strerror or error})") from None
+    return _utf8(source, data)
+
+
+def _utf8(source: str, data: bytes) -> bytes:
+    """Return the text as UTF-8 without its byte order mark, with line feeds as line ends."""
+    try:
+        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            data = data.decode("utf-16").encode()
+        data = data.removeprefix(b"\xef\xbb\xbf")
+        if not data.isascii():
+            data = _decoded(data).encode()
+    except UnicodeError:
+        raise UserError(
+            f"{source} is not a text file in UTF-8; in a spreadsheet, save it as CSV UTF-8"
+        ) from None
+    _refuse_zeros(source, data)
+    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def _refuse_zeros(source: str, data: bytes) -> None:
+    if data[:2] not in (b"\xff\xfe", b"\xfe\xff") and b"\0" in data:
+        raise UserError(
+            f"{source} is not a text file: it holds zero bytes; a CSV file was expected"
+        )
+
+
+def _decoded(data: bytes) -> str:
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        text = data.decode("cp1252")
+        if _CONTROL.search(text):  # no text at all
+            raise
+        return text
+
+
+def content(data: bytes) -> tuple[bytes, NDArray[np.int64]]:
+    """Leave out comments and blank lines; also return the number of each line that is kept."""
+    data = data.rstrip(b"\n")
+    if not data.startswith((b"\n", b" ", b"#")) and not any(
+        mark in data for mark in (b"\n#", b"\n\n", b"\n ")
+    ):
+        return data, np.arange(1, data.count(b"\n") + 2)
+    kept = [
+        (number, line)
+        for number, line in enumerate(data.split(b"\n"), start=1)
+        if (bare := line.strip(b" ")) and (bare[:1] != b"#" or bare.startswith(b"#N/A"))
+    ]
+    return b"\n".join(line for _, line in kept), np.array([n for n, _ in kept], np.int64)
+
+
+def records(body: bytes, delimiter: str) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the line in which each row begins, counted from 0, and its number of cells."""
+    if not body:
+        return np.empty(0, np.intp), np.empty(0, np.intp)
+    if b'"' not in body:
+        codes = np.frombuffer(body, np.uint8)
+        ends = np.append(np.flatnonzero(codes == ord("\n")), codes.size)
+        before = np.searchsorted(np.flatnonzero(codes == ord(delimiter)), ends)
+        return np.arange(ends.size), np.diff(before, prepend=0) + 1
+    reader = csv.reader(
+        io.StringIO(body.decode("utf-8"), newline="\n"), delimiter=delimiter, skipinitialspace=True
+    )
+    starts, counts = [], []
+    begins = 0
+    for cells in reader:
+        starts.append(begins)
+        counts.append(len(cells))
+        begins = reader.line_num
+    return np.array(starts), np.array(counts)

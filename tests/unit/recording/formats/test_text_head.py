@@ -1,0 +1,75 @@
+"""Heads of text files: what is found, and sentences about what is not."""
+
+import numpy as np
+import pytest
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.formats import ReadOptions, read_table
+
+ROWS = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(60))
+LABVIEW = "LabVIEW Measurement\t\nX_Columns\t{}\n***End_of_Header***\t\nDelta_X\t0.004\t0.004\n"
+
+
+def table(path, text, **options):
+    path.write_text(text, "utf-8")
+    return read_table(path, ReadOptions(**options))
+
+
+def test_lines_keep_their_numbers_below_a_head(tmp_path):
+    text = "Lab 3\nSubject: 1\n\n# a remark\nt,M,phi\ns,Nm,deg\n" + ROWS
+    found = table(tmp_path / "r.csv", text)
+    assert list(found.columns) == ["t", "M", "phi"]
+    assert found.units == {"t": "s", "M": "Nm", "phi": "deg"}
+    assert found.lines[0] == 7
+    skipped = table(tmp_path / "r.csv", "1,2,3\n" + text, skip_rows=1)
+    assert skipped.lines[0] == 8
+
+
+def test_labview_without_a_column_of_time_has_a_rate(tmp_path):
+    text = LABVIEW.format("No") + "***End_of_Header***\nX_Value\tTorque\tAngle\tComment\n"
+    found = table(tmp_path / "r.lvm", text + "\t1.5\t2\n" * 30)
+    assert found.scalars["rate_hz"] == pytest.approx(250.0)
+    np.testing.assert_array_equal(found.columns["Torque"], np.full(30, 1.5))
+
+
+def test_a_row_of_text_between_rows_is_not_a_footer(tmp_path):
+    with pytest.raises(UserError, match="line 62 has 1 value, but the first line names 3 columns"):
+        table(tmp_path / "r.csv", "t_s,M_Nm,phi_deg\n" + ROWS + "pause\n" + ROWS)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "told"),
+    [
+        (ROWS, {"names": ("a", "b")}, "its rows have 3 columns, but --names gives 2"),
+        (ROWS, {"names": ("a", "b", "a")}, "two columns are named a"),
+        (ROWS, {"skip_rows": 99}, "has fewer lines than --skip-rows 99"),
+        ("a\nb\nc\nd\ne\n" + ROWS, {}, "does not name as many; name them with --names"),
+        ("LabVIEW Measurement\n" + ROWS, {}, "head of this LabVIEW file is not complete"),
+        (LABVIEW.format("Multi") + "***End_of_Header***\nX_Value\tA\n" + ROWS, {}, "X_Columns One"),
+        ("x\n5 msec/sample\n900 channels\na\nb\n", {}, "head of this AcqKnowledge file is not"),
+        ("x\n0 msec/sample\n1 channels\nT\nNm\nsec\tCH1\n" + ROWS, {}, "no sampling interval"),
+        ("x\n1.2.3 sec/sample\n1 channels\nT\nNm\nsec\tCH1\n" + ROWS, {}, "no sampling interval"),
+        ("x\n5 msec/sample\n-1 channels\na\nb\n", {}, "head of this AcqKnowledge file is not"),
+    ],
+)
+def test_what_is_refused(tmp_path, text, options, told):
+    with pytest.raises(UserError) as caught:
+        table(tmp_path / "r.txt", text, **options)
+    assert told in str(caught.value)
+
+
+def test_a_head_of_any_bytes_is_read_or_refused(tmp_path):
+    rng = np.random.default_rng(8)
+    whole = (LABVIEW.format("One") + "***End_of_Header***\nX_Value\tA\n" + ROWS).encode()
+    path = tmp_path / "r.lvm"
+    told = []
+    for _ in range(100):
+        damaged = bytearray(whole)
+        for place in rng.integers(0, 200, 4):
+            damaged[place] ^= int(rng.integers(1, 256))
+        path.write_bytes(damaged)
+        try:
+            read_table(path)
+        except UserError as error:
+            told.append(str(error))
+    assert all(text.startswith(str(path)) for text in told)
