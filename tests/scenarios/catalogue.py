@@ -23,7 +23,7 @@ TERM = ("missing_term", "lack_of_fit", "residual_perturbation", "loop_bias")
 DRIVE = ("between_samples", "lack_of_fit")
 """What the drive does between the samples is not known."""
 
-CLOCK = ("velocity_delay", *DRIVE)
+CLOCK = ("velocity_delay", "torque_delay", *DRIVE)
 """Stamps, rates and filters."""
 
 another = partial(scenario, other_model=True)

@@ -108,6 +108,7 @@ class DiagnosticLevels(Section):
     gravity: Level = "note"
     velocity_scale: Level = "exclude"
     velocity_delay: Level = "doubt"
+    torque_delay: Level = "doubt"
     velocity_shape: Level = "doubt"
     guard_limited: Level = "doubt"
     position_limit: Level = "doubt"

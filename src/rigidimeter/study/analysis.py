@@ -21,7 +21,9 @@ from rigidimeter.estimation import (
 )
 from rigidimeter.estimation.alignment import MOST_EPOCHS, aligned_prepared
 from rigidimeter.estimation.between_epochs import between_epochs
+from rigidimeter.estimation.closedloop.observation import closed_loop_obstacle
 from rigidimeter.estimation.diagnostics import checked, checked_together
+from rigidimeter.estimation.diagnostics.delay_check import torque_delay
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.estimation.screening import before_fit
@@ -184,7 +186,11 @@ def analyse_prepared(
     found, pooled = estimator.fit(fitted, None, fit_progress, not fits_alone)
     fits = []
     for prepared, fit in zip(fitted, found, strict=True):
-        fits.append(checked(prepared, fit))
+        found_fit = checked(prepared, fit)
+        if closed_loop_obstacle(prepared.epoch):
+            late = torque_delay(found_fit, delays, prepared.settings.diagnostics)
+            found_fit = replace(found_fit, findings=(*found_fit.findings, *late))
+        fits.append(found_fit)
         progress(costs.check if fits_alone else costs.first_check)
     counted = [
         prepared.closed_as(fit.outcome)
