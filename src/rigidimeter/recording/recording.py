@@ -11,7 +11,7 @@ from typing import Any
 from rigidimeter.documents import noted_digests
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.mapping_file import merged, read_mapping
-from rigidimeter.recording.formats import ReadOptions, read_recording, reader_of
+from rigidimeter.recording.formats import ReadOptions, read_recording, recorded_settings
 from rigidimeter.recording.leave_out import with_left_out
 from rigidimeter.records import Epoch, Notice, Task
 from rigidimeter.settings import Settings, load_settings, settings_from
@@ -143,8 +143,7 @@ def read(
     for path, name in dict(zip(asked, conditions, strict=True)).items():
         try:
             with noted_digests() as noted:
-                reader = reader_of(path)
-                recorded = None if reader.settings is None else reader.settings(path)
+                recorded = recorded_settings(path)
                 found, remarks = read_recording(path, replace(options, condition=name))
         except UserError as error:
             notices += [Notice("error", line) for line in error.lines]

@@ -57,7 +57,7 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
             )
         )
     ended = {event["epoch"]: event for event in events if event.get("event") == "epoch_ended"}
-    first, last = _extents(samples["epoch"])
+    first, last = epoch_extents(samples["epoch"])
     epochs = []
     seen: set[int] = set()
     for event in events:
@@ -96,7 +96,11 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
                     "column limited of its samples, and the limits in [guard]",
                 )
             )
-        epochs.append(_epoch(folder, settings, manifest, samples, rows, event, ended.get(number)))
+        closed = _closed(samples["time_s"][rows], ended.get(number))
+        virtual = bool(manifest["virtual"])
+        epochs.append(
+            epoch_of_samples(str(folder), settings, samples, rows, event, closed, virtual=virtual)
+        )
     notices += [
         Notice("error", f"{folder}/{EVENTS}: does not say what epoch {number} of the samples was")
         for number in first
@@ -148,7 +152,7 @@ def _lost_of(
     return ""
 
 
-def _extents(number: NDArray[Any]) -> tuple[dict[int, int], dict[int, int]]:
+def epoch_extents(number: NDArray[Any]) -> tuple[dict[int, int], dict[int, int]]:
     """Return the first and the last row of every epoch; the rows of one epoch are contiguous."""
     if number.size == 0:
         return {}, {}
@@ -159,23 +163,51 @@ def _extents(number: NDArray[Any]) -> tuple[dict[int, int], dict[int, int]]:
     return first, last
 
 
-def _epoch(
-    folder: Path,
-    settings: Settings,
-    manifest: Mapping[str, Any],
-    samples: dict[str, NDArray[Any]],
-    rows: slice,
-    started: dict[str, Any],
-    ended: dict[str, Any] | None,
-) -> Epoch:
-    time_s = samples["time_s"][rows]
+def _closed(time_s: NDArray[Any], ended: dict[str, Any] | None) -> Outcome:
+    """Return how an epoch ended."""
     if ended is None:
         duration_s = time_s[-1] - time_s[0]
-        closed = Outcome("excluded", f"the session was interrupted {duration_s:.3g} s into it")
-    elif ended["outcome"] == "success":
-        closed = Outcome()
-    else:
-        closed = Outcome("excluded", str(ended["reason"]))
+        return Outcome("excluded", f"the session was interrupted {duration_s:.3g} s into it")
+    if ended["outcome"] == "success":
+        return Outcome()
+    return Outcome("excluded", str(ended["reason"]))
+
+
+def epoch_of_samples(
+    source: str,
+    settings: Settings,
+    samples: Mapping[str, NDArray[Any]],
+    rows: slice,
+    started: Mapping[str, Any],
+    closed: Outcome,
+    *,
+    virtual: bool,
+) -> Epoch:
+    """Return an epoch of a session.
+
+    Parameters
+    ----------
+    source : str
+        Where it was read.
+    settings : Settings
+        Those of the session.
+    samples : mapping of str to array
+        The columns of the session.
+    rows : slice
+        Those of the epoch.
+    started : mapping
+        Its label, task and condition.
+    closed : Outcome
+        How it ended.
+    virtual : bool
+        Whether a simulation made it.
+
+    Raises
+    ------
+    UserError
+        If its task is unknown.
+    """
+    time_s = samples["time_s"][rows]
     channels = [
         *_sampled(samples, rows, "torque_time_s", ("torque_nm",)),
         *_sampled(samples, rows, "motion_time_s", ("angle_rad", "velocity_rad_s")),
@@ -183,12 +215,12 @@ def _epoch(
     ]
     task = started["task"]
     if task not in ("prbs", "sinusoid"):
-        raise UserError(f"{folder}/{EVENTS}: task is {task!r}; it must be 'prbs' or 'sinusoid'")
+        raise UserError(f"{source}: task is {task!r}; it must be 'prbs' or 'sinusoid'")
     sine = settings.sinusoid
     if task == "prbs":
         channels.append(Channel("perturbation_nm", time_s, samples["perturbation_nm"][rows]))
     return Epoch(
-        source=str(folder),
+        source=source,
         label=str(started["label"]),
         channels={channel.name: channel for channel in channels},
         condition=str(started["condition"]),
@@ -202,12 +234,12 @@ def _epoch(
             (settings.prbs.wanted_low_hz, settings.prbs.wanted_high_hz) if task == "prbs" else None
         ),
         closed=closed,
-        virtual=bool(manifest["virtual"]),
+        virtual=virtual,
     )
 
 
 def _sampled(
-    samples: dict[str, NDArray[Any]], rows: slice, stamp: str, names: tuple[str, ...]
+    samples: Mapping[str, NDArray[Any]], rows: slice, stamp: str, names: tuple[str, ...]
 ) -> list[Channel]:
     """Return channels with one entry for each sample: a held reading repeats its stamp."""
     stamps = samples[stamp][rows]

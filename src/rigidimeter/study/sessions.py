@@ -17,9 +17,10 @@ from typing import Any
 from rigidimeter.documents import noted_digests, open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
-from rigidimeter.recording import ReadOptions, is_session, read_recording, session_settings
+from rigidimeter.recording import ReadOptions, is_session, read_recording
 from rigidimeter.recording.channels.mapping_file import read_mapping
 from rigidimeter.recording.event_log import read_events
+from rigidimeter.recording.formats import recorded_settings
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES
 from rigidimeter.recording.study_folder import Row, StudyFolder
 from rigidimeter.recording.study_toml import is_outside
@@ -184,7 +185,7 @@ def _read(
     condition = names.named(row["condition"])
     if condition is None:
         raise _Refused(names.unknown(row["condition"]))
-    settings = session_settings(path) if from_session else None
+    settings = recorded_settings(path)
     if from_session:
         events, _ = read_events(path / EVENTS) if (path / EVENTS).is_file() else ([], False)
         if not any(event.get("event") == "session_ended" for event in events):

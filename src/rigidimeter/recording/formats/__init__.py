@@ -8,6 +8,7 @@ from rigidimeter.recording.formats.readers import (
     read_recording,
     read_table,
     reader_of,
+    recorded_settings,
 )
 from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.text_table import TextTable, read_text_table
@@ -23,4 +24,5 @@ __all__ = [
     "read_table",
     "read_text_table",
     "reader_of",
+    "recorded_settings",
 ]

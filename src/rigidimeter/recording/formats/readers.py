@@ -11,23 +11,39 @@ import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 from rigidimeter.documents import open_regular, visible
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
+from rigidimeter.recording.formats.arrow_file import read_arrow
+from rigidimeter.recording.formats.bids_dataset import bids_settings, is_bids, read_bids
+from rigidimeter.recording.formats.export_folder import (
+    export_folder_settings,
+    is_export_folder,
+    read_export_folder,
+)
+from rigidimeter.recording.formats.mat_export import (
+    is_mat_export,
+    mat_export_settings,
+    read_mat_export,
+)
 from rigidimeter.recording.formats.mat_file import read_mat
 from rigidimeter.recording.formats.npz_file import read_npz
+from rigidimeter.recording.formats.nwb_file import nwb_settings, read_nwb
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.stored_arrays import Columns
 from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.table_epochs import epochs_from_table
 from rigidimeter.recording.formats.text_head import Layout
 from rigidimeter.recording.formats.text_table import read_text_recording
+from rigidimeter.recording.formats.xdf_file import read_xdf, xdf_settings
 from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
 from rigidimeter.records import Epoch, Notice
 from rigidimeter.settings import Settings
 
 Epochs = tuple[list[Epoch], list[Notice]]
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -50,7 +66,7 @@ class Reader:
         reader of a path with an unknown suffix. A reader without it takes every file with one of
         its suffixes.
     settings : callable, optional
-        Returns the settings with which a path was recorded.
+        Returns the settings with which a path was recorded, None where it does not say.
     made_by : str
         What makes such files. Where it is given, any exception of `read` means a damaged file.
     extra : str
@@ -61,7 +77,7 @@ class Reader:
     suffixes: tuple[str, ...]
     read: Callable[..., Table | Epochs]
     sniff: Callable[[Path], bool] | None = None
-    settings: Callable[[Path], Settings] | None = None
+    settings: Callable[[Path], Settings | None] | None = None
     made_by: str = ""
     extra: str = ""
     of_text: bool = False
@@ -70,13 +86,51 @@ class Reader:
 READERS: list[Reader] = [
     Reader("session folder", (), read_session, sniff=is_session, settings=session_settings),
     Reader(
+        "exported folder",
+        (),
+        read_export_folder,
+        sniff=is_export_folder,
+        settings=export_folder_settings,
+    ),
+    Reader("exported BIDS data set", (), read_bids, sniff=is_bids, settings=bids_settings),
+    Reader(
         "text table",
         (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".sto", ".mot"),
         read_text_recording,
         of_text=True,
     ),
     Reader("NumPy archive", (".npz",), read_npz, made_by="numpy.savez"),
+    Reader(
+        "exported MATLAB file",
+        (".mat",),
+        read_mat_export,
+        sniff=is_mat_export,
+        settings=mat_export_settings,
+        made_by="rigidimeter export",
+    ),
     Reader("MATLAB file", (".mat",), read_mat, made_by="save in MATLAB", extra="matlab73"),
+    Reader(
+        "NWB file",
+        (".nwb",),
+        read_nwb,
+        settings=nwb_settings,
+        made_by="a program that writes NWB",
+        extra="nwb",
+    ),
+    Reader(
+        "XDF file",
+        (".xdf", ".xdfz"),
+        read_xdf,
+        settings=xdf_settings,
+        made_by="LabRecorder",
+        extra="xdf",
+    ),
+    Reader(
+        "Parquet or Arrow file",
+        (".parquet", ".feather", ".arrow", ".arrows"),
+        read_arrow,
+        made_by="a program that writes Parquet or Arrow",
+    ),
 ]
 """Every format. Of several readers for one path the first counts."""
 
@@ -96,7 +150,7 @@ def reader_of(path: Path) -> Reader:
     for reader in (*named, *(reader for reader in READERS if reader.sniff is not None)):
         if reader.sniff is None or reader.sniff(path):
             return reader
-    known = _any_of([suffix for reader in READERS for suffix in reader.suffixes])
+    known = _any_of(list(dict.fromkeys(s for reader in READERS for s in reader.suffixes)))
     if path.is_dir():
         raise UserError(
             f"{path} is a folder without manifest.json, so it is not a session folder; give a "
@@ -129,6 +183,18 @@ def read_recording(path: Path, options: ReadOptions) -> Epochs:
     """
     found = _read(path, _layout(options))
     return epochs_from_table(found, options) if isinstance(found, Table) else found
+
+
+def recorded_settings(path: Path) -> Settings | None:
+    """Return the settings with which a path was recorded; None where it does not say.
+
+    Raises
+    ------
+    UserError
+        If there is no reader of the path, or it is damaged.
+    """
+    reader = reader_of(path)
+    return None if reader.settings is None else _called(reader, reader.settings, path)
 
 
 def read_table(path: Path, options: ReadOptions | None = None) -> Table:
@@ -166,8 +232,21 @@ def _read(path: Path, layout: Layout) -> Table | Epochs:
                 raise UserError(
                     f"{path} is empty; a recording in a {path.suffix} file was expected"
                 )
+
+    def read(path: Path) -> Table | Epochs:
+        return reader.read(path, layout) if reader.of_text else reader.read(path)
+
+    found = _called(reader, read, path)
+    if isinstance(found, Table) and isinstance(found.columns, Columns):
+        columns = found.columns.refusing(functools.partial(_refusal, reader, path))
+        return replace(found, columns=columns)
+    return found
+
+
+def _called(reader: Reader, function: Callable[[Path], Found], path: Path) -> Found:
+    """Call a function of a reader; what it raises becomes a sentence."""
     try:
-        found = reader.read(path, layout) if reader.of_text else reader.read(path)
+        return function(path)
     except UserError:
         raise
     except ImportError as error:
@@ -179,10 +258,6 @@ def _read(path: Path, layout: Layout) -> Table | Epochs:
         ) from error
     except Exception as error:
         raise _refusal(reader, path, error) from error
-    if isinstance(found, Table) and isinstance(found.columns, Columns):
-        columns = found.columns.refusing(functools.partial(_refusal, reader, path))
-        return replace(found, columns=columns)
-    return found
 
 
 def _refusal(reader: Reader, path: Path, error: Exception) -> Exception:

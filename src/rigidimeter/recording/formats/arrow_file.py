@@ -1,0 +1,75 @@
+"""Parquet and Arrow files: columns, with units where the schema states them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.ipc
+import pyarrow.parquet
+from numpy.typing import NDArray
+
+from rigidimeter.documents import open_regular
+from rigidimeter.documents.bounds import RECORDING_BYTES
+from rigidimeter.recording.formats.stored_arrays import Expansion, check_count
+from rigidimeter.recording.formats.table import Table, printable
+
+_FILE = b"ARROW1"
+
+
+def read_arrow(path: Path) -> Table:
+    """Read a Parquet file, an Arrow file (Feather) or an Arrow stream.
+
+    Raises
+    ------
+    UserError
+        If it holds more than a recording does.
+    Exception
+        Whatever Arrow raises on a damaged file.
+    """
+    expansion = Expansion(path, path.stat().st_size)
+    with open_regular(path, RECORDING_BYTES) as file:
+        start = file.read(6)
+        file.seek(0)
+        if start[:4] == b"PAR1":
+            parquet = pa.parquet.ParquetFile(file)
+            rows, schema = parquet.metadata.num_rows, parquet.schema_arrow
+            check_count(path, len(schema))
+            expansion.take("its columns", 8 * rows * len(schema))
+            table = parquet.read()
+        else:
+            opened = pa.ipc.open_file if start == _FILE else pa.ipc.open_stream
+            table = opened(file).read_all()
+            check_count(path, len(table.schema))
+            expansion.take("its columns", table.nbytes)
+    units = {}
+    for field in table.schema:
+        unit = (field.metadata or {}).get(b"unit") or (field.metadata or {}).get(b"units")
+        if unit:
+            units[printable(field.name)] = unit.decode("utf-8", "replace")
+    columns, others = {}, {}
+    for name in table.column_names:
+        kind = table.schema.field(name).type
+        if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
+            columns[printable(name)] = _numbers(table[name])
+        elif pa.types.is_string(kind) or pa.types.is_large_string(kind) or _is_labels(kind):
+            columns[printable(name)] = _texts(table[name])
+        else:
+            others[printable(name)] = f"a column of {kind}"
+    return Table(str(path), columns, others=others, units=units)
+
+
+def _is_labels(kind: Any) -> bool:
+    return bool(pa.types.is_dictionary(kind) and pa.types.is_string(kind.value_type))
+
+
+def _numbers(column: Any) -> NDArray[np.float64]:
+    return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
+
+
+def _texts(column: Any) -> NDArray[Any]:
+    cells = np.empty(len(column), dtype=object)
+    cells[:] = ["" if cell is None else cell for cell in column.to_pylist()]
+    return cells

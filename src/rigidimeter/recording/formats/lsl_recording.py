@@ -1,0 +1,115 @@
+"""A recording of the streams that `rigidimeter run` sends: the samples of a session as received.
+
+The samples are the columns of a session folder; the k-th marker of an epoch's start belongs to the
+k-th epoch in them. So the epochs are those of the session folder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.documents import parse_json
+from rigidimeter.errors import UserError
+from rigidimeter.recording.sample_log import Sample, sample_dtypes
+from rigidimeter.recording.session_epochs import epoch_extents, epoch_of_samples
+from rigidimeter.records import Epoch, Notice, Outcome
+from rigidimeter.settings import Settings, parse_settings
+
+SAMPLES_TYPE = "RobotSamples"
+"""The type of the stream of samples."""
+
+
+def settings_of_samples(described: Mapping[str, Any], source: str) -> Settings:
+    """Return the settings that a stream of samples holds.
+
+    Raises
+    ------
+    UserError
+        If they are damaged or missing.
+    """
+    text = _fact(described, "settings")
+    if not text:
+        raise UserError(f"{source}: its stream of samples does not hold its settings")
+    return parse_settings(parse_json(text.encode(), f"{source}: settings"), source=source)
+
+
+def epochs_of_samples(
+    source: str,
+    columns: Mapping[str, NDArray[np.float64]],
+    markers: Sequence[tuple[float, str]],
+    described: Mapping[str, Any],
+) -> tuple[list[Epoch], list[Notice]]:
+    """Return the epochs of a recording of the streams.
+
+    Parameters
+    ----------
+    source : str
+    columns : mapping of str to array, shape (n,)
+        By label.
+    markers : sequence of (float, str)
+        Time and text.
+    described : mapping
+        What the stream says of itself.
+
+    Raises
+    ------
+    UserError
+        If a column of a session is missing.
+    """
+    missing = [name for name in Sample._fields if name not in columns]
+    if missing:
+        raise UserError(f"{source}: its stream of samples has no channel {missing[0]}")
+    samples = {name: columns[name].astype(kind) for name, kind in sample_dtypes().items()}
+    settings = settings_of_samples(described, source)
+    virtual = _fact(described, "virtual") == "true"
+    notices = _lost(source, samples["tick"])
+    first, last = epoch_extents(samples["epoch"])
+    ordered = sorted(markers, key=lambda each: each[0])
+    starts = [text.split("/") for _, text in ordered if text.startswith("epoch_start/")]
+    ends = {
+        words[1]: words[2]
+        for _, text in ordered
+        if text.startswith("epoch_end/") and len(words := text.split("/")) == 3
+    }
+    if len(starts) != len(first):
+        text = (
+            f"{source}: has {len(starts)} markers of an epoch's start, but samples of "
+            f"{len(first)} epochs; labels, tasks and conditions are those of the last markers"
+        )
+        notices.append(Notice("error", text))
+        starts = starts[-len(first) :] if first else []
+    epochs = []
+    for words, number in zip(starts, first, strict=False):
+        _, label, task, condition = (*words, "", "", "")[:4]
+        outcome = ends.get(str(number), "")
+        closed = Outcome()
+        if outcome != "success":
+            closed = Outcome("excluded", f"it ended with {outcome or 'no marker'}")
+        rows = slice(first[number], last[number] + 1)
+        started = {"label": label, "task": task, "condition": condition}
+        epochs.append(
+            epoch_of_samples(source, settings, samples, rows, started, closed, virtual=virtual)
+        )
+    return epochs, notices
+
+
+def _lost(source: str, tick: NDArray[Any]) -> list[Notice]:
+    """Say how many samples the recording program did not receive."""
+    lost = int(tick[-1] - tick[0] + 1 - tick.size) if tick.size else 0
+    if lost <= 0:
+        return []
+    text = (
+        f"{source}: {lost} ticks are not in the recording of the stream; they are in the session "
+        "folder, unless the loop itself was late"
+    )
+    return [Notice("warning", text)]
+
+
+def _fact(described: Mapping[str, Any], name: str) -> str:
+    """Return a fact of the element `rigidimeter` of a stream's description."""
+    about = (described.get("rigidimeter") or [None])[0] or {}
+    return str((about.get(name) or [""])[0] or "")
