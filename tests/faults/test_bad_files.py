@@ -86,7 +86,7 @@ def test_what_is_not_a_readable_file(tmp_path):
     assert "there is no such file" in refusal(tmp_path / "none.csv")
     (tmp_path / "r.xlsx").write_bytes(b"x")
     assert (
-        "what can be read is .csv, .tsv, .txt, .asc, .dat, .lvm, .sto, .mot, .npz or .mat"
+        "what can be read is .csv, .tsv, .txt, .asc, .dat, .lvm, .sto, .mot, .npz, .mat, .nwb, "
         in refusal(tmp_path / "r.xlsx")
     )
     (tmp_path / "r").write_bytes(b"x")
