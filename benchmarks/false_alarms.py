@@ -11,7 +11,7 @@ is the guard's own too, and counts as one.
     kind       the subject
     relaxed    a voluntary torque of 0.05 N·m (SD)
     pushing    1 N·m (SD), 0.3 to 4 Hz
-    tremor     3 N·m at 4, 5 and 6 Hz in turn
+    tremor     3 N·m at 4, 5, 6, 8 and 12 Hz in turn
     hanging    next to no stiffness or damping
     rigid      ten times the stiffness, six times the damping
     heavy      three times the inertia, as with a heavier cuff, and hanging
@@ -115,7 +115,7 @@ class Counted(NamedTuple):
 
 
 def kinds() -> Iterator[Kind]:
-    """Yield every combination of size, kind and rate; tremor in three frequencies."""
+    """Yield every combination of size, kind and rate; tremor in five frequencies."""
     for size, given in SIZES.items():
         for name, (factors, subject) in KINDS.items():
             joint = [value * factor for value, factor in zip(given["joint"], factors, strict=True)]
@@ -124,7 +124,7 @@ def kinds() -> Iterator[Kind]:
             )
             spread = {f"{what}_cv_percent": 20.0 for what in ("inertia", "damping", "stiffness")}
             for tick_hz, torque_hz, guard, controller in RATES:
-                frequencies = (4.0, 5.0, 6.0) if name == "tremor" else (5.0,)
+                frequencies = (4.0, 5.0, 6.0, 8.0, 12.0) if name == "tremor" else (5.0,)
                 for frequency_hz in frequencies:
                     whole = {**values, **spread, **subject, "tremor_frequency_hz": frequency_hz}
                     settings = parse_settings(
@@ -184,10 +184,12 @@ def compiled() -> Callable[..., tuple[int, int]]:
         return njit(with_helpers(function, helpers), error_model="numpy", nogil=True)
 
     causes = numbers(Cause)
+    solved_for = made(torque_sign.solved_for)
     sign = made(
         torque_sign.sign_is_wrong,
         table=made(torque_sign.table),
-        explained=made(torque_sign.explained, solved_for=made(torque_sign.solved_for)),
+        explained=made(torque_sign.explained, solved_for=solved_for),
+        whitened=made(torque_sign.whitened, solved_for=solved_for),
         without=made(torque_sign.without),
         least_of_each_sign=made(torque_sign.least_of_each_sign, solved=made(torque_sign.solved)),
     )

@@ -53,6 +53,9 @@ LONGEST_S = 0.06
 ROWS = (24, 48, 96)
 """Of the windows. The shortest shows a relaxed joint, the longer ones a less plain answer."""
 
+NOISE_ORDERS = (1, 2, 4)
+"""Of each window: as many as leave enough of its rows."""
+
 ROWS_A_LOOK = 6
 
 SETTLED = 0.75 * math.pi
@@ -128,7 +131,7 @@ def answer_limits(settings: Settings) -> AnswerLimits:
     shows_inertia = decay_per_s <= SETTLED * rig.tick_rate_hz
     inertia = settings.guard.least_inertia_kg_m2
     steps_rad_s2 = 2.0 * rad_from_deg(rig.motion.angle_resolution_deg) * FILTER_RAD_S**2
-    short, middle, long = (most_left(rows) for rows in ROWS)
+    short, middle, long = map(most_left, ROWS, NOISE_ORDERS)
     return AnswerLimits(
         rate_per_s=controller.damping_nm_s_rad / controller.inertia_kg_m2,
         steps_a_row=max(round(ROW_S / step_s), 1),

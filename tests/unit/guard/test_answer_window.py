@@ -10,6 +10,7 @@ from rigidimeter.guard import AnswerLimits, Cause
 from rigidimeter.guard.torque_answer import (
     AT_REST,
     FILTER_RAD_S,
+    NOISE_ORDERS,
     ROWS,
     ROWS_A_LOOK,
     answer_state,
@@ -18,7 +19,7 @@ from rigidimeter.guard.torque_answer import (
 from rigidimeter.guard.torque_sign import BEFORE, COLUMNS, most_left
 
 HALF = ROWS[-1] + BEFORE
-LEFT = tuple(most_left(rows) for rows in ROWS)
+LEFT = tuple(map(most_left, ROWS, NOISE_ORDERS))
 
 
 # --- the signals of a row

@@ -225,7 +225,7 @@ def test_each_limit_is_the_settings_in_si_units():
             }
         )
     )
-    assert limits.left == tuple(most_left(rows) for rows in (24, 48, 96))
+    assert limits.left == (most_left(24, 1), most_left(48, 2), most_left(96, 4))
     numbers = {name: value for name, value in limits._asdict().items() if name != "left"}
     assert numbers == pytest.approx(
         {
@@ -269,7 +269,7 @@ def test_the_figures_of_the_laws_and_what_they_begin_with():
     assert (ROWS, ROWS_A_LOOK, UNSHOWN_NM) == ((24, 48, 96), 6, 0.0003)
     assert pytest.approx((0.75 * math.pi, 0.3)) == (SETTLED, HARDLY_SHOWN)
     assert AnswerLimits() == (0.0, 2, (Left(), Left(), Left()), True, 0.0, 1.0, math.inf)
-    assert Left() == (0.0, 0.0)
+    assert Left() == (1, 0.0, 0.0)
     state = answer_state()
     assert not state.window.any()
     for signal in state[1:3]:
