@@ -191,7 +191,12 @@ def compiled() -> Callable[..., tuple[int, int]]:
         explained=made(torque_sign.explained, solved_for=solved_for),
         whitened=made(torque_sign.whitened, solved_for=solved_for),
         without=made(torque_sign.without),
-        least_of_each_sign=made(torque_sign.least_of_each_sign, solved=made(torque_sign.solved)),
+        fits_better=made(
+            torque_sign.fits_better,
+            least_of_each_sign=made(
+                torque_sign.least_of_each_sign, solved=made(torque_sign.solved)
+            ),
+        ),
     )
     answer = made(
         torque_answer.answer_step,

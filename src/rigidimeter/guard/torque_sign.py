@@ -121,16 +121,21 @@ def sign_is_wrong(window: Array, shows_inertia: bool, left: Left) -> bool:
     if (m * columns[:, MOVED]).sum() > 0.0 and (m * columns[:, MOVED - 1]).sum() > 0.0:
         return False  # it accelerates and brakes the joint as the right sign does
     weights = np.zeros(INSTRUMENTS)
-    answer = np.zeros((COLUMNS - 2, COLUMNS - 2))
     for _ in range(PASSES):
         noise, answer, weights = explained(whitened(columns, weights, left.order))
         if not shows_inertia:
             answer = without(answer, ACCELERATION)
-        plus, minus = least_of_each_sign(answer)
-        if not noise + minus < left.at_once * (noise + plus):
+        if not fits_better(noise, answer, left.at_once):
             return False
-    plus, minus = least_of_each_sign(without(answer, JERK))
-    return bool(noise + minus < left.if_early * (noise + plus))
+        if not fits_better(noise, without(answer, JERK), left.if_early):
+            return False
+    return True
+
+
+def fits_better(noise: float, answer: Array, most: float) -> bool:
+    """Return whether the wrong sign leaves less than this part of what the right one leaves."""
+    plus, minus = least_of_each_sign(answer)
+    return bool(noise + minus < most * (noise + plus))
 
 
 def table(window: Array) -> Array:
