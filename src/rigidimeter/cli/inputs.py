@@ -25,6 +25,8 @@ _OF_RECORDINGS = (
     "scale",
     "offset",
     "mapping",
+    "join",
+    "clock_offset",
     "skip_rows",
     "names",
     "rate_hz",

@@ -16,6 +16,23 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_type_hints
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperOption
 
+from rigidimeter.cli.reading_options import (
+    ClockOffsetOption,
+    ColumnOption,
+    ConditionOption,
+    EpochLengthSOption,
+    JoinOption,
+    LeaveOutOption,
+    MappingOption,
+    NamesOption,
+    OffsetOption,
+    RateHzOption,
+    ReactionOption,
+    ScaleOption,
+    SkipRowsOption,
+    TaskOption,
+    UnitOption,
+)
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -109,112 +126,21 @@ class Recordings:
     method: Annotated[
         str, typer.Option("--method", metavar="NAME", help="The estimator, by its name.")
     ] = "auto"
-    column: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--column",
-            metavar="NAME=COLUMN",
-            help="What the file calls a quantity, for example torque=Fz; torque_nm=Fz says that it "
-            "is in N·m. Repeat as needed.",
-        ),
-    ] = None
-    unit: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--unit",
-            metavar="NAME=UNIT",
-            help="The unit of a column, where the file does not state it, for example angle=deg or "
-            "time=ms; repeat as needed.",
-        ),
-    ] = None
-    scale: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--scale",
-            metavar="NAME=FACTOR",
-            help='What a column is multiplied by, for example "torque=2.5 Nm/V", or "torque=0.25 '
-            'm" for a force with a lever arm; repeat as needed.',
-        ),
-    ] = None
-    offset: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--offset",
-            metavar="NAME=VALUE",
-            help='What a column reads at zero, for example "torque=0.1 V"; repeat as needed.',
-        ),
-    ] = None
-    skip_rows: Annotated[
-        int,
-        typer.Option(
-            "--skip-rows", metavar="N", min=0, help="Lines at the beginning of a text not to read."
-        ),
-    ] = 0
-    names: Annotated[
-        str | None,
-        typer.Option(
-            "--names",
-            metavar="A,B,...",
-            help="The names of the columns of a text that does not name them.",
-        ),
-    ] = None
-    mapping: Annotated[
-        Path | None,
-        typer.Option(
-            "--mapping",
-            metavar="FILE",
-            help="A mapping file, which says columns, units and the like for the files of one "
-            "laboratory; `rigidimeter inspect` writes one.",
-        ),
-    ] = None
-    rate_hz: Annotated[
-        float | None,
-        typer.Option(
-            "--rate-hz", metavar="HZ", help="Sampling rate of a file without a time_s column."
-        ),
-    ] = None
-    reaction: Annotated[
-        bool,
-        typer.Option(
-            "--reaction",
-            help="The file holds the reaction torque of the joint, the negative of the torque that "
-            "drives it.",
-        ),
-    ] = False
-    epoch_length_s: Annotated[
-        float | None,
-        typer.Option(
-            "--epoch-length-s",
-            metavar="S",
-            help="Cut a file without an epoch column into epochs of this length.",
-        ),
-    ] = None
-    condition: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--condition",
-            metavar="NAME",
-            help="Condition of files without a condition column: once for all of them, or once "
-            "for each input in their order.",
-        ),
-    ] = None
-    task: Annotated[
-        str | None,
-        typer.Option(
-            "--task",
-            metavar="prbs|sinusoid",
-            help="Fit J, B and K (prbs) or score (sinusoid). Default: found from the motion.",
-        ),
-    ] = None
-    leave_out: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--leave-out",
-            metavar='"[NAME=]START:STOP REASON"',
-            help="Seconds on the recording's clock that no estimate uses, for example "
-            '"12.3:14.0 cough"; NAME is a recording, where there are several. Repeat as needed.',
-        ),
-    ] = None
+    column: ColumnOption = None
+    unit: UnitOption = None
+    scale: ScaleOption = None
+    offset: OffsetOption = None
+    skip_rows: SkipRowsOption = 0
+    names: NamesOption = None
+    mapping: MappingOption = None
+    join: JoinOption = False
+    clock_offset: ClockOffsetOption = None
+    rate_hz: RateHzOption = None
+    reaction: ReactionOption = False
+    epoch_length_s: EpochLengthSOption = None
+    condition: ConditionOption = None
+    task: TaskOption = None
+    leave_out: LeaveOutOption = None
     band_hz: Annotated[
         tuple[float, float] | None,
         typer.Option(
@@ -252,6 +178,8 @@ class Recordings:
             condition=self.condition,
             leave_out=self.leave_out or (),
             settings=self.settings,
+            join=self.join,
+            clock_offset=_offset(self.clock_offset),
             **self.of_files(),
         )
         return replace(recording, settings=self.adjust(recording.settings))
@@ -332,6 +260,13 @@ def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:
     with_options.__annotations__ = {**hints, "return": None}
     del with_options.__wrapped__
     return with_options
+
+
+def _offset(text: str | None) -> float | str | None:
+    try:
+        return text if text is None else float(text)
+    except ValueError:
+        return text
 
 
 def _pairs(option: str, pairs: list[str] | None, example: str) -> dict[str, str]:

@@ -10,8 +10,15 @@ from typing import Any
 
 from rigidimeter.documents import noted_digests
 from rigidimeter.errors import UserError
+from rigidimeter.recording.channels.joining import join_tables, joined_options
 from rigidimeter.recording.channels.mapping_file import merged, read_mapping
-from rigidimeter.recording.formats import ReadOptions, read_recording, recorded_settings
+from rigidimeter.recording.formats import (
+    ReadOptions,
+    read_recording,
+    read_table,
+    recorded_settings,
+)
+from rigidimeter.recording.formats.table_epochs import epochs_from_table
 from rigidimeter.recording.leave_out import with_left_out
 from rigidimeter.records import Epoch, Notice, Task
 from rigidimeter.settings import Settings, load_settings, settings_from
@@ -66,6 +73,8 @@ def read(
     skip_rows: int = 0,
     names: Sequence[str] = (),
     mapping: str | Path | None = None,
+    join: bool = False,
+    clock_offset: float | str | None = None,
     settings: Settings | str | Path | Mapping[str, Any] | None = None,
 ) -> Recording:
     """Read session folders and files into one recording.
@@ -106,6 +115,11 @@ def read(
         Of the columns of a text file that does not name them.
     mapping : path, optional
         A mapping file, which says all of this but the conditions; an argument comes before it.
+    join : bool
+        The paths are parts of one recording, such as torque and motion, each with its clock.
+    clock_offset : float or "found", optional
+        With `join`, what is added to the clocks of the second and later paths, in s; ``"found"``:
+        estimated from torque and motion, and said with its error.
     settings : Settings, path or mapping, optional
         Settings for the analysis, or a TOML file of them. Default: those with which the first
         session folder was recorded, else the built-in ones.
@@ -140,7 +154,20 @@ def read(
     epochs: list[Epoch] = []
     notices: list[Notice] = []
     digests: dict[Path, str] = {}
-    for path, name in dict(zip(asked, conditions, strict=True)).items():
+    if clock_offset is not None and not join:
+        raise UserError("--clock-offset: is for recordings that are joined; say --join")
+    if join:
+        with noted_digests() as digests:
+            table, notices = join_tables(
+                [read_table(path, options) for path in asked], options, clock_offset
+            )
+            of_joined = replace(joined_options(options), condition=conditions[0])
+            epochs, remarks = epochs_from_table(table, of_joined)
+        notices += remarks
+        asked_alone: list[tuple[Path, str]] = []
+    else:
+        asked_alone = [*dict(zip(asked, conditions, strict=True)).items()]
+    for path, name in asked_alone:
         try:
             with noted_digests() as noted:
                 recorded = recorded_settings(path)

@@ -69,3 +69,18 @@ def test_a_session_folder_is_inspected_too(rigidimeter, simulate):
     ran = rigidimeter("inspect", folder)
     assert ran.status == 0
     assert "session folder with 1 epochs" in ran.out
+
+
+def test_torque_and_motion_in_two_files_with_a_clock_each(tmp_path, rigidimeter):
+    torque_s, motion_s = np.arange(12_000) / 500.0, np.arange(4_800) / 200.0
+    torque, motion, out = tmp_path / "m.csv", tmp_path / "a.csv", tmp_path / "out.json"
+    np.savetxt(torque, np.c_[torque_s, torque_nm(torque_s)], header="t_s,M_Nm", delimiter=",")
+    late = np.c_[1e3 * (motion_s - 0.75), np.degrees(angle_rad(motion_s))]
+    np.savetxt(motion, late, header="t_ms,phi_deg", delimiter=",")
+    asked = ("estimate", torque, motion, "--json", out)
+    assert "no column torque_nm" in rigidimeter(*asked).err
+    ran = rigidimeter(*asked, "--join", "--clock-offset", "found")
+    assert ran.status == 0, ran.err
+    assert "a.csv: 0.75" in ran.err
+    assert stiffness(out) == pytest.approx(STIFFNESS_NM_RAD, rel=0.01)
+    assert "say --join" in rigidimeter(*asked, "--clock-offset", "0.75").err

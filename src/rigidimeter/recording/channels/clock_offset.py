@@ -1,0 +1,140 @@
+"""By how much two clocks differ, from a torque on one and the motion on the other.
+
+The torque of a joint is J θ″ + B θ′ + K θ, so the share of it that least squares on the motion
+explains is largest where the clocks agree. Units and the signs of both do not matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+import scipy.interpolate
+import scipy.optimize
+import scipy.signal
+from numpy.typing import NDArray
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.channels.looks import BAND_HZ, FEWEST
+
+Array = NDArray[np.float64]
+
+HIGHEST_RATE_HZ = 250.0
+LEAST_R_SQUARED = 0.5
+RIVAL = 0.9
+"""Another offset that explains so much of what the best does makes it ambiguous."""
+_APART_S = 0.5
+_LEAST_OVERLAP = 0.5
+
+
+@dataclass(frozen=True)
+class Offset:
+    """What is added to the motion's clock, with its standard error, and the torque it explains."""
+
+    value_s: float
+    error_s: float
+    r_squared: float
+
+
+def find_offset(
+    torque: tuple[Array, Array], motion: tuple[Array, Array], *, is_angle: bool
+) -> Offset:
+    """Find the offset of two clocks.
+
+    Parameters
+    ----------
+    torque, motion : (array, array)
+        Time in s and values.
+    is_angle : bool
+        Whether the motion is an angle, and not a velocity.
+
+    Raises
+    ------
+    UserError
+        If no offset explains the torque, or several do.
+    """
+    slowest_s = max(float(np.median(np.diff(stamps))) for stamps, _ in (torque, motion))
+    rate_hz = min(HIGHEST_RATE_HZ, 1.0 / slowest_s)
+    high_hz = min(BAND_HZ[1], 0.2 * rate_hz)
+    target, regressors = _grid(*torque, rate_hz), _motion(motion, rate_hz, is_angle=is_angle)
+    if min(target.size, regressors.shape[1]) < FEWEST:
+        raise UserError(f"--clock-offset found: needs {FEWEST} samples of torque and of motion")
+    sos = scipy.signal.butter(2, [BAND_HZ[0], high_hz], "bandpass", fs=rate_hz, output="sos")
+    target = scipy.signal.sosfiltfilt(sos, target - target.mean())
+    regressors = scipy.signal.sosfiltfilt(sos, regressors - regressors.mean(axis=1, keepdims=True))
+    lags, explained = _explained(target, regressors)
+    best = int(np.argmax(explained))
+    near = np.abs(lags - lags[best]) <= _APART_S * rate_hz
+    if explained[best] < LEAST_R_SQUARED:
+        raise UserError(
+            f"--clock-offset found: at no offset the motion explains more than "
+            f"{100 * explained[best]:.0f} % of the torque; give the offset in seconds"
+        )
+    if np.max(explained[~near], initial=0.0) > RIVAL * explained[best]:
+        raise UserError(
+            "--clock-offset found: several offsets explain the torque as well, as with a motion "
+            "that repeats; give the offset in seconds"
+        )
+    starts_s = torque[0][0] - motion[0][0]
+
+    def left(shift: float) -> float:
+        return _left(target, regressors, shift)
+
+    found = scipy.optimize.minimize_scalar(
+        left, bounds=(lags[best] - 1.5, lags[best] + 1.5), method="bounded",
+        options={"xatol": 1e-4},
+    )  # fmt: skip
+    shift, step = float(found.x), 0.5
+    curvature = (left(shift + step) - 2 * found.fun + left(shift - step)) / step**2
+    # In a band only so many samples are independent.
+    free = max(2 * (high_hz - BAND_HZ[0]) / rate_hz * target.size - 4, 1.0)
+    variance = 2.0 * float(found.fun) / free * (1.0 if curvature > 0 else np.inf) / abs(curvature)
+    return Offset(
+        float(starts_s + shift / rate_hz),
+        float(np.sqrt(variance)) / rate_hz,
+        1.0 - float(found.fun),
+    )
+
+
+def _grid(stamps: Array, values: Array, rate_hz: float) -> Array:
+    count = int((stamps[-1] - stamps[0]) * rate_hz) + 1
+    grid = stamps[0] + np.arange(count) / rate_hz
+    return np.asarray(np.interp(grid, stamps, values), dtype=np.float64)
+
+
+def _motion(motion: tuple[Array, Array], rate_hz: float, *, is_angle: bool) -> Array:
+    """Return angle, velocity and acceleration, shape (3, n)."""
+    values = _grid(*motion, rate_hz)
+    angle = values if is_angle else np.cumsum(values - values.mean()) / rate_hz
+    velocity = np.gradient(angle, 1.0 / rate_hz)
+    return np.stack([angle, velocity, np.gradient(velocity, 1.0 / rate_hz)])
+
+
+def _explained(target: Array, regressors: Array) -> tuple[NDArray[np.int_], Array]:
+    """Return, for each whole shift of the motion, the share of the torque that it explains."""
+    n, m = target.size, regressors.shape[1]
+    size = scipy.fft.next_fast_len(n + m)
+    spectrum = scipy.fft.rfft(target, size)
+    crossed = scipy.fft.irfft(spectrum * np.conj(scipy.fft.rfft(regressors, size)), size)
+    lags = np.arange(-m + 1, n)
+    crossed = crossed[:, lags]  # negative lags from the end
+    gram = np.linalg.inv(regressors @ regressors.T)
+    explained = np.einsum("ik,ij,jk->k", crossed, gram, crossed) / float(target @ target)
+    overlap = np.minimum(lags + m, n) - np.maximum(lags, 0)
+    return lags, np.where(overlap >= _LEAST_OVERLAP * min(n, m), explained, 0.0)
+
+
+def _left(target: Array, regressors: Array, shift: float) -> float:
+    """Return the share of the torque that is left where the motion is shifted by samples."""
+    at = np.arange(target.size) - shift
+    inside = (at >= 1) & (at <= regressors.shape[1] - 2)
+    index = np.arange(regressors.shape[1])
+    moved = np.column_stack(
+        [scipy.interpolate.CubicSpline(index, row)(at[inside]) for row in regressors]
+    )
+    moved /= np.linalg.norm(moved, axis=0)
+    part = target[inside]
+    solution, *_ = np.linalg.lstsq(moved, part, rcond=None)
+    residual = part - moved @ solution
+    return float(residual @ residual) / float(part @ part)
