@@ -20,6 +20,7 @@ import numpy as np
 
 from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.closedloop.drive_search import (
+    explained,
     mean_sign,
     power_left,
     search,
@@ -29,6 +30,7 @@ from rigidimeter.estimation.closedloop.drive_terms import Fitted, Samples, Struc
 from rigidimeter.estimation.closedloop.drive_uncertainty import STANDARD_ERRORS, as_likely
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.stretches import sound
+from rigidimeter.estimation.uncertainty import correlation_samples
 from rigidimeter.records import Channel, Epoch
 
 STRUCTURES = (
@@ -56,8 +58,11 @@ LARGEST_MISFIT = 0.1
 
 AS_GOOD, RIVAL = 1.05, 4.0
 """A structure that leaves this many times the power of the best predicts as well; one that leaves
-no more than the second of them might be there. With friction the second holds for both: what is
-then left is not noise, and further poles are bent to it."""
+no more than the second of them might be there if what the best leaves is not noise. With friction
+the second holds for both: further poles are bent to what is then left."""
+
+COLOURED = 2.0
+"""What is left is not noise if it is alike over so many samples."""
 
 UNSEEN = 2e-5
 """Structures that differ by less than this share of the velocity's SD are alike."""
@@ -125,7 +130,9 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
     if not fitted:
         return None
     enough = RIVAL * min(one.power for one in fitted) + UNSEEN**2
+    rubbing = [one for one in fitted if one.structure.friction and one.model.delay_s > 0.0]
     fitted = [_without_delay(samples, one) if one.power <= enough else one for one in fitted]
+    fitted += [one for one in rubbing if one not in fitted]
     least = min(one.power for one in fitted)
     if least > QUIET**2 and _power_between_lines(samples, fitted[0].model) < STAIRS * least:
         return None
@@ -141,7 +148,8 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
     chosen, misfit = best.whole, math.sqrt(best.power)
     if misfit > LARGEST_MISFIT or not 0.5 < chosen.model.gain < 2.0:
         return None
-    near = (one for one in fitted if one.power <= RIVAL * least + UNSEEN**2)
+    rival = AS_GOOD if _noise(samples, min(fitted, key=_by_power)) else RIVAL
+    near = (one for one in fitted if one.power <= rival * least + UNSEEN**2)
     rivals = (
         *best.halves,
         *as_likely(samples, chosen),
@@ -203,6 +211,12 @@ def _climbed(samples: Samples, start: DriveModel, friction: bool) -> list[Fitted
     return fitted
 
 
+def _noise(samples: Samples, one: Fitted) -> bool:
+    """Return whether a drive without friction leaves no more than noise of the velocity."""
+    left = samples.measured - explained(samples, one, samples.time_s)
+    return not one.structure.friction and correlation_samples(left[:, None]).item() < COLOURED
+
+
 def _without_delay(samples: Samples, one: Fitted) -> Fitted:
     """Return the structure without a delay where the samples do not show one.
 
@@ -212,6 +226,8 @@ def _without_delay(samples: Samples, one: Fitted) -> Fitted:
         return one
     alone = search(samples, one.structure, one.model, delayed=False)
     shown = 1.0 + STANDARD_ERRORS**2 / samples.measured.size
+    if one.structure.friction:
+        shown = RIVAL
     return alone if alone.power <= shown * one.power and not alone.too_fast else one
 
 

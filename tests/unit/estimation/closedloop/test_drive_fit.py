@@ -160,3 +160,16 @@ def test_three_poles_without_a_delay_are_found_as_such(model, rate_hz):
     np.testing.assert_allclose(
         sorted(found.model.poles_rad_s, key=abs), sorted(model.poles_rad_s, key=abs), rtol=0.02
     )
+
+
+def test_what_leaves_more_than_noise_is_no_rival():
+    # A delay of 0.5 ms in place of the lag leaves three times the power of the noise.
+    model = drive_of([-86 + 92j, -86 - 92j, -1829 + 0j], [172.0, 15860.0])
+    rng = np.random.default_rng(6)
+    commands = np.convolve(rng.standard_normal(3000), np.ones(10) / 10, "same")
+    command = Channel("velocity_command_rad_s", np.arange(3000) / 1000.0, commands)
+    velocity = driven(model, command, command.time_s).velocity_rad_s
+    velocity = velocity + 3e-3 * np.std(velocity) * rng.standard_normal(3000)
+    found = fit_drive(recorded(commands, velocity, 0.001), DriveModel.second_order(20.0, 0.7071))
+    assert found.misfit == pytest.approx(3e-3, rel=0.05)
+    assert max(drive.delay_s for drive in found.rivals) < 3e-4
