@@ -1,12 +1,15 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.unit.virtual.tiny import SHORT
 
 from rigidimeter.cli.estimate import estimate_lines
 from rigidimeter.records import Analysis, Fit, Outcome, Score
+from rigidimeter.virtual.study_design import two_day_design
 
 
 def test_help_names_every_command_and_gives_examples(rigidimeter):
@@ -249,7 +252,11 @@ def test_a_session_in_which_an_epoch_failed_is_recorded_and_ends_with_1(rigidime
     assert "1 of 2 epochs did not end with success; events.jsonl holds the reason" in ran.err
 
 
-def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(rigidimeter, tmp_path):
+def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(rigidimeter, tmp_path, monkeypatch):
+    def short(*epochs):
+        return replace(two_day_design(*epochs), settings=SHORT)
+
+    monkeypatch.setattr("rigidimeter.virtual.study_design.two_day_design", short)
     other = tmp_path / "thesis"
     other.mkdir()
     (other / "chapter.txt").write_text("years of work")

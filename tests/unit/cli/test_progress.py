@@ -66,10 +66,10 @@ def simulated(delay_s: float) -> tuple[list[Epoch], Settings]:
             "rig": {"torque": {"latency_s": 0.001 + delay_s, "stamp_latency_s": 0.001}},
         }
     )
-    batch = simulate_epochs(settings, 10, conditions="OFF", seed=3)
-    epochs = [batch.epoch(i) for i in range(10)]
+    batch = simulate_epochs(settings, 6, conditions="OFF", seed=3)
+    epochs = [batch.epoch(i) for i in range(6)]
     half = [
-        Epoch(f"day {i // 5}", e.label, e.channels, "OFF", "prbs") for i, e in enumerate(epochs)
+        Epoch(f"day {i // 3}", e.label, e.channels, "OFF", "prbs") for i, e in enumerate(epochs)
     ]
     return half, settings
 
