@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from tests.unit.exporting.conftest import with_jitter
 
+from rigidimeter.errors import UserError
 from rigidimeter.exporting import export_sessions, sessions_of_recording
 from rigidimeter.recording import read
 from rigidimeter.recording.exported_session import ExportedSession
@@ -76,3 +78,39 @@ def test_a_recording_without_events_marks_its_epochs(tmp_path: Path) -> None:
         "epoch_start/2//",
         "epoch_end/2/included",
     ]
+
+
+def test_an_export_that_breaks_off_is_refused(exported: ExportedSession, tmp_path: Path) -> None:
+    path = tmp_path / "session.xdf"
+    export_sessions([exported], "xdf", path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(UserError, match="whose end is missing"):
+        read(path)
+
+
+def test_a_count_that_no_chunk_can_hold_is_refused(
+    exported: ExportedSession, tmp_path: Path
+) -> None:
+    """Before anybody makes room for it."""
+    path = tmp_path / "session.xdf"
+    export_sessions([exported], "xdf", path)
+    data = bytearray(path.read_bytes())
+    count = struct.pack("<BI", 4, 3251)
+    at = data.index(count)
+    data[at + 1 : at + 5] = b"\xff\xff\xff\x7f"
+    path.write_bytes(data)
+    with pytest.raises(UserError, match="says that it holds 2147483647 samples"):
+        read(path)
+
+
+def test_a_length_that_leads_beyond_the_file_is_refused(
+    exported: ExportedSession, tmp_path: Path
+) -> None:
+    path = tmp_path / "session.xdf"
+    export_sessions([exported], "xdf", path)
+    data = bytearray(path.read_bytes())
+    data[4 + 1 + 4] = 1  # of the file header
+    path.write_bytes(data)
+    with pytest.raises(UserError, match="damaged length"):
+        read(path)

@@ -6,6 +6,9 @@ import struct
 from typing import BinaryIO
 from xml.etree import ElementTree
 
+BOUNDARY = bytes.fromhex("43a546dccbf5410fb30ed5467383cbe4")
+"""What a chunk between others holds, so that a reader finds its place again."""
+
 _HEADER, _SAMPLES = 2, 3
 _VALUE_BYTES = {
     "int8": 1,
@@ -36,7 +39,9 @@ def check_xdf(file: BinaryIO, file_bytes: int) -> None:
     while (length := _number(file)) is not None:
         end = file.tell() + length
         if length < 2 or end > file_bytes:
-            return  # pyxdf looks for the next boundary; nothing is taken from this chunk
+            if BOUNDARY in file.read(file_bytes - file.tell()):
+                raise ValueError("a chunk within it has a damaged length")
+            return  # nothing is taken from this chunk
         (tag,) = struct.unpack("<H", file.read(2))
         if tag == _HEADER:
             stream, least = _header(file, end)

@@ -7,7 +7,10 @@ nominal rate are straightened, as pyxdf does.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import logging
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -18,6 +21,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.documents import open_regular, parse_json
 from rigidimeter.documents.bounds import RECORDING_BYTES
+from rigidimeter.errors import UserError
 from rigidimeter.recording.exported_session import (
     ExportedSession,
     Stream,
@@ -80,6 +84,11 @@ def read_xdf(path: Path) -> Table | tuple[list[Epoch], list[Notice]]:
             Stream(each.name.removeprefix(_PREFIX), each.time_s, _columns(each)) for each in own
         )
         return epochs_of_export(ExportedSession(about, exported), str(path))
+    if any(stream.name.startswith(_PREFIX) for stream in streams):
+        raise UserError(
+            f"{path}: is an export of a session whose end is missing, and its document with it; "
+            "export the session again"
+        )
     sent = next((stream for stream in streams if stream.kind == SAMPLES_TYPE), None)
     if sent is not None:
         markers = [
@@ -115,12 +124,27 @@ def _streams(path: Path) -> list[XdfStream]:
 
     with open_regular(path, RECORDING_BYTES) as file:
         check_xdf(file, path.stat().st_size)
-    ours = any(each["name"] == _DOCUMENT for each in pyxdf.resolve_streams(str(path)))
-    # Stamps of an exported session are those of its devices, on one clock.
-    found, _ = pyxdf.load_xdf(
-        str(path), synchronize_clocks=not ours, dejitter_timestamps=not ours, verbose=False
-    )
+    with _quiet():
+        ours = any(each["name"] == _DOCUMENT for each in pyxdf.resolve_streams(str(path)))
+        # Stamps of an exported session are those of its devices, on one clock.
+        found, _ = pyxdf.load_xdf(
+            str(path), synchronize_clocks=not ours, dejitter_timestamps=not ours
+        )
     return [_stream(each) for each in found]
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep pyxdf from printing tracebacks: of damage `check_xdf` has said what is to be said."""
+    log = logging.getLogger("pyxdf.pyxdf")
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # of a stream of one stamp
+            yield
+    finally:
+        log.setLevel(level)
 
 
 def _stream(found: Mapping[str, Any]) -> XdfStream:
