@@ -9,10 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.fft
-import scipy.interpolate
-import scipy.optimize
-import scipy.signal
+import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.io
+import scipy
 
 from rigidimeter.documents import open_regular, parse_json
 from rigidimeter.documents.bounds import RECORDING_BYTES
