@@ -1,9 +1,11 @@
-"""How often the tests of the lack of fit are wrong, and how often right.
+"""How often the tests of the lack of fit and of other bands are wrong, and how often right.
 
 Recordings of one and of four epochs of the same PRBS. Without a misfit the share of p below 0.05
 should be 5 %, and below 0.001 0.1 %; `lack_of_fit` needs less than 1e-4 over all tests of a
-recording, and a misfit above `lack_of_fit_most_percent`. In the last rows the torque went through
-a low-pass filter that its stamps do not know of: what the perturbation causes is then not J, B, K.
+recording, and a misfit above `lack_of_fit_most_percent`. `band_sensitivity` is counted where it
+doubts the fit to all epochs, whose interval is the narrowest. In the last rows the torque went
+through a low-pass filter that its stamps do not know of: what the perturbation causes is then not
+J, B and K.
 
     python -m benchmarks.lack_of_fit --recordings 100
 """
@@ -13,13 +15,15 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy import signal
 
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import method_named
-from rigidimeter.estimation.diagnostics.together import lack_of_fit, misfits
+from rigidimeter.estimation.diagnostics.band_check import band_finding
+from rigidimeter.estimation.diagnostics.together import in_bands, lack_of_fit, misfits
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import Settings, parse_settings
@@ -41,8 +45,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--recordings", type=int, default=100)
     count = parser.parse_args(arguments).recordings
-    print("| recording | epochs | p < 0.05 | p < 0.001 | smallest p of all | lack_of_fit |")
-    print("| --- | --- | --- | --- | --- | --- |")
+    print(
+        "| recording | epochs | p < 0.05 | p < 0.001 | smallest p of all | lack_of_fit "
+        "| bands: p < 0.05 | band_sensitivity |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for name, subject in SUBJECTS.items():
         _rows(name, subject, count, filtered=False)
     for name in ("relaxed", "0.2 N·m voluntary"):
@@ -52,7 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _rows(name: str, subject: Mapping[str, float], count: int, *, filtered: bool) -> None:
     settings = parse_settings({"subject": {"OFF": dict(subject)}})
     p: dict[int, list[float]] = {1: [], EPOCHS: []}
-    raised = dict.fromkeys(p, 0)
+    of_bands: dict[int, list[float]] = {1: [], EPOCHS: []}
+    raised, doubted = dict.fromkeys(p, 0), dict.fromkeys(p, 0)
     batches = simulate_chunks(
         settings,
         count * EPOCHS,
@@ -66,25 +74,42 @@ def _rows(name: str, subject: Mapping[str, float], count: int, *, filtered: bool
         if filtered:
             epochs = [_filtered(epoch) for epoch in epochs]
         for size in p:
-            tests, found = _judged(epochs[:size], settings)
-            p[size] += tests
-            raised[size] += found
+            judged = _judged(epochs[:size], settings)
+            p[size] += judged.p
+            of_bands[size] += judged.p_of_bands
+            raised[size] += judged.lack_of_fit
+            doubted[size] += judged.band_sensitivity
     for size, values in p.items():
         found_p = np.array(values)
         print(
             f"| {name} | {size} | {100 * np.mean(found_p < 0.05):.1f} % "
             f"| {100 * np.mean(found_p < 0.001):.2f} % | {np.min(found_p):.1g} "
-            f"| {raised[size]} of {count} |",
+            f"| {raised[size]} of {count} "
+            f"| {100 * np.mean(np.array(of_bands[size]) < 0.05):.1f} % "
+            f"| {doubted[size]} of {count} |",
             flush=True,
         )
 
 
-def _judged(epochs: Sequence[Epoch], settings: Settings) -> tuple[list[float], bool]:
+class _Judged(NamedTuple):
+    p: list[float]
+    p_of_bands: list[float]
+    lack_of_fit: bool
+    band_sensitivity: bool
+
+
+def _judged(epochs: Sequence[Epoch], settings: Settings) -> _Judged:
     iv, prepared = method_named("iv"), prepare(epochs, settings)
-    fits, _ = iv.fit(prepared, None, lambda _: None, False)
+    fits, pooled = iv.fit(prepared, None, lambda _: None, True)
     members = list(zip(prepared, fits, strict=True))
-    _, tests = misfits(members, iv)
-    return [test.p for test in tests], lack_of_fit(members, iv) is not None
+    observed, tests = misfits(members, iv)
+    _, changes = in_bands(observed)
+    return _Judged(
+        [test.p for test in tests],
+        [p for found in changes if found.part == "all" for p in found.p.tolist()],
+        bool(lack_of_fit(tests, observed, settings.diagnostics)),
+        bool(band_finding(pooled[0], changes, settings.diagnostics)),
+    )
 
 
 def _filtered(epoch: Epoch) -> Epoch:

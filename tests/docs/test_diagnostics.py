@@ -22,7 +22,8 @@ def test_every_check_has_its_row_and_no_other_has() -> None:
     assert sorted(names) == sorted(DiagnosticLevels.model_fields)
     assert len(names) == len(set(names))
     # Some are found where epochs are fitted.
-    of_fits = ["lack_of_fit", "varying_between_epochs", "between_samples", "torque_delay"]
+    of_fits = ["lack_of_fit", "band_sensitivity", "varying_between_epochs", "between_samples"]
+    of_fits += ["torque_delay"]
     assert sorted(names) == sorted([*(check.name for check in CHECKS), *of_fits])
 
 

@@ -89,7 +89,7 @@ def _fits(analysis: Analysis) -> list[str]:
     bands = sorted({fit.band_hz for fit in analysis.fits if fit.n_samples})
     band = "".join(f", {low:.4g} to {high:.4g} Hz" for low, high in bands[:1])
     heading = f"J, B, K of each epoch ± one standard error, {analysis.method}{band}"
-    return [heading, *_fit_table(analysis.fits)]
+    return [heading, *_fit_table(analysis.fits, analysis.fits)]
 
 
 def _fixed_inertia(analysis: Analysis) -> list[str]:
@@ -100,7 +100,7 @@ def _fixed_inertia(analysis: Analysis) -> list[str]:
     inertia = f"{analysis.inertia_kg_m2:.5g} kg·m²"
     return [
         f"B, K with the inertia held at the median, {inertia}",
-        *_fit_table(analysis.fixed_inertia),
+        *_fit_table(analysis.fixed_inertia, analysis.fits),
     ]
 
 
@@ -138,7 +138,8 @@ def _findings(analysis: Analysis) -> list[str]:
     return ["What the checks found (the JSON file has all of it)", *lines] if lines else []
 
 
-def _fit_table(fits: Sequence[Fit]) -> list[str]:
+def _fit_table(fits: Sequence[Fit], checked: Sequence[Fit]) -> list[str]:
+    """Return a table with a line for each fit, and what casts doubt on its epoch."""
     rows = [
         (
             fit.epoch,
@@ -152,7 +153,8 @@ def _fit_table(fits: Sequence[Fit]) -> list[str]:
         )
         for fit in fits
     ]
-    return _by_source(fits, [_FIT_HEADING, *rows], "<<>>>>><")
+    doubts = [f"doubt: {', '.join(fit.doubts)}" if fit.doubts else "" for fit in checked]
+    return _by_source(fits, [_FIT_HEADING, *rows], "<<>>>>><", doubts)
 
 
 def _scores(analysis: Analysis) -> list[str]:
@@ -167,16 +169,21 @@ def _scores(analysis: Analysis) -> list[str]:
     ]
     if not rows:
         return []
-    lines = _by_source(analysis.scores, [_SCORE_HEADING, *rows], "<<>><")
+    lines = _by_source(analysis.scores, [_SCORE_HEADING, *rows], "<<>><", [""] * len(rows))
     return ["Scores of each sinusoidal epoch, per cycle", *lines]
 
 
 def _by_source(
-    results: Sequence[Fit | Score], rows: Sequence[tuple[str, ...]], align: str
+    results: Sequence[Fit | Score],
+    rows: Sequence[tuple[str, ...]],
+    align: str,
+    doubts: Sequence[str],
 ) -> list[str]:
-    """Return a table of results by source; the last column says why one does not count."""
-    outcomes = [result.outcome for result in results]
-    remarks = ["" if o.included else f"{o.kind}: {o.reason}" for o in outcomes]
+    """Return a table of results by source; the last column says what is wrong with one."""
+    remarks = [
+        doubt if result.outcome.included else f"{result.outcome.kind}: {result.outcome.reason}"
+        for result, doubt in zip(results, doubts, strict=True)
+    ]
     heading, *lines = text_table(
         [rows[0], *((*row, remark) for row, remark in zip(rows[1:], remarks, strict=True))],
         align,

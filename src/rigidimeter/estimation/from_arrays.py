@@ -106,8 +106,8 @@ def identify(
     (fit,), _ = chosen.fit([prepared], None, lambda _: None, False)
     if fit.outcome.kind == "failed":
         raise ValueError(f"method {chosen.name}: {fit.outcome.reason}")
-    (fit,), _ = checked_together([prepared], [checked(prepared, fit)], [], chosen)
-    return fit
+    together = checked_together([prepared], [checked(prepared, fit)], [], chosen)
+    return together.fits[0]
 
 
 def _array(name: str, values: ArrayLike) -> Array:

@@ -14,6 +14,7 @@ from rigidimeter.records import (
     PARAMETERS,
     STATISTICS,
     Analysis,
+    BandEstimate,
     Delay,
     Finding,
     Fit,
@@ -21,6 +22,7 @@ from rigidimeter.records import (
     Score,
     readonly,
 )
+from rigidimeter.records.band_estimate import BAND_VECTORS
 
 ESTIMATES_SCHEMA = "rigidimeter.estimates/1"
 
@@ -41,6 +43,7 @@ def estimates_document(analysis: Analysis) -> dict[str, Any]:
             "epochs": [_fit_row(fit) for fit in analysis.fixed_inertia],
         },
         "scores": [score.row() for score in analysis.scores],
+        "sensitivity": [one.row() for one in analysis.sensitivity],
     }
     return dict(plain_values(document))
 
@@ -83,6 +86,7 @@ def read_estimates(path: Path) -> Analysis:
             _read_pooled(document.get("pooled"), method),
             tuple(_read_delay(row) for row in document.get("delays", ())),
             str(document.get("method_reason", "")),
+            tuple(_band_estimate(row) for row in document.get("sensitivity", ())),
         )
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UserError(
@@ -150,6 +154,15 @@ def _read_finding(row: Mapping[str, Any]) -> Finding:
         str(row["text"]),
         str(row["remedy"]),
     )
+
+
+def _band_estimate(row: Mapping[str, Any]) -> BandEstimate:
+    vectors: dict[str, Any] = {
+        vector: tuple(_number(row[name + ending]) for name in _PARAMETERS)
+        for vector, ending in BAND_VECTORS.items()
+    }
+    low_hz, high_hz = _number(row["low_hz"]), _number(row["high_hz"])
+    return BandEstimate(str(row["condition"]), low_hz, high_hz, str(row["part"]), **vectors)
 
 
 def _read_delay(row: Mapping[str, Any]) -> Delay:

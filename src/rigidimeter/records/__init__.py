@@ -4,6 +4,7 @@ Every name ends in its unit. Arrays are float64 and read-only once inside a reco
 """
 
 from rigidimeter.records.analysis_record import Analysis, Findings
+from rigidimeter.records.band_estimate import BandEstimate
 from rigidimeter.records.epochs import (
     CHANNEL_UNITS,
     Channel,
@@ -26,6 +27,7 @@ __all__ = [
     "PARAMETER_VECTORS",
     "STATISTICS",
     "Analysis",
+    "BandEstimate",
     "Channel",
     "Delay",
     "Epoch",

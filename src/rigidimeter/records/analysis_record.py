@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rigidimeter.records.band_estimate import BandEstimate
 from rigidimeter.records.estimates import FIT_NUMBERS, Delay, Finding, Fit, Score
 from rigidimeter.records.parameters import PARAMETERS
 
@@ -33,7 +34,8 @@ class Analysis:
     order of reading. `inertia_kg_m2` is the median that the second stage held fixed (NaN if no
     epoch was included). `pooled` are the fits to all epochs of each condition together, and with
     several conditions to all epochs, whose condition is empty. `method_reason` says why a method
-    was chosen where it was left open.
+    was chosen where it was left open. `sensitivity` is what other bands give, where the
+    perturbation was recorded.
     """
 
     method: str
@@ -44,6 +46,7 @@ class Analysis:
     pooled: tuple[Fit, ...] = ()
     delays: tuple[Delay, ...] = ()
     method_reason: str = ""
+    sensitivity: tuple[BandEstimate, ...] = ()
 
     @property
     def findings(self) -> tuple[Findings, ...]:
@@ -99,7 +102,8 @@ def _html(analysis: Analysis) -> str:
         heading = ["epoch", "condition"]
         heading += [f"{p.symbol} ({p.unit}) [95\xa0% interval]" for p in PARAMETERS]
         shown = [*analysis.fits[:MOST_EPOCHS], *analysis.pooled]
-        parts.append(_table([*heading, "R²", "outcome"], [_fit_row(fit) for fit in shown]))
+        heading += ["R²", "outcome", "doubted by"]
+        parts.append(_table(heading, [_fit_row(fit) for fit in shown]))
     if len(analysis.fits) > MOST_EPOCHS:
         parts.append(f"<p>The first {MOST_EPOCHS} of {len(analysis.fits)} epochs.</p>")
     if analysis.findings:
@@ -136,7 +140,8 @@ def _fit_row(fit: Fit) -> list[str]:
     ]
     name = "all epochs" if fit.epoch == "pooled" else f"{fit.source}, {fit.epoch}"
     outcome = f"{fit.outcome.kind} {fit.outcome.reason}"
-    return [name, fit.condition, *intervals, _number(fit.r_squared), outcome]
+    doubts = ", ".join(fit.doubts)
+    return [name, fit.condition, *intervals, _number(fit.r_squared), outcome, doubts]
 
 
 def _where(fits: Sequence[Fit]) -> str:

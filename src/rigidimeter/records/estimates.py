@@ -168,6 +168,11 @@ class Fit:
         """The names of the parameters, in the order of the vectors."""
         return tuple(parameter.name for parameter in PARAMETERS)
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """The names of the checks that cast doubt on it, or exclude it."""
+        return tuple(dict.fromkeys(one.name for one in self.findings if one.level != "note"))
+
     def row(self) -> dict[str, Any]:
         """Return the names and numbers of the fit, as files and tables have them."""
         numbers = {name: getattr(self, name) for name in FIT_NUMBERS}

@@ -89,6 +89,7 @@ class DiagnosticLevels(Section):
     residual_whiteness: Level = "note"
     residual_perturbation: Level = "doubt"
     lack_of_fit: Level = "doubt"
+    band_sensitivity: Level = "doubt"
     between_samples: Level = "doubt"
     held_out_vaf: Level = "exclude"
     missing_term: Level = "doubt"
@@ -141,6 +142,7 @@ class DiagnosticsSettings(Section):
     residual_flatness_least: float = quantity(0.7, "1", 0.0, 1.0)
     residual_perturbation_most_percent: float = quantity(10.0, "%", 0.0, 100.0)
     lack_of_fit_most_percent: float = quantity(2.0, "%", 0.0, 100.0)
+    band_sensitivity_most_percent: float = quantity(3.0, "%", 0.0, 100.0)
     r_squared_least: float = quantity(0.3, "1", -100.0, 1.0)
     between_samples_most_percent: float = quantity(1.0, "%", 0.0, 100.0)
     held_out_vaf_least_percent: float = quantity(0.0, "%", -1000.0, 100.0)

@@ -202,7 +202,8 @@ def analyse_prepared(
         _, pooled = estimator.fit(counted, None, lambda _: None, True)
     by_perturbation = estimator.uses_perturbation
     pooled = [_with_differences(fit, fits, by_perturbation, preparation.settings) for fit in pooled]
-    fits, pooled = checked_together(fitted, fits, pooled, estimator)
+    together = checked_together(fitted, fits, pooled, estimator)
+    fits, pooled = together.fits, together.pooled
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
     if included:
@@ -223,6 +224,7 @@ def analyse_prepared(
         tuple(pooled),
         delays,
         reason,
+        tuple(together.sensitivity),
     )
 
 

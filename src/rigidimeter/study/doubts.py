@@ -23,10 +23,8 @@ class Doubt:
 def doubts(analysis: Analysis) -> tuple[Doubt, ...]:
     """Return which checks cast doubt on epochs that count, those of most epochs first."""
     counting = [fit for fit in analysis.fits if fit.outcome.included]
-    of_epochs = Counter(
-        name for fit in counting for name in {f.name for f in fit.findings if f.level != "note"}
-    )
-    of_pool = {f.name for fit in analysis.pooled for f in fit.findings if f.level != "note"}
+    of_epochs = Counter(name for fit in counting for name in fit.doubts)
+    of_pool = {name for fit in analysis.pooled for name in fit.doubts}
     names = [name for name, _ in of_epochs.most_common()]
     names += sorted(of_pool - of_epochs.keys())
     return tuple(Doubt(name, of_epochs[name], len(counting)) for name in names)

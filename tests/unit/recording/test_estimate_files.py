@@ -8,7 +8,7 @@ import pytest
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read_estimates, write_estimates_csv, write_estimates_json
-from rigidimeter.records import Analysis, Delay, Finding, Fit, Outcome, Score
+from rigidimeter.records import Analysis, BandEstimate, Delay, Finding, Fit, Outcome, Score
 
 FOUND = Finding("coherence", "doubt", 0.3, 0.5, "the coherence is 0.3", "ask the subject to relax")
 GOOD = Fit(
@@ -33,6 +33,21 @@ ANALYSIS = Analysis(
     ),
     (Delay("a.csv", 0.007, 1e-5, corrected=True), Delay("b.csv", remark="not estimated")),
     "the perturbation was not recorded",
+    (
+        BandEstimate(
+            "OFF", 0.1, 30.0, "all", (0.0045, 0.13, 1.7), (0.0,) * 3, (0.0,) * 3, (1.0,) * 3
+        ),
+        BandEstimate(
+            "OFF",
+            0.1,
+            30.0,
+            "first half",
+            (0.0046, 0.13, 1.7),
+            (1e-4, 0.0, 0.0),
+            (1e-5, 1e-3, 0.02),
+            (1e-9, 0.9, 1 / 3),
+        ),
+    ),
 )
 
 
@@ -59,12 +74,18 @@ def test_the_document_has_the_published_keys(tmp_path):
     assert document["delays"][0]["delay_s"] == 0.007
     assert document["delays"][1]["delay_s"] is None
     assert document["epochs"][0]["findings"][0]["remedy"] == "ask the subject to relax"
+    half = document["sensitivity"][1]
+    assert (half["part"], half["high_hz"]) == ("first half", 30.0)
+    assert half["inertia_kg_m2"] == 0.0046
+    assert half["inertia_kg_m2_change"] == 1e-4
+    assert half["damping_nm_s_rad_change_se"] == 1e-3
+    assert half["stiffness_nm_rad_p"] == 1 / 3
 
 
 def test_a_document_of_the_first_version_is_still_read(tmp_path):
     write_estimates_json(tmp_path / "e.json", ANALYSIS)
     document = json.loads((tmp_path / "e.json").read_text())
-    for name in ("pooled", "delays", "method_reason"):
+    for name in ("pooled", "delays", "method_reason", "sensitivity"):
         del document[name]
     for row in [*document["epochs"], *document["fixed_inertia"]["epochs"]]:
         del row["findings"]

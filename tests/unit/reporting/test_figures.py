@@ -9,7 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from rigidimeter.estimation import epoch_signals, scoring_cycles
-from rigidimeter.records import Channel
+from rigidimeter.records import BandEstimate, Channel
+from rigidimeter.reporting.sections.band_sensitivity import band_sensitivity
 from rigidimeter.reporting.sections.distribution import distribution
 from rigidimeter.reporting.sections.perturbation_figure import changes, perturbation, spectrum
 from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits
@@ -66,6 +67,21 @@ def test_intervals_stand_at_their_points_and_the_pooled_estimate_beside_them() -
     low, high = axes.get_ylim()
     assert low < 0.5
     assert high > 6.0
+
+
+def test_other_bands_stand_at_their_change_in_percent_with_its_error() -> None:
+    zero, value = (0.0, 0.0, 0.0), (0.004, 0.1, 2.0)
+    own = BandEstimate("OFF", 0.1, 30.0, "all", value, zero, zero, (1.0, 1.0, 1.0))
+    changed = (0.0044, 0.1, 1.9)
+    other = BandEstimate(
+        "OFF", 0.1, 15.0, "all", changed, (0.0004, 0.0, -0.1), (0.0004, 0.01, 0.2), (0.3, 1.0, 0.6)
+    )
+    figure = band_sensitivity([own, other], {"OFF": np.array([5.0, 5.0, 5.0])})
+    drawn = [axes.lines[1].get_xdata()[0] for axes in figure.axes]
+    assert drawn == pytest.approx([10.0, 0.0, -5.0])
+    (bar,) = figure.axes[0].containers[0].lines[2][0].get_segments()
+    assert bar[:, 0] == pytest.approx([10 - 19.6, 10 + 19.6], abs=0.01)
+    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["0.10 to 15.0 Hz"]
 
 
 def test_changes_keep_the_course_of_a_held_signal() -> None:

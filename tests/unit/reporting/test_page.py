@@ -110,6 +110,7 @@ def test_every_figure_of_the_page_lies_beside_it(written: Path, page: Page) -> N
         "perturbation",
         "perturbation_spectrum",
         "voluntary_spectrum",
+        "band_sensitivity",
         "torque_1_off",
         "torque_2_dbs",
         "loop_1_off",

@@ -95,6 +95,7 @@ def test_estimates_hold_what_the_analysis_holds(study: StudyResult) -> None:
         assert (row["band_low_hz"], row["band_high_hz"]) == fit.band_hz
         assert row["findings"] == ", ".join(finding.name for finding in fit.findings)
         assert row["n_findings"] == len(fit.findings)
+        assert row["doubts"] == ", ".join(fit.doubts)
         for name in ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"):
             for ending in ("", "_se", "_low", "_high", "_bound"):
                 assert row[name + ending] == getattr(fit, name + ending)

@@ -54,12 +54,15 @@ class Smoother:
         return np.asarray(mean, dtype=np.float64)
 
     def adjoint(self, weight: Array) -> Array:
-        """Return how much each raw line counts in a weighted sum of smoothed ones."""
-        share = weight / (self.stop - self.start)
-        steps = np.zeros(share.size + 1)
-        np.add.at(steps, self.start, share)
-        np.add.at(steps, self.stop, -share)
-        return np.cumsum(steps[:-1])
+        """Return how much each raw line counts in weighted sums of smoothed ones, shape (m, p)."""
+        share = weight / (self.stop - self.start)[:, None]
+        total = np.zeros((len(share) + 1, share.shape[1]))
+        np.cumsum(share, axis=0, out=total[1:])
+        # Both ends of the lines that are averaged rise, so those with a line among them are a row.
+        line = np.arange(len(share))
+        first = np.searchsorted(self.stop, line, side="right")
+        last = np.searchsorted(self.start, line, side="right")
+        return total[last] - total[first]
 
 
 def line_covariance(
@@ -96,10 +99,8 @@ def line_covariance(
     middle = 0.5 * ((weighted.conj() * density[:, None]).T @ weighted).real
     covariance = inverse @ middle @ inverse.T
     effect = np.abs(weighted @ inverse.T) ** 2  # (m, p): each line's share of each variance
-    degrees = np.empty(p)
-    for j in range(p):
-        share = smoother.adjoint(effect[:, j] * shape) * density / shape
-        degrees[j] = 2 * np.sum(share) ** 2 / np.sum(share**2)
+    share = smoother.adjoint(effect * shape[:, None]) * (density / shape)[:, None]
+    degrees = 2 * np.sum(share, axis=0) ** 2 / np.sum(share**2, axis=0)
     return covariance, degrees
 
 

@@ -32,6 +32,9 @@ from rigidimeter.settings import USABLE_FRACTION_OF_RATE, Settings
 
 Complex = NDArray[np.complex128]
 
+WIDER = 0.5, 1.4
+"""Lines are also kept of a band whose edges are these times those of the fit."""
+
 REPEATS = 0.999
 """The correlation of a perturbation with itself one period later, at least."""
 
@@ -53,6 +56,8 @@ class Observation(NamedTuple):
         would add that explain the velocity as well; where the drive is unknown, that of the
         settings.
     drive_known : bool
+    wider : Lines or None
+        Those of a wider band, for `band_sensitivity`.
     """
 
     lines: Lines
@@ -61,6 +66,7 @@ class Observation(NamedTuple):
     excited: NDArray[np.bool_]
     otherwise: tuple[Complex, ...] = ()
     drive_known: bool = False
+    wider: Lines | None = None
 
 
 def closed_loop_obstacle(epoch: Epoch) -> str:
@@ -88,7 +94,9 @@ def observe(prepared: PreparedEpoch) -> Observation:
     """
     perturbation = _perturbation(prepared)
     grid = _grid(prepared, None)
-    return _observed(prepared, perturbation, grid, np.ones(grid.line.size, dtype=np.bool_))
+    wider = _grid(prepared, None, WIDER)
+    everywhere = np.ones(grid.line.size, dtype=np.bool_)
+    return _observed(prepared, perturbation, grid, everywhere, wider)
 
 
 def observe_periods(prepared: PreparedEpoch) -> Observation:
@@ -182,17 +190,27 @@ def _even(perturbation: Channel) -> Channel:
     return Channel(perturbation.name, time_s, perturbation.values[np.maximum(last, 0)])
 
 
-def _grid(prepared: PreparedEpoch, samples: Callable[[int, float], int] | None) -> Grid:
+def _grid(
+    prepared: PreparedEpoch,
+    samples: Callable[[int, float], int] | None,
+    factors: tuple[float, float] = (1.0, 1.0),
+) -> Grid:
+    """Return the grid in the band, its edges times these factors as far as the rate allows."""
     epoch, estimation = prepared.epoch, prepared.settings.estimation
     torque = epoch.channels["torque_nm"]
     limiting = [torque] if prepared.source.drive else [torque, *motion_channels(epoch)]
     slowest = min(channel.rate_hz for channel in limiting)
-    high = min(estimation.band_high_closed_loop_hz, USABLE_FRACTION_OF_RATE * slowest)
-    return epoch_grid(epoch, (estimation.band_low_hz, high), estimation.trim_s, samples)
+    low, high = estimation.band_low_hz, estimation.band_high_closed_loop_hz
+    band = factors[0] * low, min(factors[1] * high, USABLE_FRACTION_OF_RATE * slowest)
+    return epoch_grid(epoch, band, estimation.trim_s, samples)
 
 
 def _observed(
-    prepared: PreparedEpoch, perturbation: Channel, grid: Grid, excited: NDArray[np.bool_]
+    prepared: PreparedEpoch,
+    perturbation: Channel,
+    grid: Grid,
+    excited: NDArray[np.bool_],
+    wider: Grid | None = None,
 ) -> Observation:
     epoch = prepared.epoch
     found = prepared.source.drive
@@ -209,9 +227,18 @@ def _observed(
         prepared.epoch.left_out,
     )
     made = prepared.source.once(key, lambda: excitation(perturbation, loop, grid))
-    lines = epoch_lines(epoch, grid, drive, torque_filter_of(prepared.settings.estimation))
-    otherwise = _otherwise(prepared, lines)
-    return Observation(lines, perturbation, made, excited, otherwise, drive is not None)
+    torque_filter = torque_filter_of(prepared.settings.estimation)
+    everything = epoch_lines(epoch, wider or grid, drive, torque_filter)
+    lines = everything.on(grid)
+    return Observation(
+        lines,
+        perturbation,
+        made,
+        excited,
+        _otherwise(prepared, lines),
+        drive is not None,
+        everything if wider is not None else None,
+    )
 
 
 def _otherwise(prepared: PreparedEpoch, lines: Lines) -> tuple[Complex, ...]:

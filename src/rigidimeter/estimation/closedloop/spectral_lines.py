@@ -127,6 +127,14 @@ class Lines:
     torque_nm: Complex
     motion: Complex
 
+    def on(self, grid: Grid) -> Lines:
+        """Return the lines of a grid of the same samples within this one."""
+        if grid is self.grid:
+            return self
+        first = int(grid.line[0] - self.grid.line[0])
+        part = slice(first, first + grid.line.size)
+        return Lines(grid, self.torque_nm[part], self.motion[part])
+
 
 def epoch_grid(
     epoch: Epoch,

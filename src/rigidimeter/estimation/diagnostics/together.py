@@ -1,8 +1,9 @@
-"""What the epochs of a condition show together: the lack of fit, and the bias of their pool.
+"""What the epochs of a condition show together: lack of fit, other bands, bias of their pool.
 
-The lack of fit is a matter of the joint, not of an epoch, so each epoch of the condition carries
-what was found. It is tested at the J, B and K that the perturbation gives, for every method: at
-those of least squares the subject's own torque would show in the residual as well.
+The lack of fit and the sensitivity to the band are matters of the joint, not of an epoch, so each
+epoch of the condition carries what was found. They are tested at the J, B and K that the
+perturbation gives, for every method: at those of least squares the subject's own torque would show
+in the residual as well.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimeter.estimation.closedloop.band_sensitivity import BandChange, Member, band_changes
 from rigidimeter.estimation.closedloop.lack_of_fit import (
     Answer,
     Misfit,
@@ -29,25 +31,43 @@ from rigidimeter.estimation.closedloop.observation import (
     observe_periods,
 )
 from rigidimeter.estimation.closedloop.spectral_lines import Complex
+from rigidimeter.estimation.diagnostics.band_check import band_estimates, band_finding
 from rigidimeter.estimation.diagnostics.diagnose import CHECKS, unbiased
 from rigidimeter.estimation.diagnostics.movement_checks import loop_bias
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.methods import method_named
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array
-from rigidimeter.records import Finding, Fit
+from rigidimeter.records import BandEstimate, Finding, Fit
 from rigidimeter.settings import DiagnosticsSettings
 
 CHANCE = 1e-4
 """Probability, over all parts of all tests of a condition, below which it is not noise."""
 
 
+class Together(NamedTuple):
+    """Fits, and fits to all epochs of a condition, with what epochs show together; other bands."""
+
+    fits: list[Fit]
+    pooled: list[Fit]
+    sensitivity: list[BandEstimate]
+
+
 class Observed(NamedTuple):
-    """An epoch with the J, B and K that the perturbation gives, and what it causes at them."""
+    """An epoch with the J, B and K that the perturbation gives, and what it causes at them.
+
+    `caused_wider` is at the lines of the wider band, `fitted` says which of them are the fit's.
+    """
 
     observation: Observation
     values: Array
-    caused: Complex
+    caused_wider: Complex
+    fitted: slice
+
+    @property
+    def caused(self) -> Complex:
+        """The motion that the perturbation causes, at the lines of the fit."""
+        return self.caused_wider[self.fitted]
 
     @property
     def answer(self) -> Answer:
@@ -62,7 +82,7 @@ def checked_together(
     fits: Sequence[Fit],
     pooled: Sequence[Fit],
     estimator: Method,
-) -> tuple[list[Fit], list[Fit]]:
+) -> Together:
     """Return the fits, and the pooled fits, with what the epochs of each condition show together.
 
     Parameters
@@ -75,38 +95,51 @@ def checked_together(
         That made them.
     """
     counting = [(p, f) for p, f in zip(prepared, fits, strict=True) if f.outcome.included]
-    conditions = dict.fromkeys(fit.condition for _, fit in counting)
     of_condition: dict[str, list[Finding]] = {}
-    for condition in conditions:
+    changes: dict[str, list[BandChange]] = {}
+    sensitivity: list[BandEstimate] = []
+    for condition in dict.fromkeys(fit.condition for _, fit in counting):
         members = [(p, f) for p, f in counting if f.condition == condition]
-        finding = lack_of_fit(members, estimator)
-        of_condition[condition] = [finding] if finding is not None else []
-    return (
-        [_with(fit, of_condition[fit.condition]) if fit.outcome.included else fit for fit in fits],
-        [
-            _with(
-                fit, [*of_condition.get(fit.condition, []), *_pooled_bias(fit, counting, estimator)]
-            )
-            for fit in pooled
-        ],
+        observed, tests = misfits(members, estimator)
+        settings = members[0][0].settings.diagnostics
+        of_condition[condition] = lack_of_fit(tests, observed, settings)
+        values, changes[condition] = in_bands(observed)
+        whole = [f for f in pooled if f.condition == condition and estimator.uses_perturbation]
+        sensitivity += band_estimates(
+            condition, whole[0] if whole else None, values, changes[condition]
+        )
+
+    def shared(fit: Fit) -> list[Finding]:
+        if fit.condition not in of_condition:
+            return []
+        settings = counting[0][0].settings.diagnostics
+        bands = band_finding(fit, changes[fit.condition], settings)
+        return [*of_condition[fit.condition], *bands]
+
+    return Together(
+        [_with(fit, shared(fit)) if fit.outcome.included else fit for fit in fits],
+        [_with(fit, [*shared(fit), *_pooled_bias(fit, counting, estimator)]) for fit in pooled],
+        sensitivity,
     )
 
 
-def lack_of_fit(members: Sequence[tuple[PreparedEpoch, Fit]], estimator: Method) -> Finding | None:
-    """Return what follows the perturbation and is not J, B and K; None where nothing was found.
+def in_bands(observed: Sequence[Observed]) -> tuple[Array, list[BandChange]]:
+    """Return J, B and K of epochs together, and how they change in other bands.
 
     Parameters
     ----------
-    members : sequence of (PreparedEpoch, Fit)
-        Epochs of one condition that count; those without a perturbation are passed over.
-    estimator : Method
-        That made the fits.
+    observed : sequence of Observed
+        As `misfits` gives them.
     """
-    observed, tests = misfits(members, estimator)
-    if not observed:
-        return None
-    settings = members[0][0].settings.diagnostics
-    return _worst(tests, observed, settings)
+    members = [
+        Member(one.observation.wider, one.caused_wider, one.fitted, one.values)
+        for one in observed
+        if one.observation.wider is not None
+    ]
+    try:
+        return band_changes(members) if members else (np.full(3, np.nan), [])
+    except np.linalg.LinAlgError:
+        return np.full(3, np.nan), []  # the fits say why
 
 
 def misfits(
@@ -114,7 +147,12 @@ def misfits(
 ) -> tuple[list[Observed], list[Misfit]]:
     """Return the epochs in which the lack of fit can be seen, and what each test says of them.
 
-    Parameters are those of `lack_of_fit`.
+    Parameters
+    ----------
+    members : sequence of (PreparedEpoch, Fit)
+        Epochs of one condition that count; those without a perturbation are passed over.
+    estimator : Method
+        That made the fits.
     """
     known = [(p, f) for p, f in members if not closed_loop_obstacle(p.epoch)]
     if not estimator.uses_perturbation and known:
@@ -124,10 +162,11 @@ def misfits(
         return [], []
     values = np.array([fit.value for _, fit in known])
     common = np.maximum(np.median(values, axis=0), LEAST)
-    observed = []
+    observed: list[Observed] = []
+    made: dict[int, Complex] = {}
     for (epoch, _), own in zip(known, values, strict=True):
         try:
-            observed.append(_member(epoch.once(observe), own, common))
+            observed.append(_member(epoch.once(observe), own, common, made))
         except ValueError:
             continue  # the fit of the epoch says why
     if not observed:
@@ -135,10 +174,20 @@ def misfits(
     return observed, _tested([member.answer for member in observed], known[0], common)
 
 
-def _member(observation: Observation, values: Array, common: Array) -> Observed:
-    assert observation.excitation is not None  # `observe` gives it
+def _member(
+    observation: Observation, values: Array, common: Array, made: dict[int, Complex]
+) -> Observed:
+    """Return an epoch as observed; `made` keeps what each perturbation causes, made once."""
+    excitation = observation.excitation
+    assert excitation is not None  # `observe` gives it
     J, B, K = common.tolist()
-    return Observed(observation, values, observation.excitation.motion_lines((J, B, K)))
+    grid = observation.lines.grid
+    wider = grid if observation.wider is None else observation.wider.grid
+    if id(excitation) not in made:
+        made[id(excitation)] = replace(excitation, grid=wider).motion_lines((J, B, K))
+    first = int(grid.line[0] - wider.line[0])
+    fitted = slice(first, first + grid.line.size)
+    return Observed(observation, values, made[id(excitation)], fitted)
 
 
 def _tested(
@@ -154,19 +203,27 @@ def _tested(
         periods = prepared.once(observe_periods)
     except ValueError:
         return found  # there are not two periods
-    return found + periodic(_member(periods, fit.value, common).answer, periods.excited)
+    return found + periodic(_member(periods, fit.value, common, {}).answer, periods.excited)
 
 
-def _worst(
+def lack_of_fit(
     found: Sequence[Misfit], observed: Sequence[Observed], settings: DiagnosticsSettings
-) -> Finding | None:
-    """Return the finding for the part with the largest misfit that is not noise; None without."""
+) -> list[Finding]:
+    """Return the finding for the part with the largest misfit that is not noise, if any.
+
+    Parameters
+    ----------
+    found : sequence of Misfit
+    observed : sequence of Observed
+        As `misfits` gives them.
+    settings : DiagnosticsSettings
+    """
     most = settings.lack_of_fit_most_percent
     sure = [part for part in found if part.p * len(found) < CHANCE and 100 * part.share > most]
     if not sure:
-        return None
+        return []
     worst = max(sure, key=lambda part: part.share)
-    return Finding(
+    finding = Finding(
         "lack_of_fit",
         settings.levels.lack_of_fit,
         100 * worst.share,
@@ -178,6 +235,7 @@ def _worst(
         "lower the upper edge of the band (--band-hz) and see whether J and B change; look at the "
         "coupling; `rigidimeter model --compare` tries terms for it",
     )
+    return [finding]
 
 
 def _in_half_the_band(observed: Sequence[Observed]) -> str:

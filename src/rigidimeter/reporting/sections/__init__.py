@@ -2,6 +2,7 @@
 
 from rigidimeter.reporting.contents import Section, from_study_folder
 from rigidimeter.reporting.sections import (
+    band_sensitivity,
     comparison_tables,
     data_quality,
     day_points,
@@ -43,6 +44,7 @@ SECTIONS: list[Section] = [
     impedance.SECTION,
     torque_fit.SECTION,
     unexplained_torque.SECTION,
+    band_sensitivity.SECTION,
     torque_angle_loop.SECTION,
     data_quality.FINDINGS,
     data_quality.EXCLUSIONS,

@@ -141,12 +141,15 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
     tables = result_tables(result)
     band, in_which = _band(analysis.fits)
     found: tuple[Column, ...] = ()
+    doubts: tuple[Column, ...] = ()
     if any(fit.findings for fit in analysis.fits):
         found = (Column("n_findings", "Findings", "count"),)
+    if any(fit.doubts for fit in analysis.fits):
+        doubts = (Column("doubts", "Doubted by", "reason"),)
     yield Table(
         "estimates",
         f"Inertia, damping and stiffness, epoch by epoch{in_which}",
-        (*WHO, *HOW, *_parameters(), *_quality(), *band, *found),
+        (*WHO, *HOW, *_parameters(), *_quality(), *band, *found, *doubts),
         tables["estimates"],
         empty="No epoch was fitted.",
         folding=True,
@@ -164,6 +167,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             Column(f"{prefix}reason", "Reason", "reason"),
             *_parameters(prefix),
             *_quality(prefix),
+            *doubts,
         ),
         tables["estimates"],
         empty="No epoch was fitted with the inertia fixed.",

@@ -59,7 +59,8 @@ def test_the_adjoint_is_the_transpose():
     rng = np.random.default_rng(1)
     smoother = Smoother.over(np.arange(2, 200), 3, 0.1)
     power, weight = rng.exponential(size=198), rng.uniform(size=198)
-    assert weight @ smoother(power) == pytest.approx(smoother.adjoint(weight) @ power, rel=1e-12)
+    weights = smoother.adjoint(weight[:, None])[:, 0]
+    assert weight @ smoother(power) == pytest.approx(weights @ power, rel=1e-12)
 
 
 def test_the_covariance_of_white_lines_is_the_textbooks():
