@@ -84,10 +84,10 @@ def test_columns_that_are_not_there(tmp_path, head, options, told):
 def test_what_is_not_a_readable_file(tmp_path):
     assert "folder without manifest.json, so it is not a session folder" in refusal(tmp_path)
     assert "there is no such file" in refusal(tmp_path / "none.csv")
-    (tmp_path / "r.xlsx").write_bytes(b"x")
+    (tmp_path / "r.docx").write_bytes(b"x")
     assert (
-        "what can be read is .csv, .tsv, .txt, .asc, .dat, .lvm, .sto, .mot, .npz, .mat, .nwb, "
-        in refusal(tmp_path / "r.xlsx")
+        "what can be read is .csv, .tsv, .txt, .asc, .dat, .lvm, .sto, .mot, .xlsx, .xlsm, .xlsb, "
+        ".xls, .ods, .npz, .mat, .nwb, " in refusal(tmp_path / "r.docx")
     )
     (tmp_path / "r").write_bytes(b"x")
     assert "without a suffix" in refusal(tmp_path / "r")

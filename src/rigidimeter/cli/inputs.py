@@ -29,6 +29,7 @@ _OF_RECORDINGS = (
     "clock_offset",
     "skip_rows",
     "names",
+    "table",
     "rate_hz",
     "reaction",
     "epoch_length_s",

@@ -30,6 +30,7 @@ from rigidimeter.cli.reading_options import (
     ReactionOption,
     ScaleOption,
     SkipRowsOption,
+    TableOption,
     TaskOption,
     UnitOption,
 )
@@ -132,6 +133,7 @@ class Recordings:
     offset: OffsetOption = None
     skip_rows: SkipRowsOption = 0
     names: NamesOption = None
+    table: TableOption = None
     mapping: MappingOption = None
     join: JoinOption = False
     clock_offset: ClockOffsetOption = None
@@ -203,6 +205,7 @@ class Recordings:
             "task": cast("Task | None", self.task),
             "skip_rows": self.skip_rows,
             "names": [name.strip() for name in self.names.split(",")] if self.names else (),
+            "table": self.table or "",
             "mapping": self.mapping,
         }
 

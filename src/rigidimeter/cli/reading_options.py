@@ -56,6 +56,10 @@ NamesOption = Annotated[
         help="The names of the columns of a text that does not name them.",
     ),
 ]
+TableOption = Annotated[
+    str | None,
+    typer.Option("--table", metavar="NAME", help="The sheet that is read, of a file with several."),
+]
 MappingOption = Annotated[
     Path | None,
     typer.Option(

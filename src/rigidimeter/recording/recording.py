@@ -72,6 +72,7 @@ def read(
     offset: Mapping[str, str] | None = None,
     skip_rows: int = 0,
     names: Sequence[str] = (),
+    table: str = "",
     mapping: str | Path | None = None,
     join: bool = False,
     clock_offset: float | str | None = None,
@@ -113,6 +114,8 @@ def read(
         Lines at the beginning of a text file that are not read.
     names : sequence of str
         Of the columns of a text file that does not name them.
+    table : str
+        The sheet that is read, of a file with several.
     mapping : path, optional
         A mapping file, which says all of this but the conditions; an argument comes before it.
     join : bool
@@ -146,6 +149,7 @@ def read(
         offset=offset,
         skip_rows=skip_rows,
         names=names,
+        table=table,
         mapping=mapping,
     )
     chosen = None if settings is None else settings_from(settings)
@@ -158,11 +162,11 @@ def read(
         raise UserError("--clock-offset: is for recordings that are joined; say --join")
     if join:
         with noted_digests() as digests:
-            table, notices = join_tables(
+            joined, notices = join_tables(
                 [read_table(path, options) for path in asked], options, clock_offset
             )
             of_joined = replace(joined_options(options), condition=conditions[0])
-            epochs, remarks = epochs_from_table(table, of_joined)
+            epochs, remarks = epochs_from_table(joined, of_joined)
         notices += remarks
         asked_alone: list[tuple[Path, str]] = []
     else:
@@ -206,6 +210,7 @@ def read_options(
     offset: Mapping[str, str] | None = None,
     skip_rows: int = 0,
     names: Sequence[str] = (),
+    table: str = "",
     mapping: str | Path | None = None,
 ) -> ReadOptions:
     """Return arguments of `read` as options, with those of the mapping file behind them.
@@ -226,6 +231,7 @@ def read_options(
         offsets=_by_name("offset", offset, "'torque': '0.1 V'"),
         skip_rows=skip_rows,
         names=tuple(names),
+        table=table,
     )
     return options if mapping is None else merged(read_mapping(Path(mapping)), options)
 

@@ -127,6 +127,8 @@ def option_words(found: Inspection) -> list[str]:
             words += [f"--{name}", f"{key}={text}"]
     if options.skip_rows:
         words += ["--skip-rows", str(options.skip_rows)]
+    if options.table:
+        words += ["--table", options.table]
     if options.names:
         words += ["--names", ",".join(options.names)]
     if options.rate_hz is not None:

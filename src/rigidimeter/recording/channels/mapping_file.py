@@ -42,6 +42,7 @@ class MappingToml(Section):
     task: Literal["prbs", "sinusoid"] | None = None
     skip_rows: int = Field(0, ge=0, le=1_000_000)
     names: list[str] = Field(default_factory=list, max_length=2000)
+    table: str = Field("", max_length=200)
     time: ColumnTable = ColumnTable()
     torque: ColumnTable = ColumnTable()
     angle: ColumnTable = ColumnTable()
@@ -89,6 +90,7 @@ def read_mapping(path: Path) -> ReadOptions:
             task=said.task,
             skip_rows=said.skip_rows,
             names=tuple(said.names),
+            table=said.table,
             units={name: table.unit for name, table in tables.items() if table.unit},
             scales={name: table.scale for name, table in tables.items() if table.scale},
             offsets={name: table.offset for name, table in tables.items() if table.offset},
@@ -107,6 +109,7 @@ def mapping_text(options: ReadOptions) -> str:
         ("task", options.task),
         ("skip_rows", options.skip_rows or None),
         ("names", list(options.names) or None),
+        ("table", options.table or None),
     ):
         if value is not None:
             lines.append(f"{name} = {_toml(value)}")

@@ -45,6 +45,8 @@ class ReadOptions:
         Lines at the beginning of a text that are not read.
     names : tuple of str
         Of the columns of a text that does not name them.
+    table : str
+        The sheet that is read, of a file with several.
 
     Raises
     ------
@@ -63,6 +65,7 @@ class ReadOptions:
     offsets: Mapping[str, str] = field(default_factory=dict)
     skip_rows: int = 0
     names: tuple[str, ...] = ()
+    table: str = ""
 
     def __post_init__(self) -> None:
         positive = (

@@ -32,6 +32,7 @@ from rigidimeter.recording.formats.mat_file import read_mat
 from rigidimeter.recording.formats.npz_file import read_npz
 from rigidimeter.recording.formats.nwb_file import nwb_settings, read_nwb
 from rigidimeter.recording.formats.read_options import ReadOptions
+from rigidimeter.recording.formats.spreadsheet import read_spreadsheet
 from rigidimeter.recording.formats.stored_arrays import Columns
 from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.table_epochs import epochs_from_table
@@ -60,7 +61,7 @@ class Reader:
         Turns a path into a `Table`, or into epochs and notices. It raises `UserError` with a
         sentence that begins with the path.
     of_text : bool
-        `read` takes a `Layout` too: what the user says of the lines of a text.
+        `read` takes a `Layout` too: what the user says of the lines of a text or a sheet.
     sniff : callable, optional
         Whether a path holds this format. It decides between readers of one suffix, and finds the
         reader of a path with an unknown suffix. A reader without it takes every file with one of
@@ -97,6 +98,14 @@ READERS: list[Reader] = [
         "text table",
         (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".sto", ".mot"),
         read_text_recording,
+        of_text=True,
+    ),
+    Reader(
+        "spreadsheet",
+        (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
+        read_spreadsheet,
+        made_by="Excel or LibreOffice",
+        extra="excel",
         of_text=True,
     ),
     Reader("NumPy archive", (".npz",), read_npz, made_by="numpy.savez"),
@@ -221,7 +230,7 @@ def formats_text() -> str:
 
 
 def _layout(options: ReadOptions) -> Layout:
-    return Layout(options.skip_rows, tuple(options.names))
+    return Layout(options.skip_rows, tuple(options.names), options.table)
 
 
 def _read(path: Path, layout: Layout) -> Table | Epochs:

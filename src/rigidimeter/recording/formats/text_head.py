@@ -60,10 +60,13 @@ class Layout:
         Lines at the beginning that are not read.
     names : tuple of str
         Of the columns, where the file has none.
+    table : str
+        The sheet that is read, of a file with several.
     """
 
     skip_rows: int = 0
     names: tuple[str, ...] = ()
+    table: str = ""
 
 
 def first_line_head(source: str, text: str, example: str) -> Head:
