@@ -1,78 +1,223 @@
-"""How often tests find a difference when epochs of one day are alike: one that is not there, or is.
+"""How often tests find a difference when epochs of one day are alike: a false or a true one.
 
-No effect of the condition; epochs have SD 1. A day has an offset, and where both conditions are
-recorded on one day, either the same offset for both or one for each. 78 epochs of nine days and
-23 of four, dealt to the days in turn. Run: `python -m benchmarks.day_tests 2000`; the table is in
-`docs/explanation/days-not-epochs.md`.
+Epochs have SD 1. A day has an offset for both conditions (alike), for each (own), or both kinds.
+Shown are the shares of p < .05 without a difference (size) and with one of 1.2 SD (power). The 95 %
+interval of the test by days holds the true difference wherever p of the null is above .05, thus in
+100 % less the size. Both mixed models, with offsets for days and conditions within days or for days
+alone, are slow: they get fewer draws.
+
+    python -m benchmarks.day_tests 4000 100     # draws, those of the mixed models; three minutes
+
+The table is in `docs/explanation/days-not-epochs.md`.
 """
 
 from __future__ import annotations
 
+import math
 import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri, stdtrit
 
-from rigidimeter.statistics import day_difference, ranksum
+from rigidimeter.statistics import difference, fit_mixed, nested
+from rigidimeter.statistics.day_levels import Epochs, test_by_levels
 
-EPOCHS, DAYS = (78, 23), (9, 4)
+Array = NDArray[np.float64]
+Draw = Callable[[np.random.Generator, int], Array]
+
 LEVEL = 0.05
 SEED = 20
 EFFECT = 1.2
-"""Of a difference, in SD of epochs within a day: about the paper's."""
-CASES = (
-    ("days of one condition", 0.0, 0.0, False),
-    ("days of one condition", 0.5, 0.0, False),
-    ("days of one condition", 1.0, 0.0, False),
-    ("four days with both, one offset a day", 0.5, 0.0, True),
-    ("four days with both, one offset a day", 1.0, 0.0, True),
-    ("four days with both, an offset for each", 0.0, 0.5, True),
-    ("four days with both, an offset for each", 0.0, 1.0, True),
-)
-"""What is drawn: its name, the SD of days, the SD of condition within day, days in common."""
+"""In SD of epochs within a day: about the paper's."""
 
 
-def rejected(
-    rng: np.random.Generator,
-    draws: int,
-    day_sd: float,
-    own_sd: float,
-    common: bool,
-    effect: float = 0.0,
-) -> tuple[float, ...]:
-    """Return the shares of p < .05: rank-sum of epochs, both mixed models, that of day medians."""
-    place = [np.arange(n) % d for n, d in zip(EPOCHS, DAYS, strict=True)]
-    second = "a" if common else "b"
-    labels = [[f"a{k}" for k in place[0]], [f"{second}{k}" for k in place[1]]]
-    hits = np.zeros(4)
-    for _ in range(draws):
-        offsets = [day_sd * rng.standard_normal(d) for d in DAYS]
-        if common:
-            offsets[1] = offsets[0][: DAYS[1]].copy()
-        x, y = (
-            shift
-            + (offset + own_sd * rng.standard_normal(offset.size))[where]
-            + rng.standard_normal(where.size)
-            for shift, offset, where in zip((0.0, effect), offsets, place, strict=True)
+def student(rng: np.random.Generator, size: int) -> Array:
+    """Return values of t with 3 degrees of freedom at SD 1."""
+    return rng.standard_t(3, size) / math.sqrt(3)
+
+
+def normal(rng: np.random.Generator, size: int) -> Array:
+    return rng.standard_normal(size)
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is recorded, and how days differ.
+
+    Attributes
+    ----------
+    name : str
+    x, y : range
+        Days of each condition; a number in both is one day.
+    alike, own : float
+        SD of a day for both its conditions, and of a condition within a day.
+    epochs : (int, int)
+        Of x and of y, dealt to their days in turn.
+    y_scale : float
+        Factor of everything that varies in y.
+    draw : callable
+    outlier : float
+        Added to the first day of both conditions.
+    subjects : int
+        Each with these days, and an SD of 2 between them.
+    uneven : bool
+        Half of the epochs of a condition are of its first day.
+    """
+
+    name: str
+    x: range
+    y: range
+    alike: float
+    own: float
+    epochs: tuple[int, int] = (0, 0)
+    y_scale: float = 1.0
+    draw: Draw = normal
+    outlier: float = 0.0
+    subjects: int = 1
+    uneven: bool = False
+
+    @cached_property
+    def labels(self) -> list[tuple[list[str], list[str]]]:
+        """Return subjects and days of the epochs of each condition."""
+        found = []
+        for days, wanted in zip((self.x, self.y), self.epochs, strict=True):
+            n = wanted or 6 * len(days)
+            place = np.arange(n) % len(days)
+            if self.uneven:
+                place[n // 2 :] = 0
+            names = [f"d{days[k]}" for k in place]
+            found.append(
+                (
+                    [f"s{s}" for s in range(self.subjects) for _ in names],
+                    names * self.subjects,
+                )
+            )
+        return found
+
+    @cached_property
+    def places(self) -> list[NDArray[np.int64]]:
+        """Return the place of the day of each epoch among all days, by condition."""
+        days = sorted({*self.x, *self.y})
+        return [
+            np.array(
+                [days.index(int(label[1:])) for label in labels[: len(labels) // self.subjects]]
+            )
+            for _, labels in self.labels
+        ]
+
+    def values(self, rng: np.random.Generator) -> Iterator[Array]:
+        """Yield the epochs of x and of y, without a difference."""
+        shape = self.subjects * len({*self.x, *self.y})
+        alike = self.alike * self.draw(rng, shape).reshape(self.subjects, -1)
+        alike += 2.0 * rng.standard_normal((self.subjects, 1)) * (self.subjects > 1)
+        alike[:, 0] += self.outlier
+        for place, scale in zip(self.places, (1.0, self.y_scale), strict=True):
+            own = alike + self.own * self.draw(rng, shape).reshape(self.subjects, -1)
+            yield scale * (own[:, place].ravel() + self.draw(rng, place.size * self.subjects))
+
+
+def _cases() -> Iterator[Case]:
+    kinds = (("alike", 1.0, 0.0), ("each by itself", 0.0, 1.0), ("both", 0.7, 0.7))
+    for n in (3, 5, 8):
+        for kind, alike, own in kinds:
+            yield Case(f"{n} days with both, {kind}", range(n), range(n), alike, own)
+    for n in (3, 5, 8):
+        yield Case(f"{n} days each, none shared", range(n), range(n, 2 * n), 0.0, 1.0)
+    paper = (78, 23)
+    yield Case("9 and 4 days, none shared", range(9), range(9, 13), 0.0, 1.0, paper)
+    for kind, alike, own in (*kinds, ("days do not differ", 0.0, 0.0)):
+        yield Case(f"9 days, 4 with both, {kind}", range(9), range(4), alike, own, paper)
+    nine, four = range(9), range(4)
+    for kind, alike, own in kinds[:2]:
+        yield Case(f"5 days, 3 with both, {kind}", range(5), range(3), alike, own)
+        yield Case(f"5 and 5 days, 2 of them shared, {kind}", range(5), range(3, 8), alike, own)
+        yield Case(f"9 days, 4 with both, {kind}, y SD × 2.5", nine, four, alike, own, paper, 2.5)
+        yield Case(
+            f"9 days, 4 with both, {kind}, uneven epochs",
+            nine,
+            four,
+            alike,
+            own,
+            paper,
+            uneven=True,
         )
-        found = day_difference(x, y, *labels)
-        alike = day_difference(x, y, *labels, one_offset=True) if common else found
-        hits += np.array([ranksum(x, y).p, found.p, alike.p, found.p_days]) < LEVEL
-    return tuple((hits / draws).tolist())
+        yield Case(f"9 days, 4 with both, {kind}, t₃", nine, four, alike, own, paper, draw=student)
+        yield Case(f"8 days with both, {kind}, t₃", range(8), range(8), alike, own, draw=student)
+        yield Case(
+            f"9 days, 4 with both, {kind}, a day 4 higher", nine, four, alike, own, paper, outlier=4
+        )
+        yield Case(f"4 subjects, 3 days with both, {kind}", range(3), range(3), alike, own,
+                   subjects=4)  # fmt: skip
+        yield Case(f"2 subjects, 4 days with both, {kind}", range(4), range(4), alike, own,
+                   subjects=2)  # fmt: skip
+    yield Case("8 and 3 days, none shared, y SD × 2.5", range(8), range(8, 11), 0.0, 1.0,
+               y_scale=2.5)  # fmt: skip
 
 
-def main(draws: int) -> None:
-    """Print the table."""
-    for effect in (0.0, EFFECT):
-        what = f"the other condition {effect:g} SD higher" if effect else "no difference"
-        print(f"\nShare of p < {LEVEL:g}, {what}, {draws} draws each, seed {SEED}.\n")
-        print("| days | SD of days | epochs | mixed | mixed, one offset | day medians |")
-        print("| --- | ---: | ---: | ---: | ---: | ---: |")
-        for k, (name, day_sd, own_sd, common) in enumerate(CASES):
-            rng = np.random.default_rng([SEED, k])
-            shares = rejected(rng, draws, day_sd, own_sd, common, effect)
-            told = " | ".join(f"{100 * share:.1f} %" for share in shares)
-            print(f"| {name} | {max(day_sd, own_sd):g} | {told} |", flush=True)
+def mixed_p(case: Case, x: Array, y: Array) -> tuple[float, float]:
+    """Return p after Kenward and Roger with offsets for conditions within days, and without."""
+    (x_subjects, x_days), (y_subjects, y_days) = case.labels
+    conditions = ["x"] * x.size + ["y"] * y.size
+    subjects = x_subjects + y_subjects
+    days = nested(subjects, x_days + y_days)
+    groups = {"day": days} if case.subjects == 1 else {"subject": subjects, "day": days}
+    found = []
+    for own in ({"condition in day": nested(days, conditions)}, {}):
+        fit = fit_mixed(np.concatenate([x, y]), conditions, groups | own)
+        found.append(difference(fit, "x", "y").p_kenward_roger)
+    return found[0], found[1]
+
+
+def rank_sum(x: Array, y: Array) -> bool:
+    """Return whether the asymptotic rank-sum test of values without ties has p < `LEVEL`."""
+    n = x.size + y.size
+    ranks = np.empty(n)
+    ranks[np.argsort(np.concatenate([x, y]))] = np.arange(1, n + 1)
+    away = ranks[: x.size].sum() - x.size * (n + 1) / 2
+    return bool(abs(away) > -ndtri(LEVEL / 2) * math.sqrt(x.size * y.size * (n + 1) / 12))
+
+
+def by_day(case: Case, x: Array, y: Array) -> Epochs:
+    """Return the epochs as the test by days takes them."""
+    found: Epochs = {}
+    for k, (values, labels) in enumerate(zip((x, y), case.labels, strict=True)):
+        for value, subject, day in zip(values.tolist(), *labels, strict=True):
+            found.setdefault(subject, {}).setdefault(day, ([], []))[k].append(value)
+    return found
+
+
+def shares(case: Case, draws: int, mixed: int, seed: list[int]) -> list[float]:
+    """Return sizes and powers, of epochs, of both mixed models and by days."""
+    rng = np.random.default_rng(seed)
+    found = np.full((draws, 8), np.nan)
+    for k in range(draws):
+        x, y = case.values(rng)
+        test = test_by_levels(by_day(case, x, y), ("x", "y"))
+        half = -float(stdtrit(test.df, LEVEL / 2)) * test.se
+        for column, shift in enumerate((0.0, EFFECT * case.y_scale)):
+            # What is subtracted from y is added to the difference, and to nothing else.
+            found[k, column] = rank_sum(x, y - shift)
+            if k < mixed:
+                found[k, 2 + column : 6 : 2] = np.array(mixed_p(case, x, y - shift)) < LEVEL
+            found[k, 6 + column] = abs(test.estimate + shift) > half
+    return [float(share) for share in 100 * np.nanmean(found, axis=0)]
+
+
+def main(draws: int, mixed: int, chosen: str = "") -> None:
+    """Print the table of the cases whose names hold some text."""
+    print(f"{draws} draws, {mixed} of the mixed models, seed {SEED}; size / power in %.\n")
+    print("| days | epochs | mixed | mixed, one offset a day | by days |")
+    print("| --- | ---: | ---: | ---: | ---: |")
+    for k, case in enumerate(_cases()):
+        if chosen in case.name:
+            found = shares(case, draws, mixed, [SEED, k])
+            told = [f"{found[i]:.1f} / {found[i + 1]:.0f}" for i in range(0, 8, 2)]
+            print(f"| {case.name} | {' | '.join(told)} |", flush=True)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 2000)
+    main(*(int(n) for n in sys.argv[1:3] or ("4000", "100")), *sys.argv[3:4])

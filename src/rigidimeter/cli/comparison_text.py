@@ -19,6 +19,7 @@ BY = {
     "estimate": "without an estimate",
     "operator": "by the operator",
 }
+INDENTED = textwrap.TextWrapper(100, initial_indent="  ", subsequent_indent="    ")
 UNBOUNDED = (
     "",
     "† Too few values for an interval at this confidence: the smallest and the largest",
@@ -79,13 +80,13 @@ def _days(found: StudyResult) -> Iterator[str]:
     tested = [(c, c.days) for c in found.comparisons if c.days is not None]
     if not tested:
         return
-    model = next((days.model for _, days in tested if days.model), "each day")
     yield ""
-    yield f"Days, not epochs: mixed model with an offset for {model} (Kenward-Roger)"
+    yield "Days, not epochs:"
     for c, d in tested:
-        yield f"{c.measure.label}: {d.n_days_x} and {d.n_days_y} days"
+        both = f", {d.n_days_both} of them in both" if d.n_days_both else ""
+        yield f"{c.measure.label}: {d.n_days_x} and {d.n_days_y} days{both}"
         if d.remark:
-            yield f"  no test: {d.remark}"
+            yield from INDENTED.wrap(f"no test: {d.remark}")
             continue
         medians = (
             "" if math.isnan(d.p_days) else f", rank-sum of day medians p {number_text(d.p_days)}"
@@ -94,6 +95,8 @@ def _days(found: StudyResult) -> Iterator[str]:
             f"  {c.reference} − {c.other}: {_interval(d.estimate, d.low, d.high)}, "
             f"p {number_text(d.p)} (by Holm {number_text(c.days_p_holm)}; {d.df:.1f} df){medians}"
         )
+        for sentence in filter(None, (d.test, d.few)):
+            yield from INDENTED.wrap(sentence)
         if not math.isnan(d.day_share):
             yield f"  of the variance between epochs, {100 * d.day_share:.0f} % is between days"
 

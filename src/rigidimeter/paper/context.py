@@ -135,13 +135,12 @@ class Context:
         sessions = {session.entry.source: session.entry for session in read.gathered.sessions}
         pair = read.names.pair
         comparisons, _ = compare_measures(gathered(analysis, pair, sessions), resamples=0)
-        one_offset = read.folder.about.analysis.one_offset_a_day
         ratings, _ = rated(read.folder, read.names)
         return StudyResult(
             title=read.folder.about.title,
             reference=pair[0],
             other=pair[1],
-            comparisons=day_tests(comparisons, one_offset=one_offset),
+            comparisons=day_tests(comparisons),
             resamples=0,
             analysis=analysis,
             epochs=read.epochs,

@@ -134,7 +134,7 @@ def measure_figure(name: str, measure: str, context: Context) -> Row:
         ours=f"virtual study: medians {medians} {compared.measure.unit}; p = {p}, "
         f"r = {r}; when days count, not epochs, p = {by_day}",
         reading="Two-sided rank-sum test with tie and continuity correction; every epoch a point. "
-        "Beside it a mixed model with an offset for every day.",
+        + (f"Beside it, by days: {compared.days.test}." if compared.days else ""),
         unpublished=f"{_VIRTUAL_STUDY}stands in for them, with a subject that we chose.",
         figures=(
             Figure(

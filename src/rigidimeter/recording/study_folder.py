@@ -116,6 +116,12 @@ def read_study_folder(folder: Path, key: Path | None = None) -> StudyFolder:
 def _read_folder(folder: Path, key: Path | None, noted: Mapping[Path, str]) -> StudyFolder:
     about = read_study_toml(folder / STUDY_FILE)
     notices: list[Notice] = []
+    if "one_offset_a_day" in about.analysis.model_fields_set:
+        text = (
+            f"{folder / STUDY_FILE}: one_offset_a_day has no effect any more, for the test by days "
+            "is chosen by which days have which conditions; remove the line"
+        )
+        notices.append(Notice("warning", text))
     files = {STUDY_FILE: folder / STUDY_FILE}
     tables: dict[str, tuple[Row, ...] | None] = {}
     for name in TABLE_COLUMNS:

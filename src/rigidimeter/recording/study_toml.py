@@ -96,7 +96,7 @@ class AnalysisTable(Section):
     method : str
         Of estimation, as ``--method`` takes it.
     one_offset_a_day : bool
-        Take it that a day moves both its conditions alike (`statistics.day_difference`).
+        Read and without effect: the test by days is chosen by which days have which conditions.
     """
 
     method: str = _text("auto", 1, 40)

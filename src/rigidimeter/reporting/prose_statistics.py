@@ -7,7 +7,7 @@ import math
 from rigidimeter.reporting.method_words import method_title
 from rigidimeter.reporting.numbers import condition_name, plural, series
 from rigidimeter.reporting.references import Cited
-from rigidimeter.study import StudyResult
+from rigidimeter.study import RATING, StudyResult
 
 OFFSETS = {"condition in day": "condition within a day", "subject/day": "day within a subject"}
 """How sentences call what has an offset of its own in a mixed model, where not by its name."""
@@ -39,6 +39,13 @@ def rating_sentences(result: StudyResult, cite: Cited) -> list[str]:
     return sentences
 
 
+def day_tests_in_words(result: StudyResult) -> list[str]:
+    """Return the test by days of each measure; that of the ratings is told with their model."""
+    return [
+        c.days.test for c in result.comparisons if c.days and c.days.test and c.measure != RATING
+    ]
+
+
 def test_sentences(result: StudyResult, cite: Cited) -> list[str]:
     """Return which tests were made; nothing of those that were not."""
     sentences = []
@@ -49,16 +56,23 @@ def test_sentences(result: StudyResult, cite: Cited) -> list[str]:
             f"shift with the interval of the same test {cite('hodges')}."
         )
     tested = [c.days for c in result.comparisons if c.days and not math.isnan(c.days.p)]
-    if tested:
-        offsets = next((days.offsets for days in tested if days.offsets), ())
+    used = day_tests_in_words(result)
+    if used:
         sentences.append(
-            "Because epochs of one day are not independent, conditions were also compared by a "
-            "linear mixed model with a mean for each condition and a random intercept for "
-            f"{offsets_text(offsets)}, with {100 * tested[0].confidence:g} % intervals and p as in "
-            f"{cite.by_name('kenward')}."
+            "Because epochs of one day are not independent, conditions were also compared by the "
+            f"means of the days: {'; '.join(dict.fromkeys(used))}, with "
+            f"{100 * tested[0].confidence:g} % intervals."
         )
-        if _shared_days(result) and "condition in day" not in offsets:
-            sentences.append("The model assumes that a day affects both of its conditions equally.")
+        if any(" alone at weight " in words for words in used):
+            sentences.append(
+                "The weights follow from the numbers of days, not from the measured values."
+            )
+        if any(not words.startswith("paired") for words in used):
+            sentences.append(
+                "Variances were estimated from each kind of days by itself, without assuming them "
+                f"equal; degrees of freedom are those of {cite.by_name('satterthwaite')}, fewer "
+                "where a variance comes from few days."
+            )
         if any(not math.isnan(days.p_days) for days in tested):
             sentences.append(
                 "The medians of the days were compared by the exact two-sided rank-sum test."
@@ -97,8 +111,3 @@ def _effects(result: StudyResult, cite: Cited) -> list[str]:
             "rank-biserial correlations, in the same bootstrap."
         )
     return sentences
-
-
-def _shared_days(result: StudyResult) -> bool:
-    days = {(s.subject, s.day) for s in result.sessions}
-    return len({(s.subject, s.day, s.condition) for s in result.sessions}) > len(days)

@@ -41,6 +41,11 @@ REFERENCES = {
         "Kenward MG, Roger JH. Small sample inference for fixed effects from restricted maximum "
         "likelihood. Biometrics 53(3), 983–997, 1997.",
     ),
+    "satterthwaite": Reference(
+        "Satterthwaite 1946",
+        "Satterthwaite FE. An approximate distribution of estimates of variance components. "
+        "Biometrics Bulletin 2(6), 110–114, 1946.",
+    ),
     "bca": Reference(
         "Efron 1987",
         "Efron B. Better bootstrap confidence intervals. Journal of the American Statistical "

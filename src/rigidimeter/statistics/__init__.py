@@ -13,7 +13,6 @@ from rigidimeter.statistics.day_model import (
     DayDifference,
     day_difference,
     day_medians,
-    exact_ranksum,
 )
 from rigidimeter.statistics.effect_from_p import (
     PublishedDifference,
@@ -33,7 +32,9 @@ from rigidimeter.statistics.effect_sizes import (
     rank_biserial,
     two_groups,
 )
+from rigidimeter.statistics.exact_ranks import exact_ranksum
 from rigidimeter.statistics.mixed import Mixed, fit_mixed, nested
+from rigidimeter.statistics.partially_paired import PartiallyPaired, partially_paired
 from rigidimeter.statistics.ranksum import RankSum, ranksum
 from rigidimeter.statistics.summary import Summary, summarise
 
@@ -44,6 +45,7 @@ __all__ = [
     "Effects",
     "JointTest",
     "Mixed",
+    "PartiallyPaired",
     "PublishedDifference",
     "PublishedEffect",
     "RankSum",
@@ -65,6 +67,7 @@ __all__ = [
     "largest_r",
     "nested",
     "pairwise",
+    "partially_paired",
     "rank_biserial",
     "rank_biserial_interval",
     "ranksum",

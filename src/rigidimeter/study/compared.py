@@ -131,6 +131,7 @@ def _tested(c: Comparison) -> dict[str, Any]:
 def _days(c: Comparison) -> dict[str, Any]:
     row: dict[str, Any] = asdict(c.days) if c.days is not None else {}
     row["days_reference"], row["days_other"] = row.pop("n_days_x"), row.pop("n_days_y")
+    row["days_both"] = row.pop("n_days_both")
     return row | {"p_holm": c.days_p_holm}
 
 

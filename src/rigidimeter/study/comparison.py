@@ -192,21 +192,14 @@ def rank_test(comparison: Comparison) -> Comparison:
 
 
 def day_tests(
-    comparisons: Sequence[Comparison],
-    *,
-    one_offset: bool = False,
-    ready: Mapping[str, DayDifference] | None = None,
+    comparisons: Sequence[Comparison], ready: Mapping[str, DayDifference] | None = None
 ) -> tuple[Comparison, ...]:
     """Return paired comparisons with their tests by days, adjusted for all of them, and medians.
 
     `ready` holds tests that were made elsewhere, by measure: that of the ratings.
     """
     ready = ready or {}
-    found = [
-        ready.get(each.measure.name) or day_test(each, one_offset=one_offset)
-        for each in comparisons
-        if each.paired
-    ]
+    found = [ready.get(each.measure.name) or day_test(each) for each in comparisons if each.paired]
     adjusted = iter(zip(found, holm([each.p for each in found]), strict=True))
     done = []
     for each in comparisons:
@@ -216,11 +209,8 @@ def day_tests(
     return tuple(done)
 
 
-def day_test(comparison: Comparison, *, one_offset: bool = False) -> DayDifference:
-    """Compare the two conditions by days; where that cannot be done, a remark says why.
-
-    With `one_offset` a day is taken to affect both its conditions alike.
-    """
+def day_test(comparison: Comparison) -> DayDifference:
+    """Compare the two conditions by days; where that cannot be done, a remark says why."""
     x, y = (comparison.of(name) for name in comparison.pair)
     days = len({o.unit for o in x}), len({o.unit for o in y})
     if min(len(x), len(y)) < FEWEST_FOR_TEST:
@@ -233,7 +223,7 @@ def day_test(comparison: Comparison, *, one_offset: bool = False) -> DayDifferen
             [o.day for o in y],
             x_subjects=[o.subject for o in x],
             y_subjects=[o.subject for o in y],
-            one_offset=one_offset,
+            names=(comparison.reference, comparison.other),
         )
     except (ValueError, ArithmeticError) as error:
         return no_days(*days, str(error))
@@ -241,8 +231,7 @@ def day_test(comparison: Comparison, *, one_offset: bool = False) -> DayDifferen
 
 def no_days(days_x: int, days_y: int, remark: str = "") -> DayDifference:
     """Return a test by days without its numbers, for the reason given."""
-    numbers = (math.nan,) * 6
-    return DayDifference(*numbers, days_x, days_y, math.nan, math.nan, (), remark=remark)
+    return DayDifference(n_days_x=days_x, n_days_y=days_y, remark=remark)
 
 
 def _day_medians(comparison: Comparison) -> tuple[DayMedian, ...]:

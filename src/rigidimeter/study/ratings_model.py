@@ -139,8 +139,17 @@ def ratings_days(found: RatingsFound) -> DayDifference:
         return no_days(days_x, days_y, "the ratings cannot separate days from the residual")
     se, df = c.se_kenward_roger, c.df_kenward_roger
     low, high = interval_of(c.estimate, se, df)
-    none = no_days(days_x, days_y)
-    return replace(none, estimate=c.estimate, se=se, low=low, high=high, p=c.p_kenward_roger, df=df)
+    return DayDifference(
+        estimate=c.estimate,
+        se=se,
+        low=low,
+        high=high,
+        p=c.p_kenward_roger,
+        df=df,
+        n_days_x=days_x,
+        n_days_y=days_y,
+        test="mixed model with an offset for each examiner and each day, after Kenward and Roger",
+    )
 
 
 def rated_one_condition(found: RatingsFound) -> tuple[str, ...]:

@@ -31,8 +31,6 @@ def sensitivity_rows(
     chosen: str,
     sessions: Mapping[str, SessionEntry],
     pair: tuple[str, str],
-    *,
-    one_offset: bool = False,
 ) -> tuple[list[SensitivityRow], list[Notice]]:
     """Return one row for each measure, method and stage; a method that cannot says why.
 
@@ -47,8 +45,6 @@ def sensitivity_rows(
     sessions : mapping of str to SessionEntry
         By source.
     pair : (str, str)
-    one_offset : bool
-        As for `day_test`.
     """
     usable: dict[str, Analysis] = {}
     notices: list[Notice] = []
@@ -66,7 +62,7 @@ def sensitivity_rows(
                 fits = analysis.fixed_inertia if inertia == "fixed" else analysis.fits
                 used = method == chosen and inertia == stages[0]
                 found = rank_test(observed(measure, fits, pair, sessions))
-                p_day = day_test(found, one_offset=one_offset).p
+                p_day = day_test(found).p
                 rows.append(_row(found, method, inertia, p_day, used))
     return rows, notices
 

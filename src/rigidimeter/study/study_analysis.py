@@ -136,7 +136,6 @@ def analyse_study(
     """
     sessions = {s.entry.source: s.entry for s in read.gathered.sessions}
     pair = read.names.pair
-    one_offset = read.folder.about.analysis.one_offset_a_day
     subjects = _by_subject(read.epochs, sessions, read.settings)
     fitted = [epoch for epoch in read.epochs if epoch.task == "prbs"]
     others = sensitivity_methods() if fitted and all(pair) else ()
@@ -157,9 +156,7 @@ def analyse_study(
     comparisons, differences = compare_measures(comparisons, seed=seed, resamples=resamples)
     notices += [*lacking([c for c in comparisons if c.measure is not RATING], pair), *said]
     comparisons = day_tests(
-        comparisons,
-        one_offset=one_offset,
-        ready={} if ratings is None else {RATING.name: ratings_days(ratings)},
+        comparisons, {} if ratings is None else {RATING.name: ratings_days(ratings)}
     )
     done(statistics)
     rows: list[SensitivityRow] = []
@@ -169,7 +166,7 @@ def analyse_study(
             if method != main.method:
                 analyses[method], _ = _analysed(subjects, method, done, fits_alone=True)
         ordered = {name: analyses[name] for name in others} | analyses
-        rows, said = sensitivity_rows(ordered, main.method, sessions, pair, one_offset=one_offset)
+        rows, said = sensitivity_rows(ordered, main.method, sessions, pair)
         notices += said
     return StudyResult(
         title=read.folder.about.title,

@@ -183,7 +183,6 @@ def _study_toml(design: StudyDesign, seed: int) -> str:
     for condition in design.conditions:
         lines += ["", f"[conditions.{condition.name}]", *_stimulation(condition)]
     lines += ["", "[rating]", f"scale = [{low:.1f}, {high:.1f}]", f"step = {design.rating_step:g}"]
-    lines += ["", "[analysis]", "one_offset_a_day = true  # so it was made: see the assumptions"]
     return "\n".join(lines) + "\n"
 
 

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.unit.reporting.cohorts import Design, altered, made_study, untested
+from tests.unit.reporting.cohorts import Design, made_study, untested
 from tests.unit.reporting.parsed_page import ParsedPage
 
 from rigidimeter.reporting import SECTIONS
@@ -156,18 +156,12 @@ def test_a_blinded_study_keeps_its_codes_and_shows_no_stimulation() -> None:
     assert not re.search(r"130 Hz|stimulation|0\.32 mA|\bOFF\b|\bDBS\b", text)
 
 
-@pytest.mark.parametrize(("both", "one", "stated"), [(1, 1, True), (1, 0, False), (0, 1, False)])
-def test_one_offset_a_day_is_stated_where_days_have_both(
-    both: bool, one: bool, stated: bool
-) -> None:
-    study = made_study(dataclasses.replace(SMALL, both_on_a_day=bool(both)))
-    if one:
-        study = altered(
-            study,
-            lambda c: dataclasses.replace(c, days=dataclasses.replace(c.days, offsets=("day",))),
-        )
-    sentence = "The model assumes that a day affects both of its conditions equally."
-    assert (sentence in shown(study).words()) is stated
+def test_the_test_by_days_is_said_in_words() -> None:
+    page = shown(made_study(dataclasses.replace(SMALL, both_on_a_day=True)))
+    assert "t-test paired by " in page.words("comparison")
+    assert "of OFF alone at weight " in page.words("comparison")
+    page = shown(made_study(SMALL))
+    assert re.search(r"Welch's t-test of \d+ days of OFF and \d+ days of DBS", page.words())
 
 
 def test_several_subjects_are_distinguished() -> None:
@@ -175,9 +169,7 @@ def test_several_subjects_are_distinguished() -> None:
     page = shown(made_study(design))
     assert "2: M1, M2" in page.words("study")
     assert "6: 6 in OFF and 6 in DBS, 6 in both" in page.words("study")
-    assert "an offset for each subject, each day and each condition within a day" in page.words(
-        "comparison"
-    )
+    assert "no conclusion on other subjects" in page.words("comparison")
     assert "J held at the median of the same subject" in page.words()
 
 

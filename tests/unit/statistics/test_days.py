@@ -1,14 +1,10 @@
-"""The test of days against its closed forms: t-tests, and all ways to deal the days."""
-
-import itertools
+"""The test of days against its closed forms: t-tests of the means of days and of subjects."""
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from scipy.stats import mannwhitneyu, rankdata, ttest_ind, ttest_rel
+from scipy.stats import mannwhitneyu, ttest_ind, ttest_rel
 
-from rigidimeter.statistics import day_difference, day_medians, difference, exact_ranksum, fit_mixed
+from rigidimeter.statistics import DayDifference, day_difference, day_medians, partially_paired
 
 
 def days_of(prefix: str, days: int, epochs: int) -> list[str]:
@@ -20,138 +16,110 @@ def made(seed: int, days: int, epochs: int, spread: float) -> np.ndarray:
     return spread * rng.standard_normal((days, 1)) + rng.standard_normal((days, epochs))
 
 
-def test_one_epoch_a_day_is_the_ordinary_t_test() -> None:
-    x, y = made(1, 9, 1, 0.5).ravel(), 0.3 + made(2, 6, 1, 0.5).ravel()
-    found = day_difference(x, y, days_of("a", 9, 1), days_of("b", 6, 1), confidence=0.9)
-    expected = ttest_ind(x, y)
+def of_subjects(
+    x: np.ndarray, y: np.ndarray, x_names: list[str], y_names: list[str], shared: bool = True
+) -> DayDifference:
+    """Test values of shape (subjects, days, epochs)."""
+    labels = [
+        ([name for name in names for _ in range(values[0].size)],
+         [f"{prefix}{day}" for _ in names for day in range(values.shape[1])
+          for _ in range(values.shape[2])])
+        for names, values, prefix in ((x_names, x, "a"), (y_names, y, "a" if shared else "b"))
+    ]  # fmt: skip
+    return day_difference(
+        x.ravel(), y.ravel(), labels[0][1], labels[1][1],
+        x_subjects=labels[0][0], y_subjects=labels[1][0], names=("OFF", "DBS"),
+    )  # fmt: skip
+
+
+def test_separate_days_are_welchs_test_of_their_means() -> None:
+    x, y = made(3, 6, 5, 1.0), 0.4 + made(4, 6, 5, 2.0)
+    found = day_difference(
+        x.ravel(), y.ravel(), days_of("a", 6, 5), days_of("b", 6, 5), confidence=0.9
+    )
+    expected = ttest_ind(x.mean(axis=1), y.mean(axis=1), equal_var=False)
     assert found.p == pytest.approx(expected.pvalue, rel=1e-10)
-    assert found.df == pytest.approx(13)
     assert (found.low, found.high) == pytest.approx(expected.confidence_interval(0.9), rel=1e-10)
-    assert np.isnan(found.day_share)
+    assert found.estimate == pytest.approx(x.mean() - y.mean(), rel=1e-12)
+    assert (found.n_days_x, found.n_days_y, found.n_days_both) == (6, 6, 0)
+    assert found.offsets == ("day",)
+    assert found.test.startswith("Welch's t-test of 6 days of x and 6 days of y")
 
 
-def test_balanced_days_are_the_t_test_of_their_means() -> None:
+def test_days_with_both_conditions_are_the_paired_test_of_their_means() -> None:
+    """Whatever the number of epochs: the means of a day are not weighted by it."""
+    x, y = made(5, 5, 6, 2.0), made(6, 5, 2, 2.0)
+    found = day_difference(x.ravel(), y.ravel(), days_of("d", 5, 6), days_of("d", 5, 2))
+    expected = ttest_rel(x.mean(axis=1), y.mean(axis=1))
+    assert (found.p, found.df) == pytest.approx((expected.pvalue, 4), rel=1e-10)
+    interval = expected.confidence_interval(0.95)
+    assert (found.low, found.high) == pytest.approx(tuple(interval), rel=1e-10)
+    assert found.test == "paired t-test of 5 days"
+
+
+def test_days_with_both_and_days_with_one_are_combined() -> None:
+    x, y = made(7, 9, 4, 1.0), made(8, 4, 3, 1.0)
+    found = day_difference(
+        x.ravel(), y.ravel(), days_of("d", 9, 4), days_of("d", 4, 3), names=("OFF", "DBS")
+    )
+    means = x.mean(axis=1)
+    expected = partially_paired(means[:4], y.mean(axis=1), means[4:], [])
+    assert (found.estimate, found.se, found.df) == pytest.approx(
+        (expected.estimate, expected.se, expected.df), rel=1e-12
+    )
+    assert (found.n_days_x, found.n_days_y, found.n_days_both) == (9, 4, 4)
+    assert found.test == "t-test paired by 4 days, with 5 days of OFF alone at weight 0.28"
+    assert found.offsets == ("day", "condition in day")
+
+
+def test_the_order_of_epochs_does_not_matter() -> None:
+    x, y, order = made(7, 9, 4, 1.0).ravel(), made(8, 4, 3, 1.0).ravel(), np.arange(36)
+    days = np.array(days_of("d", 9, 4))
+    np.random.default_rng(1).shuffle(order)
+    first = day_difference(x, y, days.tolist(), days_of("d", 4, 3))
+    other = day_difference(x[order], y, days[order].tolist(), days_of("d", 4, 3))
+    assert (first.p, first.p_days) == pytest.approx((other.p, other.p_days), rel=1e-9)
+
+
+def test_three_subjects_with_both_are_compared_as_subjects() -> None:
+    x, y = (np.stack([made(seed + k, 4, 3, 1.0) for k in range(4)]) for seed in (10, 20))
+    found = of_subjects(x, y, list("stuv"), list("stuw"))
+    expected = ttest_rel(x[:3].mean(axis=(1, 2)), y[:3].mean(axis=(1, 2)))
+    assert (found.p, found.df) == pytest.approx((expected.pvalue, 2), rel=1e-9)
+    assert found.test == ("paired t-test of 3 subjects, 2 subjects with one condition left out")
+    assert (found.n_days_x, found.n_days_y, found.n_days_both) == (16, 16, 12)
+
+
+def test_two_subjects_are_the_mean_over_these_two() -> None:
+    x, y = (np.stack([made(seed + k, 4, 3, 1.0) for k in range(2)]) for seed in (30, 40))
+    found = of_subjects(x, y, ["s", "t"], ["s", "t"])
+    each = [ttest_rel(a.mean(axis=1), b.mean(axis=1)) for a, b in zip(x, y, strict=True)]
+    se = [np.std(a.mean(axis=1) - b.mean(axis=1), ddof=1) / 2 for a, b in zip(x, y, strict=True)]
+    assert all(abs(one.statistic) > 0 for one in each)
+    assert found.estimate == pytest.approx(np.mean(x) - np.mean(y))
+    assert found.se == pytest.approx(np.hypot(*se) / 2)
+    assert found.df == pytest.approx((se[0] ** 2 + se[1] ** 2) ** 2 / (se[0] ** 4 + se[1] ** 4) * 3)
+    assert "no conclusion on other subjects" in found.test
+
+
+def test_subjects_of_one_condition_each_are_welchs_test_of_subjects() -> None:
+    x, y = (np.stack([made(seed + k, 1, 4, 1.0) for k in range(5)]) for seed in (50, 60))
+    found = of_subjects(x, y, list("stuvw"), list("STUVW"))
+    expected = ttest_ind(x.mean(axis=(1, 2)), y.mean(axis=(1, 2)), equal_var=False)
+    assert found.p == pytest.approx(expected.pvalue, rel=1e-9)
+    assert np.isnan(found.p_days)  # nothing to deal within a subject
+    assert found.offsets == ("subject", "day")
+
+
+def test_the_share_between_days_is_that_of_mean_squares() -> None:
     x, y = made(3, 9, 5, 1.0), 0.4 + made(4, 4, 5, 1.0)
     found = day_difference(x.ravel(), y.ravel(), days_of("a", 9, 5), days_of("b", 4, 5))
-    expected = ttest_ind(x.mean(axis=1), y.mean(axis=1))
-    assert found.p == pytest.approx(expected.pvalue, rel=1e-9)
-    assert found.df == pytest.approx(11, rel=1e-9)
-    assert found.estimate == pytest.approx(x.mean() - y.mean(), rel=1e-12)
-    assert (found.n_days_x, found.n_days_y) == (9, 4)
-    # Mean squares: between days of a condition, and within days.
     within = np.mean([*x.var(axis=1, ddof=1), *y.var(axis=1, ddof=1)])
     sums = 5 * (8 * x.mean(axis=1).var(ddof=1) + 3 * y.mean(axis=1).var(ddof=1))
     between = (sums / 11 - within) / 5
-    assert found.day_share == pytest.approx(between / (between + within), rel=1e-8)
-
-
-def test_without_day_variance_it_tends_to_the_pooled_t_test() -> None:
-    """Mean squares between and within days alike: the variance of days is just zero."""
-    x, y = made(5, 60, 4, 0.0), 0.2 + made(6, 60, 4, 0.0)
-    for sample in (x, y):  # means of days spread by exactly what their epochs explain
-        rest = sample - sample.mean(axis=1, keepdims=True)
-        mean = sample.mean(axis=1)
-        scaled = (mean - mean.mean()) / mean.std(ddof=1)
-        sample[:] = rest / rest.std() + mean.mean() + 0.57 * scaled[:, None]
-    found = day_difference(x.ravel(), y.ravel(), days_of("a", 60, 4), days_of("b", 60, 4))
-    assert found.day_share < 1e-3
-    assert found.p == pytest.approx(ttest_ind(x.ravel(), y.ravel()).pvalue, rel=0.05)
-
-
-def test_days_with_both_conditions_give_the_paired_difference() -> None:
-    """One epoch of each condition a day: the paired t-test, for the day's offset cancels."""
-    rng = np.random.default_rng(7)
-    offsets = 2.0 * rng.standard_normal(8)
-    x, y = offsets + rng.standard_normal(8), offsets + 0.5 + rng.standard_normal(8)
-    found = day_difference(x, y, days_of("d", 8, 1), days_of("d", 8, 1))
-    assert found.p == pytest.approx(ttest_rel(x, y).pvalue, rel=1e-8)
-    assert found.df == pytest.approx(7, rel=1e-8)
-
-
-def test_balanced_days_with_both_conditions_are_the_paired_t_test_of_means() -> None:
-    """What a condition had to itself on a day does not cancel, however many epochs it has."""
-    rng = np.random.default_rng(16)
-    offsets = 2 * rng.standard_normal((8, 1))
-    x, y = (
-        offsets + rng.standard_normal((8, 1)) + rng.standard_normal((8, 5)) + shift
-        for shift in (0.0, 0.8)
-    )
-    found = day_difference(x.ravel(), y.ravel(), days_of("d", 8, 5), days_of("d", 8, 5))
-    assert found.p == pytest.approx(ttest_rel(x.mean(axis=1), y.mean(axis=1)).pvalue, rel=1e-8)
-    assert found.df == pytest.approx(7, rel=1e-8)
-
-
-def test_several_subjects_have_offsets_of_their_own() -> None:
-    """As the model written out, and a day belongs to its subject whatever its label."""
-    rng = np.random.default_rng(8)
-    subjects = [f"s{k}" for k in range(4) for _ in range(12)]
-    days = [f"{d}" for _ in range(4) for d in range(4) for _ in range(3)]
-    conditions = ["OFF" if int(day) % 2 == 0 else "DBS" for day in days]
-    own = [f"{s}-{d}" for s, d in zip(subjects, days, strict=True)]
-    shift = {name: rng.standard_normal() for name in {*subjects, *own}}
-    values = np.array([shift[s] + shift[o] for s, o in zip(subjects, own, strict=True)])
-    values += rng.standard_normal(values.size)
-    off = np.array([name == "OFF" for name in conditions])
-
-    def some(labels: list[str], which: np.ndarray) -> list[str]:
-        return [label for label, wanted in zip(labels, which, strict=True) if wanted]
-
-    found = day_difference(
-        values[off], values[~off], some(days, off), some(days, ~off),
-        x_subjects=some(subjects, off), y_subjects=some(subjects, ~off),
-    )  # fmt: skip
-    fit = fit_mixed(values, conditions, {"subject": subjects, "subject/day": own})
-    expected = difference(fit, "OFF", "DBS")
-    assert found.p == pytest.approx(expected.p_kenward_roger, rel=1e-8)
-    assert found.se == pytest.approx(expected.se_kenward_roger, rel=1e-8)
-    assert (found.n_days_x, found.n_days_y) == (8, 8)
-
-
-def test_one_day_for_each_subject_is_no_refusal() -> None:
-    x, y = made(9, 5, 4, 1.0), made(10, 5, 4, 1.0)
-    names = days_of("s", 5, 4)
-    others = days_of("t", 5, 4)
-    found = day_difference(
-        x.ravel(), y.ravel(), ["1"] * 20, ["1"] * 20, x_subjects=names, y_subjects=others
-    )
-    expected = ttest_ind(x.mean(axis=1), y.mean(axis=1))
-    assert found.p == pytest.approx(expected.pvalue, rel=1e-8)
-    assert 0 < found.day_share < 1
-    assert np.isnan(found.p_days)  # nothing to deal within a subject
-
-
-def by_enumeration(x: list[float], y: list[float]) -> float:
-    ranks = rankdata([*x, *y])
-    mean = len(x) * ranks.mean()
-    found = abs(ranks[: len(x)].sum() - mean)
-    sums = [abs(sum(some) - mean) for some in itertools.combinations(ranks, len(x))]
-    return float(np.mean(np.array(sums) >= found - 1e-9))
-
-
-@settings(max_examples=50, deadline=None)
-@given(
-    st.lists(st.integers(0, 4), min_size=1, max_size=6),
-    st.lists(st.integers(0, 4), min_size=1, max_size=6),
-)
-def test_exact_rank_sum_is_the_enumeration_ties_and_all(x: list[int], y: list[int]) -> None:
-    p = exact_ranksum([(x, y)])
-    assert p == pytest.approx(by_enumeration(list(map(float, x)), list(map(float, y))), rel=1e-9)
-    assert exact_ranksum([(y, x)]) == pytest.approx(p, rel=1e-9)
-
-
-def test_exact_rank_sum_without_ties_is_scipys() -> None:
-    x, y = made(11, 9, 1, 0).ravel(), 1 + made(12, 30, 1, 0).ravel()
-    assert exact_ranksum([(x, y)]) == pytest.approx(
-        mannwhitneyu(x, y, method="exact").pvalue, rel=1e-9
-    )
-
-
-def test_strata_are_dealt_apart() -> None:
-    """Two subjects with two days each: 6 × 6 equally likely outcomes, 2 of them as extreme."""
-    strata = [([3.0, 4.0], [1.0, 2.0]), ([13.0, 14.0], [11.0, 12.0])]
-    assert exact_ranksum(strata) == pytest.approx(2 / 36)
-    assert exact_ranksum([*strata, ([1.0], [])]) == pytest.approx(2 / 36)
-    assert np.isnan(exact_ranksum([([1.0], [])]))
+    assert found.day_share == pytest.approx(between / (between + within), rel=1e-12)
+    one = day_difference(x[:, 0], y[:, 0], days_of("a", 9, 1), days_of("b", 4, 1))
+    assert np.isnan(one.day_share)
 
 
 def test_medians_of_days() -> None:
@@ -165,33 +133,51 @@ def test_p_of_days_is_of_the_medians() -> None:
     assert found.p_days == pytest.approx(mannwhitneyu(*medians, method="exact").pvalue)
 
 
+def test_few_days_say_what_they_ask_of_a_difference() -> None:
+    """Two days with both: t of 1 degree of freedom, 12.7 standard errors for p < .05."""
+    x, y = made(15, 2, 3, 1.0), made(16, 2, 3, 1.0)
+    found = day_difference(x.ravel(), y.ravel(), days_of("d", 2, 3), days_of("d", 2, 3))
+    assert "with 1 degree of freedom only a difference above 12.7 standard errors" in found.few
+    x, y = made(15, 4, 3, 1.0), made(16, 4, 3, 1.0)
+    assert not day_difference(x.ravel(), y.ravel(), days_of("d", 4, 3), days_of("d", 4, 3)).few
+
+
 @pytest.mark.parametrize(
     ("x_days", "y_days", "told"),
     [
-        (["1"] * 4, ["1"] * 4, "only one day"),
-        (["1"] * 4, ["2"] * 4, "one day in each condition"),
+        (["1"] * 4, ["1"] * 4, "one day of x, so how much x differs between days is unknown"),
+        (["1"] * 4, ["2", "3"] * 2, "one day of x"),
+        (["1", "2"] * 2, ["2"] * 4, "one day of y"),
         (["1"] * 3, ["2"] * 4, "3 days"),
     ],
 )
-def test_days_that_are_the_conditions_are_refused(x_days, y_days, told) -> None:
+def test_one_day_of_a_condition_is_refused(x_days, y_days, told) -> None:
     rng = np.random.default_rng(1)
     with pytest.raises(ValueError, match=told):
         day_difference(rng.standard_normal(4), rng.standard_normal(4), x_days, y_days)
 
 
+def test_two_subjects_with_one_day_are_refused_by_name() -> None:
+    x, y = (np.stack([made(seed + k, 1, 4, 1.0) for k in range(2)]) for seed in (70, 80))
+    with pytest.raises(ValueError, match="subject s: there is one day of OFF"):
+        of_subjects(x, y, ["s", "t"], ["s", "t"])
+
+
 @pytest.mark.slow
 def test_the_test_of_days_keeps_its_word_where_that_of_epochs_does_not() -> None:
-    """No effect, days as far apart as epochs, 78 epochs of nine days and 23 of four."""
-    rng = np.random.default_rng(15)
-    x_days = [f"a{k % 9}" for k in range(78)]
-    y_days = [f"b{k % 4}" for k in range(23)]
-    days = np.array([int(d[1:]) for d in x_days]), np.array([int(d[1:]) for d in y_days])
-    hits = np.zeros(2)
-    draws = 400
-    for _ in range(draws):
-        x = rng.standard_normal(9)[days[0]] + rng.standard_normal(78)
-        y = rng.standard_normal(4)[days[1]] + rng.standard_normal(23)
-        p = mannwhitneyu(x, y, method="asymptotic").pvalue
-        hits += [day_difference(x, y, x_days, y_days).p < 0.05, p < 0.05]
-    assert hits[0] / draws < 0.05 + 3 * np.sqrt(0.05 * 0.95 / draws)
-    assert hits[1] / draws > 0.3
+    """No effect, 78 epochs of nine days and 23 of four of them, a day alike or each by itself."""
+    rng, draws = np.random.default_rng(15), 2000
+    place = np.arange(78) % 9, np.arange(23) % 4
+    labels = [[f"a{k}" for k in days] for days in place]
+    for alike in (True, False):
+        hits = np.zeros(2)
+        for _ in range(draws):
+            days = rng.standard_normal((2, 9))
+            x, y = (
+                days[k * (not alike)][where] + rng.standard_normal(where.size)
+                for k, where in enumerate(place)
+            )
+            p = mannwhitneyu(x, y, method="asymptotic").pvalue
+            hits += [day_difference(x, y, *labels).p < 0.05, p < 0.05]
+        assert 0.035 < hits[0] / draws < 0.065
+        assert hits[1] / draws > 0.1

@@ -16,7 +16,7 @@ from rigidimeter.reporting.contents import (
 )
 from rigidimeter.reporting.method_words import interval_basis, pooled_basis
 from rigidimeter.reporting.numbers import condition_name, series
-from rigidimeter.reporting.prose_statistics import offsets_text
+from rigidimeter.reporting.prose_statistics import day_tests_in_words
 from rigidimeter.reporting.sections.estimate_tables import pooled_table
 from rigidimeter.study import StudyResult, result_tables
 
@@ -28,8 +28,8 @@ _EPOCHS_NOTE = Markup(
     "adjusted for all measures by Holm’s method."
 )
 _DAYS_NOTE = Markup(
-    "Mixed model with an offset for {offsets}, with interval and <i>p</i> by Kenward and Roger; "
-    "in brackets: <i>p</i> adjusted for all measures by Holm’s method. <i>p</i> of day medians: "
+    "{tests}. In brackets: <i>p</i> adjusted for all measures by Holm’s method. <i>p</i> of day "
+    "medians: "
     "exact rank-sum test of the medians of the days. Between days: the share of the variance "
     "between epochs of one condition that is between days.{ratings}"
 )
@@ -42,7 +42,7 @@ def _comparison(result: StudyResult) -> Iterator[Block]:
     yield from _epochs(result)
     if not any(c.days for c in result.comparisons):
         return
-    found = next((c.days for c in result.comparisons if c.days and c.days.offsets), None)
+    used = dict.fromkeys(day_tests_in_words(result)) or ("No test by days could be made",)
     ratings = (
         " Ratings are those less the examiners’ offsets; their model has an offset for each "
         "examiner too."
@@ -68,7 +68,7 @@ def _comparison(result: StudyResult) -> Iterator[Block]:
         ),
         result_tables(result)["comparisons"],
         note=_DAYS_NOTE.format(
-            offsets=offsets_text(found.offsets) if found else "each day", ratings=ratings
+            tests="; ".join(text[:1].upper() + text[1:] for text in used), ratings=ratings
         ),
     )
 
