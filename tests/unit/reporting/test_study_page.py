@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.unit.reporting.cohorts import Design, made_study, untested
+from tests.unit.reporting.cohorts import Design, altered, made_study, untested
 from tests.unit.reporting.parsed_page import ParsedPage
 
 from rigidimeter.reporting import SECTIONS
@@ -157,11 +157,22 @@ def test_a_blinded_study_keeps_its_codes_and_shows_no_stimulation() -> None:
 
 
 def test_the_test_by_days_is_said_in_words() -> None:
-    page = shown(made_study(dataclasses.replace(SMALL, both_on_a_day=True)))
-    assert "t-test paired by " in page.words("comparison")
-    assert "of OFF alone at weight " in page.words("comparison")
+    study = made_study(dataclasses.replace(SMALL, both_on_a_day=True))
+    page = shown(study)
+    assert "Paired t-test of 4 days. In brackets" in page.words("comparison")
+    assert "by the means of the days: paired t-test of 4 days" in page.words("methods")
+    words = "t-test paired by 4 days, with 5 days of OFF alone at weight 0.28"
+    page = shown(
+        altered(
+            study,
+            lambda c: dataclasses.replace(c, days=dataclasses.replace(c.days, test=words)),
+        )
+    )
+    assert "T-test paired by 4 days, with 5 days of OFF alone" in page.words("comparison")
+    assert f"{words}, with 95 % intervals. The weights follow from the" in page.words("methods")
     page = shown(made_study(SMALL))
-    assert re.search(r"Welch's t-test of \d+ days of OFF and \d+ days of DBS", page.words())
+    assert "Welch's t-test of 4 days of OFF and 3 days of DBS" in page.words("comparison")
+    assert "Satterthwaite FE" in page.words("methods")
 
 
 def test_several_subjects_are_distinguished() -> None:
