@@ -95,15 +95,15 @@ def test_the_studys_own_files_are_never_written_over(compared, study, name) -> N
     assert (study / name).read_bytes() == before
 
 
-def test_one_offset_a_day_is_chosen_in_the_description(compared, study) -> None:
-    ran, each = compared()
-    assert "an offset for each day and each condition within a day (" in ran.out
+def test_one_offset_a_day_decides_nothing_and_that_is_said(compared, study) -> None:
+    ran, before = compared()
+    assert "one_offset_a_day" not in ran.err
     with (study / "study.toml").open("a") as file:
         file.write("\n[analysis]\none_offset_a_day = true\n")
-    ran, one = compared()
-    assert "an offset for each day (" in ran.out
-    assert [row["days"]["df"] for row in one["comparisons"]] != [
-        row["days"]["df"] for row in each["comparisons"]
+    ran, after = compared()
+    assert "study.toml: one_offset_a_day has no effect any more" in ran.err
+    assert [row["days"] for row in after["comparisons"]] == [
+        row["days"] for row in before["comparisons"]
     ]
 
 

@@ -5,6 +5,7 @@
     three subjects or more with both conditions: the paired t-test of their means over days
     two such subjects, or one of several: δ = mean of δ_s, Var δ = Σ Var δ_s / S², each by its days
     no subject with both conditions: Welch's test of subjects
+    two days of a condition: Var δ at least Σ_c s²(epochs within days)/n_c² Σ_days 1/m
 
 Nothing is assumed of how alike the conditions of a day are, nor of equal variances.
 """
@@ -19,8 +20,10 @@ import numpy as np
 
 from rigidimeter.statistics.partially_paired import PartiallyPaired, partially_paired
 
-Epochs = dict[str, dict[str, tuple[list[float], list[float]]]]
-"""Of each subject, by day: the values of x and those of y."""
+Days = dict[str, tuple[list[float], list[float]]]
+"""Of each day the values of x and those of y."""
+Epochs = dict[str, Days]
+"""Of each subject."""
 FEWEST_SUBJECTS = 3
 """With fewer subjects that have both conditions, their days are what is compared."""
 
@@ -42,13 +45,10 @@ def test_by_levels(epochs: Epochs, names: tuple[str, str]) -> Tested:
     ValueError
         If a condition has one day (or one subject), or they do not vary.
     """
-    means = {
-        subject: {day: (_mean(x), _mean(y)) for day, (x, y) in own.items()}
-        for subject, own in epochs.items()
-    }
-    if len(means) == 1:
-        (own,) = means.values()
-        return _of_units(own, "day", names)
+    if len(epochs) == 1:
+        (days,) = epochs.values()
+        return _of_days(days, names)
+    means = {subject: _means(own) for subject, own in epochs.items()}
     levels = {
         subject: (_mean([x for x, _ in own.values()]), _mean([y for _, y in own.values()]))
         for subject, own in means.items()
@@ -62,7 +62,7 @@ def test_by_levels(epochs: Epochs, names: tuple[str, str]) -> Tested:
     found = []
     for subject in both:
         try:
-            found.append(_of_units(means[subject], "day", names))
+            found.append(_of_days(epochs[subject], names))
         except ValueError as error:
             raise ValueError(
                 f"subject {subject}: {error} (with three subjects or more that have both "
@@ -78,6 +78,32 @@ def test_by_levels(epochs: Epochs, names: tuple[str, str]) -> Tested:
     )
     estimate = math.fsum(each.estimate for each in found) / n
     return Tested(estimate, math.sqrt(variances.sum()), float(df), words)
+
+
+def _of_days(days: Days, names: tuple[str, str]) -> Tested:
+    """Test the days of one subject; two days agree by chance, so their epochs bound the error."""
+    tested = _of_units(_means(days), "day", names)
+    if min(sum(len(by[k]) > 0 for by in days.values()) for k in (0, 1)) > 2:
+        return tested
+    least = math.sqrt(sum(_variance_of_epochs(days, k) for k in (0, 1)))
+    if tested.se >= least:
+        return tested
+    words = f"{tested.words}, with the standard error of the epochs alone, which is larger"
+    return tested._replace(se=least, words=words)
+
+
+def _variance_of_epochs(days: Days, k: int) -> float:
+    """Return what the scatter of epochs within days gives the unweighted mean of the days."""
+    own = [np.array(by[k]) for by in days.values() if by[k]]
+    free = sum(day.size - 1 for day in own)
+    if not free:
+        return 0.0
+    within = sum(float(np.sum((day - day.mean()) ** 2)) for day in own) / free
+    return within * sum(1 / day.size for day in own) / len(own) ** 2
+
+
+def _means(days: Days) -> dict[str, tuple[float, float]]:
+    return {day: (_mean(x), _mean(y)) for day, (x, y) in days.items()}
 
 
 def _of_units(

@@ -130,7 +130,8 @@ def conclude(result: StudyResult) -> Conclusions | None:
         elif reason := _too_few(test, basis, with_p):
             found.append(Conclusion(c, "cannot be decided", p, reason))
         else:
-            found.append(Conclusion(c, "no difference shown", p, _hidden(c, result)))
+            few = c.days.few if c.days is not None and basis == "days" else ""
+            found.append(Conclusion(c, "no difference shown", p, _hidden(c, result) or few))
     return Conclusions(basis, tuple(found))
 
 

@@ -142,6 +142,17 @@ def test_few_days_say_what_they_ask_of_a_difference() -> None:
     assert not day_difference(x.ravel(), y.ravel(), days_of("d", 4, 3), days_of("d", 4, 3)).few
 
 
+def test_two_days_that_agree_by_chance_have_the_error_of_their_epochs() -> None:
+    """Differences of 1 and 1.001 on two days, epochs with a variance of 0.5 about each mean."""
+    x, y = np.array([[0.5, 1.5], [1.0, 2.0]]), np.array([[-0.5, 0.5], [-0.001, 0.999]])
+    found = day_difference(x.ravel(), y.ravel(), days_of("d", 2, 2), days_of("d", 2, 2))
+    assert found.se == pytest.approx(np.sqrt(2 * 0.5 * (1 / 2 + 1 / 2) / 2**2))
+    assert found.p > 0.2
+    assert found.test.endswith("with the standard error of the epochs alone, which is larger")
+    one = day_difference(x[:, 0], y[:, 0], days_of("d", 2, 1), days_of("d", 2, 1))
+    assert one.p == pytest.approx(ttest_rel(x[:, 0], y[:, 0]).pvalue)
+
+
 @pytest.mark.parametrize(
     ("x_days", "y_days", "told"),
     [
