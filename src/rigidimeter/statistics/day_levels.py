@@ -112,6 +112,12 @@ def _of_units(
     """Test units by their values in x and in y, NaN for a condition that one does not have."""
     table = np.array(list(values.values()))
     has = ~np.isnan(table)
+    if len(table) == 1:
+        raise ValueError(f"there is only one {unit}, so what differs between {unit}s is unknown")
+    if len(table) == 2 and not has.all(axis=1).any():
+        raise ValueError(
+            f"there is one {unit} in each condition, so {unit} and condition cannot be separated"
+        )
     for name, known in zip(names, has.T, strict=True):
         if known.sum() < 2:
             raise ValueError(

@@ -156,8 +156,9 @@ def test_two_days_that_agree_by_chance_have_the_error_of_their_epochs() -> None:
 @pytest.mark.parametrize(
     ("x_days", "y_days", "told"),
     [
-        (["1"] * 4, ["1"] * 4, "one day of x, so how much x differs between days is unknown"),
-        (["1"] * 4, ["2", "3"] * 2, "one day of x"),
+        (["1"] * 4, ["1"] * 4, "only one day"),
+        (["1"] * 4, ["2"] * 4, "one day in each condition"),
+        (["1"] * 4, ["2", "3"] * 2, "one day of x, so how much x differs between days is unknown"),
         (["1", "2"] * 2, ["2"] * 4, "one day of y"),
         (["1"] * 3, ["2"] * 4, "3 days"),
     ],
@@ -170,7 +171,7 @@ def test_one_day_of_a_condition_is_refused(x_days, y_days, told) -> None:
 
 def test_two_subjects_with_one_day_are_refused_by_name() -> None:
     x, y = (np.stack([made(seed + k, 1, 4, 1.0) for k in range(2)]) for seed in (70, 80))
-    with pytest.raises(ValueError, match="subject s: there is one day of OFF"):
+    with pytest.raises(ValueError, match="subject s: there is only one day"):
         of_subjects(x, y, ["s", "t"], ["s", "t"])
 
 
