@@ -68,6 +68,18 @@ _DATED = "Timestamp,torque_nm,angle_deg\n" + "".join(
     f"{t},{m:.9g},{d:.9g}\n" for t, m, d in zip(_DATES, M, D, strict=True)
 )
 
+_SPIKE2 = (
+    '"INFORMATION"\n"elbow.smr"\n\n"SUMMARY"\n'
+    '"1"\t"Waveform"\t"Torque"\t" Nm"\t200\t200\t0.001\t0\n'
+    '"2"\t"Evt+"\t"Sync"\t""\n'
+    '"3"\t"Waveform"\t"Angle"\t" deg"\t200\t200\t0.001\t0\n\n'
+    '"CHANNEL"\t"1"\n"Waveform"\n"No comment"\n"Torque"\n" Nm"\n"START"\t0.00000\t0.00500\n'
+    + rows(M)
+    + '\n"CHANNEL"\t"2"\n"Evt+"\n"No comment"\n"Sync"\n0.5\n1.5\n\n'
+    '"CHANNEL"\t"3"\n"Waveform"\n"No comment"\n"Angle"\n" deg"\n"START"\t0.00000\t0.00500\n'
+    + rows(D)
+)
+
 DIALECTS: Mapping[str, Dialect] = {
     "own names": Dialect("r.csv", csv("time_s,torque_nm,angle_rad", T, M, A)),
     "own names, no time": Dialect("r.csv", csv("torque_nm,angle_rad", M, A), {"rate_hz": RATE_HZ}),
@@ -155,6 +167,7 @@ DIALECTS: Mapping[str, Dialect] = {
         "r.txt", (_BIOPAC + "\t4000\t4000\t\n" + rows(T.round(2), M, D, mark="\t", end="\t"))
         .encode("cp1252"),
     ),
+    "Spike2": Dialect("r.txt", _SPIKE2.encode()),
     "block of lines and units": Dialect("r.txt", (_MONITOR + rows(T, M, D, mark="\t")).encode()),
     "headerless": Dialect("r.csv", rows(T, M, D).encode(), refused="must name the columns"),
     "headerless with names": Dialect(

@@ -48,6 +48,8 @@ def inspect(
     keep_inputs((write_mapping, plot), recordings.paths)
     if len(recordings.paths) > 1 and (write_mapping is not None or plot is not None):
         raise UserError("--write-mapping and --plot are for one file; name one")
+    if recordings.join:
+        raise UserError("--join: inspect looks at each file by itself; leave out --join")
     options = read_options(**recordings.of_files())
     status = 0
     for path in recordings.paths:

@@ -23,6 +23,8 @@ from rigidimeter.documents.bounds import RECORDING_BYTES, TABLE_BYTES, TABLE_CEL
 from rigidimeter.documents.escaping import NUMBER
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.headers import read_header
+from rigidimeter.recording.formats.spike2_text import FIRST as SPIKE2
+from rigidimeter.recording.formats.spike2_text import spike2_table
 from rigidimeter.recording.formats.table import Table, printable
 from rigidimeter.recording.formats.text_head import (
     HEAD_LINES,
@@ -119,7 +121,7 @@ def read_text_table(path: Path, *, may_be_empty: bool = False) -> TextTable:
     UserError
         If it is not such a file, or has no rows and may not be empty.
     """
-    text = _open(path, "rows", "condition,examiner,score", TABLE_BYTES)
+    text = _open(str(path), read_utf8(path, TABLE_BYTES), "rows", "condition,examiner,score")
     n_rows, n_columns = text.lines.size, len(text.names)
     if not n_rows and not may_be_empty:
         raise text.without_rows()
@@ -155,7 +157,10 @@ def read_text_recording(path: Path, layout: Layout | None = None) -> Table:
         If it is not such a file; the sentence names the line where there is one.
     """
     example = "time_s,torque_nm,angle_rad"
-    text = _open(path, "samples", example, RECORDING_BYTES, layout or Layout())
+    whole = read_utf8(path, RECORDING_BYTES)
+    if whole.startswith(SPIKE2):
+        return spike2_table(str(path), whole)
+    text = _open(str(path), whole, "samples", example, layout or Layout())
     if len(text.names) < 2:
         raise UserError(
             f"{text.source}: its first line, {text.names[0][:40]!r}, names fewer than two columns; "
@@ -248,14 +253,12 @@ class _Text:
 
 
 def _open(
-    path: Path, rows_are: str, example: str, most_bytes: int, layout: Layout | None = None
+    source: str, whole: bytes, rows_are: str, example: str, layout: Layout | None = None
 ) -> _Text:
     """Find the columns and rows of a text table, and check that every row has every column.
 
     Without a layout its first line names its columns.
     """
-    source = str(path)
-    whole = read_utf8(path, most_bytes)
     if layout is not None and layout.skip_rows:
         parts = whole.split(b"\n", layout.skip_rows)
         if len(parts) <= layout.skip_rows:

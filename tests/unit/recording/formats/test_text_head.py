@@ -73,3 +73,31 @@ def test_a_head_of_any_bytes_is_read_or_refused(tmp_path):
         except UserError as error:
             told.append(str(error))
     assert all(text.startswith(str(path)) for text in told)
+
+
+SPIKE2 = '"INFORMATION"\n"SUMMARY"\n"1"\t"Waveform"\t"T"\t"Nm"\n"2"\t"Waveform"\t"phi"\t"deg"\n'
+
+
+def test_spike2_channels_keep_their_clocks(tmp_path):
+    text = SPIKE2 + '"CHANNEL"\t"1"\n"T"\n"START"\t0.5\t0.1\n1\n2\n3\n\n"START"\t9.0\t0.1\n4\n5\n'
+    text += '"CHANNEL"\t"2"\n"START"\t0.25\t0.5\n7\n8\n'
+    found = table(tmp_path / "r.txt", text)
+    assert found.units == {"time_s": "s", "T": "Nm", "phi": "deg"}
+    here = np.isfinite(found.columns["T"])
+    np.testing.assert_allclose(found.columns["time_s"][here], [0.5, 0.6, 0.7, 9.0, 9.1])
+    here = np.isfinite(found.columns["phi"])
+    np.testing.assert_allclose(found.columns["time_s"][here], [0.25, 0.75])
+
+
+@pytest.mark.parametrize(
+    ("channel", "told"),
+    [
+        ("", "holds no signal with at least 2 samples"),
+        ('"START"\t0\t0.1\n1\nx\n', "the channel that starts here cannot be read"),
+        ('"START"\t0\n1\n2\n', "the channel that starts here cannot be read"),
+        ('"START"\t0\t0\n1\n2\n', "the sampling interval is 0 s"),
+    ],
+)
+def test_a_damaged_export_of_spike2_is_refused(tmp_path, channel, told):
+    with pytest.raises(UserError, match=told):
+        table(tmp_path / "r.txt", SPIKE2 + '"CHANNEL"\t"1"\n' + channel)
