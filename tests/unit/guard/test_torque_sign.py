@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy
 
+from rigidimeter.guard import torque_sign
 from rigidimeter.guard.torque_sign import (
     BEFORE,
     COLUMNS,
@@ -137,7 +138,7 @@ def test_the_quantiles_are_those_of_a_beta_distribution(rows, order):
     assert left.order == order
     for x, part in ((left.at_once, FALSE_ALARMS), (left.if_early, IF_EARLY)):
         assert x**a * (1.0 + a * (1.0 - x)) == pytest.approx(part)
-    assert (FALSE_ALARMS, IF_EARLY, INSTRUMENTS) == (1e-10, 1e-3, 4)
+    assert (FALSE_ALARMS, IF_EARLY, INSTRUMENTS, PASSES) == (1e-10, 1e-3, 4, 2)
 
 
 def seems_an_answer(columns, order, part):
@@ -222,3 +223,29 @@ def test_a_motion_that_the_perturbation_does_not_cause_shows_nothing():
     moved = window(-JOINT, 0.0)
     moved[:, :2] = np.random.default_rng(8).standard_normal((len(moved), 2))
     assert not sign_is_wrong(moved, True, LEFT)
+
+
+def an_answer(a):
+    """Return R, P and weights of a torque that is a multiple of a, with little noise."""
+    columns = np.eye(5)[:, :4]
+    square = np.column_stack([columns, columns @ np.array([0.0, a, 0.0, 0.0])])
+    return 1e-3, square.T @ square, np.full(INSTRUMENTS, a)
+
+
+A_WRONG, A_RIGHT = an_answer(-1.0), an_answer(1.0)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "wrong"),
+    [(A_WRONG, A_WRONG, True), (A_RIGHT, A_WRONG, False), (A_WRONG, A_RIGHT, False)],
+)
+def test_the_sign_has_to_be_wrong_with_the_noise_of_each_pass(monkeypatch, first, second, wrong):
+    seen, results = [], iter((first, second))
+    monkeypatch.setattr(torque_sign, "explained", lambda _: next(results))
+    monkeypatch.setattr(
+        torque_sign, "whitened", lambda *given: seen.append((given[1][0], given[2])) or given[0]
+    )
+    left = LEFT._replace(order=3)
+    assert sign_is_wrong(window(-JOINT, 0.05), True, left) == wrong
+    assert seen[0] == (0.0, 3)
+    assert seen[1:] == ([(-1.0, 3)] if first is A_WRONG else [])
