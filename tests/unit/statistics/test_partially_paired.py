@@ -72,6 +72,15 @@ def test_one_side_alone_has_half_the_weight_it_would_have_of_independent_units()
     assert found.se == pytest.approx(np.sqrt(variance), rel=1e-12)
 
 
+def test_a_single_unit_takes_its_variance_and_its_freedom_from_those_with_both() -> None:
+    x_both, y_both, x_only = drawn(10, 4, 4, 1)
+    found = partially_paired(x_both, y_both, x_only, [])
+    paired = (1 - found.weight_x) * x_both - y_both
+    variance = paired.var(ddof=1) / 4 + found.weight_x**2 * x_both.var(ddof=1)
+    assert found.se == pytest.approx(np.sqrt(variance), rel=1e-12)
+    assert found.df == pytest.approx(3)
+
+
 def test_what_units_share_cancels_where_all_have_both_only() -> None:
     x, y, shared = drawn(6, 5, 5, 5)
     assert partially_paired(x + 9 * shared, y + 9 * shared, [], []).se == pytest.approx(
