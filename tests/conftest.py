@@ -24,8 +24,13 @@ pytest_plugins = ["pytester"]
 
 Simulate = Callable[..., Path]
 
-# The same examples in every run: a failure is the change's, not the day's.
-hypothesis.settings.register_profile("fixed", derandomize=True)
+# The same examples in every run, however long they take: a failure is the change's, not the day's.
+hypothesis.settings.register_profile(
+    "fixed",
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+)
 hypothesis.settings.load_profile("fixed")
 
 

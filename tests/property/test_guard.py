@@ -74,7 +74,7 @@ def pure_delay(ticks):
 
 
 @given(requests, st.integers(1, 20), st.integers(0, 25), st.integers(0, 20), st.integers(20, 200))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_a_drive_that_lags_by_up_to_the_reaction_time_never_crosses(wanted, every, late, lag, hold):
     angles, _, state = run(EXACT, wanted, pure_delay(lag), hold=hold, every=every, late=late)
     assert np.abs(angles).max() <= LIMITS.position_rad + 1e-9
@@ -82,7 +82,7 @@ def test_a_drive_that_lags_by_up_to_the_reaction_time_never_crosses(wanted, ever
 
 
 @given(requests, st.integers(1, 20), st.integers(0, 25), st.floats(25.0, 200.0))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_a_second_order_drive_passes_by_its_own_overshoot_at_most(wanted, every, late, bandwidth):
     angles, _, state = run(LIMITS, wanted, second_order(bandwidth), hold=60, every=every, late=late)
     assert np.abs(angles).max() <= LIMITS.position_rad + np.deg2rad(0.05)
@@ -90,7 +90,7 @@ def test_a_second_order_drive_passes_by_its_own_overshoot_at_most(wanted, every,
 
 
 @given(requests)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_only_the_position_limit_brakes_harder_than_the_acceleration_limit(wanted):
     _, sent, _ = run(LIMITS, wanted, second_order(50.0), hold=60)
     assert np.abs(sent).max() <= LIMITS.speed_rad_s
@@ -126,7 +126,7 @@ def test_it_does_not_hold_the_arm_at_the_limit():
     st.integers(0, 25),
     st.integers(1, 200),
 )
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 def test_steps_that_come_late_by_up_to_the_gap_never_let_it_cross(wanted, steps, lag, late, hold):
     limits = EXACT._replace(gap_s=0.005)
     state, move, commands, angles, tick, missed = (
@@ -178,7 +178,7 @@ ticks = st.lists(
 
 
 @given(ticks, st.sampled_from([LIMITS, STRICT]))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_whatever_comes_in_whatever_order(inputs, limits):
     state = guard_state(limits)
     most = limits.acceleration_rad_s2 * DT
@@ -211,7 +211,7 @@ def test_whatever_comes_in_whatever_order(inputs, limits):
 
 
 @given(ticks, st.integers(1, 20))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_what_is_latched_comes_to_rest_within_the_ramp(inputs, speed):
     state = guard_state(STRICT)._replace(
         velocity_rad_s=0.15 * speed, cause=int(Cause.SOFTWARE), reaction=int(Reaction.RAMP)
@@ -223,7 +223,7 @@ def test_what_is_latched_comes_to_rest_within_the_ramp(inputs, speed):
 
 
 @given(st.lists(st.floats(-5, 5), min_size=60, max_size=60), st.integers(0, 20), st.integers(0, 20))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_an_encoder_that_jumps_is_found_at_once_and_one_that_does_not_never(wanted, lag, late):
     state, move, commands, angles = guard_state(EXACT), pure_delay(lag), [], [0.0]
     for k, request in enumerate(np.repeat(wanted, 5).tolist()):

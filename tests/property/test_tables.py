@@ -41,7 +41,7 @@ def written(folder: str, suffix: str, data, delimiter: str = ",", decimal: str =
     return path
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(data=columns(), suffix=st.sampled_from([".npz", ".mat", ".csv"]))
 def test_what_is_written_is_read(data, suffix):
     with TemporaryDirectory() as folder:
@@ -51,7 +51,7 @@ def test_what_is_written_is_read(data, suffix):
             np.testing.assert_array_equal(table.columns[name], values)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(data=columns(), delimiter=st.sampled_from([";", "\t"]), decimal=st.sampled_from([",", "."]))
 def test_delimiters_and_decimal_marks(data, delimiter, decimal):
     with TemporaryDirectory() as folder:
@@ -85,7 +85,7 @@ def recordings(draw):
     return Table("r", data)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(table=recordings(), length_s=st.sampled_from([None, 0.25, 1.0]))
 def test_cutting_loses_nothing_in_silence(table, length_s):
     try:
@@ -120,7 +120,7 @@ def test_cutting_loses_nothing_in_silence(table, length_s):
             assert named or without, (row, at_s, [notice.text for notice in notices])
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(table=recordings(), length_s=st.sampled_from([None, 0.25, 1.0]))
 def test_no_epoch_holds_an_interval_too_long_to_bridge(table, length_s):
     try:

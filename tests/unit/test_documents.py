@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rigidimeter.documents import (
@@ -26,7 +26,6 @@ from rigidimeter.documents import (
 from rigidimeter.errors import UserError
 
 
-@settings(deadline=None)
 @given(values=st.lists(st.floats(allow_nan=False, allow_infinity=False)))
 def test_floats_survive_json_and_csv_to_the_bit(values):
     assert json.loads(json_text(values)) == values

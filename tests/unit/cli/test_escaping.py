@@ -73,7 +73,7 @@ def test_an_error_of_usage_shows_a_word_without_commands(rigidimeter, given):
     assert "\\x1b]0;t\\x07" in ran.err
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(text=st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=8))
 def test_text_of_a_table_is_read_as_it_was_written(text):
     assert as_read(as_written(text)) == text
