@@ -60,6 +60,11 @@ def test_every_output_has_every_finding(shown, method):
     for _, name in kinds:
         assert f">{name}<" in page
     assert ("Checks cast doubt on" in page) == any(level != "note" for level, _ in kinds)
+    for epoch in document["epochs"]:  # the line of each epoch names what casts doubt on it
+        doubts = ", ".join(f["name"] for f in epoch["findings"] if f["level"] != "note")
+        lines = re.findall(rf"^ +{epoch['epoch']} .*$", terminal, re.M)
+        assert len(lines) == 2
+        assert all(line.endswith(f"doubt: {doubts}") == bool(doubts) for line in lines), lines
 
 
 def names_and_levels(epochs, method, settings):
