@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import batch, estimation, online
+from benchmarks import batch, checks_cost, estimation, online
 from benchmarks.paired import REPEATS, Row, in_ms, paired
 from rigidimeter.recording import ReadOptions, read_recording
 from rigidimeter.settings import parse_settings
@@ -60,6 +60,7 @@ def main() -> None:
             reading_against_numpy(folder),
             *batch.rows(),
             *estimation.rows(),
+            *checks_cost.rows(),
             *online.rows(),
         ]
     lines = [

@@ -5,7 +5,7 @@ with the perturbation recorded (`iv`), of the same without it (`bandlimited`), a
 ankle where `RIGIDIMETER_SHARED` names the folder of the recordings. With `--parts` each check is
 timed too; what several checks share is with the first of them.
 
-    python -m benchmarks.checks_cost
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.checks_cost
     python -m benchmarks.checks_cost --epochs 12 --parts
 """
 
@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-import statistics
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,6 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
+from benchmarks.paired import REPEATS, Row, in_ms, paired
 from rigidimeter.estimation.diagnostics import CHECKS, Check
 from rigidimeter.recording import ReadOptions, read_recording
 from rigidimeter.records import Epoch
@@ -73,11 +73,21 @@ def no_checks() -> Iterator[None]:
         yield
 
 
-def cpu_s(epochs: Sequence[Epoch]) -> float:
-    """Return the CPU time of one estimate."""
-    start_s = time.process_time()
-    analysis.estimate(epochs)
-    return time.process_time() - start_s
+def rows(count: int = 6, repeats: int = REPEATS) -> list[Row]:
+    """Return what an epoch costs with every check and with none."""
+    return [
+        _row(f"estimate of an epoch of 20 s with every check, {name} / without", epochs, repeats)
+        for name, epochs in inputs(count).items()
+    ]
+
+
+def _row(name: str, epochs: Sequence[Epoch], repeats: int) -> Row:
+    def alone() -> None:
+        with no_checks():
+            analysis.estimate(epochs)
+
+    times_s = paired(lambda: analysis.estimate(epochs), alone, repeats, clock=time.process_time)
+    return in_ms(name, (times_s[0] / len(epochs), times_s[1] / len(epochs)))
 
 
 def parts_ms(epochs: Sequence[Epoch]) -> Mapping[str, float]:
@@ -117,25 +127,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         prog="python -m benchmarks.checks_cost", description=(__doc__ or "").partition("\n")[0]
     )
     parser.add_argument("--epochs", type=int, default=6)
-    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--repeats", type=int, default=REPEATS)
     parser.add_argument("--parts", action="store_true", help="time each check too")
     options = parser.parse_args(arguments)
-    print("| epochs of 20 s | without checks, ms each | with them, ms each | checks / estimate |")
+    print("| what / reference | ours | reference | ratio |")
     print("| --- | ---: | ---: | ---: |")
-    found = inputs(options.epochs)
-    for name, epochs in found.items():
-        costs: tuple[list[float], list[float]] = ([], [])
-        for repeat in range(options.repeats + 1):
-            with no_checks():
-                alone_s = cpu_s(epochs)
-            with_s = cpu_s(epochs)
-            if repeat:  # the first run compiles and fills caches
-                costs[0].append(1e3 * alone_s / len(epochs))
-                costs[1].append(1e3 * with_s / len(epochs))
-        alone, whole = (statistics.median(one) for one in costs)
-        print(f"| {name} | {alone:.1f} | {whole:.1f} | {whole / alone - 1:.2f} |", flush=True)
+    for row in rows(options.epochs, options.repeats):
+        print(row)
     if options.parts:
-        tables = {name: parts_ms(epochs) for name, epochs in found.items()}
+        tables = {name: parts_ms(epochs) for name, epochs in inputs(options.epochs).items()}
         print(f"\n| check, ms an epoch | {' | '.join(tables)} |")
         print(f"| --- | {' | '.join('---:' for _ in tables)} |")
         for check in dict.fromkeys(part for table in tables.values() for part in table):

@@ -32,14 +32,17 @@ def in_ms(name: str, times_s: tuple[float, float]) -> Row:
 
 
 def paired(
-    ours: Callable[[], object], reference: Callable[[], object], repeats: int = REPEATS
+    ours: Callable[[], object],
+    reference: Callable[[], object],
+    repeats: int = REPEATS,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> tuple[float, float]:
     """Return the median time of ours and of the reference, taken in turn, after a warm-up."""
     times: tuple[list[float], list[float]] = ([], [])
     for repeat in range(repeats + 1):
         for which, work in enumerate((ours, reference)):
-            start = time.perf_counter()
+            start = clock()
             work()
             if repeat:
-                times[which].append(time.perf_counter() - start)
+                times[which].append(clock() - start)
     return statistics.median(times[0]), statistics.median(times[1])

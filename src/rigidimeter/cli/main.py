@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import io
+import os
 import signal
 import sys
 from pathlib import Path
@@ -133,6 +134,9 @@ def _say_interrupted() -> None:
 
 def main() -> None:
     """Run the command line; a mistake of the user ends with one sentence and status 1."""
+    # Before NumPy is imported: matrices here are small, and a second thread mostly waits, in a busy
+    # loop, for the first.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT):  # also where a parent ignores it
         signal.signal(number, _terminated)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as `nohup` does, for a long study

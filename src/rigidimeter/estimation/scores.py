@@ -13,7 +13,7 @@ which also lets the cycles begin and end between samples.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import optimize, signal
@@ -26,6 +26,7 @@ from rigidimeter.estimation.signals import (
     angle_at,
     grid_rate_hz,
     motion_channels,
+    thinned,
     uniform_grid,
     values_at,
 )
@@ -232,7 +233,8 @@ def single_frequency_share(epoch: Epoch) -> float:
 
     Close to 1 for an imposed sinusoid, well below for a perturbation with many frequencies.
     """
-    time_s, angle = _angle(epoch)
+    motion = {c.name: thinned(c, HIGHEST_HZ) for c in motion_channels(epoch)}
+    time_s, angle = _angle(replace(epoch, channels=motion))
     if time_s.size < 16 or not np.any(angle):
         return 0.0
     return _spectral_peak(time_s, angle)[1]

@@ -22,6 +22,9 @@ from rigidimeter.records import Channel
 
 Complex = NDArray[np.complex128]
 
+MOST_STATES = 12
+"""Of poles, that are kept during a search."""
+
 TINY = float(np.finfo(np.float64).tiny)
 
 FASTEST, SLOWEST = 6.0, 5e-4
@@ -230,19 +233,31 @@ class Acting:
         self._interval_s = 1.0 / channel.mean_rate_hz
         self._uneven_s = lateness_s(channel)
         self._late_s = math.nan
+        self._states: dict[complex, Array | Complex] = {}
 
     def columns(self, poles: tuple[complex, ...], shapes: Complex, late_s: float) -> Array:
         """Return the velocity that each term of a numerator makes of the input, shape (j, n)."""
-        if late_s != self._late_s:  # a search moves the poles more often than the delay
-            self._since = since_ticks(self._channel, self._time_s, late_s, even=0.0)
-            self._late_s = late_s
         columns = np.zeros((shapes.shape[1], self._time_s.size))
         for pole, weights in zip(poles, shapes, strict=True):
-            values = self._channel.values
-            state = state_after(pole, values, self._interval_s, *self._since, self._uneven_s)
+            state = self._state(pole, late_s)
             if pole.imag:
-                weights = 2 * weights
-                columns += np.outer(weights.real, state.real) - np.outer(weights.imag, state.imag)
+                columns += np.outer(2 * weights.real, state.real)
+                columns -= np.outer(2 * weights.imag, state.imag)
             else:
                 columns += np.outer(weights.real, state)
         return columns
+
+    def _state(self, pole: complex, late_s: float) -> Array | Complex:
+        """Return the state of a pole; a search moves some of them, or the delay, and not all."""
+        if late_s != self._late_s:
+            self._since = since_ticks(self._channel, self._time_s, late_s, even=0.0)
+            self._late_s = late_s
+            self._states.clear()
+        if pole not in self._states:
+            if len(self._states) >= MOST_STATES:
+                self._states.clear()
+            values = self._channel.values
+            self._states[pole] = state_after(
+                pole, values, self._interval_s, *self._since, self._uneven_s
+            )
+        return self._states[pole]

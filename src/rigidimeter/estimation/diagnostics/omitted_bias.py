@@ -24,10 +24,11 @@ from rigidimeter.estimation.closedloop.spectral_lines import Grid
 from rigidimeter.estimation.diagnostics.check_record import Case
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array
-from rigidimeter.estimation.terms.beyond_linear import BeyondLinear, Complex
+from rigidimeter.estimation.terms.beyond_linear import BeyondLinear
 from rigidimeter.estimation.terms.catalogue import REFLEXES
+from rigidimeter.estimation.terms.explained import Complex, explained, stacked, strongest
 from rigidimeter.estimation.terms.linear_misfit import LinearTerm
-from rigidimeter.estimation.terms.omitted_terms import OmittedTerm, strongest
+from rigidimeter.estimation.terms.omitted_terms import OmittedTerm
 
 
 def moved(case: Case, beyond: BeyondLinear, groups: Sequence[Sequence[OmittedTerm]]) -> list[Array]:
@@ -36,24 +37,31 @@ def moved(case: Case, beyond: BeyondLinear, groups: Sequence[Sequence[OmittedTer
     For least squares by a fit with them, which a loop with torque of the subject's own biases, and
     by their coefficients from what is not linear, which it does not.
     """
-    torques = {term: term.torque(beyond) for group in groups for term in group}
-    together = [np.sum([torques[term] for term in group], axis=0) for group in groups]
+    terms = dict.fromkeys(term for group in groups for term in group)
     if case.uses_perturbation and case.prepared is not None:
         weighted, problem, grid = _weighted(case, case.prepared)
         here = beyond.motion.time_s
-        lines = (grid.transform(np.interp(grid.time_s, here, one, 0.0, 0.0)) for one in together)
-        return [_added(weighted, problem.regressors, one)[None] for one in lines]
+        alone = {
+            term: _added(
+                weighted,
+                problem.regressors,
+                grid.transform(np.interp(grid.time_s, here, term.torque(beyond), 0.0, 0.0)),
+            )
+            for term in terms
+        }
+        return [np.sum([alone[term] for term in group], axis=0)[None] for group in groups]
     low, high = case.signals.band_hz
     inside = (beyond.frequency_hz >= low) & (beyond.frequency_hz <= high)
     motion = beyond.linear[inside]
+    alone = {term: _added(motion, motion, term.lines(beyond)[inside]) for term in terms}
     return [
         np.stack(
             [
                 case.parameters - _refitted(beyond, group, inside),
-                _added(motion, motion, beyond.lines(one)[inside]),
+                np.sum([alone[term] for term in group], axis=0),
             ]
         )
-        for group, one in zip(groups, together, strict=True)
+        for group in groups
     ]
 
 
@@ -90,21 +98,11 @@ def _refitted(
     plain = [term.name for term in terms if term.name not in REFLEXES]
     reflexes = [term.name for term in terms if term.name in REFLEXES]
     plain_lines = [beyond.term_lines(name) for name in plain]
-    columns = _stacked(np.column_stack([beyond.linear, *plain_lines])[inside])
-    target = _stacked(beyond.torque_lines[inside])
+    columns = stacked(np.column_stack([beyond.linear, *plain_lines])[inside])
+    target = stacked(beyond.torque_lines[inside])
     if reflexes:
         # One reflex at most is looked for: its direction is decided by what is not linear.
         (name,) = reflexes
-        late = _stacked(beyond.reflex_lines(name)[inside])
+        late = stacked(beyond.reflex_lines(name)[inside])
         columns = np.column_stack([columns, late[:, strongest(columns, late, target)]])
-    return _solved(columns, target)[:3]
-
-
-def _solved(columns: Array, target: Array) -> Array:
-    scale = np.linalg.norm(columns, axis=0)
-    left, upper = np.linalg.qr(columns / scale)
-    return np.asarray(np.linalg.lstsq(upper, left.T @ target)[0] / scale)
-
-
-def _stacked(lines: Complex) -> Array:
-    return np.concatenate([lines.real, lines.imag])
+    return explained(columns, target).values[:3]

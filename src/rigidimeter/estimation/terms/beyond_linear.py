@@ -25,22 +25,17 @@ from functools import cached_property, lru_cache, partial
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
+from rigidimeter.estimation.terms.explained import COLLINEAR, Complex, stacked
 from rigidimeter.estimation.terms.reflex import kernel
 from rigidimeter.estimation.window import tapered_ends
-
-Complex = NDArray[np.complex128]
 
 STRETCH_HZ = 1.0
 FEWEST_LINES = 9
 """Lines of a stretch, three for each of angle, velocity and acceleration."""
-
-COLLINEAR = 1e-8
-"""Of the largest singular value: columns that differ by less are one."""
 
 NOTHING = 1e-3
 """A term of which less than this share of the size is left is linear."""
@@ -185,8 +180,7 @@ class BeyondLinear:
 
     def solve(self, columns: Complex) -> Solution:
         """Fit columns, shape (m, p), to the torque; collinear ones share their coefficient."""
-        rows = np.concatenate([columns.real, columns.imag])
-        target = np.concatenate([self.torque.real, self.torque.imag])
+        rows, target = stacked(columns), stacked(self.torque)
         lengths = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
         # By way of R, since the lines are many and the columns few.
         left, upper = np.linalg.qr(rows / lengths)

@@ -21,8 +21,9 @@ import numpy as np
 from scipy import optimize, stats
 
 from rigidimeter.estimation.signals import Array
-from rigidimeter.estimation.terms.beyond_linear import BeyondLinear, Complex
-from rigidimeter.estimation.terms.omitted_terms import CHANCE, strongest
+from rigidimeter.estimation.terms.beyond_linear import BeyondLinear
+from rigidimeter.estimation.terms.explained import Complex, explained, stacked, strongest
+from rigidimeter.estimation.terms.omitted_terms import CHANCE
 
 NEARLY_ALL = 0.9
 """Of what J, B and K leave to a free filter, that a term must explain."""
@@ -70,9 +71,9 @@ def linear_term(beyond: BeyondLinear) -> LinearTerm | None:
     """Return the linear term that is there; None where there is none, or none that is known."""
     size = beyond.line_size_nm
     omega = 2 * np.pi * beyond.frequency_hz
-    target = _stacked(beyond.torque_lines / size)
+    target = stacked(beyond.torque_lines / size)
     motion = beyond.linear / size[:, None]
-    joint, rest = _solved(_stacked(motion), target)
+    rest, joint = explained(stacked(motion), target)
     free = float(np.sum(np.abs(beyond.torque) ** 2))
     taken = beyond.free_gains - 3
     left = target.size - beyond.free_gains
@@ -108,13 +109,13 @@ def _coupling(joint: Array, omega: Array, angle: Complex, target: Array) -> Foun
 
     def residual(values: Array) -> Array:
         path, soft = through(values)
-        return target - _stacked(path * soft * angle)
+        return target - stacked(path * soft * angle)
 
     def jacobian(values: Array) -> Array:
         path, soft = through(values)
         passed = soft**2 * angle
         by_softness = -(path**2) * passed / start[2]
-        return -_stacked(np.column_stack([slopes * passed[:, None], by_softness]))
+        return -stacked(np.column_stack([slopes * passed[:, None], by_softness]))
 
     tried = [
         optimize.least_squares(residual, [1.0, 1.0, 1.0, softness], jacobian, max_nfev=30)
@@ -128,26 +129,13 @@ def _coupling(joint: Array, omega: Array, angle: Complex, target: Array) -> Foun
 
 def _both_directions(motion: Complex, omega: Array, target: Array) -> Found:
     turns = np.exp(-1j * omega[:, None] * DELAYS_S)
-    late = _stacked(turns * motion[:, [1]])
-    columns = _stacked(motion)
+    late = stacked(turns * motion[:, [1]])
+    columns = stacked(motion)
     best = strongest(columns, late, target)
-    values, rest = _solved(np.column_stack([columns, late[:, best]]), target)
+    rest, values = explained(np.column_stack([columns, late[:, best]]), target)
     return ("reflex", float(values[3]), float(DELAYS_S[best]), values[:3]), rest
-
-
-def _solved(columns: Array, target: Array) -> tuple[Array, float]:
-    """Return the least-squares solution and the sum of squares that it leaves."""
-    scale = np.linalg.norm(columns, axis=0)
-    left, upper = np.linalg.qr(columns / scale)
-    products = left.T @ target
-    values = np.linalg.lstsq(upper, products)[0] / scale
-    return np.asarray(values), float(target @ target - products @ products)
 
 
 def _impedance(joint: Array, omega_rad_s: Array) -> Complex:
     J, B, K = joint
     return np.asarray(K - J * omega_rad_s**2 + 1j * omega_rad_s * B)
-
-
-def _stacked(lines: Complex) -> Array:
-    return np.concatenate([lines.real, lines.imag])

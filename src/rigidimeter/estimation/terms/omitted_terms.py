@@ -22,8 +22,16 @@ import numpy as np
 from scipy import stats
 
 from rigidimeter.estimation.signals import Array
-from rigidimeter.estimation.terms.beyond_linear import COLLINEAR, BeyondLinear, Complex
+from rigidimeter.estimation.terms.beyond_linear import BeyondLinear
 from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
+from rigidimeter.estimation.terms.explained import (
+    Complex,
+    Explained,
+    explained,
+    stacked,
+    strongest,
+    triangle,
+)
 from rigidimeter.estimation.terms.reflex import kernel, pass_through, stretch_velocity
 from rigidimeter.statistics import holm
 
@@ -79,17 +87,16 @@ class OmittedTerm(NamedTuple):
         passed = pass_through(stretch, beyond.motion.rate_hz, kernel(self.name), inner)
         return self.value * passed[0]
 
+    def lines(self, beyond: BeyondLinear) -> Complex:
+        """Return the lines of its torque, shape (m,)."""
+        if self.name in REFLEXES:
+            return beyond.lines(self.torque(beyond))
+        return np.asarray(self.value * beyond.term_lines(self.name)[:, 0])
+
 
 class _Found(NamedTuple):
     name: str
     inner: tuple[float, ...]
-
-
-class _Fit(NamedTuple):
-    """What a least-squares fit leaves, as a sum of squares, and its coefficients, shape (p,)."""
-
-    left: float
-    values: Array
 
 
 class _Test(NamedTuple):
@@ -97,7 +104,7 @@ class _Test(NamedTuple):
 
     name: str
     p: float
-    fit: _Fit
+    fit: Explained
 
 
 def omitted_terms(beyond: BeyondLinear) -> tuple[OmittedTerm, ...]:
@@ -145,13 +152,13 @@ def _tests(beyond: BeyondLinear, found: Sequence[_Found], left: Sequence[str]) -
         for name in left
     ]
     everything = [*found, *(term for group in groups for term in group)]
-    upper = _triangle(_columns(beyond, everything), beyond.torque)
+    upper = triangle(_columns(beyond, everything), beyond.torque)
     base = upper[:, : len(found)]
-    before = _fit(base, upper[:, -1])
+    before = explained(base, upper[:, -1])
     tests, at = [], len(found)
     for name, group in zip(left, groups, strict=True):
         more = len(group)
-        fit = _fit(np.column_stack([base, upper[:, at : at + more]]), upper[:, -1])
+        fit = explained(np.column_stack([base, upper[:, at : at + more]]), upper[:, -1])
         at += more
         degrees = beyond.free_values - len(found) - more
         gained = max(before.left - fit.left, 0.0) / more / beyond.taper_loss
@@ -160,7 +167,7 @@ def _tests(beyond: BeyondLinear, found: Sequence[_Found], left: Sequence[str]) -
     return tests
 
 
-def _best(beyond: BeyondLinear, found: Sequence[_Found], test: _Test) -> tuple[_Found, _Fit]:
+def _best(beyond: BeyondLinear, found: Sequence[_Found], test: _Test) -> tuple[_Found, Explained]:
     """Return the term and its fit, a reflex with its delay of least residual."""
     if test.name not in REFLEXES:
         return _Found(test.name, ()), test.fit
@@ -170,41 +177,11 @@ def _best(beyond: BeyondLinear, found: Sequence[_Found], test: _Test) -> tuple[_
         inners = beyond.grid([kind])
         late = np.flatnonzero([inner[0] >= EARLIEST_S for inner in inners])
         tried = beyond.white(beyond.reflex_lines(kind)[:, late])
-        best = strongest(_stacked(base), _stacked(tried), _stacked(beyond.torque))
-        upper = _triangle(np.column_stack([base, tried[:, best]]), beyond.torque)
-        fits.append((_Found(kind, inners[late[best]]), _fit(upper[:, :-1], upper[:, -1])))
+        best = strongest(stacked(base), stacked(tried), stacked(beyond.torque))
+        upper = triangle(np.column_stack([base, tried[:, best]]), beyond.torque)
+        fits.append((_Found(kind, inners[late[best]]), explained(upper[:, :-1], upper[:, -1])))
     delayed, slow = fits
     return slow if delayed[1].left - slow[1].left > DYNAMICS else delayed
-
-
-def strongest(base: Array, tried: Array, target: Array) -> int:
-    """Return which of the columns tried explains most of the target beside those of the base."""
-    basis, _ = np.linalg.qr(base / np.maximum(np.linalg.norm(base, axis=0), 1e-300))
-    # What one more column explains is its projection beside those that are there.
-    beside = tried - basis @ (basis.T @ tried)
-    explained = (target @ beside) ** 2 / np.maximum(np.sum(beside**2, axis=0), 1e-300)
-    return int(np.argmax(explained))
-
-
-def _triangle(columns: Complex, target: Complex) -> Array:
-    """Return R of the columns with the target as the last: few rows that hold every fit."""
-    whole = _stacked(np.column_stack([columns, target]))
-    lengths = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
-    return np.asarray(np.linalg.qr(whole / lengths, mode="r") * lengths)
-
-
-def _fit(columns: Array, target: Array) -> _Fit:
-    """Fit columns by singular values; collinear ones share their coefficient."""
-    lengths = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    left, singular, right = np.linalg.svd(columns / lengths, full_matrices=False)
-    kept = singular > COLLINEAR * np.max(singular, initial=0.0)
-    products = left[:, kept].T @ target
-    values = right[kept].T @ (products / singular[kept]) / lengths
-    return _Fit(float(target @ target - products @ products), np.asarray(values))
-
-
-def _stacked(lines: Complex) -> Array:
-    return np.concatenate([lines.real, lines.imag])
 
 
 def _columns(beyond: BeyondLinear, terms: Sequence[_Found]) -> Complex:
