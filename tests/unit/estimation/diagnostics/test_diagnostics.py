@@ -80,7 +80,14 @@ def test_every_level_that_can_be_set_belongs_to_a_check(sound):
     # What is found where epochs are fitted; what varies within one, and terms that are missing, are
     # looked for in a prepared epoch (test_varying, test_missing_term).
     varying = [name for name in DiagnosticLevels.model_fields if name.startswith("varying_")]
-    of_fits = ["lack_of_fit", "between_samples", "torque_delay", "missing_term", *varying]
+    of_fits = [
+        "lack_of_fit",
+        "band_sensitivity",
+        "between_samples",
+        "torque_delay",
+        "missing_term",
+        *varying,
+    ]
     assert sorted([*names, *of_fits]) == sorted(DiagnosticLevels.model_fields)
 
 
