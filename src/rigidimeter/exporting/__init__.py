@@ -1,7 +1,7 @@
 """Sessions and studies in the formats that archives and other programs take."""
 
+from rigidimeter.exporting.exported_sessions import sessions_of_recording, sessions_of_study
 from rigidimeter.exporting.formats import FORMATS, Format, export_sessions, format_named
-from rigidimeter.exporting.sessions import sessions_of_recording, sessions_of_study
 
 __all__ = [
     "FORMATS",

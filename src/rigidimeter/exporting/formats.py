@@ -16,7 +16,7 @@ from rigidimeter.exporting.bids import write_bids
 from rigidimeter.exporting.mat import write_mat
 from rigidimeter.exporting.names import stems
 from rigidimeter.exporting.nwb import write_nwb
-from rigidimeter.exporting.tables import write_csv, write_parquet
+from rigidimeter.exporting.table_folders import write_csv, write_parquet
 from rigidimeter.exporting.xdf import write_xdf
 from rigidimeter.recording.exported_session import ExportedSession
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rigidimeter.exporting.document_tables import columns_of, document_tables
-from rigidimeter.exporting.exclusions import exclusion_reasons
+from rigidimeter.exporting.exclusion_reasons import exclusion_reasons
 
 if TYPE_CHECKING:
     from pynwb import NWBFile

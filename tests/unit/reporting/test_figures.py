@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from rigidimeter.estimation import epoch_signals, scoring_cycles
 from rigidimeter.records import BandEstimate, Channel
-from rigidimeter.reporting.sections.band_sensitivity import band_sensitivity
 from rigidimeter.reporting.sections.distribution import distribution
+from rigidimeter.reporting.sections.other_bands import band_sensitivity
 from rigidimeter.reporting.sections.perturbation_figure import changes, perturbation, spectrum
 from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits
 from rigidimeter.reporting.sections.torque_fit import torque_limit_nm, torque_parts

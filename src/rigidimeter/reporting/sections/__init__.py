@@ -2,7 +2,6 @@
 
 from rigidimeter.reporting.contents import Section, from_study_folder
 from rigidimeter.reporting.sections import (
-    band_sensitivity,
     comparison_tables,
     data_quality,
     day_points,
@@ -12,6 +11,7 @@ from rigidimeter.reporting.sections import (
     impedance,
     method_sensitivity,
     methods_prose,
+    other_bands,
     perturbation_figure,
     rating_points,
     recordings,
@@ -44,7 +44,7 @@ SECTIONS: list[Section] = [
     impedance.SECTION,
     torque_fit.SECTION,
     unexplained_torque.SECTION,
-    band_sensitivity.SECTION,
+    other_bands.SECTION,
     torque_angle_loop.SECTION,
     data_quality.FINDINGS,
     data_quality.EXCLUSIONS,
