@@ -55,9 +55,10 @@ def _sentences(result: StudyResult, concluded: Conclusions) -> list[str]:
         for side in _SIDES
         if (members := concluded.of(side))
     ]
-    none = concluded.of("no difference shown")
-    if none:
-        shown.append(f"no difference is shown in {series(_with_p(none))}")
+    shown += [
+        f"no difference is shown in {series(_with_p(members))}{f' ({reason})' if reason else ''}"
+        for reason, members in _by_reason(concluded.of("no difference shown"))
+    ]
     found = []
     if shown:
         adjusted = f" (p adjusted by Holm’s method for {concluded.tested} measures)"
@@ -66,15 +67,20 @@ def _sentences(result: StudyResult, concluded: Conclusions) -> list[str]:
             f"{'; '.join(shown)}."
         )
     for verdict, heading in _WITHHELD.items():
-        by_reason: dict[str, list[Conclusion]] = {}
-        for one in concluded.of(verdict):
-            by_reason.setdefault(one.reason, []).append(one)
-        for reason, withheld in by_reason.items():
+        for reason, withheld in _by_reason(concluded.of(verdict)):
             titles = [_lower_first(one.comparison) for one in withheld]
             if verdict == "not supported":
                 titles = _with_p(withheld)
             found.append(f"{heading} {series(titles)}: {reason}.")
     return found
+
+
+def _by_reason(members: Iterable[Conclusion]) -> list[tuple[str, list[Conclusion]]]:
+    """Return the conclusions that share a reason, in the order of the first of each."""
+    found: dict[str, list[Conclusion]] = {}
+    for one in members:
+        found.setdefault(one.reason, []).append(one)
+    return list(found.items())
 
 
 def _with_p(members: Iterable[Conclusion]) -> list[str]:

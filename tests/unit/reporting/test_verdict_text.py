@@ -188,6 +188,12 @@ def test_reasons_that_measures_share_are_said_once(make_study, make_analysis, ep
     assert "there is only one recording" in text
 
 
+def test_that_few_days_show_only_large_differences_is_said_once() -> None:
+    text = verdict_sentence(made_study(dataclasses.replace(SMALL, days=(2, 2), both_on_a_day=True)))
+    assert text.count("with 1 degree of freedom only a difference above 12.7 standard errors") == 1
+    assert text.index("no difference is shown in") < text.index("with 1 degree of freedom")
+
+
 def test_what_was_found_and_is_not_supported(study: StudyResult) -> None:
     finding = Finding("tremor", "doubt", 2.0, 1.0, "a tremor", "repeat it at rest")
     fits = tuple(
