@@ -25,7 +25,7 @@ demo: install
 # In the order of their names: by the number of tests, files of few long ones would come last, alone.
 test: install
 	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m 'not slow and not realtime'
-	$(BIN)/python -m pytest -n 3 -m 'not slow and realtime' tests/faults tests/wire tests/unit/acquisition
+	$(BIN)/python -m pytest -n 2 -m 'not slow and realtime' tests/faults tests/wire tests/unit/acquisition
 
 check: install
 	$(BIN)/ruff format --check .
