@@ -27,14 +27,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from rigidimeter.devices.base import DeviceFacts, Now
 from rigidimeter.devices.composed import ComposedRig, Home
 from rigidimeter.devices.rig_lock import RigLock
 from rigidimeter.documents import read_toml
 from rigidimeter.errors import UserError
-from rigidimeter.settings.messages import sentence
+from rigidimeter.settings.messages import validated
 
 DRIVERS: Mapping[str, Mapping[str, str]] = {
     "torque_sensor": {
@@ -200,11 +200,7 @@ def _device(path: Path, role: str, table: Any) -> tuple[type[Any], Any]:
         raise UserError(f"{path}: [{role}] must name its driver: {known}, or package.module:Class")
     driver = _driver(path, role, table["driver"])
     values = {key: value for key, value in table.items() if key != "driver"}
-    try:
-        return driver, driver.Settings.model_validate(values)
-    except ValidationError as error:
-        lines = [sentence(driver.Settings, values, detail) for detail in error.errors()]
-        raise UserError(f"{path}, [{role}]: " + "; ".join(lines)) from None
+    return driver, validated(driver.Settings, values, f"{path}, [{role}]")
 
 
 def _driver(path: Path, role: str, name: str) -> Any:

@@ -102,11 +102,10 @@ class EmulatedRig:
         self._bus: dict[str, Any] = {}
         self.torque = rdt.RdtEmulator(self.arm, rate_hz=torque_rate_hz, seed=seed)
         self.torque.start()
-        try:
+        with contextlib.ExitStack() as on_failure:
+            on_failure.callback(self.torque.stop)
             self.drive: Any = self._make_drive()
-        except BaseException:
-            self.torque.stop()
-            raise
+            on_failure.pop_all()
         self._commands: Mapping[str, Callable[..., dict[str, Any]]] = {
             "state": self._state,
             "misbehave": self._misbehave,

@@ -131,7 +131,10 @@ def export_sessions(
 def _check_place(form: Format, out: Path, *, overwrite: bool, several: bool) -> None:
     single = bool(form.suffix) and not several
     if single and out.suffix.lower() != form.suffix:
-        raise UserError(f"--out {out}: the name of a {form.title} must end in {form.suffix}")
+        raise UserError(
+            f"--out {out}: the name of the file must end in {form.suffix}, such as "
+            f"{out.with_suffix(form.suffix)}"
+        )
     if single and out.is_dir():
         raise UserError(f"--out {out}: is a folder; name a new {form.suffix} file")
     if not single and out.exists() and not out.is_dir():

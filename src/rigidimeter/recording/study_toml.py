@@ -10,11 +10,9 @@ import os
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from rigidimeter.documents import read_toml
-from rigidimeter.errors import UserError
-from rigidimeter.settings.messages import sentence
+from rigidimeter.settings.load import read_section
 from rigidimeter.settings.section import Section
 
 STUDY_FILE = "study.toml"
@@ -165,16 +163,4 @@ def read_study_toml(path: Path) -> StudyToml:
     UserError
         Naming each offending key, its value, and what would be right.
     """
-    values = read_toml(path)
-    schema = values.pop("schema", None)
-    if schema is None:
-        raise UserError(
-            f'{path}: schema is missing; its first line must be schema = "{STUDY_SCHEMA}"'
-        )
-    if schema != STUDY_SCHEMA:
-        raise UserError(f"{path}: schema is {schema!r}; this version reads {STUDY_SCHEMA!r}")
-    try:
-        return StudyToml.model_validate(values)
-    except ValidationError as error:
-        text = "; ".join(dict.fromkeys(sentence(StudyToml, values, d) for d in error.errors()))
-        raise UserError(f"{path}: {text}") from None
+    return read_section(path, STUDY_SCHEMA, StudyToml)

@@ -7,11 +7,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from rigidimeter.documents import read_toml
 from rigidimeter.errors import UserError
-from rigidimeter.settings.messages import sentence
+from rigidimeter.settings.messages import Model, validated
 from rigidimeter.settings.models import Settings
 
 
@@ -24,11 +22,24 @@ def parse_settings(values: Mapping[str, Any], *, source: str = "settings") -> Se
         Naming each offending key, its value, its unit and the allowed range; for an unknown key
         the nearest known one.
     """
-    try:
-        return Settings.model_validate(dict(values))
-    except ValidationError as error:
-        lines = [sentence(Settings, values, detail) for detail in error.errors()]
-        raise UserError(f"{source}: " + "; ".join(lines)) from None
+    return validated(Settings, values, source)
+
+
+def read_section(path: Path, schema: str, model: type[Model]) -> Model:
+    """Read a TOML file whose `schema` is this one.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, is not TOML, is of another schema, or holds a bad value.
+    """
+    values = read_toml(path)
+    found = values.pop("schema", None)
+    if found is None:
+        raise UserError(f'{path}: schema is missing; its first line must be schema = "{schema}"')
+    if found != schema:
+        raise UserError(f"{path}: schema is {found!r}; this version reads {schema!r}")
+    return validated(model, values, str(path))
 
 
 def load_settings(path: Path | None) -> Settings:

@@ -6,11 +6,30 @@ import difflib
 import types
 import typing
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
+
+from rigidimeter.errors import UserError
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def validated(model: type[Model], values: Mapping[str, Any], source: str) -> Model:
+    """Return a section of values.
+
+    Raises
+    ------
+    UserError
+        Naming the source, and each offending key with its value and what would be right.
+    """
+    try:
+        return model.model_validate(dict(values))
+    except ValidationError as error:
+        told = dict.fromkeys(sentence(model, values, detail) for detail in error.errors())
+        raise UserError(f"{source}: {'; '.join(told)}") from None
 
 
 def sentence(root: type[BaseModel], values: Mapping[str, Any], detail: ErrorDetails) -> str:

@@ -81,7 +81,7 @@ def test_other_bands_stand_at_their_change_in_percent_with_its_error() -> None:
     assert drawn == pytest.approx([10.0, 0.0, -5.0])
     (bar,) = figure.axes[0].containers[0].lines[2][0].get_segments()
     assert bar[:, 0] == pytest.approx([10 - 19.6, 10 + 19.6], abs=0.01)
-    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["0.10 to 15.0 Hz"]
+    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["0.1 to 15 Hz"]
 
 
 def test_changes_keep_the_course_of_a_held_signal() -> None:

@@ -11,14 +11,13 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from rigidimeter.documents import read_toml
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.choice import LABELS
 from rigidimeter.recording.channels.quantities import QUANTITIES
 from rigidimeter.recording.formats.read_options import ReadOptions
-from rigidimeter.settings.messages import sentence
+from rigidimeter.settings.load import read_section
 from rigidimeter.settings.section import Section
 
 MAPPING_SCHEMA = "rigidimeter.mapping/1"
@@ -63,19 +62,7 @@ def read_mapping(path: Path) -> ReadOptions:
     UserError
         Naming each offending key, its value, and what would be right.
     """
-    values = read_toml(path)
-    schema = values.pop("schema", None)
-    if schema != MAPPING_SCHEMA:
-        shown = "is missing" if schema is None else f"is {schema!r}"
-        raise UserError(
-            f"{path}: schema {shown}; the first line of a mapping must be schema = "
-            f'"{MAPPING_SCHEMA}"'
-        )
-    try:
-        said = MappingToml.model_validate(values)
-    except ValidationError as error:
-        told = [sentence(MappingToml, values, detail) for detail in error.errors()]
-        raise UserError(f"{path}: {'; '.join(dict.fromkeys(told))}") from None
+    said = read_section(path, MAPPING_SCHEMA, MappingToml)
     tables: dict[str, ColumnTable] = {one.name: getattr(said, one.name) for one in QUANTITIES}
     columns = {name: table.column for name, table in tables.items() if table.column}
     columns |= {

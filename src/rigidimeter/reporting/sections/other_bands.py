@@ -50,7 +50,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     yield Figure(
         "band_sensitivity",
         f"Change of J, B and K of all epochs together from those of the band of the fit, "
-        f"{number(own.low_hz, 3)} to {number(own.high_hz, 3)} Hz, if another band or one half of "
+        f"{own.low_hz:.3g} to {own.high_hz:.3g} Hz, if another band or one half of "
         "each epoch is used. Bars: 95 % interval of the change. Bands of colour: 95 % interval of "
         "the estimate.",
         f"How J, B and K depend on the band. {words}.",
@@ -68,7 +68,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
 def _label(one: BandEstimate) -> str:
     if one.part != "all":
         return f"{one.part} of each epoch"
-    return f"{number(one.low_hz, 2)} to {number(one.high_hz, 3)} Hz"
+    return f"{one.low_hz:.2g} to {one.high_hz:.3g} Hz"
 
 
 def _percent(one: BandEstimate) -> tuple[np.ndarray, np.ndarray]:

@@ -81,7 +81,7 @@ def test_a_mapping_says_what_the_options_said(tmp_path):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("", 'schema is missing; the first line of a mapping must be schema = "rigidimeter.map'),
+        ("", 'schema is missing; its first line must be schema = "rigidimeter.map'),
         ('schema = "rigidimeter.mapping/9"', "schema is 'rigidimeter.mapping/9'"),
         ('schema = "rigidimeter.mapping/1"\n[torqe]\ncolumn = "a"', "the nearest is torque"),
         ('schema = "rigidimeter.mapping/1"\n[torque]\nunits = "a"', "the nearest is torque.unit"),

@@ -1,0 +1,29 @@
+"""What the picture of a file shows of its columns."""
+
+import numpy as np
+from tests.known_joint import angle_rad, torque_nm
+
+from rigidimeter.recording.channels.inspection import inspect_table
+from rigidimeter.recording.formats.read_options import ReadOptions
+from rigidimeter.recording.formats.table import Table
+from rigidimeter.reporting.inspected_columns import columns_figure
+
+TIME_S = np.arange(1200) / 100.0
+
+
+def test_each_column_but_the_time_with_every_value_and_its_unit():
+    angle = np.degrees(angle_rad(TIME_S))
+    angle[1::2] = np.nan  # a slower clock: every other row is empty
+    columns = {
+        "Zeit [s]": TIME_S,
+        "M [Nm]": torque_nm(TIME_S),
+        "phi": angle,
+        "note": np.full(TIME_S.size, "a", dtype=object),
+    }
+    options = ReadOptions({"angle_rad": "phi"}, units={"angle_rad": "deg"})
+    panes = columns_figure(inspect_table(Table("r.csv", columns), options)).axes
+    assert [pane.get_ylabel() for pane in panes] == ["M [Nm]", "phi\n(deg)"]
+    assert panes[-1].get_xlabel() == "time (s)"
+    time, drawn = panes[1].lines[0].get_data()
+    np.testing.assert_array_equal(time, TIME_S[::2])
+    np.testing.assert_array_equal(drawn, angle[::2])
