@@ -12,16 +12,12 @@ from __future__ import annotations
 import argparse
 import math
 from collections import Counter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.false_alarms import RATES, SIZES
-from rigidimeter.acquisition import SimulatedClock, perturb, tick
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.devices.base import Reading
-from rigidimeter.experiment import prbs_nm
+from rigidimeter.commissioning.turned_sign import turned_epoch
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings, parse_settings
 
@@ -40,53 +36,18 @@ SUBJECTS: dict[str, tuple[tuple[float, float, float], dict[str, float]]] = {
 }
 
 
-class TurnedRig(SimulatedRig):
-    """The simulated rig whose torque has the wrong sign from one of its ticks on."""
-
-    turned_at = math.inf
-
-    def read(self, elapsed_ticks: int = 1) -> Reading:
-        """Return the reading, its torque perhaps turned."""
-        reading = super().read(elapsed_ticks)
-        if self._tick > self.turned_at:
-            return reading._replace(torque_nm=-reading.torque_nm)
-        return reading
-
-
-class Run(NamedTuple):
-    """What ended an epoch, after how many ticks, and the angle at each of them."""
-
-    cause: Cause
-    ticks: int
-    angle_deg: NDArray[np.float64]
-
-
-def run(settings: Settings, seed: int, turned_at: float, seconds: float) -> Run:
-    """Run one epoch from rest."""
-    rate_hz = settings.rig.tick_rate_hz
-    rig = TurnedRig(settings.rig, settings.subject["OFF"], np.random.default_rng(seed))
-    rig.turned_at = turned_at * rate_hz
-    angles: list[float] = []
-    loop = tick.ControlLoop(settings, rig, SimulatedClock(), lambda s: angles.append(s.angle_rad))
-    rig.enable()
-    perturb(loop, 0, prbs_nm(settings.prbs, rate_hz)[: round(seconds * rate_hz)].tolist())
-    return Run(loop.cause, loop.tick, np.degrees(angles))
-
-
 def row(settings: Settings, epochs: int) -> str:
     """Return what became of one subject, as columns of the table."""
-    rate_hz = settings.rig.tick_rate_hz
     found_s: list[float] = []
     wrong_deg: list[float] = []
     others: Counter[str] = Counter()
     for moment_s in MOMENTS_S:
         for seed in range(epochs):
-            seconds = moment_s + LONGEST_S
-            turned = run(settings, seed, moment_s, seconds)
-            twin = run(settings, seed, math.inf, turned.ticks / rate_hz)
-            n = min(turned.ticks, twin.ticks)
+            turned = turned_epoch(settings, "OFF", seed, moment_s, moment_s + LONGEST_S)
+            twin = turned_epoch(settings, "OFF", seed, math.inf, turned.ended_s)
+            n = min(len(turned.angle_deg), len(twin.angle_deg))
             if turned.cause is Cause.TORQUE_SIGN:
-                found_s.append(turned.ticks / rate_hz - moment_s)
+                found_s.append(turned.ended_s - moment_s)
                 wrong_deg.append(float(abs(turned.angle_deg[:n] - twin.angle_deg[:n]).max()))
             else:
                 others[turned.cause.name.lower().replace("_", " ")] += 1

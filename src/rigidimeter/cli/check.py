@@ -13,6 +13,7 @@ from rigidimeter.cli.commission import claimed, table
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.sign_text import sign_lines
 from rigidimeter.errors import UserError
 
 
@@ -105,6 +106,8 @@ def check(
     echo(f"Record: {path}")
     if found.objection:
         raise UserError(f"{rig}: not fit for a person today: {found.objection}")
+    for line in sign_lines(chosen, found.checks):
+        echo(line)
     kept = found.reference
     if kept is not None and kept.made_utc == found.made_utc:
         was = "" if kept.before_kg_m2 is None else f"; it was {kept.before_kg_m2:.3g} kg·m²"

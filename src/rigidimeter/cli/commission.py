@@ -17,6 +17,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.sign_text import sign_lines
 from rigidimeter.cli.table_lines import text_table
 from rigidimeter.errors import UserError
 
@@ -114,6 +115,8 @@ def commission(
         raise UserError(f"{rig}: not fit for a person: {found.objection}")
     if found.not_tried:
         echo(f"Not tried: {', '.join(found.not_tried)}.")
+    for line in sign_lines(chosen, found.checks):
+        echo(line)
     what = "this emulated rig, with nobody in it" if found.emulated else "this rig"
     echo(
         f"Valid for {what}, its devices and this controller, for "

@@ -18,7 +18,14 @@ from rigidimeter.commissioning.daily_record import (
     write_daily,
 )
 from rigidimeter.commissioning.sequence import commission
+from rigidimeter.commissioning.static_tests import measured_noise_nm
 from rigidimeter.commissioning.trial import Operator, Setup, Timebase
+from rigidimeter.commissioning.turned_sign import (
+    Search,
+    TurnedEpochs,
+    perturbed_conditions,
+    search_for_turned_sign,
+)
 
 __all__ = [
     "Check",
@@ -27,16 +34,21 @@ __all__ = [
     "DailyRecord",
     "Operator",
     "Outcome",
+    "Search",
     "Setup",
     "Timebase",
+    "TurnedEpochs",
     "check_record",
     "commission",
     "daily_check",
     "daily_path",
+    "measured_noise_nm",
+    "perturbed_conditions",
     "read_daily",
     "read_record",
     "record_path",
     "require_daily_check",
+    "search_for_turned_sign",
     "with_measured_floor",
     "write_daily",
     "write_record",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from rigidimeter.settings import Settings
 
 BAD_COUNTS = ("lost", "damaged", "short", "reordered", "repeated", "refused", "unsent")
 FEWEST_VALUES = 3
+NOISE = "torque noise (SD)"
 BRAKING = "braking_rad_s2"
 """What a drive's facts call the slowest of its own ways to brake."""
 
@@ -155,7 +156,7 @@ def noise_checks(readings: Readings, settings: Settings) -> list[Check]:
             "the sensor is too coarse: choose a finer calibration",
         ),
         below(
-            "torque noise (SD)",
+            NOISE,
             float(np.std(torque, ddof=1)) if len(torque) > 1 else math.inf,
             "N·m",
             zeroing.noise_limit_nm,
@@ -170,6 +171,12 @@ def noise_checks(readings: Readings, settings: Settings) -> list[Check]:
             "take the load off and zero the sensor, or look at its calibration",
         ),
     ]
+
+
+def measured_noise_nm(checks: Sequence[Check]) -> float | None:
+    """Return the standard deviation of the torque at rest; None if it was not measured."""
+    values = [check.value for check in checks if check.name == NOISE]
+    return values[0] if values and isinstance(values[0], float) else None
 
 
 def lateness(readings: Readings, settings: Settings) -> Check:

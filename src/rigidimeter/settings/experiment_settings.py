@@ -10,7 +10,12 @@ from rigidimeter.settings.section import Section, quantity
 
 
 class PrbsSettings(Section):
-    """The torque perturbation: a maximal-length pseudo-random binary sequence."""
+    """The torque perturbation: a maximal-length pseudo-random binary sequence.
+
+    By the torque's answer to it the guard finds a torque sensor of the wrong sign. Where the
+    subject's own torque is larger than about a tenth of `amplitude_nm` it may not;
+    `rigidimeter commission` and `check` print what it finds with the settings.
+    """
 
     ascending: ClassVar = (("wanted_low_hz", "wanted_high_hz"),)
 
