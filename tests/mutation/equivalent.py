@@ -3,6 +3,7 @@
 SLOWER = "looks closer where it need not; what it finds there does not limit"
 NEAR = "step.py guard_step: "
 ANSWER = "torque_answer.py "
+SIGN = "torque_sign.py "
 STEP = "consistency.py consistency_step: "
 
 MOMENT = "a measured value in floating point is never met to the bit"
@@ -13,6 +14,9 @@ ANEW = "each stretch sets it; a ramp before the first has no velocity to take of
 GIVEN = "a default that is never used: every result is made with all its fields"
 BEGUN = "a default that is never used: a state begins within its first mean"
 ANY_SIGN = "infinite or no number in a sum makes the sum so, whatever the signs"
+OF_NOTHING = "divides a column of nothing, or solves for what is 0"
+BOTH_SIDES = "a scale of both sides, next to which what is added is a thousand-millionth"
+SQUARE = "its rows are as many as its columns"
 RAMP = "only a ramp uses it, and its controller does not ask for the tick's number"
 
 EQUIVALENT: dict[str, str] = {
@@ -40,6 +44,15 @@ EQUIVALENT: dict[str, str] = {
     ANSWER + "answer_step: needed > limits.unshown_nm * limits.unshown_nm → "
     "needed >= limits.unshown_nm * limits.unshown_nm": MOMENT,
     ANSWER + "answer_step: shown < part * needed → shown <= part * needed": MOMENT,
+    SIGN + "table: 1.0 → 1.01": OF_NOTHING,
+    SIGN + "table: 1.0 → 0.9900990099009901": OF_NOTHING,
+    SIGN + "whitened: 0 → -1": "a column has one dimension",
+    SIGN + "whitened: 1.0 → 1.01": BOTH_SIDES,
+    SIGN + "whitened: 1.0 → 0.9900990099009901": BOTH_SIDES,
+    SIGN + "whitened: 0.0 → 0.001 #2": OF_NOTHING,
+    SIGN + "whitened: 0.0 → -0.001 #2": OF_NOTHING,
+    SIGN + "solved_for: 0 → 1": SQUARE,
+    SIGN + "solved_for: 0 → -1": SQUARE,
     CAN + "_check_watchdog: now_s - min(wire.sync_s, wire.asked_s) > self._stops_itself_s → "
     "now_s - min(wire.sync_s, wire.asked_s) >= self._stops_itself_s": MOMENT,
     CAN + "_find_cause: now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s → "

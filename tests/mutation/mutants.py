@@ -133,7 +133,7 @@ def _does_nothing(node: ast.AST) -> bool:
         return True
     return isinstance(node, ast.Assign) and (
         ast.unparse(node.targets[0]) == "__all__"
-        or ast.unparse(node.value).startswith(("Callable[", "tuple["))
+        or ast.unparse(node.value).startswith(("Callable[", "NDArray[", "tuple["))
     )
 
 

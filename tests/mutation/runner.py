@@ -49,7 +49,9 @@ TESTS = {
         *("guard/test_answer_window.py", "guard/test_torque_answer.py"),
         "guard/test_consistency.py",
     ),
-    "guard/torque_sign.py": ("guard/test_torque_sign.py", "guard/test_torque_answer.py"),
+    "guard/torque_sign.py": (
+        *("guard/test_torque_sign.py", "guard/test_sign_edges.py", "guard/test_torque_answer.py"),
+    ),
     "guard/watch.py": ("guard/test_watch.py", *_STEP),
     "acquisition/control_modes.py": ("acquisition/test_modes.py", *_RUN),
     "acquisition/controller_run.py": ("acquisition/test_controller_run.py", *_RUN),
