@@ -266,8 +266,8 @@ def table(path: Path, time_s=None, scale_torque=1.0, scale_angle=1.0, **more) ->
         ({"scale_torque": 1e-320}, {}, "the largest value of torque_nm is 9.99989e-321; it must"),
         ({"scale_angle": 1e-320}, {}, "the largest value of angle_rad is"),
         ({"scale_angle": 1e300}, {}, "must be from 1e-30 to 1e+30 in SI units"),
-        ({"time_s": np.arange(50) * 1e-310}, {}, "rows that are 1e-310 s apart"),
-        ({"time_s": np.arange(50) * 1e300}, {}, "rows that are 1e+300 s apart"),
+        ({"time_s": np.arange(50) * 1e-310}, {}, "samples that are 1e-310 s apart"),
+        ({"time_s": np.arange(50) * 1e300}, {}, "samples that are 1e+300 s apart"),
         ({}, {"epoch_length_s": 1e-300}, "more than 10000 epochs of --epoch-length-s 1e-300"),
     ],
 )

@@ -51,7 +51,8 @@ def read_nwb(path: Path) -> Table | tuple[list[Epoch], list[Notice]]:
             return epochs_of_export(_exported(file, about, expansion), str(path))
         found = dict(_series(file, expansion, 0))
         check_count(path, len(found))
-        streams, units = [], {}
+        streams: list[Stream] = []
+        units: list[dict[str, str]] = []
         for name, series in found.items():
             values, unit = _values(series, expansion)
             stamps = _stamps(series, len(values), expansion)
@@ -59,7 +60,7 @@ def read_nwb(path: Path) -> Table | tuple[list[Epoch], list[Notice]]:
             if values.ndim != 1 or stamps is None:
                 continue
             streams.append(Stream(name, stamps, {short: values}))
-            units[short] = unit
+            units.append({short: unit})
         return _with_trials(table_of_streams(str(path), streams, units), file, expansion)
 
 

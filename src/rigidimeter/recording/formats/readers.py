@@ -18,6 +18,8 @@ from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.arrow_file import read_arrow
 from rigidimeter.recording.formats.bids_dataset import bids_settings, is_bids, read_bids
+from rigidimeter.recording.formats.biopac_file import read_biopac
+from rigidimeter.recording.formats.c3d_file import read_c3d
 from rigidimeter.recording.formats.export_folder import (
     export_folder_settings,
     is_export_folder,
@@ -29,6 +31,7 @@ from rigidimeter.recording.formats.mat_export import (
     read_mat_export,
 )
 from rigidimeter.recording.formats.mat_file import read_mat
+from rigidimeter.recording.formats.neurophysiology_file import SUFFIXES, read_neurophysiology
 from rigidimeter.recording.formats.npz_file import read_npz
 from rigidimeter.recording.formats.nwb_file import nwb_settings, read_nwb
 from rigidimeter.recording.formats.read_options import ReadOptions
@@ -36,6 +39,7 @@ from rigidimeter.recording.formats.spreadsheet import read_spreadsheet
 from rigidimeter.recording.formats.stored_arrays import Columns
 from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.table_epochs import epochs_from_table
+from rigidimeter.recording.formats.tdms_file import read_tdms
 from rigidimeter.recording.formats.text_head import Layout
 from rigidimeter.recording.formats.text_table import read_text_recording
 from rigidimeter.recording.formats.xdf_file import read_xdf, xdf_settings
@@ -133,6 +137,16 @@ READERS: list[Reader] = [
         settings=xdf_settings,
         made_by="LabRecorder",
         extra="xdf",
+    ),
+    Reader("TDMS file", (".tdms",), read_tdms, made_by="LabVIEW", extra="tdms"),
+    Reader("C3D file", (".c3d",), read_c3d, made_by="a program of motion capture", extra="c3d"),
+    Reader("BIOPAC file", (".acq",), read_biopac, made_by="AcqKnowledge", extra="biopac"),
+    Reader(
+        "electrophysiology file",
+        SUFFIXES,
+        read_neurophysiology,
+        made_by="Spike2, pCLAMP, Central or Plexon",
+        extra="neo",
     ),
     Reader(
         "Parquet or Arrow file",

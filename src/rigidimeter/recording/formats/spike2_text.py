@@ -28,7 +28,7 @@ def spike2_table(source: str, text: bytes) -> Table:
     lines = text.decode("utf-8").split("\n")
     titles = {row[0]: row for row in _rows(lines) if len(row) > 3 and row[0].isdigit()}
     streams: list[Stream] = []
-    units: dict[str, str] = {}
+    units: list[dict[str, str]] = []
     for number, (first, last) in _channels(lines).items():
         title = titles.get(number, [number, "", f"channel {number}", ""])
         pieces = [*_pieces(source, lines, first, last)]
@@ -38,7 +38,7 @@ def spike2_table(source: str, text: bytes) -> Table:
         time_s = np.concatenate([stamps for stamps, _ in pieces])
         values = np.concatenate([values for _, values in pieces])
         streams.append(Stream(f"channel {number}", time_s, {name: values}))
-        units[name] = title[3].strip()
+        units.append({name: title[3].strip()})
     if len(streams) > COLUMNS:
         raise UserError(f"{source}: has {len(streams)} channels; at most {COLUMNS} are read")
     return table_of_streams(source, streams, units)

@@ -29,7 +29,7 @@ from rigidimeter.recording.exported_session import (
     epochs_of_export,
     exported_settings,
 )
-from rigidimeter.recording.formats.clocked_table import table_of_streams
+from rigidimeter.recording.formats.clocked_table import table_of_streams, unique
 from rigidimeter.recording.formats.lsl_recording import (
     SAMPLES_TYPE,
     epochs_of_samples,
@@ -100,11 +100,7 @@ def read_xdf(path: Path) -> Table | tuple[list[Epoch], list[Notice]]:
         return epochs_of_samples(str(path), _columns(sent), markers, sent.described)
     signals = [stream for stream in streams if not stream.of_text]
     first_s = min((float(each.time_s[0]) for each in signals if each.time_s.size), default=0.0)
-    units = {
-        label: unit
-        for each in signals
-        for label, unit in zip(_labels(each), each.units, strict=False)
-    }
+    units = [dict(zip(_labels(each), each.units, strict=False)) for each in signals]
     named = [Stream(each.name, each.time_s - first_s, _columns(each)) for each in signals]
     return table_of_streams(str(path), named, units)
 
@@ -171,7 +167,7 @@ def _one(facts: Mapping[str, Any], name: str) -> str:
 def _labels(stream: XdfStream) -> list[str]:
     count = stream.values.shape[1] if stream.values.ndim == 2 else 0
     pairs = zip_longest(stream.labels[:count], range(count))
-    return [label or f"{stream.name} {k + 1}" for label, k in pairs if k is not None]
+    return unique(label or f"{stream.name} {k + 1}" for label, k in pairs if k is not None)
 
 
 def _columns(stream: XdfStream) -> dict[str, NDArray[np.float64]]:

@@ -119,12 +119,12 @@ def test_parquet_of_pandas_without_units_is_not_guessed(tmp_path: Path) -> None:
 def test_clocks_keep_their_rows() -> None:
     one = Stream("a", np.array([0.0, 1.0, 2.0]), {"x": np.array([1.0, 2.0, 3.0])})
     two = Stream("b", np.array([0.5, 1.0]), {"x": np.array([4.0, 5.0]), "y": np.array([6.0, 7.0])})
-    table = table_of_streams("file", [one, two], {"y": "deg"})
+    table = table_of_streams("file", [one, two], [{"x": "N"}, {"x": "Nm", "y": "deg"}])
     assert table.columns["time_s"].tolist() == [0.0, 0.5, 1.0, 2.0]
     np.testing.assert_array_equal(table.columns["a.x"], [1.0, np.nan, 2.0, 3.0])
     np.testing.assert_array_equal(table.columns["b.x"], [np.nan, 4.0, 5.0, np.nan])
     np.testing.assert_array_equal(table.columns["y"], [np.nan, 6.0, 7.0, np.nan])
-    assert table.units == {"time_s": "s", "y": "deg"}
+    assert table.units == {"time_s": "s", "a.x": "N", "b.x": "Nm", "y": "deg"}
 
 
 def test_stamps_that_go_back_are_refused() -> None:
