@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 from rigidimeter.version import __version__
 
 if TYPE_CHECKING:
+    from rigidimeter.archives import batch
     from rigidimeter.estimation import identify
     from rigidimeter.experiment import design
     from rigidimeter.recording import read
@@ -32,7 +33,17 @@ if TYPE_CHECKING:
     from rigidimeter.study import compare, estimate
     from rigidimeter.virtual import simulate
 
-__all__ = ["__version__", "compare", "design", "estimate", "identify", "read", "report", "simulate"]
+__all__ = [
+    "__version__",
+    "batch",
+    "compare",
+    "design",
+    "estimate",
+    "identify",
+    "read",
+    "report",
+    "simulate",
+]
 
 _ROOMS = {
     "identify": "rigidimeter.estimation",
@@ -42,6 +53,7 @@ _ROOMS = {
     "simulate": "rigidimeter.virtual",
     "design": "rigidimeter.experiment",
     "report": "rigidimeter.reporting",
+    "batch": "rigidimeter.archives",
 }
 
 

@@ -13,6 +13,7 @@ from tests.known_joint import angle_rad, torque_nm
 from tests.small_study import scored_study, study
 from typer.testing import CliRunner
 
+from rigidimeter.archives.table import columns as batch_columns
 from rigidimeter.cli.main import app
 from rigidimeter.errors import UserError
 from rigidimeter.recording import (
@@ -88,6 +89,13 @@ def test_the_keys_of_the_estimates_are_documented() -> None:
     assert set(document["pooled"]) == {*table(FILES, "Each fit"), "conditions"}
     assert set(document["fixed_inertia"]) == {"inertia_kg_m2", "epochs"}
     assert f"`{document['schema']}`" in FILES.read_text("utf-8")
+
+
+def test_the_columns_of_a_batch_are_documented() -> None:
+    named, columns = list(table(FILES, "Batch table")), list(batch_columns())
+    assert named == columns[:10] + columns[-4:]
+    numbers = set(columns[10:-4])
+    assert numbers == {*_analysis().rows()[0], *_analysis().scores[0].row()} - set(columns[:10])
 
 
 def test_the_keys_of_the_comparisons_are_documented(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 import rigidimeter
 from rigidimeter.errors import UserError, arguments_named
 
-NAMES = {"compare", "design", "estimate", "identify", "read", "report", "simulate"}
+NAMES = {"batch", "compare", "design", "estimate", "identify", "read", "report", "simulate"}
 
 
 def test_the_front_door_lists_what_users_need() -> None:
@@ -66,7 +66,8 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
 def test_the_names_stay_functions_when_their_rooms_are_imported() -> None:
     """A sub-package of the same name would take the place of the function."""
     code = (
-        "import rigidimeter, rigidimeter.experiment, rigidimeter.reporting, rigidimeter.study;"
+        "import rigidimeter, rigidimeter.archives, rigidimeter.experiment, rigidimeter.reporting;"
+        "import rigidimeter.study;"
         f"print(all(callable(getattr(rigidimeter, name)) for name in {sorted(NAMES)}))"
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

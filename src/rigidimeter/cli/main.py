@@ -6,7 +6,6 @@ Modules of the command line import heavy libraries inside their functions, so th
 
 from __future__ import annotations
 
-import importlib.util
 import io
 import os
 import signal
@@ -17,6 +16,7 @@ from typing import Annotated
 
 import typer
 
+from rigidimeter.cli.batch import batch
 from rigidimeter.cli.check import check
 from rigidimeter.cli.commission import commission
 from rigidimeter.cli.compare import compare
@@ -35,6 +35,7 @@ from rigidimeter.cli.run import recover, run
 from rigidimeter.cli.simulate import simulate
 from rigidimeter.cli.study import demo, study
 from rigidimeter.errors import UserError
+from rigidimeter.extensions import load_file
 from rigidimeter.version import __version__
 
 _INTERRUPTED = 130
@@ -59,17 +60,7 @@ def _print_version(wanted: bool) -> None:
 def _load(paths: list[Path] | None) -> None:
     """Run Python files that add to the package, such as an estimator, in their order."""
     for path in paths or ():
-        if not path.is_file():
-            raise UserError(f"--load {path}: there is no such file")
-        spec = importlib.util.spec_from_file_location(path.stem, path)
-        if spec is None or spec.loader is None:
-            raise UserError(f"--load {path}: is not a Python file; its name must end in .py")
-        module = importlib.util.module_from_spec(spec)
-        sys.modules.setdefault(path.stem, module)
-        try:
-            spec.loader.exec_module(module)
-        except Exception as error:
-            raise UserError(f"--load {path}: {type(error).__name__}: {error}") from error
+        load_file(path)
 
 
 @app.callback()
@@ -108,6 +99,7 @@ for command in (
     check,
     emulate,
     estimate,
+    batch,
     inspect,
     model,
     compare,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast, get_type_hints
@@ -219,6 +219,25 @@ class Recordings:
         """
         from rigidimeter.settings import changed_settings
 
+        for option, change in self._changes():
+            settings = changed_settings(settings, change, option)
+        return settings
+
+    def changes(self) -> dict[str, Any]:
+        """Return the band and the controller of the options as values of settings.
+
+        Raises
+        ------
+        UserError
+            If a value is out of its range.
+        """
+        from rigidimeter.settings import Settings
+
+        self.adjust(Settings())
+        return {table: values for _, change in self._changes() for table, values in change.items()}
+
+    def _changes(self) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Yield what each option changes in the settings, with the option as it was given."""
         if self.band_hz is not None:
             low, high = self.band_hz
             band = {
@@ -227,17 +246,11 @@ class Recordings:
                 "band_high_unknown_hz": high,
                 "band_high_closed_loop_hz": high,
             }
-            settings = changed_settings(
-                settings, {"estimation": band}, f"--band-hz {low:g} {high:g}"
-            )
+            yield f"--band-hz {low:g} {high:g}", {"estimation": band}
         if self.controller is not None:
             inertia, damping = self.controller
-            settings = changed_settings(
-                settings,
-                {"controller": {"inertia_kg_m2": inertia, "damping_nm_s_rad": damping}},
-                f"--controller {inertia:g} {damping:g}",
-            )
-        return settings
+            values = {"inertia_kg_m2": inertia, "damping_nm_s_rad": damping}
+            yield f"--controller {inertia:g} {damping:g}", {"controller": values}
 
 
 def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:

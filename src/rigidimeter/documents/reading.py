@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from rigidimeter.documents.bounds import (
     DIGITS,
@@ -37,7 +37,7 @@ _KINDS = (
 _noted: ContextVar[dict[Path, str] | None] = ContextVar("noted", default=None)
 
 
-def open_regular(path: Path, most_bytes: int) -> BinaryIO:
+def open_regular(path: Path, most_bytes: int) -> io.BufferedReader:
     """Open a regular file for reading, or what a link to one leads to.
 
     Parameters

@@ -153,25 +153,46 @@ def read(
         mapping=mapping,
     )
     chosen = None if settings is None else settings_from(settings)
+    if clock_offset is not None and not join:
+        raise UserError("--clock-offset: is for recordings that are joined; say --join")
+    if not join:
+        named = dict(zip(asked, conditions, strict=True))
+        return read_as(named, options, chosen, leave_out)
+    with noted_digests() as digests:
+        joined, notices = join_tables(
+            [read_table(path, options) for path in asked], options, clock_offset
+        )
+        of_joined = replace(joined_options(options), condition=conditions[0])
+        epochs, remarks = epochs_from_table(joined, of_joined)
+    joined_recording = Recording(
+        tuple(epochs),
+        (*notices, *remarks),
+        chosen or load_settings(None),
+        tuple(dict.fromkeys(asked)),
+        digests,
+    )
+    return _complete(joined_recording, leave_out)
+
+
+def read_as(
+    named: Mapping[Path, str],
+    options: ReadOptions,
+    chosen: Settings | None,
+    leave_out: Sequence[str] = (),
+) -> Recording:
+    """Read paths, each with its condition, with options and settings that are made already.
+
+    Raises
+    ------
+    UserError
+        If nothing could be read.
+    """
     compared = _RECORDED_WITH if chosen is not None else (*_RECORDED_WITH, *_ANALYSED_WITH)
     first: Settings | None = None
     epochs: list[Epoch] = []
     notices: list[Notice] = []
     digests: dict[Path, str] = {}
-    if clock_offset is not None and not join:
-        raise UserError("--clock-offset: is for recordings that are joined; say --join")
-    if join:
-        with noted_digests() as digests:
-            joined, notices = join_tables(
-                [read_table(path, options) for path in asked], options, clock_offset
-            )
-            of_joined = replace(joined_options(options), condition=conditions[0])
-            epochs, remarks = epochs_from_table(joined, of_joined)
-        notices += remarks
-        asked_alone: list[tuple[Path, str]] = []
-    else:
-        asked_alone = [*dict(zip(asked, conditions, strict=True)).items()]
-    for path, name in asked_alone:
+    for path, name in named.items():
         try:
             with noted_digests() as noted:
                 recorded = recorded_settings(path)
@@ -185,17 +206,17 @@ def read(
         digests |= noted
         epochs += found
         notices += remarks
-    if not epochs:
-        raise UserError(*[n.text for n in notices] or ["no epoch was found"])
-    epochs, remarks = with_left_out(epochs, leave_out)
-    notices += remarks
-    return Recording(
-        tuple(epochs),
-        tuple(notices),
-        chosen or first or load_settings(None),
-        tuple(dict.fromkeys(asked)),
-        digests,
-    )
+    settings = chosen or first or load_settings(None)
+    recording = Recording(tuple(epochs), tuple(notices), settings, tuple(named), digests)
+    return _complete(recording, leave_out)
+
+
+def _complete(found: Recording, leave_out: Sequence[str]) -> Recording:
+    """Return what was read without what the user leaves out; refuse a recording of nothing."""
+    if not found.epochs:
+        raise UserError(*[n.text for n in found.notices] or ["no epoch was found"])
+    epochs, remarks = with_left_out(found.epochs, leave_out)
+    return replace(found, epochs=tuple(epochs), notices=(*found.notices, *remarks))
 
 
 def read_options(

@@ -1,0 +1,5 @@
+"""Many recordings at once, to one table: resumable, on one machine or a cluster."""
+
+from rigidimeter.archives.run import BatchResult, batch
+
+__all__ = ["BatchResult", "batch"]

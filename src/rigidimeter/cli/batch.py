@@ -1,0 +1,102 @@
+"""`rigidimeter batch`: thousands of recordings to one table."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigidimeter.cli.inputs import keep_inputs
+from rigidimeter.cli.options import Recordings, reads_recordings
+from rigidimeter.cli.output import echo
+from rigidimeter.errors import UserError
+
+_SHOWN = 20
+
+
+@reads_recordings
+def batch(
+    recordings: Recordings,
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="FILE", help="The table to write, .parquet or .csv."),
+    ],
+    jobs: Annotated[
+        int, typer.Option("--jobs", metavar="N", min=1, max=1024, help="Processes on this machine.")
+    ] = 1,
+    scheduler: Annotated[
+        str,
+        typer.Option(
+            "--scheduler",
+            metavar="ADDRESS",
+            help="A Dask scheduler, such as tcp://host:8786, whose workers do the work instead of "
+            "--jobs.",
+        ),
+    ] = "",
+) -> None:
+    """Estimate many recordings, and write a table with a row for each epoch.
+
+    INPUT may also be a folder of recordings, a study folder or a quoted pattern. Each recording is
+    estimated on its own, as by estimate. One that fails is a row with the reason, and the exit
+    status is then 1; the others are still estimated.
+
+    Given again, the command goes on where it was, also after it was killed: nothing with the same
+    content, settings and version is estimated twice. What failed is tried again.
+
+    \b
+    For example:
+      rigidimeter batch archive --out results.parquet --jobs 4
+      rigidimeter batch 'archive/**/*.csv' --mapping lab.toml --out results.csv
+      rigidimeter batch study --out results.parquet --scheduler tcp://host:8786
+    """
+    from rigidimeter.archives import batch as run_batch
+    from rigidimeter.cli.progress import Meter
+
+    _refuse(recordings)
+    keep_inputs((out,), recordings.paths)
+    with Meter("batch", 1.0) as meter:
+        # In a file or a pipe there is nobody to look at progress for hours.
+        progress = meter.reach if sys.stderr.isatty() else (lambda _: None)
+        done = run_batch(
+            recordings.paths,
+            out,
+            method=recordings.method,
+            jobs=jobs,
+            scheduler=scheduler,
+            condition=(recordings.condition or [""])[0],
+            settings=recordings.settings,
+            changes=recordings.changes(),
+            progress=progress,
+            **recordings.of_files(),
+        )
+    for reason in done.failed[:_SHOWN]:
+        echo(f"error: {reason}", err=True)
+    if len(done.failed) > _SHOWN:
+        echo(f"error: {len(done.failed) - _SHOWN} more, each a row of {out}", err=True)
+    before = f", {done.before} of them estimated before" if done.before else ""
+    echo(f"{out}: {done.epochs} epochs of {done.inputs} inputs{before}")
+    raise typer.Exit(int(bool(done.failed)))
+
+
+def _refuse(recordings: Recordings) -> None:
+    """Refuse what concerns single recordings.
+
+    Raises
+    ------
+    UserError
+        Naming the option, and what does it instead.
+    """
+    for option, given in (
+        ("--join", recordings.join),
+        ("--clock-offset", recordings.clock_offset),
+        ("--leave-out", recordings.leave_out),
+    ):
+        if given:
+            raise UserError(f"{option}: is for single recordings; use `rigidimeter estimate`")
+    if len(recordings.condition or ()) > 1:
+        raise UserError(
+            "--condition: is given once to a batch, for all recordings that do not say one; name "
+            "several in the sessions.csv of a study folder"
+        )

@@ -1,0 +1,155 @@
+"""Many pieces of work: in this process, in processes of this machine, or on a Dask cluster.
+
+joblib and Dask do the scheduling. Whatever must go through many independent pieces comes here.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import BrokenExecutor
+from contextlib import ExitStack
+from typing import Any, TypeVar
+
+from rigidimeter.errors import UserError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+_CONNECT_S = 10.0
+_AHEAD = 2
+"""Items that wait for each process, so that none waits for its next."""
+
+
+def each(
+    function: Callable[[Item], Result],
+    items: Iterable[Item],
+    *,
+    jobs: int = 1,
+    scheduler: str = "",
+    on_death: Callable[[Item], Result] | None = None,
+) -> Iterator[tuple[Item, Result]]:
+    """Yield every item with its result, in the order in which they are done.
+
+    Items are taken as they are needed, so an iterator of many takes no memory. With processes both
+    they and the results must pickle, and a worker must be able to import the function.
+
+    Parameters
+    ----------
+    function : callable
+    items : iterable
+    jobs : int
+        Processes; with 1 everything runs in this one.
+    scheduler : str
+        The address of a Dask scheduler, such as ``tcp://host:8786``, instead of `jobs`.
+    on_death : callable, optional
+        Gives the result of an item that ended its process twice, such as one that needs more memory
+        than there is. Without it that raises.
+
+    Raises
+    ------
+    UserError
+        If the scheduler cannot be reached, or its package is not installed.
+    """
+    if jobs == 1 and not scheduler:
+        for item in items:
+            yield item, function(item)
+        return
+    with ExitStack() as stack:
+        parallel, deaths = _workers(jobs, scheduler, stack)
+        waiting = _Given(items)
+        while True:
+            try:
+                for number, result in parallel(_tasks(function, waiting)):
+                    yield waiting.given.pop(number), result
+                return
+            except deaths:
+                if on_death is None:
+                    raise
+            # One of those that were begun ended its process: which, shows when each runs alone.
+            for number in list(waiting.given):
+                item = waiting.given[number]
+                try:
+                    (result,) = (found for _, found in parallel(_tasks(function, [(number, item)])))
+                except deaths:
+                    result = on_death(item)
+                del waiting.given[number]
+                yield item, result
+
+
+def _tasks(function: Callable[[Item], Any], numbered: Iterable[tuple[int, Item]]) -> Iterator[Any]:
+    from joblib import delayed
+
+    # In a tuple: joblib would send a large item to one worker of a cluster, to be lost with it.
+    return (delayed(_run)(function, (number, item)) for number, item in numbered)
+
+
+def _run(function: Callable[[Item], Result], numbered: tuple[int, Item]) -> tuple[int, Result]:
+    if threading.current_thread() is threading.main_thread():
+        # An interrupt from the keyboard goes to all processes; the first ends the others.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    number, item = numbered
+    return number, function(item)
+
+
+class _Given(Iterator[tuple[int, Item]]):
+    """Items with their numbers; those that were given out, until they are taken from `given`.
+
+    joblib takes items in threads of its own, one at a time except after a process ended.
+    """
+
+    def __init__(self, items: Iterable[Item]) -> None:
+        self.given: dict[int, Item] = {}
+        self._items = enumerate(items)
+        self._lock = threading.Lock()
+
+    def __next__(self) -> tuple[int, Item]:
+        with self._lock:
+            number, item = next(self._items)
+            self.given[number] = item
+            return number, item
+
+
+def _workers(
+    jobs: int, scheduler: str, stack: ExitStack
+) -> tuple[Callable[..., Iterator[Any]], tuple[type[BaseException], ...]]:
+    """Return what runs tasks, and the exceptions that say that a process ended."""
+    from joblib import Parallel, parallel_config
+
+    deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
+    if scheduler:
+        client, killed = _client(scheduler, stack)
+        deaths = (killed,)
+        stack.enter_context(parallel_config(backend="dask", client=client))
+    else:
+        stack.enter_context(parallel_config(backend="loky", inner_max_num_threads=1))
+    parallel = Parallel(
+        n_jobs=-1 if scheduler else jobs,
+        return_as="generator_unordered",
+        batch_size=1,
+        pre_dispatch=f"{_AHEAD} * n_jobs",
+    )
+    return parallel, deaths
+
+
+def _client(scheduler: str, stack: ExitStack) -> tuple[Any, type[BaseException]]:
+    try:
+        from distributed import Client, KilledWorker
+    except ImportError:
+        raise UserError(
+            "--scheduler: needs one more package: pip install 'rigidimeter[cluster]'"
+        ) from None
+    connect: Callable[..., Any] = Client
+    try:
+        client = stack.enter_context(connect(scheduler, timeout=_CONNECT_S, set_as_default=False))
+    except (OSError, ValueError) as error:
+        raise UserError(
+            f"--scheduler {scheduler}: cannot be reached ({error}); give the address that "
+            "`dask scheduler` printed, such as tcp://host:8786"
+        ) from None
+    if not client.scheduler_info()["workers"]:
+        raise UserError(
+            f"--scheduler {scheduler}: has no worker; start one with `dask worker {scheduler}`"
+        )
+    return client, KilledWorker
