@@ -17,6 +17,7 @@ ANY_SIGN = "infinite or no number in a sum makes the sum so, whatever the signs"
 OF_NOTHING = "divides a column of nothing, or solves for what is 0"
 BOTH_SIDES = "a scale of both sides, next to which what is added is a thousand-millionth"
 SQUARE = "its rows are as many as its columns"
+EMPTY = "before the first step the window is empty"
 RAMP = "only a ramp uses it, and its controller does not ask for the tick's number"
 
 EQUIVALENT: dict[str, str] = {
@@ -44,6 +45,11 @@ EQUIVALENT: dict[str, str] = {
     ANSWER + "answer_step: needed > limits.unshown_nm * limits.unshown_nm → "
     "needed >= limits.unshown_nm * limits.unshown_nm": MOMENT,
     ANSWER + "answer_step: shown < part * needed → shown <= part * needed": MOMENT,
+    ANSWER + "answer_step: if steps > 0: ... → if True: ...": EMPTY,
+    ANSWER + "answer_step: steps > 0 → steps >= 0": EMPTY,
+    ANSWER + "answer_step: 0 → -1": EMPTY,
+    ANSWER + "keep_row: rows % half + half → rows % half - half": "a place below zero counts from "
+    "the end",
     SIGN + "table: 1.0 → 1.01": OF_NOTHING,
     SIGN + "table: 1.0 → 0.9900990099009901": OF_NOTHING,
     SIGN + "whitened: 0 → -1": "a column has one dimension",

@@ -93,6 +93,15 @@ def test_each_window_is_looked_at_over_its_own_rows(which):
     assert ROWS[which] <= first <= ROWS[which] + 2 * ROWS_A_LOOK
 
 
+def test_a_torque_that_is_silent_is_named_before_its_sign():
+    limits = AnswerLimits(10.0, 1, LEFT, True, 1.0, 1.0, 0.0)  # no joint is as heavy as 1 kg·m²
+    state, found = answer_state(), set()
+    for values in sums(120, 0.016, (0.0045, 0.14, 1.8)):
+        state, cause = answer_step(limits, state, *values, 0.016)
+        found.add(Cause(cause))
+    assert found == {Cause.NONE, Cause.TORQUE_SILENT}
+
+
 def test_a_window_begins_anew_after_a_rest():
     state = answer_state()
     for k, values in enumerate(sums(60, 0.016, (0.0045, 0.14, 1.8))):
@@ -108,6 +117,13 @@ def test_a_window_begins_anew_after_a_rest():
     assert state.steps == 19
     assert state.window.shape == (2 * HALF, COLUMNS)
     assert np.count_nonzero(state.window.any(axis=1)) == 2 * 19
+
+
+def test_a_single_row_is_forgotten_too():
+    limits, state = AnswerLimits(10.0, 1), answer_state()
+    for pushed, rows in ((1.0, 2), (0.0, 0)):
+        state, _ = answer_step(limits, state, pushed, 0.1, 0.2, 0.016)
+        assert np.count_nonzero(state.window.any(axis=1)) == rows
 
 
 # --- steps that come late

@@ -246,13 +246,19 @@ def test_each_limit_is_the_settings_in_si_units():
     assert [mean_of_ticks(rate_hz) for rate_hz in rates_hz] == [1, 4, 8, 32]
     steps = [answer_limits(settings_at(rate_hz)).steps_a_row for rate_hz in (50.0, 62.5, 100.0)]
     assert steps == [1, 1, 2]
+    slower = settings_at(50.0).rig.model_copy(update={"tick_rate_hz": 20.0})
+    assert answer_limits(settings_at(50.0).model_copy(update={"rig": slower})).steps_a_row == 1
 
 
 def test_ticks_show_the_inertia_until_the_drive_has_nearly_come_to_its_velocity():
-    """ζ ω t = 0.7071 · 2π · f/rate is 3π/4 at f = 0.5303 rate."""
-    for bandwidth_hz, shown in ((52.0, True), (54.0, False)):
+    """ζ 2π f/rate is 3π/4 at f = 0.5303 rate with ζ = 0.7071, at half the rate with 3/4."""
+    for damping, bandwidth_hz, shown in (
+        *((0.7071, 53.0, True), (0.7071, 53.1, False)),
+        *((0.75, 50.0, True), (0.75, 50.1, False)),
+    ):
         settings = settings_at(100.0)
-        rig = settings.rig.model_copy(update={"drive_bandwidth_hz": bandwidth_hz})
+        drive = {"drive_damping_ratio": damping, "drive_bandwidth_hz": bandwidth_hz}
+        rig = settings.rig.model_copy(update=drive)
         limits = answer_limits(settings.model_copy(update={"rig": rig}))
         assert limits.shows_inertia is shown
         assert limits.least_part == (1.0 if shown else HARDLY_SHOWN)
