@@ -17,6 +17,8 @@ from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.readers import read_recording
 from rigidimeter.recording.formats.text_table import read_text_table
 from rigidimeter.recording.resume import rest_of
+from rigidimeter.recording.session_folder import SessionWriter
+from rigidimeter.settings import parse_settings
 from rigidimeter.statistics import fit_mixed
 from rigidimeter.statistics.bootstrap import bootstrap
 
@@ -104,9 +106,15 @@ def test_recordings_are_regular_files(tmp_path, suffix):
     assert str(path) in refused(path)
 
 
-def test_a_manifest_that_is_a_pipe(tmp_path):
-    os.mkfifo(tmp_path / "manifest.json")
-    refused(tmp_path)
+@pytest.mark.parametrize("name", ["manifest.json", "samples.arrows", "events.jsonl"])
+def test_a_file_of_a_session_that_is_a_pipe(tmp_path, name):
+    folder = tmp_path / "s"
+    SessionWriter(folder, parse_settings({}), [], {"session": 1}, virtual=True).close(
+        1.0, "success", ""
+    )
+    (folder / name).unlink()
+    os.mkfifo(folder / name)
+    assert f"{name}: cannot be read (it is a named pipe)" in refused(folder)
 
 
 def test_a_million_columns(tmp_path):

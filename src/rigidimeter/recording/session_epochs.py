@@ -20,8 +20,8 @@ MUCH_LIMITED = 0.01
 
 
 def is_session(path: Path) -> bool:
-    """Whether the path is a folder with a manifest."""
-    return (path / MANIFEST).is_file()
+    """Whether the path is a folder with a manifest, regular or not: reading it says what it is."""
+    return (path / MANIFEST).exists()
 
 
 def session_settings(folder: Path) -> Settings:

@@ -40,7 +40,7 @@ def read_session_files(folder: Path) -> SessionFiles:
     """
     manifest = read_manifest(folder)
     for name in (SAMPLES, EVENTS):
-        if not (folder / name).is_file():
+        if not (folder / name).exists():
             raise UserError(f"{folder}: the session has no {name}")
     samples_path, events_path = folder / SAMPLES, folder / EVENTS
     samples = scan_samples(read_bytes(samples_path, RECORDING_BYTES), samples_path)
