@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,9 @@ from rigidimeter.cli.options import Recordings, reads_recordings
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.table_lines import text_table, wrapped
 from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.recording.formats import ReadOptions
 
 
 @reads_recordings
@@ -39,48 +42,80 @@ def inspect(
       rigidimeter inspect elbow.csv
       rigidimeter inspect elbow.csv --unit torque=Nm --write-mapping lab.toml
     """
-    from rigidimeter.documents.writing import write_text
-    from rigidimeter.recording.channels.inspection import command_for, inspect_table, option_words
-    from rigidimeter.recording.channels.mapping_file import mapping_text
-    from rigidimeter.recording.formats import read_table, reader_of
-    from rigidimeter.recording.recording import read, read_options
-
     keep_inputs((write_mapping, plot), recordings.paths)
-    if len(recordings.paths) > 1 and (write_mapping is not None or plot is not None):
+    several = len(recordings.paths) > 1
+    if several and (write_mapping is not None or (plot is not None and not recordings.join)):
         raise UserError("--write-mapping and --plot are for one file; name one")
-    if recordings.join:
-        raise UserError("--join: inspect looks at each file by itself; leave out --join")
-    options = read_options(**recordings.of_files())
+    groups = [[*recordings.paths]] if recordings.join else [[path] for path in recordings.paths]
     status = 0
-    for path in recordings.paths:
+    for paths in groups:
         try:
-            if path.is_dir():
-                recording = read(path)
-                echo(f"{path}: {reader_of(path).name} with {len(recording.epochs)} epochs")
-                say(recording.notices)
-                echo(f"reads it: {command_for(path, [])}")
-                continue
-            table = read_table(path, options)
-            found = inspect_table(table, options)
+            status |= _inspect(paths, recordings, write_mapping, plot)
         except UserError as error:
             for line in error.lines:
                 echo(f"error: {line}", err=True)
             status = 1
-            continue
-        rows = max((column.size for column in table.columns.values()), default=0)
-        echo(f"{path}: {reader_of(path).name}, {len(table.columns)} columns of {rows} rows")
-        _show(found)
-        if found.proposal.unsaid:
-            status = 1
-        else:
-            echo(f"reads it: {command_for(path, option_words(found))}")
-        if write_mapping is not None:
-            write_text(write_mapping, mapping_text(found.options))
-        if plot is not None:
-            from rigidimeter.reporting.inspected_columns import draw_columns
-
-            draw_columns(found, plot)
     raise typer.Exit(status)
+
+
+def _inspect(
+    paths: list[Path], recordings: Recordings, write_mapping: Path | None, plot: Path | None
+) -> int:
+    """Inspect one file, or the files of one recording; return the exit status."""
+    from rigidimeter.documents.writing import write_text
+    from rigidimeter.recording.channels.inspection import command_for, inspect_table, option_words
+    from rigidimeter.recording.channels.joining import join_tables, joined_options
+    from rigidimeter.recording.channels.mapping_file import mapping_text
+    from rigidimeter.recording.formats import Table, read_content, read_table, reader_of
+    from rigidimeter.recording.recording import read_options
+
+    options = given = read_options(**recordings.of_files())
+    name = " + ".join(map(str, paths))
+    kind = " + ".join(dict.fromkeys(reader_of(path).name for path in paths))
+    joining: list[str] = []
+    if recordings.join:
+        tables = [read_table(path, options) for path in paths]
+        table, offset = join_tables(tables, options, recordings.asked_clock_offset)
+        options = joined_options(options)
+        joining = _joining_words(recordings, given)
+        if offset is not None:
+            echo(f"clock offset: {offset.value_s:.4f} ± {offset.error_s:.2g} s")
+    else:
+        content = read_content(paths[0], options)
+        if not isinstance(content, Table):
+            epochs, notices = content
+            echo(f"{name}: {kind} with {len(epochs)} epochs")
+            say(notices)
+            echo(f"reads it: {command_for(paths, [])}")
+            return 0
+        table = content
+    found = inspect_table(table, options)
+    rows = max((column.size for column in table.columns.values()), default=0)
+    echo(f"{name}: {kind}, {len(table.columns)} columns of {rows} rows")
+    _show(found)
+    if not found.proposal.unsaid:
+        echo(f"reads it: {command_for(paths, [*option_words(found), *joining])}")
+    if write_mapping is not None:
+        write_text(write_mapping, mapping_text(found.options))
+    if plot is not None:
+        from rigidimeter.reporting.inspected_columns import draw_columns
+
+        draw_columns(found, plot)
+    return int(bool(found.proposal.unsaid))
+
+
+def _joining_words(recordings: Recordings, given: ReadOptions) -> list[str]:
+    """Return the options that join files: those of their clocks, which the joined table has not."""
+    words = ["--join"]
+    for name, pairs in (("column", given.columns), ("unit", given.units)):
+        for key, text in pairs.items():
+            if key in ("time", "time_s"):
+                words += [f"--{name}", f"{key}={text}"]
+    if given.rate_hz is not None:
+        words += ["--rate-hz", f"{given.rate_hz:g}"]
+    if recordings.clock_offset is not None:
+        words += ["--clock-offset", recordings.clock_offset]
+    return words
 
 
 def _show(found: object) -> None:

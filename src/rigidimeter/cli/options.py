@@ -181,10 +181,18 @@ class Recordings:
             leave_out=self.leave_out or (),
             settings=self.settings,
             join=self.join,
-            clock_offset=_offset(self.clock_offset),
+            clock_offset=self.asked_clock_offset,
             **self.of_files(),
         )
         return replace(recording, settings=self.adjust(recording.settings))
+
+    @property
+    def asked_clock_offset(self) -> float | str | None:
+        """The clock offset in s, or ``found``."""
+        try:
+            return None if self.clock_offset is None else float(self.clock_offset)
+        except ValueError:
+            return self.clock_offset
 
     def of_files(self) -> dict[str, Any]:
         """Return the arguments of `recording.read` that say how a file is read.
@@ -276,13 +284,6 @@ def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:
     with_options.__annotations__ = {**hints, "return": None}
     del with_options.__wrapped__
     return with_options
-
-
-def _offset(text: str | None) -> float | str | None:
-    try:
-        return text if text is None else float(text)
-    except ValueError:
-        return text
 
 
 def _pairs(option: str, pairs: list[str] | None, example: str) -> dict[str, str]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from rigidimeter.documents import noted_digests
 from rigidimeter.errors import UserError
-from rigidimeter.recording.channels.joining import join_tables, joined_options
+from rigidimeter.recording.channels.joining import join_tables, joined_options, offset_notice
 from rigidimeter.recording.channels.mapping_file import merged, read_mapping
 from rigidimeter.recording.formats import (
     ReadOptions,
@@ -159,18 +159,15 @@ def read(
         named = dict(zip(asked, conditions, strict=True))
         return read_as(named, options, chosen, leave_out)
     with noted_digests() as digests:
-        joined, notices = join_tables(
-            [read_table(path, options) for path in asked], options, clock_offset
-        )
+        tables = [read_table(path, options) for path in asked]
+        joined, found_offset = join_tables(tables, options, clock_offset)
         of_joined = replace(joined_options(options), condition=conditions[0])
-        epochs, remarks = epochs_from_table(joined, of_joined)
-    joined_recording = Recording(
-        tuple(epochs),
-        (*notices, *remarks),
-        chosen or load_settings(None),
-        tuple(dict.fromkeys(asked)),
-        digests,
-    )
+        epochs, notices = epochs_from_table(joined, of_joined)
+    used = chosen or load_settings(None)
+    if found_offset is not None and epochs:
+        notices.insert(0, offset_notice(found_offset, tables, epochs, used))
+    paths_read = tuple(dict.fromkeys(asked))
+    joined_recording = Recording(tuple(epochs), tuple(notices), used, paths_read, digests)
     return _complete(joined_recording, leave_out)
 
 

@@ -82,5 +82,28 @@ def test_torque_and_motion_in_two_files_with_a_clock_each(tmp_path, rigidimeter)
     ran = rigidimeter(*asked, "--join", "--clock-offset", "found")
     assert ran.status == 0, ran.err
     assert "a.csv: 0.75" in ran.err
+    assert "N·m·s/rad of B" in " ".join(ran.err.split())
     assert stiffness(out) == pytest.approx(STIFFNESS_NM_RAD, rel=0.01)
     assert "say --join" in rigidimeter(*asked, "--clock-offset", "0.75").err
+
+
+def test_files_that_belong_together_are_inspected_together(tmp_path, rigidimeter):
+    """The command that is proposed has what joins them, and the sign that the numbers decide."""
+    torque, motion, out = tmp_path / "m.csv", tmp_path / "a.csv", tmp_path / "out.json"
+    torque_s, motion_s = np.arange(6_000) / 250.0, np.arange(2_400) / 100.0
+    np.savetxt(torque, np.c_[torque_s, -torque_nm(torque_s)], header="t_s,M_Nm", delimiter=",")
+    late = np.c_[1e3 * (motion_s - 0.75), np.degrees(angle_rad(motion_s))]
+    np.savetxt(motion, late, header="t,phi_deg", delimiter=",")
+    asked = ("inspect", torque, motion, "--join", "--clock-offset", "found")
+    assert "the unit of 't' is stated nowhere" in rigidimeter(*asked).err
+    ran = rigidimeter("inspect", torque, "--join")
+    assert "name two recordings" in ran.err
+    motion.write_text(motion.read_text().replace("t,phi", "t_ms,phi"))
+    ran = rigidimeter(*asked)
+    assert ran.status == 0, ran.err
+    assert "clock offset: 0.75" in ran.out
+    (line,) = [line for line in ran.out.splitlines() if line.startswith("reads it: ")]
+    words = shlex.split(line.removeprefix("reads it: "))
+    assert words[-4:] == ["--reaction", "--join", "--clock-offset", "found"]
+    assert rigidimeter(*words[1:], "--json", out).status == 0
+    assert stiffness(out) == pytest.approx(STIFFNESS_NM_RAD, rel=0.01)

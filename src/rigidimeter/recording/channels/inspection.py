@@ -144,9 +144,9 @@ def option_words(found: Inspection) -> list[str]:
     return words if length_s is None else [*words, "--epoch-length-s", f"{length_s:g}"]
 
 
-def command_for(path: Path, words: Sequence[str]) -> str:
-    """Return the command that estimates a file."""
-    return shlex.join(["rigidimeter", "estimate", str(path), *words])
+def command_for(paths: Sequence[Path], words: Sequence[str]) -> str:
+    """Return the command that estimates files."""
+    return shlex.join(["rigidimeter", "estimate", *map(str, paths), *words])
 
 
 def _number(value: float, form: str, unit: str = "") -> str:

@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
+from rigidimeter.estimation import fit_epoch
 from rigidimeter.recording.channels.choice import LABELS, MOTION, choose
-from rigidimeter.recording.channels.clock_offset import find_offset
+from rigidimeter.recording.channels.clock_offset import Offset, find_offset
 from rigidimeter.recording.channels.readings import options_text
 from rigidimeter.recording.formats.columns import numbers, own_rate, own_rates, time_stamps
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
-from rigidimeter.records import Notice
+from rigidimeter.records import Epoch, Notice
+from rigidimeter.settings import Settings
 
 Array = NDArray[np.float64]
 FOUND = "found"
@@ -37,8 +39,8 @@ class _Part:
 
 def join_tables(
     tables: Sequence[Table], options: ReadOptions, clock_offset: float | str | None
-) -> tuple[Table, list[Notice]]:
-    """Return tables as one, and what to say of their clocks.
+) -> tuple[Table, Offset | None]:
+    """Return tables as one, and the offset of their clocks where it was found.
 
     Parameters
     ----------
@@ -57,17 +59,52 @@ def join_tables(
     if len(tables) < 2:
         raise UserError("--join: name two recordings or more, which then are one")
     parts = [_part(table, options) for table in tables]
-    notices: list[Notice] = []
     offset_s = 0.0
+    found: Offset | None = None
     if clock_offset == FOUND:
-        offset_s, text = _found(parts, options)
-        notices.append(Notice("warning", text))
+        found = _found(parts, options)
+        offset_s = found.value_s
     elif isinstance(clock_offset, int | float):
         offset_s = float(clock_offset)
     elif clock_offset is not None:
         raise UserError(f"--clock-offset {clock_offset}: write seconds, or {FOUND}")
     moved = [replace(part, time_s=part.time_s + offset_s) for part in parts[1:]]
-    return _union([parts[0], *moved]), notices
+    return _union([parts[0], *moved]), found
+
+
+def offset_notice(
+    found: Offset, tables: Sequence[Table], epochs: Sequence[Epoch], settings: Settings
+) -> Notice:
+    """Say what offset was added to the second clock, and what its error does to J, B and K.
+
+    The longest epoch is fitted with its motion moved by the error forth and back: how much that
+    changes depends on the band, since J θ‴ times the error is part of it.
+    """
+    text = (
+        f"{tables[1].source}: {found.value_s:.4f} ± {found.error_s:.2g} s is added to its clock; "
+        f"the motion then explains {100 * found.r_squared:.1f} % of the torque"
+    )
+    longest = max(epochs, key=lambda epoch: len(epoch.channels["torque_nm"]))
+    early, late = (
+        fit_epoch(_moved(longest, sign * found.error_s), "bandlimited", settings)
+        for sign in (-1.0, 1.0)
+    )
+    if early.outcome.included and late.outcome.included:
+        change = np.abs(late.value - early.value) / 2
+        text += (
+            f". Its error alone makes ± {change[0]:.2g} kg·m² of J, ± {change[1]:.2g} N·m·s/rad of "
+            f"B and ± {change[2]:.2g} N·m/rad of K, which their intervals do not contain"
+        )
+    return Notice("warning", text)
+
+
+def _moved(epoch: Epoch, by_s: float) -> Epoch:
+    """Return an epoch whose motion is `by_s` later."""
+    channels = {
+        name: replace(channel, time_s=channel.time_s + by_s) if name in MOTION else channel
+        for name, channel in epoch.channels.items()
+    }
+    return replace(epoch, channels=channels)
 
 
 def _part(table: Table, options: ReadOptions) -> _Part:
@@ -146,7 +183,7 @@ def _spread(column: NDArray[Any], at: NDArray[np.intp], size: int, *, fill: bool
     return spread
 
 
-def _found(parts: Sequence[_Part], options: ReadOptions) -> tuple[float, str]:
+def _found(parts: Sequence[_Part], options: ReadOptions) -> Offset:
     others = parts[1:]
     if len(others) > 1:
         raise UserError("--clock-offset found: is for two recordings; join the others first")
@@ -170,10 +207,4 @@ def _found(parts: Sequence[_Part], options: ReadOptions) -> tuple[float, str]:
             "name the columns with --column, or give the offset in seconds"
         )
     offset = find_offset(signals["torque_nm"], signals[motion], is_angle=motion == "angle_rad")
-    added_s = offset.value_s if where[motion] == 1 else -offset.value_s
-    text = (
-        f"{others[0].table.source}: {added_s:.4f} ± {offset.error_s:.2g} s is added to its clock; "
-        f"the motion then explains {100 * offset.r_squared:.1f} % of the torque. An offset that is "
-        "wrong makes B wrong by K times as much"
-    )
-    return added_s, text
+    return offset if where[motion] == 1 else replace(offset, value_s=-offset.value_s)

@@ -166,8 +166,6 @@ def _seen(
     rate_hz: float | None,
     as_units: Mapping[str, str],
 ) -> Look | None:
-    if "torque_nm" not in raw or not any(name in raw for name in MOTION):
-        return None
     if rate_hz is None and "time_s" not in raw:
         return None
     return look_at(taken, raw, rate_hz, as_units)

@@ -161,6 +161,9 @@ def look_at(
     as_units: Mapping[str, str],
 ) -> Look | None:
     """Look at columns in the units that are stated, or in those of `as_units`; None if too few."""
+    motion = "angle_rad" if "angle_rad" in raw else "velocity_rad_s"
+    if "torque_nm" not in raw or motion not in raw:
+        return None
 
     def si(name: str) -> Array:
         values = raw[name].astype(np.float64)
@@ -169,7 +172,6 @@ def look_at(
         to_si = taken[name].to_si
         return values if to_si is None else to_si(values)
 
-    motion = "angle_rad" if "angle_rad" in raw else "velocity_rad_s"
     time_s = si("time_s") if "time_s" in raw else np.arange(raw[motion].size) / (rate_hz or 1.0)
     signals = []
     for name in ("torque_nm", motion):

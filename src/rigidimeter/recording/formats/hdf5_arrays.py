@@ -68,7 +68,7 @@ def _stored(path: Path, h5py: Any, dataset: Any, name: str, expansion: Expansion
     kind = _kind(dataset)
     if "MATLAB_empty" in dataset.attrs:
         return Stored.of(np.empty(0))
-    if dataset.is_virtual or dataset.external:
+    if dataset.is_virtual or dataset.external or "MATLAB_object_decode" in dataset.attrs:
         return Stored(np.dtype("V1"), dataset.shape, lambda: np.empty(0))
     if kind == "char":
         expansion.take(name, 4 * dataset.size)

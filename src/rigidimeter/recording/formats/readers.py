@@ -228,10 +228,21 @@ def read_table(path: Path, options: ReadOptions | None = None) -> Table:
     UserError
         If there is no such file, or none that can be read as a table.
     """
-    found = _read(path, _layout(options or ReadOptions()))
+    found = read_content(path, options or ReadOptions())
     if not isinstance(found, Table):
         raise UserError(f"{path} is a {reader_of(path).name}, which holds epochs and no table")
     return found
+
+
+def read_content(path: Path, options: ReadOptions) -> Table | Epochs:
+    """Read the columns of a file, or the epochs and notices of a path that knows its own.
+
+    Raises
+    ------
+    UserError
+        If there is no such path, or it cannot be read.
+    """
+    return _read(path, _layout(options))
 
 
 def formats_text() -> str:

@@ -30,6 +30,11 @@ def test_what_the_numbers_decide_is_proposed_and_reads_the_file():
     np.testing.assert_allclose(read.values["angle_rad"], 3 * ANGLE_RAD, rtol=1e-12)
 
 
+def test_a_table_without_a_torque_is_told_so():
+    found = inspected(time=TIME_S, angle=ANGLE_RAD)
+    assert "has no column torque_nm" in found.proposal.unsaid[0]
+
+
 @pytest.mark.parametrize(
     ("columns", "told"),
     [
