@@ -23,8 +23,9 @@ from unittest import mock
 
 from benchmarks.paired import REPEATS, Row, in_ms, paired
 from rigidimeter.estimation.diagnostics import CHECKS, Check
+from rigidimeter.estimation.diagnostics.together import Together
 from rigidimeter.recording import ReadOptions, read_recording
-from rigidimeter.records import Epoch
+from rigidimeter.records import Epoch, Fit
 from rigidimeter.settings import parse_settings
 from rigidimeter.study import analysis
 from rigidimeter.virtual.batch import simulate_epochs
@@ -64,8 +65,8 @@ def no_checks() -> Iterator[None]:
     def fit_alone(_: object, fit: object) -> object:
         return fit
 
-    def fits_alone(*found: object) -> tuple[object, object]:
-        return found[1], found[2]
+    def fits_alone(_: object, fits: list[Fit], pooled: list[Fit], *__: object) -> Together:
+        return Together(fits, pooled, [])
 
     with contextlib.ExitStack() as stack:
         for name, stub in zip(OUTSIDE, (fit_alone, fits_alone, lambda *_: None), strict=True):

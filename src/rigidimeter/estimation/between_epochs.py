@@ -23,10 +23,11 @@ that does not change, so its scatter shows how large that is.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy import special, stats
 
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import PARAMETERS, Finding, Fit
@@ -51,22 +52,30 @@ class Scatter(NamedTuple):
         Standard deviation beyond the errors.
     drawn : array, shape (e,)
         The estimates, drawn to the mean.
-    trend_percent, trend_p : float
-        What a straight line through the epochs, in order, changes from the first to the last, in %
-        of the mean, and the probability of such a trend by chance.
+    values : array, shape (e,)
+        The estimates, in order.
+    mean : float
+        Weighted.
     """
 
     parameter: int
     p: float
     sd: float
     drawn: Array
-    trend_percent: float
-    trend_p: float
+    values: Array
+    mean: float
 
     @property
     def percent(self) -> float:
         """The range over the epochs, in % of the mean."""
         return 100 * float(np.ptp(self.drawn)) / max(abs(float(np.mean(self.drawn))), 1e-300)
+
+    def trend(self) -> tuple[float, float]:
+        """Return what a straight line changes from the first epoch to the last, in %, and its p."""
+        count = self.values.size
+        line = stats.linregress(np.arange(count), self.values)
+        change = float(line.slope) * (count - 1) / max(abs(self.mean), 1e-300)
+        return 100 * change, float(line.pvalue)
 
 
 def scatter(parameter: int, values: Array, errors: Array, degrees: Array) -> Scatter:
@@ -85,20 +94,12 @@ def scatter(parameter: int, values: Array, errors: Array, degrees: Array) -> Sca
     Q = float(weight @ (values - mean) ** 2)
     unsure = float(np.sum((1 - weight / total) ** 2 / degrees))
     F = Q / (count - 1) / (1 + 2 * (count - 2) / (count**2 - 1) * unsure)
-    p = float(stats.f.sf(F, count - 1, (count**2 - 1) / (3 * unsure)))
+    p = float(special.fdtrc(count - 1, (count**2 - 1) / (3 * unsure), F))
     beyond = max((Q - (count - 1)) / (total - float(weight @ weight) / total), 0.0)
     weight = 1 / (errors**2 + beyond)
     mean = float(weight @ values / np.sum(weight))
     drawn = mean + np.sqrt(beyond * weight) * (values - mean)
-    order = stats.linregress(np.arange(count), values)
-    return Scatter(
-        parameter,
-        p,
-        float(np.sqrt(beyond)),
-        drawn,
-        100 * float(order.slope) * (count - 1) / max(abs(mean), 1e-300),
-        float(order.pvalue),
-    )
+    return Scatter(parameter, p, float(np.sqrt(beyond)), drawn, values, mean)
 
 
 def between_epochs(
@@ -150,18 +151,25 @@ def between_epochs(
 
 def _degrees(ratio: Array) -> Array:
     """Return the degrees of freedom of t intervals, half their width over the standard error."""
-    known = np.geomspace(1.0, 1e4, 400)
-    quantile = stats.t.ppf(0.975, known)
+    known, quantile = _quantiles()
     return np.asarray(np.interp(-ratio, -quantile, known))
+
+
+@lru_cache
+def _quantiles() -> tuple[Array, Array]:
+    """Return degrees of freedom and Student's quantile for 95 % at each."""
+    known = np.geomspace(1.0, 1e4, 400)
+    return known, np.asarray(special.stdtrit(known, 0.975))
 
 
 def _sentence(one: Scatter) -> str:
     _, symbol, unit, _ = PARAMETERS[one.parameter]
     low, high = int(np.argmin(one.drawn)), int(np.argmax(one.drawn))
+    trend_percent, trend_p = one.trend()
     trend = (
-        f"{'rising' if one.trend_percent > 0 else 'falling'} by {abs(one.trend_percent):.0f} % "
-        f"from the first to the last ({p_text(one.trend_p)})"
-        if one.trend_p < 0.05
+        f"{'rising' if trend_percent > 0 else 'falling'} by {abs(trend_percent):.0f} % "
+        f"from the first to the last ({p_text(trend_p)})"
+        if trend_p < 0.05
         else "without a trend"
     )
     return (

@@ -21,6 +21,7 @@ from scipy import signal
 
 from rigidimeter.estimation.closedloop.as_sampled import InertiaDoubt
 from rigidimeter.estimation.closedloop.line_noise import Smoother
+from rigidimeter.estimation.linear_solution import Solution, solve
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, SignalsOf
 from rigidimeter.estimation.screening import after_fit, unusable
@@ -68,13 +69,6 @@ class _Kept(NamedTuple):
     doubt: InertiaDoubt
 
 
-class _Solved(NamedTuple):
-    values: Array
-    bread: Array
-    condition_number: float
-    residual: Array
-
-
 def fit_inertia_damping_stiffness(
     signals: Signals,
     inertia_kg_m2: float | None = None,
@@ -102,16 +96,22 @@ def fit_inertia_damping_stiffness(
         If the regressors are rank deficient: the motion cannot distinguish the parameters.
     """
     settings = settings or EstimationSettings()
-    motion = [signals.acceleration_rad_s2, signals.velocity_rad_s, signals.angle_rad]
-    torque = signals.torque_nm
+    torque = target = signals.torque_nm
     if inertia_kg_m2 is None:
-        regressors, target = np.column_stack(motion), torque
+        regressors, solved = signals.motion, signals.solution
     else:
-        regressors = np.column_stack(motion[1:])
-        target = torque - inertia_kg_m2 * motion[0]
-    solved = _solve(regressors, target)
-    values, residual = solved.values, solved.residual
-    covariance, low, high = _interval(signals, regressors, target, solved, settings)
+        regressors = np.ascontiguousarray(signals.motion[:, 1:])
+        target = torque - inertia_kg_m2 * signals.acceleration_rad_s2
+        solved = solve(regressors, target)
+    if not np.all(solved.lengths > 0):
+        raise ValueError("a regressor is zero throughout")
+    if solved.dependent:
+        raise ValueError(
+            "the motion cannot distinguish J, B and K: its regressors are linearly dependent"
+        )
+    values = solved.values
+    residual = target - regressors @ values
+    covariance, low, high = _interval(signals, regressors, residual, solved, settings)
     se = np.sqrt(np.diag(covariance))
     bound = _bound(signals, regressors, residual)
     estimate = Estimate(values, se, low, high, bound, covariance)
@@ -217,15 +217,16 @@ def _widened(fit: Fit, share: float) -> Fit:
 def _interval(
     signals: Signals,
     regressors: Array,
-    target: Array,
-    solved: _Solved,
+    residual: Array,
+    solved: Solution,
     settings: EstimationSettings,
 ) -> tuple[Array, Array, Array]:
     """Return the covariance and the ends of the 95 % intervals."""
-    values, bread, _, residual = solved
+    values, bread = solved.values, solved.bread
     n, p = regressors.shape
     if settings.intervals == "bootstrap":
         rng = np.random.default_rng(BOOTSTRAP_SEED)
+        target = regressors @ values + residual
         drawn = block_bootstrap(regressors, target, rng, draws=settings.bootstrap_draws)
         return drawn.covariance, drawn.low, drawn.high
     if settings.intervals == "white":
@@ -250,20 +251,3 @@ def _bound(signals: Signals, regressors: Array, residual: Array) -> Array:
         return np.zeros(regressors.shape[1])  # nothing was left: the channels are exact
     bound = cramer_rao_coloured(regressors, density, signals.rate_hz)
     return np.asarray(np.sqrt(np.diag(bound)), dtype=np.float64)
-
-
-def _solve(regressors: Array, target: Array) -> _Solved:
-    """Return the solution, (AᵀA)⁻¹, the condition number and the residual."""
-    lengths = np.linalg.norm(regressors, axis=0)
-    if not np.all(lengths > 0):
-        raise ValueError("a regressor is zero throughout")
-    left, singular, right = np.linalg.svd(regressors / lengths, full_matrices=False)
-    if singular[-1] < singular[0] * regressors.shape[0] * np.finfo(np.float64).eps:
-        raise ValueError(
-            "the motion cannot distinguish J, B and K: its regressors are linearly dependent"
-        )
-    inverse = right.T / singular
-    values = (inverse @ (left.T @ target)) / lengths
-    residual = target - regressors @ values
-    bread = inverse @ inverse.T / np.outer(lengths, lengths)
-    return _Solved(values, bread, float(singular[0] / singular[-1]), residual)

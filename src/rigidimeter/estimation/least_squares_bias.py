@@ -15,6 +15,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from scipy import fft
 
 from rigidimeter.dynamics import Loop, OpenLoop
 from rigidimeter.estimation.signals import Array, Signals
@@ -40,17 +41,13 @@ def compensated(signals: Signals, loop: Loop) -> Array | None:
     loop : Loop
         In which the joint was moved.
     """
-    everything = np.stack(
-        [signals.acceleration_rad_s2, signals.velocity_rad_s, signals.angle_rad, signals.torque_nm]
-    )
-    regressors, torque = everything[:3].T, everything[3]
-    lengths = np.linalg.norm(regressors, axis=0)
-    if not np.all(lengths > 0):
+    solution = signals.solution
+    if solution.dependent:
         return None
-    fitted = np.linalg.lstsq(regressors / lengths, torque, rcond=None)[0] / lengths
-    n = torque.size
+    fitted, lengths, n = solution.values, solution.lengths, solution.rows
+    everything = np.stack([*signals.motion.T, signals.torque_nm])
     # A taper, or the slow part of u leaks into all lines.
-    spectra = np.fft.rfft(everything * np.hanning(n), axis=1)
+    spectra = fft.rfft(everything * _taper(n))
     fastest_hz = 0.49 * min(signals.rate_hz, loop.rig.tick_rate_hz)
     highest_hz = min(BEYOND_BAND * signals.band_hz[1], fastest_hz)
     lines = slice(1, int(highest_hz * n / signals.rate_hz) + 1)
@@ -68,6 +65,13 @@ def compensated(signals: Signals, loop: Loop) -> Array | None:
         if np.all(np.abs(step) < SETTLED * np.abs(fitted)):
             return np.asarray(fitted - bias)
     return None
+
+
+@lru_cache(maxsize=4)
+def _taper(n: int) -> Array:
+    taper = np.hanning(n)
+    taper.setflags(write=False)
+    return taper
 
 
 @lru_cache(maxsize=8)

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
 
+from rigidimeter.estimation.linear_solution import Solution, solve
 from rigidimeter.records import Channel, Epoch
 
 Array = NDArray[np.float64]
@@ -50,6 +52,16 @@ class Signals:
     angle_rad: Array
     rate_hz: float
     band_hz: tuple[float, float]
+
+    @property
+    def motion(self) -> Array:
+        """Acceleration, velocity and angle, shape (n, 3)."""
+        return np.column_stack([self.acceleration_rad_s2, self.velocity_rad_s, self.angle_rad])
+
+    @cached_property
+    def solution(self) -> Solution:
+        """J, B and K by least squares, which the fit and the checks share."""
+        return solve(self.motion, self.torque_nm)
 
     def part(self, rows: slice) -> Signals:
         """Return the same of some of the samples in a row."""

@@ -39,12 +39,8 @@ Signals that have nothing to do with each other then still show about 0.2.
 
 def conditioning(signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return whether the regressors can be told apart, and if not which two and because of what."""
-    regressors = np.column_stack(
-        [signals.acceleration_rad_s2, signals.velocity_rad_s, signals.angle_rad]
-    )
-    lengths = np.linalg.norm(regressors, axis=0)
-    most = settings.condition_number_most
-    if not np.all(lengths > 0):
+    solution, most = signals.solution, settings.condition_number_most
+    if not np.all(solution.lengths > 0):
         return Look(
             math.inf,
             most,
@@ -52,11 +48,9 @@ def conditioning(signals: Signals, settings: DiagnosticsSettings) -> Look:
             f"the condition number of the motion is infinite (at most {most:g})",
             "the joint did not move",
         )
-    upper = np.linalg.qr(regressors / lengths, mode="r")
-    _, singular, right = np.linalg.svd(upper)
-    value = float(singular[0] / singular[-1]) if singular[-1] > 0 else math.inf
+    value = solution.condition_number
     # The weakest direction adds and subtracts what cannot be told apart.
-    first, second = sorted(np.argsort(np.abs(right[-1]))[-2:])
+    first, second = sorted(np.argsort(np.abs(solution.right[-1]))[-2:])
     low_hz, high_hz = _middle_hz(signals)
     return at_most(
         value,

@@ -26,7 +26,13 @@ from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.terms.beyond_linear import BeyondLinear
 from rigidimeter.estimation.terms.catalogue import REFLEXES
-from rigidimeter.estimation.terms.explained import Complex, explained, stacked, strongest
+from rigidimeter.estimation.terms.explained import (
+    Complex,
+    explained,
+    stacked,
+    strongest,
+    triangle,
+)
 from rigidimeter.estimation.terms.linear_misfit import LinearTerm
 from rigidimeter.estimation.terms.omitted_terms import OmittedTerm
 
@@ -54,13 +60,9 @@ def moved(case: Case, beyond: BeyondLinear, groups: Sequence[Sequence[OmittedTer
     inside = (beyond.frequency_hz >= low) & (beyond.frequency_hz <= high)
     motion = beyond.linear[inside]
     alone = {term: _added(motion, motion, term.lines(beyond)[inside]) for term in terms}
+    refit = _Refit(beyond, [term.name for term in terms], inside)
     return [
-        np.stack(
-            [
-                case.parameters - _refitted(beyond, group, inside),
-                np.sum([alone[term] for term in group], axis=0),
-            ]
-        )
+        np.stack([case.parameters - refit.joint(group), np.sum([alone[t] for t in group], axis=0)])
         for group in groups
     ]
 
@@ -91,18 +93,34 @@ def _added(weighted: Complex, regressors: Complex, torque: Complex) -> Array:
     return np.asarray(np.linalg.solve(gram, (weighted.conj().T @ torque).real) / scale)
 
 
-def _refitted(
-    beyond: BeyondLinear, terms: Sequence[OmittedTerm], inside: NDArray[np.bool_]
-) -> Array:
-    """Return J, B and K by least squares with the terms, shape (3,)."""
-    plain = [term.name for term in terms if term.name not in REFLEXES]
-    reflexes = [term.name for term in terms if term.name in REFLEXES]
-    plain_lines = [beyond.term_lines(name) for name in plain]
-    columns = stacked(np.column_stack([beyond.linear, *plain_lines])[inside])
-    target = stacked(beyond.torque_lines[inside])
-    if reflexes:
+class _Refit:
+    """J, B and K by least squares with some of the terms, at lines of the band."""
+
+    def __init__(
+        self, beyond: BeyondLinear, names: Sequence[str], inside: NDArray[np.bool_]
+    ) -> None:
+        self._beyond, self._inside = beyond, inside
+        self._plain = [name for name in names if name not in REFLEXES]
+        lines = [beyond.linear, *(beyond.term_lines(name) for name in self._plain)]
+        self._columns = np.concatenate(lines, axis=1)[inside]
+        self._torque = beyond.torque_lines[inside]
+        self._upper = triangle(self._columns, self._torque)
+
+    def joint(self, terms: Sequence[OmittedTerm]) -> Array:
+        """Return J, B and K beside these terms, shape (3,)."""
+        reflexes = [term.name for term in terms if term.name in REFLEXES]
+        used = [
+            0,
+            1,
+            2,
+            *(3 + i for i, n in enumerate(self._plain) if n in {t.name for t in terms}),
+        ]
+        if not reflexes:
+            return explained(self._upper[:, used], self._upper[:, -1]).values[:3]
         # One reflex at most is looked for: its direction is decided by what is not linear.
         (name,) = reflexes
-        late = stacked(beyond.reflex_lines(name)[inside])
-        columns = np.column_stack([columns, late[:, strongest(columns, late, target)]])
-    return explained(columns, target).values[:3]
+        columns = self._columns[:, used]
+        late = self._beyond.reflex_lines(name)[self._inside]
+        best = strongest(*(stacked(lines) for lines in (columns, late, self._torque)))
+        upper = triangle(np.column_stack([columns, late[:, best]]), self._torque)
+        return explained(upper[:, :-1], upper[:, -1]).values[:3]

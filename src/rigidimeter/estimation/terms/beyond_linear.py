@@ -19,9 +19,9 @@ times Σ w⁴ n / (Σ w²)² for the taper w.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -113,20 +113,28 @@ class BeyondLinear:
         nonlinear : sequence of float
             The parameters inside the reflexes, in the order of the names.
         """
-        found = [np.zeros((self.torque.size, 0), dtype=np.complex128)]
+        found: list[tuple[str, tuple[float, ...]]] = []
         used = 0
         for name in names:
             count = len(kernel(name).nonlinear) if name in REFLEXES else 0
-            inner = tuple(nonlinear[used : used + count])
+            found.append((name, tuple(nonlinear[used : used + count])))
             used += count
-            found.append(self._once((name, inner), partial(self._white_term, name, inner)))
-        return np.concatenate(found, axis=1)
+        new = [one for one in dict.fromkeys(found) if one not in self._made]
+        if new:  # all of them are made white at once
+            lines = [self._term(*one) for one in new]
+            white = self.white(np.concatenate(lines, axis=1))
+            ends = np.cumsum([part.shape[1] for part in lines])
+            self._made.update(zip(new, np.split(white, ends[:-1], axis=1), strict=True))
+        empty = np.zeros((self.torque.size, 0), dtype=np.complex128)
+        return np.concatenate([empty, *(self._made[one] for one in found)], axis=1)
 
     def term_lines(self, name: str) -> Complex:
         """Return the lines of a term that is no reflex as they are, shape (m, 1)."""
         term = term_named(name)
         assert term is not None  # names are known
-        return self._once(name, lambda: self.lines(term.regressor(self.motion))[:, None])
+        if name not in self._made:
+            self._made[name] = self.lines(term.regressor(self.motion))[:, None]
+        return self._made[name]
 
     def reflex_lines(self, name: str) -> Complex:
         """Return the lines of a reflex at each point of its grid as they are, shape (m, g)."""
@@ -134,21 +142,16 @@ class BeyondLinear:
         kind = kernel(name).kind
         return self._stretch(name) * _gains(kind, self._first, self.frequency_hz.size, duration_s)
 
-    def _white_term(self, name: str, inner: tuple[float, ...]) -> Complex:
+    def _term(self, name: str, inner: tuple[float, ...]) -> Complex:
         if name not in REFLEXES:
-            return self.white(self.term_lines(name))
+            return self.term_lines(name)
         # Its gains change slowly over a stretch, as the filter that is free there.
         gains = kernel(name).transfer(self.frequency_hz, np.asarray(inner, dtype=np.float64))
-        return self.white(self._stretch(name) * np.stack(gains, axis=1))
+        return self._stretch(name) * np.stack(gains, axis=1)
 
     def _stretch(self, name: str) -> Complex:
         """Return the lines of the velocity that stretches, that of the damping of one direction."""
         return self.term_lines(f"damping{name[-1]}")
-
-    def _once(self, key: Hashable, make: Callable[[], Complex]) -> Complex:
-        if key not in self._made:
-            self._made[key] = make()
-        return self._made[key]
 
     def grid(self, names: Sequence[str]) -> list[tuple[float, ...]]:
         """Return the points at which the parameters inside the reflexes are tried."""

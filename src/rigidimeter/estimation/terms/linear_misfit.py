@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import optimize, special
 
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.terms.beyond_linear import BeyondLinear
@@ -78,7 +78,7 @@ def linear_term(beyond: BeyondLinear) -> LinearTerm | None:
     taken = beyond.free_gains - 3
     left = target.size - beyond.free_gains
     ratio = (rest - free) / taken / beyond.taper_loss / (free / left)
-    p = float(stats.f.sf(ratio, taken, left))
+    p = float(special.fdtrc(taken, left, ratio))
     if not p < CHANCE:
         return None
     found = [

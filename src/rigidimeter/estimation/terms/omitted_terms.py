@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.terms.beyond_linear import BeyondLinear
@@ -112,11 +112,13 @@ def omitted_terms(beyond: BeyondLinear) -> tuple[OmittedTerm, ...]:
     found: list[_Found] = []
     chances: list[float] = []
     left = list(TESTED)
+    search = _Search(beyond)
     while left:
-        tests = _tests(beyond, found, left)
+        before = search.fit(found)
+        tests = [search.test(found, before, name) for name in left]
         adjusted = holm([test.p for test in tests])
         fits = [
-            (*_best(beyond, found, test), p)
+            (*search.best(found, test), p)
             for test, p in zip(tests, adjusted, strict=True)
             if p < CHANCE
         ]
@@ -145,43 +147,67 @@ def _named(term: _Found, value: float, error: float, p: float) -> OmittedTerm:
     return OmittedTerm(term.name, value, error, p, term.inner)
 
 
-def _tests(beyond: BeyondLinear, found: Sequence[_Found], left: Sequence[str]) -> list[_Test]:
-    """Test each of the terms that are left beside those that were found."""
-    groups = [
-        [_Found(*one) for one in REFLEX_COLUMNS] if name in REFLEXES else [_Found(name, ())]
-        for name in left
-    ]
-    everything = [*found, *(term for group in groups for term in group)]
-    upper = triangle(_columns(beyond, everything), beyond.torque)
-    base = upper[:, : len(found)]
-    before = explained(base, upper[:, -1])
-    tests, at = [], len(found)
-    for name, group in zip(left, groups, strict=True):
-        more = len(group)
-        fit = explained(np.column_stack([base, upper[:, at : at + more]]), upper[:, -1])
-        at += more
+class _Search:
+    """Fits to the torque of one epoch, all by way of one triangle of the terms' columns."""
+
+    def __init__(self, beyond: BeyondLinear) -> None:
+        self._beyond = beyond
+        self._terms: dict[_Found, int] = {}
+        self._tried: dict[str, tuple[list[_Found], Array]] = {}
+        self._take([term for name in TESTED for term in _tested(name)])
+
+    def _take(self, terms: Sequence[_Found]) -> None:
+        everything = list(dict.fromkeys([*self._terms, *terms]))
+        if len(everything) > len(self._terms):
+            self._terms = {term: column for column, term in enumerate(everything)}
+            self._upper = triangle(_columns(self._beyond, everything), self._beyond.torque)
+
+    def fit(self, terms: Sequence[_Found]) -> Explained:
+        """Return the fit with these terms, which were taken."""
+        columns = [self._terms[term] for term in terms]
+        return explained(self._upper[:, columns], self._upper[:, -1])
+
+    def test(self, found: Sequence[_Found], before: Explained, name: str) -> _Test:
+        """Test a term beside those that were found; `before` is the fit without it."""
+        beyond, tested = self._beyond, _tested(name)
+        more = len(tested)
+        fit = self.fit([*found, *tested])
         degrees = beyond.free_values - len(found) - more
         gained = max(before.left - fit.left, 0.0) / more / beyond.taper_loss
         ratio = gained / (fit.left / degrees) if fit.left > 0 else np.inf
-        tests.append(_Test(name, float(stats.f.sf(ratio, more, degrees)), fit))
-    return tests
+        # The tail of Fisher's distribution.
+        return _Test(name, float(special.fdtrc(more, degrees, ratio)), fit)
+
+    def best(self, found: Sequence[_Found], test: _Test) -> tuple[_Found, Explained]:
+        """Return the term and its fit, a reflex with its delay of least residual."""
+        if test.name not in REFLEXES:
+            return _Found(test.name, ()), test.fit
+        base, torque = (
+            stacked(lines) for lines in (_columns(self._beyond, found), self._beyond.torque)
+        )
+        best = []
+        for kind in ("reflex+", "reflex-second-order+"):
+            terms, tried = self._reflexes(kind)
+            best.append(terms[strongest(base, tried, torque)])
+        self._take(best)
+        delayed, slow = ((term, self.fit([*found, term])) for term in best)
+        return slow if delayed[1].left - slow[1].left > DYNAMICS else delayed
+
+    def _reflexes(self, kind: str) -> tuple[list[_Found], Array]:
+        """Return the reflexes that are tried, and their columns, real parts above imaginary."""
+        if kind not in self._tried:
+            inners = self._beyond.grid([kind])
+            late = np.flatnonzero([inner[0] >= EARLIEST_S for inner in inners])
+            tried = self._beyond.white(self._beyond.reflex_lines(kind)[:, late])
+            self._tried[kind] = [_Found(kind, inners[i]) for i in late], stacked(tried)
+        return self._tried[kind]
 
 
-def _best(beyond: BeyondLinear, found: Sequence[_Found], test: _Test) -> tuple[_Found, Explained]:
-    """Return the term and its fit, a reflex with its delay of least residual."""
-    if test.name not in REFLEXES:
-        return _Found(test.name, ()), test.fit
-    base = _columns(beyond, found)
-    fits = []
-    for kind in ("reflex+", "reflex-second-order+"):
-        inners = beyond.grid([kind])
-        late = np.flatnonzero([inner[0] >= EARLIEST_S for inner in inners])
-        tried = beyond.white(beyond.reflex_lines(kind)[:, late])
-        best = strongest(stacked(base), stacked(tried), stacked(beyond.torque))
-        upper = triangle(np.column_stack([base, tried[:, best]]), beyond.torque)
-        fits.append((_Found(kind, inners[late[best]]), explained(upper[:, :-1], upper[:, -1])))
-    delayed, slow = fits
-    return slow if delayed[1].left - slow[1].left > DYNAMICS else delayed
+def _tested(name: str) -> list[_Found]:
+    """Return the columns with which a term is tested."""
+    if name in REFLEXES:
+        return [_Found(*one) for one in REFLEX_COLUMNS]
+    return [_Found(name, ())]
 
 
 def _columns(beyond: BeyondLinear, terms: Sequence[_Found]) -> Complex:

@@ -22,6 +22,7 @@ G is in N·m·s/rad: a steady stretch of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +79,11 @@ class Kernel:
 
 def kernel(name: str) -> Kernel:
     """Return the kernel of a reflex term, whatever its direction."""
-    kind = name.rstrip("+-")
+    return _kernel(name.rstrip("+-"))
+
+
+@lru_cache
+def _kernel(kind: str) -> Kernel:
     if kind == "reflex-fir":
         return Kernel(kind, tuple(f"response {lag_s:.3f} s" for lag_s in _fir_lags_s()))
     delays = (0.03, 0.045, 0.06, 0.08, 0.1, 0.13)
