@@ -42,7 +42,7 @@ class Solution(NamedTuple):
     @property
     def dependent(self) -> bool:
         """Whether the columns are linearly dependent, to rounding."""
-        return self.condition_number > 1 / (self.rows * np.finfo(np.float64).eps)
+        return self.condition_number > 1 / (self.rows * float(np.finfo(np.float64).eps))
 
     @property
     def bread(self) -> Array:

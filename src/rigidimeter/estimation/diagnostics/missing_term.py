@@ -39,6 +39,11 @@ WORDS = {
 """What a term is called, and what `rigidimeter model --terms` calls it."""
 
 
+LITTLE = 0.02
+"""A friction below this share of the torque's SD may be one of the drive: in simulated recordings a
+drive with 3 N·m of it, which sticks where the motion turns, left 0.013 of it in the torque."""
+
+
 class _Found:
     """The terms of one epoch, which every method shares."""
 
@@ -62,6 +67,12 @@ class _Found:
         self.terms = omitted_terms(self.beyond)
         if not self.terms:
             self.linear = linear_term(self.beyond)
+
+
+def terms_found(case: Case) -> str:
+    """Return what the terms are called that are not linear and are missing; empty if none is."""
+    found = case.prepared.once(_Found) if case.prepared is not None else None
+    return " and ".join(WORDS[term.name][0] for term in found.terms) if found is not None else ""
 
 
 def missing_term(case: Case) -> Look | None:
@@ -122,10 +133,15 @@ def _text(term: OmittedTerm, moved: Array, case: Case) -> str:
     plain = term_named(term.name)
     unit = "N·m·s/rad" if plain is None else plain.unit
     late = f" {1e3 * term.inner[0]:.0f} ms late" if term.name in REFLEXES else ""
+    small = term.name == "coulomb" and abs(term.value) < LITTLE * np.std(case.signals.torque_nm)
+    other = (
+        f"; below {100 * LITTLE:g} % of the torque's SD it may be friction of the drive, and then "
+        "including it does not make J, B and K better"
+    )
     return (
         f"{term.name}: the torque holds a {words} of {term.value:.3g} ± "
         f"{term.standard_error:.2g} {unit}{late} (p = {term.p:.1g}, below {CHANCE:g}); included, "
-        f"it changes {_changes(case, moved)}"
+        f"it changes {_changes(case, moved)}{other if small else ''}"
     )
 
 

@@ -6,14 +6,16 @@ from functools import partial
 
 from rigidimeter.estimation.between_epochs import p_text
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
+from rigidimeter.estimation.diagnostics.missing_term import terms_found
 from rigidimeter.estimation.diagnostics.varying_lines import varying_lines
 from rigidimeter.estimation.diagnostics.varying_selection import Change, Variation, variation
 from rigidimeter.records import PARAMETERS
 from rigidimeter.settings import DiagnosticsSettings
 
+WITH_ANGLE = "varying_with_angle"
 WITH = {
     "varying_with_time": "time",
-    "varying_with_angle": "the angle",
+    WITH_ANGLE: "the angle",
     "varying_with_phase": "the phase of the movement",
 }
 
@@ -60,10 +62,18 @@ def _variation(case: Case) -> Variation | None:
 
 def _look(case: Case, name: str) -> Look | None:
     found = case.once(_variation)
-    return None if found is None else varying_look(name, found, case.settings)
+    look = None if found is None else varying_look(name, found, case.settings)
+    if look is None or not look.failed or name != WITH_ANGLE or not (terms := terms_found(case)):
+        return look
+    return look._replace(
+        meaning=f"{_OF_NO_ANGLE}; {terms}, which missing_term names, may look like this as well",
+        remedy=f"include what missing_term names and see whether J, B and K still change; {_ABOUT}",
+    )
 
 
 _MEANING = "the estimate is a mean over a joint that was not the same throughout, and its interval"
+_OF_NO_ANGLE = f"{_MEANING} holds for no angle in particular"
+_ABOUT = "use a smaller perturbation about each angle of interest, and state the angle"
 
 VARYING_CHECKS = tuple(
     Check(name, (), partial(_look, name=name), meaning, remedy)
@@ -74,9 +84,9 @@ VARYING_CHECKS = tuple(
             "cut the epoch into shorter ones, or fit the part in which the joint did not change",
         ),
         (
-            "varying_with_angle",
-            f"{_MEANING} holds for no angle in particular",
-            "use a smaller perturbation about each angle of interest, and state the angle",
+            WITH_ANGLE,
+            _OF_NO_ANGLE,
+            _ABOUT,
         ),
         (
             "varying_with_phase",

@@ -97,3 +97,19 @@ class TestTremor:
     def test_what_is_no_tremor_is_none(self, subject):
         *_, found = fitted("bandlimited", subject=subject, seed=4)
         assert "tremor" not in found
+
+
+@pytest.mark.parametrize(("coulomb_nm", "said"), [(0.002, True), (0.02, False)])
+def test_so_little_friction_may_be_the_drives(coulomb_nm, said):
+    _, _, found = fitted("bandlimited", {"coulomb_nm": coulomb_nm})
+    finding = found["missing_term"]
+    assert finding.text.startswith("coulomb")
+    assert ("may be friction of the drive" in finding.text) == said
+
+
+def test_what_goes_with_the_angle_and_misses_a_term_may_have_one_cause():
+    _, _, found = fitted("iv", JOINTS["cubic"])
+    finding = found["varying_with_angle"]
+    assert finding.level == "doubt"
+    assert "cubic stiffness, which missing_term names" in finding.text
+    assert finding.remedy.startswith("include what missing_term names")
