@@ -20,6 +20,7 @@ import numpy as np
 from matplotlib import font_manager
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter
@@ -82,7 +83,9 @@ def svg_text(figure: Figure, mark: str = "") -> str:
         for text in figure.findobj(Text):  # fonts have no control characters, XML forbids them
             if (shown := visible(text.get_text(), lines=True)) != text.get_text():
                 text.set_text(shown)
-        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": "rigidimeter"})
+        # Not `savefig`: it draws all of the figure a second time, for a layout that is made here too.
+        canvas = FigureCanvasSVG(figure)
+        canvas.print_svg(file, metadata={"Date": None, "Creator": "rigidimeter"})
     # A clipping path is named after its place in memory; it is named by its order instead.
     document = file.getvalue()
     names = dict.fromkeys(re.findall(r'<clipPath id="(\w+)"', document))
