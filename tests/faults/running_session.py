@@ -91,8 +91,8 @@ class Session:
             return found if found.get("LOOP") else {}
 
         found = wait_for(pids)
-        stem = found.pop("MEMORY")  # other sessions may run beside this one
-        self.mine = {name for name in memory() if name.startswith(stem)}
+        self.stem = found.pop("MEMORY")  # other sessions may run beside this one
+        self.mine = {name for name in memory() if name.startswith(self.stem)}
         return dict(found)
 
     def ended(self) -> dict[str, Any]:
