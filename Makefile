@@ -22,6 +22,9 @@ $(STAMP): pyproject.toml constraints.txt
 demo: install
 	$(BIN)/rigidimeter demo --out $(OUT)
 
+# Hundreds of processes are started, and without bytecode each would compile the package anew.
+test: export PYTHONDONTWRITEBYTECODE =
+
 # In the order of their names: by the number of tests, files of few long ones would come last, alone.
 test: install
 	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m 'not slow and not realtime'

@@ -12,7 +12,7 @@ import resource
 import signal
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from pathlib import Path
@@ -21,7 +21,7 @@ from types import ModuleType
 import pytest
 from tests.mutation.mutants import PACKAGE, Mutant
 
-__all__ = ["TESTS", "seen_by"]
+__all__ = ["TESTS", "seen_by", "tests_of"]
 
 ROOT = Path(__file__).parents[2]
 NAME = PACKAGE.name
@@ -108,8 +108,17 @@ class _First:
             self.name = self.name or f"{report.nodeid} (import)"
 
 
-def seen_by(mutants: Sequence[Mutant], workers: int = 2) -> Iterator[tuple[Mutant, str]]:
-    """Yield each mutant with the test that saw it, empty if none did."""
+def tests_of(path: Path) -> tuple[str, ...]:
+    """Return the files of the tests of a module, as pytest takes them."""
+    return tuple(f"{UNIT}/{test}" for test in TESTS[path.relative_to(PACKAGE).as_posix()])
+
+
+def seen_by(
+    mutants: Sequence[Mutant],
+    workers: int = 2,
+    tests: Mapping[Path, Sequence[str]] | None = None,
+) -> Iterator[tuple[Mutant, str]]:
+    """Yield each mutant with the test that saw it, empty if none did; `tests` are by module."""
     for name in HEAVY:
         importlib.import_module(name)
     waiting, running = list(reversed(mutants)), {}
@@ -117,7 +126,8 @@ def seen_by(mutants: Sequence[Mutant], workers: int = 2) -> Iterator[tuple[Mutan
         while waiting or running:
             while waiting and len(running) < workers:
                 mutant = waiting.pop()
-                pid, answer = _child(mutant, Path(scratch) / str(len(waiting)))
+                its_own = tests[mutant.path] if tests else tests_of(mutant.path)
+                pid, answer = _child(mutant, its_own, Path(scratch) / str(len(waiting)))
                 running[pid] = mutant, answer
             pid, status = os.wait()
             mutant, answer = running.pop(pid)
@@ -127,7 +137,7 @@ def seen_by(mutants: Sequence[Mutant], workers: int = 2) -> Iterator[tuple[Mutan
             yield mutant, "" if code == 0 else test or f"no end: {code}"
 
 
-def _child(mutant: Mutant, scratch: Path) -> tuple[int, int]:
+def _child(mutant: Mutant, tests: Sequence[str], scratch: Path) -> tuple[int, int]:
     """Fork a process that ends with 0 if no test fails, and tells which did."""
     sys.stdout.flush()
     answer, tell = os.pipe()
@@ -144,13 +154,13 @@ def _child(mutant: Mutant, scratch: Path) -> tuple[int, int]:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
-        status, name = _tested(mutant, scratch)
+        status, name = _tested(mutant, tests, scratch)
         os.write(tell, name.encode())
     finally:
         os._exit(status)
 
 
-def _tested(mutant: Mutant, scratch: Path) -> tuple[int, str]:
+def _tested(mutant: Mutant, tests: Sequence[str], scratch: Path) -> tuple[int, str]:
     """Return 0 if every test passes with the mutant in place, else the first that does not."""
     for name in [name for name in sys.modules if name.startswith(NAME)]:
         if not name.startswith(KEPT):
@@ -159,7 +169,6 @@ def _tested(mutant: Mutant, scratch: Path) -> tuple[int, str]:
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"  # each costs a mutant time
     options = ["-x", "-q", "-p", "no:cacheprovider", "--noconftest", "--assert=plain"]
     options += ["-m", "not slow and not realtime", "--basetemp", str(scratch)]
-    tests = dict.fromkeys(TESTS[mutant.path.relative_to(PACKAGE).as_posix()])
     first = _First()
     os.chdir(ROOT)
-    return int(pytest.main([*options, *(f"{UNIT}/{test}" for test in tests)], [first])), first.name
+    return int(pytest.main([*options, *dict.fromkeys(tests)], [first])), first.name
