@@ -83,9 +83,9 @@ def svg_text(figure: Figure, mark: str = "") -> str:
         for text in figure.findobj(Text):  # fonts have no control characters, XML forbids them
             if (shown := visible(text.get_text(), lines=True)) != text.get_text():
                 text.set_text(shown)
-        # Not `savefig`: it draws all of the figure a second time, for a layout that is made here too.
-        canvas = FigureCanvasSVG(figure)
-        canvas.print_svg(file, metadata={"Date": None, "Creator": "rigidimeter"})
+        # `savefig` would draw all of it a second time, for a layout that is made here too.
+        metadata = {"Date": None, "Creator": "rigidimeter"}
+        FigureCanvasSVG(figure).print_svg(file, metadata=metadata)  # type: ignore[no-untyped-call]
     # A clipping path is named after its place in memory; it is named by its order instead.
     document = file.getvalue()
     names = dict.fromkeys(re.findall(r'<clipPath id="(\w+)"', document))
