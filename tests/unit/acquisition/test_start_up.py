@@ -1,7 +1,16 @@
-"""What the processes of a session load: each starts Python anew, before anything moves."""
+"""What the processes of a session load and do first: each starts Python anew."""
 
 import subprocess
 import sys
+
+import pytest
+
+from rigidimeter.acquisition.processes import (
+    live_estimate,
+    loop_process,
+    lsl_streams,
+    recorder_process,
+)
 
 HEAVY = ("scipy.signal", "scipy.stats", "scipy.optimize", "pandas", "pint", "matplotlib")
 
@@ -15,3 +24,26 @@ def test_loop_and_recorder_load_nothing_heavy():
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"
+
+
+NAMES = tuple(f"rigidimeter-none-{part}" for part in ("samples", "events", "status"))
+
+
+@pytest.mark.parametrize(
+    ("module", "main", "arguments"),
+    [
+        (live_estimate, "estimator_main", (None, 1000.0, NAMES, 1.0, 1)),
+        (loop_process, "loop_main", (None, None, NAMES, None, None, 1)),
+        (lsl_streams, "streamer_main", (None, NAMES, 1.0, 1)),
+        (recorder_process, "recorder_main", (None, NAMES, None, 1)),
+    ],
+)
+def test_a_process_whose_session_ended_before_it_began_ends_without_a_word(
+    monkeypatch, module, main, arguments
+):
+    """The console was killed, and the last of the others took the memory with it."""
+    monkeypatch.setattr(module, "leave_to_the_others", lambda: None, raising=False)
+    monkeypatch.setattr("os.nice", lambda _: 0)
+    with pytest.raises(SystemExit) as ended:
+        getattr(module, main)(*arguments)
+    assert ended.value.code == 1

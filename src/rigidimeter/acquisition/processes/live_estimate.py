@@ -87,7 +87,7 @@ def estimator_main(
         The process that started this one; without it nobody looks at the estimate.
     """
     leave_to_the_others()
-    shared = SessionMemory.attach(names)
+    shared = SessionMemory.attach_or_end(names)
     status = shared.status
     try:
         status.join(Role.ESTIMATOR)

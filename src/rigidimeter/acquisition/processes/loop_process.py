@@ -88,7 +88,7 @@ def loop_main(
     console_pid : int
         The process that started this one.
     """
-    shared = SessionMemory.attach(names)
+    shared = SessionMemory.attach_or_end(names)
     status = shared.status
     raise_flags(status)
     status.join(Role.LOOP)

@@ -146,7 +146,7 @@ def streamer_main(
     """
     leave_to_the_others()
     os.nice(NICENESS)
-    shared = SessionMemory.attach(names)
+    shared = SessionMemory.attach_or_end(names)
     try:
         folder = shared.status.folder()
         manifest = read_manifest(folder) if folder is not None else {}

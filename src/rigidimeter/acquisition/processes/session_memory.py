@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import ExitStack
 from dataclasses import dataclass
 
@@ -46,6 +47,14 @@ class SessionMemory:
             attached = cls(samples, events, SharedStatus.attach(names[2]))
             undo.pop_all()
         return attached
+
+    @classmethod
+    def attach_or_end(cls, names: tuple[str, str, str]) -> SessionMemory:
+        """Attach; end this process if the session ended, and took its memory, before it began."""
+        try:
+            return cls.attach(names)
+        except FileNotFoundError:
+            sys.exit(1)
 
     @property
     def names(self) -> tuple[str, str, str]:
