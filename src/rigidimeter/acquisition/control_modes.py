@@ -84,7 +84,9 @@ def hold(
 
 
 def _age_ticks(loop: ControlLoop, reading: Reading) -> int:
-    return round(loop.tick - reading.motion_time_s * loop.rate_hz)
+    """Return the age of a reading; 0 for a stamp that is no number, which the guard names."""
+    age_ticks = loop.tick - reading.motion_time_s * loop.rate_hz
+    return round(age_ticks) if math.isfinite(age_ticks) else 0
 
 
 def change_parameter(

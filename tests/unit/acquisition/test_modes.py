@@ -135,6 +135,19 @@ def test_a_rest_compares_an_old_reading_with_the_target_of_its_time():
         assert samples[k].velocity_request_rad_s == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.parametrize("stamp_s", [math.nan, math.inf, -math.inf])
+def test_a_stamp_that_is_no_number_is_for_the_guard_to_name(stamp_s):
+    """The reading is compared with the target of that tick, and nothing of it is sent."""
+    loop, samples = made(
+        SETTINGS, change=lambda k, r: r._replace(motion_time_s=stamp_s) if k == 5 else r
+    )
+    target = [0.001 * k for k in range(10)]
+    ended = follow(loop, 2, target, [0.01] * 10)
+    assert ended.cause in (Cause.MOTION_NOT_FINITE, Cause.MOTION_STALE, Cause.STAMP_AHEAD)
+    gain = SETTINGS.controller.tracking_gain_per_s
+    assert requests(samples)[5] == pytest.approx(0.01 + gain * (0.005 - samples[5].angle_rad))
+
+
 def test_a_hold_asks_for_nothing_and_hands_on_every_reading():
     taken = []
     loop, samples = made(SETTINGS, change=lambda k, r: r._replace(torque_nm=0.01 * k))

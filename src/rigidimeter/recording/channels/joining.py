@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.estimation import fit_epoch
 from rigidimeter.recording.channels.choice import LABELS, MOTION, choose
 from rigidimeter.recording.channels.clock_offset import Offset, find_offset
 from rigidimeter.recording.channels.readings import options_text
@@ -80,6 +79,8 @@ def offset_notice(
     The longest epoch is fitted with its motion moved by the error forth and back: how much that
     changes depends on the band, since J θ‴ times the error is part of it.
     """
+    from rigidimeter.estimation import fit_epoch  # seconds to load; the loop's process has no use
+
     text = (
         f"{tables[1].source}: {found.value_s:.4f} ± {found.error_s:.2g} s is added to its clock; "
         f"the motion then explains {100 * found.r_squared:.1f} % of the torque"
