@@ -30,10 +30,12 @@ from __future__ import annotations
 
 import argparse
 import math
+import operator
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from multiprocessing import get_context
+from functools import partial
+from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -48,6 +50,7 @@ from rigidimeter.estimation.closedloop.perturbation_methods import CLOSED_LOOP
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.scores import angular_impulse_nm_s, loop_area_j, scoring_cycles
 from rigidimeter.paper.score_rows import imposed_epoch
+from rigidimeter.parallel import each
 from rigidimeter.records import Epoch
 from rigidimeter.settings import Settings, SubjectSettings, parse_settings
 from rigidimeter.statistics import day_difference, difference, exact_ranksum, fit_mixed, ranksum
@@ -260,17 +263,17 @@ def simulate_studies(studies: int, processes: int, keep: Path | None = None) -> 
     if keep is not None and keep.exists():
         rows = _unstacked(dict(np.load(keep)))[:studies]
     start_s, before = time.monotonic(), len(rows)
-    with get_context("spawn").Pool(processes) as pool:
-        for row in pool.imap(simulate_study, range(before, studies)):
-            rows.append(row)
-            if len(rows) % SAVE_EVERY == 0 or len(rows) == studies:
-                spent_s = time.monotonic() - start_s
-                left_s = spent_s / (len(rows) - before) * (studies - len(rows))
-                print(f"{len(rows)} studies, {spent_s:.0f} s, {left_s:.0f} s left", flush=True)
-                if keep is not None:
-                    part = keep.with_name(f".{keep.name}")
-                    np.savez(part.with_suffix(".part.npz"), **_stacked(rows))
-                    part.with_suffix(".part.npz").replace(keep)
+    seeds = range(before, studies)
+    for _, row in each(simulate_study, seeds, jobs=processes, in_order=True):
+        rows.append(row)
+        if len(rows) % SAVE_EVERY == 0 or len(rows) == studies:
+            spent_s = time.monotonic() - start_s
+            left_s = spent_s / (len(rows) - before) * (studies - len(rows))
+            print(f"{len(rows)} studies, {spent_s:.0f} s, {left_s:.0f} s left", flush=True)
+            if keep is not None:
+                part = keep.with_name(f".{keep.name}")
+                np.savez(part.with_suffix(".part.npz"), **_stacked(rows))
+                part.with_suffix(".part.npz").replace(keep)
     return _stacked(rows)
 
 
@@ -409,33 +412,35 @@ def tables(
     shown = [("No difference", "DBS", way) for way in WAYS]
     shown += [("B 0.1368 → 0.119, K 1.751 → 1.44", "effect", way) for way in WAYS[:3]]
     designs = {"no difference": NULL, "the difference above": PAPER}
-    with get_context("spawn").Pool(processes) as pool:
-        jobs = {
-            (other, way, measure): pool.apply_async(
-                found_in,
-                (
-                    {k: v for k, v in estimates.items() if k.endswith(f" {measure}")},
-                    measure,
-                    other,
-                    way,
-                    studies,
-                ),
-            )
-            for _, other, way in shown
-            for measure in MEASURES
-        }
-        ratings = {
-            f"{name}, {'day scatter' if scatter else 'no day scatter'}": pool.apply_async(
-                rated_in, (design, scatter, studies)
-            )
-            for name, design in designs.items()
-            for scatter in (False, True)
-        }
-        for title, other, way in shown:
-            rows = {measure: jobs[other, way, measure].get() for measure in MEASURES}
-            yield f"{title}, {way}", table("Measure", TESTS, rows)
-        rows = {name: job.get() for name, job in ratings.items()}
-        yield "Ratings", table("Scores of three examiners", RATING_TESTS, rows)
+    ours = {
+        measure: {k: v for k, v in estimates.items() if k.endswith(f" {measure}")}
+        for measure in MEASURES
+    }
+    tests = (
+        partial(found_in, ours[measure], measure, other, way, studies)
+        for _, other, way in shown
+        for measure in MEASURES
+    )
+    rated_designs = {
+        f"{name}, {'day scatter' if scatter else 'no day scatter'}": partial(
+            rated_in, design, scatter, studies
+        )
+        for name, design in designs.items()
+        for scatter in (False, True)
+    }
+    pieces = chain(tests, rated_designs.values())
+    found = (result for _, result in each(operator.call, pieces, jobs=processes, in_order=True))
+    for title, _, way in shown:
+        yield (
+            f"{title}, {way}",
+            table("Measure", TESTS, dict(zip(MEASURES, islice(found, len(MEASURES)), strict=True))),
+        )
+    yield (
+        "Ratings",
+        table(
+            "Scores of three examiners", RATING_TESTS, dict(zip(rated_designs, found, strict=True))
+        ),
+    )
 
 
 def main() -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.recordings import measured_alone
 
+from rigidimeter.parallel import each
 from rigidimeter.records import Fit
 from rigidimeter.study.analysis import Preparation, analyse_prepared
 
@@ -36,12 +37,10 @@ def measure(
         Processes.
     """
     tasks = [(name, number, tuple(methods)) for name in numbers for number in numbers[name]]
-    with ProcessPoolExecutor(jobs) as pool:
-        found = map(_one, tasks) if jobs == 1 else pool.map(_one, tasks)
-        for name in numbers:
-            both = [next(found) for _ in numbers[name]]
-            if both:
-                yield name, {method: [kept[method] for kept in both] for method in methods}
+    found = each(_one, tasks, jobs=jobs, in_order=True)
+    for name, own in groupby(found, lambda done: done[0][0]):
+        both = [kept for _, kept in own]
+        yield name, {method: [kept[method] for kept in both] for method in methods}
 
 
 def _one(task: tuple[str, int, tuple[str, ...]]) -> dict[str, Kept]:

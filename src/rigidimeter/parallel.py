@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import BrokenExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from typing import Any, TypeVar
 
 from rigidimeter.errors import UserError
@@ -28,9 +29,10 @@ def each(
     *,
     jobs: int = 1,
     scheduler: str = "",
+    in_order: bool = False,
     on_death: Callable[[Item], Result] | None = None,
-) -> Iterator[tuple[Item, Result]]:
-    """Yield every item with its result, in the order in which they are done.
+) -> Generator[tuple[Item, Result], None, None]:
+    """Yield every item with its result, as they are done.
 
     Items are taken as they are needed, so an iterator of many takes no memory. With processes both
     they and the results must pickle, and a worker must be able to import the function.
@@ -43,6 +45,8 @@ def each(
         Processes; with 1 everything runs in this one.
     scheduler : str
         The address of a Dask scheduler, such as ``tcp://host:8786``, instead of `jobs`.
+    in_order : bool
+        Yield in the order of the items; a result that waits for an earlier one is kept until then.
     on_death : callable, optional
         Gives the result of an item that ended its process twice, such as one that needs more memory
         than there is. Without it that raises.
@@ -57,12 +61,13 @@ def each(
             yield item, function(item)
         return
     with ExitStack() as stack:
-        parallel, deaths = _workers(jobs, scheduler, stack)
+        parallel, deaths = _workers(jobs, scheduler, in_order, stack)
         waiting = _Given(items)
         while True:
             try:
-                for number, result in parallel(_tasks(function, waiting)):
-                    yield waiting.given.pop(number), result
+                with _ended(parallel(_tasks(function, waiting))) as done:
+                    for number, result in done:
+                        yield waiting.given.pop(number), result
                 return
             except deaths:
                 if on_death is None:
@@ -76,6 +81,17 @@ def each(
                     result = on_death(item)
                 del waiting.given[number]
                 yield item, result
+
+
+@contextmanager
+def _ended(results: Generator[Any, None, None]) -> Iterator[Generator[Any, None, None]]:
+    """End what still runs when the results are not wanted any more."""
+    try:
+        yield results
+    finally:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # joblib warns that it does
+            results.close()
 
 
 def _tasks(function: Callable[[Item], Any], numbered: Iterable[tuple[int, Item]]) -> Iterator[Any]:
@@ -112,8 +128,8 @@ class _Given(Iterator[tuple[int, Item]]):
 
 
 def _workers(
-    jobs: int, scheduler: str, stack: ExitStack
-) -> tuple[Callable[..., Iterator[Any]], tuple[type[BaseException], ...]]:
+    jobs: int, scheduler: str, in_order: bool, stack: ExitStack
+) -> tuple[Callable[..., Generator[Any, None, None]], tuple[type[BaseException], ...]]:
     """Return what runs tasks, and the exceptions that say that a process ended."""
     from joblib import Parallel, parallel_config
 
@@ -126,7 +142,7 @@ def _workers(
         stack.enter_context(parallel_config(backend="loky", inner_max_num_threads=1))
     parallel = Parallel(
         n_jobs=-1 if scheduler else jobs,
-        return_as="generator_unordered",
+        return_as="generator" if in_order else "generator_unordered",
         batch_size=1,
         pre_dispatch=f"{_AHEAD} * n_jobs",
     )

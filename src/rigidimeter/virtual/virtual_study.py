@@ -8,24 +8,19 @@ last: a folder that has one is complete. What was written is removed when it is 
 from __future__ import annotations
 
 import shutil
-import signal
-import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import fields
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 from rigidimeter.documents import csv_text, write_text
 from rigidimeter.errors import UserError
+from rigidimeter.parallel import each
 from rigidimeter.recording.study_toml import STUDY_SCHEMA
 from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
 from rigidimeter.virtual.study_plan import DayPlan, plan_study
 from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s
-
-_POLL_S = 0.1
 
 Progress = Callable[[float], None]
 
@@ -66,9 +61,15 @@ def write_virtual_study(
     if not made and not (folder.is_dir() and not any(folder.iterdir())):
         raise UserError(f"{folder}: {_in_the_way(folder)} name another")
     plans = plan_study(design, seed)
-    run = partial(_run_beside, processes=processes) if processes > 1 else _run_in_turn
+    done_s = 0.0
+    run = partial(_run, folder=folder)
     try:
-        run(plans, folder, progress=progress)
+        with closing(
+            each(run, plans, jobs=processes)
+        ) as done:  # what runs ends before it is removed
+            for plan, _ in done:
+                done_s += session_length_s(plan.settings)
+                progress(done_s)
     except (KeyboardInterrupt, SystemExit):
         # Half a study is of no use, and its sessions could be taken for all of them.
         shutil.rmtree(folder / "sessions", ignore_errors=True)
@@ -88,60 +89,8 @@ def _in_the_way(folder: Path) -> str:
     return "is there already; a study is never written over,"
 
 
-def _run_in_turn(plans: Sequence[DayPlan], folder: Path, progress: Progress) -> None:
-    before_s = 0.0
-    for plan in plans:
-        done_s = before_s
-        _run(plan, folder, lambda time_s, done_s=done_s: progress(done_s + time_s))  # type: ignore[misc]
-        before_s += session_length_s(plan.settings)
-    progress(before_s)
-
-
-def _run_beside(
-    plans: Sequence[DayPlan], folder: Path, *, processes: int, progress: Progress
-) -> None:
-    """Run sessions in processes; end them when we are interrupted."""
-    context = get_context("spawn")
-    reached = context.Array("d", len(plans), lock=False)
-    # An interrupt from the keyboard goes to all processes; only this one is to hear it.
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    with context.Pool(min(processes, len(plans)), _take, (reached,)) as pool:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        results = [
-            pool.apply_async(_run_apart, (index, plan, str(folder)))
-            for index, plan in enumerate(plans)
-        ]
-        waiting = results
-        while waiting:
-            time.sleep(_POLL_S)
-            progress(sum(reached))
-            for result in waiting:
-                if result.ready():
-                    result.get()  # raises what the session raised
-            waiting = [result for result in waiting if not result.ready()]
-    progress(study_length_s(plans))
-
-
-_reached: Any = None
-"""In a process of the pool: how far each session has come."""
-
-
-def _take(reached: Any) -> None:
-    global _reached
-    _reached = reached
-
-
-def _run_apart(index: int, plan: DayPlan, folder: str) -> None:
-    def reach(time_s: float) -> None:
-        _reached[index] = time_s
-
-    _run(plan, Path(folder), reach)
-
-
-def _run(plan: DayPlan, folder: Path, progress: Progress) -> None:
-    result = run_virtual_session(
-        plan.settings, folder / plan.folder, progress=progress, created_utc=plan.created_utc
-    )
+def _run(plan: DayPlan, folder: Path) -> None:
+    result = run_virtual_session(plan.settings, folder / plan.folder, created_utc=plan.created_utc)
     if result.outcome == "abort":  # a session closes in order when it is interrupted
         raise KeyboardInterrupt
     if result.outcome != "success":
