@@ -32,7 +32,7 @@ def comparison_lines(found: StudyResult) -> list[str]:
     from rigidimeter.reporting.verdict_text import verdict_sentence
     from rigidimeter.study import TEST
 
-    lines = [*textwrap.wrap(verdict_sentence(found), 100), ""]
+    lines = [*textwrap.wrap(verdict_sentence(found), 100), *_first_screen(found), ""]
     if found.source:
         lines.append(f"{found.source} by {found.by}: {found.reference} − {found.other}")
     lines += [TEST, ""]
@@ -56,6 +56,30 @@ def comparison_lines(found: StudyResult) -> list[str]:
                 f"{row.shift:.4g}, p {number_text(row.p)}, by days {number_text(row.p_day)}"
             )
     return [*lines, *_exclusions(found)] if found.sessions else lines
+
+
+def _first_screen(found: StudyResult) -> Iterator[str]:
+    """Yield what the first screen of the report shows."""
+    from rigidimeter.reporting.first_screen import (
+        LIGHTS,
+        difference_words,
+        gravest_words,
+        light_words,
+    )
+    from rigidimeter.study import conclude, traffic_light
+
+    light, concluded = traffic_light(found), conclude(found)
+    if light is not None:
+        words = f"Data quality: {LIGHTS[light.level][1]}. {light_words(light)} "
+        yield from textwrap.wrap(words + gravest_words(light), 100)
+    if concluded is None:
+        return
+    yield ""
+    for one in concluded.each:
+        d, measure = one.difference, one.comparison.measure
+        yield f"{measure.label}: {found.reference} {d.reference:.4g}, {found.other} {d.other:.4g}"
+        yield f"  {found.other} {difference_words(d, measure.unit)}"
+        yield f"  {one.verdict}: p {number_text(d.p)}, by Holm {number_text(one.p)}"
 
 
 def _epochs(c: Comparison, several: bool) -> Iterator[str]:

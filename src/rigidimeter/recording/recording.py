@@ -43,6 +43,8 @@ class Recording:
         What was asked for, each once.
     digests : mapping of Path to str
         SHA-256 of every file that was read, as it was then.
+    own_rig : bool
+        Whether a session folder was read, so that `settings` are those of the rig.
     """
 
     epochs: tuple[Epoch, ...]
@@ -50,6 +52,7 @@ class Recording:
     settings: Settings
     paths: tuple[Path, ...]
     digests: Mapping[Path, str] = field(default_factory=dict)
+    own_rig: bool = False
 
     @property
     def failed(self) -> bool:
@@ -204,7 +207,9 @@ def read_as(
         epochs += found
         notices += remarks
     settings = chosen or first or load_settings(None)
-    recording = Recording(tuple(epochs), tuple(notices), settings, tuple(named), digests)
+    recording = Recording(
+        tuple(epochs), tuple(notices), settings, tuple(named), digests, first is not None
+    )
     return _complete(recording, leave_out)
 
 

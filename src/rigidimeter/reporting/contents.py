@@ -90,7 +90,7 @@ class Table:
     note : str or Markup
         Below the table on the page, where it has rows.
     empty : str
-        What the page says in place of a table without rows.
+        What the page says in place of a table without rows; a section of nothing else is not shown.
     folding : bool
         A long table, which the reader can fold away.
     """
@@ -120,6 +120,8 @@ class Figure:
         Returns the drawing; called when the report is written.
     size : {"broad", "tall", "small"}
         On the page; small figures are side by side.
+
+    What is drawn, as numbers, is written to ``figures/NAME.csv``.
     """
 
     name: str
@@ -147,12 +149,19 @@ class Section:
         Takes the result; returns text, tables and figures in the order of the page.
     shown_if : callable
         Takes the result; whether the page has this section.
+    part : str
+        The part of the page, an entry of its contents bar; sections of one part follow each other.
+        One without a part is a part by itself.
+    printed : bool
+        Whether it is printed where not everything is asked for.
     """
 
     name: str
     title: str
     blocks: Callable[[StudyResult], Iterable[Block]]
     shown_if: Callable[[StudyResult], bool] = lambda _: True
+    part: str = ""
+    printed: bool = False
 
 
 def from_study_folder(result: StudyResult) -> bool:
@@ -160,7 +169,7 @@ def from_study_folder(result: StudyResult) -> bool:
     return bool(result.sessions)
 
 
-def paragraph(text: str, kind: Literal["", "remark", "nothing", "banner"] = "") -> Markup:
+def paragraph(text: str, kind: Literal["", "remark", "banner"] = "") -> Markup:
     """Return a paragraph; text that is not `Markup` is escaped."""
     start = Markup('<p class="{}">').format(kind) if kind else Markup("<p>")
     return start + text + Markup("</p>")

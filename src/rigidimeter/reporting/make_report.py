@@ -94,5 +94,6 @@ def recording_result(recording: Recording, analysis: Analysis, command: str = ""
         settings=recording.settings,
         epochs=recording.epochs,
         notices=(*recording.notices, *analysis_warnings(analysis)),
+        own_rig=recording.own_rig,
         provenance=provenance(recording.paths, recording.digests, recording.settings, command),
     )

@@ -33,6 +33,33 @@ def number(value: float, digits: int = 4) -> str:
     return f"{sign}{size:.{max(digits - 1 - exponent, 0)}f}"
 
 
+def scaled(size: float, unit: str) -> tuple[float, str]:
+    """Return the factor and the unit in which a number of this size is written without zeros.
+
+    Examples
+    --------
+    >>> scaled(0.0045, "kg·m²"), scaled(1.7, "N·m/rad")
+    ((1000.0, '10⁻³ kg·m²'), (1.0, 'N·m/rad'))
+    """
+    if unit and 0 < abs(size) < 0.01:
+        return 1e3, f"10⁻³ {unit}"
+    return 1.0, unit
+
+
+def amount(value: float, unit: str, digits: int = 4) -> str:
+    """Return a number with its unit, scaled, unbroken between the two.
+
+    Examples
+    --------
+    >>> amount(0.00451, "kg·m²", 3).replace("\N{NO-BREAK SPACE}", " ")
+    '4.51·10⁻³ kg·m²'
+    """
+    factor, in_unit = scaled(value, unit)
+    joint = "·" if factor != 1 else "\N{NO-BREAK SPACE}"
+    text = f"{number(factor * value, digits)}{joint}{in_unit}" if unit else number(value, digits)
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
 def interval(low: float, high: float, digits: int = 4) -> str:
     """Return an interval as the page writes it.
 

@@ -8,19 +8,21 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jinja2
 from markupsafe import Markup
 
 from rigidimeter.documents import csv_text, visible
+from rigidimeter.reporting import first_screen
 from rigidimeter.reporting.contents import Block, Column, Figure, Section, Table
+from rigidimeter.reporting.drawn_data import drawn_csv
 from rigidimeter.reporting.numbers import interval, number, p_value, short_names
 from rigidimeter.reporting.sections import SECTIONS
 from rigidimeter.reporting.sections.methods_prose import methods_prose
 from rigidimeter.reporting.style import svg_text
-from rigidimeter.reporting.verdict_text import verdict_sentence
-from rigidimeter.study import StudyResult
+from rigidimeter.reporting.verdict_text import verdict
+from rigidimeter.study import StudyResult, traffic_light
 from rigidimeter.version import __version__
 
 Contents = Sequence[tuple[Section, Sequence[Block]]]
@@ -28,13 +30,45 @@ Contents = Sequence[tuple[Section, Sequence[Block]]]
 
 
 def contents(result: StudyResult, progress: Callable[[float], None] = lambda _: None) -> Contents:
-    """Return what the page shows of a result, in the order of the page."""
+    """Return the sections of a result in the order of the page, also those with nothing to show."""
     shown = [section for section in SECTIONS if section.shown_if(result)]
     made = []
     for done, section in enumerate(shown, start=1):
         made.append((section, tuple(section.blocks(result))))
         progress(done / len(shown))
     return made
+
+
+class Part(NamedTuple):
+    """A part of the page: an entry of its contents bar, with one section or several."""
+
+    anchor: str
+    title: str
+    printed: bool
+    sections: Contents
+
+
+def parts(made: Contents) -> list[Part]:
+    """Return the sections that show anything, by part, each part once."""
+    found: dict[str, list[tuple[Section, Sequence[Block]]]] = {}
+    for section, blocks in made:
+        if any(map(_is_shown, blocks)):
+            found.setdefault(section.part or section.title, []).append((section, blocks))
+    return [
+        Part(
+            f"part-{place}",
+            title,
+            any(section.printed for section, _ in own),
+            own,
+        )
+        for place, (title, own) in enumerate(found.items(), start=1)
+    ]
+
+
+def _is_shown(block: Block) -> bool:
+    if isinstance(block, Table):
+        return bool(block.columns and block.rows)
+    return True
 
 
 def tables(made: Contents) -> dict[str, Table]:
@@ -45,7 +79,7 @@ def tables(made: Contents) -> dict[str, Table]:
 def write_report(
     result: StudyResult, out: Path, progress: Callable[[float], None] = lambda _: None
 ) -> Path:
-    """Write ``report.html``, ``tables/*.csv`` and ``figures/*.svg`` into a folder.
+    """Write ``report.html``, ``tables/*.csv`` and ``figures/*`` into a folder.
 
     A study folder also gets ``methods.txt``, the paragraphs of methods as plain text. The same
     result gives the same bytes.
@@ -68,21 +102,30 @@ def write_report(
     figures = [block for _, blocks in made for block in blocks if isinstance(block, Figure)]
     mark = _mark(result)
     svg: dict[str, str] = {}
+    drawn: dict[str, str] = {}
     for figure in figures:
-        svg[figure.name] = svg_text(figure.draw(), mark)
+        drawing = figure.draw()
+        drawn[figure.name] = drawn_csv(drawing)
+        svg[figure.name] = svg_text(drawing, mark)
         progress(0.5 + 0.5 * len(svg) / len(figures))
     (out / "tables").mkdir(parents=True, exist_ok=True)
     (out / "figures").mkdir(parents=True, exist_ok=True)
     for table in tables(made).values():
         _write(out / "tables" / f"{table.name}.csv", _csv(table))
     for name, text in svg.items():
-        _write(out / "figures" / f"{name.replace('/', '_')}.svg", text)
+        _write(out / "figures" / f"{file_stem(name)}.svg", text)
+        _write(out / "figures" / f"{file_stem(name)}.csv", drawn[name])
     if result.sessions:
         _write(out / "methods.txt", methods_prose(result).text)
     page = out / "report.html"
     _write(page, render_page(result, made, svg))
     progress(1.0)
     return page
+
+
+def file_stem(name: str) -> str:
+    """Return the name of the files of a figure."""
+    return name.replace("/", "_")
 
 
 def _write(path: Path, text: str) -> None:
@@ -111,6 +154,7 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
     sources += [fit.source for fit in (*analysis.fits, *analysis.fixed_inertia)]
     names = short_names([*sources, *(score.source for score in analysis.scores)])
     environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
         autoescape=True,
         finalize=shown_text,
         undefined=jinja2.StrictUndefined,
@@ -123,14 +167,21 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
     environment.globals["below"] = lambda row, column: _below(row, column, names)
     environment.globals["shown_columns"] = lambda table: _shown_columns(table, len(names) > 1)
     environment.globals["heads"] = _heads
-    template = environment.from_string((folder / "page.html").read_text(encoding="utf-8"))
-    return template.render(
+    environment.globals["file_stem"] = file_stem
+    light = traffic_light(result)
+    return environment.get_template("page.html").render(
         result=result,
         # The style is this package's own file and needs no escaping.
         css=Markup((folder / "page.css").read_text(encoding="utf-8")),
-        contents=made,
+        parts=parts(made),
         images={name: data_uri(text) for name, text in svg.items()},
-        verdict=verdict_sentence(result),
+        verdict=verdict(result),
+        strip=first_screen.strip(result),
+        tested=first_screen.tested_words(result),
+        precision=first_screen.precision_rows(result),
+        light=light,
+        screen=first_screen,
+        advice=() if result.other else first_screen.advice(result, light),
         virtual=sum(epoch.virtual for epoch in result.epochs),
         version=__version__,
     )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from rigidimeter.reporting.numbers import (
+    amount,
     condition_name,
     interval,
     number,
@@ -23,17 +25,25 @@ from rigidimeter.study import (
     dependences,
     doubt_sentence,
     leader,
+    precisions,
 )
 
 _SIDES: tuple[Literal["lower", "higher"], ...] = ("lower", "higher")
 _WITHHELD: dict[Literal["not supported", "cannot be decided"], str] = {
-    "not supported": "A difference was found but is not supported in",
+    "not supported": "A difference was found, but is not supported, in",
     "cannot be decided": "It cannot be decided whether the conditions differ in",
 }
 
 
-def verdict_sentence(result: StudyResult) -> str:
-    """Return what is shown and what is not, and which effect is the largest."""
+class Verdict(NamedTuple):
+    """What a result shows: the sentence to quote, and what else there is to say."""
+
+    lead: str
+    rest: tuple[str, ...]
+
+
+def verdict(result: StudyResult) -> Verdict:
+    """Return what is shown, the first sentence to be quoted, and what is not."""
     prefix = ""
     if result.virtual or any(epoch.virtual for epoch in result.epochs):
         prefix = "Virtual data. "
@@ -41,37 +51,56 @@ def verdict_sentence(result: StudyResult) -> str:
         prefix += "Blinded: the names of the conditions are codes. "
     concluded = conclude(result)
     if concluded is None:
-        return prefix + " ".join([_medians(result), *doubt_sentence(result.analysis)])
-    sentences = _sentences(result, concluded)
-    if concluded.of("lower", "higher"):
-        sentences += _largest(result)
-    return prefix + " ".join([*sentences, *doubt_sentence(result.analysis)])
+        lead, *rest = [_only_condition(result)]
+    else:
+        lead, *rest = _sentences(result, concluded)
+        if concluded.of("lower", "higher"):
+            rest += _largest(result)
+    return Verdict(prefix + lead, (*rest, *doubt_sentence(result.analysis)))
+
+
+def verdict_sentence(result: StudyResult) -> str:
+    """Return what is shown and what is not, and which effect is the largest."""
+    found = verdict(result)
+    return " ".join([found.lead, *found.rest])
 
 
 def _sentences(result: StudyResult, concluded: Conclusions) -> list[str]:
+    """Return a sentence for each kind of verdict, the most important first, and the test."""
     reference, other = condition_name(result.reference), condition_name(result.other)
     shown = [
-        f"{other} is {side} than {reference} in {series(_with_p(members))}"
+        f"{other} is {side} than {reference} in {series(_with_size(own))}"
         for side in _SIDES
-        if (members := concluded.of(side))
+        if (own := concluded.of(side))
     ]
-    shown += [
-        f"no difference is shown in {series(_with_p(members))}{f' ({reason})' if reason else ''}"
-        for reason, members in _by_reason(concluded.of("no difference shown"))
-    ]
-    found = []
-    if shown:
-        adjusted = f" (p adjusted by Holm’s method for {concluded.tested} measures)"
+    found = [f"{'; '.join(shown)}."] if shown else []
+    found += _withheld(concluded, "not supported")
+    for reason, members in _by_reason(concluded.of("no difference shown")):
+        titles = series([_lower_first(one.comparison) for one in members])
+        least = min(one.p for one in members)
+        p = _p(least)
+        if any(one.p > least for one in members):
+            p = p.replace("=", "≥")
         found.append(
-            f"Tested by {concluded.basis}{adjusted if concluded.tested > 1 else ''}: "
-            f"{'; '.join(shown)}."
+            f"No difference between {reference} and {other} is shown in {titles} ({p}"
+            f"{f'; {reason}' if reason else ''})."
         )
-    for verdict, heading in _WITHHELD.items():
-        for reason, withheld in _by_reason(concluded.of(verdict)):
-            titles = [_lower_first(one.comparison) for one in withheld]
-            if verdict == "not supported":
-                titles = _with_p(withheld)
-            found.append(f"{heading} {series(titles)}: {reason}.")
+    found += _withheld(concluded, "cannot be decided")
+    if concluded.tested:
+        adjusted = f"; p adjusted by Holm’s method for {concluded.tested} measures"
+        found.append(f"Tested by {concluded.basis}{adjusted if concluded.tested > 1 else ''}.")
+    return found
+
+
+def _withheld(
+    concluded: Conclusions, verdict: Literal["not supported", "cannot be decided"]
+) -> list[str]:
+    found = []
+    for reason, withheld in _by_reason(concluded.of(verdict)):
+        titles = [_lower_first(one.comparison) for one in withheld]
+        if verdict == "not supported":
+            titles = [f"{title} ({_p(one.p)})" for title, one in zip(titles, withheld, strict=True)]
+        found.append(f"{_WITHHELD[verdict]} {series(titles)}: {reason}.")
     return found
 
 
@@ -83,24 +112,32 @@ def _by_reason(members: Iterable[Conclusion]) -> list[tuple[str, list[Conclusion
     return list(found.items())
 
 
-def _with_p(members: Iterable[Conclusion]) -> list[str]:
-    return [f"{_lower_first(one.comparison)} ({_p(one.p)})" for one in members]
+def _with_size(members: Iterable[Conclusion]) -> list[str]:
+    """Return measures as ``stiffness K by 0.27 N·m/rad, 15 % (p = 0.003)``."""
+    found = []
+    for one in members:
+        d, unit = one.difference, one.comparison.measure.unit
+        size = amount(abs(d.estimate), unit if unit != "1" else "", 2)
+        if not math.isnan(d.percent[0]):
+            size += f", {number(abs(d.percent[0]), 2)}\N{NO-BREAK SPACE}%"
+        found.append(f"{_lower_first(one.comparison)} by {size} ({_p(one.p)})")
+    return found
 
 
-def _medians(result: StudyResult) -> str:
-    """Return the medians of each condition, where there is nothing to compare."""
+def _only_condition(result: StudyResult) -> str:
+    """Return the values of the only condition, where there is nothing to compare."""
     parts = []
-    for name in result.condition_names:
-        medians = [
-            f"{c.measure.title} {number(s.median)} {c.measure.unit} (n = {s.n})"
-            for c in result.comparisons
-            if (s := c.summaries.get(name)) is not None and s.n
-        ]
-        if medians:
-            parts.append(f"{condition_name(name)}: {', '.join(medians)}")
+    for one in precisions(result):
+        ends = ""
+        if not math.isnan(one.percent):
+            ends = f" ±\N{NO-BREAK SPACE}{number(one.percent, 2)}\N{NO-BREAK SPACE}%"
+        title = one.measure.title[:1].lower() + one.measure.title[1:]
+        parts.append(f"{title} {amount(one.value, one.measure.unit, 3)}{ends}")
     if not parts:
         return "No epoch could be included; the reasons are listed under “Exclusions”."
-    return f"No comparison of conditions. Medians: {'; '.join(parts)}."
+    name = f"{condition_name(result.reference)}: " if result.reference else ""
+    text = f"{name}{', '.join(parts)} (95 % intervals); no two conditions are compared."
+    return text[:1].upper() + text[1:]
 
 
 def _p(p: float) -> str:

@@ -29,12 +29,14 @@ FEWEST_SUBJECTS = 3
 
 
 class Tested(NamedTuple):
-    """A difference with its standard error and degrees of freedom, and the test in words."""
+    """A difference of two means with its standard error and degrees of freedom, and the test."""
 
     estimate: float
     se: float
     df: float
     words: str
+    mean_x: float
+    mean_y: float
 
 
 def test_by_levels(epochs: Epochs, names: tuple[str, str]) -> Tested:
@@ -76,8 +78,9 @@ def test_by_levels(epochs: Epochs, names: tuple[str, str]) -> Tested:
         f"mean of {_count(n, 'subject')}, each by its days ({told}){said}; no conclusion on other "
         "subjects"
     )
-    estimate = math.fsum(each.estimate for each in found) / n
-    return Tested(estimate, math.sqrt(variances.sum()), float(df), words)
+    mean_x = math.fsum(each.mean_x for each in found) / n
+    mean_y = math.fsum(each.mean_y for each in found) / n
+    return Tested(mean_x - mean_y, math.sqrt(variances.sum()), float(df), words, mean_x, mean_y)
 
 
 def _of_days(days: Days, names: tuple[str, str]) -> Tested:
@@ -132,7 +135,7 @@ def _of_units(
             f"the means of the {unit}s do not vary, so there is no error to test against"
         ) from None
     words = _in_words(found, int(both.sum()), unit, names)
-    return Tested(found.estimate, found.se, found.df, words)
+    return Tested(found.estimate, found.se, found.df, words, found.mean_x, found.mean_y)
 
 
 def _in_words(found: PartiallyPaired, both: int, unit: str, names: tuple[str, str]) -> str:

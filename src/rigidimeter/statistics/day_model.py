@@ -55,6 +55,8 @@ class DayDifference:
         Days with both conditions.
     test : str
         The test in words, without its degrees of freedom; empty where there is none.
+    mean_x, mean_y : float
+        The means that `estimate` is the difference of.
     """
 
     estimate: float = math.nan
@@ -72,6 +74,8 @@ class DayDifference:
     remark: str = ""
     n_days_both: int = 0
     test: str = ""
+    mean_x: float = math.nan
+    mean_y: float = math.nan
 
     @property
     def few(self) -> str:
@@ -149,7 +153,8 @@ def day_difference(
                 f"{name} has {sample.size} values, {len(day)} days and {len(subject)} subjects"
             )
     epochs = _by_day(samples, subjects, days)
-    estimate, se, df, words = test_by_levels(epochs, names)
+    tested = test_by_levels(epochs, names)
+    estimate, se, df = tested.estimate, tested.se, tested.df
     low, high = interval_of(estimate, se, df, confidence)
     have = [sum(len(by[k]) > 0 for own in epochs.values() for by in own.values()) for k in (0, 1)]
     both = sum(all(map(len, by)) for own in epochs.values() for by in own.values())
@@ -168,7 +173,9 @@ def day_difference(
         offsets=tuple(name for name, there in parts if there),
         confidence=confidence,
         n_days_both=both,
-        test=words,
+        test=tested.words,
+        mean_x=tested.mean_x,
+        mean_y=tested.mean_y,
     )
 
 

@@ -40,6 +40,8 @@ class PartiallyPaired:
         Units that counted as pairs, and those that counted for one condition.
     weight_x, weight_y : float
         α and β: the share of units with x (or y) alone in the mean of x (or y).
+    mean_x, mean_y : float
+        With these weights; their difference is `estimate`.
     """
 
     estimate: float
@@ -50,6 +52,8 @@ class PartiallyPaired:
     n_y: int
     weight_x: float
     weight_y: float
+    mean_x: float
+    mean_y: float
 
 
 @dataclass(frozen=True)
@@ -122,7 +126,14 @@ def partially_paired(
     ):
         raise ValueError("the values do not vary, so there is no error to test against")
     return PartiallyPaired(
-        float(means[0] - means[1]), math.sqrt(variance), _df(parts), n, n_x, n_y, *weights
+        float(means[0] - means[1]),
+        math.sqrt(variance),
+        _df(parts),
+        n,
+        n_x,
+        n_y,
+        *weights,
+        *map(float, means),
     )
 
 

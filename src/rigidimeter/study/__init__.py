@@ -15,9 +15,11 @@ from rigidimeter.study.comparison import (
 )
 from rigidimeter.study.conclusions import Conclusion, Conclusions, conclude, conclusion_rows
 from rigidimeter.study.dependence import Dependence, dependences
+from rigidimeter.study.differences import Difference
 from rigidimeter.study.doubts import doubt_sentence
 from rigidimeter.study.leading_effect import Leader, leader
 from rigidimeter.study.measures import MEASURES, RATING, Measure, Observation, conditions
+from rigidimeter.study.precision import WANTED_PERCENT, Precision, precisions
 from rigidimeter.study.provenance import provenance
 from rigidimeter.study.ratings_found import RatingMean, RatingsFound
 from rigidimeter.study.results import (
@@ -31,6 +33,7 @@ from rigidimeter.study.results import (
 )
 from rigidimeter.study.study_analysis import analyse_study, estimate_study, read_study
 from rigidimeter.study.tables import comparison_document, result_tables, table_csv
+from rigidimeter.study.traffic_light import TrafficLight, traffic_light
 from rigidimeter.study.warnings import analysis_warnings
 
 __all__ = [
@@ -38,24 +41,28 @@ __all__ = [
     "RATING",
     "TEST",
     "UNCHANGED",
+    "WANTED_PERCENT",
     "Comparison",
     "Conclusion",
     "Conclusions",
     "Condition",
     "DayMedian",
     "Dependence",
+    "Difference",
     "EffectPair",
     "Exclusion",
     "Leader",
     "LeftOut",
     "Measure",
     "Observation",
+    "Precision",
     "Preparation",
     "RatingMean",
     "RatingsFound",
     "SensitivityRow",
     "SessionEntry",
     "StudyResult",
+    "TrafficLight",
     "analyse_study",
     "analysis_warnings",
     "compare",
@@ -71,10 +78,12 @@ __all__ = [
     "estimate_study",
     "keep",
     "leader",
+    "precisions",
     "provenance",
     "read_study",
     "result_tables",
     "split_pooled",
     "table_csv",
     "task_of",
+    "traffic_light",
 ]

@@ -21,13 +21,14 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 from rigidimeter.estimation import method_named
 from rigidimeter.records import Analysis, Finding
 from rigidimeter.statistics import holm, ranksum
-from rigidimeter.study.compared import Comparison
+from rigidimeter.study.compared import Comparison, measure_names
 from rigidimeter.study.comparison import day_test, rank_test
+from rigidimeter.study.differences import Difference, by_units, by_values
 from rigidimeter.study.ratings_found import RatingsFound
 from rigidimeter.study.ratings_model import rated_one_condition, without_examiners
 from rigidimeter.study.results import StudyResult
@@ -62,10 +63,13 @@ class Conclusion:
         Of the test, adjusted for the measures; NaN without one.
     reason : str
         A clause; empty where the test is the whole reason.
+    difference : Difference
+        Of the test, with both values.
     """
 
     comparison: Comparison
     verdict: Verdict
+    difference: Difference
     p: float = math.nan
     reason: str = ""
 
@@ -92,9 +96,13 @@ class _Test:
     """A test of one measure; `sign` is that of reference − other."""
 
     comparison: Comparison
-    p: float = math.nan
+    difference: Difference
     sign: float = 0.0
     remark: str = ""
+
+    @property
+    def p(self) -> float:
+        return self.difference.p
 
     @property
     def found(self) -> bool:
@@ -121,29 +129,33 @@ def conclude(result: StudyResult) -> Conclusions | None:
     found = []
     for test, p in zip(tests, adjusted, strict=True):
         c = test.comparison
+        verdict: Verdict
         if math.isnan(p):
-            found.append(Conclusion(c, "cannot be decided", p, test.remark))
+            verdict, reason = "cannot be decided", test.remark
         elif p < LEVEL:
             reason = next(_objections(test, basis, result, moved), "")
-            side: Verdict = "lower" if test.sign > 0 else "higher"
-            found.append(Conclusion(c, "not supported" if reason else side, p, reason))
+            verdict = "not supported" if reason else "lower" if test.sign > 0 else "higher"
         elif reason := _too_few(test, basis, with_p):
-            found.append(Conclusion(c, "cannot be decided", p, reason))
+            verdict = "cannot be decided"
         else:
             few = c.days.few if c.days is not None and basis == "days" else ""
-            found.append(Conclusion(c, "no difference shown", p, _hidden(c, result) or few))
-    return Conclusions(basis, tuple(found))
+            verdict, reason = "no difference shown", _hidden(c, result) or few
+        found.append(Conclusion(c, verdict, test.difference, p, reason))
+    return Conclusions(basis, tuple(sorted(found, key=lambda one: one.comparison.measure.place)))
 
 
-def conclusion_rows(result: StudyResult) -> list[dict[str, str | float]]:
+def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
     """Return the conclusions as rows of a document."""
     concluded = conclude(result)
     if concluded is None:
         return []
     return [
         {
-            "measure": one.comparison.measure.name,
+            **measure_names(one.comparison.measure),
+            "reference": one.comparison.reference,
+            "other": one.comparison.other,
             "verdict": one.verdict,
+            **one.difference.row(),
             "p_holm": one.p,
             "tested_by": concluded.basis,
             "reason": one.reason,
@@ -163,22 +175,24 @@ def _tested(c: Comparison, basis: Basis) -> _Test:
         return _by_values(c)
     if basis == "recordings":
         return _by_recordings(c)
+    found = by_units(c, c.days)
     if c.days is None:
-        return _Test(c, remark=c.remark)
-    return _Test(c, c.days.p, c.days.estimate, c.days.remark)
+        return _Test(c, found, remark=c.remark)
+    return _Test(c, found, c.days.estimate, c.days.remark)
 
 
 def _by_values(c: Comparison) -> _Test:
+    found = by_values(c)
     if c.test is None:
-        return _Test(c, remark=c.remark)
-    return _Test(c, c.test.p, c.test.z)
+        return _Test(c, found, remark=c.remark)
+    return _Test(c, found, c.test.z)
 
 
 def _by_recordings(c: Comparison) -> _Test:
     by_source = replace(c, observations=tuple(replace(o, day=o.source) for o in c.observations))
     found = day_test(by_source)
     remark = found.remark.replace("days", "recordings").replace("day", "recording")
-    return _Test(c, found.p, found.estimate, remark)
+    return _Test(c, by_units(by_source, found), found.estimate, remark)
 
 
 def _too_few(test: _Test, basis: Basis, tests: int) -> str:
@@ -233,7 +247,8 @@ def _one_sided(test: _Test, ratings: RatingsFound) -> Iterator[str]:
     if not examiners:
         return
     rest = without_examiners(ratings, examiners)
-    again = _Test(test.comparison, rest.p, rest.estimate, rest.remark)
+    c = test.comparison
+    again = _Test(c, by_units(c, rest), rest.estimate, rest.remark)
     if not _agrees(again, test):
         who = f"{'examiners' if len(examiners) > 1 else 'examiner'} {', '.join(examiners)}"
         yield f"{who} rated one of the conditions alone; without these ratings {_said(again)}"

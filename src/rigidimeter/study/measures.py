@@ -46,6 +46,12 @@ class Measure:
         return f"{self.title} ({self.unit})" if self.unit else self.title
 
     @property
+    def place(self) -> int:
+        """Where summaries name it: stiffness first, for rigidity is a stiffness before all."""
+        first = ("stiffness_nm_rad", "damping_nm_s_rad", "inertia_kg_m2")
+        return first.index(self.name) if self.name in first else len(first)
+
+    @property
     def counted(self) -> str:
         """What one value is, in the plural."""
         return {"ratings": "ratings", "column": "values"}.get(self.origin, "epochs")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -66,6 +66,8 @@ class RatingsFound:
     contrast_days : Contrast or None
         The contrast with an offset for every day too; None where the data cannot separate days, or
         days were not asked for.
+    means_days : (float, float)
+        The means of the two conditions in that model; NaN without it.
     """
 
     source: str
@@ -76,6 +78,7 @@ class RatingsFound:
     notices: tuple[str, ...] = ()
     left_out_lines: tuple[int, ...] = ()
     contrast_days: Contrast | None = None
+    means_days: tuple[float, float] = (math.nan, math.nan)
 
     @cached_property
     def contrast(self) -> Contrast:
@@ -157,6 +160,17 @@ def fit_ratings(
     scores, conditions = [row.score for row in rows], [row.condition for row in rows]
     fit = fit_mixed(scores, conditions, groupings(rows, random))
     return RatingsFound(source, tuple(rows), fit, *pair, tuple(notices), tuple(left_out_lines))
+
+
+def with_days(found: RatingsFound, fit: Mixed | None) -> RatingsFound:
+    """Return the ratings with the contrast of a model that has an offset for every day too."""
+    if fit is None:
+        return found
+    first, second = (
+        float(fit.means[fit.conditions.index(name)]) for name in (found.reference, found.other)
+    )
+    contrast_days = difference(fit, found.reference, found.other)
+    return replace(found, contrast_days=contrast_days, means_days=(first, second))
 
 
 def ratings_document(found: RatingsFound) -> dict[str, Any]:

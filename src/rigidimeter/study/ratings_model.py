@@ -8,19 +8,18 @@ since all scores of one day are of one arm on that day.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import TextTable
 from rigidimeter.recording.study_folder import StudyFolder
 from rigidimeter.records import Notice
-from rigidimeter.statistics import Contrast, DayDifference, difference, fit_mixed, interval_of
+from rigidimeter.statistics import DayDifference, Mixed, fit_mixed, interval_of
 from rigidimeter.study.blinding import Naming
 from rigidimeter.study.compared import Comparison
 from rigidimeter.study.comparison import measured, no_days
 from rigidimeter.study.measures import RATING, Observation
 from rigidimeter.study.rating_table import RANDOM, Rating, groupings, oddities, ratings_of
-from rigidimeter.study.ratings_found import RatingsFound, fit_ratings
+from rigidimeter.study.ratings_found import RatingsFound, fit_ratings, with_days
 
 FEWEST = 3
 
@@ -53,7 +52,7 @@ def rated(read: StudyFolder, names: Naming) -> tuple[RatingsFound | None, list[N
     except (ValueError, ArithmeticError) as error:
         return None, [*notices, Notice("error", f"{source}: {error}")]
     notices += [Notice("warning", text) for text in (*odd, *found.model_notices)]
-    return replace(found, contrast_days=_with_days(rows, random, names.pair)), notices
+    return with_days(found, _fit_with_days(rows, random)), notices
 
 
 def _rows(read: StudyFolder, names: Naming) -> tuple[list[Rating], list[Notice]]:
@@ -92,10 +91,8 @@ def _rows(read: StudyFolder, names: Naming) -> tuple[list[Rating], list[Notice]]
     return rows, notices
 
 
-def _with_days(
-    rows: list[Rating], random: tuple[str, ...], pair: tuple[str, str]
-) -> Contrast | None:
-    """Return the contrast with days, and what a condition had to itself on a day, modelled."""
+def _fit_with_days(rows: list[Rating], random: tuple[str, ...]) -> Mixed | None:
+    """Return the model with days, and with what a condition had to itself on a day."""
     labels = groupings(rows, random)
     days = [f"{row.subject}/{row.day}" for row in rows]
     visits = [f"{day}/{row.condition}" for day, row in zip(days, rows, strict=True)]
@@ -105,10 +102,9 @@ def _with_days(
     if len(set(visits)) in (len(rows), len({row.condition for row in rows})):
         return None  # one rating a day says nothing of days; nor does one day a condition
     try:
-        fit = fit_mixed([r.score for r in rows], [r.condition for r in rows], labels)
+        return fit_mixed([r.score for r in rows], [r.condition for r in rows], labels)
     except (ValueError, ArithmeticError):
         return None
-    return difference(fit, *pair)
 
 
 def ratings_comparison(found: RatingsFound) -> Comparison:
@@ -149,6 +145,8 @@ def ratings_days(found: RatingsFound) -> DayDifference:
         n_days_x=days_x,
         n_days_y=days_y,
         test="mixed model with an offset for each examiner and each day, after Kenward and Roger",
+        mean_x=found.means_days[0],
+        mean_y=found.means_days[1],
     )
 
 
@@ -170,7 +168,7 @@ def without_examiners(found: RatingsFound, examiners: Sequence[str]) -> DayDiffe
         rest = fit_ratings(found.source, rows, random, pair)
     except (ValueError, ArithmeticError) as error:
         return no_days(0, 0, str(error))
-    return ratings_days(replace(rest, contrast_days=_with_days(rows, random, pair)))
+    return ratings_days(with_days(rest, _fit_with_days(rows, random)))
 
 
 def model_ratings(

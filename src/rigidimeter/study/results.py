@@ -150,6 +150,9 @@ class StudyResult:
         Of a study folder alone; `sessions` is empty if there is none. `blinded`: the conditions are
         codes, for no key was given. `virtual`: every session comes from the virtual rig.
         `changes`: what is new since the last analysis was kept, in sentences.
+    own_rig : bool
+        Whether a session of this program was among what was analysed, so that the settings of the
+        rig are those that it was recorded with.
     """
 
     title: str
@@ -176,6 +179,7 @@ class StudyResult:
     exclusions: tuple[Exclusion, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     changes: tuple[str, ...] = ()
+    own_rig: bool = False
 
     @property
     def condition_names(self) -> tuple[str, ...]:

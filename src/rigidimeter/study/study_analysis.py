@@ -193,6 +193,7 @@ def analyse_study(
         sensitivity=tuple(rows),
         exclusions=tuple(exclusions_of(read.epochs, main, sessions, read.operator)),
         left_out=read.gathered.left_out,
+        own_rig=read.gathered.settings is not None,
     )
 
 

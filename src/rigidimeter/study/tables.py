@@ -14,6 +14,7 @@ from rigidimeter.documents import csv_text, plain_values
 from rigidimeter.recording import estimates_document
 from rigidimeter.study.compared import Comparison, comparison_rows, comparison_values, measure_names
 from rigidimeter.study.conclusions import conclusion_rows
+from rigidimeter.study.precision import precisions
 from rigidimeter.study.ratings_found import (
     rating_contrast,
     rating_offsets,
@@ -21,6 +22,7 @@ from rigidimeter.study.ratings_found import (
     ratings_document,
 )
 from rigidimeter.study.results import StudyResult
+from rigidimeter.study.traffic_light import traffic_light
 
 COMPARISON_SCHEMA = "rigidimeter.comparison/2"
 
@@ -36,6 +38,7 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
     """
     analysis = result.analysis
     tables = result_tables(result)
+    light = traffic_light(result)
     of_result = ("title", "source", "by", "reference", "other", "seed", "resamples", "blinded",
                  "virtual")  # fmt: skip
     document = {
@@ -46,7 +49,8 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
         "method_reason": analysis.method_reason,
         "inertia_kg_m2": analysis.inertia_kg_m2,
         "inertia_by_subject": result.several_subjects,
-        "conclusion": conclusion_rows(result),
+        "conclusion": tables["conclusion"],
+        "quality": None if light is None else light.row(),
         "comparisons": [comparison_values(comparison) for comparison in result.comparisons],
         "days": tables["days"],
         "effect_differences": tables["effect_differences"],
@@ -70,6 +74,8 @@ def result_tables(result: StudyResult) -> dict[str, Rows]:
     ratings = result.ratings
     titles = {c.measure.name: c.measure.title for c in result.comparisons}
     return {
+        "conclusion": conclusion_rows(result),
+        "precision": [one.row() for one in precisions(result)],
         "comparisons": comparison_rows(result.comparisons),
         "summaries": list(_summaries(result.comparisons)),
         "days": [

@@ -12,7 +12,6 @@ from rigidimeter.records import Analysis, Channel, Epoch, Fit, Motion, Notice, O
 from rigidimeter.statistics import (
     TwoGroups,
     day_difference,
-    difference,
     fit_mixed,
     holm,
     ranksum,
@@ -32,7 +31,7 @@ from rigidimeter.study import (
 )
 from rigidimeter.study.comparison import day_tests, gathered, no_days
 from rigidimeter.study.rating_table import Rating
-from rigidimeter.study.ratings_found import fit_ratings
+from rigidimeter.study.ratings_found import fit_ratings, with_days
 from rigidimeter.study.ratings_model import ratings_comparison, ratings_days
 
 JOINT = {"inertia_kg_m2": 0.0045, "damping_nm_s_rad": 0.137, "stiffness_nm_rad": 1.75}
@@ -259,7 +258,7 @@ def ratings_found(
         Rating(line, condition, score, examiner, subject, day)
         for line, (condition, examiner, subject, day, score) in enumerate(rows, start=2)
     ]
-    with_days = fit_mixed(
+    by_day = fit_mixed(
         [r.score for r in ratings],
         [r.condition for r in ratings],
         {
@@ -268,7 +267,7 @@ def ratings_found(
         },
     )
     found = fit_ratings("ratings.csv", ratings, ["examiner"], names)
-    return replace(found, contrast_days=difference(with_days, *names))
+    return with_days(found, by_day)
 
 
 PULL = {

@@ -107,7 +107,7 @@ def test_comparisons_over_epochs(study, json, folder: Path, page: ParsedPage) ->
         assert_shows(cells[8], [c["p"], c["p_holm"]], 2)
         for cell, name in ((cells[2], "OFF"), (cells[4], "DBS")):
             assert_shows(cell, [c["groups"][name][key] for key in ("median", "q1", "q3")], 3)
-        place = next(k for k, line in enumerate(lines) if line.startswith(c["title"]))
+        place = next(k for k, line in enumerate(lines) if line == f"{c['title']} ({c['unit']})")
         line = lines[place + 3]
         ends = [c["shift"], c["shift_low"], c["shift_high"]]
         assert_shows(line.split(", z")[0], ends, 4)

@@ -50,13 +50,14 @@ def said(study: StudyResult, *methods: tuple[str, str, float, float]) -> str:
 
 def test_a_clear_effect_is_shown_and_none_is_not(study: StudyResult) -> None:
     text = verdict_sentence(study)
-    assert text.startswith(
-        "Tested by days (p adjusted by Holm’s method for 6 measures): DBS is lower than OFF in"
+    plain = text.replace("\N{NO-BREAK SPACE}", " ")
+    assert plain.startswith(
+        "DBS is lower than OFF in stiffness K by 0.31 N·m/rad, 18 % (p = 0.0212)"
     )
-    assert "stiffness K (p" in text
+    assert "Tested by days; p adjusted by Holm’s method for 6 measures." in text
     none = verdict_sentence(made_study(dataclasses.replace(SMALL, effect=0.0)))
     assert "is lower" not in none
-    assert "no difference is shown in inertia J" in none
+    assert none.startswith("No difference between OFF and DBS is shown in stiffness K, viscous")
 
 
 def test_the_sign_is_that_of_the_estimate(study: StudyResult) -> None:
@@ -80,7 +81,7 @@ def test_a_p_that_only_one_measure_alone_would_bear_is_not_claimed(study: StudyR
 
     text = verdict_sentence(altered(study, weaker))
     assert "is lower" not in text
-    assert "work (p\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}0.18)" in text
+    assert "(p\N{NO-BREAK SPACE}≥\N{NO-BREAK SPACE}0.18)" in text
 
 
 def test_the_lead_is_claimed_only_where_it_is_beyond_chance(study: StudyResult) -> None:
@@ -106,7 +107,7 @@ def test_the_lead_is_claimed_only_where_it_is_beyond_chance(study: StudyResult) 
 def test_prefixes_and_missing_tests(study: StudyResult) -> None:
     other = dataclasses.replace(study, virtual=True, blinded=True)
     assert verdict_sentence(other).startswith(
-        "Virtual data. Blinded: the names of the conditions are codes. Tested by days"
+        "Virtual data. Blinded: the names of the conditions are codes. DBS is lower than OFF"
     )
     lacking = untested(study, "work_j", "one day in each condition")
     assert (
@@ -180,8 +181,8 @@ def test_reasons_that_measures_share_are_said_once(make_study, make_analysis, ep
     """One recording in each condition: what a difference comes from cannot be known."""
     text = verdict_sentence(make_study(epochs))
     assert text.startswith(
-        "It cannot be decided whether the conditions differ in inertia J, viscous damping B, "
-        "stiffness K, angular impulse and work: there is one recording in each condition, so "
+        "It cannot be decided whether the conditions differ in stiffness K, viscous damping B, "
+        "inertia J, angular impulse and work: there is one recording in each condition, so "
         "recording and condition cannot be separated."
     )
     text = verdict_sentence(make_study([], analysis=make_analysis({"OFF": 40, "DBS": 40})))
@@ -191,7 +192,9 @@ def test_reasons_that_measures_share_are_said_once(make_study, make_analysis, ep
 def test_that_few_days_show_only_large_differences_is_said_once() -> None:
     text = verdict_sentence(made_study(dataclasses.replace(SMALL, days=(2, 2), both_on_a_day=True)))
     assert text.count("with 1 degree of freedom only a difference above 12.7 standard errors") == 1
-    assert text.index("no difference is shown in") < text.index("with 1 degree of freedom")
+    assert text.index("No difference between OFF and DBS is shown in") < text.index(
+        "with 1 degree of freedom"
+    )
 
 
 def test_what_was_found_and_is_not_supported(study: StudyResult) -> None:
@@ -204,15 +207,16 @@ def test_what_was_found_and_is_not_supported(study: StudyResult) -> None:
         study, sensitivity=(), analysis=dataclasses.replace(study.analysis, fits=fits)
     )
     text = verdict_sentence(shaken)
-    assert "DBS is lower than OFF in angular impulse" in text
-    assert "A difference was found but is not supported in viscous damping B (p" in text
+    assert text.startswith("DBS is lower than OFF in angular impulse")
+    assert "A difference was found, but is not supported, in stiffness K (p" in text
     assert ": tremor casts doubt on 0 of 23 epochs in OFF and 19 of 19 epochs in DBS" in text
 
 
-def test_verdict_without_comparison_gives_medians(make_study, make_analysis) -> None:
+def test_verdict_without_comparison_gives_the_values(make_study, make_analysis) -> None:
     text = verdict_sentence(make_study([], analysis=make_analysis({"": 3})))
-    assert text.startswith("No comparison of conditions. Medians: (no condition): Inertia J ")
-    assert text.count("(n = 3)") == 5
+    assert text.startswith("Stiffness K ")
+    assert "±" in text
+    assert text.endswith("(95 % intervals); no two conditions are compared.")
 
 
 def test_verdict_of_nothing(make_study, make_analysis) -> None:

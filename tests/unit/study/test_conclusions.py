@@ -193,12 +193,12 @@ def test_an_examiner_for_each_condition_makes_no_difference():
 def test_rows_of_the_document(study):
     rows = conclusion_rows(unsupported(study, "voluntary_torque", in_dbs))
     assert [row["measure"] for row in rows][:3] == [
-        "inertia_kg_m2",
-        "damping_nm_s_rad",
         "stiffness_nm_rad",
+        "damping_nm_s_rad",
+        "inertia_kg_m2",
     ]
     assert {row["tested_by"] for row in rows} == {"days"}
-    assert rows[2]["verdict"] == "not supported"
+    assert rows[0]["verdict"] == "not supported"
     alone = replace(
         study, other="", comparisons=tuple(replace(c, other="") for c in study.comparisons)
     )

@@ -1,6 +1,8 @@
 """The sections of the report, one module for each figure or group of tables."""
 
-from rigidimeter.reporting.contents import Section, from_study_folder
+from dataclasses import replace
+
+from rigidimeter.reporting.contents import Section
 from rigidimeter.reporting.sections import (
     comparison_tables,
     data_quality,
@@ -23,36 +25,39 @@ from rigidimeter.reporting.sections import (
 
 __all__ = ["SECTIONS"]
 
-SECTIONS: list[Section] = [
-    study_overview.OVERVIEW,
-    comparison_tables.COMPARISON,
-    forest.SECTION,
-    day_points.SECTION,
-    rating_points.SECTION,
-    data_quality.STUDY_EXCLUSIONS,
-    method_sensitivity.SECTION,
-    study_overview.CHANGES,
-    methods_prose.SECTION,
-    Section("recordings", "The recordings", lambda _: (), from_study_folder),
-    recordings.ABOUT,
-    recordings.DESIGN,
-    estimate_tables.ESTIMATION,
-    comparison_tables.RESULTS,
-    comparison_tables.ALL_EPOCHS,
-    distribution.SECTION,
-    perturbation_figure.SECTION,
-    impedance.SECTION,
-    torque_fit.SECTION,
-    unexplained_torque.SECTION,
-    other_bands.SECTION,
-    torque_angle_loop.SECTION,
-    data_quality.FINDINGS,
-    data_quality.EXCLUSIONS,
-    recordings.NOTICES,
-    estimate_tables.EPOCHS,
-    recordings.PROVENANCE,
-]
-"""Every section in the order of the page; append a `Section` to add one.
 
-A section without blocks is the heading of those that follow.
-"""
+def _part(title: str, *sections: Section, printed: bool = False) -> list[Section]:
+    return [replace(section, part=title, printed=printed) for section in sections]
+
+
+SECTIONS: list[Section] = [
+    *_part(
+        "Summary",
+        study_overview.NUMBERS,
+        study_overview.OVERVIEW,
+        study_overview.CHANGES,
+        printed=True,
+    ),
+    *_part(
+        "Measures",
+        comparison_tables.COMPARISON,
+        comparison_tables.RESULTS,
+        forest.SECTION,
+        day_points.SECTION,
+        comparison_tables.ALL_EPOCHS,
+        distribution.SECTION,
+        printed=True,
+    ),
+    *_part("Ratings", rating_points.SECTION, printed=True),
+    *_part("What rests on the method", method_sensitivity.SECTION, other_bands.SECTION),
+    *_part("Joint over frequency", impedance.SECTION, unexplained_torque.SECTION),
+    *_part("Examples", torque_fit.SECTION, torque_angle_loop.SECTION, perturbation_figure.SECTION),
+    *_part("Quality", data_quality.FINDINGS, recordings.NOTICES, printed=True),
+    *_part("Exclusions", data_quality.STUDY_EXCLUSIONS, data_quality.EXCLUSIONS),
+    *_part(
+        "Methods", methods_prose.SECTION, recordings.ABOUT, estimate_tables.ESTIMATION, printed=True
+    ),
+    *_part("Settings and provenance", recordings.DESIGN, recordings.PROVENANCE),
+    *_part("Tables", estimate_tables.EPOCHS),
+]
+"""Every section in the order of the page; append a `Section` to add one."""

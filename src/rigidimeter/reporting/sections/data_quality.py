@@ -111,6 +111,8 @@ def _kinds(result: StudyResult, found: list[tuple[Fit, Finding]]) -> Iterator[di
 def _where(result: StudyResult, fits: list[Fit]) -> str:
     """Return the epochs by source, at most `MOST_LABELS`."""
     names = short_names(fit.source for fit in result.analysis.fits)
+    if len(fits) == len(result.analysis.fits) > 1:
+        return "all"
     if any(fit.epoch == "pooled" for fit in fits):
         return "all epochs together"
     by_source: dict[str, list[str]] = {}

@@ -55,7 +55,6 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     yield Table("days", "Medians of the days", (), result_tables(result)["days"])
     by_measure = [(c, found) for c in result.comparisons if (found := _days(c))]
     if not by_measure:
-        yield paragraph("No epoch is included, so there is nothing to draw.", "nothing")
         return
     yield paragraph(
         "Each small point is an included epoch. Beside the points of a day are their median and, "

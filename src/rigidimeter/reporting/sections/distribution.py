@@ -27,7 +27,6 @@ Array = NDArray[np.float64]
 def _blocks(result: StudyResult) -> Iterator[Block]:
     shown = [c for c in result.comparisons if c.measure.origin != "ratings" and c.observations]
     if not shown:
-        yield paragraph("No epoch is included, so there is nothing to draw.", "nothing")
         return
     yield paragraph(
         "Each point is an included epoch; the thin line through it is its 95 % interval. The bar "

@@ -31,7 +31,6 @@ COHEN = (0.1, 0.3, 0.5)
 def _blocks(result: StudyResult) -> Iterator[Block]:
     found = [(c, c.effects) for c in result.comparisons if c.effects is not None]
     if not found:
-        yield paragraph("No effect size could be computed.", "nothing")
         return
     percent = f"{100 * found[0][1].confidence:g} %"
     reference, other = condition_name(result.reference), condition_name(result.other)

@@ -73,11 +73,6 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         shown[condition] = Response(*found, _joint(fits.get(condition)))
         used[condition] = len(observations), len(epochs)
     if not shown:
-        yield paragraph(
-            "This needs a recorded perturbation that repeats at least twice within an included "
-            "epoch, and there is none: without one, the response cannot be separated from noise.",
-            "nothing",
-        )
         return
     yield paragraph(
         Markup(

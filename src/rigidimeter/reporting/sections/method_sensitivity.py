@@ -35,7 +35,6 @@ MOST_BESIDE = 3
 def _blocks(result: StudyResult) -> Iterator[Block]:
     found = result.sensitivity
     if not found:
-        yield paragraph("No other method was applied.", "nothing")
         return
     words = "; ".join(
         f"{row.measure.title}, {row.method}, J {row.inertia}: {number(row.shift, 3)} "

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from rigidimeter.records import Channel, Epoch
-from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
+from rigidimeter.reporting.contents import Block, Figure, Section
 from rigidimeter.reporting.numbers import condition_name, number, short_names
 from rigidimeter.reporting.representative import analysed_epoch, origin_s, representative_fits
 from rigidimeter.reporting.style import GREY, note, plain_ticks, styled
@@ -30,7 +30,6 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         if channel is not None:
             break
     else:
-        yield paragraph("The recordings have no perturbation channel.", "nothing")
         return
     prbs = result.settings.prbs
     low, high = epoch.excitation_hz or (prbs.wanted_low_hz, prbs.wanted_high_hz)

@@ -42,7 +42,6 @@ _MEAN = 0.43
 def _blocks(result: StudyResult) -> Iterator[Block]:
     found = result.ratings
     if found is None:
-        yield paragraph("The study has no ratings.", "nothing")
         return
     words = "; ".join(
         f"{condition_name(m.condition)} {number(m.mean, 3)} {interval(m.low, m.high, 3)}"

@@ -20,6 +20,9 @@ from rigidimeter.units import rad_from_deg
 
 _TASKS = {"prbs": "torque perturbation", "sinusoid": "imposed sinusoid", None: "not stated"}
 
+_OF_THE_RIG = ("Controller", "PRBS", "Sinusoid", "Limits")
+"""Settings that recordings of another rig were not made with."""
+
 
 def epoch_duration_s(epoch: Epoch) -> float:
     """Return how long the longest channel of an epoch lasts; NaN without samples."""
@@ -102,12 +105,12 @@ def _design(result: StudyResult) -> Iterator[Block]:
             Column("value", "Value", "setting"),
             Column("unit", "Unit", "text"),
         ),
-        [dict(zip(names, row, strict=True)) for row in _main_settings(result.settings)],
-        note=Markup(
-            "Controller, perturbation and limits describe this program’s own rig; a recording from "
-            "elsewhere was not necessarily made with them. Every setting is in "
-            "<code>tables/settings.csv</code>."
-        ),
+        [
+            dict(zip(names, row, strict=True))
+            for row in _main_settings(result.settings)
+            if result.own_rig or row[0] not in _OF_THE_RIG
+        ],
+        note=Markup('Every setting is in <a href="tables/settings.csv">tables/settings.csv</a>.'),
     )
     yield Table("settings", "Every setting", (), list(_flat("", result.settings)))
 

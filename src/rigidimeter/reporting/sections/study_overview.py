@@ -14,10 +14,9 @@ from rigidimeter.reporting.contents import (
     Table,
     bullets,
     from_study_folder,
-    paragraph,
 )
 from rigidimeter.reporting.numbers import condition_name, plural, series
-from rigidimeter.study import StudyResult, result_tables
+from rigidimeter.study import StudyResult, result_tables, traffic_light
 
 _STIMULATION: tuple[tuple[str, str, Kind], ...] = (
     ("title", "Description", "text"),
@@ -84,9 +83,22 @@ def _changes(result: StudyResult) -> Iterator[Block]:
     yield Table("changes", "Changes", (), [{"change": text} for text in result.changes])
     if result.changes:
         yield bullets(result.changes)
-    else:
-        yield paragraph("No changes are known.", "nothing")
 
 
+def _numbers(result: StudyResult) -> Iterator[Block]:
+    """Yield the numbers of the first screen as files."""
+    tables = result_tables(result)
+    for name, title in (
+        ("conclusion", "What is concluded of each measure"),
+        ("precision", "Precision of each measure"),
+    ):
+        if tables[name]:
+            yield Table(name, title, (), tables[name])
+    light = traffic_light(result)
+    if light is not None:
+        yield Table("quality", "Quality of the data", (), [light.row()])
+
+
+NUMBERS = Section("numbers", "Numbers of the first screen", _numbers)
 OVERVIEW = Section("study", "The study", _overview, from_study_folder)
 CHANGES = Section("changes", "Since the last analysis", _changes, from_study_folder)

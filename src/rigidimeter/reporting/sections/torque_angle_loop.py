@@ -27,7 +27,6 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         if (epoch := analysed_epoch(result, score)) is not None
     ]
     if not found:
-        yield paragraph("No epoch with an imposed sinusoid was scored.", "nothing")
         return
     yield paragraph(
         "Torque against angle during the imposed sinusoid, both band-pass filtered in the same "

@@ -40,7 +40,6 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         if (epoch := analysed_epoch(result, fit)) is not None
     ]
     if not found:
-        yield paragraph("No fit is included, so there is nothing to draw.", "nothing")
         return
     text = (
         "The model is the fit with the inertia fixed. The panels of inertia, damping and stiffness "

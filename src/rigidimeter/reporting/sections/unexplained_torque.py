@@ -46,7 +46,6 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         sizes_nm.setdefault(fit.condition, []).append(float(np.std(own_nm)))
         bands.append(signals.band_hz)
     if not spectra:
-        yield paragraph("No fit is included, so there is nothing to draw.", "nothing")
         return
     text = Markup(
         "The torque of each epoch that J, B and K do not explain, "

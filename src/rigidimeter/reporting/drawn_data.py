@@ -1,0 +1,58 @@
+"""What a figure shows, as numbers: every line, interval and point in the order of drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.figure import Figure
+
+from rigidimeter.documents import csv_text
+
+COLUMNS = ("panel", "title", "x_axis", "y_axis", "series", "label", "x", "y")
+
+
+def drawn_csv(figure: Figure) -> str:
+    """Return a row for each point that is drawn in the units of the axes.
+
+    `series` counts the lines of a panel; an interval is a series of its two ends. What only marks a
+    place across the whole of an axis is left out.
+    """
+    return csv_text(COLUMNS, list(_rows(figure)))
+
+
+def _rows(figure: Figure) -> Iterator[dict[str, Any]]:
+    for panel, axes in enumerate(figure.axes, start=1):
+        title = axes.get_title("left") or axes.get_title()
+        about = {
+            "panel": panel,
+            "title": title,
+            "x_axis": axes.get_xlabel(),
+            "y_axis": axes.get_ylabel(),
+        }
+        about = {name: " ".join(str(text).split()) for name, text in about.items()}
+        for series, (label, points) in enumerate(_series(axes), start=1):
+            for x, y in points:
+                yield about | {"series": series, "label": label, "x": float(x), "y": float(y)}
+
+
+def _series(axes: Axes) -> Iterator[tuple[str, np.ndarray]]:
+    for line in axes.lines:
+        if line.get_transform() == axes.transData and np.size(line.get_xdata()):
+            yield _label(line.get_label()), np.asarray(line.get_xydata(), dtype=np.float64)
+    for collection in axes.collections:
+        label = _label(collection.get_label())
+        if isinstance(collection, LineCollection):
+            for segment in collection.get_segments():
+                yield label, np.asarray(segment, dtype=np.float64)
+        elif isinstance(collection, PathCollection):
+            yield label, np.asarray(collection.get_offsets(), dtype=np.float64)
+
+
+def _label(label: object) -> str:
+    """Return a label of the legend; what has none is called ``_child0`` and the like."""
+    text = str(label)
+    return "" if text.startswith("_") else text.strip()

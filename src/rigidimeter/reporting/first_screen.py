@@ -1,0 +1,240 @@
+"""The first screen of a report in words: two values, their difference, and the traffic light."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from markupsafe import Markup
+
+from rigidimeter.reporting.interval_plot import MOST_PERCENT, interval_plot, reach
+from rigidimeter.reporting.numbers import (
+    condition_name,
+    number,
+    p_value,
+    plural,
+    scaled,
+    series,
+)
+from rigidimeter.study import (
+    WANTED_PERCENT,
+    Conclusion,
+    Difference,
+    Precision,
+    StudyResult,
+    TrafficLight,
+    conclude,
+    precisions,
+)
+
+DIGITS = 3
+_PERCENT = "\N{NO-BREAK SPACE}%"
+_KIND = {"lower": "shown", "higher": "shown", "not supported": "unsupported"}
+
+
+class StripRow(NamedTuple):
+    """One measure of two conditions as the first screen shows it; all text but the plot."""
+
+    title: str
+    unit: str
+    reference: str
+    other: str
+    difference: str
+    interval: str
+    percent: str
+    percent_interval: str
+    p: str
+    p_holm: str
+    verdict: str
+    kind: str
+    plot: Markup
+
+
+class PrecisionRow(NamedTuple):
+    """One measure of one condition as the first screen shows it."""
+
+    title: str
+    unit: str
+    value: str
+    interval: str
+    percent: str
+    epochs: int
+    needed: str
+    plot: Markup
+
+
+def strip(result: StudyResult) -> list[StripRow]:
+    """Return a row for each measure that was compared; none where there were not two conditions."""
+    concluded = conclude(result)
+    if concluded is None:
+        return []
+    percents = [size for one in concluded.each for size in one.difference.percent]
+    to = reach(percents, MOST_PERCENT)
+    other = condition_name(result.other)
+    return [_strip_row(one, to, other) for one in concluded.each]
+
+
+def tested_words(result: StudyResult) -> str:
+    """Return what the values of the strip are, and what was tested."""
+    concluded = conclude(result)
+    if concluded is None:
+        return ""
+    centres = {one.difference.centre for one in concluded.each}
+    what = "medians" if centres == {"median"} else f"means of {concluded.basis}"
+    return f"{what}; p and intervals by the test of {concluded.basis}"
+
+
+def _strip_row(one: Conclusion, to: float, other: str) -> StripRow:
+    d, measure = one.difference, one.comparison.measure
+    factor, unit = scaled(max(abs(d.reference), abs(d.other)), measure.unit.removeprefix("1"))
+    estimate, low, high = (factor * size for size in (d.estimate, d.low, d.high))
+    percent, percent_low, percent_high = d.percent
+    words = f"{other} {difference_words(d, measure.unit)}"
+    if math.isnan(percent):
+        own = reach([low, high, estimate])
+        axis, drawn, to = f"{number(own, 1)} {unit}".strip(), (estimate, low, high), own
+    else:
+        axis, drawn = f"{number(to, 2 + (to >= 100))}{_PERCENT}", d.percent
+    value, *ends = (-size for size in drawn)
+    return StripRow(
+        measure.title,
+        unit,
+        number(factor * d.reference, DIGITS),
+        number(factor * d.other, DIGITS),
+        _sided(estimate),
+        _sided_interval(low, high),
+        "" if math.isnan(percent) else f"{number(abs(percent), 2)}{_PERCENT} {d.side}",
+        "" if math.isnan(percent_low) else _sided_interval(percent_low, percent_high, 2, _PERCENT),
+        p_value(d.p),
+        p_value(one.p),
+        one.verdict,
+        _KIND.get(one.verdict, ""),
+        interval_plot(
+            value,
+            (ends[0], ends[1]),
+            (f"{axis} lower", "0", f"{axis} higher"),
+            to,
+            kind=_KIND.get(one.verdict, ""),
+            words=words,
+        ),
+    )
+
+
+def difference_words(d: Difference, unit: str) -> str:
+    """Return ``lower by 0.27 N·m/rad, 15 %, 95 % interval 0.1 to 0.4 lower``."""
+    factor, in_unit = scaled(max(abs(d.reference), abs(d.other)), unit.removeprefix("1"))
+    if math.isnan(d.estimate):
+        return "unknown"
+    size = f"{number(abs(factor * d.estimate), DIGITS)} {in_unit}".strip()
+    text = f"{d.side} by {size}" if d.estimate else "the same"
+    if not math.isnan(d.percent[0]):
+        text += f", {number(abs(d.percent[0]), 2)} %"
+    if not math.isnan(d.low):
+        text += f", 95 % interval {_sided_interval(factor * d.low, factor * d.high)}"
+    return text
+
+
+def _sided(size: float, digits: int = DIGITS) -> str:
+    """Return a difference, reference − other, in words for the other: ``0.27 lower``."""
+    if math.isnan(size):
+        return "–"
+    return f"{number(abs(size), digits)} {'lower' if size > 0 else 'higher'}" if size else "0"
+
+
+def _sided_interval(low: float, high: float, digits: int = DIGITS, unit: str = "") -> str:
+    """Return an interval of reference − other in words for the other."""
+    if math.isnan(low) or math.isnan(high):
+        return ""
+    if low < 0 < high:
+        return f"{number(-low, digits)}{unit} higher to {number(high, digits)}{unit} lower"
+    ends = sorted((abs(low), abs(high)))
+    side = "lower" if high > 0 else "higher"
+    return f"{number(ends[0], digits)} to {number(ends[1], digits)}{unit} {side}"
+
+
+def precision_rows(result: StudyResult) -> list[PrecisionRow]:
+    """Return a row for each measure of the only condition; none where two were compared."""
+    found = precisions(result)
+    to = reach([WANTED_PERCENT, *(one.percent for one in found)], MOST_PERCENT)
+    return [_precision_row(one, to) for one in found]
+
+
+def _precision_row(one: Precision, to: float) -> PrecisionRow:
+    factor, unit = scaled(one.value, one.measure.unit)
+    low, high = (number(factor * end, DIGITS) for end in (one.low, one.high))
+    known = not math.isnan(one.percent)
+    axis = f"{number(to, 2 + (to >= 100))}{_PERCENT}"
+    percent = f"±\N{NO-BREAK SPACE}{number(one.percent, 2)}{_PERCENT}" if known else ""
+    return PrecisionRow(
+        one.measure.title,
+        unit,
+        number(factor * one.value, DIGITS),
+        f"{low} to {high}" if known else "not known from one epoch",
+        percent,
+        one.n,
+        "" if one.epochs_needed is None else str(one.epochs_needed),
+        interval_plot(
+            0.0,
+            (-one.percent, one.percent),
+            (f"−{axis}", "estimate", f"+{axis}"),
+            to,
+            kind="shown",
+            band=WANTED_PERCENT,
+            words=f"{one.measure.title} {percent}",
+        ),
+    )
+
+
+LIGHTS = {"good": ("✓", "good"), "caution": ("!", "use with caution"), "poor": ("✕", "poor")}
+"""The sign and the words of each level, so that colour is never alone."""
+
+
+def light_words(light: TrafficLight) -> str:
+    """Return how many epochs are sound, and what of the others."""
+    text = f"{light.sound} of {plural(light.epochs, 'epoch')} "
+    text += "is sound" if light.sound == 1 else "are sound"
+    others = []
+    if light.doubted:
+        others.append(f"checks cast doubt on {light.doubted}")
+    if light.excluded:
+        others.append(f"{light.excluded} {'is' if light.excluded == 1 else 'are'} excluded")
+    more = f" ({', '.join(others)})" if others else ""
+    return f"{text}{more}."
+
+
+def gravest_words(light: TrafficLight) -> str:
+    """Return the name of the gravest doubt and where it is; what was found, if it is no check."""
+    if not light.doubt:
+        return light.text or "No check casts doubt on an epoch."
+    name = light.doubt.replace("_", " ")
+    where = f"{light.doubt_epochs} of them" if light.doubt_epochs else "all epochs together"
+    return f"Gravest doubt: {name}, in {where}."
+
+
+def advice(result: StudyResult, light: TrafficLight | None) -> list[str]:
+    """Return what would make the estimates of one condition better."""
+    found = []
+    epochs = [epoch for epoch in result.epochs if epoch.task != "sinusoid"]
+    if epochs and not any("perturbation_nm" in epoch.channels for epoch in epochs):
+        found.append(
+            "Record the perturbation (perturbation_nm): without it the subject’s own torque biases "
+            "J, B and K, whatever the number of epochs."
+        )
+    measured = precisions(result)
+    more = [
+        f"{one.epochs_needed} for {one.measure.title} (now {one.n})"
+        for one in measured
+        if one.epochs_needed is not None and one.epochs_needed > one.n
+    ]
+    if more:
+        found.append(
+            f"Repeat epochs like these, for ±\N{NO-BREAK SPACE}{WANTED_PERCENT:g}{_PERCENT} about "
+            f"{series(more)}."
+        )
+    unknown = [one.measure.title for one in measured if one.epochs_needed is None]
+    if unknown:
+        found.append(f"Record several epochs: one gives no interval of {series(unknown)}.")
+    if light is not None and light.remedy:
+        name = light.doubt.replace("_", " ")
+        found.append(f"Because of {name}: {light.remedy}.")
+    return found

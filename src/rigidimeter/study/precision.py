@@ -1,0 +1,110 @@
+"""How precise the estimates of one condition are, and how many epochs would make them better.
+
+    N ≈ n (h / (0.05 |K|))²,   h half the 95 % interval of n epochs
+
+since the standard error falls with the root of the number of epochs. A bias, such as that by the
+subject's own torque, does not fall.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as t_distribution
+
+from rigidimeter.records import PARAMETERS, Fit
+from rigidimeter.study.compared import measure_names
+from rigidimeter.study.comparison import split_pooled
+from rigidimeter.study.measures import MEASURES, Measure
+from rigidimeter.study.results import StudyResult
+
+WANTED_PERCENT = 5.0
+"""Half the interval that is asked for, in per cent of the value."""
+
+
+@dataclass(frozen=True)
+class Precision:
+    """One measure of one condition.
+
+    Attributes
+    ----------
+    measure : Measure
+    n : int
+        Epochs.
+    value, low, high : float
+        With a 95 % interval: J, B and K fitted to all epochs together; scores as the mean over
+        epochs, with an interval from their scatter.
+    """
+
+    measure: Measure
+    n: int
+    value: float
+    low: float
+    high: float
+
+    @property
+    def percent(self) -> float:
+        """Half the interval in per cent of the value."""
+        return 100 * (self.high - self.low) / 2 / abs(self.value) if self.value else math.nan
+
+    @property
+    def epochs_needed(self) -> int | None:
+        """The number of epochs whose interval is ± `WANTED_PERCENT`; None where it is not known."""
+        epochs = self.n * (self.percent / WANTED_PERCENT) ** 2
+        return math.ceil(epochs - 1e-9) if math.isfinite(epochs) else None
+
+    def row(self) -> dict[str, Any]:
+        """Return all numbers as tables have them."""
+        return measure_names(self.measure) | {
+            "epochs": self.n,
+            "value": self.value,
+            "low": self.low,
+            "high": self.high,
+            "half_width_percent": self.percent,
+            "epochs_for_5_percent": self.epochs_needed,
+        }
+
+
+def precisions(result: StudyResult) -> tuple[Precision, ...]:
+    """Return each measure of the only condition that was recorded, with its interval."""
+    if result.other:
+        return ()
+    analysis = result.analysis
+    counting = [fit for fit in analysis.fits if fit.outcome.included]
+    by_condition, overall = split_pooled(analysis)
+    fit = by_condition.get(result.reference) or overall
+    if fit is None and len(counting) == 1:
+        fit = counting[0]
+    symbols = {parameter.name: k for k, parameter in enumerate(PARAMETERS)}
+    found = []
+    for measure in sorted(MEASURES, key=lambda one: one.place):
+        if measure.name in symbols:
+            if fit is not None and fit.outcome.included:
+                found.append(_of_fit(measure, fit, symbols[measure.name], max(len(counting), 1)))
+                continue
+            values = [getattr(one, measure.name) for one in counting]
+        else:
+            values = [
+                getattr(one, measure.name)
+                for one in measure.results(analysis)
+                if one.outcome.included
+            ]
+        if values:
+            found.append(_of_values(measure, values))
+    return tuple(found)
+
+
+def _of_fit(measure: Measure, fit: Fit, k: int, n: int) -> Precision:
+    return Precision(measure, n, float(fit.value[k]), float(fit.low[k]), float(fit.high[k]))
+
+
+def _of_values(measure: Measure, values: Sequence[float]) -> Precision:
+    n, mean = len(values), float(np.mean(values))
+    half = math.nan
+    if n > 1:
+        half = float(t_distribution.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
+    return Precision(measure, n, mean, mean - half, mean + half)
