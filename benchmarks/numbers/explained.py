@@ -62,9 +62,8 @@ EXPLANATIONS = (
     Explanation("full", "study/effects/* inertia_kg_m2", 5e-2, RANK),
     Explanation("full", "study/effect_differences/* inertia_kg_m2 *", 0.4, RANK),
     Explanation("ledger", "checks/ours eq-6 00", 1.0, ZERO),
-    Explanation("ledger", "checks/ours eq-7 00", 2e-5, LOOP),
     Explanation("ledger", "checks/ours sec-1-voluntary-iv 0[01]", 1e-8, FFT),
-    Explanation("ledger", "checks/ours sec-3.4-mean 0[012]", 5e-4, LOOP),
+    Explanation("ledger", "checks/ours sec-3.4-mean-iv 0[012]", 5e-4, LOOP),
 )
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -27,6 +28,14 @@ def estimate(
     recordings: Recordings,
     json_out: JsonOption = None,
     csv_out: CsvOption = None,
+    subject_torque_out: Annotated[
+        Path | None,
+        typer.Option(
+            "--subject-torque",
+            metavar="FILE",
+            help="Write measured, joint and subject's torque of each epoch, as .csv or .parquet.",
+        ),
+    ] = None,
 ) -> None:
     """Estimate inertia J, damping B and stiffness K of each epoch, and score the sinusoids.
 
@@ -43,13 +52,16 @@ def estimate(
           --column torque_nm=torque_Nm --rate-hz 1000 --reaction --epoch-length-s 20
     """
     from rigidimeter.recording import write_estimates_csv, write_estimates_json
+    from rigidimeter.study.subject_torque import write_subject_torque
 
-    keep_inputs((json_out, csv_out), recordings.paths)
-    _, analysis, status = analyse_recordings(recordings)
+    keep_inputs((json_out, csv_out, subject_torque_out), recordings.paths)
+    read, analysis, status = analyse_recordings(recordings)
     if json_out is not None:
         write_estimates_json(json_out, analysis)
     if csv_out is not None:
         write_estimates_csv(csv_out, analysis)
+    if subject_torque_out is not None:
+        write_subject_torque(subject_torque_out, read, analysis)
     echo("\n".join(estimate_lines(analysis)))
     raise typer.Exit(status)
 

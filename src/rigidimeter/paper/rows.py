@@ -10,7 +10,7 @@ from importlib import resources
 from typing import Any
 
 from rigidimeter.errors import UserError
-from rigidimeter.paper import appendix, controller, highpass, score_rows
+from rigidimeter.paper import appendix, controller, highpass, rig_drawings, score_rows
 from rigidimeter.paper import printed_effects as effects
 from rigidimeter.paper import protocol_rows as protocol
 from rigidimeter.paper import sensitivity_rows as sensitivity
@@ -35,9 +35,12 @@ MAKERS: Mapping[str, Maker] = {
     "eq-6": highpass.equation_6,
     "eq-6-highpass": partial(highpass.highpass, "per degree"),
     "eq-6-highpass-per-radian": partial(highpass.highpass, "per radian"),
-    "eq-7": virtual.equation_7,
+    "eq-7": highpass.equation_7,
+    "eq-7-median": virtual.median_inertia,
     "eq-8": appendix.equation_8,
     "eq-8-largest": appendix.largest_bandwidth,
+    "fig-1": rig_drawings.figure_1,
+    "fig-2": rig_drawings.figure_2,
     "fig-3a": appendix.figure_3a,
     "fig-3b": protocol.figure_3b,
     "fig-4a": protocol.figure_4a,
@@ -52,6 +55,7 @@ MAKERS: Mapping[str, Maker] = {
     "fig-6b-left-sum": sensitivity.left_sum,
     "fig-6b-delay": sensitivity.delay,
     "fig-7": virtual.figure_7,
+    "fig-7-asymmetry": score_rows.asymmetry,
     "fig-8a": partial(virtual.measure_figure, "fig-8a", "inertia_kg_m2"),
     "fig-8b": partial(virtual.measure_figure, "fig-8b", "damping_nm_s_rad"),
     "fig-8c": partial(virtual.measure_figure, "fig-8c", "stiffness_nm_rad"),
@@ -69,6 +73,7 @@ MAKERS: Mapping[str, Maker] = {
     "sec-2.3-duration": protocol.session_length,
     "sec-2.4.2-units": partial(controller.units, "per degree"),
     "sec-2.4.3-bandwidth": appendix.bandwidth,
+    "sec-2.5-sequences": protocol.sequences,
     "sec-3.1-f-test": effects.f_test,
     "sec-3.2-cancel": sensitivity.cancelling,
     "p-mupdrs": partial(effects.p_of_text, "mupdrs"),
@@ -79,6 +84,7 @@ MAKERS: Mapping[str, Maker] = {
     "sec-3.6-order": effects.order_of_effects,
     "sec-4-better": effects.better_than_work,
     "sec-3.4-mean": simulated.mean_errors,
+    "sec-3.4-mean-iv": simulated.mean_errors_by_instruments,
     "sec-3.4-sd": simulated.spread_of_errors,
     "sec-3.4-noise": simulated.implied_noise,
     "app-a-units": partial(controller.units, "per radian"),

@@ -16,20 +16,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.estimation import score_epoch
+from rigidimeter.estimation import Cycles, score_epoch, scoring_cycles
 from rigidimeter.estimation.scores import loop_area_j
 from rigidimeter.experiment import sinusoid
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import Row, within_percent
+from rigidimeter.paper.comparison_table import Row, bounded, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.records import Channel, Epoch, Motion, Score
+from rigidimeter.reporting.contents import Figure
 from rigidimeter.reporting.numbers import number
+from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits
+from rigidimeter.reporting.style import GREY
 from rigidimeter.settings import Settings
 from rigidimeter.units import rad_from_deg
 
@@ -39,16 +43,18 @@ SCORE_PERCENT = 0.5
 Array = NDArray[np.float64]
 
 
-def imposed_epoch(joint: JointDynamics, settings: Settings) -> Epoch:
+def imposed_epoch(joint: JointDynamics, settings: Settings, uneven: float = 0.0) -> Epoch:
     """Return an epoch of the sinusoid as it would be recorded, without noise.
 
     The drive imposes θ(t) and Eq. 3 gives the torque. The rates of the sensors must divide that of
-    the ticks.
+    the ticks. The stiffness is K (1 + `uneven`) at positive angles and K (1 − `uneven`) at negative
+    ones.
     """
     rig, sine, tick_hz = settings.rig, settings.sinusoid, settings.rig.tick_rate_hz
     angle, velocity = sinusoid(sine, tick_hz)
     time_s = np.arange(angle.size) / tick_hz
     torque = joint.torque_nm(angle, velocity, CubicSpline(time_s, velocity).derivative()(time_s))
+    torque = torque + uneven * joint.stiffness_nm_rad * np.abs(angle)
     channels = {}
     for name, values, rate_hz in (
         ("torque_nm", torque, rig.torque.rate_hz),
@@ -163,3 +169,55 @@ def equation_2(context: Context) -> Row:
             within_percent("Σ M Δθ / n", "J", wanted, area, SCORE_PERCENT),
         ),
     )
+
+
+_UNEVEN = 0.3
+"""Of the arm in `asymmetry`: stiffer by 30 % one way and softer by 30 % the other."""
+
+
+def asymmetry(context: Context) -> Row:
+    """Compare the torque at the two ends of the motion, of a linear and of an uneven arm.
+
+    With K (1 ± ε) on either side the torque at the ends is ±(K (1 ± ε) − Jω²) A, and a spring of
+    any shape gives back what it takes: the work stays π B ω A².
+    """
+    settings = context.settings
+    uneven_epoch = imposed_epoch(printed.FIG_6, settings, _UNEVEN)
+    cycles = scoring_cycles(uneven_epoch, settings.scores)
+    linear, uneven = (
+        _asymmetry_percent(one)
+        for one in (scoring_cycles(imposed_epoch(printed.FIG_6, settings), settings.scores), cycles)
+    )
+    work = score_epoch(uneven_epoch, settings.scores, settings.estimation).work_j
+    change = 100.0 * (work / work_closed_form_j(printed.FIG_6, settings) - 1.0)
+    return Row(
+        ours=f"torque at the two ends, difference over mean: {number(linear, 2)} % for Eq. 3, "
+        f"{number(uneven, 3)} % for an arm {100 * _UNEVEN:g} % stiffer one way and softer the "
+        f"other, whose work is off by {number(change, 2)} %",
+        checks=(
+            bounded("Asymmetry of a linear arm", "%", linear, high=SCORE_PERCENT),
+            bounded("Asymmetry of an uneven arm", "%", uneven, low=10.0),
+        ),
+        figures=(
+            Figure(
+                "fig-7-uneven",
+                f"Fig. 7 for a computed arm that is {100 * _UNEVEN:g} % stiffer at positive angles "
+                "and as much softer at negative ones.",
+                "Torque against angle of an arm whose stiffness differs by direction: eight loops.",
+                partial(loop, cycles, GREY, loop_limits([cycles]), "uneven stiffness"),
+                "small",
+            ),
+        ),
+    )
+
+
+def _asymmetry_percent(cycles: Cycles) -> float:
+    """Return how far the torques at largest and smallest angle differ in size, in % of their mean.
+
+    The band-pass takes the mean torque away, so half of the difference is left of a stiffness that
+    changes at the middle; a linear arm has none.
+    """
+    high, low = (
+        abs(float(cycles.torque_nm[index(cycles.angle_rad)])) for index in (np.argmax, np.argmin)
+    )
+    return 100.0 * abs(high - low) / (0.5 * (high + low))

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from rigidimeter.dynamics import ClosedLoopMotion, JointDynamics, closed_loop_motion
 from rigidimeter.estimation import Signals, epoch_signals, scoring_cycles
 from rigidimeter.estimation.bandlimited import zero_phase_band
-from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import Row, within_percent
+from rigidimeter.paper.comparison_table import Row
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.paper_figures import torque_traces
 from rigidimeter.paper.printed_effects import ratings_of
@@ -237,8 +236,8 @@ def figure_7(context: Context) -> Row:
     )  # fmt: skip
 
 
-def equation_7(context: Context) -> Row:
-    """Compare the two stages: J at the median of all epochs, then B and K alone."""
+def median_inertia(context: Context) -> Row:
+    """Show the two stages on the virtual study: J at the median of all epochs, then B and K."""
     analysis = context.study.analysis
     counted = [fit for fit in analysis.fixed_inertia if fit.outcome.included]
     damping = float(np.median([fit.damping_nm_s_rad for fit in counted]))
@@ -247,9 +246,8 @@ def equation_7(context: Context) -> Row:
         ours=f"median J of {len(analysis.fits)} virtual epochs {number(analysis.inertia_kg_m2)} "
         f"kg·m²; with it held, all epochs together give B {number(damping)} N·m·s/rad and "
         f"K {number(stiffness)} N·m/rad (medians)",
-        checks=(
-            within_percent("Median J", "kg·m²", printed.FIG_8_INERTIA, analysis.inertia_kg_m2, 5.0),
-        ),
+        unpublished=f"{_MISSING}the virtual arm was given the printed inertia, so that its median "
+        "confirms nothing.",
         virtual=True,
     )
 
