@@ -7,13 +7,16 @@ model makes of the window.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from rigidimeter.estimation.signals import Array
 
 
+@lru_cache(maxsize=4)
 def tapered_ends(n: int, rate_hz: float, taper_s: float) -> tuple[Array, Array]:
-    """Return a window with raised-cosine ends, and its slope.
+    """Return a window with raised-cosine ends, and its slope, which epochs of one length share.
 
     Parameters
     ----------
@@ -29,8 +32,10 @@ def tapered_ends(n: int, rate_hz: float, taper_s: float) -> tuple[Array, Array]:
     """
     centre_s = (np.arange(n) + 0.5) / rate_hz
     window, steep = _edge(np.minimum(centre_s, n / rate_hz - centre_s), taper_s)
-    rising = np.arange(n) < n / 2
-    return window, np.where(rising, steep, -steep)
+    slope = np.where(np.arange(n) < n / 2, steep, -steep)
+    for array in (window, slope):
+        array.setflags(write=False)
+    return window, slope
 
 
 def with_hole(

@@ -8,6 +8,7 @@ found in `omitted_bias`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -96,7 +97,19 @@ def missing_term(case: Case) -> Look | None:
         100.0,
         True,
         f"{named}{together}, {value:.3g} % of half their intervals (at most 100 %)",
+        meaning=_of_drive(case, found.terms),
         remedy=f"include it: rigidimeter model --terms {asked}",
+    )
+
+
+def _of_drive(case: Case, terms: Sequence[OmittedTerm]) -> str:
+    """Say that a friction is so small that it may be the drive's; else return an empty text."""
+    (first, *more), most = terms, LITTLE * float(np.std(case.signals.torque_nm))
+    if more or first.name != "coulomb" or first.value > most:
+        return ""
+    return (
+        f"J, B and K take it for their own; or, since it is below {100 * LITTLE:g} % of the "
+        "torque's SD, it is friction of the drive, and including it does not make them better"
     )
 
 
@@ -133,15 +146,10 @@ def _text(term: OmittedTerm, moved: Array, case: Case) -> str:
     plain = term_named(term.name)
     unit = "N·m·s/rad" if plain is None else plain.unit
     late = f" {1e3 * term.inner[0]:.0f} ms late" if term.name in REFLEXES else ""
-    small = term.name == "coulomb" and abs(term.value) < LITTLE * np.std(case.signals.torque_nm)
-    other = (
-        f"; below {100 * LITTLE:g} % of the torque's SD it may be friction of the drive, and then "
-        "including it does not make J, B and K better"
-    )
     return (
         f"{term.name}: the torque holds a {words} of {term.value:.3g} ± "
         f"{term.standard_error:.2g} {unit}{late} (p = {term.p:.1g}, below {CHANCE:g}); included, "
-        f"it changes {_changes(case, moved)}{other if small else ''}"
+        f"it changes {_changes(case, moved)}"
     )
 
 

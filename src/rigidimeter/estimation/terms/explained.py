@@ -48,8 +48,11 @@ def strongest(base: Array, tried: Array, target: Array) -> int:
     """Return which of the columns tried explains most of the target beside those of the base."""
     basis, _ = np.linalg.qr(base / _lengths(base))
     # What one more column explains is its projection beside those that are there.
-    beside = tried - basis @ (basis.T @ tried)
-    power = (target @ beside) ** 2 / np.maximum(np.sum(beside**2, axis=0), 1e-300)
+    left = target - basis @ (basis.T @ target)
+    sizes = np.einsum("ij,ij->j", tried, tried)
+    beside = sizes - np.sum((basis.T @ tried) ** 2, axis=0)
+    new = beside > COLLINEAR * sizes
+    power = np.where(new, (left @ tried) ** 2 / np.where(new, beside, 1.0), 0.0)
     return int(np.argmax(power))
 
 

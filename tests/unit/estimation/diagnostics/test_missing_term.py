@@ -104,7 +104,7 @@ def test_so_little_friction_may_be_the_drives(coulomb_nm, said):
     _, _, found = fitted("bandlimited", {"coulomb_nm": coulomb_nm})
     finding = found["missing_term"]
     assert finding.text.startswith("coulomb")
-    assert ("may be friction of the drive" in finding.text) == said
+    assert ("it is friction of the drive" in finding.text) == said
 
 
 def test_what_goes_with_the_angle_and_misses_a_term_may_have_one_cause():
