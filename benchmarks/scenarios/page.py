@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 
 from benchmarks.scenarios.measure import EPOCHS
@@ -51,7 +52,10 @@ def page(rows: Rows) -> str:
     """Return the whole page."""
     counts = sorted({row.recordings for row in rows.values()})
     many = " to ".join(str(count) for count in dict.fromkeys((counts[0], counts[-1])))
-    how_many = f"Each row: {many} recordings of {EPOCHS} epochs of 20 s."
+    how_many = (
+        f"Each row: {many} recordings of {EPOCHS} epochs of 20 s. The standard error of a share of "
+        f"{counts[0]} recordings is up to {50 / math.sqrt(counts[0]):.0f} %."
+    )
     return _INTRODUCTION + "\n".join([how_many, "", *summary(rows), "", *table(rows), ""])
 
 
