@@ -13,7 +13,6 @@ from rigidimeter.cli.commission import claimed, table
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.sign_text import sign_lines
 from rigidimeter.errors import UserError
 
 
@@ -57,6 +56,7 @@ def check(
     """
     from datetime import UTC, datetime
 
+    from rigidimeter.cli.sign_text import sign_lines
     from rigidimeter.commissioning import (
         Compared,
         check_record,

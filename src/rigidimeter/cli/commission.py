@@ -17,7 +17,6 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.sign_text import sign_lines
 from rigidimeter.cli.table_lines import text_table
 from rigidimeter.errors import UserError
 
@@ -81,6 +80,7 @@ def commission(
     """
     from datetime import UTC, datetime
 
+    from rigidimeter.cli.sign_text import sign_lines
     from rigidimeter.commissioning import commission as try_rig
     from rigidimeter.commissioning import record_path, write_record
     from rigidimeter.devices.rigfile import load_rig
