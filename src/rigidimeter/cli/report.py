@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -53,6 +54,7 @@ def report(
         raise UserError(
             f"--out {out}: is or lies in a session folder; name another folder for the report"
         )
+    can_be_made(out)
     if (folder := study_of(recordings, key)) is not None:
         if out.resolve() in (folder.resolve(), (folder / "analysis").resolve()):
             raise UserError(
@@ -68,6 +70,14 @@ def report(
     write_estimates_json(out / "estimates.json", result.analysis)
     echo(str(page))
     raise typer.Exit(status)
+
+
+def can_be_made(out: Path) -> None:
+    """Refuse a folder that cannot be written, before anything is computed for it."""
+    there = next(path for path in (out.resolve(), *out.resolve().parents) if path.exists())
+    if not there.is_dir() or not os.access(there, os.W_OK):
+        why = "is not writable" if there.is_dir() else "is no folder"
+        raise UserError(f"--out {out}: the report cannot be written ({there} {why})")
 
 
 def write_page(result: StudyResult, out: Path, title: str | None = None) -> Path:
