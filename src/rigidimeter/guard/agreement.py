@@ -153,7 +153,7 @@ def means_step(
     torque_old_share: float,
     motion_old_share: float,
     elapsed_s: float,
-    before_s: float = 0.0,
+    before_s: float,
 ) -> tuple[MeansState, int]:
     """Look at the means of the ticks since the last ones; return the state and a `Cause`.
 

@@ -20,7 +20,7 @@ def state(**values):
 def step(
     before, *, limits=LIMITS, torque=0.0, angle=0.0, stamp_s=0.0, old=(0.0, 0.0), elapsed_s=STEP_S
 ):
-    return means_step(limits, before, 0.0, torque, angle, 0.0, stamp_s, *old, elapsed_s)
+    return means_step(limits, before, 0.0, torque, angle, 0.0, stamp_s, *old, elapsed_s, 0.0)
 
 
 # --- the share of old readings

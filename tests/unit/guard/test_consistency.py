@@ -93,7 +93,7 @@ def test_a_drive_at_rest_and_a_reading_that_is_no_number_show_nothing():
 def test_one_mean_after_another_is_what_the_equations_say(passed_s):
     answer = answer_state()
     before = MeansState(answer, 0.2, 1.0, 0.0, 0.3, 0.1, 0.05, 0.06, 0.5)
-    after, cause = means_step(NOTHING, before, 0, 0, 0.3, 2.0, passed_s, 0, 0, passed_s + 0.001)
+    after, cause = means_step(NOTHING, before, 0, 0, 0.3, 2.0, passed_s, 0, 0, passed_s + 0.001, 0)
     kept = 1.0 - passed_s / 0.05
     moved, reported = 0.3 * kept + 0.1, 0.1 * kept + 1.5 * passed_s
     weight = passed_s / 0.3
@@ -107,9 +107,9 @@ def test_one_mean_after_another_is_what_the_equations_say(passed_s):
             pace,
         )
     )
-    same, _ = means_step(NOTHING, after, 0, 0, 9.0, 9.0, -0.001, 0, 0, 0.008)
+    same, _ = means_step(NOTHING, after, 0, 0, 9.0, 9.0, -0.001, 0, 0, 0.008, 0)
     assert same[1:9] == (*after[1:3], pytest.approx(0.009), *after[4:9])
-    long, _ = means_step(NOTHING, before, 0, 0, 0.3, 2.0, 5.0, 0, 0, 5.0)
+    long, _ = means_step(NOTHING, before, 0, 0, 0.3, 2.0, 5.0, 0, 0, 5.0, 0)
     assert long[4:8] == pytest.approx((0.1, 7.5, 7.4**2, 0.1**2 + 7.5**2))
 
 
