@@ -27,6 +27,7 @@ from tests.known_joint import angle_rad, torque_nm
 
 import rigidimeter as rm
 from benchmarks.paired import Row
+from rigidimeter.cli.progress import LEAST_SHARE
 
 EPOCHS_A_FILE = 4
 RATE_HZ, LENGTH_S = 100.0, 6.0
@@ -60,8 +61,15 @@ def measured(folder: Path, files: int, jobs: int) -> Measured:
     rm.estimate(rm.read(paths[0]))  # imports are made and caches are full
     with tempfile.TemporaryDirectory() as name:
         used_s, start_s = time.process_time(), time.perf_counter()
+        told: list[tuple[float, float]] = []  # when, and the time left then
+
+        def progress(share: float) -> None:
+            if share >= LEAST_SHARE:
+                done_s = time.perf_counter() - start_s
+                told.append((done_s, done_s * (1 - share) / share))
+
         if jobs:
-            done = rm.batch(paths, Path(name) / "out.parquet", jobs=jobs)
+            done = rm.batch(paths, Path(name) / "out.parquet", jobs=jobs, progress=progress)
             assert (done.epochs, done.failed) == (files * EPOCHS_A_FILE, ())
         else:
             for path in paths:
@@ -77,6 +85,8 @@ def measured(folder: Path, files: int, jobs: int) -> Measured:
         "workers_s": workers.ru_utime + workers.ru_stime,
         "mb": own.ru_maxrss / 1024,
         "worker_mb": workers.ru_maxrss / 1024,
+        "told_s": told[0][1] if told else 0.0,
+        "left_s": elapsed_s - told[0][0] if told else 0.0,
     }
 
 
@@ -138,6 +148,12 @@ def rows(folder: Path, epochs: int) -> list[Row]:
     sizes = f"of {large['epochs']:.0f} epochs / of {small['epochs']:.0f}"
     return [
         *found,
+        Row(
+            "archive, time left as shown after a tenth of the work / as it was",
+            large["told_s"],
+            large["left_s"],
+            "s",
+        ),
         Row(f"archive, peak memory {sizes}", large["mb"], small["mb"], "MB"),
         Row(
             f"archive, peak memory of a worker {sizes}",

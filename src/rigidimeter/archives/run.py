@@ -130,7 +130,12 @@ def batch(
                                    on_death=_dead):  # fmt: skip
                 work.done(task, rows)
                 progress(work.share)
-        write_table(place, work.rows())
+        try:
+            write_table(place, work.rows())
+        except UserError as error:
+            raise UserError(
+                f"{error}; give the command again, which goes on from {beside}"
+            ) from None
         parts.remove()
     return BatchResult(place, len(listed), work.epochs, work.before, tuple(work.reasons))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 from collections.abc import Iterable, Iterator
 from functools import cache
 from itertools import islice
@@ -55,7 +56,8 @@ def write_table(path: Path, rows: Iterable[Row]) -> None:
         finally:
             beside.unlink(missing_ok=True)
     except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
+        reason = os.strerror(error.errno) if error.errno else error
+        raise UserError(f"{path}: cannot be written ({reason})") from None
 
 
 def read_table(path: Path) -> Iterator[Row]:
