@@ -89,7 +89,7 @@ def batch(
         Processes on this machine.
     scheduler : str
         The address of a Dask scheduler, instead of `jobs`. Its workers must find the inputs under
-        the same paths.
+        the same absolute paths.
     condition : str
         Of recordings that do not say one.
     settings : Settings, path or mapping, optional
@@ -118,6 +118,8 @@ def batch(
     how = _how(method, condition, settings, changes or {}, reading)
     beside = place.with_name(f"{place.name}.parts")
     named = [inputs] if isinstance(inputs, str | Path) else inputs
+    if scheduler:  # its workers have other working directories
+        named = [Path(one).absolute() for one in named]
     listed = [*inputs_of(named, (place, beside))]
     if not listed:
         raise UserError("no input is named")

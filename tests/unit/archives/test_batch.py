@@ -112,7 +112,7 @@ def test_a_disk_that_is_full_at_the_end_keeps_what_is_done(
     monkeypatch.setattr(table, "_write_parquet", full)
     with pytest.raises(
         UserError,
-        match="No space left on device.*; give the command again, which goes on from .*parts$",
+        match=r"No space left on device.*; give the command again, which goes on from .*parts$",
     ):
         rm.batch(archive, tmp_path / "out.parquet")
     assert len(estimated) == 3

@@ -5,13 +5,14 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 from tests.unit.archives.conftest import write_recording
 
 import rigidimeter as rm
-from rigidimeter.archives import run
+from rigidimeter.archives import rows, run
 from rigidimeter.archives.parts import Parts
 from rigidimeter.cli.progress import Meter
 from rigidimeter.errors import UserError
@@ -35,8 +36,10 @@ def test_a_killed_batch_goes_on_where_it_was(
     ran = subprocess.run([sys.executable, "-c", KILLED, archive, out], check=False)
     assert ran.returncode == -9
     assert not out.exists()
-    done = rm.batch(archive, out)
+    shares: list[float] = []
+    done = rm.batch(archive, out, progress=shares.append)
     assert (done.before, done.epochs) == (2, 6)
+    assert shares == [1.0]
     assert estimated == [archive / "day-2" / "elbow.csv"]
     rm.batch(archive, tmp_path / "whole.parquet")
     assert out.read_bytes() == (tmp_path / "whole.parquet").read_bytes()
@@ -72,14 +75,39 @@ def test_other_content_settings_or_version_are_estimated_again(
     write_recording(archive / "day-1" / "elbow.csv", 9)
     rm.batch(archive, out, **change)
     assert estimated == [archive / "day-1" / "elbow.csv"]
-    for module in (run, sys.modules["rigidimeter.archives.rows"]):
+
+
+def test_another_version_estimates_again_what_one_left_behind(
+    archive: Path, tmp_path: Path, estimated: list[Path], monkeypatch
+) -> None:
+    def killed(path, rows):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(run, "write_table", killed)
+        with pytest.raises(KeyboardInterrupt):
+            rm.batch(archive, tmp_path / "out.parquet")
+    for module in (run, rows):
         monkeypatch.setattr(module, "__version__", "0.2.0")
-    monkeypatch.setattr(run, "How", lambda *given: run_how(*given, version="0.2.0"))
-    run_how = sys.modules["rigidimeter.archives.rows"].How
+    monkeypatch.setattr(run, "How", partial(rows.How, version="0.2.0"))
     estimated.clear()
-    assert rm.batch(archive, out, **change).before == 0
+    for before in (0, 3):
+        assert rm.batch(archive, tmp_path / "out.parquet").before == before
+        assert len(estimated) == 3
 
 
+@pytest.fixture(params=["in turn", "at once"])
+def taken(request, monkeypatch) -> None:
+    """Take inputs one by one, or all before the first is done, as many processes do."""
+
+    def at_once(function, items, **_):
+        return [(item, function(item)) for item in [*items]]
+
+    if request.param == "at once":
+        monkeypatch.setattr(run, "each", at_once)
+
+
+@pytest.mark.usefixtures("taken")
 def test_a_copy_is_estimated_once_and_has_its_rows(
     archive: Path, tmp_path: Path, estimated: list[Path]
 ) -> None:
@@ -95,6 +123,7 @@ def test_a_copy_is_estimated_once_and_has_its_rows(
     )
 
 
+@pytest.mark.usefixtures("taken")
 def test_what_failed_is_tried_again(archive: Path, tmp_path: Path, estimated: list[Path]) -> None:
     (archive / "bad.csv").write_text("nonsense\n")
     shutil.copy(archive / "bad.csv", archive / "worse.csv")
