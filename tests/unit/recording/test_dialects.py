@@ -3,58 +3,82 @@
 No file may give a wrong number silently.
 """
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
-from tests.dialects import DIALECTS
+from tests.corpus import CORPUS, Entry
 from tests.known_joint import TRUTH
 
 from rigidimeter.errors import UserError
-from rigidimeter.estimation import identify
+from rigidimeter.estimation import fit_epoch
 from rigidimeter.recording.channels.inspection import inspect_table
-from rigidimeter.recording.formats import read_recording, read_table
+from rigidimeter.recording.channels.joining import join_tables, joined_options
+from rigidimeter.recording.formats import read_table
+from rigidimeter.recording.formats.table_epochs import epochs_from_table
 from rigidimeter.recording.recording import read_options
+from rigidimeter.settings import load_settings
+
+TOLERANCE = np.array([2e-3, 2e-3, 1e-3])
+"""Beside the interval: rounding of 12 and 16 bits, interpolation of a channel of 100 Hz."""
 
 
-def outcome(folder, dialect):
-    """Return J, B and K with their intervals at the proposed options, or why not."""
-    path = folder / dialect.file
-    path.write_bytes(dialect.content)
-    options = read_options(**dialect.said)
+def outcome(folder: Path, entry: Entry):
+    """Return the fit and the warnings at the proposed options, or why there is none."""
+    folder.mkdir(exist_ok=True)
+    entry.write(folder)
+    said = dict(entry.said)
+    joins, offset = said.pop("join", False), said.pop("clock_offset", None)
+    options = read_options(**said)
     try:
-        found = inspect_table(read_table(path, options), options)
+        tables = [read_table(folder / name, options) for name in entry.files]
+        table = tables[0]
+        if joins:
+            table, _ = join_tables(tables, options, offset)
+            options = joined_options(options)
+        found = inspect_table(table, options)
         if found.proposal.unsaid:
             return "\n".join(found.proposal.unsaid)
-        (epoch,), _ = read_recording(path, found.options)
+        (epoch,), notices = epochs_from_table(table, found.options)
     except UserError as error:
         return str(error)
-    values = {name: channel.values for name, channel in epoch.channels.items()}
-    stamps = epoch.channels["torque_nm"].time_s
-    return identify(**values, time_s=stamps - stamps[0], method="bandlimited")
+    return fit_epoch(epoch, "bandlimited", load_settings(None)), [one.text for one in notices]
 
 
-def says_the_truth(fit):
-    return bool(np.all((fit.low <= TRUTH) & (fit.high >= TRUTH)))
+def says_the_truth(fit) -> bool:
+    slack = TOLERANCE * TRUTH
+    return bool(np.all((fit.low - slack <= TRUTH) & (fit.high + slack >= TRUTH)))
 
 
-@pytest.mark.parametrize("name", DIALECTS)
+@pytest.mark.parametrize("name", CORPUS)
 def test_a_dialect_is_read_right_or_refused(tmp_path, name):
-    dialect = DIALECTS[name]
-    found = outcome(tmp_path, dialect)
-    if dialect.refused:
-        assert isinstance(found, str), found.value
-        assert dialect.refused in found
+    entry = CORPUS[name]
+    found = outcome(tmp_path, entry)
+    if entry.refused:
+        assert isinstance(found, str), found[0].value
+        assert entry.refused in found
+        return
+    assert not isinstance(found, str), found
+    fit, warnings = found
+    if entry.warned:
+        assert entry.warned in " ".join(warnings)
     else:
-        assert not isinstance(found, str), found
-        assert says_the_truth(found), (found.low, TRUTH, found.high)
+        assert says_the_truth(fit), (fit.low, TRUTH, fit.high)
 
 
 def test_no_file_gives_a_wrong_number_silently(tmp_path):
     """Also without what a person would add: then most is refused, and nothing is wrong."""
-    bare = {name: found for name, found in DIALECTS.items() if found.said}
+    bare = {name: entry for name, entry in CORPUS.items() if entry.said}
     wrong = []
-    for name, dialect in bare.items():
-        found = outcome(tmp_path, type(dialect)(dialect.file, dialect.content))
-        if not isinstance(found, str) and not says_the_truth(found):
+    for number, (name, entry) in enumerate(bare.items()):
+        found = outcome(tmp_path / str(number), replace(entry, said={}))
+        if not isinstance(found, str) and not (found[1] or says_the_truth(found[0])):
             wrong.append(name)
     assert wrong == []
-    assert len(DIALECTS) >= 40
+
+
+def test_the_corpus_has_what_was_promised():
+    assert len(CORPUS) >= 60
+    suffixes = {Path(name).suffix for entry in CORPUS.values() for name in entry.files}
+    assert len(suffixes) >= 18

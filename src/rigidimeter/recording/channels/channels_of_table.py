@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
+from rigidimeter.recording.channels.looks import Look
 from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.readings import (
     doubts,
     look_at,
+    oddities,
     options_text,
     readings,
     sign_fault,
@@ -153,6 +155,16 @@ def _unstated(
     return [text, *(readings(choice.taken, raw, rate_hz, vary) if usable else [])]
 
 
+def _unusual(table: Table, taken: Mapping[str, Taken], seen: Look) -> list[str]:
+    """Return a warning for each unit that the file alone states and that may be wrong."""
+    return [
+        f"{table.source}: column {one.column!r} is in {one.unit}, and {odd.text}; if that is "
+        f"right, say --unit {BY_STANDARD[odd.standard].name}={one.unit}"
+        for odd in oddities(seen)
+        if (one := taken.get(odd.standard)) is not None and not one.of_user
+    ]
+
+
 def _doubtful(
     table: Table,
     taken: Mapping[str, Taken],
@@ -172,8 +184,9 @@ def _doubtful(
     if wrong := sign_fault(seen, columns, reaction=options.reaction):
         return [f"{table.source}: {wrong}"], []
     faults: list[str] = []
-    warnings: list[str] = []
-    for doubt in doubts(seen):
+    found = doubts(seen)
+    warnings = [] if found else _unusual(table, taken, seen)
+    for doubt in found:
         one = taken.get(doubt.standard)
         if one is None:
             option = "check --rate-hz" if options.rate_hz is not None else "say --rate-hz"

@@ -22,6 +22,7 @@ LEAST_R_SQUARED = 0.5
 RIVAL = 0.9
 """Another offset that explains so much of what the best does makes it ambiguous."""
 _APART_S = 0.5
+_EDGE_S = 3.0
 _LEAST_OVERLAP = 0.5
 
 
@@ -75,8 +76,10 @@ def find_offset(
         )
     starts_s = torque[0][0] - motion[0][0]
 
+    edge = min(int(_EDGE_S * rate_hz), target.size // 8, regressors.shape[1] // 8)
+
     def left(shift: float) -> float:
-        return _left(target, regressors, shift)
+        return _left(target, regressors, shift, edge)
 
     found = scipy.optimize.minimize_scalar(
         left, bounds=(lags[best] - 1.5, lags[best] + 1.5), method="bounded",
@@ -101,11 +104,16 @@ def _grid(stamps: Array, values: Array, rate_hz: float) -> Array:
 
 
 def _motion(motion: tuple[Array, Array], rate_hz: float, *, is_angle: bool) -> Array:
-    """Return angle, velocity and acceleration, shape (3, n)."""
+    """Return angle, velocity and acceleration, shape (3, n).
+
+    A velocity from differences is too small by (ω h)²/6, which an offset of B h²/(6 J) makes up
+    for; that of a spline is right to the fourth power.
+    """
     values = _grid(*motion, rate_hz)
-    angle = values if is_angle else np.cumsum(values - values.mean()) / rate_hz
-    velocity = np.gradient(angle, 1.0 / rate_hz)
-    return np.stack([angle, velocity, np.gradient(velocity, 1.0 / rate_hz)])
+    values = values - values.mean()
+    spline = scipy.interpolate.CubicSpline(np.arange(values.size) / rate_hz, values)
+    angle = spline if is_angle else spline.antiderivative()
+    return np.stack([angle(spline.x, order) for order in range(3)])
 
 
 def _explained(target: Array, regressors: Array) -> tuple[NDArray[np.int_], Array]:
@@ -122,10 +130,15 @@ def _explained(target: Array, regressors: Array) -> tuple[NDArray[np.int_], Arra
     return lags, np.where(overlap >= _LEAST_OVERLAP * min(n, m), explained, 0.0)
 
 
-def _left(target: Array, regressors: Array, shift: float) -> float:
-    """Return the share of the torque that is left where the motion is shifted by samples."""
+def _left(target: Array, regressors: Array, shift: float, edge: int) -> float:
+    """Return the share of the torque that is left where the motion is shifted by samples.
+
+    `edge` samples at each end, where the filter was starting, do not count: they are those of the
+    filter and move the offset by several of its standard errors.
+    """
     at = np.arange(target.size) - shift
-    inside = (at >= 1) & (at <= regressors.shape[1] - 2)
+    inside = (at >= edge + 1) & (at <= regressors.shape[1] - 2 - edge)
+    inside[:edge] = inside[inside.size - edge :] = False
     index = np.arange(regressors.shape[1])
     moved = np.column_stack(
         [scipy.interpolate.CubicSpline(index, row)(at[inside]) for row in regressors]

@@ -25,6 +25,8 @@ LARGEST_SPEED_RAD_S = 20.0
 LARGEST_POWER_W = 20.0
 """Of an axis that turns on, the default of `guard.power_limit_w`."""
 LARGEST_TORQUE_NM = 1000.0
+UNUSUAL_SPEED_RAD_S, UNUSUAL_TORQUE_NM = 8.0, 150.0
+"""What some limbs do; more often the unit is wrong."""
 SLOWEST_MOTION_HZ = 0.02
 SLOWEST_RATE_HZ = 5.0
 FASTEST_MOTION_HZ, FASTEST_RATE_HZ = 100.0, 5e4
@@ -67,6 +69,22 @@ def doubts(seen: Look) -> list[Doubt]:
     elif seen.speed_rad_s > LARGEST_SPEED_RAD_S and not turns_on:
         name = "velocity_rad_s" if math.isnan(seen.largest_rad) else "angle_rad"
         found.append(Doubt(name, f"a speed of {seen.speed_rad_s:.4g} rad/s is too fast for a limb"))
+    return found
+
+
+def oddities(seen: Look) -> list[Doubt]:
+    """Return what is possible, but unusual enough to be said."""
+    if seen.n_samples < FEWEST or seen.duration_s < SHORTEST_S:
+        return []
+    found = []
+    turns_on = seen.turned_rad >= 0.5 * seen.range_rad and seen.power_w <= LARGEST_POWER_W
+    if seen.torque_nm > UNUSUAL_TORQUE_NM:
+        text = f"a torque of {seen.torque_nm:.4g} N·m is more than most joints take"
+        found.append(Doubt("torque_nm", text))
+    if seen.speed_rad_s > UNUSUAL_SPEED_RAD_S and not turns_on:
+        name = "velocity_rad_s" if math.isnan(seen.largest_rad) else "angle_rad"
+        text = f"a speed of {seen.speed_rad_s:.4g} rad/s is more than most limbs move"
+        found.append(Doubt(name, text))
     return found
 
 

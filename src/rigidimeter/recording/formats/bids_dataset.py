@@ -1,8 +1,4 @@
-"""BIDS data sets with motion: those that `rigidimeter export` wrote, and the recordings of others.
-
-A tracking system has a clock: its LATENCY channel, or else its sampling frequency. Events are
-epochs.
-"""
+"""BIDS data sets that `rigidimeter export` wrote: a tracking system for each clock."""
 
 from __future__ import annotations
 
@@ -76,21 +72,29 @@ def _documents(path: Path) -> Iterator[Path]:
 def _stream(place: Path, stem: str, name: str) -> Stream:
     head, acquisition, tail = stem.partition("_acq-")
     whole = place / f"{head}_tracksys-{name}{acquisition}{tail}"
-    channels = _rows(Path(f"{whole}_channels.tsv"))
+    channels = tsv_rows(Path(f"{whole}_channels.tsv"))
     names = [row.get("name", "") for row in channels]
     path = Path(f"{whole}_motion.tsv")
-    columns = _columns(path, names)
+    columns = motion_columns(path, names)
     if "time_s" not in columns:
         raise UserError(f"{path}: has no channel time_s, which holds its time stamps")
     return Stream(name, columns.pop("time_s"), columns)
 
 
-def _rows(path: Path) -> list[dict[str, Any]]:
+def tsv_rows(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of a small table with names in its first line."""
     text = read_bytes(path, TABLE_BYTES).decode("utf-8")
     return list(csv.DictReader(io.StringIO(text), delimiter="\t"))
 
 
-def _columns(path: Path, names: list[str]) -> dict[str, NDArray[np.float64]]:
+def motion_columns(path: Path, names: list[str]) -> dict[str, NDArray[np.float64]]:
+    """Return the columns of ``_motion.tsv``, which has no names.
+
+    Raises
+    ------
+    UserError
+        If it has others.
+    """
     options = pa.csv.ReadOptions(column_names=names)
     parsing = pa.csv.ParseOptions(delimiter="\t")
     kinds = pa.csv.ConvertOptions(

@@ -18,6 +18,7 @@ from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.arrow_file import read_arrow
 from rigidimeter.recording.formats.bids_dataset import bids_settings, is_bids, read_bids
+from rigidimeter.recording.formats.bids_motion import is_bids_motion, read_bids_motion
 from rigidimeter.recording.formats.biopac_file import read_biopac
 from rigidimeter.recording.formats.c3d_file import read_c3d
 from rigidimeter.recording.formats.export_folder import (
@@ -98,6 +99,13 @@ READERS: list[Reader] = [
         settings=export_folder_settings,
     ),
     Reader("exported BIDS data set", (), read_bids, sniff=is_bids, settings=bids_settings),
+    Reader(
+        "BIDS motion recording",
+        (".tsv",),
+        read_bids_motion,
+        sniff=is_bids_motion,
+        made_by="a program that writes BIDS-Motion",
+    ),
     Reader(
         "text table",
         (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".sto", ".mot"),
