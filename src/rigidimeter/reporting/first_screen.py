@@ -15,6 +15,7 @@ from rigidimeter.reporting.numbers import (
     plural,
     scaled,
     series,
+    within,
 )
 from rigidimeter.study import (
     WANTED_PERCENT,
@@ -106,7 +107,7 @@ def _strip_row(one: Conclusion, to: float, other: str) -> StripRow:
         "" if math.isnan(percent) else f"{number(abs(percent), 2)}{_PERCENT} {d.side}",
         "" if math.isnan(percent_low) else _sided_interval(percent_low, percent_high, 2, _PERCENT),
         p_value(d.p),
-        p_value(one.p),
+        "" if math.isnan(one.p) else p_value(one.p),
         one.verdict,
         _KIND.get(one.verdict, ""),
         interval_plot(
@@ -222,7 +223,7 @@ def advice(result: StudyResult, light: TrafficLight | None) -> list[str]:
         )
     measured = precisions(result)
     more = [
-        f"{one.epochs_needed} for {one.measure.title} (now {one.n})"
+        f"{one.epochs_needed} for {within(one.measure.title)} (now {one.n})"
         for one in measured
         if one.epochs_needed is not None and one.epochs_needed > one.n
     ]
@@ -231,7 +232,7 @@ def advice(result: StudyResult, light: TrafficLight | None) -> list[str]:
             f"Repeat epochs like these, for ±\N{NO-BREAK SPACE}{WANTED_PERCENT:g}{_PERCENT} about "
             f"{series(more)}."
         )
-    unknown = [one.measure.title for one in measured if one.epochs_needed is None]
+    unknown = [within(one.measure.title) for one in measured if one.epochs_needed is None]
     if unknown:
         found.append(f"Record several epochs: one gives no interval of {series(unknown)}.")
     if light is not None and light.remedy:

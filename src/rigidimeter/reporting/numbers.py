@@ -108,6 +108,17 @@ def series(items: Sequence[str]) -> str:
     return " and ".join([", ".join(items[:-1]), items[-1]] if len(items) > 1 else items)
 
 
+def within(title: str) -> str:
+    """Return a title as it is written within a sentence.
+
+    Examples
+    --------
+    >>> within("Stiffness K")
+    'stiffness K'
+    """
+    return title[:1].lower() + title[1:]
+
+
 def condition_name(condition: str) -> str:
     """Return the condition as people read it."""
     return condition or "(no condition)"

@@ -13,6 +13,7 @@ from rigidimeter.reporting.numbers import (
     number,
     p_value,
     series,
+    within,
 )
 from rigidimeter.study import (
     Comparison,
@@ -33,6 +34,10 @@ _WITHHELD: dict[Literal["not supported", "cannot be decided"], str] = {
     "not supported": "A difference was found, but is not supported, in",
     "cannot be decided": "It cannot be decided whether the conditions differ in",
 }
+
+
+LEAST_P = 0.0001
+"""Below this a sentence does not say how small p is; tables do."""
 
 
 class Verdict(NamedTuple):
@@ -73,6 +78,9 @@ def _sentences(result: StudyResult, concluded: Conclusions) -> list[str]:
         for side in _SIDES
         if (own := concluded.of(side))
     ]
+    if shown and (not_shown := concluded.of("not supported")):
+        titles = series([_lower_first(one.comparison) for one in not_shown])
+        shown.append(f"a difference in {titles} is not supported")
     found = [f"{'; '.join(shown)}."] if shown else []
     found += _withheld(concluded, "not supported")
     for reason, members in _by_reason(concluded.of("no difference shown")):
@@ -131,8 +139,7 @@ def _only_condition(result: StudyResult) -> str:
         ends = ""
         if not math.isnan(one.percent):
             ends = f" ±\N{NO-BREAK SPACE}{number(one.percent, 2)}\N{NO-BREAK SPACE}%"
-        title = one.measure.title[:1].lower() + one.measure.title[1:]
-        parts.append(f"{title} {amount(one.value, one.measure.unit, 3)}{ends}")
+        parts.append(f"{within(one.measure.title)} {amount(one.value, one.measure.unit, 3)}{ends}")
     if not parts:
         return "No epoch could be included; the reasons are listed under “Exclusions”."
     name = f"{condition_name(result.reference)}: " if result.reference else ""
@@ -141,14 +148,14 @@ def _only_condition(result: StudyResult) -> str:
 
 
 def _p(p: float) -> str:
-    text = p_value(p)
+    text = p_value(p) if p >= LEAST_P else f"< {LEAST_P:.4f}"
     joined = text if text.startswith("<") else f"= {text}"
     return f"p {joined}".replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _lower_first(c: Comparison) -> str:
     """Return the title of a measure as it is written within a sentence."""
-    return c.measure.title[:1].lower() + c.measure.title[1:]
+    return within(c.measure.title)
 
 
 def _largest(result: StudyResult) -> list[str]:

@@ -1,8 +1,9 @@
 """How precise the estimates of one condition are, and how many epochs would make them better.
 
-    N ≈ n (h / (0.05 |K|))²,   h half the 95 % interval of n epochs
+    N ≈ n (1.96 SE / (0.05 |K|))²,   SE the standard error from n epochs
 
-since the standard error falls with the root of the number of epochs. A bias, such as that by the
+since it falls with the root of the number of epochs. 1.96 SE is half the 95 % interval of many
+epochs; that of few is wider, for their scatter is not well known. A bias, such as that by the
 subject's own torque, does not fall.
 """
 
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import norm
 from scipy.stats import t as t_distribution
 
 from rigidimeter.records import PARAMETERS, Fit
@@ -22,6 +24,7 @@ from rigidimeter.study.comparison import split_pooled
 from rigidimeter.study.measures import MEASURES, Measure
 from rigidimeter.study.results import StudyResult
 
+_WIDE = float(norm.ppf(0.975))
 WANTED_PERCENT = 5.0
 """Half the interval that is asked for, in per cent of the value."""
 
@@ -38,6 +41,8 @@ class Precision:
     value, low, high : float
         With a 95 % interval: J, B and K fitted to all epochs together; scores as the mean over
         epochs, with an interval from their scatter.
+    se : float
+        The standard error of `value`.
     """
 
     measure: Measure
@@ -45,6 +50,7 @@ class Precision:
     value: float
     low: float
     high: float
+    se: float
 
     @property
     def percent(self) -> float:
@@ -54,7 +60,10 @@ class Precision:
     @property
     def epochs_needed(self) -> int | None:
         """The number of epochs whose interval is ± `WANTED_PERCENT`; None where it is not known."""
-        epochs = self.n * (self.percent / WANTED_PERCENT) ** 2
+        if not self.value:
+            return None
+        percent = 100 * _WIDE * self.se / abs(self.value)
+        epochs = self.n * (percent / WANTED_PERCENT) ** 2
         return math.ceil(epochs - 1e-9) if math.isfinite(epochs) else None
 
     def row(self) -> dict[str, Any]:
@@ -64,6 +73,7 @@ class Precision:
             "value": self.value,
             "low": self.low,
             "high": self.high,
+            "se": self.se,
             "half_width_percent": self.percent,
             "epochs_for_5_percent": self.epochs_needed,
         }
@@ -99,12 +109,12 @@ def precisions(result: StudyResult) -> tuple[Precision, ...]:
 
 
 def _of_fit(measure: Measure, fit: Fit, k: int, n: int) -> Precision:
-    return Precision(measure, n, float(fit.value[k]), float(fit.low[k]), float(fit.high[k]))
+    value, low, high, se = (float(own[k]) for own in (fit.value, fit.low, fit.high, fit.se))
+    return Precision(measure, n, value, low, high, se)
 
 
 def _of_values(measure: Measure, values: Sequence[float]) -> Precision:
     n, mean = len(values), float(np.mean(values))
-    half = math.nan
-    if n > 1:
-        half = float(t_distribution.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
-    return Precision(measure, n, mean, mean - half, mean + half)
+    se = float(np.std(values, ddof=1)) / math.sqrt(n) if n > 1 else math.nan
+    half = float(t_distribution.ppf(0.975, n - 1)) * se if n > 1 else math.nan
+    return Precision(measure, n, mean, mean - half, mean + half, se)

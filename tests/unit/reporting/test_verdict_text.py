@@ -208,6 +208,8 @@ def test_what_was_found_and_is_not_supported(study: StudyResult) -> None:
     )
     text = verdict_sentence(shaken)
     assert text.startswith("DBS is lower than OFF in angular impulse")
+    lead = text.partition(". A difference was found")[0]
+    assert lead.endswith("a difference in stiffness K and viscous damping B is not supported")
     assert "A difference was found, but is not supported, in stiffness K (p" in text
     assert ": tremor casts doubt on 0 of 23 epochs in OFF and 19 of 19 epochs in DBS" in text
 

@@ -168,10 +168,10 @@ class TestPrecision:
         return compare_analysis(analysis, "OFF", "", resamples=0)
 
     def test_epochs_for_five_per_cent(self, study):
-        """±20 % from one epoch: (20/5)² = 16 epochs; ±4 % needs no more than there are."""
+        """A standard error of 10 % from one epoch: (1.96 · 10 / 5)² = 15.4 epochs."""
         result = self.alone(study, 1)
         (fit,) = result.analysis.fits
-        wide = replace(fit, low=0.8 * fit.value, high=1.2 * fit.value)
+        wide = replace(fit, se=0.1 * fit.value, low=0.8 * fit.value, high=1.2 * fit.value)
         result = replace(result, analysis=replace(result.analysis, fits=(wide,)))
         found = precisions(result)
         assert [one.measure.name for one in found[:3]] == [

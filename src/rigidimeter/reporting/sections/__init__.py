@@ -26,8 +26,12 @@ from rigidimeter.reporting.sections import (
 __all__ = ["SECTIONS"]
 
 
-def _part(title: str, *sections: Section, printed: bool = False) -> list[Section]:
-    return [replace(section, part=title, printed=printed) for section in sections]
+def _part(title: str, *sections: Section, printed: int = 0) -> list[Section]:
+    """Return the sections of a part; the first ones are printed."""
+    return [
+        replace(section, part=title, printed=place < printed)
+        for place, section in enumerate(sections)
+    ]
 
 
 SECTIONS: list[Section] = [
@@ -36,7 +40,7 @@ SECTIONS: list[Section] = [
         study_overview.NUMBERS,
         study_overview.OVERVIEW,
         study_overview.CHANGES,
-        printed=True,
+        printed=2,
     ),
     *_part(
         "Measures",
@@ -44,18 +48,18 @@ SECTIONS: list[Section] = [
         comparison_tables.RESULTS,
         forest.SECTION,
         day_points.SECTION,
-        comparison_tables.ALL_EPOCHS,
         distribution.SECTION,
-        printed=True,
+        comparison_tables.ALL_EPOCHS,
+        printed=5,
     ),
-    *_part("Ratings", rating_points.SECTION, printed=True),
+    *_part("Ratings", rating_points.SECTION, printed=1),
     *_part("What rests on the method", method_sensitivity.SECTION, other_bands.SECTION),
     *_part("Joint over frequency", impedance.SECTION, unexplained_torque.SECTION),
     *_part("Examples", torque_fit.SECTION, torque_angle_loop.SECTION, perturbation_figure.SECTION),
-    *_part("Quality", data_quality.FINDINGS, recordings.NOTICES, printed=True),
+    *_part("Quality", data_quality.FINDINGS, recordings.NOTICES, printed=2),
     *_part("Exclusions", data_quality.STUDY_EXCLUSIONS, data_quality.EXCLUSIONS),
     *_part(
-        "Methods", methods_prose.SECTION, recordings.ABOUT, estimate_tables.ESTIMATION, printed=True
+        "Methods", methods_prose.SECTION, recordings.ABOUT, estimate_tables.ESTIMATION, printed=1
     ),
     *_part("Settings and provenance", recordings.DESIGN, recordings.PROVENANCE),
     *_part("Tables", estimate_tables.EPOCHS),

@@ -70,6 +70,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             Column("paired", "Same days", "label"),
         ),
         result_tables(result)["effect_differences"],
+        folding=True,
     )
 
 

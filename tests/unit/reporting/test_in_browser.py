@@ -1,0 +1,138 @@
+"""The page as a browser shows and prints it: nothing is cut, every link leads somewhere."""
+
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+from tests.unit.reporting.cohorts import Design, made_study
+
+from rigidimeter.reporting import SECTIONS
+from rigidimeter.reporting import page as page_module
+from rigidimeter.reporting.page import write_report
+from rigidimeter.study import StudyResult, compare_analysis
+
+CHROMIUM = shutil.which("chromium")
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="needs Debian's chromium: apt-get install chromium"
+)
+DESKTOP, PHONE = (1280, 800), (390, 844)
+SCREENS = Path(__file__).parents[3] / "build" / "screens"
+LONG = ("perturbation", "torque", "voluntary", "loops", "impedance")
+"""Figures of recordings, which take long to draw."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as driver:
+        started = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Return the pages of a study and of one condition."""
+    study = made_study(Design(days=(9, 4), epochs=(3, 3), scores=(2, 2)))
+    one = compare_analysis(study.analysis, "OFF", "", resamples=0)
+    results: dict[str, StudyResult] = {
+        "study": study,
+        "one": replace(one, epochs=study.epochs, title="One recording"),
+    }
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(page_module, "SECTIONS", [s for s in SECTIONS if s.name not in LONG])
+        return {
+            name: write_report(result, tmp_path_factory.mktemp(name))
+            for name, result in results.items()
+        }
+
+
+def opened(browser: Browser, path: Path, size: tuple[int, int]) -> Page:
+    page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+    page.goto(path.as_uri())
+    return page
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+@pytest.mark.parametrize("name", ["study", "one"])
+def test_the_first_screen_holds_stiffness_and_the_traffic_light(
+    browser: Browser, reports: dict[str, Path], name: str, size: tuple[int, int]
+) -> None:
+    page = opened(browser, reports[name], size)
+    SCREENS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=SCREENS / f"{name}-{size[0]}.png")
+    row = page.locator(".strip tbody tr", has_text="Stiffness K")
+    shown = (page.locator(".verdict"), page.locator(".light"), row)
+    for part in shown:
+        box = part.bounding_box()
+        assert box is not None
+        assert box["y"] >= 0
+        assert box["y"] + box["height"] <= size[1]
+        assert box["x"] + box["width"] <= size[0]
+    assert re.search(r"\[[\d.]+ (\w+ )?to [\d.]+", row.inner_text())
+    assert row.locator("svg.interval").is_visible()
+    assert "Data quality: good" in page.locator(".light").inner_text()
+    page.close()
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_nothing_is_cut_at_the_side(
+    browser: Browser, reports: dict[str, Path], size: tuple[int, int]
+) -> None:
+    for path in reports.values():
+        page = opened(browser, path, size)
+        assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+        strip = page.locator(".scroll:has(> .strip)")
+        assert not strip.evaluate("one => one.scrollWidth > one.clientWidth")
+        page.close()
+
+
+def test_every_link_leads_somewhere(browser: Browser, reports: dict[str, Path]) -> None:
+    page = opened(browser, reports["study"], DESKTOP)
+    links = page.locator("a").evaluate_all("all => all.map(a => a.getAttribute('href'))")
+    assert len(links) > 30
+    for link in links:
+        if not link.startswith("#"):
+            assert (reports["study"].parent / link).is_file(), link
+    for entry in page.locator("nav a").all():
+        entry.click()
+        target = page.locator(str(entry.get_attribute("href")))
+        box = target.bounding_box()
+        assert box is not None
+        assert -1 <= box["y"] < DESKTOP[1], entry.inner_text()
+    page.close()
+
+
+def test_the_print_is_the_first_parts_with_page_numbers(
+    browser: Browser, reports: dict[str, Path]
+) -> None:
+    page = opened(browser, reports["study"], DESKTOP)
+
+    def pages() -> int:
+        return len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True)))
+
+    first = pages()
+    assert 2 <= first <= 8
+    page.locator("#everything").check()
+    page.locator("details.long").evaluate_all("all => all.forEach(one => one.open = true)")
+    assert pages() > first
+    assert "counter(page)" in reports["study"].read_text(encoding="utf-8")
+    page.close()
+
+
+def test_the_dark_scheme_is_dark_and_its_text_light(
+    browser: Browser, reports: dict[str, Path]
+) -> None:
+    page = opened(browser, reports["study"], PHONE)
+    page.emulate_media(color_scheme="dark")
+    style = "getComputedStyle(document.body)"
+    ground, ink = (
+        sum(map(int, re.findall(r"\d+", page.evaluate(f"{style}.{name}"))[:3])) / 765
+        for name in ("backgroundColor", "color")
+    )
+    assert ground < 0.15
+    assert ink > 0.8
+    page.close()
