@@ -19,6 +19,8 @@ from rigidimeter.settings import parse_settings
 from rigidimeter.virtual.virtual_session import run_virtual_session
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "benchmarks.md"
+END = "<!-- measured: end -->"
+"""What follows it in the page is written by hand, and stays."""
 
 
 def session(folder: Path, seed: int) -> Path:
@@ -74,7 +76,8 @@ def main() -> None:
         *map(str, rows),
     ]
     print("\n".join(lines))
-    TABLE.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    by_hand = TABLE.read_text(encoding="utf-8").partition(END)[2]
+    TABLE.write_text("\n".join(lines) + f"\n\n{END}{by_hand}", encoding="utf-8")
 
 
 if __name__ == "__main__":
