@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from rigidimeter.estimation.closedloop.as_sampled import InertiaDoubt
+from rigidimeter.estimation.closedloop.as_sampled import NONE, InertiaDoubt
 from rigidimeter.estimation.closedloop.line_noise import Smoother
 from rigidimeter.estimation.linear_solution import Solution, solve
 from rigidimeter.estimation.method_record import Progress
@@ -132,7 +132,7 @@ def fit_inertia_damping_stiffness(
 def fit_least_squares(
     method: str,
     signals_of: SignalsOf,
-    doubt_of: Callable[[PreparedEpoch], InertiaDoubt],
+    doubt_of: Callable[[PreparedEpoch, Signals], InertiaDoubt],
     epochs: Sequence[PreparedEpoch],
     inertia_kg_m2: float | None = None,
     progress: Progress = lambda _: None,
@@ -140,7 +140,7 @@ def fit_least_squares(
 ) -> tuple[list[Fit], list[Fit]]:
     """Fit every epoch, and all epochs of a condition put one after the other.
 
-    `signals_of` prepares the signals of an epoch, and `doubt_of` says how far its J hangs on what
+    `signals_of` prepares the signals of an epoch, and `doubt_of` says how far its fit hangs on what
     the drive did between the samples; for the rest see `method_record.FitEpochs`.
     """
     fits = []
@@ -157,9 +157,9 @@ def fit_least_squares(
             outcome = unusable(epoch, str(error))
             fits.append(Fit(epoch.source, epoch.label, epoch.condition, method, outcome))
         else:
-            doubt = doubt_of(prepared) if free else InertiaDoubt(0.0)
+            doubt = doubt_of(prepared, signals) if free else NONE
             fit = replace(
-                _widened(found, doubt.share),
+                _widened(found, doubt.away),
                 source=epoch.source,
                 epoch=epoch.label,
                 condition=epoch.condition,
@@ -199,7 +199,7 @@ def _pooled(
     )
     found = fit_inertia_damping_stiffness(together, inertia_kg_m2, settings)
     return replace(
-        _widened(found, doubts[0].share),
+        _widened(found, doubts[0].away),
         findings=doubts[0].findings,
         source=", ".join(dict.fromkeys(member.source for member in fits)),
         epoch="pooled",
@@ -208,10 +208,10 @@ def _pooled(
     )
 
 
-def _widened(fit: Fit, share: float) -> Fit:
-    """Return a fit whose J may be elsewhere by that share of it, whatever chance does."""
-    away = abs(float(fit.value[0])) * share * np.array([1.0, 0.0, 0.0])
-    return replace(fit, low=fit.low - away, high=fit.high + away)
+def _widened(fit: Fit, away: Array) -> Fit:
+    """Return a fit that may be so far away for each unit of J, whatever chance does."""
+    moved = abs(float(fit.value[0])) * away
+    return replace(fit, low=fit.low - moved, high=fit.high + moved)
 
 
 def _interval(

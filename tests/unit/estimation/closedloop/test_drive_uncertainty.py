@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from rigidimeter.dynamics import DriveModel
+from rigidimeter.estimation.bandlimited import zero_phase_band
+from rigidimeter.estimation.closedloop.as_sampled import moved_by_settings
 from rigidimeter.estimation.closedloop.between_samples import (
     acceleration_by_settings,
     phases_s,
@@ -13,6 +15,7 @@ from rigidimeter.estimation.closedloop.drive_motion import driven
 from rigidimeter.estimation.closedloop.drive_search import mean_sign, search
 from rigidimeter.estimation.closedloop.drive_terms import Samples, Structure
 from rigidimeter.estimation.closedloop.drive_uncertainty import as_likely
+from rigidimeter.estimation.signals import Signals, spline_slopes
 from rigidimeter.records import Channel
 from rigidimeter.settings import RigSettings
 
@@ -67,3 +70,22 @@ def test_stamps_that_scatter_about_a_time_after_the_ticks_are_told_from_even_one
     assert step_kept_s(command, even_s) is None
     assert step_kept_s(command, anywhere_s) is None
     np.testing.assert_allclose(phases_s(command, even_s), [4e-4], atol=1e-9)
+
+
+def test_least_squares_of_held_commands_is_moved_as_the_drive_of_the_settings_says():
+    J, B, K = 0.0045, 0.02, 1.75
+    rig = RigSettings(tick_rate_hz=1000.0, drive_bandwidth_hz=50.0)
+    drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
+    n = 20000
+    slow = zero_phase_band(np.random.default_rng(3).standard_normal(n), 1000.0, (0.2, 25.0))
+    moved = drive.held(slow, 1e-3)
+    derivative = spline_slopes(1e-3 * np.arange(n), moved.velocity_rad_s)
+    torque = J * moved.acceleration_rad_s2 + B * moved.velocity_rad_s + K * moved.angle_rad
+    columns = (torque, derivative, moved.velocity_rad_s, moved.angle_rad)
+    filtered = (zero_phase_band(one, 1000.0, (0.4, 30.0))[1000:-1000] for one in columns)
+    signals = Signals(1e-3 * np.arange(n - 2000), *filtered, 1000.0, (0.4, 30.0))
+    predicted = J * moved_by_settings(rig, None, signals)
+    error = signals.solution.values - [J, B, K]
+    np.testing.assert_allclose(predicted[:2], error[:2], rtol=0.02)
+    assert error[1] > 0.003 * B
+    assert predicted[2] == pytest.approx(error[2], rel=0.25)
