@@ -35,6 +35,7 @@ from rigidimeter.statistics.effect_sizes import (
 from rigidimeter.statistics.exact_ranks import exact_ranksum
 from rigidimeter.statistics.mixed import Mixed, fit_mixed, nested
 from rigidimeter.statistics.partially_paired import PartiallyPaired, partially_paired
+from rigidimeter.statistics.rank_correlation import RankCorrelation, rank_correlation
 from rigidimeter.statistics.ranksum import RankSum, ranksum
 from rigidimeter.statistics.summary import Summary, summarise
 
@@ -48,6 +49,7 @@ __all__ = [
     "PartiallyPaired",
     "PublishedDifference",
     "PublishedEffect",
+    "RankCorrelation",
     "RankSum",
     "Summary",
     "TwoGroups",
@@ -70,6 +72,7 @@ __all__ = [
     "partially_paired",
     "rank_biserial",
     "rank_biserial_interval",
+    "rank_correlation",
     "ranksum",
     "summarise",
     "two_groups",

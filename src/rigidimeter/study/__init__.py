@@ -21,6 +21,7 @@ from rigidimeter.study.leading_effect import Leader, leader
 from rigidimeter.study.measures import MEASURES, RATING, Measure, Observation, conditions
 from rigidimeter.study.precision import WANTED_PERCENT, Precision, precisions
 from rigidimeter.study.provenance import provenance
+from rigidimeter.study.rating_relation import Agreement, Relation, agreement, relations
 from rigidimeter.study.ratings_found import RatingMean, RatingsFound
 from rigidimeter.study.results import (
     Condition,
@@ -42,6 +43,7 @@ __all__ = [
     "TEST",
     "UNCHANGED",
     "WANTED_PERCENT",
+    "Agreement",
     "Comparison",
     "Conclusion",
     "Conclusions",
@@ -59,10 +61,12 @@ __all__ = [
     "Preparation",
     "RatingMean",
     "RatingsFound",
+    "Relation",
     "SensitivityRow",
     "SessionEntry",
     "StudyResult",
     "TrafficLight",
+    "agreement",
     "analyse_study",
     "analysis_warnings",
     "compare",
@@ -81,6 +85,7 @@ __all__ = [
     "precisions",
     "provenance",
     "read_study",
+    "relations",
     "result_tables",
     "split_pooled",
     "table_csv",

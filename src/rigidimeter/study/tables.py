@@ -15,6 +15,7 @@ from rigidimeter.recording import estimates_document
 from rigidimeter.study.compared import Comparison, comparison_rows, comparison_values, measure_names
 from rigidimeter.study.conclusions import conclusion_rows
 from rigidimeter.study.precision import precisions
+from rigidimeter.study.rating_relation import relations
 from rigidimeter.study.ratings_found import (
     rating_contrast,
     rating_offsets,
@@ -55,6 +56,7 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
         "days": tables["days"],
         "effect_differences": tables["effect_differences"],
         "ratings": None if result.ratings is None else ratings_document(result.ratings),
+        "rating_relation": tables["rating_relation"],
         "sensitivity": tables["sensitivity"],
         "exclusions": tables["excluded_epochs"],
         "notices": [
@@ -97,6 +99,7 @@ def result_tables(result: StudyResult) -> dict[str, Rows]:
         "ratings": [] if ratings is None else rating_rows(ratings),
         "rating_offsets": [] if ratings is None else list(rating_offsets(ratings)),
         "rating_contrast": [] if ratings is None else list(rating_contrast(ratings)),
+        "rating_relation": [one.row() for one in relations(result)],
         "sensitivity": [
             measure_names(row.measure) | vars(row) | {"measure": row.measure.name}
             for row in result.sensitivity
