@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rigidimeter.settings import Settings
 
 DAILY = (
-    "So repeat `rigidimeter check`, which measures it with nobody in the rig, before every session."
+    "repeat `rigidimeter check`, which measures it with nobody in the rig, before every session."
 )
 IMPOSED = "In an imposed sinusoid the guard does not see the sign."
 
@@ -39,7 +39,7 @@ def sign_lines(settings: Settings, checks: Sequence[Check]) -> Iterator[str]:
     if not perturbed_conditions(settings):
         yield from wrapped(
             "This protocol has no torque perturbation: the guard cannot find a wrong sign of the "
-            f"torque. {DAILY}"
+            f"torque. So {DAILY}"
         )
         return
     noise_nm = measured_noise_nm(checks)
@@ -78,7 +78,7 @@ def found_lines(search: Search) -> Iterator[str]:
             f"{min(better.found_s):.1f} to {max(better.found_s):.1f} s, the arm at up to "
             f"{better.farthest_deg:.0f} deg"
         )
-    yield from wrapped(f"{words}; {larger}. {DAILY}")
+    yield from wrapped(f"{words}; {larger}. {'So' if better is None else 'Otherwise'} {DAILY}")
 
 
 def _row(epochs: TurnedEpochs) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ def test_each_own_torque_has_a_line_with_what_else_ended_its_epochs():
     said = " ".join(" ".join(lines[3:]).split())
     assert said.startswith("With 0.1 N·m of own torque the guard does not always find it; with ")
     assert "prbs.amplitude_nm = 3 it does, after 2.0 to 3.3 s, the arm at up to 35 deg" in said
+    assert "deg. Otherwise repeat `rigidimeter check`, which" in said
     assert said.endswith("before every session.")
 
 
@@ -39,6 +40,7 @@ def test_no_perturbation_is_named_that_does_not_help():
     said = " ".join(" ".join(found_lines(Search((hidden,), None))).split())
     assert "Even of a subject without any own torque the guard does not always find it; no " in said
     assert "prbs.amplitude_nm" not in said
+    assert "that was tried helps. So repeat `rigidimeter check`" in said
 
 
 def test_a_protocol_without_perturbation_is_said_to_show_no_sign():
