@@ -10,7 +10,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from rigidimeter.records import Finding, Fit, Score
-from rigidimeter.study.conclusions import ALIKE_IN_BOTH, conclude
+from rigidimeter.study.conclusions import conclude
+from rigidimeter.study.doubted_epochs import ALIKE_IN_BOTH
 from rigidimeter.study.doubts import Doubt, doubts
 from rigidimeter.study.results import StudyResult
 

@@ -2,12 +2,20 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 from tests.unit.reporting.cohorts import Design, made_study, ratings_found
 
 from rigidimeter.records import Finding, Fit
-from rigidimeter.study import StudyResult, compare, compare_analysis, conclude, conclusion_rows
+from rigidimeter.study import (
+    Observation,
+    StudyResult,
+    compare,
+    compare_analysis,
+    conclude,
+    conclusion_rows,
+)
 from rigidimeter.study.comparison import day_tests, gathered
 from rigidimeter.study.conclusions import Conclusion
 from rigidimeter.study.ratings_model import ratings_comparison, ratings_days
@@ -61,8 +69,8 @@ def test_a_difference_made_by_doubted_epochs_is_not_supported(study):
     found = of(unsupported(study, "voluntary_torque", in_dbs), "stiffness_nm_rad")
     assert found.verdict == "not supported"
     assert found.reason.startswith(
-        "voluntary_torque casts doubt on 0 of 23 epochs in OFF and 19 of 19 epochs in DBS; "
-        "without these epochs a test needs 3 epochs in each condition"
+        "torque of the subject's own (voluntary_torque) casts doubt on 0 of 23 epochs in OFF and "
+        "19 of 19 epochs in DBS; without these epochs a test needs 3 epochs in each condition"
     )
 
 
@@ -136,15 +144,98 @@ def test_no_treatment_changes_the_inertia(study):
         assert of(found, measure).reason.startswith("inertia differs by 98 %")
 
 
+def with_values(study: StudyResult, change) -> StudyResult:
+    """Return the study with other estimates, tested anew."""
+    fits = tuple(replace(fit, value=change(fit)) for fit in study.analysis.fits)
+    analysis = replace(study.analysis, fits=fits)
+    by_source = {session.source: session for session in study.sessions}
+    comparisons = day_tests(gathered(analysis, ("OFF", "DBS"), by_source))
+    return replace(study, analysis=analysis, comparisons=comparisons)
+
+
+def test_a_difference_that_is_not_there_with_the_inertia_free(study):
+    """What an inertia held at the wrong value does to K is seen in the fits that leave it free."""
+
+    def free(fit: Fit) -> np.ndarray:
+        heavier = 1.2 if in_dbs(fit) else 1.0
+        spread = 1.0 + 0.01 * (int(fit.epoch[1:]) % 3)
+        return np.array([0.0045 * heavier, 0.137, 1.75]) * spread
+
+    found = of(with_values(study, free), "stiffness_nm_rad")
+    assert found.p < 0.05
+    assert found.verdict == "not supported"
+    assert found.reason.startswith("inertia differs by 17 %, and no treatment changes it; held at")
+
+
+def test_a_difference_smaller_than_the_error_between_samples_is_none(study):
+    def same(fit: Fit) -> np.ndarray:
+        lower = 0.995 if in_dbs(fit) else 1.0
+        return np.array([0.0045, 0.137, 1.75]) * lower * (1 + 1e-4 * int(fit.epoch[1:]))
+
+    found = of(with_values(study, same), "inertia_kg_m2")
+    assert found.p < 0.05
+    assert found.verdict == "no difference shown"
+    assert "within the 1 % by which the motion between samples may move it" in found.reason
+
+
+@pytest.mark.parametrize(("half_width", "verdict"), [(0.02, "lower"), (0.5, "not supported")])
+def test_a_bias_counts_as_far_as_it_could_make_the_difference(study, half_width, verdict):
+    """60 % of half the interval of all epochs together."""
+    finding = Finding("loop_bias", "doubt", 60.0, 50.0, "torque comes back", "record it")
+    value = study.analysis.fits[0].value
+    pooled = replace(
+        study.analysis.fits[0],
+        condition="DBS",
+        findings=(finding,),
+        low=value - half_width,
+        high=value + half_width,
+    )
+    together = replace(study.analysis, pooled=(pooled,))
+    found = of(replace(study, analysis=together, sensitivity=()), "stiffness_nm_rad")
+    assert found.verdict == verdict
+    if verdict != "lower":
+        assert found.reason == "loop_bias casts doubt on all epochs of a condition together"
+
+
+@pytest.mark.parametrize(
+    ("label", "verdict"),
+    [
+        (lambda n: str(n), "not supported"),
+        (lambda n: f"day {n}", "not supported"),
+        (lambda n: f"2026-01-{n:02d}", "not supported"),
+        (lambda n: f"{n}. January", "lower"),
+    ],
+    ids=["numbers", "numbered", "dates", "of no known order"],
+)
+def test_days_of_one_condition_after_all_of_the_other(study, label, verdict):
+    """Where days tell their order; 10 is after 9."""
+
+    def later(observation: Observation) -> Observation:
+        day = int(observation.day) + (10 if observation.condition == "DBS" else 0)
+        return replace(observation, day=label(day))
+
+    comparisons = tuple(
+        replace(c, observations=tuple(later(o) for o in c.observations))
+        for c in study.comparisons
+        if c.measure.origin != "ratings"
+    )
+    found = of(replace(study, comparisons=comparisons), "stiffness_nm_rad")
+    assert found.verdict == verdict
+    if verdict != "lower":
+        assert found.reason.startswith("all days in DBS came after all days in OFF")
+
+
 class TestRecordings:
     """Where days are not known, a recording stands for a day."""
 
-    def test_several_of_each_condition_are_compared(self, study):
+    def test_a_difference_between_them_may_be_that_of_one_day_from_another(self, study):
         found = compare_analysis(study.analysis, "OFF", "DBS", resamples=0)
         assert conclude(found).basis == "recordings"
-        as_study = {one.comparison.measure.name: one.verdict for one in conclude(study).each}
-        for one in conclude(found).each:
-            assert one.verdict == as_study[one.comparison.measure.name]
+        stiffness = of(found, "stiffness_nm_rad")
+        assert stiffness.p < 0.05
+        assert stiffness.verdict == "not supported"
+        assert stiffness.reason.startswith("which recordings are of one day is not known")
+        assert of(found, "inertia_kg_m2").verdict == "no difference shown"
 
     def test_one_of_each_decides_nothing(self, study):
         """Another day may have shifted all stiffness: there is nothing to tell the two apart."""

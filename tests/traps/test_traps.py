@@ -1,0 +1,216 @@
+"""Studies that look like a difference and hold none: what is concluded, and what is named for it.
+
+The joints of both conditions are the same but where a test says otherwise; where a stiffness
+differs, something else than the condition made it.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from tests.traps.recorded_studies import (
+    AT_REST,
+    MOTION,
+    Session,
+    both_each_day,
+    write_study,
+)
+
+import rigidimeter as rm
+from rigidimeter.reporting.verdict_text import verdict_sentence
+from rigidimeter.study import StudyResult, comparison_document
+
+OFF, DBS = Session("1", "OFF"), Session("1", "DBS")
+NAMES = ("OFF", "DBS")
+SOFTER = (1.0, 1.0, 0.8)
+DAYS = 4
+Told = tuple[dict[str, dict[str, str]], str]
+Make = Callable[..., Path]
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Make:
+    """Record a study once: the name of it gives the folder."""
+    folder = tmp_path_factory.mktemp("traps")
+
+    def make(name: str, sessions: list[Session]) -> Path:
+        place = folder / name
+        return place if place.exists() else write_study(place, sessions, seed=1)
+
+    return make
+
+
+def on_later_days(recorded: Make) -> Path:
+    """Return a study whose arm is softer from its fourth day on, when DBS was recorded."""
+    days = [replace(OFF, day=str(day), epochs=3) for day in (1, 2, 3)]
+    days += [replace(DBS, day=str(day), factors=SOFTER, epochs=3) for day in (4, 5, 6)]
+    return recorded("later", days)
+
+
+def one_day_each(study: Path) -> None:
+    """Leave the first and the fourth day."""
+    rows = (study / "sessions.csv").read_text().splitlines()
+    (study / "sessions.csv").write_text("\n".join([rows[0], rows[1], rows[4]]) + "\n")
+
+
+def told(result: StudyResult) -> Told:
+    """Return the conclusions of the JSON file by measure, and the page's first sentence."""
+    rows = {row["measure"]: row for row in comparison_document(result)["conclusion"]}
+    return rows, verdict_sentence(result)
+
+
+def compared(study: Path) -> Told:
+    return told(rm.compare(study, resamples=0))
+
+
+def assert_none_claimed(found: Told) -> None:
+    rows, sentence = found
+    assert not {row["verdict"] for row in rows.values()} & {"lower", "higher"}
+    assert "is lower" not in sentence
+    assert "is higher" not in sentence
+
+
+def test_a_true_difference_is_claimed(recorded):
+    """What the traps are held against: the same rig, subject and days."""
+    softer = replace(DBS, factors=(1.0, 0.85, 0.85))
+    rows, sentence = compared(recorded("true", both_each_day(DAYS, OFF, softer)))
+    assert rows["stiffness_nm_rad"]["verdict"] == rows["damping_nm_s_rad"]["verdict"] == "lower"
+    assert rows["inertia_kg_m2"]["verdict"] == "no difference shown"
+    assert "DBS is lower than OFF in stiffness K" in sentence
+
+
+def test_pushing_in_one_condition_without_the_perturbation(recorded):
+    off = replace(OFF, columns=MOTION)
+    pushing = replace(DBS, columns=MOTION, subject=replace(AT_REST, voluntary_nm=0.2))
+    found = compared(recorded("pushing", both_each_day(DAYS, off, pushing)))
+    assert_none_claimed(found)
+    rows, sentence = found
+    assert rows["damping_nm_s_rad"]["p_holm"] < 0.05
+    assert "torque of the subject's own (voluntary_torque)" in rows["damping_nm_s_rad"]["reason"]
+    assert "torque of the subject's own (voluntary_torque)" in sentence
+
+
+def test_tremor_in_one_condition(recorded):
+    off = replace(OFF, columns=MOTION)
+    trembling = replace(DBS, columns=MOTION, subject=replace(AT_REST, tremor_nm=0.15))
+    found = compared(recorded("tremor", both_each_day(DAYS, off, trembling)))
+    assert_none_claimed(found)
+    rows, sentence = found
+    assert rows["inertia_kg_m2"]["verdict"] == "not supported"
+    assert "tremor (and 1 other check) casts doubt on 0 of 8" in rows["inertia_kg_m2"]["reason"]
+    assert "tremor (and 1 other check) casts doubt on 0 of 8" in sentence
+
+
+def test_stiffness_that_varies_within_the_recording(recorded):
+    """Least squares weighs the softer half more, in which the arm moves further."""
+    off = replace(OFF, columns=MOTION)
+    varying = replace(AT_REST, stiffness="drift", stiffness_depth=0.6)
+    found = compared(
+        recorded(
+            "varying",
+            both_each_day(DAYS, off, replace(DBS, columns=MOTION, subject=varying)),
+        )
+    )
+    assert_none_claimed(found)
+    rows, sentence = found
+    assert rows["stiffness_nm_rad"]["p_holm"] < 0.05
+    assert "a joint that changes during the epoch" in rows["stiffness_nm_rad"]["reason"]
+    assert "a joint that changes during the epoch" in sentence
+
+
+@pytest.mark.parametrize(
+    ("amplitude_nm", "cause"),
+    [(1.0, "an angle of"), (0.3, "degrees are read as radians")],
+    ids=["refused", "slipped through"],
+)
+def test_degrees_under_a_header_of_radians(recorded, amplitude_nm, cause):
+    """More than one turn is refused when it is read; of a smaller motion J gives it away."""
+    off = replace(OFF, perturbation_nm=amplitude_nm)
+    degrees = replace(DBS, perturbation_nm=amplitude_nm, degrees=True)
+    found = compared(recorded(f"degrees {amplitude_nm}", both_each_day(3, off, degrees)))
+    assert_none_claimed(found)
+    rows, sentence = found
+    for measure in ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"):
+        assert cause in rows[measure]["reason"]
+    assert cause in sentence
+
+
+def test_one_day_in_each_condition(recorded, tmp_path):
+    later = on_later_days(recorded)
+    study = Path(shutil.copytree(later, tmp_path / "study"))
+    one_day_each(study)
+    found = compared(study)
+    assert_none_claimed(found)
+    assert {row["verdict"] for row in found[0].values()} == {"cannot be decided"}
+    assert "one day in each condition" in found[1]
+
+
+def test_three_epochs_a_side():
+    table = pd.DataFrame({"condition": ["OFF"] * 3 + ["DBS"] * 3, "k": [3.0, 2.9, 2.8, 1, 2, 1.5]})
+    found = told(rm.compare(table, value="k", resamples=0))
+    assert_none_claimed(found)
+    assert "3 values against 3 cannot reach p < 0.05" in found[1]
+
+
+def test_a_file_in_each_condition(recorded):
+    """`compare FILES` of three epochs each: no number of epochs makes them two days."""
+    study = on_later_days(recorded)
+    off, dbs = study / "day-1-OFF.csv", study / "day-4-DBS.csv"
+    read = rm.read([off, dbs], condition=["OFF", "DBS"])
+    found = told(rm.compare(rm.estimate(read, "bandlimited"), resamples=0))
+    assert_none_claimed(found)
+
+
+def test_all_days_of_one_condition_later_than_those_of_the_other(recorded):
+    found = compared(on_later_days(recorded))
+    assert_none_claimed(found)
+    rows, sentence = found
+    assert rows["stiffness_nm_rad"]["p_holm"] < 0.05
+    assert "all days in DBS came after all days in OFF" in rows["stiffness_nm_rad"]["reason"]
+    assert "all days in DBS came after all days in OFF" in sentence
+
+
+def test_files_whose_days_are_not_known(recorded):
+    study = on_later_days(recorded)
+    files = sorted(study.glob("day-*.csv"))
+    read = rm.read(files, condition=[file.stem.split("-")[2] for file in files])
+    found = told(rm.compare(rm.estimate(read, "bandlimited"), resamples=0))
+    assert_none_claimed(found)
+    rows, sentence = found
+    assert rows["stiffness_nm_rad"]["p_holm"] < 0.05
+    assert "which recordings are of one day is not known" in sentence
+
+
+@pytest.mark.parametrize("both", ["", "C"], ids=["nobody saw both", "one saw both"])
+def test_an_examiner_who_rated_one_condition_only(recorded, tmp_path, both):
+    """A rated OFF and B, who rates lower, DBS; C rates both alike."""
+    study = Path(shutil.copytree(on_later_days(recorded), tmp_path / "study"))
+    one_day_each(study)
+    scores = [2.0, 2.5, 2.0, 2.5, 1.0, 1.5, 1.0, 1.5]
+    rows = []
+    for day, score in enumerate(scores, start=1):
+        own = f"M1,{day},OFF,A" if day < 5 else f"M1,{day},DBS,B"
+        rows += [f"{own},{score}", f"{own},{score + 0.5}"]
+        rows += [f"M1,{day},{name},{both},{1 + day % 2 / 2}" for name in NAMES if both]
+    (study / "ratings.csv").write_text("\n".join(["subject,day,condition,examiner,score", *rows]))
+    found = compared(study)
+    assert_none_claimed(found)
+    rows, sentence = found
+    assert "examiners A, B rated one of the conditions alone" in rows["rating"]["reason"]
+    assert "examiners A, B rated one of the conditions alone" in sentence
+
+
+def test_the_inertia_held_is_wrong_for_one_condition(recorded):
+    """J is 15 % larger with another handle; held at the median of all, it goes into K."""
+    heavier = replace(DBS, factors=(1.15, 1.0, 1.0))
+    found = compared(recorded("heavier", both_each_day(DAYS, OFF, heavier)))
+    assert_none_claimed(found)
+    rows, sentence = found
+    assert rows["stiffness_nm_rad"]["p_holm"] < 0.05
+    assert rows["stiffness_nm_rad"]["reason"].startswith("inertia differs by 13 %")
+    assert "inertia differs by 13 %" in sentence
