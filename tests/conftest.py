@@ -94,6 +94,12 @@ def rigidimeter(monkeypatch, capsys) -> Callable[..., Ran]:
     return run
 
 
+@pytest.fixture
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the figures of a report, which take most of its time, where words are read."""
+    monkeypatch.setattr("rigidimeter.reporting.page.svg_text", lambda *_: "<svg/>")
+
+
 REALTIME = {
     # What is commissioned must not be later than a tick of 4 ms.
     "tests/wire/test_commission": {"priority": 50, "resolves_s": 0.02},

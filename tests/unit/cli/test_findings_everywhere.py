@@ -16,7 +16,7 @@ PUSHING = {"OFF": {"voluntary_sd_nm": 0.2}}
 
 
 @pytest.fixture
-def shown(simulate, rigidimeter, tmp_path):
+def shown(simulate, rigidimeter, no_figures, tmp_path):
     """Return what each output of a recording with findings holds."""
 
     def run(method):

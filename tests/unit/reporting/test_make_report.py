@@ -38,6 +38,7 @@ def test_estimates_give_a_page_without_figures_of_signals(
     assert not list((tmp_path / "figures").glob("torque_*"))
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_a_path_and_what_is_read_from_it_give_the_same_page(csv_file: Path, tmp_path: Path) -> None:
     one = report(csv_file, tmp_path / "path")
     two = report(read(csv_file), tmp_path / "recording")

@@ -222,6 +222,7 @@ def found(level: str, name: str = "voluntary_torque", text: str = "it pushed") -
     return Finding(name, level, 20.0, 15.0, text, "relax")
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_findings_are_told_once_a_kind(make_study, make_analysis, tmp_path: Path) -> None:
     analysis = make_analysis({"OFF": 30, "DBS": 2}, scores=False)
     fits = [
@@ -281,10 +282,12 @@ def test_degenerate_studies(
     counts, outcome, scores: bool, make_study, make_analysis, tmp_path: Path
 ) -> None:
     analysis = make_analysis(counts, outcome, scores and outcome is None)
-    page = page_of(make_study([], analysis=analysis), tmp_path)
-    assert "nan" not in page.text.split()
+    made = make_study([], analysis=analysis)
+    # Without scores the page has a part of the same figures.
+    text = page_of(made, tmp_path).text if scores else words_of(made)
+    assert "nan" not in text.split()
     for fit in analysis.fits:
-        assert fit.outcome.reason in page.text
+        assert fit.outcome.reason in text
 
 
 def test_short_samples_say_what_their_interval_is(make_study, make_analysis) -> None:
