@@ -27,7 +27,7 @@ from tests.known_joint import angle_rad, torque_nm
 
 import rigidimeter as rm
 from benchmarks.paired import Row
-from rigidimeter.cli.progress import LEAST_SHARE
+from rigidimeter.cli.progress import Meter
 
 EPOCHS_A_FILE = 4
 RATE_HZ, LENGTH_S = 100.0, 6.0
@@ -60,13 +60,14 @@ def measured(folder: Path, files: int, jobs: int) -> Measured:
     paths = sorted(folder.glob("*.npz"))[:files]
     rm.estimate(rm.read(paths[0]))  # imports are made and caches are full
     with tempfile.TemporaryDirectory() as name:
+        meter = Meter("batch", 1.0, from_first=True)
         used_s, start_s = time.process_time(), time.perf_counter()
         told: list[tuple[float, float]] = []  # when, and the time left then
 
         def progress(share: float) -> None:
-            if share >= LEAST_SHARE:
-                done_s = time.perf_counter() - start_s
-                told.append((done_s, done_s * (1 - share) / share))
+            meter.reach(share)
+            if meter.left_s is not None:
+                told.append((time.perf_counter() - start_s, meter.left_s))
 
         if jobs:
             done = rm.batch(paths, Path(name) / "out.parquet", jobs=jobs, progress=progress)

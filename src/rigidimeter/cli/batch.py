@@ -56,7 +56,7 @@ def batch(
 
     _refuse(recordings)
     keep_inputs((out,), recordings.paths)
-    with Meter("batch", 1.0) as meter:
+    with Meter("batch", 1.0, from_first=True) as meter:
         # In a file or a pipe there is nobody to look at progress for hours.
         progress = meter.reach if sys.stderr.isatty() else (lambda _: None)
         done = run_batch(

@@ -35,16 +35,24 @@ class Meter:
         The amount of work, in any unit in which equal amounts take equal times.
     clock : callable
         Gives the time in s.
+    from_first : bool
+        The speed counts from the first report on: before that processes are started.
     """
 
     def __init__(
-        self, title: str, total: float, clock: Callable[[], float] = time.monotonic
+        self,
+        title: str,
+        total: float,
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        from_first: bool = False,
     ) -> None:
         self._title = title
         self._total = max(total, 1e-12)
         self._done = 0.0
         self._clock = clock
         self._start_s = clock()
+        self._first = None if from_first else (self._start_s, 0.0)
         self._line_s: float | None = None
         self._replaces = sys.stderr.isatty()
 
@@ -68,9 +76,10 @@ class Meter:
     @property
     def left_s(self) -> float | None:
         """The time left at the mean speed so far; None before a tenth of the work is done."""
-        if self.share < LEAST_SHARE:
+        first_s, first = self._first or (0.0, self._done)
+        if self.share < LEAST_SHARE or self._done <= first:
             return None
-        return (self._clock() - self._start_s) * (1 - self.share) / self.share
+        return (self._clock() - first_s) * (self._total - self._done) / (self._done - first)
 
     def advance(self, amount: float = 1.0) -> None:
         """Add to what is done."""
@@ -80,6 +89,7 @@ class Meter:
         """Set what is done."""
         self._done = min(done, self._total)
         now_s = self._clock()
+        self._first = self._first or (now_s, self._done)
         every_s = TERMINAL_EVERY_S if self._replaces else LINE_EVERY_S
         if now_s - self._start_s < QUIET_S or (
             self._line_s is not None and now_s - self._line_s < every_s

@@ -149,7 +149,7 @@ def test_time_left_is_right_within_three_of_inputs_of_all_sizes(
     for index, epochs in enumerate([8, 1, 3, 1, 12, 2]):
         write_recording(archive / f"{index}.csv", index, epochs)
     now_s, left_s = [0.0], []
-    meter = Meter("batch", 1.0, clock=lambda: now_s[0])
+    meter = Meter("batch", 1.0, clock=lambda: now_s[0], from_first=True)
 
     def answer(one, digest, how):
         now_s[0] += 0.05 + 0.04 * round(one.path.stat().st_size / 72_000)

@@ -35,6 +35,16 @@ def test_the_time_left_is_that_of_an_even_speed() -> None:
             assert meter.left_s == pytest.approx(0.2 * (50 - done))
 
 
+def test_the_start_of_processes_is_no_work() -> None:
+    clock = Clock()
+    meter = Meter("work", 50.0, clock, from_first=True)
+    clock.now_s += 30.0
+    for _ in range(9):
+        clock.now_s += 0.2
+        meter.advance()
+    assert meter.left_s == pytest.approx(0.2 * (50 - 9))
+
+
 def test_lines_come_after_two_seconds_and_every_five(capsys: pytest.CaptureFixture[str]) -> None:
     clock = Clock()
     with Meter("work", 20.0, clock) as meter:
