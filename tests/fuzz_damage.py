@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import re
+import zipfile
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -21,6 +23,7 @@ def mutated(data: bytes, rng: np.random.Generator) -> tuple[str, bytes]:
     """Change a file in one way; return the way and the bytes."""
     ways: Sequence[Callable[[bytes, np.random.Generator], bytes]] = (
         _flip, _cut, _double, _number, _nest, _wide, _long, _encoded, _word, _value, _value,
+        _swap, _head, _pickle, _bomb, _ones,
     )  # fmt: skip
     way = ways[int(rng.integers(len(ways)))]
     return way.__name__.strip("_"), way(data, rng)
@@ -113,6 +116,49 @@ def _word(data: bytes, rng: np.random.Generator) -> bytes:
     return data[: one.start()] + str(rng.choice(words)).encode() + data[one.end() :]
 
 
+def _swap(data: bytes, rng: np.random.Generator) -> bytes:
+    """Exchange two pieces of one length."""
+    size = min(int(rng.choice([2, 8, 512])), max(len(data) // 4, 1))
+    one, two = sorted(int(place) for place in rng.integers(0, max(len(data) - size, 1), 2))
+    if two - one < size:
+        return _flip(data, rng)
+    parts = data[:one], data[two : two + size], data[one + size : two], data[one : one + size]
+    return b"".join(parts) + data[two + size :]
+
+
+def _head(data: bytes, rng: np.random.Generator) -> bytes:
+    """Put a huge head before it, or into it."""
+    at = int(rng.choice([0, 4, min(512, len(data))]))
+    return data[:at] + bytes(rng.integers(0, 256, 8)) * 2**17 + data[at:]
+
+
+def _ones(data: bytes, rng: np.random.Generator) -> bytes:
+    """Set a number of the head to the largest or to zero: a count, an offset or a size."""
+    size = int(rng.choice([2, 4, 8]))
+    at = int(rng.integers(0, min(len(data), 2048)))
+    value = [b"\xff" * size, b"\xff" * (size - 1) + b"\x7f", bytes(size)][int(rng.integers(3))]
+    return data[:at] + value + data[at + size :]
+
+
+def _pickle(data: bytes, rng: np.random.Generator) -> bytes:
+    """Replace it by a pickle that leaves a file where it is read."""
+    return b"cos\nsystem\n(S'touch unpickled'\ntR." + data[int(rng.integers(len(data))) :]
+
+
+def _bomb(data: bytes, rng: np.random.Generator) -> bytes:
+    """Replace a member of a ZIP archive by 160 MiB of one byte; elsewhere repeat the end."""
+    if data[:2] != b"PK":
+        return data + data[-64:] * 2**14
+    out = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(out, "w", 8) as new:
+        members = old.namelist()
+        swollen = members[int(rng.integers(len(members)))]
+        for member in members:
+            content = bytes([int(rng.integers(256))]) * (160 * 2**20) if member == swollen else b""
+            new.writestr(member, content or old.read(member))
+    return out.getvalue()
+
+
 def strange(
     columns: Mapping[str, np.ndarray], rng: np.random.Generator
 ) -> tuple[str, dict[str, ArrayLike]]:
@@ -144,6 +190,7 @@ def strange(
         "half": column.astype(np.float16),
         "record": np.zeros(column.size, dtype=[("a", "f8"), ("b", "i4")]),
         "time": column.astype("datetime64[s]"),
+        "objects": column.astype(object),
     }
     way = str(rng.choice(list(ways)))
     return f"{name} {way}", {**columns, name: ways[way]}

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import scipy.io
 from numpy.typing import ArrayLike
+from tests.fuzz_files import FILES
 from tests.version_1 import as_version_1
 
 from rigidimeter.devices.rigfile import load_rig
@@ -212,6 +213,7 @@ TARGETS = (
         "study's ratings", _study, "study/ratings.csv", ("compare", "study", "--resamples", "100")
     ),
     Target("estimates", _estimates, "e.json", ("compare", "e.json", "--resamples", "100")),
+    *(Target(*made) for made in FILES),
 )
 OPTIONS = (
     ("--rate-hz",), ("--epoch-length-s",), ("--band-hz", "0.5"), ("--controller", "0.1"),

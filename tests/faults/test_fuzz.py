@@ -1,7 +1,7 @@
 """A part of the cases of the fuzzer, in one process: no traceback, only the output is changed."""
 
 import pytest
-from tests.fuzz import run_case, run_here
+from tests.fuzz import run_apart, run_case, run_here, warm
 from tests.fuzz_inputs import TARGETS
 
 SHARES = 5
@@ -15,6 +15,14 @@ def test_damaged_inputs_are_read_or_refused(share):
         if result.failed
     ]
     assert failed == []
+
+
+@pytest.mark.slow
+def test_two_thousand_damaged_inputs_each_in_a_process_of_its_own():
+    """30 s and 1 GB each; `python -m tests.fuzz` runs more."""
+    warm()
+    found = [result for _, result in run_apart(range(2000), 5)]
+    assert [f"{one.case}\n{one.failed}" for one in found if one.failed] == []
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)

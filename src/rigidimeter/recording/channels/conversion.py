@@ -29,9 +29,10 @@ class Conversion:
 
     def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return values in SI; the same array where it is in SI already."""
-        if self.offset:
-            values = values - self.offset
-        return values if self.factor == 1.0 else values * self.factor
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite counts as missing
+            if self.offset:
+                values = values - self.offset
+            return values if self.factor == 1.0 else values * self.factor
 
 
 def conversion(standard: str, column: str, unit: str, scale: str, offset: str) -> Conversion:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimeter.recording.channels.choice import Taken
+from rigidimeter.recording.channels.conversion import Conversion
 from rigidimeter.recording.channels.looks import Array, Look, RoughFit, look
 from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.unit_text import factor
@@ -186,7 +187,7 @@ def look_at(
     def si(name: str) -> Array:
         values = raw[name].astype(np.float64)
         if name in as_units:
-            return values * (factor(as_units[name], name) or 1.0)
+            return Conversion(factor(as_units[name], name) or 1.0)(values)
         to_si = taken[name].to_si
         return values if to_si is None else to_si(values)
 

@@ -1,0 +1,63 @@
+"""BIDS-Motion and XDF of other programs: a clock for each system, units as they are stated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.archive_files import write_bids_motion, write_xdf
+from tests.instrument_files import Signal
+from tests.known_joint import angle_rad, torque_nm
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording import read
+
+TORQUE_S, ANGLE_S = np.arange(2000) / 200.0, np.arange(950) / 100.0
+TORQUE = Signal("Torque", "Nm", torque_nm(TORQUE_S))
+ANGLE = Signal("Angle", "deg", np.degrees(angle_rad(ANGLE_S)), 100.0)
+
+
+@pytest.mark.parametrize("latency", [True, False])
+def test_a_data_set_with_two_tracking_systems(tmp_path: Path, latency: bool) -> None:
+    write_bids_motion(tmp_path / "set", [TORQUE, ANGLE], latency=latency)
+    (epoch,) = read(tmp_path / "set").epochs
+    angle = epoch.channels["angle_rad"]
+    np.testing.assert_allclose(angle.time_s, ANGLE_S, atol=1e-9)
+    np.testing.assert_allclose(angle.values, angle_rad(ANGLE_S), rtol=1e-10)
+    assert len(epoch.channels["torque_nm"]) == 1899  # as long as both last
+
+
+def test_one_file_of_a_data_set_is_one_system(tmp_path: Path) -> None:
+    write_bids_motion(tmp_path / "set", [TORQUE, ANGLE], latency=True)
+    files = sorted((tmp_path / "set").rglob("*_motion.tsv"))
+    with pytest.raises(UserError, match="torque_nm"):
+        read(files[0])
+    (epoch,) = read(files, join=True).epochs
+    assert set(epoch.channels) == {"torque_nm", "angle_rad"}
+
+
+def test_several_recordings_of_a_data_set_are_named(tmp_path: Path) -> None:
+    write_bids_motion(tmp_path / "set", [TORQUE], latency=True)
+    place = tmp_path / "set" / "sub-01" / "motion"
+    for path in list(place.iterdir()):
+        (place / path.name.replace("task-elbow", "task-rest")).write_bytes(path.read_bytes())
+    with pytest.raises(UserError, match=r"has 2 motion recordings .*task-rest"):
+        read(tmp_path / "set")
+
+
+def test_a_data_set_without_a_rate_is_refused(tmp_path: Path) -> None:
+    write_bids_motion(tmp_path / "set", [TORQUE], latency=False)
+    for path in (tmp_path / "set").rglob("*_motion.json"):
+        path.unlink()
+    with pytest.raises(UserError, match="states no SamplingFrequency"):
+        read(tmp_path / "set")
+
+
+def test_clock_offsets_of_an_xdf_file_are_applied(tmp_path: Path) -> None:
+    """The second computer's clock is 0.4 s ahead, and the file says so every 5 s."""
+    write_xdf(tmp_path / "r.xdf", [TORQUE, ANGLE], offset_s=0.4)
+    (epoch,) = read(tmp_path / "r.xdf").epochs
+    angle = epoch.channels["angle_rad"]
+    np.testing.assert_allclose(angle.time_s, ANGLE_S, atol=1e-6)
+    np.testing.assert_allclose(angle.values, angle_rad(ANGLE_S), rtol=1e-12, atol=1e-15)
