@@ -68,8 +68,27 @@ def estimate(
 
 def estimate_lines(analysis: Analysis) -> list[str]:
     """Return everything that was estimated, with an empty line between blocks."""
-    blocks = (_method, _delays, _fits, _fixed_inertia, _pooled, _findings, _scores)
+    blocks = (_method, _delays, _fits, _fixed_inertia, _pooled, _precision, _findings, _scores)
     return [line for block in blocks if (lines := block(analysis)) for line in (*lines, "")][:-1]
+
+
+def _precision(analysis: Analysis) -> list[str]:
+    """Return what the first screen of a report shows of one condition."""
+    from rigidimeter.study import WANTED_PERCENT, compare_analysis, precisions
+
+    found = precisions(compare_analysis(analysis, resamples=0))
+    lines = []
+    for one in found:
+        text = f"  {one.measure.label}: {one.value:.4g} [{one.low:.4g} to {one.high:.4g}]"
+        if one.epochs_needed is None:
+            text = f"  {one.measure.label}: {one.value:.4g}, from one epoch, so without an interval"
+        elif one.epochs_needed > one.n:
+            text += f", ±{one.percent:.2g} %; ±{WANTED_PERCENT:g} % needs about "
+            text += f"{one.epochs_needed} such epochs, not {one.n}"
+        else:
+            text += f", ±{one.percent:.2g} %"
+        lines.append(text)
+    return ["All epochs, with 95 % intervals", *lines] if lines else []
 
 
 def _method(analysis: Analysis) -> list[str]:

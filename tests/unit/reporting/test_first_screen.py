@@ -12,13 +12,21 @@ from tests.unit.reporting.parsed_page import ParsedPage
 from tests.unit.reporting.test_agreement import assert_shows
 
 from rigidimeter.cli.comparison_text import comparison_lines
+from rigidimeter.cli.estimate import estimate_lines
 from rigidimeter.documents import read_json, write_json
 from rigidimeter.reporting import page as page_module
 from rigidimeter.reporting.first_screen import difference_words, gravest_words, light_words
 from rigidimeter.reporting.interval_plot import interval_plot, reach
 from rigidimeter.reporting.page import contents, parts, render_page, write_report
 from rigidimeter.reporting.sections.study_overview import NUMBERS
-from rigidimeter.study import Difference, StudyResult, comparison_document, traffic_light
+from rigidimeter.study import (
+    Difference,
+    StudyResult,
+    compare_analysis,
+    comparison_document,
+    precisions,
+    traffic_light,
+)
 
 SMALL = Design(days=(4, 3), epochs=(4, 4), scores=(3, 3))
 
@@ -147,3 +155,18 @@ def test_what_has_nothing_to_show_is_neither_on_the_page_nor_in_its_contents(stu
     assert not {"Ratings", "What rests on the method"} & set(titles)
     assert titles.index("Settings and provenance") > titles.index("Methods")
     assert titles == list(dict.fromkeys(titles))
+
+
+def test_the_terminal_has_the_precision_of_one_condition(make_analysis) -> None:
+    analysis = make_analysis({"DBS": 3})
+    lines = estimate_lines(analysis)
+    begin = lines.index("All epochs, with 95 % intervals")
+    for one, line in zip(
+        precisions(compare_analysis(analysis, resamples=0)), lines[begin + 1 :], strict=False
+    ):
+        assert line.startswith(f"  {one.measure.label}: ")
+        needed = [one.epochs_needed or 0, one.n] if (one.epochs_needed or 0) > one.n else []
+        numbers = [one.value, one.low, one.high, one.percent, *([5.0] if needed else []), *needed]
+        assert_shows(line.partition("): ")[2], numbers, 2)
+    (work,) = (line for line in estimate_lines(make_analysis({"DBS": 1})) if "Work" in line)
+    assert work.endswith(", from one epoch, so without an interval")
