@@ -47,8 +47,10 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Make:
 
 def on_later_days(recorded: Make) -> Path:
     """Return a study whose arm is softer from its fourth day on, when DBS was recorded."""
-    days = [replace(OFF, day=str(day), epochs=3) for day in (1, 2, 3)]
-    days += [replace(DBS, day=str(day), factors=SOFTER, epochs=3) for day in (4, 5, 6)]
+    off, dbs = (replace(one, columns=MOTION) for one in (OFF, DBS))
+    days = [replace(off, day=str(day)) for day in (1, 2, 3)]
+    days += [replace(dbs, day=str(day), factors=SOFTER) for day in (4, 5, 6)]
+    days[0], days[3] = (replace(one, epochs=3) for one in (days[0], days[3]))
     return recorded("later", days)
 
 
@@ -78,7 +80,7 @@ def assert_none_claimed(found: Told) -> None:
 def test_a_true_difference_is_claimed(recorded):
     """What the traps are held against: the same rig, subject and days."""
     softer = replace(DBS, factors=(1.0, 0.85, 0.85))
-    rows, sentence = compared(recorded("true", both_each_day(DAYS, OFF, softer)))
+    rows, sentence = compared(recorded("true", both_each_day(3, OFF, softer)))
     assert rows["stiffness_nm_rad"]["verdict"] == rows["damping_nm_s_rad"]["verdict"] == "lower"
     assert rows["inertia_kg_m2"]["verdict"] == "no difference shown"
     assert "DBS is lower than OFF in stiffness K" in sentence
@@ -130,8 +132,8 @@ def test_stiffness_that_varies_within_the_recording(recorded):
 )
 def test_degrees_under_a_header_of_radians(recorded, amplitude_nm, cause):
     """More than one turn is refused when it is read; of a smaller motion J gives it away."""
-    off = replace(OFF, perturbation_nm=amplitude_nm)
-    degrees = replace(DBS, perturbation_nm=amplitude_nm, degrees=True)
+    off = replace(OFF, columns=MOTION, perturbation_nm=amplitude_nm)
+    degrees = replace(DBS, columns=MOTION, perturbation_nm=amplitude_nm, degrees=True)
     found = compared(recorded(f"degrees {amplitude_nm}", both_each_day(3, off, degrees)))
     assert_none_claimed(found)
     rows, sentence = found
@@ -208,7 +210,7 @@ def test_an_examiner_who_rated_one_condition_only(recorded, tmp_path, both):
 def test_the_inertia_held_is_wrong_for_one_condition(recorded):
     """J is 15 % larger with another handle; held at the median of all, it goes into K."""
     heavier = replace(DBS, factors=(1.15, 1.0, 1.0))
-    found = compared(recorded("heavier", both_each_day(DAYS, OFF, heavier)))
+    found = compared(recorded("heavier", both_each_day(3, OFF, heavier)))
     assert_none_claimed(found)
     rows, sentence = found
     assert rows["stiffness_nm_rad"]["p_holm"] < 0.05
