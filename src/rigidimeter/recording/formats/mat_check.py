@@ -22,6 +22,7 @@ _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED, _UTF8 = 1, 5, 6, 14, 15, 16
 _NUMBERS = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13})
 _TYPES = _NUMBERS | {_MATRIX, _UTF8, 17, 18}
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _LAST_PLAIN = 1, 2, 3, 4, 5, 15
+_CLASS = 17  # such as a table: its values are in the last variable, which has no name
 _COMPLEX = 0x0800
 _OPAQUE = (_OBJECT, _SPARSE)
 
@@ -167,7 +168,9 @@ class _Walk:
                 self.matrix(data, part, depth + 1)
         if not _CELL <= kind <= _LAST_PLAIN:
             # Classes and functions: never a column, and read without their parts.
-            return Variable("", "other", (0,), 0)
+            named = kind == _CLASS and len(parts) > 1 and parts[1].kind == _INT8
+            text = data[parts[1].start : parts[1].stop].decode("latin-1") if named else ""
+            return Variable(text, "other", (0,), 0)
         _, dims, name, *rest = parts
         shape = self._shape(data, dims, name)
         count = math.prod(shape)

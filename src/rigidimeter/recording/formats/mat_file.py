@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.documents import open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
+from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.hdf5_arrays import hdf5_arrays
 from rigidimeter.recording.formats.mat4_check import check_mat4
 from rigidimeter.recording.formats.mat_check import Variable, check_mat5
@@ -45,6 +46,14 @@ def read_mat(path: Path) -> Table:
         else:
             file.seek(0)
             entries = _entries(path, file)
+    objects = [name for name, entry in entries.items() if entry.dtype.kind == "V"]
+    if objects and len(objects) == len(entries):
+        name = objects[0]
+        raise UserError(
+            f"{path}: {', '.join(objects)[:60]} is a table or another object, and those are not "
+            f"read; in MATLAB say s = table2struct({name[:60]}, 'ToScalar', true); "
+            "save('r.mat', '-struct', 's')"
+        )
     return table_of_arrays(str(path), entries)
 
 
