@@ -20,6 +20,8 @@ from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.sample_reading import read_samples
 
 SCRIPT = Path(__file__).with_name("realtime_session.py")
+HANGS_S = 120.0
+"""Three processes that load take so long on a machine that does a dozen other things at once."""
 
 
 def memory() -> set[str]:
@@ -83,7 +85,7 @@ class Session:
     def running(self) -> dict[str, int]:
         """Wait until samples are in the file; return the processes."""
         path = self.folder / "samples.arrows"
-        wait_for(lambda: path.is_file() and read_samples(path)["tick"].size > 50)
+        wait_for(lambda: path.is_file() and read_samples(path)["tick"].size > 50, HANGS_S)
         pids_path = self.folder.with_name("pids.json")
 
         def pids() -> dict[str, int | str]:
@@ -97,7 +99,7 @@ class Session:
 
     def ended(self) -> dict[str, Any]:
         """Wait for its end; return how it ended, having seen that no memory is left."""
-        out, err = self.process.communicate(timeout=40.0)
+        out, err = self.process.communicate(timeout=HANGS_S)
         assert self.process.returncode == 0, err
         self.said = err
         assert not self.mine & memory()
@@ -116,7 +118,7 @@ class Session:
             os.killpg(self.process.pid, signal.SIGCONT)
             self.process.terminate()
             try:
-                self.process.communicate(timeout=30.0)
+                self.process.communicate(timeout=HANGS_S)
             except subprocess.TimeoutExpired:
                 os.killpg(self.process.pid, signal.SIGKILL)
                 self.process.communicate()
