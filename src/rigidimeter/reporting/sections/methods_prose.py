@@ -153,7 +153,7 @@ def _rates(result: StudyResult) -> list[str]:
             and math.isfinite(rate := epoch.channels[channel].mean_rate_hz)
         ]
         if found:
-            rates.setdefault(f"{float(np.median(found)):.3g}", []).append(name)
+            rates.setdefault(number(float(np.median(found)), 3), []).append(name)
     if not rates:
         return []
     parts = [f"{series(group)} at {rate} samples/s" for rate, group in rates.items()]
