@@ -38,6 +38,12 @@ def test_rows_are_what_estimate_gives(archive: Path, tmp_path: Path) -> None:
     assert np.all(np.abs(values - TRUTH) < 5 * errors)
 
 
+def test_two_processes_write_the_same_bytes(archive: Path, tmp_path: Path) -> None:
+    one = rm.batch(archive, tmp_path / "one.parquet")
+    two = rm.batch(archive, tmp_path / "two.parquet", jobs=2)
+    assert two.path.read_bytes() == one.path.read_bytes()
+
+
 def test_csv_holds_the_same_numbers(archive: Path, tmp_path: Path) -> None:
     parquet = rm.batch(archive, tmp_path / "out.parquet").table()
     csv = rm.batch(archive, tmp_path / "out.csv").table()
