@@ -223,7 +223,7 @@ HAND_MADE = tuple(
         ),
         (
             MODES,
-            "return round(loop.tick - reading.motion_time_s * loop.rate_hz)",
+            "return round(age_ticks) if math.isfinite(age_ticks) else 0",
             "return 0",
             "an old reading is held against the present target",
         ),
