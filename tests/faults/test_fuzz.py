@@ -17,6 +17,13 @@ def test_damaged_inputs_are_read_or_refused(share):
     assert failed == []
 
 
+@pytest.mark.parametrize("case", [244, 258])
+def test_lengths_that_are_stated_take_no_memory(case):
+    """A name of 4 GB in a TDMS file, a first message of 2 GB in an Arrow stream."""
+    ((_, result),) = run_apart([case], 5)
+    assert result.failed == ""
+
+
 @pytest.mark.slow
 def test_two_thousand_damaged_inputs_each_in_a_process_of_its_own():
     """30 s and 1 GB each; `python -m tests.fuzz` runs more."""

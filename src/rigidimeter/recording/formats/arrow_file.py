@@ -40,6 +40,8 @@ def read_arrow(path: Path) -> Table:
             expansion.take("its columns", 8 * rows * len(schema))
             table = parquet.read()
         else:
+            _check_first(file.read(8), path.stat().st_size)
+            file.seek(0)
             opened = pa.ipc.open_file if start == _FILE else pa.ipc.open_stream
             table = opened(file).read_all()
             check_count(path, len(table.schema))
@@ -59,6 +61,16 @@ def read_arrow(path: Path) -> Table:
         else:
             others[printable(name)] = f"a column of {kind}"
     return Table(str(path), columns, others=others, units=units)
+
+
+def _check_first(start: bytes, file_bytes: int) -> None:
+    """Refuse a first message that says it is longer than the file: Arrow makes room for it."""
+    if start[:6] == _FILE:
+        return
+    marked = start[:4] == b"\xff\xff\xff\xff"  # since Arrow 0.15
+    length = int.from_bytes(start[4:8] if marked else start[:4], "little", signed=True)
+    if not 0 <= length <= file_bytes:
+        raise ValueError(f"its first message has {length} bytes")
 
 
 def _is_labels(kind: Any) -> bool:

@@ -7,11 +7,14 @@ needs one.
 
 from __future__ import annotations
 
+import io
+import logging
 import math
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +31,18 @@ from rigidimeter.recording.formats.table import Table
 
 _Clocked = tuple[Stream, dict[str, str]]
 _INCREMENT, _OFFSET, _START = "wf_increment", "wf_start_offset", "wf_start_time"
+
+
+class _Bounded(io.BufferedReader):
+    """A file of which no more is asked than is left: else room is made for any length it states."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        super().__init__(io.FileIO(os.dup(file.fileno())))
+        self._size = os.fstat(file.fileno()).st_size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        left = max(self._size - self.tell(), 0)
+        return super().read(left if size is None or size < 0 else min(size, left))
 
 
 @dataclass(frozen=True)
@@ -54,8 +69,15 @@ def read_tdms(path: Path) -> Table:
         Whatever npTDMS raises on a damaged file.
     """
     from nptdms import TdmsFile
+    from nptdms.log import log_manager
 
-    with open_regular(path, RECORDING_BYTES) as file, TdmsFile.open(file) as tdms:
+    log_manager.set_level(logging.CRITICAL)  # what is wrong is said in a sentence
+
+    with (
+        open_regular(path, RECORDING_BYTES) as raw,
+        _Bounded(raw) as file,
+        TdmsFile.open(file) as tdms,
+    ):
         found = [channel for group in tdms.groups() for channel in group.channels()]
         check_count(path, len(found))
         expansion = Expansion(path, path.stat().st_size)
