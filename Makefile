@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test test-computing test-by-clock check bench bench-loop hazards mutation fuzz clean
+.PHONY: install demo test check bench bench-loop hazards mutation fuzz clean
 
 install: $(STAMP)
 
@@ -25,17 +25,9 @@ demo: install
 # Hundreds of processes are started, and without bytecode each would compile the package anew.
 test: export PYTHONDONTWRITEBYTECODE =
 
-# Tests by the clock mostly wait. The others take what they leave of the processors, and no more:
-# they have the lowest priority, and a probe beside each test by the clock says if it was disturbed.
-test: install
-	@echo "Two runs side by side; what each says comes at its end, some minutes from now."
-	@$(MAKE) --jobs=2 --output-sync=target --no-print-directory test-computing test-by-clock
-
 # In the order of their names: by the number of tests, files of few long ones would come last, alone.
-test-computing:
-	nice -n 19 $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m 'not slow and not realtime'
-
-test-by-clock:
+test: install
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m 'not slow and not realtime'
 	$(BIN)/python -m pytest -n 2 -m 'not slow and realtime' tests/faults tests/wire tests/unit/acquisition
 
 check: install
