@@ -85,10 +85,8 @@ def test_what_is_not_a_readable_file(tmp_path):
     assert "folder without manifest.json, so it is not a session folder" in refusal(tmp_path)
     assert "there is no such file" in refusal(tmp_path / "none.csv")
     (tmp_path / "r.docx").write_bytes(b"x")
-    assert (
-        "what can be read is .csv, .tsv, .txt, .asc, .dat, .lvm, .sto, .mot, .xlsx, .xlsm, .xlsb, "
-        ".xls, .ods, .npz, .mat, .nwb, " in refusal(tmp_path / "r.docx")
-    )
+    readable = refusal(tmp_path / "r.docx").partition("what can be read is ")[2]
+    assert {".csv", ".xlsx", ".npz", ".mat", ".nwb", ".tdms", ".c3d"} < set(readable.split(", "))
     (tmp_path / "r").write_bytes(b"x")
     assert "without a suffix" in refusal(tmp_path / "r")
 

@@ -37,8 +37,8 @@ def test_some_rows_in_the_order_of_the_page(tmp_path: Path) -> None:
 
 
 def test_an_unknown_row_is_refused_before_any_work(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="--only fig-1: there is no such row"):
-        run("--out", tmp_path / "paper", "--only", "fig-1")
+    with pytest.raises(UserError, match="--only fig-9: there is no such row"):
+        run("--out", tmp_path / "paper", "--only", "fig-9")
     assert not (tmp_path / "paper").exists()
 
 
