@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -99,7 +100,7 @@ def end_workers() -> None:
 
 
 def apart(folder: Path, files: int, jobs: int) -> Measured:
-    """Measure in a process of its own."""
+    """Measure in a process of its own, which computes with one thread, as the command line does."""
     command = [
         sys.executable,
         "-m",
@@ -109,7 +110,8 @@ def apart(folder: Path, files: int, jobs: int) -> Measured:
         str(files),
         str(jobs),
     ]
-    ran = subprocess.run(command, check=True, capture_output=True, text=True)
+    one_thread = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    ran = subprocess.run(command, check=True, capture_output=True, text=True, env=one_thread)
     return dict(json.loads(ran.stdout))
 
 

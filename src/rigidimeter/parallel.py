@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from typing import Any, TypeVar
 
 from rigidimeter.errors import UserError
@@ -61,23 +62,27 @@ def each(
             yield item, function(item)
         return
     with ExitStack() as stack:
-        parallel, deaths = _workers(jobs, scheduler, in_order, stack)
+        new_call, deaths = _workers(jobs, scheduler, in_order, stack)
         waiting = _Given(items)
-        while True:
+        ended = False
+        while not ended:
             try:
-                with _ended(parallel(_tasks(function, waiting))) as done:
+                with _ended(new_call()(_tasks(function, waiting))) as done:
                     for number, result in done:
                         yield waiting.given.pop(number), result
-                return
+                ended = True
             except deaths:
                 if on_death is None:
                     raise
             # One of those that were begun ended its process: which, shows when each runs alone.
+            # Threads of the call that ended may still take items, which are here the next time.
             for number in list(waiting.given):
                 item = waiting.given[number]
                 try:
-                    (result,) = (found for _, found in parallel(_tasks(function, [(number, item)])))
-                except deaths:
+                    ((_, result),) = new_call()(_tasks(function, [(number, item)]))
+                except deaths as death:
+                    if on_death is None:
+                        raise death from None
                     result = on_death(item)
                 del waiting.given[number]
                 yield item, result
@@ -129,8 +134,11 @@ class _Given(Iterator[tuple[int, Item]]):
 
 def _workers(
     jobs: int, scheduler: str, in_order: bool, stack: ExitStack
-) -> tuple[Callable[..., Generator[Any, None, None]], tuple[type[BaseException], ...]]:
-    """Return what runs tasks, and the exceptions that say that a process ended."""
+) -> tuple[Callable[[], Any], tuple[type[BaseException], ...]]:
+    """Return what makes a call that runs tasks, and the exceptions that say that a process ended.
+
+    Each call is used once: after a process ended, results of its tasks can still come in.
+    """
     from joblib import Parallel, parallel_config
 
     deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
@@ -140,13 +148,14 @@ def _workers(
         stack.enter_context(parallel_config(backend="dask", client=client))
     else:
         stack.enter_context(parallel_config(backend="loky", inner_max_num_threads=1))
-    parallel = Parallel(
+    new_call = partial(
+        Parallel,
         n_jobs=-1 if scheduler else jobs,
         return_as="generator" if in_order else "generator_unordered",
         batch_size=1,
         pre_dispatch=f"{_AHEAD} * n_jobs",
     )
-    return parallel, deaths
+    return new_call, deaths
 
 
 def _client(scheduler: str, stack: ExitStack) -> tuple[Any, type[BaseException]]:
