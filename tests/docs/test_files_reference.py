@@ -13,7 +13,7 @@ from tests.known_joint import angle_rad, torque_nm
 from tests.small_study import scored_study, study
 from typer.testing import CliRunner
 
-from rigidimeter.archives.table import columns as batch_columns
+from rigidimeter.archives.epoch_table import columns as batch_columns
 from rigidimeter.cli.main import app
 from rigidimeter.errors import UserError
 from rigidimeter.recording import (

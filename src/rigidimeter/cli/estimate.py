@@ -52,7 +52,7 @@ def estimate(
           --column torque_nm=torque_Nm --rate-hz 1000 --reaction --epoch-length-s 20
     """
     from rigidimeter.recording import write_estimates_csv, write_estimates_json
-    from rigidimeter.study.subject_torque import write_subject_torque
+    from rigidimeter.study.subject_torque_table import write_subject_torque
 
     keep_inputs((json_out, csv_out, subject_torque_out), recordings.paths)
     read, analysis, status = analyse_recordings(recordings)

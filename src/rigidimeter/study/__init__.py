@@ -19,10 +19,10 @@ from rigidimeter.study.differences import Difference
 from rigidimeter.study.doubts import doubt_sentence
 from rigidimeter.study.leading_effect import Leader, leader
 from rigidimeter.study.measures import MEASURES, RATING, Measure, Observation, conditions
-from rigidimeter.study.precision import WANTED_PERCENT, Precision, precisions
 from rigidimeter.study.provenance import provenance
 from rigidimeter.study.rating_relation import Agreement, Relation, agreement, relations
 from rigidimeter.study.ratings_found import RatingMean, RatingsFound
+from rigidimeter.study.reached_precision import WANTED_PERCENT, Precision, precisions
 from rigidimeter.study.results import (
     Condition,
     EffectPair,

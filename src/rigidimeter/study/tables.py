@@ -14,7 +14,6 @@ from rigidimeter.documents import csv_text, plain_values
 from rigidimeter.recording import estimates_document
 from rigidimeter.study.compared import Comparison, comparison_rows, comparison_values, measure_names
 from rigidimeter.study.conclusions import conclusion_rows
-from rigidimeter.study.precision import precisions
 from rigidimeter.study.rating_relation import relations
 from rigidimeter.study.ratings_found import (
     rating_contrast,
@@ -22,6 +21,7 @@ from rigidimeter.study.ratings_found import (
     rating_rows,
     ratings_document,
 )
+from rigidimeter.study.reached_precision import precisions
 from rigidimeter.study.results import StudyResult
 from rigidimeter.study.traffic_light import traffic_light
 

@@ -39,7 +39,7 @@ def archive(tmp_path: Path) -> Path:
 @pytest.fixture
 def estimated(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """Note every input that is estimated in this process."""
-    from rigidimeter.archives import run
+    from rigidimeter.archives import archive_run as run
 
     seen: list[Path] = []
     original: Callable = run.answer

@@ -13,7 +13,9 @@ from tests.small_study import fitted_study
 from tests.unit.archives.conftest import write_recording
 
 import rigidimeter as rm
-from rigidimeter.archives import parts, rows, table
+from rigidimeter.archives import epoch_rows as rows
+from rigidimeter.archives import epoch_table as table
+from rigidimeter.archives import parts
 from rigidimeter.errors import UserError
 
 __all__ = ["fitted_study"]

@@ -12,7 +12,8 @@ import pytest
 from tests.unit.archives.conftest import write_recording
 
 import rigidimeter as rm
-from rigidimeter.archives import rows, run
+from rigidimeter.archives import archive_run as run
+from rigidimeter.archives import epoch_rows as rows
 from rigidimeter.archives.parts import Parts
 from rigidimeter.cli.progress import Meter
 from rigidimeter.errors import UserError

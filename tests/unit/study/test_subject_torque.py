@@ -9,7 +9,7 @@ from tests.known_joint import angle_rad, torque_nm
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read
 from rigidimeter.study import estimate
-from rigidimeter.study.subject_torque import subject_torque, write_subject_torque
+from rigidimeter.study.subject_torque_table import subject_torque, write_subject_torque
 
 RATE_HZ = 200.0
 TIME_S = np.arange(8000) / RATE_HZ

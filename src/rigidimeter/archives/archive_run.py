@@ -10,10 +10,10 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rigidimeter.archives.inputs import Input, content_bytes, content_digest, inputs_of
+from rigidimeter.archives.archive_inputs import Input, content_bytes, content_digest, inputs_of
+from rigidimeter.archives.epoch_rows import How, Row, answer, refusal
+from rigidimeter.archives.epoch_table import ENDINGS, columns, read_table, write_table
 from rigidimeter.archives.parts import Parts
-from rigidimeter.archives.rows import How, Row, answer, refusal
-from rigidimeter.archives.table import ENDINGS, columns, read_table, write_table
 from rigidimeter.errors import UserError
 from rigidimeter.estimation import method_names, no_such_method
 from rigidimeter.extensions import loaded

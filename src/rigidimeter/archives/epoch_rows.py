@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.archives.inputs import Input, content_digest
+from rigidimeter.archives.archive_inputs import Input, content_digest
 from rigidimeter.documents import plain_values
 from rigidimeter.errors import UserError
 from rigidimeter.extensions import load_file
