@@ -80,9 +80,8 @@ def each(
                 item = waiting.given[number]
                 try:
                     ((_, result),) = new_call()(_tasks(function, [(number, item)]))
-                except deaths as death:
-                    if on_death is None:
-                        raise death from None
+                except deaths:
+                    assert on_death is not None  # else nothing is left after a process ended
                     result = on_death(item)
                 del waiting.given[number]
                 yield item, result

@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.documents import as_read, csv_text
+from rigidimeter.documents import as_read, csv_text, in_place
 from rigidimeter.errors import UserError
 from rigidimeter.records import Analysis, Fit, Outcome, Score
 
@@ -47,14 +47,10 @@ def write_table(path: Path, rows: Iterable[Row]) -> None:
     UserError
         If it cannot be written.
     """
-    beside = path.with_name(f".{path.name}.part")
-    chunks = _chunks(iter(rows))
+    write = _write_csv if path.suffix == ".csv" else _write_parquet
     try:
-        try:
-            (_write_csv if path.suffix == ".csv" else _write_parquet)(beside, chunks)
-            beside.replace(path)
-        finally:
-            beside.unlink(missing_ok=True)
+        with in_place(path) as beside:
+            write(beside, _chunks(iter(rows)))
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else error
         raise UserError(f"{path}: cannot be written ({reason})") from None

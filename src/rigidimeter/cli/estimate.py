@@ -52,34 +52,36 @@ def estimate(
           --column torque_nm=torque_Nm --rate-hz 1000 --reaction --epoch-length-s 20
     """
     from rigidimeter.recording import write_estimates_csv, write_estimates_json
-    from rigidimeter.study.subject_torque_table import write_subject_torque
+    from rigidimeter.study.subject_torque_table import check_name, write_subject_torque
 
     keep_inputs((json_out, csv_out, subject_torque_out), recordings.paths)
+    if subject_torque_out is not None:
+        check_name(subject_torque_out)
     read, analysis, status = analyse_recordings(recordings)
     if json_out is not None:
         write_estimates_json(json_out, analysis)
     if csv_out is not None:
         write_estimates_csv(csv_out, analysis)
+    echo("\n".join(estimate_lines(analysis)))
     if subject_torque_out is not None:
         write_subject_torque(subject_torque_out, read, analysis)
-    echo("\n".join(estimate_lines(analysis)))
     raise typer.Exit(status)
 
 
 def estimate_lines(analysis: Analysis) -> list[str]:
     """Return everything that was estimated, with an empty line between blocks."""
-    blocks = (_method, _delays, _fits, _fixed_inertia, _pooled, _precision, _findings, _scores)
+    blocks = (_method, _delays, _fits, _fixed_inertia, _together, _findings, _scores)
     return [line for block in blocks if (lines := block(analysis)) for line in (*lines, "")][:-1]
 
 
-def _precision(analysis: Analysis) -> list[str]:
-    """Return what the first screen of a report shows of one condition."""
+def _together(analysis: Analysis) -> list[str]:
+    """Return all epochs together; of one condition what the first screen of a report shows."""
     from rigidimeter.study import WANTED_PERCENT, compare_analysis, precisions
 
     found = precisions(compare_analysis(analysis, resamples=0))
     lines = []
     for one in found:
-        text = f"  {one.measure.label}: {one.value:.4g} [{one.low:.4g} to {one.high:.4g}]"
+        text = f"  {one.measure.label}: {one.value:.5g} [{one.low:.5g} to {one.high:.5g}]"
         if one.epochs_needed is None:
             text = f"  {one.measure.label}: {one.value:.4g}, from one epoch, so without an interval"
         elif one.epochs_needed > one.n:
@@ -88,7 +90,7 @@ def _precision(analysis: Analysis) -> list[str]:
         else:
             text += f", ±{one.percent:.2g} %"
         lines.append(text)
-    return ["All epochs, with 95 % intervals", *lines] if lines else []
+    return ["All epochs together, with 95 % intervals", *lines] if lines else _pooled(analysis)
 
 
 def _method(analysis: Analysis) -> list[str]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from rigidimeter.cli.table_lines import Rows, text_table, wrapped
 from rigidimeter.guard import Cause
 
@@ -85,7 +83,7 @@ def _row(epochs: TurnedEpochs) -> tuple[str, ...]:
     found_s = epochs.found_s
     after = "–"
     if found_s:
-        after = f"{np.median(found_s):.2f} s ({min(found_s):.2f}–{max(found_s):.2f})"
+        after = f"{epochs.median_s:.2f} s ({min(found_s):.2f}–{max(found_s):.2f})"
     others = [_ended(*ends) for ends in sorted(epochs.ended_s.items())]
     return (
         epochs.condition,

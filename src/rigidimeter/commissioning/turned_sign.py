@@ -103,6 +103,11 @@ class TurnedEpochs(NamedTuple):
         return self.ended_s.get(Cause.TORQUE_SIGN, ())
 
     @property
+    def median_s(self) -> float:
+        """The median of `found_s`; NaN if it was never found."""
+        return float(np.median(self.found_s)) if self.found_s else math.nan
+
+    @property
     def all_found(self) -> bool:
         """Whether the sign was found in every one."""
         return len(self.found_s) == self.epochs

@@ -12,6 +12,7 @@ from rigidimeter.documents.reading import (
 )
 from rigidimeter.documents.writing import (
     csv_text,
+    in_place,
     json_line,
     json_text,
     plain_values,
@@ -25,6 +26,7 @@ __all__ = [
     "as_read",
     "as_written",
     "csv_text",
+    "in_place",
     "json_line",
     "json_text",
     "noted_digests",

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -111,10 +112,19 @@ def replace_file(path: Path, content: bytes) -> None:
     OSError
         If that cannot be done; the older file is still there then.
     """
+    with in_place(path) as beside:
+        beside.write_bytes(content)
+
+
+@contextmanager
+def in_place(path: Path) -> Iterator[Path]:
+    """Give the name of a file to write, which gets the name `path` once it is complete.
+
+    Whatever is raised meanwhile, the older file of that name is still there.
+    """
     beside = path.with_name(f".{path.name}.part")
     try:
-        beside.write_bytes(content)
+        yield beside
         beside.replace(path)
-    except OSError:
+    finally:
         beside.unlink(missing_ok=True)
-        raise

@@ -16,20 +16,22 @@ from rigidimeter.reporting.numbers import number
 BANDWIDTH_PERCENT = 5.0
 """How far a bandwidth may be from a printed one."""
 
-_FOREARM_M = 0.150
-
 
 def forearm_inertia(context: Context) -> Row:
     """Compare the forearm as a rod about its end, m l²/3."""
     mass_kg = printed.APP_A_FOREARM_SHARE * printed.APP_A_BODY_MASS_KG
     length_m = math.sqrt(3.0 * printed.APP_A_FOREARM_INERTIA / mass_kg)
-    ours = mass_kg * _FOREARM_M**2 / 3.0
+    ours = mass_kg * printed.APP_A_FOREARM_M**2 / 3.0
     return Row(
         ours=f"m = {number(mass_kg)} kg; the printed inertia asks for l = {number(length_m)} m, "
-        f"and l = {_FOREARM_M:.3f} m gives {number(ours, 5)} kg·m²",
+        f"and l = {printed.APP_A_FOREARM_M:.3f} m gives {number(ours, 5)} kg·m²",
         checks=(
             rounded(
-                "Forearm inertia at l = 0.150 m", "kg·m²", printed.APP_A_FOREARM_INERTIA, ours, 1e-8
+                f"Forearm inertia at l = {printed.APP_A_FOREARM_M:.3f} m",
+                "kg·m²",
+                printed.APP_A_FOREARM_INERTIA,
+                ours,
+                1e-8,
             ),
         ),
     )

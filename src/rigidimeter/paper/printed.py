@@ -24,19 +24,24 @@ BANDWIDTH_HZ = 3.5
 
 APP_A_BODY_MASS_KG, APP_A_FOREARM_SHARE = 7.7, 0.015
 APP_A_FOREARM_INERTIA = 8.6625e-4
+APP_A_FOREARM_M = 0.150
 APP_A_ROBOT_INERTIA = 4e-3
 APP_A_CONTROLLER_INERTIA = 0.0008
 APP_A_INERTIA_TOTAL = 0.0052
 APP_A_ELBOW_DAMPING = 0.06
 APP_A_CONTROLLER_DAMPING = 0.028
 APP_A_DAMPING_TOTAL = 0.0088
-"""App. A: mass in kg and share of it, inertia in kg·m², damping in N·m·s/rad."""
+"""App. A: mass in kg and share of it, inertia in kg·m², damping in N·m·s/rad; the length of the
+forearm is not printed, and 150 mm gives its inertia (row app-a-forearm)."""
 
 EQUATION_8 = JointDynamics(0.0026, 0.044, 0.75)
 """App. A: "the transfer function with the largest bandwidth"."""
 
 SEC_34 = JointDynamics(0.0045, 0.1368, 1.751)
 """Sec. 3.4: the joint of the simulations."""
+
+SEC_34_RUNS = 100
+"""Sec. 3.4: simulations."""
 
 SEC_34_MEAN = (-1.9e-7, -2.6e-7, -1.9e-7)
 """Sec. 3.4, of 100 simulations: mean error of J, B and K."""

@@ -40,6 +40,8 @@ def figure_3b(context: Context) -> Row:
     prbs, rate_hz = context.settings.prbs, context.settings.rig.tick_rate_hz
     low_hz, high_hz = printed.BAND_HZ
     band = check_band(prbs, rate_hz)
+    half = band.half_power_hz / prbs.clock_hz  # whatever the clock
+    reaching_hz = high_hz / half
     channel = _perturbation(context)
     share = power_spectrum(channel.values, rate_hz).share(low_hz, high_hz)
     return Row(
@@ -50,6 +52,13 @@ def figure_3b(context: Context) -> Row:
             near("Lowest line", "Hz", low_hz, band.line_spacing_hz, 0.01),
             near("Half power", "Hz", high_hz, band.half_power_hz, 0.5),
         ),
+        reading="Register and clock are not printed. The band reaches from the lowest line to half "
+        f"power; 7 bits at {prbs.clock_hz:g} Hz have its lower end, at "
+        f"{number(reaching_hz, 3)} Hz they would have its upper end and a lowest line at "
+        f"{number(reaching_hz / (2**prbs.register_bits - 1), 3)} Hz.",
+        differs="No maximal sequence has both ends: its half power is at "
+        f"{half * (2**7 - 1):.0f} times the lowest line with 7 bits and at "
+        f"{half * (2**8 - 1):.0f} times with 8, in the paper at {high_hz / low_hz:.0f} times.",
         figures=(
             Figure(
                 "fig-3b",
@@ -147,6 +156,9 @@ def table_1(context: Context) -> Row:
             *(near(f"Ratings {name}", "1", ratings[name], rated[name], 0.0) for name in _DAYS),
             *(near(f"Sinusoids {name}", "1", sines[name], planned[name], 0.0) for name in _DAYS),
         ),
+        differs="The ratings fit. Of the sinusoids "
+        + " and ".join(f"{planned[name] - sines[name]} in {name}" for name in _DAYS)
+        + " are missing, and the text names no rule by which one was left out.",
     )
 
 

@@ -27,9 +27,6 @@ from rigidimeter.reporting.style import GREY, styled
 _TILT_DEG = 5.0
 """An axis that is mounted by eye is within this of the vertical."""
 
-_FOREARM_M = 0.15
-"""The length that App. A implies (row app-a-forearm)."""
-
 _SINE_HZ, _CYCLES = 1.0, 10
 
 _ARM, _SUBJECT, _LINE = "#CFE3F1", "#F3E3D3", "#222222"
@@ -38,7 +35,7 @@ _ARM, _SUBJECT, _LINE = "#CFE3F1", "#F3E3D3", "#222222"
 def figure_1(context: Context) -> Row:
     """Compare the part of the weight in K with K, the axis tilted as far as by eye."""
     mass_kg = printed.APP_A_FOREARM_SHARE * printed.APP_A_BODY_MASS_KG
-    weight_nm = mass_kg * g * _FOREARM_M / 2.0
+    weight_nm = mass_kg * g * printed.APP_A_FOREARM_M / 2.0
     stiffness = printed.SEC_34.stiffness_nm_rad
     tilted = 100.0 * weight_nm * math.sin(math.radians(_TILT_DEG)) / stiffness
     return Row(

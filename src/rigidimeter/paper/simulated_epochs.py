@@ -10,6 +10,7 @@ as an instrument does not (Sec. 1).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -119,13 +120,15 @@ def mean_errors(context: Context) -> Row:
     """Compare the mean errors of the paper's method with the printed ones."""
     found = noise_runs(context)
     percent = errors_percent(TRUTH + found.as_printed)
+    allowed = _SIGMAS / math.sqrt(printed.SEC_34_RUNS)  # times a printed SD
     return Row(
         ours=f"{context.runs} runs by the method as printed: {_numbers(found.as_printed)}, that is "
         f"{', '.join(signed(p, 0) for p in percent)} % of J, B, K",
         reading=f"Closed loop at the paper's rates, sensor noise {found.noise_sd_nm:g} N·m. The "
-        f"mean of 100 runs may be off by {_SIGMAS:g} of its printed standard errors.",
+        f"mean of {printed.SEC_34_RUNS} runs may be off by {_SIGMAS:g} of its printed standard "
+        "errors.",
         checks=tuple(
-            near(f"Mean error of {name}", unit, paper, ours, _SIGMAS * sd / 10.0)
+            near(f"Mean error of {name}", unit, paper, ours, allowed * sd)
             for name, unit, paper, ours, sd in zip(
                 "JBK",
                 ("kg·m²", "N·m·s/rad", "N·m/rad"),

@@ -162,14 +162,15 @@ def precision_rows(result: StudyResult) -> list[PrecisionRow]:
 
 def _precision_row(one: Precision, to: float) -> PrecisionRow:
     factor, unit = scaled(one.value, one.measure.unit)
-    low, high = (number(factor * end, DIGITS) for end in (one.low, one.high))
+    digits = resolving(one.value, (one.high - one.low) / 2)
+    low, high = (number(factor * end, digits) for end in (one.low, one.high))
     known = not math.isnan(one.percent)
     axis = f"{number(to, 2 + (to >= 100))}{_PERCENT}"
     percent = f"±\N{NO-BREAK SPACE}{number(one.percent, 2)}{_PERCENT}" if known else ""
     return PrecisionRow(
         one.measure.title,
         unit,
-        number(factor * one.value, DIGITS),
+        number(factor * one.value, digits),
         f"{low} to {high}" if known else "not known from one epoch",
         percent,
         one.n,
@@ -184,6 +185,20 @@ def _precision_row(one: Precision, to: float) -> PrecisionRow:
             words=f"{one.measure.title} {percent}",
         ),
     )
+
+
+def resolving(value: float, half: float) -> int:
+    """Return how many digits of a value show half its interval with two, from 3 to 6.
+
+    Examples
+    --------
+    >>> resolving(1.8006, 0.00105), resolving(1.8, 0.2), resolving(1.8, math.nan)
+    (5, 3, 3)
+    """
+    if not (value and 0 < half < math.inf):
+        return DIGITS
+    places = math.floor(math.log10(abs(value))) - math.floor(math.log10(half))
+    return min(max(places + 2, DIGITS), 6)
 
 
 LIGHTS = {"good": ("✓", "good"), "caution": ("!", "use with caution"), "poor": ("✕", "poor")}

@@ -8,7 +8,7 @@ the band of its fit alike. Sensor noise, and torque that the model lacks, are in
 
 from __future__ import annotations
 
-import contextlib
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from rigidimeter.documents import as_written
+from rigidimeter.documents import as_written, in_place
 from rigidimeter.errors import UserError
 from rigidimeter.estimation import aligned, epoch_signals
 from rigidimeter.estimation.stretches import longest_part
@@ -64,28 +64,34 @@ def subject_torque(recording: Recording, analysis: Analysis) -> Iterator[pa.Tabl
         )
 
 
+def check_name(path: Path) -> None:
+    """Refuse a name that says no format.
+
+    Raises
+    ------
+    UserError
+        If it ends in neither ``.csv`` nor ``.parquet``.
+    """
+    if path.suffix.lower() not in _WRITERS:
+        raise UserError(f"{path}: the name must end in .csv or .parquet")
+
+
 def write_subject_torque(path: Path, recording: Recording, analysis: Analysis) -> None:
     """Write the tables of all epochs below each other, as CSV or Parquet.
 
     Raises
     ------
     UserError
-        If the name ends in neither, no epoch was included, or the file cannot be written.
+        If the name says neither, no epoch was included, or the file cannot be written.
     """
-    writer = _WRITERS.get(path.suffix.lower())
-    if writer is None:
-        raise UserError(f"{path}: the name must end in .csv or .parquet")
-    beside = path.with_name(f".{path.name}.part")
+    check_name(path)
+    tables = subject_torque(recording, analysis)
+    first = next(tables, None)
+    if first is None:
+        raise UserError(f"{path}: not written, since no epoch has an included estimate")
     try:
-        with contextlib.ExitStack() as open_file:
-            open_file.callback(beside.unlink, missing_ok=True)
-            out = None
-            for table in subject_torque(recording, analysis):
-                out = out or open_file.enter_context(writer(beside, table.schema))
+        with in_place(path) as beside, _WRITERS[path.suffix.lower()](beside, first.schema) as out:
+            for table in itertools.chain([first], tables):
                 out.write_table(table)
-            if out is None:
-                raise UserError(f"{path}: not written, since no epoch has an included estimate")
-            out.close()
-            beside.replace(path)
     except OSError as error:
         raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None

@@ -337,4 +337,4 @@ def test_what_was_not_estimated_is_a_dash_and_has_no_error():
     text = "\n".join(estimate_lines(Analysis("other", fits, fits, 0.0045, scores, fits[:1])))
     assert "nan" not in text
     assert "±" not in text.partition("\n")[2]
-    assert text.count("0.137 ") == 3
+    assert text.count("0.137") == 3

@@ -160,7 +160,7 @@ def test_what_has_nothing_to_show_is_neither_on_the_page_nor_in_its_contents(stu
 def test_the_terminal_has_the_precision_of_one_condition(make_analysis) -> None:
     analysis = make_analysis({"DBS": 3})
     lines = estimate_lines(analysis)
-    begin = lines.index("All epochs, with 95 % intervals")
+    begin = lines.index("All epochs together, with 95 % intervals")
     for one, line in zip(
         precisions(compare_analysis(analysis, resamples=0)), lines[begin + 1 :], strict=False
     ):

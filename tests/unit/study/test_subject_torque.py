@@ -59,3 +59,10 @@ def test_all_epochs_in_one_file_without_formulas(pushed, tmp_path, suffix, reade
 def test_a_name_that_says_no_format_is_refused(pushed, tmp_path):
     with pytest.raises(UserError, match=r"must end in \.csv or \.parquet"):
         write_subject_torque(tmp_path / "torque.txt", *pushed)
+
+
+def test_such_a_name_is_refused_before_anything_is_read(rigidimeter, tmp_path):
+    ran = rigidimeter("estimate", tmp_path / "no_such.csv", "--subject-torque", tmp_path / "t.txt")
+    assert ran.status == 1
+    assert "must end in .csv or .parquet" in ran.out + ran.err
+    assert "no_such" not in ran.out + ran.err

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -16,7 +13,7 @@ from rigidimeter.documents import open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.recording.exported_session import Stream
 from rigidimeter.recording.formats.clocked_table import even_clock, table_of_streams
-from rigidimeter.recording.formats.stored_arrays import Expansion, check_count
+from rigidimeter.recording.formats.stored_arrays import Expansion, check_count, silent
 from rigidimeter.recording.formats.table import Table
 
 _PATTERN = 1_000_000
@@ -37,7 +34,7 @@ def read_biopac(path: Path) -> Table:
     """
     from bioread.reader import Reader
 
-    with open_regular(path, RECORDING_BYTES) as file, _quiet():
+    with open_regular(path, RECORDING_BYTES) as file, silent("bioread"):
         reader = Reader.read_headers(file)
         if reader.datafile is None:
             raise ValueError("its headers are damaged")
@@ -81,15 +78,3 @@ def _read_compressed(path: Path, file: BinaryIO, reader: Any) -> None:
         if len(data) != channel.data_length:
             raise ValueError(f"channel {channel.name[:40]} is shorter than it says")
         channel.raw_data = np.frombuffer(data, dtype=channel.dtype)
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep bioread from printing what is said in a sentence."""
-    log = logging.getLogger("bioread")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        log.setLevel(level)

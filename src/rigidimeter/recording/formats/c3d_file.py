@@ -6,7 +6,6 @@ Points are left out: no joint angle is in them before somebody has said how it f
 from __future__ import annotations
 
 import math
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.exported_session import Stream
 from rigidimeter.recording.formats.clocked_table import even_clock, table_of_streams, unique
-from rigidimeter.recording.formats.stored_arrays import check_count
+from rigidimeter.recording.formats.stored_arrays import check_count, silent
 from rigidimeter.recording.formats.table import Table
 
 
@@ -36,8 +35,7 @@ def read_c3d(path: Path) -> Table:
     """
     import c3d
 
-    with open_regular(path, RECORDING_BYTES) as file, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # such as of a file without points
+    with open_regular(path, RECORDING_BYTES) as file, silent("c3d"):
         reader = c3d.Reader(file)
         n_channels = reader.analog_used
         if not n_channels:

@@ -6,11 +6,9 @@ when; only then are samples read. Where a recording was paused, its segments fol
 
 from __future__ import annotations
 
-import logging
 import struct
-import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -22,7 +20,7 @@ from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.exported_session import Stream
 from rigidimeter.recording.formats.clocked_table import even_clock, table_of_streams, unique
-from rigidimeter.recording.formats.stored_arrays import Expansion, check_count
+from rigidimeter.recording.formats.stored_arrays import Expansion, check_count, silent
 from rigidimeter.recording.formats.table import Table
 
 _SPIKE2_HEAD, _SPIKE2_CHANNEL, _SPIKE2_BLOCK = 512, 140, 20
@@ -49,7 +47,7 @@ def read_neurophysiology(path: Path) -> Table:
     with open_regular(path, RECORDING_BYTES) as file:
         if path.suffix.lower() == ".smr":
             _check_spike2(file, path.stat().st_size)
-    with _quiet(), ExitStack() as on_end:
+    with silent("neo"), ExitStack() as on_end:
         raw = _reader(path)
         on_end.callback(_close, raw)
         raw.parse_header()
@@ -149,17 +147,3 @@ def _check_spike2(file: BinaryIO, file_bytes: int) -> None:
         blocks += max(struct.unpack_from("<h", channel, 14)[0], 0)
     if blocks * _SPIKE2_BLOCK > file_bytes:
         raise ValueError(f"{blocks} blocks of data are not in it")
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep neo from printing and warning of what is said in a sentence, or is of no matter."""
-    log = logging.getLogger("neo")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        log.setLevel(level)

@@ -6,7 +6,10 @@ against an `Expansion` before it is read.
 
 from __future__ import annotations
 
+import logging
+import warnings
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -130,3 +133,17 @@ def check_count(path: Path, n_entries: int) -> None:
             f"{path}: holds {n_entries} entries; at most {COLUMNS} are read, so save the columns "
             "of the recording alone"
         )
+
+
+@contextmanager
+def silent(library: str) -> Iterator[None]:
+    """Keep a library from printing and warning of what a message says, or of no matter."""
+    log = logging.getLogger(library)
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        log.setLevel(level)
