@@ -6,6 +6,7 @@ its reason are kept here. What is run, and in which order, is the session's.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -83,6 +84,10 @@ class ControllerRun:
     def _take_order(self, order: Order) -> bool:
         """Take an order; return whether the stretch that runs ends now."""
         facts: dict[str, Any] = {}
+        if order.command is Command.NOTE:
+            about = {"time_s": self.loop.time_s, "during_epoch": self.open_epoch}
+            self._sink.event("note", **{**json.loads(order.name), **about})
+            return False
         if order.command is Command.CHANGE:
             facts = change_parameter(self.loop, self._controller, order)
         self.change_state(after(self.run, order.command))

@@ -38,10 +38,11 @@ class Command(IntEnum):
     HALT = 7
     RESET = 8
     CHANGE = 9
+    NOTE = 10
 
 
 class Order(NamedTuple):
-    """A command, and for CHANGE which parameter becomes what."""
+    """A command; for CHANGE which parameter becomes what, for NOTE a JSON object to be recorded."""
 
     command: Command = Command.NONE
     name: str = ""

@@ -66,6 +66,8 @@ class SessionWriter:
         Whether the rig is simulated.
     continues : mapping
         The session that this one continues, if any.
+    about : mapping
+        What the operator said of subject, condition and stimulation, if anything.
     created_utc : str
         When the session took place, ISO 8601; now if empty.
     repeatable : bool
@@ -87,6 +89,7 @@ class SessionWriter:
         *,
         virtual: bool,
         continues: Mapping[str, Any] | None = None,
+        about: Mapping[str, Any] | None = None,
         created_utc: str = "",
         repeatable: bool = False,
     ) -> None:
@@ -121,6 +124,8 @@ class SessionWriter:
             }
             if continues:
                 manifest["continues"] = dict(continues)
+            if about:
+                manifest["about"] = dict(about)
             text = text_bytes(json_text({"checksum": ZEROS, **manifest}))
             replace_file(folder / MANIFEST, with_checksum(text))
             self._log = SampleLog(folder / SAMPLES, settings.rig.tick_rate_hz, self.session_id)

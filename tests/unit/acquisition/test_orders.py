@@ -91,6 +91,18 @@ def test_a_pause_now_ends_the_epoch_which_is_run_again_first(tmp_path):
     assert labels(events) == ["1", "1r", "2", "3"]
 
 
+def test_what_an_operator_notes_is_an_event_and_nothing_else_changes(tmp_path):
+    rated = Order(Command.NOTE, '{"what": "rating", "epoch": 1, "score": 1.5, "time_s": 9}')
+    desk = Desk({100: Order(Command.NOTE, '{"what": "mark", "text": "cough"}'), 500: rated})
+    _, events, samples = run(tmp_path / "s", desk)
+    _, _, same = run(tmp_path / "same")
+    notes = [event for event in events if event["event"] == "note"]
+    assert [note["time_s"] for note in notes] == pytest.approx([0.5, 2.5], abs=0.01)
+    assert [note["during_epoch"] for note in notes] == [1, None]
+    assert (notes[0]["text"], notes[1]["score"]) == ("cough", 1.5)
+    np.testing.assert_array_equal(samples["angle_rad"], same["angle_rad"])
+
+
 def test_stop_finishes_the_epoch(tmp_path):
     result, events, _ = run(tmp_path / "s", Desk({100: Command.STOP}))
     assert ended(events) == [(1, "success")]

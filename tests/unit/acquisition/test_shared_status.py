@@ -7,7 +7,7 @@ import pytest
 
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.shared_status import NOTE_BYTES, SharedStatus
 from rigidimeter.acquisition.processes.sink import RingSink, SharedSupervision
 from rigidimeter.acquisition.processes.status_values import (
     Condition,
@@ -102,6 +102,23 @@ def test_orders_that_nobody_takes_are_refused(shared_status):
         shared_status.post(Order(Command.PAUSE))
     with pytest.raises(ValueError, match="at most 48 bytes"):
         shared_status.post(Order(Command.CHANGE, "x" * 49, 1.0))
+
+
+def test_a_note_is_given_whole_and_the_next_when_it_was_taken(shared_status):
+    long = "ä" * (NOTE_BYTES // 2)
+    assert shared_status.post_note(long) == 1
+    assert shared_status.post_note("second") is None
+    assert shared_status.take() == pytest.approx((Command.NOTE, long, math.nan), nan_ok=True)
+    assert shared_status.post_note("second") == 2
+    assert shared_status.take().name == "second"
+    with pytest.raises(ValueError, match=f"takes {NOTE_BYTES + 2} bytes; {NOTE_BYTES} are"):
+        shared_status.post_note(long + "ä")
+
+
+def test_a_heartbeat_may_be_that_of_an_earlier_moment(shared_status, now):
+    earlier_ns = now() - 300_000_000
+    shared_status.beat(Role.CONSOLE, earlier_ns)
+    assert shared_status.age_s(Role.CONSOLE) == pytest.approx(0.3)
 
 
 def sample(k: int) -> Sample:

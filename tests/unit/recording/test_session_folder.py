@@ -22,6 +22,16 @@ def events(folder):
     return [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
 
 
+def test_the_manifest_holds_what_the_operator_said_of_the_session(tmp_path):
+    about = {"subject": "S01", "stimulation": {"frequency_hz": 130.0}}
+    for name, said in (("one", about), ("two", {})):
+        SessionWriter(
+            tmp_path / name, Settings(), [], {"session": 1}, virtual=True, about=said
+        ).close(0.0, "success", "")
+    assert read_manifest(tmp_path / "one")["about"] == about
+    assert "about" not in read_manifest(tmp_path / "two")
+
+
 def test_the_manifest_says_what_was_run(simulate):
     folder = simulate(seed=9)
     manifest = read_manifest(folder)

@@ -33,6 +33,7 @@ class Recording:
     seeds: Mapping[str, int] = field(default_factory=dict)
     virtual: bool = False
     continues: Mapping[str, Any] = field(default_factory=dict)
+    about: Mapping[str, Any] = field(default_factory=dict)
 
     def writer(self) -> SessionWriter:
         """Make the session folder.
@@ -49,6 +50,7 @@ class Recording:
             self.seeds,
             virtual=self.virtual,
             continues=self.continues,
+            about=self.about,
         )
 
 

@@ -7,7 +7,8 @@ that sees an odd count, or another one after its copy, reads again. A writer kil
 it odd for good, so a reader gives up after some tries and returns nothing.
 
 Orders of the operator go into a ring of their own, in order, none lost: the console writes, the
-loop takes them one by one, and how many it has taken is its acknowledgement.
+loop takes them one by one, and how many it has taken is its acknowledgement. What the operator
+writes to be recorded is longer than an order: one at a time stands in the console's own note.
 """
 
 from __future__ import annotations
@@ -39,6 +40,8 @@ _SYNCED = 80
 _STATUS, _LIVE = 96, 128
 _ORDERS_BYTE, _NOTES_BYTE = 2048, 4096
 _NOTE_BYTES = 1024
+NOTE_BYTES = _NOTE_BYTES - 16
+"""So long may be what a process says, or an operator writes, in UTF-8."""
 _ORDER = struct.Struct("@qqd48s")
 _ORDER_SLOTS = 16
 _NAME_BYTES = 48
@@ -112,9 +115,10 @@ class SharedStatus:
         self._words = memory.words
         self._bytes = memory.bytes
         self._now_ns = now_ns
+        self._noted = 0
         self._loop = _Block(memory, _STATUS, "@5q6d")
         self._live = _Block(memory, _LIVE, "@3q8d")
-        note = f"@q{_NOTE_BYTES - 16}s"
+        note = f"@q{NOTE_BYTES}s"
         self._notes = [
             _Block(memory, (_NOTES_BYTE + role * _NOTE_BYTES) // 8, note) for role in Role
         ]
@@ -152,9 +156,9 @@ class SharedStatus:
 
     # Heartbeats, conditions and notes: each process writes its own.
 
-    def beat(self, role: Role) -> None:
-        """Say that a process is alive, now."""
-        self._words[_HEARTS + 8 * role] = self._now_ns()
+    def beat(self, role: Role, at_ns: int | None = None) -> None:
+        """Say that a process is alive, now or at a time of CLOCK_MONOTONIC in nanoseconds."""
+        self._words[_HEARTS + 8 * role] = self._now_ns() if at_ns is None else at_ns
 
     def age_s(self, role: Role) -> float:
         """Return how long ago a process last said so, infinity if it never did."""
@@ -174,7 +178,7 @@ class SharedStatus:
     def set_condition(self, role: Role, condition: Condition, note: str | None = None) -> None:
         """Say how a process is, with a sentence for the operator where there is one."""
         if note is not None:
-            text = note.encode()[: _NOTE_BYTES - 16]
+            text = note.encode()[:NOTE_BYTES]
             self._notes[role].write(len(text), text)
         self._words[_CONDITIONS + role] = condition
 
@@ -259,6 +263,23 @@ class SharedStatus:
         self._words[_ORDERED] = number + 1
         return number + 1
 
+    def post_note(self, text: str) -> int | None:
+        """Give the loop a JSON object to record; None while it has not taken the one before.
+
+        Raises
+        ------
+        ValueError
+            If it is longer than `NOTE_BYTES`, or so many orders wait that the loop cannot be alive.
+        """
+        if self._words[_TAKEN] < self._noted:
+            return None
+        line = text.encode()
+        if len(line) > NOTE_BYTES:
+            raise ValueError(f"a note takes {len(line)} bytes; {NOTE_BYTES} are possible")
+        self._notes[Role.CONSOLE].write(len(line), line)
+        self._noted = self.post(Order(Command.NOTE))
+        return self._noted
+
     def take(self) -> Order:
         """Return the next order, `NOTHING` if there is none; only the loop may."""
         words = self._words
@@ -267,8 +288,10 @@ class SharedStatus:
             return NOTHING
         at = _ORDERS_BYTE + taken % _ORDER_SLOTS * _ORDER.size
         command, length, value, name = _ORDER.unpack_from(self._bytes, at)
-        words[_TAKEN] = taken + 1
-        return Order(Command(command), name[:length].decode(), value)
+        noted = command == Command.NOTE
+        text = self.note(Role.CONSOLE) if noted else name[:length].decode()
+        words[_TAKEN] = taken + 1  # from now on the console may write the next note
+        return Order(Command(command), text, value)
 
     @property
     def taken(self) -> int:

@@ -80,6 +80,7 @@ def supervise(
     realtime: Realtime | None = None,
     patience: Patience | None = None,
     console: Callable[[SharedStatus], object] = lambda _: None,
+    operator_seen_ns: Callable[[], int] | None = None,
     ring_s: float = RING_S,
 ) -> Ended:
     """Run a session in processes of its own and return how it ended.
@@ -97,6 +98,10 @@ def supervise(
     console : callable
         Called in this process about 20 times a second with the shared status. It must return soon:
         the loop stops when this process is silent.
+    operator_seen_ns : callable
+        When the operator was last known to be there, in nanoseconds of CLOCK_MONOTONIC, for a
+        console of which this process is only a part: the loop stops when that is too long ago.
+        Now, as long as this process lives, if not given.
     ring_s : float
         How much the rings hold.
 
@@ -135,7 +140,7 @@ def supervise(
             if recording.settings.sharing.lsl:
                 sending = (recording.settings, shared.names, patience.stopping_s, me)
                 streamer = start("lsl", _streamer_main, *sending)
-            look = _Look(status, console)
+            look = _Look(status, console, operator_seen_ns or time.monotonic_ns)
             remarks = _see_through(loop, recorder, status, patience, look)
             recorder_watch = WatchedProcess(recorder.pid or 0)
             try:
@@ -170,12 +175,18 @@ def supervise(
 class _Look:
     """Keeps the console's heart beating and shows the session; an error in it ends the session."""
 
-    def __init__(self, status: SharedStatus, console: Callable[[SharedStatus], object]) -> None:
+    def __init__(
+        self,
+        status: SharedStatus,
+        console: Callable[[SharedStatus], object],
+        operator_seen_ns: Callable[[], int],
+    ) -> None:
         self._status, self._console = status, console
+        self._operator_seen_ns = operator_seen_ns
         self.remarks: list[str] = []
 
     def __call__(self) -> None:
-        self._status.beat(Role.CONSOLE)
+        self._status.beat(Role.CONSOLE, self._operator_seen_ns())
         if self.remarks:
             return
         try:
