@@ -28,7 +28,7 @@ import numpy as np
 from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.loop_process import LoopSide, LoopTarget, Realtime
 from rigidimeter.acquisition.processes.recorder import Recording
-from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.supervise import Ended, supervise
 from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.acquisition.session_run import run_session
@@ -137,8 +137,8 @@ def measure(
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     beside: list[subprocess.Popen[str]] = []
 
-    def console(shared_status: SharedStatus) -> None:
-        status = shared_status.loop()
+    def console(shared: SessionMemory) -> None:
+        status = shared.status.loop()
         if not beside and status is not None and status.time_s >= SKIPPED_S:
             beside.append(cyclictest(rate_hz, seconds - SKIPPED_S, cpu))
 

@@ -54,7 +54,8 @@ def main() -> None:
     save_to = Path(options["save"]) if "save" in options else None
     seen: dict[str, object] = {}
 
-    def console(shared_status) -> None:
+    def console(shared) -> None:
+        shared_status = shared.status
         pids = {
             **{role.name: shared_status.pid(role) for role in Role},
             "MEMORY": shared_status.name.rpartition("-")[0],

@@ -21,7 +21,7 @@ import numpy as np
 from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.loop_process import LoopSide, Realtime
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
-from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.status_values import Condition, Role
 from rigidimeter.acquisition.processes.supervise import supervise
 from rigidimeter.acquisition.session_run import run_session
@@ -105,7 +105,8 @@ class Console:
         self.said = False
         self.memory = memory
 
-    def __call__(self, shared_status: SharedStatus) -> None:
+    def __call__(self, shared: SessionMemory) -> None:
+        shared_status = shared.status
         if not self.said and shared_status.condition(Role.LOOP) is Condition.RUNNING:
             self.said = True
             said: dict[str, int | str] = {role.name: shared_status.pid(role) for role in Role}

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import statistics
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,14 +14,14 @@ from rigidimeter.acquisition.controller_run import ControllerRun
 from rigidimeter.acquisition.ramp import ramp_to_rest
 from rigidimeter.acquisition.run_states import Command, Run, State, after, epoch_over
 from rigidimeter.acquisition.supervision import Sink, Supervision
-from rigidimeter.acquisition.tick import skip_passed_ticks
+from rigidimeter.acquisition.tick import ControlLoop, skip_passed_ticks
+from rigidimeter.acquisition.zeroing import bias_and_noise, moved
 from rigidimeter.devices.base import Reading, Rig
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import PlannedEpoch, Protocol, prbs_nm, sinusoid
 from rigidimeter.guard import Cause, Reaction, released, why_ended
 from rigidimeter.recording.session_folder import Ending
-from rigidimeter.settings import Settings, ZeroingSettings
-from rigidimeter.units import deg_from_rad
+from rigidimeter.settings import Settings
 
 BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
 
@@ -31,9 +30,6 @@ LOOK_S = 0.1
 
 BRAKE_S = 0.1
 """For so long a drive that left its state brakes by its own ramp before its power goes."""
-
-FEWEST_ZEROING_SAMPLES = 10
-"""The standard deviation of fewer samples is not the sensor's noise."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +76,7 @@ def run_session(
     supervision: Supervision | None = None,
     zero_first: bool = False,
     state_changed: Callable[[Run], None] = lambda _: None,
+    watch: Callable[[ControlLoop], None] = lambda _: None,
 ) -> SessionResult:
     """Run every epoch of a protocol with its rest.
 
@@ -105,8 +102,11 @@ def run_session(
         Whether to zero the torque sensor, and check its noise, before the first epoch.
     state_changed : callable
         Called whenever the run changes its state.
+    watch : callable
+        Called once with the loop, before its first tick; whoever shows it may look at it.
     """
     run = ControllerRun(settings, rig, clock, sink, progress, supervision, state_changed)
+    watch(run.loop)
     queue, rate_hz = deque(protocol.epochs), settings.rig.tick_rate_hz
     angle_rad, velocity_rad_s = sinusoid(settings.sinusoid, rate_hz)
     session = _Session(
@@ -221,6 +221,7 @@ def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
     ending: Ending = "fail" if why else "success"
     if ticks.interrupted and not why:
         ending, why = "abort", "ended by the operator"
+    again = _repetition(session, planned, ending)
     sink.event(
         "epoch_ended",
         epoch=planned.number,
@@ -230,20 +231,26 @@ def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
         limited_ticks=ticks.limited_ticks,
         missed_ticks=ticks.missed_ticks,
         counts=dict(session.rig.counts),
+        **({"again_as": again.number} if again is not None else {}),
     )
     run.open_epoch = None
     session.epochs_run += 1
     session.epochs_good += ending == "success"
+
+
+def _repetition(session: _Session, planned: PlannedEpoch, ending: Ending) -> PlannedEpoch | None:
+    """Put the repetition of an epoch into the queue, if it is to be repeated, and return it."""
     if planned.label.endswith("r"):  # a repetition is not repeated
-        return
+        return None
     again = replace(planned, number=session.next_number, label=f"{planned.label}r")
     if ending == "abort":
         session.queue.appendleft(again)
-    elif ending == "fail" and settings.protocol.repeat_limited:
+    elif ending == "fail" and session.settings.protocol.repeat_limited:
         session.queue.append(again)
     else:
-        return
+        return None
     session.next_number += 1
+    return again
 
 
 def _zero_sensor(session: _Session) -> bool:
@@ -262,8 +269,8 @@ def _zero_sensor(session: _Session) -> bool:
             break
         if not _ready_for_epoch(session):
             return False
-    bias_nm, noise_sd_nm, why = _bias_and_noise(readings, limits)
-    why = why or _moved(readings, session.settings)
+    bias_nm, noise_sd_nm, why = bias_and_noise(readings, limits)
+    why = why or moved(readings, session.settings)
     session.sink.event(
         "sensor_zeroed",
         time_s=run.loop.time_s,
@@ -276,48 +283,6 @@ def _zero_sensor(session: _Session) -> bool:
         return False
     session.rig.zero(bias_nm)
     return True
-
-
-def _bias_and_noise(
-    readings: Sequence[Reading], limits: ZeroingSettings
-) -> tuple[float, float, str]:
-    """Return mean and SD of the torque at rest in N·m, and why the run must not begin, if so."""
-    torques_nm, stamp_s = [], -math.inf
-    for reading in readings:
-        if reading.torque_time_s > stamp_s:  # one that repeats the sample before counts once
-            stamp_s = reading.torque_time_s
-            torques_nm.append(reading.torque_nm)
-    n = len(torques_nm)
-    if n < FEWEST_ZEROING_SAMPLES:
-        return math.nan, math.nan, f"only {n} torque samples came in {limits.duration_s:g} s"
-    bias_nm, noise_sd_nm = statistics.fmean(torques_nm), statistics.stdev(torques_nm)
-    why = ""
-    if abs(bias_nm) > limits.bias_limit_nm:
-        why = (
-            f"at rest the torque sensor reads {bias_nm:.3g} N·m, more than "
-            f"zeroing.bias_limit_nm = {limits.bias_limit_nm:g} N·m: it was zeroed under load, "
-            "or its calibration is another"
-        )
-    elif noise_sd_nm > limits.noise_limit_nm:
-        why = (
-            f"at rest the torque varies by {noise_sd_nm:.3g} N·m (SD), more than "
-            f"zeroing.noise_limit_nm = {limits.noise_limit_nm:g} N·m: the subject moves, or "
-            "the sensor is noisy"
-        )
-    return bias_nm, noise_sd_nm, why
-
-
-def _moved(readings: Sequence[Reading], settings: Settings) -> str:
-    """Return why a torque is none at rest, if so: a joint in motion needs torque by itself."""
-    limit_deg = settings.zeroing.motion_limit_deg
-    angles_rad = [reading.angle_rad for reading in readings]
-    moved_deg = deg_from_rad(max(angles_rad) - min(angles_rad))
-    if moved_deg <= limit_deg + settings.rig.motion.angle_resolution_deg:
-        return ""
-    return (
-        f"the joint moved by {moved_deg:.3g} deg while the torque sensor was zeroed, more than "
-        f"zeroing.motion_limit_deg = {limit_deg:g} deg: the drive does not hold it still"
-    )
 
 
 def _close(session: _Session) -> None:

@@ -121,7 +121,7 @@ class ControlLoop:
         # What a tick changes.
         self.filtered = BiquadState()
         self.guard, self.consistency = guard_state(self.limits), consistency_state(self.agreement)
-        self.tick = 0
+        self.tick = self.until_tick = 0
         self.elapsed_ticks = 1
         self.late_in_a_row = 0
         self.missed_ticks = 0
@@ -191,6 +191,7 @@ def run_ticks(
     loop.limited_ticks = loop.missed_ticks = 0
     known = loop.guard.reaction if latched else 0
     interrupted = False
+    loop.until_tick = loop.tick + n
     k = 0
     while k < n:
         k = run_tick(loop, epoch, k, command, n - 1) + 1

@@ -99,6 +99,7 @@ def _run(
             supervision=side.supervision,
             zero_first=True,
             state_changed=side.sink.state_changed,
+            watch=side.sink.watch,
         )
     finally:
         rig.close()

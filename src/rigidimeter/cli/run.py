@@ -79,13 +79,13 @@ def run(
     from rigidimeter.cli.realtime_rig import run_loop
     from rigidimeter.cli.sharing import require_packages, write_nwb_beside
     from rigidimeter.commissioning import check_record, require_daily_check, with_measured_floor
-    from rigidimeter.console import Terminal
+    from rigidimeter.console import SessionPlan, Terminal
     from rigidimeter.devices.rigfile import load_rig
     from rigidimeter.recording.resume import count_epochs, require_all
 
     for line in complete_left():
         echo(line, err=True)
-    settings, planned, continues = _planned(protocol, resume, seed, virtual=rig is None)
+    settings, planned, continues, done = _planned(protocol, resume, seed, virtual=rig is None)
     require_packages(settings)
     home_rad = continues.get("origin_rad") if rig is not None else None
     _offer(out)
@@ -105,12 +105,13 @@ def run(
         virtual=rig is None,
         continues=continues,
     )
+    shown = SessionPlan(settings, planned.epochs, done, virtual=rig is None)
     attended = not unattended and sys.stdin is not None and sys.stdin.isatty()
     ended = supervise(
         partial(run_loop, settings, planned, rig, home_rad),
         recording,
         realtime=Realtime(priority=priority, cpu=cpu, attended=attended),
-        console=Terminal(sys.stdin if attended else None, sys.stdout),
+        console=Terminal(sys.stdin if attended else None, sys.stdout, shown),
     )
     for remark in ended.remarks:
         echo(remark, err=True)
@@ -130,8 +131,8 @@ def run(
 
 def _planned(
     path: Path | None, resume: Path | None, seed: int | None, *, virtual: bool
-) -> tuple[Settings, Protocol, dict[str, Any]]:
-    """Return settings, the epochs to run, and what they continue."""
+) -> tuple[Settings, Protocol, dict[str, Any], int]:
+    """Return settings, the epochs to run, what they continue, and how many epochs were done."""
     from rigidimeter.experiment import Protocol, plan
     from rigidimeter.recording.resume import rest_of
     from rigidimeter.settings import changed_settings, load_settings
@@ -141,7 +142,7 @@ def _planned(
         if seed is not None:
             settings = changed_settings(settings, {"seed": seed}, "the options")
         planned = plan(settings.protocol, settings.prbs, settings.sinusoid, settings.seed)
-        return settings, planned, {}
+        return settings, planned, {}, 0
     if path is not None or seed is not None:
         raise UserError(
             "--resume uses the settings and the seed of that session; leave out "
@@ -161,7 +162,8 @@ def _planned(
     if not rest.epochs:
         raise UserError(f"{resume}: nothing is left to run, all {rest.done} epochs are done")
     echo(f"{rest.done} epochs are done; {len(rest.epochs)} are left")
-    return rest.settings, Protocol(rest.settings.seed, rest.epochs), dict(rest.continues)
+    protocol = Protocol(rest.settings.seed, rest.epochs)
+    return rest.settings, protocol, dict(rest.continues), rest.done
 
 
 def _offer(out: Path) -> None:

@@ -1,5 +1,31 @@
 """What the operator sees and says while the rig runs."""
 
+from rigidimeter.console.facts import ConditionCount, EpochFacts, Facts, facts
+from rigidimeter.console.lamps import Lamp, Level, RecorderState
+from rigidimeter.console.limit_distances import LimitDistance
+from rigidimeter.console.live_values import LiveValue
+from rigidimeter.console.observer import Observer
+from rigidimeter.console.progress import EndedEpoch, Progress
+from rigidimeter.console.session_plan import SessionPlan
 from rigidimeter.console.terminal import KEYS, Terminal
+from rigidimeter.console.trace_reader import TraceReader, Traces
 
-__all__ = ["KEYS", "Terminal"]
+__all__ = [
+    "KEYS",
+    "ConditionCount",
+    "EndedEpoch",
+    "EpochFacts",
+    "Facts",
+    "Lamp",
+    "Level",
+    "LimitDistance",
+    "LiveValue",
+    "Observer",
+    "Progress",
+    "RecorderState",
+    "SessionPlan",
+    "Terminal",
+    "TraceReader",
+    "Traces",
+    "facts",
+]

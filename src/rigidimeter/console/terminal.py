@@ -14,16 +14,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import SharedStatus
-from rigidimeter.acquisition.processes.status_values import (
-    Condition,
-    Flag,
-    LiveEstimate,
-    LoopStatus,
-    Role,
-)
-from rigidimeter.acquisition.run_states import Command, Order, State
-from rigidimeter.guard import Cause
+from rigidimeter.acquisition.processes.status_values import Condition, Flag, Role
+from rigidimeter.acquisition.run_states import Command, Order
+from rigidimeter.console.facts import Facts
+from rigidimeter.console.lamps import Level
+from rigidimeter.console.observer import Observer
+from rigidimeter.console.session_plan import SessionPlan
 
 KEYS = {
     "p": Command.PAUSE,
@@ -64,24 +62,22 @@ def order_of(text: str) -> Order | None:
     return Order(command) if command is not None else None
 
 
-def status_line(loop: LoopStatus, live: LiveEstimate | None) -> str:
+def status_line(facts: Facts) -> str:
     """Return what the operator reads, in one line."""
-    where = f"epoch {loop.epoch}" if loop.epoch >= 0 else "rest"
     parts = [
-        f"{loop.time_s:8.1f} s",
-        f"{State(loop.state).name.lower()}, {where}",
-        f"{math.degrees(loop.angle_rad):+6.1f} deg",
-        f"{loop.torque_nm:+6.2f} N·m",
+        f"{facts.time_s:8.1f} s",
+        facts.epoch.text if facts.epoch is not None else facts.state_words,
+        f"{facts.angle_deg:+6.1f} deg",
+        f"{facts.torque_nm:+6.2f} N·m",
     ]
-    if loop.missed_deadlines:
-        parts.append(f"{loop.missed_deadlines} deadlines missed")
-    if live is not None and math.isfinite(live.stiffness_nm_rad):
-        parts.append(
-            f"J {live.inertia_kg_m2:.4f} B {live.damping_nm_s_rad:.3f} "
-            f"K {live.stiffness_nm_rad:.2f} (live)"
-        )
-    if loop.cause:
-        parts.append(Cause(loop.cause).sentence)
+    if facts.countdown_words:
+        parts.insert(2, f"{facts.countdown_words}: {facts.countdown_s:.0f} s left")
+    known = [value.text for value in facts.live if value.settled]
+    if known:
+        parts.append(f"{facts.live_words}, live: {', '.join(known)}")
+    parts += [f"{lamp.name}: {lamp.words}" for lamp in facts.lamps if lamp.level >= Level.WATCH]
+    if facts.stop_words:
+        parts.append(facts.stop_words)
     return " | ".join(parts)
 
 
@@ -93,6 +89,7 @@ class Terminal:
     keyboard : file or None
         Lines are read from it as they come; None for nobody.
     screen : file
+    plan : SessionPlan
     now : callable
         Monotonic seconds.
     """
@@ -101,18 +98,25 @@ class Terminal:
         self,
         keyboard: IO[str] | None,
         screen: IO[str],
+        plan: SessionPlan,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._keyboard, self._screen, self._now = keyboard, screen, now
+        self._plan = plan
+        self._observer: Observer | None = None
         self._shown_s = -math.inf
         self._typed = b""
         self._troubles: dict[Role, str] = {}
         if keyboard is not None:
             self._say(HELP)
 
-    def __call__(self, status: SharedStatus) -> None:
-        """Look at keyboard and status once."""
+    def __call__(self, shared: SessionMemory) -> None:
+        """Look at keyboard and session once."""
+        status = shared.status
         self._listen(status)
+        if self._observer is None:
+            self._observer = Observer(self._plan, shared)
+        facts = self._observer.look()
         for role in (Role.RECORDER, Role.ESTIMATOR):
             note = status.note(role) if status.condition(role) is Condition.TROUBLE else ""
             if note and self._troubles.get(role) != note:
@@ -120,10 +124,9 @@ class Terminal:
             self._troubles[role] = note
         if self._now() - self._shown_s < EVERY_S:
             return
-        loop = status.loop()
-        if loop is not None and loop.tick >= 0:
+        if math.isfinite(facts.angle_deg):
             self._shown_s = self._now()
-            self._say(status_line(loop, status.live()))
+            self._say(status_line(facts))
 
     def _listen(self, status: SharedStatus) -> None:
         if self._keyboard is None:

@@ -56,7 +56,8 @@ def rest_of(folder: Path) -> Rest:
     """Return what is left of a session, however it ended.
 
     An epoch is done when it ended with success, or failed and the session continued: an arm that
-    reached its limit would reach it again. The epoch in which the session ended is repeated.
+    reached its limit would reach it again. So is one whose repetition is done. The epoch in which
+    the session ended is repeated.
 
     Raises
     ------
@@ -81,6 +82,7 @@ def rest_of(folder: Path) -> Rest:
     done |= {event["epoch"] for event in ended[:-1] if event["outcome"] == "fail"}
     if ended and ended[-1]["outcome"] == "fail" and _went_on(events, ended[-1]):
         done.add(ended[-1]["epoch"])
+    done |= {event["epoch"] for event in ended if event.get("again_as") in done}
     # The first session sets the origin: otherwise the limits would drift from session to session.
     origins = [manifest.get("continues", {}), *events]
     for found in origins:

@@ -4,7 +4,7 @@ import time
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition.processes.ring import ROW, EventRing, Reader, SampleReader, SampleRing
+from rigidimeter.acquisition.processes.ring import ROW, EventRing, SampleReader, SampleRing
 from rigidimeter.acquisition.processes.shared_memory import Memory
 from rigidimeter.recording.sample_log import Sample, sample_dtypes
 
@@ -53,7 +53,7 @@ def test_the_writer_neither_waits_nor_writes_over_what_is_not_recorded(ring):
 
 
 def test_a_reader_that_is_overtaken_learns_how_much_it_missed(ring):
-    reader = SampleReader(ring, Reader.CONSOLE)
+    reader = SampleReader(ring)
     for k in range(5):
         ring.push(sample(k))
     rows, missed = reader.read()
@@ -69,7 +69,7 @@ def test_a_reader_that_is_overtaken_learns_how_much_it_missed(ring):
 
 
 def test_a_reader_may_skip_to_the_newest(ring):
-    reader = SampleReader(ring, Reader.CONSOLE)
+    reader = SampleReader(ring)
     for k in range(6):
         ring.push(sample(k))
     rows, missed = reader.read(most=2)
@@ -77,7 +77,7 @@ def test_a_reader_may_skip_to_the_newest(ring):
 
 
 def test_a_reader_overtaken_while_it_copies_gives_up_what_is_torn(ring, monkeypatch):
-    reader = SampleReader(ring, Reader.CONSOLE)
+    reader = SampleReader(ring)
     for k in range(7):
         ring.push(sample(k))
     copy = ring.rows
@@ -144,7 +144,7 @@ def write(name: str, count: int) -> None:
 
 def test_no_row_is_torn_while_another_process_writes():
     ring = SampleRing.create(64)
-    reader = SampleReader(ring, Reader.CONSOLE)
+    reader = SampleReader(ring)
     # Fork, so that the writer needs no import; it uses nothing but the ring.
     process = multiprocessing.get_context("fork").Process(target=write, args=(ring.name, 50_000))
     process.start()

@@ -7,7 +7,7 @@ from tests.unit.acquisition.exact_rig import Desk
 from tests.unit.acquisition.whole_session import RATE_HZ, SENSOR, VALUES, session
 
 from rigidimeter.acquisition.run_states import Command
-from rigidimeter.acquisition.session_run import FEWEST_ZEROING_SAMPLES
+from rigidimeter.acquisition.zeroing import FEWEST_ZEROING_SAMPLES
 from rigidimeter.guard import Cause
 
 

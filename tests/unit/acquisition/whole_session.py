@@ -78,8 +78,7 @@ def session(desk=None, *, change=lambda tick, reading: reading, late=None, value
             LateClock(late, interval_s),
             sink,
             supervision=desk,
-            state_changed=states.append,
-            **options,
+            **{"state_changed": states.append, **options},
         )
     except Exception as caught:
         error = caught

@@ -6,8 +6,10 @@ import math
 import os
 
 import pytest
+from tests.unit.console.test_live_values import estimate
+from tests.unit.console.test_progress import EPOCHS, started, told
 
-from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.status_values import (
     Condition,
     Flag,
@@ -16,8 +18,13 @@ from rigidimeter.acquisition.processes.status_values import (
     Role,
 )
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order, State
+from rigidimeter.console import SessionPlan, facts
+from rigidimeter.console.recent_samples import RecentSamples
 from rigidimeter.console.terminal import KEYS, Terminal, order_of, status_line
 from rigidimeter.guard import Cause
+from rigidimeter.settings import Settings
+
+PLAN = SessionPlan(Settings(), EPOCHS)
 
 
 @pytest.mark.parametrize(
@@ -55,36 +62,45 @@ def test_a_parameter_is_set_by_its_name():
 
 
 def test_the_status_says_where_the_run_is_and_why_it_stands():
-    status = LoopStatus(State.RUNNING, 5, 3, 0, 0, 12.25, 0.1, 0.0, -1.5, 0.0, 0.0)
-    line = status_line(status, None)
-    assert line == "    12.2 s | running, epoch 3 |   +5.7 deg |  -1.50 N·m"
-    assert "live" not in status_line(status, LiveEstimate())
-    live = LiveEstimate(inertia_kg_m2=0.08, damping_nm_s_rad=0.4, stiffness_nm_rad=1.7)
-    assert status_line(status, live).endswith("J 0.0800 B 0.400 K 1.70 (live)")
-    stopped = status._replace(epoch=-1, missed_deadlines=4, cause=int(Cause.STALLED))
-    line = status_line(stopped, None)
-    assert "rest" in line
-    assert "4 deadlines missed" in line
-    assert line.endswith(Cause.STALLED.sentence)
+    progress = told(started(1, "1"))
+    loop = LoopStatus(State.RUNNING, 5, 1, time_s=12.25, angle_rad=0.1, until_s=20.0)
+    recent = RecentSamples(10, -1.5)
+
+    def line(loop, history=()):
+        return status_line(facts(PLAN, progress, loop, history, recent))
+
+    assert line(loop).startswith(
+        "    12.2 s | epoch 1 of 3: OFF, prbs | epoch: 8 s left |   +5.7 deg |  -1.50 N·m"
+    )
+    assert "live" not in line(loop, [LiveEstimate()])
+    known = [estimate(0.1 * k, epoch=1) for k in range(1, 100)]
+    assert "epoch 1, live: J 0.004500 ± 0.000020 kg·m², B" in line(loop, known)
+    wild = LiveEstimate(5, 0, 0, 1, 0.0, 0.2, 0.4701, 0.1, -341.779, 99.0, 75761.14, 9e3, 0.2)
+    assert "live" not in line(loop, [wild])
+    stopped = loop._replace(epoch=-1, missed_deadlines=4, cause=int(Cause.STALLED))
+    assert line(stopped).endswith(f"stopped: {Cause.STALLED.sentence}")
 
 
 class Desk:
     """A terminal on a pipe for its keyboard and one for its screen."""
 
-    def __init__(self, shared_status: SharedStatus) -> None:
-        self.shared_status = shared_status
+    def __init__(self, shared: SessionMemory) -> None:
+        self.shared, self.shared_status = shared, shared.status
         keys, self.keys = os.pipe()
         self.screen, screen = os.pipe()
         os.set_blocking(self.screen, False)
         self.keyboard = os.fdopen(keys)
         self.out = os.fdopen(screen, "w")
         self.now_s = 0.0
-        self.terminal = Terminal(self.keyboard, self.out, lambda: self.now_s)
+        self.terminal = Terminal(self.keyboard, self.out, PLAN, lambda: self.now_s)
         self.said()
 
     def type(self, text: str) -> None:
         os.write(self.keys, text.encode())
-        self.terminal(self.shared_status)
+        self.look()
+
+    def look(self) -> None:
+        self.terminal(self.shared)
 
     def hang_up(self) -> None:
         os.close(self.keys)
@@ -114,17 +130,17 @@ class Desk:
 
 @pytest.fixture
 def desk():
-    shared_status = SharedStatus.create()
-    desk = Desk(shared_status)
+    shared = SessionMemory.create(100.0, 1.0)
+    desk = Desk(shared)
     yield desk
     desk.close()
-    shared_status.memory.unlink()
-    shared_status.close()
+    shared.unlink()
+    shared.close()
 
 
 def test_an_order_goes_once_and_is_confirmed(desk):
     desk.type("p\n")
-    desk.terminal(desk.shared_status)
+    desk.look()
     assert desk.orders() == [Command.PAUSE]
     assert desk.said() == ["ordered: pause"]
 
@@ -164,32 +180,32 @@ def test_a_parameter_mistyped_and_an_empty_line_only_ask_for_help(desk, typed):
 
 def test_bytes_that_are_no_text_pause_too(desk):
     os.write(desk.keys, b"\xff\xfe\n")
-    desk.terminal(desk.shared_status)
+    desk.look()
     assert desk.orders() == [Command.PAUSE_NOW]
 
 
 def test_a_keyboard_that_is_gone_ends_the_run(desk):
     desk.hang_up()
-    desk.terminal(desk.shared_status)
+    desk.look()
     assert desk.shared_status.flag(Flag.END_ASKED)
     assert desk.said() == ["the keyboard is gone: the rig stops"]
-    desk.terminal(desk.shared_status)  # and is not asked again
+    desk.look()  # and is not asked again
     assert desk.said() == []
 
 
 def test_what_was_typed_before_the_keyboard_went_still_counts(desk):
     os.write(desk.keys, b"e\n")
     desk.hang_up()
-    desk.terminal(desk.shared_status)
+    desk.look()
     assert desk.shared_status.flag(Flag.END_ASKED)
     assert desk.shared_status.flag(Flag.EMERGENCY_STOP)
 
 
 def test_without_an_operator_nothing_is_asked(desk):
-    terminal = Terminal(None, desk.out)
+    terminal = Terminal(None, desk.out, PLAN)
     desk.said()
     os.write(desk.keys, b"e\n")
-    terminal(desk.shared_status)
+    terminal(desk.shared)
     assert not desk.shared_status.flag(Flag.EMERGENCY_STOP)
 
 
@@ -214,20 +230,18 @@ def test_a_screen_that_takes_nothing_does_not_hold_the_operator_up(desk):
 
 
 def test_the_loop_is_shown_once_a_second_and_trouble_once(desk):
-    desk.shared_status.show_loop(
-        LoopStatus(State.RUNNING, 1, 1, 0, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    )
+    desk.shared_status.show_loop(LoopStatus(State.RUNNING, 1, 1, time_s=1.0, angle_rad=0.0))
     desk.shared_status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
     for _ in range(5):
-        desk.terminal(desk.shared_status)
+        desk.look()
     assert [line.split(" | ")[0].strip() for line in desk.said()] == ["the disk is full", "1.0 s"]
     desk.now_s += 1.0
-    desk.terminal(desk.shared_status)
+    desk.look()
     assert len(desk.said()) == 1
     desk.shared_status.set_condition(Role.RECORDER, Condition.RUNNING)
-    desk.terminal(desk.shared_status)
+    desk.look()
     desk.shared_status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
-    desk.terminal(desk.shared_status)
+    desk.look()
     assert desk.said() == ["the disk is full"]
 
 
@@ -248,5 +262,5 @@ def test_another_folder_is_asked_for_while_the_recorder_can_write_nothing(desk, 
 def test_before_the_first_tick_nothing_is_shown(desk):
     assert desk.shared_status.loop() is not None
     assert math.isnan(desk.shared_status.loop().angle_rad)
-    desk.terminal(desk.shared_status)
+    desk.look()
     assert desk.said() == []

@@ -50,6 +50,14 @@ def test_what_was_not_run_to_its_end_is_left(session):
     assert rest.settings == SETTINGS
 
 
+def test_an_epoch_whose_repetition_is_done_is_done(tmp_path):
+    writer = SessionWriter(tmp_path / "s", SETTINGS, [asdict(e) for e in EPOCHS], {}, virtual=True)
+    for number, outcome, more in ((1, "abort", {"again_as": 4}), (4, "success", {})):
+        writer.event("epoch_ended", epoch=number, time_s=1.0, outcome=outcome, reason="", **more)
+    writer.close(1.0, "abort", "aborted by the operator")
+    assert rest_of(tmp_path / "s").epochs == EPOCHS[1:]
+
+
 @pytest.mark.parametrize("closed", [True, False])
 def test_it_goes_on_from_where_the_joint_stood(session, closed):
     rest = rest_of(session("s", origin_rad=-0.25, closed=closed))

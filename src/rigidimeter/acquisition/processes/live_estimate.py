@@ -1,7 +1,8 @@
 """The live estimator's process: J, B and K from the ring to the shared status, while the arm moves.
 
 It reads the samples as the console does: where it falls behind it misses some, begins anew, and
-says how many. Nothing waits for it.
+says how many. Nothing waits for it. It begins anew with every epoch too: the joint stands still
+then, which is how the filters begin, and no condition is mixed with another. Rests are left out.
 """
 
 from __future__ import annotations
@@ -14,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.acquisition.processes.end_signals import leave_to_the_others
-from rigidimeter.acquisition.processes.ring import Reader, SampleReader
+from rigidimeter.acquisition.processes.ring import SampleReader
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.acquisition.processes.status_values import Condition, LiveEstimate, Role
+from rigidimeter.acquisition.tick import REST
 from rigidimeter.estimation.online import (
     STATE_SIZE,
     compiled_online_step,
@@ -46,24 +48,40 @@ class Estimator:
         self._step(self._values, np.zeros(STATE_SIZE), 0.0, 0.0, 0.0)  # compile now, not later
         self._state: Any = np.zeros(STATE_SIZE)
         self._missed = 0
+        self._tick, self._epoch = -1, REST
+        self._since_s = self._time_s = 0.0
 
     def take(self, rows: NDArray[np.void], missed: int) -> LiveEstimate:
-        """Take samples; after a gap the filters and the memory begin anew."""
-        if missed:
-            self._missed += missed
-            self._state = np.zeros(STATE_SIZE)
+        """Take samples; after a gap, and with a new epoch, filters and memory begin anew."""
+        begins = np.flatnonzero(np.diff(rows["epoch"])) + 1
+        for k, part in enumerate(np.split(rows, begins)):
+            epoch, gap = int(part["epoch"][0]), missed and k == 0
+            if gap:
+                self._missed += missed
+            if epoch == REST:
+                continue
+            if gap or epoch != self._epoch:
+                self._epoch, self._since_s = epoch, float(part["time_s"][0])
+                self._state = np.zeros(STATE_SIZE)
+            self._take(part)
+        found = online_reading(self._design, self._state, self._rate_hz)
+        return LiveEstimate(
+            tick=self._tick,
+            resting=int(found.resting),
+            missed_samples=self._missed,
+            epoch=self._epoch,
+            since_s=self._since_s,
+            time_s=self._time_s,
+            **{name: getattr(found, name) for name in LiveEstimate._fields[6:]},
+        )
+
+    def _take(self, rows: NDArray[np.void]) -> None:
+        """Take samples of one epoch."""
         step, values, state = self._step, self._values, self._state
         columns = (rows[name].tolist() for name in ("torque_nm", "angle_rad", "velocity_rad_s"))
         for torque_nm, angle_rad, velocity_rad_s in zip(*columns, strict=True):
             step(values, state, torque_nm, angle_rad, velocity_rad_s)
-        found = online_reading(self._design, state, self._rate_hz)
-        return LiveEstimate(
-            tick=int(rows["tick"][-1]),
-            resting=int(found.resting),
-            missed_samples=self._missed,
-            time_s=float(rows["time_s"][-1]),
-            **{name: getattr(found, name) for name in LiveEstimate._fields[4:]},
-        )
+        self._tick, self._time_s = int(rows["tick"][-1]), float(rows["time_s"][-1])
 
 
 def estimator_main(
@@ -92,7 +110,7 @@ def estimator_main(
     try:
         status.join(Role.ESTIMATOR)
         estimator = Estimator(settings, rate_hz)
-        reader = SampleReader(shared.samples, Reader.ESTIMATOR)
+        reader = SampleReader(shared.samples)
         status.set_condition(Role.ESTIMATOR, Condition.RUNNING)
         while os.getppid() == console_pid and _session_runs(status, lost_s):
             status.beat(Role.ESTIMATOR)

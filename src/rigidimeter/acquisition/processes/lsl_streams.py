@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.acquisition.processes.end_signals import leave_to_the_others
-from rigidimeter.acquisition.processes.ring import ROW, Reader, SampleReader
+from rigidimeter.acquisition.processes.ring import ROW, SampleReader
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.acquisition.processes.status_values import Condition, Role
@@ -160,7 +160,7 @@ def streamer_main(
 
 
 def _send(streams: Streams, shared: SessionMemory, lost_s: float, console_pid: int) -> None:
-    reader = SampleReader(shared.samples, Reader.STREAM)
+    reader = SampleReader(shared.samples)
     sent_events = 0
     while True:
         over = os.getppid() != console_pid or _is_over(shared.status, lost_s)

@@ -107,6 +107,8 @@ class FsyncWorker:
                 for descriptor in self._descriptors:
                     os.fsync(descriptor)
                 self._status.synced_samples = self._samples
+                room = os.fstatvfs(self._descriptors[0])
+                self._status.free_bytes = room.f_bavail * room.f_frsize
                 self.error = ""
             except OSError as error:
                 self.error = error.strerror or str(error)

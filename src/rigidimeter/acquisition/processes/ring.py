@@ -2,8 +2,9 @@
 
 One process writes, the loop. It never waits: where there is no room it says so and counts. Room is
 what the recorder has put into the file: its cursor moves only then, so what is not in the file is
-still in the ring, whoever is killed. Other readers have cursors of their own, which the writer does
-not look at; they may fall behind, and then learn how many rows they missed.
+still in the ring, whoever is killed. Other readers, as many as there are, know for themselves how
+far they have read, which the writer does not look at; they may fall behind, and then learn how many
+they missed.
 
     written   how many rows there ever were; stored after the row itself
     recorded  how many of them are in the file; stored by the recorder
@@ -21,7 +22,6 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Mapping
-from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,16 +43,7 @@ _HEADER_BYTES = 512
 # Words of the header; what different processes write is at least a cache line apart.
 _KIND, _CAPACITY, _SLOT_BYTES = 0, 1, 2
 _WRITTEN, _REFUSED = 8, 9
-_CURSORS = 16
-
-
-class Reader(IntEnum):
-    """Who reads; each has a cursor in the ring."""
-
-    RECORDER = 0
-    CONSOLE = 1
-    ESTIMATOR = 2
-    STREAM = 3
+_RECORDED = 16
 
 
 class _Ring:
@@ -66,7 +57,6 @@ class _Ring:
         self._slot_bytes = slot_bytes
         self._words = memory.words
         self._bytes = memory.bytes
-        self._recorded_at = _CURSORS + 8 * Reader.RECORDER
 
     @classmethod
     def _make(cls, capacity: int, slot_bytes: int, name: str) -> Memory:
@@ -102,15 +92,15 @@ class _Ring:
     @property
     def recorded(self) -> int:
         """How many are in the file."""
-        return self._words[self._recorded_at]
+        return self._words[_RECORDED]
 
     @recorded.setter
     def recorded(self, count: int) -> None:
-        self._words[self._recorded_at] = count
+        self._words[_RECORDED] = count
 
     def lag(self) -> int:
         """Return how many wait for the recorder."""
-        return self._words[_WRITTEN] - self._words[self._recorded_at]
+        return self._words[_WRITTEN] - self._words[_RECORDED]
 
     def close(self) -> None:
         """Let go of the memory."""
@@ -149,7 +139,7 @@ class SampleRing(_Ring):
         """Write a row; return False, having counted it, where there is no room."""
         words = self._words
         written = words[_WRITTEN]
-        if written - words[self._recorded_at] >= self.capacity:
+        if written - words[_RECORDED] >= self.capacity:
             words[_REFUSED] += 1
             return False
         _ROW_FORMAT.pack_into(
@@ -176,11 +166,18 @@ class SampleRing(_Ring):
 
 
 class SampleReader:
-    """A reader that may fall behind: the console, the live estimate."""
+    """A reader that may fall behind: the console, the live estimate.
 
-    def __init__(self, ring: SampleRing, reader: Reader) -> None:
+    Parameters
+    ----------
+    ring : SampleRing
+    next_row : int
+        The first row to read.
+    """
+
+    def __init__(self, ring: SampleRing, next_row: int = 0) -> None:
         self._ring = ring
-        self._at = _CURSORS + 8 * reader
+        self._next = next_row
 
     def read(
         self, most: int | None = None, *, recorded: bool = False
@@ -194,8 +191,7 @@ class SampleReader:
         recorded : bool
             Of those alone that are in the file.
         """
-        ring, words = self._ring, self._ring.memory.words
-        before = words[self._at]
+        ring, before = self._ring, self._next
         written = ring.recorded if recorded else ring.written
         first = min(max(before, ring.written - ring.capacity + 1), written)
         if most is not None:
@@ -206,7 +202,7 @@ class SampleReader:
         if safe > first:
             rows = rows[safe - first :]
             first = min(safe, written)
-        words[self._at] = written
+        self._next = written
         return rows, first - before
 
 
@@ -255,7 +251,7 @@ class EventRing(_Ring):
             )
         words = self._words
         written = words[_WRITTEN]
-        if written - words[self._recorded_at] >= self.capacity:
+        if written - words[_RECORDED] >= self.capacity:
             words[_REFUSED] += 1
             return False
         at = _HEADER_BYTES + written % self.capacity * self._slot_bytes

@@ -36,7 +36,7 @@ _KIND = 0x424F415244
 # Words, a cache line of 8 for each writer.
 _HEARTS, _PIDS, _CONDITIONS, _FLAGS = 8, 40, 48, 56
 _ORDERED, _TAKEN = 64, 72
-_SYNCED = 80
+_SYNCED, _FREE = 80, 81
 _STATUS, _LIVE = 96, 128
 _ORDERS_BYTE, _NOTES_BYTE = 2048, 4096
 _NOTE_BYTES = 1024
@@ -116,8 +116,8 @@ class SharedStatus:
         self._bytes = memory.bytes
         self._now_ns = now_ns
         self._noted = 0
-        self._loop = _Block(memory, _STATUS, "@5q6d")
-        self._live = _Block(memory, _LIVE, "@3q8d")
+        self._loop = _Block(memory, _STATUS, "@6q8d")
+        self._live = _Block(memory, _LIVE, "@4q9d")
         note = f"@q{NOTE_BYTES}s"
         self._notes = [
             _Block(memory, (_NOTES_BYTE + role * _NOTE_BYTES) // 8, note) for role in Role
@@ -326,3 +326,12 @@ class SharedStatus:
     @synced_samples.setter
     def synced_samples(self, count: int) -> None:
         self._words[_SYNCED] = count
+
+    @property
+    def free_bytes(self) -> int | None:
+        """How much room there is where is recorded; None before that is known."""
+        return self._words[_FREE] - 1 if self._words[_FREE] else None
+
+    @free_bytes.setter
+    def free_bytes(self, count: int) -> None:
+        self._words[_FREE] = count + 1

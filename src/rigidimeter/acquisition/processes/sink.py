@@ -11,8 +11,15 @@ from typing import Any
 
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import Nanoseconds
-from rigidimeter.acquisition.processes.status_values import Condition, LoopStatus, Role
+from rigidimeter.acquisition.processes.status_values import (
+    PAUSE_NEXT,
+    STOP_NEXT,
+    Condition,
+    LoopStatus,
+    Role,
+)
 from rigidimeter.acquisition.run_states import Command, Order, Run, State
+from rigidimeter.acquisition.tick import ControlLoop
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.recording.session_folder import Ending
@@ -48,7 +55,8 @@ class RingSink:
         self._heart = shared.status.places()[-1]
         self._interval_s = 1.0 / tick_rate_hz
         self._missed = 0
-        self._state = State.IDLE
+        self._state, self._pending = State.IDLE, 0
+        self._loop: ControlLoop | None = None
         self._begun = False
         self._show_s = -math.inf
         self.closed = False
@@ -69,6 +77,7 @@ class RingSink:
         if not self._begun:
             self._begun = True
             self._status.set_condition(Role.LOOP, Condition.RUNNING)
+        loop = self._loop
         self._status.show_loop(
             LoopStatus(
                 state=self._state,
@@ -76,18 +85,26 @@ class RingSink:
                 epoch=sample.epoch,
                 cause=sample.cause,
                 missed_deadlines=self._missed,
+                pending=self._pending,
                 time_s=sample.time_s,
                 angle_rad=sample.angle_rad,
                 velocity_rad_s=sample.velocity_rad_s,
                 torque_nm=sample.torque_nm,
                 perturbation_nm=sample.perturbation_nm,
                 velocity_command_rad_s=sample.velocity_command_rad_s,
+                until_s=math.nan if loop is None else loop.until_tick / loop.rate_hz,
+                energy_j=math.nan if loop is None else loop.guard.energy_j,
             )
         )
+
+    def watch(self, loop: ControlLoop) -> None:
+        """Show of this loop, from now on, what no sample says."""
+        self._loop = loop
 
     def state_changed(self, run: Run) -> None:
         """Take the state of the run, to be shown with the next sample."""
         self._state = run.state
+        self._pending = PAUSE_NEXT * run.pause_next + STOP_NEXT * run.stop_next
         self._show_s = -math.inf
         if run.state in (State.STOPPING, State.FAULTED):
             self._stopping()

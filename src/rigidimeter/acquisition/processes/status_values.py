@@ -45,31 +45,46 @@ class Flag(IntEnum):
     ABORT_ASKED = 2
 
 
+PAUSE_NEXT, STOP_NEXT = 1, 2
+"""What `LoopStatus.pending` adds up: a pause, and the end, after this epoch."""
+
+
 class LoopStatus(NamedTuple):
-    """What the loop shows of itself. `state` is a `states.State`, `cause` a `guard.Cause`."""
+    """What the loop shows of itself. `state` is a `states.State`, `cause` a `guard.Cause`.
+
+    `pending` says what comes after this epoch. `until_s` is when the epoch, the rest or whatever
+    else runs ends as planned, `energy_j` what the guard counts as going to and fro.
+    """
 
     state: int = 0
     tick: int = -1
     epoch: int = -1
     cause: int = int(Cause.NONE)
     missed_deadlines: int = 0
+    pending: int = 0
     time_s: float = 0.0
     angle_rad: float = math.nan
     velocity_rad_s: float = math.nan
     torque_nm: float = math.nan
     perturbation_nm: float = math.nan
     velocity_command_rad_s: float = math.nan
+    until_s: float = math.nan
+    energy_j: float = math.nan
 
 
 class LiveEstimate(NamedTuple):
     """What the live estimator knows: J, B, K with standard errors, and of what time.
 
+    Every epoch is estimated anew, so that no condition is mixed with another: `epoch` is the last
+    one of which samples were taken, `since_s` and `time_s` when the first and the last of them was.
     `missed_samples` is how many it could not read in time, in all.
     """
 
     tick: int = -1
     resting: int = 0
     missed_samples: int = 0
+    epoch: int = -1
+    since_s: float = 0.0
     time_s: float = 0.0
     inertia_kg_m2: float = math.nan
     inertia_kg_m2_se: float = math.inf

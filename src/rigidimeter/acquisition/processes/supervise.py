@@ -79,7 +79,7 @@ def supervise(
     *,
     realtime: Realtime | None = None,
     patience: Patience | None = None,
-    console: Callable[[SharedStatus], object] = lambda _: None,
+    console: Callable[[SessionMemory], object] = lambda _: None,
     operator_seen_ns: Callable[[], int] | None = None,
     ring_s: float = RING_S,
 ) -> Ended:
@@ -96,8 +96,8 @@ def supervise(
     realtime : Realtime
     patience : Patience
     console : callable
-        Called in this process about 20 times a second with the shared status. It must return soon:
-        the loop stops when this process is silent.
+        Called in this process about 20 times a second with the rings and the shared status. It
+        must return soon: the loop stops when this process is silent.
     operator_seen_ns : callable
         When the operator was last known to be there, in nanoseconds of CLOCK_MONOTONIC, for a
         console of which this process is only a part: the loop stops when that is too long ago.
@@ -140,7 +140,7 @@ def supervise(
             if recording.settings.sharing.lsl:
                 sending = (recording.settings, shared.names, patience.stopping_s, me)
                 streamer = start("lsl", _streamer_main, *sending)
-            look = _Look(status, console, operator_seen_ns or time.monotonic_ns)
+            look = _Look(shared, console, operator_seen_ns or time.monotonic_ns)
             remarks = _see_through(loop, recorder, status, patience, look)
             recorder_watch = WatchedProcess(recorder.pid or 0)
             try:
@@ -177,11 +177,11 @@ class _Look:
 
     def __init__(
         self,
-        status: SharedStatus,
-        console: Callable[[SharedStatus], object],
+        shared: SessionMemory,
+        console: Callable[[SessionMemory], object],
         operator_seen_ns: Callable[[], int],
     ) -> None:
-        self._status, self._console = status, console
+        self._shared, self._status, self._console = shared, shared.status, console
         self._operator_seen_ns = operator_seen_ns
         self.remarks: list[str] = []
 
@@ -190,7 +190,7 @@ class _Look:
         if self.remarks:
             return
         try:
-            self._console(self._status)
+            self._console(self._shared)
         except Exception as error:
             with contextlib.suppress(OSError):  # of a terminal that is gone
                 traceback.print_exc()

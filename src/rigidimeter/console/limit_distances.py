@@ -1,0 +1,81 @@
+"""How far the joint is from each limit of the guard, in the limit's unit and as a part of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rigidimeter.console.recent_samples import RecentSamples
+from rigidimeter.settings import GuardSettings
+from rigidimeter.units import deg_from_rad
+
+NEAR = 0.8
+"""From this part of a limit on, the joint is near it."""
+
+
+@dataclass(frozen=True)
+class LimitDistance:
+    """The largest value of the last second, and the limit.
+
+    Attributes
+    ----------
+    name, unit : str
+    value, limit : float
+        In `unit`; NaN where the value is not known.
+    beyond : str
+        What the guard does at the limit.
+    """
+
+    name: str
+    unit: str
+    value: float
+    limit: float
+    beyond: str
+
+    @property
+    def left(self) -> float:
+        """What is left to the limit, in its unit; negative beyond it."""
+        return self.limit - self.value
+
+    @property
+    def part(self) -> float:
+        """The value as a part of the limit: 1 at the limit."""
+        return self.value / self.limit
+
+    @property
+    def near(self) -> bool:
+        """Whether the joint is near the limit or beyond it."""
+        return self.part >= NEAR
+
+
+def limit_distances(
+    guard: GuardSettings, recent: RecentSamples, energy_j: float
+) -> tuple[LimitDistance, ...]:
+    """Return the distance to each limit.
+
+    Parameters
+    ----------
+    guard : GuardSettings
+    recent : RecentSamples
+    energy_j : float
+        What the guard counts as going to and fro within a second.
+    """
+    holds, stops = "the rig holds still", "the rig stops"
+    return (
+        LimitDistance(
+            "angle",
+            "deg",
+            deg_from_rad(recent.largest_angle_rad),
+            guard.position_limit_deg,
+            "the arm is braked; held there for 1 s, the rig holds still",
+        ),
+        LimitDistance(
+            "speed",
+            "deg/s",
+            deg_from_rad(recent.largest_velocity_rad_s),
+            guard.speed_limit_deg_s,
+            "the command is cut to it; a joint a quarter faster stops the rig",
+        ),
+        LimitDistance("torque", "N·m", recent.largest_torque_nm, guard.torque_limit_nm, holds),
+        LimitDistance("power", "W", recent.largest_power_w, guard.power_limit_w, holds),
+        LimitDistance("energy", "J", energy_j, guard.energy_limit_j, stops),
+    )

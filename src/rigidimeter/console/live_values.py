@@ -1,0 +1,116 @@
+"""J, B and K while the epoch runs, with their intervals; hidden until they mean something.
+
+A value means something once
+
+- the causal filters have forgotten how they began. The slowest is the high-pass, a Butterworth
+  filter of second order with the poles ω (−1 ± i) / √2, ω = 2π f: what it keeps of its beginning
+  falls as exp(−ω t / √2), to 5 % after t = 3 √2 / ω, 4.5 s at 0.15 Hz;
+- half of its 95 % interval is below half of the value: zero, and so the other sign, is then more
+  than twice as far away as the interval reaches;
+- it no longer moves: half of what is remembered ago it differed by less than half of what it is
+  now. The standard error allows for noise that is white in the band, so it may be small while the
+  value still comes down from far away.
+
+An imposed sinusoid has one frequency, at which K − J ω² is all that can be known of J and K, so
+nothing is shown of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigidimeter.acquisition.processes.status_values import LiveEstimate
+from rigidimeter.settings import OnlineSettings
+
+MOST_PART = 0.5
+"""Half an interval, and a shift, above this part of the value say that it is not known yet."""
+
+NORMAL_95 = 1.959963984540054
+
+_VALUES = (
+    ("J", "inertia_kg_m2", "kg·m²"),
+    ("B", "damping_nm_s_rad", "N·m·s/rad"),
+    ("K", "stiffness_nm_rad", "N·m/rad"),
+)
+
+
+@dataclass(frozen=True)
+class LiveValue:
+    """One parameter as the operator may read it.
+
+    Attributes
+    ----------
+    symbol, unit : str
+    value, half_width : float
+        The estimate and half of its 95 % interval; NaN where nothing is known.
+    settled : bool
+        Whether to show them.
+    why_not : str
+        Why they are hidden, in words; empty where they are not.
+    """
+
+    symbol: str
+    unit: str
+    value: float
+    half_width: float
+    settled: bool
+    why_not: str
+
+    @property
+    def text(self) -> str:
+        """The value with its interval and unit, or why there is none."""
+        if not self.settled:
+            return f"{self.symbol} {self.why_not}"
+        # As many digits as the interval gives: two of its half width.
+        digits = max(0, 1 - math.floor(math.log10(self.half_width))) if self.half_width > 0 else 4
+        return f"{self.symbol} {self.value:.{digits}f} ± {self.half_width:.{digits}f} {self.unit}"
+
+
+def settling_s(settings: OnlineSettings) -> float:
+    """Return after how long the filters have forgotten their beginning, to 5 %."""
+    return 3.0 * math.sqrt(2.0) / (2.0 * math.pi * settings.band_low_hz)
+
+
+def live_values(
+    history: Sequence[LiveEstimate], task: str, settings: OnlineSettings
+) -> tuple[LiveValue, ...]:
+    """Return J, B and K of the last estimate.
+
+    Parameters
+    ----------
+    history : sequence of LiveEstimate
+        Oldest first; those of other epochs are passed over.
+    task : str
+        Of the epoch that was estimated.
+    settings : OnlineSettings
+    """
+    now = history[-1] if history else LiveEstimate()
+    elapsed_s = now.time_s - now.since_s
+    common = ""
+    if now.epoch < 0:
+        common = "no epoch yet"
+    elif task != "prbs":
+        common = "not from a sinusoid"
+    elif elapsed_s < settling_s(settings):
+        common = f"in {settling_s(settings) - elapsed_s:.0f} s"
+    # As much was remembered when half of it had been seen.
+    middle_s = now.time_s - min(elapsed_s, now.memory_s) / 2.0
+    same = [one for one in history if (one.epoch, one.since_s) == (now.epoch, now.since_s)]
+    before = next((one for one in reversed(same) if one.time_s <= middle_s), None)
+    return tuple(_value(symbol, name, unit, now, before, common) for symbol, name, unit in _VALUES)
+
+
+def _value(
+    symbol: str, name: str, unit: str, now: LiveEstimate, before: LiveEstimate | None, why: str
+) -> LiveValue:
+    value, half_width = getattr(now, name), NORMAL_95 * getattr(now, f"{name}_se")
+    shift = abs(value - getattr(before, name)) if before is not None else math.inf
+    if not why:
+        if not half_width < MOST_PART * abs(value):
+            percent = 100.0 * half_width / abs(value) if value else math.inf
+            why = f"not known yet (±{percent:.0f} %)" if percent < 1000 else "not known yet"
+        elif not shift < MOST_PART * abs(value):
+            why = "still changes"
+    return LiveValue(symbol, unit, value, half_width, not why, why)

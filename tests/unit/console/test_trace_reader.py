@@ -1,0 +1,98 @@
+"""Traces from the ring: least and largest of each few ticks, none twice, none torn."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rigidimeter.acquisition.processes.ring import SampleRing
+from rigidimeter.console.trace_reader import TraceReader
+from rigidimeter.recording.sample_log import Sample
+
+RATE_HZ = 1000.0
+
+
+@pytest.fixture
+def ring():
+    ring = SampleRing.create(capacity=200)
+    yield ring
+    ring.memory.unlink()
+    ring.close()
+
+
+def push(ring, first, stop, torque=lambda k: float(k)):
+    for k in range(first, stop):
+        ring.recorded = ring.written
+        values = (k, k / RATE_HZ, 0.0, k // 50, 0.0, torque(k), 0.0, 0.1, *[0.0] * 5, 0)
+        assert ring.push(Sample(*values))
+
+
+def test_each_piece_has_its_least_and_largest_value_and_comes_once(ring):
+    reader = TraceReader(ring, RATE_HZ, points_per_s=250.0)
+    push(ring, 0, 10, lambda k: (-1.0) ** k * k)
+    traces = reader.read()
+    assert traces.time_s.tolist() == [0.0, 0.004]  # ticks 8 and 9 wait for theirs
+    assert traces.low["torque_nm"].tolist() == [-3.0, -7.0]
+    assert traces.high["torque_nm"].tolist() == [2.0, 6.0]
+    push(ring, 10, 12)
+    traces = reader.read()
+    assert traces.time_s.tolist() == [0.008]
+    assert traces.low["torque_nm"].tolist() == [-9.0]
+    assert reader.read().time_s.size == 0
+
+
+def test_in_pieces_or_at_once_it_is_the_same(ring):
+    torque = np.random.default_rng(1).normal(size=120).tolist()
+    whole, parts = TraceReader(ring, RATE_HZ), TraceReader(ring, RATE_HZ)
+    found = []
+    for k in range(120):
+        push(ring, k, k + 1, torque.__getitem__)
+        if k % 7 == 0:
+            found.append(parts.read())
+    found.append(parts.read())
+    at_once = whole.read()
+    for name in ("torque_nm", "angle_rad"):
+        np.testing.assert_array_equal(
+            np.concatenate([traces.low[name] for traces in found]), at_once.low[name]
+        )
+    low = np.reshape(torque, (30, 4)).min(axis=1)
+    np.testing.assert_array_equal(at_once.low["torque_nm"], low)
+    assert at_once.epoch[[0, 11, 12, 29]].tolist() == [0, 0, 1, 2]  # of the last sample
+
+
+def test_a_tick_that_was_left_out_leaves_its_piece_shorter(ring):
+    reader = TraceReader(ring, RATE_HZ)
+    push(ring, 0, 2)
+    push(ring, 6, 8)
+    traces = reader.read()
+    assert traces.time_s.tolist() == [0.0, 0.006]
+    assert traces.high["torque_nm"].tolist() == [1.0, 7.0]
+
+
+def test_no_number_is_a_gap_in_the_trace_and_not_a_peak(ring):
+    reader = TraceReader(ring, RATE_HZ)
+    push(ring, 0, 4, lambda k: math.nan)
+    push(ring, 4, 8, lambda k: math.inf if k == 5 else 1.0)
+    traces = reader.read()
+    assert math.isnan(traces.low["torque_nm"][0])
+    assert traces.high["torque_nm"][1] == 1.0
+
+
+def test_one_that_comes_too_late_says_how_much_it_missed_and_goes_on(ring):
+    reader = TraceReader(ring, RATE_HZ)
+    push(ring, 0, 6)
+    reader.read()
+    push(ring, 6, 1000)
+    traces = reader.read()
+    assert traces.missed == 1000 - 199 - 6
+    assert traces.time_s[0] == pytest.approx(0.801)  # not joined to what it had kept
+    assert traces.time_s[-1] == pytest.approx(0.996)
+
+
+def test_the_past_that_is_still_there_comes_with_the_first_call(ring):
+    push(ring, 0, 100)
+    assert TraceReader(ring, RATE_HZ).read().time_s.size == 0
+    traces = TraceReader(ring, RATE_HZ, back_s=0.04).read()
+    assert traces.time_s[[0, -1]].tolist() == [0.06, 0.096]
+    assert traces.missed == 0
+    assert TraceReader(ring, RATE_HZ, back_s=60.0).read().time_s[0] == 0.0
