@@ -25,14 +25,13 @@ class Entry:
     """A recording of the joint.
 
     `files` are read, `write` makes them in a folder; `said` is what a person adds that no file
-    says; `refused` is a part of the refusal, `warned` of the warning, where there must be one.
+    says; `refused` is a part of the refusal, where there must be one.
     """
 
     files: tuple[str, ...]
     write: Callable[[Path], object]
     said: Mapping[str, object] = field(default_factory=dict)
     refused: str = ""
-    warned: str = ""
 
 
 T, M, D = TIME_S, TORQUE_NM, ANGLE_DEG
@@ -48,8 +47,8 @@ FULL = [Signal("Torque", "mV", 8000 * M), Signal("Angle", "mV", 500 * D)]
 
 def _one(file: str, writer: Callable, *arguments: object, **more: object) -> Entry:
     said = more.pop("said", {})
-    told = {name: more.pop(name, "") for name in ("refused", "warned")}
-    return Entry((file,), lambda folder: writer(folder / file, *arguments, **more), said, **told)
+    refused = more.pop("refused", "")
+    return Entry((file,), lambda folder: writer(folder / file, *arguments, **more), said, refused)
 
 
 def _save(path: Path, **values: object) -> None:
@@ -97,7 +96,11 @@ FILES: Mapping[str, Entry] = {
     ),
     "TDMS, small degrees stated as rad": _one(
         "r.tdms", instruments.write_tdms, [TORQUE, Signal("Angle", "rad", D / 8)],
-        warned="more than most limbs move",
+        refused="unusually fast",
+    ),
+    "TDMS, rad stated as degrees": _one(
+        "r.tdms", instruments.write_tdms, [TORQUE, Signal("Angle", "deg", ANGLE_RAD)],
+        refused="unusually slow",
     ),
     "C3D": _one("r.c3d", instruments.write_c3d, [TORQUE, ANGLE]),
     "C3D in N·mm": _one(
@@ -105,7 +108,11 @@ FILES: Mapping[str, Entry] = {
     ),
     "C3D, N·mm stated as N·m": _one(
         "r.c3d", instruments.write_c3d, [Signal("Moment", "Nm", MILLI * M), ANGLE],
-        warned="more than most joints take",
+        refused="unusually large",
+    ),
+    "C3D, N·m stated as N·mm": _one(
+        "r.c3d", instruments.write_c3d, [Signal("Moment", "N.mm", M), ANGLE],
+        refused="unusually small",
     ),
     "C3D with a force": _one("r.c3d", instruments.write_c3d, [FORCE, ANGLE], refused="lever arm"),
     "C3D with a force and its lever arm": _one(

@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
-from rigidimeter.recording.channels.looks import Look
 from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.readings import (
+    confusions,
     doubts,
     look_at,
-    oddities,
     options_text,
     readings,
     sign_fault,
@@ -146,23 +145,13 @@ def _unstated(
     *,
     usable: bool,
 ) -> list[str]:
-    vary = [taken.standard for taken in choice.unstated]
+    vary: dict[str, tuple[str, ...]] = {taken.standard: () for taken in choice.unstated}
     columns = ", ".join(repr(taken.column) for taken in choice.unstated)
     text = (
         f"{table.source}: the unit of {columns} is stated nowhere, so nothing is estimated; say "
         f"{options_text(vary)}"
     )
     return [text, *(readings(choice.taken, raw, rate_hz, vary) if usable else [])]
-
-
-def _unusual(table: Table, taken: Mapping[str, Taken], seen: Look) -> list[str]:
-    """Return a warning for each unit that the file alone states and that may be wrong."""
-    return [
-        f"{table.source}: column {one.column!r} is in {one.unit}, and {odd.text}; if that is "
-        f"right, say --unit {BY_STANDARD[odd.standard].name}={one.unit}"
-        for odd in oddities(seen)
-        if (one := taken.get(odd.standard)) is not None and not one.of_user
-    ]
 
 
 def _doubtful(
@@ -184,9 +173,13 @@ def _doubtful(
     if wrong := sign_fault(seen, columns, reaction=options.reaction):
         return [f"{table.source}: {wrong}"], []
     faults: list[str] = []
-    found = doubts(seen)
-    warnings = [] if found else _unusual(table, taken, seen)
-    for doubt in found:
+    warnings: list[str] = []
+    of_file = {
+        name: one.to_si.factor
+        for name, one in taken.items()
+        if name in ("torque_nm", motion) and one.to_si is not None and not one.of_user
+    }
+    for doubt in doubts(seen) or confusions(seen, of_file):
         one = taken.get(doubt.standard)
         if one is None:
             option = "check --rate-hz" if options.rate_hz is not None else "say --rate-hz"
@@ -197,8 +190,6 @@ def _doubtful(
         if one.of_user:
             warnings.append(f"{text}; it is read as the unit that was given says")
             continue
-        faults += [
-            f"{text}; say {options_text([doubt.standard])}",
-            *readings(taken, signed, rate_hz, [doubt.standard]),
-        ]
+        vary = {doubt.standard: doubt.units}
+        faults += [f"{text}; say {options_text(vary)}", *readings(taken, signed, rate_hz, vary)]
     return faults, warnings

@@ -124,7 +124,7 @@ def _part(table: Table, options: ReadOptions) -> _Part:
     if taken.to_si is None:
         raise UserError(
             f"{table.source}: the unit of {taken.column!r} is stated nowhere; say "
-            f"{options_text(['time_s'])}"
+            f"{options_text({'time_s': ()})}"
         )
     raw = numbers(table, "time_s", taken.column)
     return _Part(table, time_stamps(table, taken.column, raw, taken.to_si, None), taken.column)

@@ -1,7 +1,7 @@
 """What a recording looks like under each reading of its units, and which readings cannot be.
 
 A unit that the user states is believed, with a warning; one that only the file states is not
-believed where the numbers contradict it.
+believed where the numbers contradict it, or would rather be in the unit with which it is confused.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,8 +26,11 @@ LARGEST_SPEED_RAD_S = 20.0
 LARGEST_POWER_W = 20.0
 """Of an axis that turns on, the default of `guard.power_limit_w`."""
 LARGEST_TORQUE_NM = 1000.0
-UNUSUAL_SPEED_RAD_S, UNUSUAL_TORQUE_NM = 8.0, 150.0
-"""What some limbs do; more often the unit is wrong."""
+BELIEVED_SPEED_RAD_S, BELIEVED_TORQUE_NM = (0.2, 5.0), (0.2, 100.0)
+"""Up to the second a file's word for the larger unit is believed (rad, N·m), from the first on that
+for the smaller (deg, N·mm). As the units differ by 57 and 1000, no recording is believed in both.
+Joints from a finger to a knee, and a human ankle, reach 0.7 to 0.9 rad/s when they are perturbed at
+random, and 2.2 rad/s in a sinusoid of 20° at 1 Hz."""
 SLOWEST_MOTION_HZ = 0.02
 SLOWEST_RATE_HZ = 5.0
 FASTEST_MOTION_HZ, FASTEST_RATE_HZ = 100.0, 5e4
@@ -35,6 +38,11 @@ FEWEST = 100
 SHORTEST_S = 5.0
 """What is shorter is not estimated."""
 RARE_TIME_UNITS = ("us", "days")
+CONFUSED: Mapping[str, tuple[str, str]] = {
+    "angle_rad": ("rad", "deg"),
+    "velocity_rad_s": ("rad/s", "deg/s"),
+    "torque_nm": ("Nm", "Nmm"),
+}
 _MOST_LINES = 8
 _CLEAR_R_SQUARED = 0.5
 _MUCH = 0.3
@@ -42,10 +50,11 @@ _MUCH = 0.3
 
 @dataclass(frozen=True)
 class Doubt:
-    """Why a quantity's unit cannot be right; `usual` are the units to offer instead."""
+    """Why a quantity's unit cannot be right, or is not believed; the units to offer, if not all."""
 
     standard: str
     text: str
+    units: tuple[str, ...] = ()
 
 
 def doubts(seen: Look) -> list[Doubt]:
@@ -55,14 +64,16 @@ def doubts(seen: Look) -> list[Doubt]:
     if seen.rate_hz < SLOWEST_RATE_HZ or seen.motion_hz < SLOWEST_MOTION_HZ:
         text = f"{seen.rate_hz:.4g} samples/s and a motion of {seen.motion_hz:.2g} Hz are too slow"
         return [Doubt("time_s", text)]
-    if seen.rate_hz > FASTEST_RATE_HZ and seen.motion_hz > FASTEST_MOTION_HZ:
+    fast = seen.rate_hz > FASTEST_RATE_HZ or seen.duration_s < SHORTEST_S
+    if fast and seen.motion_hz > FASTEST_MOTION_HZ:
         text = f"{seen.rate_hz:.4g} samples/s and a motion of {seen.motion_hz:.2g} Hz are too fast"
         return [Doubt("time_s", text)]
     if seen.duration_s < SHORTEST_S:
         return []
     found = []
     if seen.torque_nm > LARGEST_TORQUE_NM:
-        found.append(Doubt("torque_nm", f"a torque of {seen.torque_nm:.4g} N·m is too large"))
+        text = f"a torque of {seen.torque_nm:.4g} N·m is too large"
+        found.append(Doubt("torque_nm", text, CONFUSED["torque_nm"]))
     turns_on = seen.turned_rad >= 0.5 * seen.range_rad and seen.power_w <= LARGEST_POWER_W
     if seen.largest_rad > LARGEST_RAD and not turns_on:
         text = f"an angle of {seen.largest_rad:.4g} rad is more than one turn"
@@ -73,19 +84,36 @@ def doubts(seen: Look) -> list[Doubt]:
     return found
 
 
-def oddities(seen: Look) -> list[Doubt]:
-    """Return what is possible, but unusual enough to be said."""
+def confusions(seen: Look, factors: Mapping[str, float]) -> list[Doubt]:
+    """Return the units that a file states, while the numbers look like those of another.
+
+    Parameters
+    ----------
+    seen : Look
+    factors : mapping of str to float
+        What 1 of the stated unit is in SI, of the torque and the motion that were looked at.
+    """
     if seen.n_samples < FEWEST or seen.duration_s < SHORTEST_S:
         return []
-    found = []
     turns_on = seen.turned_rad >= 0.5 * seen.range_rad and seen.power_w <= LARGEST_POWER_W
-    if seen.torque_nm > UNUSUAL_TORQUE_NM:
-        text = f"a torque of {seen.torque_nm:.4g} N·m is more than most joints take"
-        found.append(Doubt("torque_nm", text))
-    if seen.speed_rad_s > UNUSUAL_SPEED_RAD_S and not turns_on:
-        name = "velocity_rad_s" if math.isnan(seen.largest_rad) else "angle_rad"
-        text = f"a speed of {seen.speed_rad_s:.4g} rad/s is more than most limbs move"
-        found.append(Doubt(name, text))
+    measured = {"torque_nm": seen.torque_nm}
+    if not turns_on:
+        measured |= dict.fromkeys(("angle_rad", "velocity_rad_s"), seen.speed_rad_s)
+    found = []
+    for standard in (name for name in measured if name in factors):
+        units = CONFUSED[standard]
+        of_torque = standard == "torque_nm"
+        low, high = BELIEVED_TORQUE_NM if of_torque else BELIEVED_SPEED_RAD_S
+        sizes = [factor(unit, standard) or 1.0 for unit in units]
+        stated = [k for k in (0, 1) if math.isclose(factors[standard], sizes[k], rel_tol=1e-3)]
+        value = measured[standard]
+        if not stated or (low <= value if stated[0] else value <= high):
+            continue
+        other = value * sizes[1 - stated[0]] / sizes[stated[0]]
+        what = (("large", "small") if of_torque else ("fast", "slow"))[stated[0]]
+        si = "N·m" if of_torque else "rad/s"
+        text = f"{value:.3g} {si} is unusually {what}; in {units[1 - stated[0]]} it is {other:.3g}"
+        found.append(Doubt(standard, f"{text} {si}", units))
     return found
 
 
@@ -132,9 +160,12 @@ def _exchanged(fit: RoughFit, swapped: RoughFit) -> bool:
 
 
 def readings(
-    taken: Mapping[str, Taken], raw: Mapping[str, Array], rate_hz: float | None, vary: Sequence[str]
+    taken: Mapping[str, Taken],
+    raw: Mapping[str, Array],
+    rate_hz: float | None,
+    vary: Mapping[str, tuple[str, ...]],
 ) -> list[str]:
-    """Return a line for each reading of the quantities in `vary` in their usual units.
+    """Return a line for each reading of the quantities in `vary`, in the units named or usual.
 
     Parameters
     ----------
@@ -143,11 +174,11 @@ def readings(
         The columns as they are, by standard name, of numbers or NaN.
     rate_hz : float or None
         Where there is no column of time.
-    vary : sequence of str
+    vary : mapping of str to tuple of str
     """
     motion = "angle_rad" if "angle_rad" in raw else "velocity_rad_s"
     varied = [name for name in ("time_s", "torque_nm", motion) if name in vary]
-    usual = {name: usual_units(name, taken, raw) for name in varied}
+    usual = {name: vary[name] or usual_units(name, taken, raw) for name in varied}
     lines = []
     for units in itertools.product(*usual.values()):
         as_units = dict(zip(varied, units, strict=True))
@@ -202,14 +233,14 @@ def look_at(
     return look(signals[0], signals[1], is_angle=motion == "angle_rad")
 
 
-def options_text(vary: Sequence[str]) -> str:
-    """Return the options that would state the units of some quantities."""
+def options_text(vary: Mapping[str, tuple[str, ...]]) -> str:
+    """Return the options that would state the units of some quantities, those named or usual."""
     return "; ".join(
         " or ".join(
             f"--unit {BY_STANDARD[name].name}={shlex.quote(unit)}"
-            for unit in BY_STANDARD[name].usual
+            for unit in units or BY_STANDARD[name].usual
         )
-        for name in vary
+        for name, units in vary.items()
     )
 
 

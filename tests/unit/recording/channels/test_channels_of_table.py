@@ -7,6 +7,7 @@ from tests.known_joint import TRUTH, angle_rad, torque_nm
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.channels_of_table import channels_of_table
 from rigidimeter.recording.channels.looks import look
+from rigidimeter.recording.channels.readings import BELIEVED_SPEED_RAD_S, BELIEVED_TORQUE_NM
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
 
@@ -117,6 +118,39 @@ def test_what_is_optional_and_in_doubt_is_not_used_and_said():
 def test_a_stated_unit_sign_or_name_that_cannot_be_is_found(columns, told):
     whole = {"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle_rad": ANGLE_RAD} | columns
     assert told in refusal(table(**whole))[0]
+
+
+@pytest.mark.parametrize(
+    ("column", "other", "to_si"),
+    [
+        ("angle [deg]", "rad", 1.0),
+        ("angle [rad]", "deg", np.pi / 180),
+        ("Torque (N·mm)", "Nm", 1.0),
+        ("Torque (Nm)", "Nmm", 1e-3),
+    ],
+)
+@pytest.mark.parametrize("size", [0.3, 1.0, 3.0])
+def test_a_unit_that_is_confused_with_another_is_refused_unless_the_user_insists(
+    column, other, to_si, size
+):
+    """Whatever the motion and the joint: J, B and K alone are those of one joint or another."""
+    right = {"torque_nm": TORQUE_NM, "angle_rad": ANGLE_RAD}
+    standard = "angle_rad" if "angle" in column else "torque_nm"
+    si = size * right.pop(standard)
+    data = table(time_s=TIME_S, **right, **{column: si / to_si})
+    lines = refusal(data)
+    name, stated = standard.split("_")[0], column.split("[")[-1].split("(")[-1][:-1]
+    assert f"is in {stated}, but" in lines[0]
+    assert f"--unit {name}={other}" in lines[0]
+    assert len(lines) == 3  # and a line for each reading
+    found = channels_of_table(data, ReadOptions(units={name: other}))
+    np.testing.assert_allclose(found.values[standard], si, rtol=1e-12)
+    channels_of_table(data, ReadOptions(units={name: stated}))
+
+
+def test_no_recording_is_believed_in_two_units_that_are_confused():
+    for (low, high), ratio in ((BELIEVED_SPEED_RAD_S, 180 / np.pi), (BELIEVED_TORQUE_NM, 1e3)):
+        assert high / ratio < low
 
 
 def test_reaction_turns_the_torque_and_its_second_use_is_found():
