@@ -80,6 +80,7 @@ class Ran(NamedTuple):
 @pytest.fixture
 def rigidimeter(monkeypatch, capsys) -> Callable[..., Ran]:
     """Run a command line in this process and return its status and what it printed."""
+    monkeypatch.setattr("rigidimeter.extensions._loaded", {})  # of --load: a batch depends on it
 
     def run(*arguments: object) -> Ran:
         monkeypatch.setattr(sys, "argv", ["rigidimeter", *map(str, arguments)])
