@@ -225,26 +225,68 @@ def state_after(
     tick: NDArray[np.intp],
     after_s: Array,
     late_s: Array | None = None,
-) -> Complex:
+) -> Array | Complex:
     """Return x of x' = λ x + c, from rest, so long after the ticks of given numbers.
 
     A command that came ε late is one in time, and a pulse of c_(k−1) − c_k for ε.
     """
-    growth = pole if pole.imag else pole.real  # numbers that are real take half the time
+    state = state_at_ticks(pole, command_rad_s, interval_s, late_s)
+    return state_later(pole, state[tick], command_rad_s[tick], same_time(after_s))
+
+
+def state_at_ticks(
+    pole: complex, command_rad_s: Array, interval_s: float, late_s: Array | None = None
+) -> Array | Complex:
+    """Return x of x' = λ x + c, from rest, at each tick; real for a pole that is real."""
+    growth = _growth(pole)
     decay = np.exp(growth * interval_s)
     held = (decay - 1) / growth * command_rad_s
     if late_s is None:
-        state = scipy.signal.lfilter([0.0, 1.0], [1.0, -decay], held)[tick]
-    else:
-        before = np.concatenate(([0.0], command_rad_s[:-1]))
-        grown = np.exp(growth * late_s)
-        held = held + decay * (1 - 1 / grown) / growth * (before - command_rad_s)
-        state = scipy.signal.lfilter([0.0, 1.0], [1.0, -decay], held)[tick]
-        state = grown[tick] * state + (grown[tick] - 1) / growth * before[tick]
-    if after_s.size and np.ptp(after_s) < SAME_TIME_S:
-        if after_s[0] == 0.0:
-            return np.asarray(state)
-        passed = np.exp(growth * np.mean(after_s))
-    else:
-        passed = np.exp(growth * after_s)
-    return np.asarray(passed * state + (passed - 1) / growth * command_rad_s[tick])
+        return np.asarray(scipy.signal.lfilter([0.0, 1.0], [1.0, -decay], held))
+    before = np.concatenate(([0.0], command_rad_s[:-1]))
+    grown = np.exp(growth * late_s)
+    held = held + decay * (1 - 1 / grown) / growth * (before - command_rad_s)
+    state = scipy.signal.lfilter([0.0, 1.0], [1.0, -decay], held)
+    return np.asarray(grown * state + (grown - 1) / growth * before)
+
+
+def state_at_every(
+    pole: complex, command_rad_s: Array, interval_s: float, first: int, stride: int
+) -> Array | Complex:
+    """Return x of x' = λ x + c, from rest, at the tick `first` and each `stride` ticks later.
+
+    For ticks that came evenly. What the commands of one stride add is summed before the recursion.
+    """
+    growth = _growth(pole)
+    decay = np.exp(growth * interval_s)
+    began = state_at_ticks(pole, command_rad_s[: first + 1], interval_s)[-1]
+    strides = (command_rad_s.size - 1 - first) // stride
+    blocks = command_rad_s[first : first + strides * stride].reshape(strides, stride)
+    weights = (decay - 1) / growth * decay ** np.arange(stride)[::-1]
+    added = blocks @ weights.real + (1j * (blocks @ weights.imag) if pole.imag else 0.0)
+    whole = decay**stride
+    state, _ = scipy.signal.lfilter([1.0], [1.0, -whole], added, zi=np.atleast_1d(whole * began))
+    return np.append(began, state)
+
+
+def state_later(
+    pole: complex, state: Array | Complex, command_rad_s: Array, after_s: Array | float
+) -> Array | Complex:
+    """Return x under the command that has been held for so long since it was `state`."""
+    if isinstance(after_s, float) and after_s == 0.0:
+        return state
+    growth = _growth(pole)
+    passed = np.exp(growth * after_s)
+    return np.asarray(passed * state + (passed - 1) / growth * command_rad_s)
+
+
+def same_time(after_s: Array) -> Array | float:
+    """Return times after ticks, as one number if all are the same."""
+    if not after_s.size or np.ptp(after_s) >= SAME_TIME_S:
+        return after_s
+    return 0.0 if after_s[0] == 0.0 else float(np.mean(after_s))
+
+
+def _growth(pole: complex) -> complex | float:
+    """Return the pole; numbers that are real take half the time."""
+    return pole if pole.imag else pole.real

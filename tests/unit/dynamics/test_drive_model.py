@@ -1,11 +1,13 @@
 """A drive of any order against its steps, its closed form and the sum of all that is folded."""
 
+import cmath
 import math
 
 import numpy as np
 import pytest
 
 from rigidimeter.dynamics import DriveModel, DriveState, drive, drive_step, lowpass
+from rigidimeter.dynamics.drive_model import state_at_every, state_at_ticks
 
 SECOND_ORDER = DriveModel.second_order(40.0, 0.8)
 
@@ -106,3 +108,18 @@ def test_a_low_pass_whose_pole_is_the_drives_own_is_not_divided_by_zero():
     s = 2j * np.pi * np.array([10.0, 100.0])
     wanted = (200 * np.pi / (s + 200 * np.pi)) ** 2
     np.testing.assert_allclose(model.smoothed(100.0, 1).response(s), wanted, rtol=1e-3)
+
+
+@pytest.mark.parametrize("pole", [complex(-50.0), complex(-50.0, 80.0)])
+@pytest.mark.parametrize(("first", "stride"), [(0, 4), (7, 3), (99, 2)])
+def test_the_state_at_every_so_many_ticks_is_that_of_each_tick(pole, first, stride):
+    """x(t + T) = e^(λT) x(t) + (e^(λT) − 1)/λ c, tick by tick."""
+    command = np.random.default_rng(0).normal(size=100)
+    decay, state, states = cmath.exp(pole * 1e-3), 0j, []
+    for sent in command:
+        states.append(state)
+        state = decay * state + (decay - 1) / pole * sent
+    found = state_at_every(pole, command, 1e-3, first, stride)
+    assert found == pytest.approx(np.array(states[first::stride]), rel=1e-12)
+    each = state_at_ticks(pole, command, 1e-3)
+    assert each == pytest.approx(np.array(states), rel=1e-12)

@@ -38,8 +38,20 @@ def since_ticks(
     then_s = (time_s - origin_s) - delay_s
     # A stamp that is a rounding error early belongs to the tick it names.
     near_s = max(even * interval_s, SAME_TIME_S)
-    tick = np.searchsorted(ticks_s, then_s + near_s, side="right") - 1
-    tick = np.clip(tick, 0, ticks_s.size - 1)
+    tick = _last_before(ticks_s, then_s + near_s, interval_s)
     after_s = np.maximum(then_s - ticks_s[tick], 0.0)
     after_s[after_s < near_s] = 0.0
     return tick, after_s
+
+
+def _last_before(ticks_s: Array, time_s: Array, interval_s: float) -> NDArray[np.intp]:
+    """Return the last tick that is no later than each time, or the first tick.
+
+    Where ticks came evenly a division tells; the others are searched for.
+    """
+    edges_s = np.concatenate(([-np.inf], ticks_s[1:], [np.inf]))
+    tick = np.clip(time_s / interval_s, 0, ticks_s.size - 1).astype(np.intp)
+    other = (time_s < edges_s[tick]) | (time_s >= edges_s[tick + 1])
+    if np.any(other):
+        tick[other] = np.searchsorted(edges_s, time_s[other], side="right") - 1
+    return tick

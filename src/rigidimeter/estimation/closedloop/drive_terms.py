@@ -15,7 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.dynamics import DriveModel, with_conjugates
-from rigidimeter.dynamics.drive_model import state_after
+from rigidimeter.dynamics.drive_model import (
+    same_time,
+    state_at_every,
+    state_at_ticks,
+    state_later,
+)
 from rigidimeter.estimation.closedloop.drive_motion import lateness_s, since_ticks
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel
@@ -130,7 +135,7 @@ class Terms(NamedTuple):
     poles : tuple of complex
     delay_s : float
     shapes : tuple of complex array, shape (poles, j)
-        Residues of each term, for the command and for the sign of the velocity.
+        Residues of each term, for the command and, with friction, for the sign of the velocity.
     table : array, shape (terms, n)
         The velocity that each term makes.
     """
@@ -142,21 +147,23 @@ class Terms(NamedTuple):
 
     def numerator(self, measured: Array) -> Array:
         """Return the terms that explain a velocity best."""
-        size = np.sqrt(np.einsum("ij,ij->i", self.table, self.table)) + TINY
-        gram = (self.table @ self.table.T) / np.outer(size, size)
-        return np.asarray(np.linalg.lstsq(gram, self.table @ measured / size)[0] / size)
+        gram = self.table @ self.table.T
+        size = np.sqrt(np.diagonal(gram)) + TINY
+        along = self.table @ measured / size
+        if size.size == 1:
+            return np.asarray(along / size)
+        return np.asarray(np.linalg.lstsq(gram / np.outer(size, size), along)[0] / size)
 
     def fitted(
         self, structure: Structure, samples: Samples, numerator: Array, power: float
     ) -> Fitted:
         """Return the drive with that numerator."""
         parts = np.split(samples.scale * numerator, [structure.zeros + 1])
-        residues, rubbing = (
-            tuple((shape[:, : part.size] @ part).tolist())
-            for shape, part in zip(self.shapes, parts, strict=True)
+        residues, *rubbing = (
+            tuple((shape @ part).tolist()) for shape, part in zip(self.shapes, parts, strict=False)
         )
         drive = DriveModel(self.poles, residues, self.delay_s)
-        answer = rubbing if structure.friction else ()
+        answer = rubbing[0] if rubbing else ()
         return Fitted(structure, drive, answer, power, samples.interval_s)
 
 
@@ -172,7 +179,8 @@ def terms_of(
     poles = _poles(coordinates[:-1], interval_s)
     delay_s = float(coordinates[-1]) * interval_s
     # Friction acts behind the controller, whose zeros are not its own.
-    shapes = tuple(_shapes(poles, n) for n in (structure.zeros, structure.poles - 1))
+    zeros = (structure.zeros, structure.poles - 1)[: len(inputs)]
+    shapes = tuple(_shapes(poles, n) for n in zeros)
     columns = [
         acting.columns(poles, shape, late_s)
         for acting, shape, late_s in zip(inputs, shapes, (delay_s, 0.0), strict=False)
@@ -233,31 +241,48 @@ class Acting:
         self._interval_s = 1.0 / channel.mean_rate_hz
         self._uneven_s = lateness_s(channel)
         self._late_s = math.nan
-        self._states: dict[complex, Array | Complex] = {}
+        self._at_ticks: dict[complex, Array | Complex] = {}
+        self._states: dict[complex, Array] = {}
 
     def columns(self, poles: tuple[complex, ...], shapes: Complex, late_s: float) -> Array:
         """Return the velocity that each term of a numerator makes of the input, shape (j, n)."""
-        columns = np.zeros((shapes.shape[1], self._time_s.size))
-        for pole, weights in zip(poles, shapes, strict=True):
-            state = self._state(pole, late_s)
-            if pole.imag:
-                columns += np.outer(2 * weights.real, state.real)
-                columns -= np.outer(2 * weights.imag, state.imag)
-            else:
-                columns += np.outer(weights.real, state)
-        return columns
+        states = np.concatenate([self._state(pole, late_s) for pole in poles])
+        weights = [
+            part
+            for pole, row in zip(poles, shapes, strict=True)
+            for part in ((2 * row.real, -2 * row.imag) if pole.imag else (row.real,))
+        ]
+        return np.asarray(np.transpose(weights) @ states)
 
-    def _state(self, pole: complex, late_s: float) -> Array | Complex:
-        """Return the state of a pole; a search moves some of them, or the delay, and not all."""
+    def _state(self, pole: complex, late_s: float) -> Array:
+        """Return the state of a pole, of a pair its real and imaginary part, shape (1 or 2, n).
+
+        A search moves some of the poles, or the delay, and not all.
+        """
         if late_s != self._late_s:
-            self._since = since_ticks(self._channel, self._time_s, late_s, even=0.0)
+            self._tick, after_s = since_ticks(self._channel, self._time_s, late_s, even=0.0)
+            self._after_s, self._sent = same_time(after_s), self._channel.values[self._tick]
             self._late_s = late_s
             self._states.clear()
+            steps = np.diff(self._tick)
+            strided = steps.size and self._uneven_s is None and steps[0] > 1
+            self._stride = int(steps[0]) if strided and np.all(steps == steps[0]) else 0
         if pole not in self._states:
             if len(self._states) >= MOST_STATES:
                 self._states.clear()
-            values = self._channel.values
-            self._states[pole] = state_after(
-                pole, values, self._interval_s, *self._since, self._uneven_s
-            )
+            before = self._before(pole)
+            state = state_later(pole, before, self._sent, self._after_s)
+            self._states[pole] = np.array([state.real, state.imag] if pole.imag else [state])
         return self._states[pole]
+
+    def _before(self, pole: complex) -> Array | Complex:
+        """Return the state at the tick before each time."""
+        values, first = self._channel.values, int(self._tick[0])
+        if self._stride:
+            used = values[: int(self._tick[-1]) + 1]
+            return state_at_every(pole, used, self._interval_s, first, self._stride)
+        if pole not in self._at_ticks:
+            if len(self._at_ticks) >= MOST_STATES:
+                self._at_ticks.clear()
+            self._at_ticks[pole] = state_at_ticks(pole, values, self._interval_s, self._uneven_s)
+        return self._at_ticks[pole][self._tick]

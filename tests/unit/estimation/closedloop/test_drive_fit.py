@@ -5,7 +5,8 @@ import pytest
 
 from rigidimeter.dynamics import DriveModel, DriveState, drive, drive_step
 from rigidimeter.estimation.closedloop.drive_fit import fit_drive
-from rigidimeter.estimation.closedloop.drive_motion import driven
+from rigidimeter.estimation.closedloop.drive_motion import driven, since_ticks
+from rigidimeter.estimation.closedloop.drive_search import _slopes
 from rigidimeter.records import Channel, Epoch
 
 
@@ -173,3 +174,22 @@ def test_what_leaves_more_than_noise_is_no_rival():
     found = fit_drive(recorded(commands, velocity, 0.001), DriveModel.second_order(20.0, 0.7071))
     assert found.misfit == pytest.approx(3e-3, rel=0.05)
     assert max(drive.delay_s for drive in found.rivals) < 3e-4
+
+
+@pytest.mark.parametrize("jitter_s", [0.0, 0.0004, 0.02])
+def test_the_last_tick_before_a_time_is_found_however_the_ticks_came(jitter_s):
+    rng = np.random.default_rng(3)
+    ticks_s = np.sort(np.arange(200) / 1000 + rng.uniform(0, jitter_s, 200)) + 5.0
+    command = Channel("velocity_command_rad_s", ticks_s, np.zeros(200))
+    time_s = rng.uniform(4.99, 5.25, 500)
+    tick, after_s = since_ticks(command, time_s, 0.0)
+    wanted = [max((k for k in range(200) if ticks_s[k] <= t + 1e-5), default=0) for t in time_s]
+    assert tick.tolist() == wanted
+    late = after_s > 0
+    assert after_s[late] == pytest.approx((time_s - ticks_s[tick])[late], abs=1e-12)
+
+
+def test_slopes_are_the_derivative():
+    x = np.array([0.3, -2.0])
+    slopes = _slopes(lambda at: np.array([np.sin(at[0]), at[0] * at[1], at[1] ** 2]), x)
+    assert slopes == pytest.approx(np.array([[math.cos(0.3), 0], [-2.0, 0.3], [0, -4.0]]), abs=1e-7)
