@@ -58,6 +58,10 @@ class Timed:
         self._now_s = now_s
         return self._supervision.cause(now_s)
 
+    @property
+    def measured(self) -> float:
+        return self._supervision.measured
+
     def order(self) -> Order:
         if self._now_s >= self._end_s:
             self._end_s = math.inf

@@ -37,6 +37,10 @@ class SharedDesk:
             self.ring.recorded = self.ring.written
         return self.supervision.cause(now_s)
 
+    @property
+    def measured(self):
+        return self.supervision.measured
+
     def order(self):
         return NOTHING
 

@@ -43,6 +43,7 @@ class Desk:
     causes: dict[int, Cause] = field(default_factory=dict)
     attended: bool = False
     tick: int = -1
+    measured: float = math.nan
 
     def cause(self, now_s: float) -> int:
         self.tick += 1

@@ -91,7 +91,7 @@ EQUIVALENT: dict[str, str] = {
     "step.py _stoppable_speed: distance_rad <= 0.0 → distance_rad < 0.0": "the root gives 0, too",
     "session_run.py run_session: 0 → 1": "the next number where no epoch is planned: none repeats",
     "session_run.py run_session: 0 → -1": "the next number where no epoch is planned: none repeats",
-    "session_run.py _moved: moved_deg <= limit_deg + settings.rig.motion.angle_resolution_deg → "
+    "zeroing.py moved: moved_deg <= limit_deg + settings.rig.motion.angle_resolution_deg → "
     "moved_deg < limit_deg + settings.rig.motion.angle_resolution_deg": MOMENT,
     LOOP + "self.elapsed_ticks = 1 → pass": SET,
     LOOP + "1 → 2": SET,

@@ -32,6 +32,7 @@ class HandMade(NamedTuple):
 TICK, RAMP = "acquisition/tick.py", "acquisition/ramp.py"
 MODES = "acquisition/control_modes.py"
 SESSION = "acquisition/session_run.py"
+ZEROING = "acquisition/zeroing.py"
 RUN = "acquisition/controller_run.py"
 STATES = "acquisition/run_states.py"
 SINK = "acquisition/processes/sink.py"
@@ -166,8 +167,8 @@ HAND_MADE = tuple(
         (TICK, "loop.rig.write(allowed)", "loop.rig.write(request)", "no limit reaches the wire"),
         (
             TICK,
-            "            request,\n            sent,",
-            "            request,\n            request,",
+            "        request,\n        sent,",
+            "        request,\n        request,",
             "the record shows what was asked for, not what was sent",
         ),
         (
@@ -236,16 +237,16 @@ HAND_MADE = tuple(
         (FILTER, "b2 * value - a2 * output", "b2 * value", "a filter that is none"),
         (TRACKING, "(target_rad - angle_rad)", "(angle_rad - target_rad)", "runs away"),
         # The session
-        (SESSION, "abs(bias_nm) > limits.bias_limit_nm", "False", "zeroed under load"),
+        (ZEROING, "abs(bias_nm) > limits.bias_limit_nm", "False", "zeroed under load"),
         (
-            SESSION,
+            ZEROING,
             "noise_sd_nm > limits.noise_limit_nm",
             "False",
             "zeroed while the subject moves",
         ),
         (
             SESSION,
-            "why or _moved(readings, session.settings)",
+            "why or moved(readings, session.settings)",
             "why",
             "zeroed while the joint moves",
         ),

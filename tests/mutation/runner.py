@@ -31,7 +31,7 @@ _RUN = tuple(
     f"acquisition/test_{name}.py"
     for name in (
         *("tick", "late_ticks", "ramp", "modes", "session_run", "session_end", "zeroing"),
-        *("controller_run", "orders", "loop_and_session"),
+        *("controller_run", "orders", "loop_and_session", "stop_account"),
     )
 )
 _STEP = tuple(f"guard/test_{name}.py" for name in ("step", "position_limit", "following"))
@@ -58,6 +58,7 @@ TESTS = {
     "acquisition/ramp.py": _RUN,
     "acquisition/run_states.py": ("acquisition/test_states.py", "acquisition/test_session_run.py"),
     "acquisition/session_run.py": ("acquisition/test_session_run.py", *_RUN),
+    "acquisition/zeroing.py": ("acquisition/test_zeroing.py", "acquisition/test_session_run.py"),
     "acquisition/supervision.py": ("acquisition/test_session_run.py",),
     "acquisition/tick.py": _RUN,
     "acquisition/processes/sink.py": ("acquisition/test_shared_status.py",),

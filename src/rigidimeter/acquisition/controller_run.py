@@ -13,6 +13,8 @@ from typing import Any
 from rigidimeter.acquisition.clock import Clock
 from rigidimeter.acquisition.control_modes import change_parameter
 from rigidimeter.acquisition.run_states import Command, Order, Run, State, after
+from rigidimeter.acquisition.stop_account import StopAccount
+from rigidimeter.acquisition.stop_remedies import REMEDIES
 from rigidimeter.acquisition.supervision import NoSupervision, Sink, Supervision
 from rigidimeter.acquisition.tick import ControlLoop
 from rigidimeter.devices.base import Rig
@@ -63,7 +65,14 @@ class ControllerRun:
         self._supervision = supervision or NoSupervision()
         self._state_changed = state_changed
         self.loop = ControlLoop(
-            settings, rig, clock, sink.sample, progress, self._supervision, self._take_order
+            settings,
+            rig,
+            clock,
+            sink.sample,
+            progress,
+            self._supervision,
+            self._take_order,
+            self._latched,
         )
         self.run = Run()
         self.open_epoch: int | None = None
@@ -100,9 +109,15 @@ class ControllerRun:
         )
         if order.command is Command.HALT:
             self._rig.disable()
-            self.fail(Cause.OPERATOR_HALT, Cause.OPERATOR_HALT.sentence)
+            cause = Cause.OPERATOR_HALT
+            self.fail(cause, f"{cause.sentence}; {REMEDIES[cause]}")
         ends_rest = order.command is Command.STOP and self.open_epoch is None
         return self.run.at_once or ends_rest
+
+    def _latched(self, stop: StopAccount) -> None:
+        """Record why the guard stopped or holds the rig."""
+        time_s = self.loop.sample.time_s if self.loop.sample is not None else self.loop.time_s
+        self._sink.event("guard_latched", time_s=time_s, epoch=self.open_epoch, **stop.facts())
 
     def fail(self, cause: Cause, reason: str) -> None:
         """End with fail, a cause and a reason."""
@@ -113,7 +128,7 @@ class ControllerRun:
         if self.loop.reaction <= Reaction.HOLD:
             return False
         cause = self.loop.cause
-        self.fail(cause, f"the guard stopped the rig: {cause.sentence}")
+        self.fail(cause, f"the guard stopped the rig: {self.loop.why}")
         self.change_state(Run(State.FAULTED))
         return True
 
@@ -131,7 +146,7 @@ class ControllerRun:
             return True
         cause = self.loop.cause
         self.fail(
-            cause, f"the guard held the rig and no operator was there to continue: {cause.sentence}"
+            cause, f"the guard held the rig and no operator was there to continue: {self.loop.why}"
         )
         return False
 
@@ -147,4 +162,4 @@ class ControllerRun:
             self.outcome, self.reason = "fail", f"ended with {left} epochs left"
         elif self.loop.reaction is Reaction.HOLD:
             self.cause = self.loop.cause
-            self.reason = f"the guard held the rig in the last epoch: {self.cause.sentence}"
+            self.reason = f"the guard held the rig in the last epoch: {self.loop.why}"

@@ -14,12 +14,12 @@ from rigidimeter.acquisition.controller_run import ControllerRun
 from rigidimeter.acquisition.ramp import ramp_to_rest
 from rigidimeter.acquisition.run_states import Command, Run, State, after, epoch_over
 from rigidimeter.acquisition.supervision import Sink, Supervision
-from rigidimeter.acquisition.tick import ControlLoop, skip_passed_ticks
+from rigidimeter.acquisition.tick import ControlLoop, release, skip_passed_ticks
 from rigidimeter.acquisition.zeroing import bias_and_noise, moved
 from rigidimeter.devices.base import Reading, Rig
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import PlannedEpoch, Protocol, prbs_nm, sinusoid
-from rigidimeter.guard import Cause, Reaction, released, why_ended
+from rigidimeter.guard import Cause, Reaction, why_ended
 from rigidimeter.recording.session_folder import Ending
 from rigidimeter.settings import Settings
 
@@ -179,7 +179,7 @@ def _ready_for_epoch(session: _Session) -> bool:
             if not _look(run):
                 return False
         if run.is_in(State.RUNNING):
-            loop.guard = released(loop.guard)
+            release(loop)
             # The full way back, whatever was ordered before it: an epoch begins at its place.
             rest(loop, return_s, return_s)
         if not run.may_go_on():

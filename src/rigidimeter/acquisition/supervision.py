@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Protocol
 
 from rigidimeter.acquisition.run_states import NOTHING, Order
@@ -14,6 +15,10 @@ class Supervision(Protocol):
 
     attended: bool
     """Whether an operator is there who can go on after a hold."""
+
+    measured: float
+    """What the last cause was found by: for how many seconds a process was silent or the computer
+    suspended, or how many samples wait; NaN for other causes."""
 
     def cause(self, now_s: float) -> int:
         """Return a `guard.Cause` to stop for, 0 if there is none.
@@ -30,6 +35,7 @@ class NoSupervision:
     """A session in one process, without an operator."""
 
     attended = False
+    measured = math.nan
 
     def cause(self, now_s: float) -> int:
         """Return no cause."""

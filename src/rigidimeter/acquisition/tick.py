@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from rigidimeter.acquisition.clock import Clock
 from rigidimeter.acquisition.run_states import Command, Order
+from rigidimeter.acquisition.stop_account import Latched, StopAccount, stop_account
 from rigidimeter.acquisition.supervision import NoSupervision, Supervision
 from rigidimeter.control import (
     Admittance,
@@ -38,6 +39,7 @@ from rigidimeter.guard import (
     guard_limits,
     guard_state,
     guard_step,
+    released,
 )
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import Settings
@@ -88,6 +90,8 @@ class ControlLoop:
         Asked at every tick; by default nobody supervises.
     take_order : callable
         Takes an order of the operator; returns whether the stretch that runs ends now.
+    latched : callable
+        Takes what a stop or a hold says, at the tick at which the guard latches.
     """
 
     inertia_kg_m2: float
@@ -103,10 +107,12 @@ class ControlLoop:
         progress: Callable[[float], None] = lambda _: None,
         supervision: Supervision | None = None,
         take_order: Callable[[Order], bool] = lambda _: False,
+        latched: Callable[[StopAccount], None] = lambda _: None,
     ) -> None:
         controller = settings.controller
         self.rig, self.clock, self.record = rig, clock, record
-        self.progress, self.take_order = progress, take_order
+        self.progress, self.take_order, self.latched = progress, take_order, latched
+        self.settings = settings
         self.supervision = supervision or NoSupervision()
         self.rate_hz = settings.rig.tick_rate_hz
         self.interval_s = 1.0 / self.rate_hz
@@ -128,6 +134,8 @@ class ControlLoop:
         self.limited_ticks = 0
         self.limit_time_s = math.nan
         self.angle_rad = 0.0
+        self.sample: Sample | None = None
+        self.stop: StopAccount | None = None
 
     @property
     def time_s(self) -> float:
@@ -138,6 +146,11 @@ class ControlLoop:
     def cause(self) -> Cause:
         """Why the guard latched."""
         return Cause(self.guard.cause)
+
+    @property
+    def why(self) -> str:
+        """Why the guard latched, in words, with value, limit and remedy where they are known."""
+        return self.stop.sentence if self.stop is not None else self.cause.sentence
 
     @property
     def reaction(self) -> Reaction:
@@ -196,6 +209,7 @@ def run_ticks(
     while k < n:
         k = run_tick(loop, epoch, k, command, n - 1) + 1
         if loop.guard.reaction > known:
+            _account(loop)
             break
         order = loop.supervision.order()
         if order.command is not Command.NONE and loop.take_order(order):
@@ -205,6 +219,18 @@ def run_ticks(
             loop.progress(loop.time_s)
     counts = loop.limited_ticks, loop.missed_ticks
     return TickResult(loop.limit_time_s, loop.cause, *counts, interrupted)
+
+
+def release(loop: ControlLoop) -> None:
+    """Let the loop go on after a hold; see `guard.released`."""
+    loop.guard, loop.stop = released(loop.guard), None
+
+
+def _account(loop: ControlLoop) -> None:
+    """Say why the guard latched; the first cause is kept."""
+    if loop.stop is None and loop.sample is not None:
+        loop.stop = stop_account(Latched.of(loop, loop.sample))
+        loop.latched(loop.stop)
 
 
 def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: int = 0) -> int:
@@ -277,29 +303,28 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
             loop.limit_time_s = due_s
     if math.isfinite(angle):
         loop.angle_rad = angle
-    loop.record(
-        Sample(
-            tick,
-            now_s,
-            lateness_s,
-            epoch,
-            perturbation_nm,
-            torque_nm,
-            torque_s,
-            angle,
-            velocity,
-            motion_s,
-            target,
-            request,
-            sent,
-            limited,
-            reading.torque_sequence,
-            reading.torque_status,
-            reading.motion_sequence,
-            reading.motion_status,
-            loop.guard.cause,
-        )
+    loop.sample = sample = Sample(
+        tick,
+        now_s,
+        lateness_s,
+        epoch,
+        perturbation_nm,
+        torque_nm,
+        torque_s,
+        angle,
+        velocity,
+        motion_s,
+        target,
+        request,
+        sent,
+        limited,
+        reading.torque_sequence,
+        reading.torque_status,
+        reading.motion_sequence,
+        reading.motion_status,
+        loop.guard.cause,
     )
+    loop.record(sample)
     return k
 
 

@@ -252,4 +252,4 @@ def _stop_words(progress: Progress, loop: LoopStatus) -> str:
     if cause is Cause.NONE:
         return ""
     held = cause.reaction is Reaction.HOLD and State(loop.state) is not State.FAULTED
-    return f"{'held' if held else 'stopped'}: {cause.sentence}"
+    return f"{'held' if held else 'stopped'}: {progress.stop or cause.sentence}"

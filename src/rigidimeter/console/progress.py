@@ -47,6 +47,8 @@ class Progress:
     ended : tuple of EndedEpoch
     zeroed : bool
         Whether the torque sensor was zeroed.
+    stop : str
+        Why the guard last stopped or held the rig, with value, limit and remedy.
     outcome, reason : str
         How the session ended; empty as long as it runs.
     """
@@ -58,6 +60,7 @@ class Progress:
     started_s: float = 0.0
     ended: tuple[EndedEpoch, ...] = ()
     zeroed: bool = False
+    stop: str = ""
     outcome: str = ""
     reason: str = ""
 
@@ -76,6 +79,8 @@ def progress_after(progress: Progress, event: Mapping[str, Any]) -> Progress:
         return _ended(progress, event)
     if kind == "sensor_zeroed":
         return replace(progress, zeroed=not event["refused"])
+    if kind == "guard_latched":
+        return replace(progress, stop=event["sentence"])
     if kind == "session_ended":
         return replace(
             progress, running=False, outcome=event["outcome"], reason=event["reason"] or ""

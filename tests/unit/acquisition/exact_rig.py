@@ -79,6 +79,8 @@ class LateClock:
 class Desk:
     """Causes and orders by the tick, the first one 0, at which they come."""
 
+    measured = math.nan
+
     def __init__(self, causes=None, orders=None, attended=True):
         self.causes, self.orders, self.attended = dict(causes or {}), dict(orders or {}), attended
         self.times_s = []

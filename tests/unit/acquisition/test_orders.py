@@ -33,6 +33,7 @@ class Desk:
     causes: dict = field(default_factory=dict)
     attended: bool = True
     tick: int = 0
+    measured: float = math.nan
 
     def cause(self, now_s):
         self.tick += 1

@@ -17,6 +17,7 @@ from tests.unit.acquisition.whole_session import (
 
 from rigidimeter.acquisition.run_states import Command, Order, State
 from rigidimeter.acquisition.session_run import SessionResult
+from rigidimeter.acquisition.stop_remedies import REMEDIES
 from rigidimeter.experiment import prbs_nm
 from rigidimeter.guard import Cause
 from rigidimeter.settings import parse_settings
@@ -167,7 +168,7 @@ def test_a_halt_takes_the_power_away_in_its_tick():
     ]
     assert ran.result.outcome == "fail"
     assert ran.result.cause is Cause.OPERATOR_HALT
-    assert ran.result.reason == Cause.OPERATOR_HALT.sentence
+    assert ran.result.reason.startswith(f"{Cause.OPERATOR_HALT.sentence}; see to the subject")
     assert ran.epochs[0] == (1, "abort")
     assert ran.states[-1].state is State.FAULTED
 
@@ -192,10 +193,17 @@ def test_an_order_is_told_with_its_state_and_what_it_changed():
 
 def test_a_stop_of_the_guard_ends_the_session_with_its_cause():
     ran = session(Desk({20: Cause.DRIVE_FAULT}))
-    why = f"the guard stopped the rig: {Cause.DRIVE_FAULT.sentence}"
+    account = f"{Cause.DRIVE_FAULT.sentence}; {REMEDIES[Cause.DRIVE_FAULT]}"
+    why = f"the guard stopped the rig: {account}"
     assert ran.result == SessionResult("fail", why, 1, 0, Cause.DRIVE_FAULT)
     assert ran.epochs == [(1, "fail")]
-    assert ran.sink.of("epoch_ended")[0]["reason"] == why
+    of_epoch = f"the guard stopped the rig: {Cause.DRIVE_FAULT.sentence}"
+    assert ran.sink.of("epoch_ended")[0]["reason"] == of_epoch
+    latched = ran.sink.of("guard_latched")
+    assert [(e["cause"], e["reaction"], e["epoch"]) for e in latched] == [
+        ("drive_fault", "ramp", 1)
+    ]
+    assert latched[0]["sentence"] == account
     assert ran.states[-1].state is State.FAULTED
     assert ran.rig.calls[-1] == ("disable",)
     assert ran.rig.of("stop") == []
@@ -212,6 +220,7 @@ def test_a_hold_is_a_pause_that_the_operator_ends():
     ran = session(Desk({20: Cause.TORQUE_HIGH}, {90: Command.RESUME}))
     assert ran.epochs == [(1, "fail"), (2, "success")]
     assert (ran.result.outcome, ran.result.cause) == ("success", Cause.NONE)
+    assert len(ran.sink.of("guard_latched")) == 1
     held = ran.sink.samples[40:90]
     assert not any(s.velocity_command_rad_s for s in held)
     assert {s.cause for s in held} == {int(Cause.TORQUE_HIGH)}
@@ -239,9 +248,9 @@ def test_a_hold_without_an_operator_is_the_end():
     ran = session(Desk({20: Cause.TORQUE_HIGH}, attended=False))
     assert ran.labels == ["1"]
     assert ran.result.cause is Cause.TORQUE_HIGH
-    assert ran.result.reason == (
+    assert ran.result.reason.startswith(
         "the guard held the rig and no operator was there to continue: "
-        f"{Cause.TORQUE_HIGH.sentence}"
+        f"{Cause.TORQUE_HIGH.sentence}: "
     )
 
 

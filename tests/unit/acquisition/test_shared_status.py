@@ -141,14 +141,17 @@ def test_causes_to_stop(shared_status, rings, now):
     for k in range(7):
         samples.push(sample(k))
     assert supervision.cause(0.0) == Cause.RECORD_OVERFLOW
+    assert supervision.measured == 7
     samples.recorded = 7
     assert supervision.cause(0.0) == Cause.NONE
     now.ns += 600_000_000
     assert supervision.cause(0.0) == Cause.CONSOLE_LOST
+    assert supervision.measured == pytest.approx(0.6)
     shared_status.beat(Role.CONSOLE)
     now.ns += 1_500_000_000
     shared_status.beat(Role.CONSOLE)
     assert supervision.cause(0.0) == Cause.RECORDER_LOST
+    assert supervision.measured == pytest.approx(2.1)
     shared_status.raise_flag(Flag.END_ASKED)
     assert supervision.cause(0.0) == Cause.SIGNAL
     shared_status.raise_flag(Flag.EMERGENCY_STOP)
@@ -164,6 +167,7 @@ def test_a_console_that_was_killed_is_lost_at_once(shared_status, rings, now, mo
     assert supervision.cause(0.0) == Cause.NONE
     monkeypatch.setattr("rigidimeter.acquisition.processes.sink.getppid", lambda: 1)
     assert supervision.cause(0.0) == Cause.CONSOLE_LOST
+    assert math.isnan(supervision.measured)
 
 
 def test_an_interrupt_is_one_order_to_abort(shared_status, rings):
@@ -206,6 +210,7 @@ def test_a_suspended_computer_has_stood_still(shared_status, supervision, now):
     assert supervision.cause(0.0) == Cause.NONE
     boot.ns += 2_000_000
     assert supervision.cause(0.0) == Cause.STALLED
+    assert supervision.measured == pytest.approx(0.101)
     shared_status.raise_flag(
         Flag.END_ASKED
     )  # the ramp that a signal asks for would set the arm going

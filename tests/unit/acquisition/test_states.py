@@ -76,6 +76,6 @@ def test_stopping_cannot_be_taken_back():
 
 def test_the_numbers_that_other_processes_read_stay():
     assert [state.value for state in State] == list(range(5))
-    assert [command.value for command in Command] == list(range(10))
+    assert [command.value for command in Command] == list(range(11))
     assert (NOTHING.command, NOTHING.name) == (Command.NONE, "")
     assert math.isnan(NOTHING.value)

@@ -90,6 +90,8 @@ def test_in_a_pause_nothing_is_counted_down():
     held = loop._replace(cause=int(Cause.TORQUE_HIGH))
     assert shown(told(), held).state_words == "held by the guard"
     assert shown(told(), held).stop_words == f"held: {Cause.TORQUE_HIGH.sentence}"
+    why = told({"event": "guard_latched", "sentence": "the torque was 11 N·m"})
+    assert shown(why, held).stop_words == "held: the torque was 11 N·m"
 
 
 @pytest.mark.parametrize(

@@ -88,6 +88,10 @@ def test_the_sensor_is_zeroed_unless_that_was_refused_and_the_session_ends():
     assert (over.running, over.outcome, over.reason) == (False, "fail", "why")
 
 
+def test_why_the_guard_latched_is_kept():
+    assert told({"event": "guard_latched", "sentence": "too fast"}).stop == "too fast"
+
+
 def test_other_events_change_nothing():
     progress = told(started(1, "1"))
     assert progress_after(progress, {"event": "order", "command": "pause"}) is progress

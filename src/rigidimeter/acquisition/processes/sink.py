@@ -178,6 +178,7 @@ class SharedSupervision:
         boot_ns: Nanoseconds = _boot_ns,
     ) -> None:
         self.attended = attended
+        self.measured = math.nan
         self._console_pid = console_pid
         self._aborted = False
         self._status, self._samples = shared.status, shared.samples
@@ -189,6 +190,7 @@ class SharedSupervision:
         # difference smaller, and so never looks like a suspension.
         awake_ns = max(boot_ns() - now_ns() for _ in range(3))
         self._suspended_ns = awake_ns + round(1e9 * stall_s)
+        self._stall_s = stall_s
         self._words = shared.status.memory.words
         self._places = shared.status.places()
 
@@ -201,16 +203,21 @@ class SharedSupervision:
         boot_ns = self._boot_ns()
         now_ns = self._now_ns()
         if boot_ns - now_ns > self._suspended_ns:
+            self.measured = 1e-9 * (boot_ns - now_ns - self._suspended_ns) + self._stall_s
             return _STALLED
         if words[ended]:
             return _SIGNAL
         if now_ns - words[console] > self._console_ns:
+            self.measured = 1e-9 * (now_ns - words[console])
             return _CONSOLE_LOST
         if self._console_pid and getppid() != self._console_pid:
+            self.measured = math.nan  # it was killed: its silence is short
             return _CONSOLE_LOST
         if now_ns - words[recorder] > self._recorder_ns:
+            self.measured = 1e-9 * (now_ns - words[recorder])
             return _RECORDER_LOST
         if self._samples.lag() > self._most_lag:
+            self.measured = float(self._samples.lag())
             return _RECORD_OVERFLOW
         return _NONE
 
