@@ -4,6 +4,11 @@ Least squares filters the whole epoch and then leaves out the rows within `trim_
 it does at the ends. So that what a sensor said there does not come out of the filter seconds later,
 torque and motion are bridged first by a straight line. The methods of the closed loop use a window
 that falls to zero at a stretch and rises after it; what was measured there counts for nothing.
+
+Where samples are lost, every channel gets stamps as even as its others, so that all that is made of
+even samples can be made of these too. What was commanded there is not known either: the command
+goes on a straight line, the perturbation keeps its level, and what follows from them is forgotten
+as what was before the epoch is.
 """
 
 from __future__ import annotations
@@ -14,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.estimation.signals import Array, motion_channels
-from rigidimeter.records import Channel, Epoch
+from rigidimeter.records import Channel, Epoch, LeftOut
 from rigidimeter.settings import EstimationSettings
 
 LEAST_USED_S = 1.0
@@ -31,11 +36,14 @@ def sound(epoch: Epoch, time_s: Array, margin_s: float = 0.0) -> NDArray[np.bool
 def bridged(epoch: Epoch) -> Epoch:
     """Return the epoch with torque and motion on a straight line over what is left out.
 
-    Command and perturbation stay: they are causes, and what follows the stretch depends on them.
+    Command and perturbation stay where they were recorded: they are causes, and what follows the
+    stretch depends on them.
     """
     if not epoch.left_out:
         return epoch
-    channels = dict(epoch.channels)
+    lost = [stretch for stretch in epoch.left_out if stretch.lost]
+    channels = {name: _evenly(one, lost) for name, one in epoch.channels.items()}
+    epoch = replace(epoch, channels=channels)
     for channel in _fitted(epoch):
         kept = sound(epoch, channel.time_s)
         if not np.any(kept):
@@ -44,6 +52,27 @@ def bridged(epoch: Epoch) -> Epoch:
         values = np.where(kept, channel.values, line)
         channels[channel.name] = Channel(channel.name, channel.time_s, values)
     return replace(epoch, channels=channels)
+
+
+def _evenly(channel: Channel, lost: list[LeftOut]) -> Channel:
+    """Return a channel with samples where its own are lost, evenly between those around them."""
+    steps_s = np.diff(channel.time_s)
+    if not lost or steps_s.size == 0:
+        return channel
+    missing = np.maximum(np.rint(steps_s * channel.rate_hz).astype(np.intp) - 1, 0)
+    middle_s = channel.time_s[:-1] + 0.5 * steps_s
+    missing[
+        ~np.any([(one.start_s < middle_s) & (middle_s < one.stop_s) for one in lost], axis=0)
+    ] = 0
+    if not np.any(missing):
+        return channel
+    before = np.repeat(np.arange(len(channel)), np.append(missing, 0) + 1)
+    first = np.concatenate(([0], np.cumsum(missing + 1)))
+    place = before + (np.arange(before.size) - first[before]) / np.append(missing + 1, 1)[before]
+    time_s = np.interp(place, np.arange(len(channel)), channel.time_s)
+    if channel.name == "perturbation_nm":
+        return Channel(channel.name, time_s, channel.values[before])
+    return Channel(channel.name, time_s, np.interp(place, np.arange(len(channel)), channel.values))
 
 
 def longest_part(epoch: Epoch) -> Epoch:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.lost_samples import lost_stretches
 from rigidimeter.recording.session_files import SessionFiles, read_session_files
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES, read_manifest
 from rigidimeter.records import Channel, Epoch, Motion, Notice, Outcome
@@ -78,12 +80,17 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
             )
             continue
         rows = slice(first[number], last[number] + 1)
-        if closed_well:
-            lost = _lost_of(files, rows, event, ended[number], 1.5 / settings.rig.tick_rate_hz)
-            if lost:
-                notices.append(Notice("error", f"{folder}, epoch {event['label']}: {lost}"))
-                ended[number] = {"outcome": "fail", "reason": lost}
-        elif number not in ended and files.ended and files.log.damaged:
+        most_s = 1.5 / settings.rig.tick_rate_hz
+        left_out = lost_stretches(files, rows, event, ended.get(number, {}), most_s)
+        notices += [
+            Notice(
+                "error",
+                f"{folder}, epoch {event['label']}: {lost.start_s:.3f} to {lost.stop_s:.3f} s are "
+                f"left out: {lost.reason}",
+            )
+            for lost in left_out
+        ]
+        if number not in ended and files.ended and files.log.damaged:
             line = f"line {files.log.damaged[0]} of {EVENTS} is damaged"
             ended[number] = {"outcome": "fail", "reason": f"how it ended is not known: {line}"}
         share = float(np.mean(samples["limited"][rows] > 0))
@@ -98,9 +105,10 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
             )
         closed = _closed(samples["time_s"][rows], ended.get(number))
         virtual = bool(manifest["virtual"])
-        epochs.append(
-            epoch_of_samples(str(folder), settings, samples, rows, event, closed, virtual=virtual)
+        epoch = epoch_of_samples(
+            str(folder), settings, samples, rows, event, closed, virtual=virtual
         )
+        epochs.append(replace(epoch, left_out=left_out))
     notices += [
         Notice("error", f"{folder}/{EVENTS}: does not say what epoch {number} of the samples was")
         for number in first
@@ -122,34 +130,6 @@ def _damage(folder: Path, files: SessionFiles) -> list[Notice]:
         said = [f"{SAMPLES}: {damaged} bytes are damaged, but no sample is lost"]
     said += [f"{EVENTS}: line {n} is damaged and left out" for n in files.log.damaged]
     return [Notice("error", f"{folder}/{text}") for text in said]
-
-
-def _lost_of(
-    files: SessionFiles,
-    rows: slice,
-    started: Mapping[str, Any],
-    ended: Mapping[str, Any],
-    most_s: float,
-) -> str:
-    """Return what an epoch that was closed with success has lost, empty if nothing.
-
-    Its events say when it began and ended; a sample may be so many seconds away from that.
-    """
-    time_s = files.samples.columns["time_s"]
-    began_s = started.get("time_s")
-    at_start = not isinstance(began_s, int | float) or time_s[rows.start] - began_s > most_s
-    missing_s = ended["time_s"] - float(time_s[rows.stop - 1])
-    at_end = missing_s > most_s
-    for lost in files.samples.lost:
-        if (
-            rows.start < lost.row < rows.stop
-            or (at_start and lost.row == rows.start)
-            or (at_end and lost.row == rows.stop)
-        ):
-            return f"{lost} of {SAMPLES} is damaged"
-    if at_end:
-        return f"its last {missing_s:.3g} s are missing; {SAMPLES} breaks off at {time_s[-1]:.3f} s"
-    return ""
 
 
 def epoch_extents(number: NDArray[Any]) -> tuple[dict[int, int], dict[int, int]]:

@@ -7,6 +7,7 @@ from rigidimeter.records.analysis_record import Analysis, Findings
 from rigidimeter.records.band_estimate import BandEstimate
 from rigidimeter.records.epochs import (
     CHANNEL_UNITS,
+    LOST_SAMPLES,
     Channel,
     Epoch,
     LeftOut,
@@ -23,6 +24,7 @@ from rigidimeter.records.parameters import PARAMETER_VECTORS, PARAMETERS, Parame
 __all__ = [
     "CHANNEL_UNITS",
     "FIT_NUMBERS",
+    "LOST_SAMPLES",
     "PARAMETERS",
     "PARAMETER_VECTORS",
     "STATISTICS",

@@ -126,6 +126,10 @@ class Notice:
     text: str
 
 
+LOST_SAMPLES = "lost_samples"
+"""The check that speaks of stretches whose samples are lost."""
+
+
 class LeftOut(NamedTuple):
     """A stretch of an epoch that is not used, ends included.
 
@@ -136,13 +140,18 @@ class LeftOut(NamedTuple):
     reason : str
         What was seen there, or what the user said of it; may be empty.
     check : str
-        The check that found it; empty where the user named it.
+        The check that speaks of it; empty where the user named it.
     """
 
     start_s: float
     stop_s: float
     reason: str = ""
     check: str = ""
+
+    @property
+    def lost(self) -> bool:
+        """Whether nothing is known of it, not even what was commanded: its samples are lost."""
+        return self.check == LOST_SAMPLES
 
 
 @dataclass(frozen=True)

@@ -106,6 +106,7 @@ class DiagnosticLevels(Section):
     saturation: Level = "exclude"
     frozen: Level = "exclude"
     left_out: Level = "note"
+    lost_samples: Level = "exclude"
     gravity: Level = "note"
     velocity_scale: Level = "exclude"
     velocity_delay: Level = "doubt"

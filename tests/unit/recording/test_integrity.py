@@ -101,22 +101,79 @@ def test_a_zeroed_block_loses_the_batches_it_touches(tmp_path):
     assert [str(lost) for lost in found.lost] == ["batches 1 to 2 (ticks 100 to 299)"]
 
 
-def test_an_epoch_that_touches_damage_is_excluded_and_the_others_are_not(recorded):
-    folder = recorded(epochs=3)
+def damage_at(folder, row):
+    """Flip a bit in the batch of a row; return the number of the batch."""
     path = folder / "samples.arrows"
-    whole, _ = read_session(folder)
     found = scan_samples(path.read_bytes(), path)
-    row = int(np.flatnonzero(found.columns["epoch"] == 2)[5000])
-    batch = next(m for m in found.stream.batches if m.facts["batch"] == row // BATCH)
+    number = row // BATCH
+    batch = next(m for m in found.stream.batches if m.facts["batch"] == number)
     flip(path, 8 * (batch.stop - 500))
+    return number
+
+
+def rows_of(folder, epoch):
+    path = folder / "samples.arrows"
+    return np.flatnonzero(scan_samples(path.read_bytes(), path).columns["epoch"] == epoch)
+
+
+def test_an_epoch_that_touches_damage_is_read_without_it(recorded):
+    folder = recorded(epochs=3)
+    whole, _ = read_session(folder)
+    number = damage_at(folder, rows_of(folder, 2)[5000])
     epochs, notices = read_session(folder)
-    assert [epoch.closed.kind for epoch in epochs] == ["included", "excluded", "included"]
-    assert f"batch {row // BATCH} (ticks " in epochs[1].closed.reason
+    assert [epoch.closed.kind for epoch in epochs] == ["included"] * 3
+    (lost,) = epochs[1].left_out
+    first_s = number * BATCH / 1000
+    # The sample at the tick before the batch was taken a little earlier than the tick.
+    assert (lost.start_s, lost.stop_s) == pytest.approx((first_s - 0.001, first_s + 0.1), abs=2e-3)
+    assert lost.lost
+    assert f"batch {number} (ticks {number * BATCH} to" in lost.reason
     assert [notice.level for notice in notices] == ["error", "error"]
-    for k in (0, 2):
-        np.testing.assert_array_equal(
-            epochs[k].channels["torque_nm"].values, whole[k].channels["torque_nm"].values
-        )
+    assert f"epoch {epochs[1].label}: {lost.start_s:.3f} to {lost.stop_s:.3f} s are left out" in (
+        notices[1].text
+    )
+    for before, after in zip(whole, epochs, strict=True):
+        for name, channel in after.channels.items():
+            missing = len(before.channels[name]) - len(channel)
+            assert missing == (BATCH if after is epochs[1] else 0)
+            kept = np.isin(before.channels[name].time_s, channel.time_s)
+            np.testing.assert_array_equal(before.channels[name].values[kept], channel.values)
+    assert [len(epoch.left_out) for epoch in epochs] == [0, 1, 0]
+
+
+@pytest.mark.parametrize("at", ["start", "end"])
+def test_an_epoch_that_lost_an_end_is_shorter(recorded, at):
+    folder = recorded(epochs=2)
+    (before, _), _ = read_session(folder)
+    rows = rows_of(folder, 1)
+    # A batch that belongs to the epoch alone.
+    row = rows[0] // BATCH * BATCH if at == "start" else rows[-1]
+    damage_at(folder, row)
+    (epoch, _), _ = read_session(folder)
+    assert epoch.closed.included
+    (lost,) = epoch.left_out
+    time_s, whole_s = (each.channels["torque_nm"].time_s for each in (epoch, before))
+    assert 0 < whole_s.size - time_s.size <= BATCH
+    if at == "start":
+        assert lost.start_s == pytest.approx(whole_s[0], abs=3e-3)
+        assert lost.stop_s == pytest.approx(time_s[0], abs=3e-3)
+    else:
+        assert lost.start_s == pytest.approx(time_s[-1], abs=3e-3)
+        assert lost.stop_s == pytest.approx(whole_s[-1], abs=3e-3)
+
+
+def test_an_epoch_whose_samples_break_off_says_when(recorded):
+    folder = recorded(epochs=1)
+    path = folder / "samples.arrows"
+    found = scan_samples(path.read_bytes(), path)
+    cut = rows_of(folder, 1)[15000] // BATCH
+    path.write_bytes(path.read_bytes()[: found.stream.batches[cut].start])
+    (epoch,), notices = read_session(folder)
+    (lost,) = epoch.left_out
+    stop_s = epoch.channels["torque_nm"].time_s[-1]
+    assert lost.start_s == pytest.approx(stop_s, abs=2e-3)
+    assert lost.reason == f"samples.arrows breaks off at {lost.start_s:.3f} s"
+    assert [notice.level for notice in notices] == ["error"]
 
 
 def test_damage_in_a_rest_excludes_no_epoch(recorded):

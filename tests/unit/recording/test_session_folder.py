@@ -240,9 +240,11 @@ def test_a_closed_session_that_lost_samples_does_not_pass_for_whole(simulate):
     path = folder / "samples.arrows"
     path.write_bytes(path.read_bytes()[: int(0.3 * path.stat().st_size)])
     (first,), notices = read_session(folder)
-    assert first.closed.kind == "excluded"
-    assert "are missing; samples.arrows breaks off at" in first.closed.reason
-    assert [notice.level for notice in notices] == ["error", "error"]
+    (lost,) = first.left_out
+    assert lost.start_s == pytest.approx(first.channels["torque_nm"].time_s[-1], abs=2e-3)
+    assert "breaks off at" in lost.reason or "and what follows it" in lost.reason
+    assert {notice.level for notice in notices} == {"error"}
+    assert f"epoch {first.label}: {lost.start_s:.3f} to " in notices[-2].text + notices[-1].text
 
 
 def test_an_epoch_that_starts_twice_or_never_is_said(simulate):

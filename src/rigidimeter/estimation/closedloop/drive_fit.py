@@ -51,7 +51,8 @@ FEWEST_SAMPLES, MOST_SAMPLES, MOST_TICKS = 50, 3000, 8000
 linear."""
 
 SETTLED_S = 0.3
-"""An epoch may begin in motion, and the model begins at rest."""
+"""An epoch may begin in motion, and the model begins at rest. After commands that are lost it is
+also in a state that is not known."""
 
 LARGEST_MISFIT = 0.1
 """Above this share of the velocity's standard deviation the command does not explain it."""
@@ -276,6 +277,11 @@ def _samples(epoch: Epoch) -> Samples | None:
     last_s = command.time_s[:MOST_TICKS][-1]
     inside = (velocity.time_s >= start_s) & (velocity.time_s <= last_s)
     inside &= sound(epoch, velocity.time_s)
+    for stretch in epoch.left_out:
+        if stretch.lost:
+            inside &= (velocity.time_s < stretch.stop_s) | (
+                velocity.time_s > stretch.stop_s + SETTLED_S
+            )
     time_s = velocity.time_s[inside][:MOST_SAMPLES]
     measured = velocity.values[inside][:MOST_SAMPLES]
     if time_s.size < FEWEST_SAMPLES or np.std(measured) == 0.0:

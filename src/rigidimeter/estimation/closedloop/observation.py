@@ -110,11 +110,12 @@ def observe_periods(prepared: PreparedEpoch) -> Observation:
     # A window with a hole would spread the excited lines over those between them.
     part = replace(prepared, epoch=longest_part(prepared.epoch))
     perturbation = _perturbation(part)
+    known = _during(perturbation, part.epoch.channels["torque_nm"])
     periods = 0
 
     def samples(available: int, rate_hz: float) -> int:
         nonlocal periods
-        periods, count = whole_periods(perturbation, rate_hz, available)
+        periods, count = whole_periods(known, rate_hz, available)
         return count
 
     grid = _grid(part, samples)
@@ -176,6 +177,13 @@ def _perturbation(prepared: PreparedEpoch) -> Channel:
     if obstacle:
         raise ValueError(obstacle)
     return _even(prepared.epoch.channels["perturbation_nm"])
+
+
+def _during(perturbation: Channel, torque: Channel) -> Channel:
+    """Return the perturbation while the torque was sampled: elsewhere it may not be known."""
+    early, late = np.searchsorted(perturbation.time_s, torque.time_s[[0, -1]])
+    rows = slice(int(early), int(late) + 1)
+    return Channel(perturbation.name, perturbation.time_s[rows], perturbation.values[rows])
 
 
 def _even(perturbation: Channel) -> Channel:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from rigidimeter.estimation.bad_stretches import FITTED, longest_repetition, share_at_extremes
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_most
 from rigidimeter.estimation.stretches import left_out_s
-from rigidimeter.records import Channel, Epoch, LeftOut
+from rigidimeter.records import LOST_SAMPLES, Channel, Epoch, LeftOut
 from rigidimeter.settings import DiagnosticsSettings
 
 MOST_SHOWN = 3
@@ -65,6 +65,26 @@ def left_out(epoch: Epoch) -> Look:
     reasons = "; ".join(dict.fromkeys(stretch.reason for stretch in found if stretch.reason))
     fact = f"{value:.3g} s are left out by hand, {_spans(found)}"
     return Look(value, 0.0, True, fact, f"{reasons or 'no reason was given'}; {_rest(epoch)}")
+
+
+def lost_samples(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
+    """Return in which share of the epoch's time its samples are lost, in %."""
+    found, most = _left_out(epoch, LOST_SAMPLES), settings.left_out_most_percent
+    if not found:
+        return Look(0.0, most, False, "no samples are lost")
+    lost_s = _seconds(found)
+    torque_s = epoch.channels["torque_nm"].time_s
+    start_s = min(float(torque_s[0]), *(stretch.start_s for stretch in found))
+    stop_s = max(float(torque_s[-1]), *(stretch.stop_s for stretch in found))
+    value = 100.0 * lost_s / (stop_s - start_s)
+    reasons = "; ".join(stretch.reason for stretch in found[:MOST_SHOWN])
+    fact = f"samples of {lost_s:.3g} s are lost, {value:.2g} % of the epoch (at most {most:g} %): "
+    return Look(value, most, True, fact + reasons)
+
+
+def _said_lost(case: Case, look: Look) -> str:
+    """Return that what is lost is left out, where enough is left."""
+    return said_left_out(LOST_SAMPLES)(case, look) if look.value <= look.threshold else ""
 
 
 def said_left_out(check: str) -> Callable[[Case, Look], str]:
@@ -173,6 +193,15 @@ CHANNEL_CHECKS = (
         "",
         "see whether the estimate changes with them",
         of_fit=False,
+    ),
+    Check(
+        LOST_SAMPLES,
+        (),
+        lambda c: lost_samples(c.epoch, c.settings),
+        "what is left is another experiment than was planned",
+        "read a copy of the recording that is whole; test the disk that it was on",
+        of_fit=False,
+        harmless=_said_lost,
     ),
     Check(
         "guard_limited",

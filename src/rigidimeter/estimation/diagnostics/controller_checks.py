@@ -21,11 +21,15 @@ from rigidimeter.estimation.diagnostics.check_record import (
     push_harmless,
 )
 from rigidimeter.estimation.signals import Array
+from rigidimeter.estimation.window import with_hole
 from rigidimeter.records import Epoch
 from rigidimeter.settings import DiagnosticsSettings, Settings
 
 COMPARED_HZ = (0.5, 10.0)
 """Below, the start of the epoch still counts; above, how the torque is held between its samples."""
+
+FORGOTTEN_S = 1.0
+"""So long after a stretch that is left out the comparison counts in full again."""
 
 REMEDY = "give the values that were used, per radian: --controller, or [controller] in the settings"
 
@@ -38,7 +42,11 @@ def controller_misfit(epoch: Epoch, loop: Loop, settings: DiagnosticsSettings) -
         return None  # ticks are missing
     expected = _command_rad_s(epoch, loop, command.time_s, rate_hz)
     n = command.time_s.size
-    both = np.fft.rfft(np.stack([command.values, expected]) * np.hanning(n), axis=1)
+    window, steep = np.hanning(n), np.zeros(n)
+    for stretch in epoch.left_out:  # there neither torque nor, where samples are lost, command is
+        hole_s = (stretch.start_s - command.time_s[0], stretch.stop_s - command.time_s[0])
+        window, steep = with_hole(window, steep, rate_hz, FORGOTTEN_S, hole_s)
+    both = np.fft.rfft(np.stack([command.values, expected]) * window, axis=1)
     first, last = (int(frequency * n / rate_hz) for frequency in COMPARED_HZ)
     sent, made = both[:, first : last + 1]
     power = float(np.sum(np.abs(sent) ** 2))
