@@ -13,6 +13,7 @@ from rigidimeter.cli.commission import claimed, table
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.tables import show
 from rigidimeter.errors import UserError
 
 
@@ -56,7 +57,7 @@ def check(
     """
     from datetime import UTC, datetime
 
-    from rigidimeter.cli.sign_text import sign_lines
+    from rigidimeter.cli.sign_text import sign_blocks
     from rigidimeter.commissioning import (
         Compared,
         check_record,
@@ -102,12 +103,11 @@ def check(
             software=__version__,
         )
     write_daily(path, found)
-    echo(table(found.checks))
+    show([table(found.checks)])
     echo(f"Record: {path}")
     if found.objection:
         raise UserError(f"{rig}: not fit for a person today: {found.objection}")
-    for line in sign_lines(chosen, found.checks):
-        echo(line)
+    show(sign_blocks(chosen, found.checks))
     kept = found.reference
     if kept is not None and kept.made_utc == found.made_utc:
         was = "" if kept.before_kg_m2 is None else f"; it was {kept.before_kg_m2:.3g} kg·m²"

@@ -17,7 +17,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.table_lines import text_table
+from rigidimeter.cli.tables import Table, show
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def commission(
     """
     from datetime import UTC, datetime
 
-    from rigidimeter.cli.sign_text import sign_lines
+    from rigidimeter.cli.sign_text import sign_blocks
     from rigidimeter.commissioning import commission as try_rig
     from rigidimeter.commissioning import record_path, write_record
     from rigidimeter.devices.rigfile import load_rig
@@ -109,14 +109,13 @@ def commission(
             signed_by=signed_by,
         )
     write_record(path, found)
-    echo(table(found.checks))
+    show([table(found.checks)])
     echo(f"Record: {path}")
     if found.objection:
         raise UserError(f"{rig}: not fit for a person: {found.objection}")
     if found.not_tried:
         echo(f"Not tried: {', '.join(found.not_tried)}.")
-    for line in sign_lines(chosen, found.checks):
-        echo(line)
+    show(sign_blocks(chosen, found.checks))
     what = "this emulated rig, with nobody in it" if found.emulated else "this rig"
     echo(
         f"Valid for {what}, its devices and this controller, for "
@@ -190,24 +189,16 @@ def _check_known(known: Mapping[str, float | None]) -> None:
             raise UserError(f"{option} {value:g}: must be a number other than 0")
 
 
-def table(checks: Sequence[Check]) -> str:
-    """Return the checks as lines, each with its remedy below where it has one."""
+def table(checks: Sequence[Check]) -> Table:
+    """Return the checks, each with its remedy below where it has one."""
     marks = {"passed": "ok", "failed": "FAIL"}
-    rows = [("", "check", "found", "must be")]
-    rows += [
-        (
-            marks.get(check.outcome, "–"),
-            check.name,
-            "" if check.value is None else check.words,
-            check.limit,
-        )
-        for check in checks
-    ]
-    heading, *lines = text_table(rows, "<<<<")
-    shown = [heading]
-    for check, line in zip(checks, lines, strict=True):
-        shown += [line, f"      {check.remedy}"] if check.remedy else [line]
-    return "\n".join(shown)
+    rows: list[Sequence[str] | str] = []
+    for check in checks:
+        found = "" if check.value is None else check.words
+        rows.append((marks.get(check.outcome, "–"), check.name, found, check.limit))
+        if check.remedy:
+            rows.append(f"      {check.remedy}")
+    return Table(("", "check", "found", "must be"), rows, "=<<<", indent=0)
 
 
 def _ask(question: str) -> bool:

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rigidimeter.cli.comparison_text import comparison_lines
+from rigidimeter.cli.comparison_text import comparison_blocks
 from rigidimeter.cli.inputs import (
     analyse_recordings,
     analyse_study_folder,
     keep_inputs,
     say,
+    say_analysed,
     study_files,
     study_of,
 )
@@ -24,10 +25,10 @@ from rigidimeter.cli.options import (
     reads_recordings,
 )
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.tables import show
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.records import Analysis
     from rigidimeter.study import StudyResult
 
 
@@ -107,34 +108,38 @@ def compare(
         raise UserError(f"--value takes one table, but {len(paths)} inputs were given")
     if not value and (folder := study_of(recordings, key)) is not None:
         keep_inputs(outputs, study_files(folder, key))
-        analysed = analyse_study_folder(
+        study = analyse_study_folder(
             folder, recordings, key, pair=(reference, other), seed=seed, resamples=resamples
         )
-        _write(analysed.result, *outputs, str(folder))
-        echo("\n".join(comparison_lines(analysed.result)))
-        _say_changes(analysed.result, folder, analysed.kept)
-        raise typer.Exit(analysed.status)
+        try:
+            _write(study.result, *outputs, str(folder))
+            show(comparison_blocks(study.result))
+            _say_changes(study.result, folder, kept=not study.not_kept)
+        finally:
+            status = study.say()
+        raise typer.Exit(status)
     keep_inputs(outputs, paths)
-    compared: Path | Analysis = paths[0]
+    if is_json and not value and len(paths) > 1:
+        raise UserError("compare takes one JSON file of estimates, or recordings, not both")
+    analysed = None if value or is_json else analyse_recordings(recordings)
     status = 0
-    if not value and is_json:
-        if len(paths) > 1:
-            raise UserError("compare takes one JSON file of estimates, or recordings, not both")
-    elif not value:
-        _, compared, status = analyse_recordings(recordings)
-    found = studies.compare(
-        compared,
-        other,
-        reference=reference,
-        value=value,
-        by=by,
-        session=session,
-        seed=seed,
-        resamples=resamples,
-    )
-    say(found.notices)
-    _write(found, *outputs)
-    echo("\n".join(comparison_lines(found)))
+    try:
+        found = studies.compare(
+            paths[0] if analysed is None else analysed[1],
+            other,
+            reference=reference,
+            value=value,
+            by=by,
+            session=session,
+            seed=seed,
+            resamples=resamples,
+        )
+        _write(found, *outputs)
+        show(comparison_blocks(found))
+        say(found.notices)
+    finally:
+        if analysed is not None:
+            status = say_analysed(*analysed)
     raise typer.Exit(status)
 
 
@@ -150,7 +155,7 @@ def _write(
         write_text(csv_out, table_csv(result_tables(found)["comparisons"]))
 
 
-def _say_changes(found: StudyResult, folder: Path, kept: bool) -> None:
+def _say_changes(found: StudyResult, folder: Path, *, kept: bool) -> None:
     echo("")
     if found.changes:
         echo("Since the last analysis:")

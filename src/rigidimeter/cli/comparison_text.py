@@ -1,17 +1,16 @@
-"""A comparison as lines for a terminal."""
+"""A comparison as it is shown on a terminal."""
 
 from __future__ import annotations
 
 import math
-import textwrap
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from rigidimeter.cli.table_lines import number_text
+from rigidimeter.cli.tables import Block, Heading, Table, number_text
 
 if TYPE_CHECKING:
-    from rigidimeter.study import Comparison, RatingsFound, StudyResult
+    from rigidimeter.study import RatingsFound, StudyResult
 
 BY = {
     "protocol": "by the protocol",
@@ -19,142 +18,202 @@ BY = {
     "estimate": "without an estimate",
     "operator": "by the operator",
 }
-INDENTED = textwrap.TextWrapper(100, initial_indent="  ", subsequent_indent="    ")
 UNBOUNDED = (
-    "",
-    "† Too few values for an interval at this confidence: the smallest and the largest",
-    "  difference stand in its place.",
+    "† Too few values for an interval at this confidence: the smallest and the largest difference "
+    "stand in its place."
 )
 
 
-def comparison_lines(found: StudyResult) -> list[str]:
-    """Return everything that was concluded."""
-    from rigidimeter.reporting.verdict_text import verdict_sentence
-    from rigidimeter.study import TEST
+def comparison_blocks(found: StudyResult) -> Iterator[Block]:
+    """Yield everything that was concluded, the verdict first."""
+    from rigidimeter.reporting.verdict_text import verdict
 
-    lines = [*textwrap.wrap(verdict_sentence(found), 100), *_first_screen(found), ""]
-    if found.source:
-        lines.append(f"{found.source} by {found.by}: {found.reference} − {found.other}")
-    lines += [TEST, ""]
-    several = sum(c.test is not None for c in found.comparisons) > 1
-    for c in found.comparisons:
-        lines += _epochs(c, several)
-    if any(c.test is not None and not c.test.shift_bounded for c in found.comparisons):
-        lines += UNBOUNDED
+    said = verdict(found)
+    yield Heading(said.lead)
+    if said.rest:
+        yield " ".join(said.rest)
+    yield from _first_screen(found)
+    yield ""
+    yield from _epochs(found)
     if found.blinded:
         codes = ", ".join(condition.name for condition in found.conditions)
-        lines += ["", f"Blinded: the conditions are the codes {codes}; give the key with --key."]
-    lines += [*_days(found), *_effects(found)]
+        yield ""
+        yield f"Blinded: the conditions are the codes {codes}; give the key with --key."
+    yield from _days(found)
+    yield from _effects(found)
     if found.ratings is not None:
-        lines += _ratings(found.ratings)
-    if found.sensitivity:
-        lines += ["", "By other methods (p of epochs, p of days; * as above):"]
-        for row in found.sensitivity:
-            mark = "*" if row.chosen else " "
-            lines.append(
-                f" {mark}{row.measure.title}, {row.method}, J {row.inertia}: shift "
-                f"{row.shift:.4g}, p {number_text(row.p)}, by days {number_text(row.p_day)}"
-            )
-    return [*lines, *_exclusions(found)] if found.sessions else lines
+        yield from _ratings(found.ratings)
+    yield from _sensitivity(found)
+    if found.sessions:
+        yield from _exclusions(found)
 
 
-def _first_screen(found: StudyResult) -> Iterator[str]:
+def _first_screen(found: StudyResult) -> Iterator[Block]:
     """Yield what the first screen of the report shows."""
     from rigidimeter.reporting.first_screen import (
         LIGHTS,
-        difference_words,
         gravest_words,
         light_words,
+        strip,
+        tested_words,
     )
-    from rigidimeter.study import conclude, traffic_light
+    from rigidimeter.study import traffic_light
 
-    light, concluded = traffic_light(found), conclude(found)
+    light = traffic_light(found)
     if light is not None:
         words = f"Data quality: {LIGHTS[light.level][1]}. {light_words(light)} "
-        yield from textwrap.wrap(words + gravest_words(light), 100)
-    if concluded is None:
+        yield words + gravest_words(light)
+    rows = strip(found)
+    if not rows:
         return
-    yield ""
-    for one in concluded.each:
-        d, measure = one.difference, one.comparison.measure
-        yield f"{measure.label}: {found.reference} {d.reference:.4g}, {found.other} {d.other:.4g}"
-        yield f"  {found.other} {difference_words(d, measure.unit)}"
-        yield f"  {one.verdict}: p {number_text(d.p)}, by Holm {number_text(one.p)}"
-
-
-def _epochs(c: Comparison, several: bool) -> Iterator[str]:
-    yield c.measure.label
-    for name in c.pair:
-        s = c.summaries[name]
-        excluded = f", excluded {c.excluded[name]:2d}" if c.measure.counted == "epochs" else ""
-        yield f"  {name:>10}: n {s.n:3d}{excluded}, median {_interval(s.median, s.q1, s.q3)}"
-    if c.test is None:
-        yield f"  no test: {c.remark}"
-        return
-    t = c.test
-    adjusted = f" (by Holm {c.p_holm:.2g})" if several else ""
-    yield (
-        f"  {c.reference} − {c.other}: shift {_interval(t.shift, t.shift_low, t.shift_high)}"
-        f"{'' if t.shift_bounded else ' †'}, z {t.z:.3f}, "
-        f"p {t.p:.2g}{adjusted}, r {t.r:.3f}"
+    cells: list[Sequence[str] | str] = []
+    for row in rows:
+        cells.append(f"{', '.join(filter(None, (row.title, row.unit)))}: {row.verdict}")
+        cells.append(
+            (
+                *(row.reference, row.other, row.difference, row.percent, row.interval),
+                row.p,
+                row.p_holm,
+            )
+        )
+    headings = (
+        found.reference,
+        found.other,
+        f"{found.other} is",
+        "",
+        "95 % interval",
+        "p",
+        "by Holm",
     )
+    yield from ("", Heading(f"In short: {tested_words(found)}"), Table(headings, cells, ">>==<>>"))
 
 
-def _days(found: StudyResult) -> Iterator[str]:
+def _epochs(found: StudyResult) -> Iterator[Block]:
+    """Yield each condition in each measure, and the rank-sum tests."""
+    from rigidimeter.study import TEST
+
+    if found.source:
+        yield f"{found.source} by {found.by}: {found.reference} − {found.other}"
+    groups: list[Sequence[str] | str] = []
+    for c in found.comparisons:
+        groups.append(c.measure.label)
+        for name in c.pair:
+            s = c.summaries[name]
+            excluded = f"{c.excluded[name]}" if c.measure.counted == "epochs" else ""
+            quartiles = f"{s.q1:.4g} to {s.q3:.4g}"
+            groups.append((name, f"{s.n}", excluded, f"{s.median:.4g}", quartiles))
+    yield Heading("Each condition")
+    yield Table(("condition", "n", "excluded", "median", "quartiles"), groups, "<>>>=")
+    yield ""
+    tested = [(c, c.test) for c in found.comparisons if c.test is not None]
+    if tested:
+        yield Heading(f"{found.reference} − {found.other}, {TEST}")
+        rows = [
+            (
+                c.measure.title,
+                f"{t.shift:.4g}",
+                f"{t.shift_low:.4g} to {t.shift_high:.4g}{'' if t.shift_bounded else ' †'}",
+                f"{t.z:.3f}",
+                f"{t.p:.2g}",
+                number_text(c.p_holm),
+                f"{t.r:.3f}",
+            )
+            for c, t in tested
+        ]
+        headings = ("", "shift", "95 % interval", "z", "p", "by\nHolm", "r")
+        yield Table(headings, rows, "<>=>>>>")
+    for c in found.comparisons:
+        if c.test is None:
+            yield f"  {c.measure.title}: no test: {c.remark}"
+    if any(not t.shift_bounded for _, t in tested):
+        yield UNBOUNDED
+
+
+def _days(found: StudyResult) -> Iterator[Block]:
     tested = [(c, c.days) for c in found.comparisons if c.days is not None]
     if not tested:
         return
     yield ""
-    yield "Days, not epochs:"
+    yield Heading(f"{found.reference} − {found.other}: days, not epochs")
+    rows: list[Sequence[str] | str] = []
     for c, d in tested:
-        both = f", {d.n_days_both} of them in both" if d.n_days_both else ""
-        yield f"{c.measure.label}: {d.n_days_x} and {d.n_days_y} days{both}"
-        if d.remark:
-            yield from INDENTED.wrap(f"no test: {d.remark}")
-            continue
-        medians = (
-            "" if math.isnan(d.p_days) else f", rank-sum of day medians p {number_text(d.p_days)}"
+        rows.append(c.measure.label)
+        rows.append(
+            (
+                f"{d.n_days_x}, {d.n_days_y} ({d.n_days_both})",
+                number_text(d.estimate, ".4g"),
+                "" if math.isnan(d.low) else f"{d.low:.4g} to {d.high:.4g}",
+                number_text(d.p),
+                number_text(c.days_p_holm),
+                number_text(d.df, ".1f"),
+                number_text(d.p_days),
+                number_text(100 * d.day_share, ".0f"),
+            )
         )
-        yield (
-            f"  {c.reference} − {c.other}: {_interval(d.estimate, d.low, d.high)}, "
-            f"p {number_text(d.p)} (by Holm {number_text(c.days_p_holm)}; {d.df:.1f} df){medians}"
-        )
-        for sentence in filter(None, (d.test, d.few)):
-            yield from INDENTED.wrap(sentence)
-        if not math.isnan(d.day_share):
-            yield f"  of the variance between epochs, {100 * d.day_share:.0f} % is between days"
+    headings = ("days\n(both)", "estimate", "95 % interval", "p", "by\nHolm", "df",
+                "p of\nmedians", "variance\nof days %")  # fmt: skip
+    yield Table(headings, rows, "=>=>>>>>")
+    said: dict[str, list[str]] = {}
+    for c, d in tested:
+        sentences = (f"no test: {d.remark}",) if d.remark else (d.test, d.few)
+        for sentence in filter(None, sentences):
+            said.setdefault(sentence, []).append(c.measure.title)
+    for sentence, titles in said.items():
+        yield f"  {'all' if len(titles) == len(tested) else ', '.join(titles)}: {sentence}"
+    yield "  p of medians: rank-sum test of the days' medians"
 
 
-def _effects(found: StudyResult) -> Iterator[str]:
+def _effects(found: StudyResult) -> Iterator[Block]:
     sized = [(c.measure, c.effects) for c in found.comparisons if c.effects is not None]
     if not sized:
         return
     resampled = "whole days" if found.sessions else "sessions or single values"
     yield ""
-    yield f"Effect sizes, 95 % intervals by resampling {resampled}"
-    for measure, e in sized:
-        r = _interval(e.r, e.r_low, e.r_high, ".3f")
-        biserial = _interval(e.rank_biserial, e.rank_biserial_low, e.rank_biserial_high, ".3f")
-        yield f"  {measure.title}: r {r}, rank-biserial {biserial} ({e.method})"
+    yield Heading(f"Effect sizes, 95 % intervals by resampling {resampled}")
+    effects = [
+        (
+            measure.title,
+            f"{e.r:.3f}",
+            f"{e.r_low:.3f} to {e.r_high:.3f}",
+            f"{e.rank_biserial:.3f}",
+            f"{e.rank_biserial_low:.3f} to {e.rank_biserial_high:.3f}",
+            e.method,
+        )
+        for measure, e in sized
+    ]
+    headings = ("", "r", "95 % interval", "rank-\nbiserial", "95 % interval", "")
+    yield Table(headings, effects, "<>=>=<")
     titles = {measure.name: measure.title for measure, _ in sized}
-    if found.differences:
-        yield "Which separates the conditions better (difference of rank-biserial correlations):"
+    if not found.differences:
+        return
+    yield ""
+    yield Heading("Which separates the conditions better: difference of rank-biserial correlations")
+    rows = []
     for each in found.differences:
         d = each.difference
         how = "paired" if d.paired else "independent"
-        pair = f"  {titles[each.first]} − {titles[each.second]}"
+        ends = f"{d.low:.3f} to {d.high:.3f}"
         if math.isnan(d.p):
-            yield f"{pair}: {d.estimate:.3f}, no interval: every resample gives the same ({how})"
-        else:
-            size = _interval(d.estimate, d.low, d.high, ".3f")
-            p, adjusted = number_text(d.p), number_text(each.p_holm)
-            yield f"{pair}: {size}, p {p}, by Holm {adjusted} ({how})"
+            how, ends = f"{how}; no interval: every resample gives the same", ""
+        rows.append(
+            (
+                f"{titles[each.first]} − {titles[each.second]}",
+                f"{d.estimate:.3f}",
+                ends,
+                number_text(d.p),
+                number_text(each.p_holm),
+                how,
+            )
+        )
+    yield Table(("", "", "95 % interval", "p", "by Holm", ""), rows, "<>=>><")
 
 
-def _ratings(found: RatingsFound) -> Iterator[str]:
+def _ratings(found: RatingsFound) -> Iterator[Block]:
     c, fit = found.contrast, found.fit
     yield ""
-    yield f"Examiners' ratings ({found.source}): {fit.n} in {len(fit.conditions)} conditions"
+    yield Heading(
+        f"Examiners' ratings ({found.source}): {fit.n} in {len(fit.conditions)} conditions"
+    )
     means = ", ".join(
         f"{name} {mean:.3g}" for name, mean in zip(fit.conditions, fit.means, strict=True)
     )
@@ -172,15 +231,32 @@ def _ratings(found: RatingsFound) -> Iterator[str]:
         )
 
 
-def _exclusions(found: StudyResult) -> Iterator[str]:
+def _sensitivity(found: StudyResult) -> Iterator[Block]:
+    if not found.sensitivity:
+        return
+    rows = [
+        (
+            "*" if row.chosen else "",
+            row.measure.title,
+            row.method,
+            row.inertia,
+            f"{row.shift:.4g}",
+            number_text(row.p),
+            number_text(row.p_day),
+        )
+        for row in found.sensitivity
+    ]
     yield ""
+    yield Heading("By other methods (* as above)")
+    headings = ("", "", "method", "J", "shift", "p of\nepochs", "p of\ndays")
+    yield Table(headings, rows, "<<<<>>>")
+
+
+def _exclusions(found: StudyResult) -> Iterator[Block]:
+    yield ""
+    yield Heading(f"Epochs that do not count: {len(found.exclusions)}")
     counts = Counter((exclusion.by, exclusion.reason) for exclusion in found.exclusions)
-    yield f"Epochs that do not count: {len(found.exclusions)}"
     for (by, reason), count in counts.most_common():
         yield f"  {count:3d} {BY[by]}: {reason}"
     for out in found.left_out:
         yield f"Left out: {out.path}: {out.reason}"
-
-
-def _interval(value: float, low: float, high: float, digits: str = ".4g") -> str:
-    return f"{value:{digits}} [{low:{digits}} to {high:{digits}}]"

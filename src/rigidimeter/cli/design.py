@@ -10,6 +10,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import JsonOption, SettingsOption
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.tables import show
 
 
 def design(
@@ -74,7 +75,7 @@ def design(
       rigidimeter design --settings rig.toml --detect damping=20% --power 0.8
       rigidimeter design --settings rig.toml --optimise --multisine
     """
-    from rigidimeter.cli.design_text import design_lines
+    from rigidimeter.cli.design_text import design_blocks
     from rigidimeter.documents import write_json
     from rigidimeter.dynamics import refuse_unstable
     from rigidimeter.experiment import check_criterion, design_document
@@ -90,7 +91,7 @@ def design(
         search=criterion if optimise else None,
         with_multisine=multisine,
     )
-    echo("\n".join(design_lines(designed, power, alpha)))
+    show(design_blocks(designed, power, alpha))
     if out is not None:
         from rigidimeter.reporting.design_folder import write_design_folder
 

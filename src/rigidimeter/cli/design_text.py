@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterator
 
-from rigidimeter.cli.table_lines import Rows, text_table
+from rigidimeter.cli.tables import Block, Heading, Table
 from rigidimeter.dynamics import Margins
 from rigidimeter.experiment import (
     Candidate,
@@ -21,7 +20,7 @@ from rigidimeter.experiment import (
 from rigidimeter.units import deg_from_rad, rad_from_deg
 
 _SHOWN = 8
-_HEADS = ("J kg·m²", "B N·m·s/rad", "K N·m/rad")
+_HEADS = ("J\nkg·m²", "B\nN·m·s/rad", "K\nN·m/rad")
 _UNITS = {"inertia": "kg·m²", "damping": "N·m·s/rad", "stiffness": "N·m/rad"}
 _EQUAL = {
     "prbs": "PRBS",
@@ -31,7 +30,7 @@ _EQUAL = {
 }
 
 
-def design_lines(design: Design, power: float, alpha: float) -> Iterator[str]:
+def design_blocks(design: Design, power: float, alpha: float) -> Iterator[Block]:
     """Yield the text, section by section; `power` and `alpha` are those that were asked for."""
     sections = [
         part(design)
@@ -48,18 +47,13 @@ def design_lines(design: Design, power: float, alpha: float) -> Iterator[str]:
     if not design.warnings:
         yield "Everything stays within the guard's limits."
     for warning in (*design.warnings, *design.stability.warnings):
-        yield from _wrapped(f"Warning: {warning}.", indent="")
+        yield f"Warning: {warning}."
 
 
-def _wrapped(text: str, indent: str = "  ") -> list[str]:
-    """Return the text on lines of at most 96 letters."""
-    return textwrap.wrap(text, 96, initial_indent=indent, subsequent_indent="  ")
-
-
-def _prbs(design: Design) -> Iterator[str]:
+def _prbs(design: Design) -> Iterator[Block]:
     prbs, band = design.settings.prbs, design.band
     low_nm, high_nm = design.perturbation_nm.min(), design.perturbation_nm.max()
-    yield "Torque perturbation (PRBS)"
+    yield Heading("Torque perturbation (PRBS)")
     yield (
         f"  {prbs.register_bits} bits ({chip_count(prbs)} chips) at {prbs.clock_hz:g} Hz, period "
         f"{period_s(prbs):.4g} s; {prbs.duration_s:g} s at {design.settings.rig.tick_rate_hz:g} "
@@ -74,26 +68,25 @@ def _prbs(design: Design) -> Iterator[str]:
         f"  in the wanted band: {band.lines_in_band} lines, {band.in_band_percent:.0f} % of the "
         "power"
     )
-    yield from _wrapped(band.verdict)
-    rows: Rows = [
-        ("predicted in the ideal loop", "angle SD deg", "peak angle deg", "peak speed deg/s")
-    ]
+    yield f"  {band.verdict}"
+    rows = []
     for name, needs in design.prbs_demand.items():
         angles = (needs.angle_sd_rad, needs.peak_angle_rad)
         rows.append(
             (
-                f"  {name}",
+                name,
                 *(f"{deg_from_rad(angle):.2f}" for angle in angles),
                 f"{deg_from_rad(needs.peak_speed_rad_s):.1f}",
             )
         )
-    yield from text_table(rows, "<>>>", "  ")
+    headings = ("in the ideal loop", "angle SD\ndeg", "peak angle\ndeg", "peak speed\ndeg/s")
+    yield Table(headings, rows, "<>>>")
 
 
-def _sinusoid(design: Design) -> Iterator[str]:
+def _sinusoid(design: Design) -> Iterator[Block]:
     sinusoid, guard = design.settings.sinusoid, design.settings.guard
     needs = design.sinusoid_demand
-    yield "Position perturbation (sinusoid)"
+    yield Heading("Position perturbation (sinusoid)")
     yield (
         f"  ±{sinusoid.amplitude_deg:g} deg at {sinusoid.frequency_hz:g} Hz for "
         f"{sinusoid.motion_s:g} s of {sinusoid.duration_s:g} s, tapers of {sinusoid.taper_s:g} s"
@@ -111,11 +104,11 @@ def _sinusoid(design: Design) -> Iterator[str]:
         yield f"  {name} {deg_from_rad(value):.4g} {unit} (guard: {limit:g} {unit})"
 
 
-def _controller(design: Design) -> Iterator[str]:
+def _controller(design: Design) -> Iterator[Block]:
     controller = design.settings.controller
     J, B = controller.inertia_kg_m2, controller.damping_nm_s_rad
     tau_s = time_constant_s(controller)
-    yield "Controller (admittance)"
+    yield Heading("Controller (admittance)")
     yield f"  J_c {J:.4g} kg·m²/rad ({rad_from_deg(J):.4g} kg·m²/deg)"
     yield f"  B_c {B:.4g} N·m·s/rad ({rad_from_deg(B):.4g} N·m·s/deg)"
     if math.isfinite(tau_s):
@@ -124,12 +117,13 @@ def _controller(design: Design) -> Iterator[str]:
         yield "  no damping: the free arm's velocity never settles"
 
 
-def _bandwidth(design: Design) -> Iterator[str]:
+def _bandwidth(design: Design) -> Iterator[Block]:
     table = design.bandwidth
-    yield f"Bandwidth (−3 dB) of the arm of App. A, J, B, K ±{table.uncertainty_percent:g} %"
+    yield Heading(
+        f"Bandwidth (−3 dB) of the arm of App. A, J, B, K ±{table.uncertainty_percent:g} %"
+    )
     notes = {table.equation_8.signs: "Eq. 8", table.widest.signs: "widest"}
-    rows: Rows = [("corner", "J kg·m²", "B N·m·s/rad", "K N·m/rad", "Hz", "")]
-    rows += [
+    rows = [
         (
             "".join("−0+"[sign + 1] for sign in corner.signs) if any(corner.signs) else "nominal",
             f"{corner.joint.inertia_kg_m2:.4f}",
@@ -140,26 +134,27 @@ def _bandwidth(design: Design) -> Iterator[str]:
         )
         for corner in (table.nominal, *table.corners)
     ]
-    yield from text_table(rows, "<>>>><", "  ")
+    yield Table(("corner", *_HEADS, "bandwidth\nHz", ""), rows, "<>>>><")
 
 
-def _protocol(design: Design) -> Iterator[str]:
+def _protocol(design: Design) -> Iterator[Block]:
     protocol = design.protocol
-    yield f"Protocol (seed {protocol.seed})"
+    yield Heading(f"Protocol (seed {protocol.seed})")
     for (task, condition), epochs in protocol.counts.items():
         yield f"  {condition}, {task}: {epochs} {'epoch' if epochs == 1 else 'epochs'}"
     yield f"  {protocol.total_s:g} s ({protocol.total_s / 60:.1f} min) with the rests"
 
 
-def _stability(design: Design) -> Iterator[str]:
+def _stability(design: Design) -> Iterator[Block]:
     """Yield the margins of the loop."""
     ours = design.settings.margins
-    yield "Stability of the admittance on the arm"
-    rows: Rows = [("", "gain margin", "phase margin", "delay margin", "modulus", "verdict")]
+    yield Heading("Stability of the admittance on the arm")
+    rows = []
     for name, margins in design.stability.conditions.items():
         rows.append((f"subject {name}", *_margins(margins)))
-        rows.append(("  worst joint around it", *_margins(design.stability.worst[name])))
-    yield from text_table(rows, "<>>>><", "  ")
+        rows.append(("worst joint around it", *_margins(design.stability.worst[name])))
+    headings = ("", "gain\nmargin", "phase\nmargin", "delay\nmargin", "modulus", "verdict")
+    yield Table(headings, rows, "<>>>><")
     yield (
         f"  worst: each of J, B, K from {ours.joint_factor_low:g} to {ours.joint_factor_high:g} "
         "times its value"
@@ -179,10 +174,10 @@ def _margins(found: Margins) -> tuple[str, ...]:
     )
 
 
-def _precision(design: Design) -> Iterator[str]:
+def _precision(design: Design) -> Iterator[Block]:
     """Yield the standard errors of one epoch, and of all planned ones."""
     counts = design.planned_epochs
-    yield "Predicted standard errors of one epoch"
+    yield Heading("Predicted standard errors of one epoch")
     for name, found in design.precision.items():
         errors = [
             ("bound, every frequency", found.bound.free),
@@ -194,9 +189,8 @@ def _precision(design: Design) -> Iterator[str]:
         ]
         if counts[name] > 1:
             errors.insert(2, (f"iv, {counts[name]} epochs pooled", found.iv_pooled(counts[name])))
-        rows: Rows = [(f"subject {name}", *_HEADS)]
-        rows += [(f"  {what}", *map(_error, values, found.values)) for what, values in errors]
-        yield from text_table(rows, "<>>>", "  ")
+        rows = [(what, *map(_error, values, found.values)) for what, values in errors]
+        yield Table((f"subject {name}", *_HEADS), rows, "<>>>")
         if any(found.least_squares_bias):
             off = ", ".join(
                 f"{symbol} by {100.0 * bias / value:+.0f} %"
@@ -205,9 +199,9 @@ def _precision(design: Design) -> Iterator[str]:
                 )
                 if value
             )
-            yield from _wrapped(f"  the subject's own torque would bias least squares: {off}")
+            yield f"  the subject's own torque would bias least squares: {off}"
     for remark in design.remarks:
-        yield from _wrapped(f"  {remark}")
+        yield f"  {remark}"
 
 
 def _band(band_hz: tuple[float, float]) -> str:
@@ -216,17 +210,16 @@ def _band(band_hz: tuple[float, float]) -> str:
 
 
 def _error(error: float, value: float) -> str:
-    return f"{error:.3g} ({100.0 * error / value:.3g} %)" if value else f"{error:.3g}"
+    return f"{error:.2g} ({100.0 * error / value:.2g} %)" if value else f"{error:.2g}"
 
 
-def _ranking(design: Design, ranked: tuple[Candidate, ...]) -> Iterator[str]:
+def _ranking(design: Design, ranked: tuple[Candidate, ...]) -> Iterator[Block]:
     """Yield the best sequences of the search, beside the present one."""
     now = design.present
-    yield (
+    yield Heading(
         f"Search for a PRBS ({len(ranked)} sequences, criterion {design.criterion}, iv, one epoch)"
     )
-    rows: Rows = [("", "bits", "clock Hz", "±N·m", "cost %", "J %", "B %", "K %", "angle SD deg",
-             "peak angle deg", "")]  # fmt: skip
+    rows = []
     best = [(f"{k}", found) for k, found in enumerate(ranked[:_SHOWN], start=1)]
     for label, found in [*best, *([("present", now)] if now else [])]:
         largest = (max(values) for values in zip(*found.errors_percent.values(), strict=True))
@@ -243,29 +236,31 @@ def _ranking(design: Design, ranked: tuple[Candidate, ...]) -> Iterator[str]:
                 "" if found.covered else "misses the band",
             )
         )
-    yield from text_table(rows, "<>>>>>>>>><", "  ")
+    headings = ("", "bits", "clock\nHz", "±N·m", "cost\n%", "J\n%", "B\n%", "K\n%",
+                "angle SD\ndeg", "peak\ndeg", "")  # fmt: skip
+    yield Table(headings, rows, "<>>>>>>>>><")
     yield "  the best one, as settings:"
     yield from (f"    {line}" for line in prbs_toml(ranked[0].prbs).splitlines())
 
 
-def _multisine(found: MultisineComparison) -> Iterator[str]:
+def _multisine(found: MultisineComparison) -> Iterator[Block]:
     """Yield the standard errors of the multisine beside those of the PRBS."""
-    yield f"Multisine (crest factor {found.crest_factor:.3g}), standard errors of iv, one epoch"
+    yield Heading(
+        f"Multisine (crest factor {found.crest_factor:.3g}), standard errors of iv, one epoch"
+    )
     for name, errors in found.errors.items():
-        rows: Rows = [(f"subject {name}", *_HEADS)]
-        rows += [
-            (f"  {_EQUAL[what]}", *(f"{value:.3g}" for value in values))
-            for what, values in errors.items()
+        rows = [
+            (_EQUAL[what], *(f"{value:.3g}" for value in values)) for what, values in errors.items()
         ]
-        yield from text_table(rows, "<>>>", "  ")
+        yield Table((f"subject {name}", *_HEADS), rows, "<>>>")
 
 
-def _detection(found: Detection, power: float, alpha: float) -> Iterator[str]:
+def _detection(found: Detection, power: float, alpha: float) -> Iterator[Block]:
     """Yield how many epochs a difference needs."""
     wanted, effect = found.wanted, found.effect
     unit = _UNITS[wanted.parameter]
     share = f" ({wanted.amount:g} %)" if wanted.percent else ""
-    yield (
+    yield Heading(
         f"To detect a {wanted.parameter} different by {abs(effect.difference):.4g} {unit}{share} "
         f"from subject {found.condition}"
     )

@@ -10,17 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rigidimeter.cli.inputs import analyse_recordings, keep_inputs
+from rigidimeter.cli.inputs import analyse_recordings, keep_inputs, say_analysed
 from rigidimeter.cli.options import CsvOption, JsonOption, Recordings, reads_recordings
-from rigidimeter.cli.output import echo
-from rigidimeter.cli.table_lines import number_text, text_table, with_error, wrapped
+from rigidimeter.cli.tables import Block, Heading, Table, number_text, show, with_error
 
 if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Score
+    from rigidimeter.study import StudyResult
 
-_FIT_HEADING = ("epoch", "condition", "J kg·m²", "B N·m·s/rad", "K N·m/rad", "R²", "VAF %", "")
-_DIGITS = (".5g", ".4g", ".4g")
-_SCORE_HEADING = ("epoch", "condition", "impulse N·m·s", "work J", "")
+_DIGITS = ("#.5g", "#.4g", "#.4g")
 
 
 @reads_recordings
@@ -52,92 +50,104 @@ def estimate(
           --column torque_nm=torque_Nm --rate-hz 1000 --reaction --epoch-length-s 20
     """
     from rigidimeter.recording import write_estimates_csv, write_estimates_json
+    from rigidimeter.study import recording_result
     from rigidimeter.study.subject_torque_table import check_name, write_subject_torque
 
     keep_inputs((json_out, csv_out, subject_torque_out), recordings.paths)
     if subject_torque_out is not None:
         check_name(subject_torque_out)
-    read, analysis, status = analyse_recordings(recordings)
-    if json_out is not None:
-        write_estimates_json(json_out, analysis)
-    if csv_out is not None:
-        write_estimates_csv(csv_out, analysis)
-    echo("\n".join(estimate_lines(analysis)))
-    if subject_torque_out is not None:
-        write_subject_torque(subject_torque_out, read, analysis)
+    read, analysis = analyse_recordings(recordings)
+    try:
+        if json_out is not None:
+            write_estimates_json(json_out, analysis)
+        if csv_out is not None:
+            write_estimates_csv(csv_out, analysis)
+        show(estimate_blocks(recording_result(read, analysis)))
+        if subject_torque_out is not None:
+            write_subject_torque(subject_torque_out, read, analysis)
+    finally:
+        status = say_analysed(read, analysis)
     raise typer.Exit(status)
 
 
-def estimate_lines(analysis: Analysis) -> list[str]:
-    """Return everything that was estimated, with an empty line between blocks."""
-    blocks = (_method, _delays, _fits, _fixed_inertia, _together, _findings, _scores)
-    return [line for block in blocks if (lines := block(analysis)) for line in (*lines, "")][:-1]
+def estimate_blocks(result: StudyResult) -> list[Block]:
+    """Return the verdict and everything that was estimated, with an empty line between parts."""
+    from rigidimeter.reporting.verdict_text import verdict
+
+    parts: list[Sequence[Block]] = [[Heading(verdict(result).lead)]]
+    parts += [part(result.analysis) for part in (_method, _delays, _fits, _fixed_inertia)]
+    parts.append(_together(result) or _pooled(result.analysis))
+    parts += [_findings(result.analysis), _scores(result.analysis)]
+    return [block for part in parts if part for block in (*part, "")][:-1]
 
 
-def _together(analysis: Analysis) -> list[str]:
-    """Return all epochs together; of one condition what the first screen of a report shows."""
-    from rigidimeter.study import WANTED_PERCENT, compare_analysis, precisions
+def _together(result: StudyResult) -> list[Block]:
+    """Return of one condition what the first screen of a report shows."""
+    from rigidimeter.reporting.numbers import scaled
+    from rigidimeter.study import WANTED_PERCENT, precisions
 
-    found = precisions(compare_analysis(analysis, resamples=0))
-    lines = []
-    for one in found:
-        text = f"  {one.measure.label}: {one.value:.5g} [{one.low:.5g} to {one.high:.5g}]"
-        if one.epochs_needed is None:
-            text = f"  {one.measure.label}: {one.value:.4g}, from one epoch, so without an interval"
-        elif one.epochs_needed > one.n:
-            text += f", ±{one.percent:.2g} %; ±{WANTED_PERCENT:g} % needs about "
-            text += f"{one.epochs_needed} such epochs, not {one.n}"
-        else:
-            text += f", ±{one.percent:.2g} %"
-        lines.append(text)
-    return ["All epochs together, with 95 % intervals", *lines] if lines else _pooled(analysis)
-
-
-def _method(analysis: Analysis) -> list[str]:
-    if not analysis.method_reason:
+    rows = []
+    for one in precisions(result):
+        factor, unit = scaled(one.value, one.measure.unit)
+        ends = ("not known from one epoch", "")
+        if one.epochs_needed is not None:
+            ends = f"{factor * one.low:.5g} to {factor * one.high:.5g}", f"±{one.percent:.2g} %"
+        needed = "" if one.epochs_needed is None else f"{one.epochs_needed}"
+        rows.append(
+            (f"{one.measure.title}, {unit}", f"{factor * one.value:.5g}", *ends, f"{one.n}", needed)
+        )
+    if not rows:
         return []
-    return wrapped(f"Method {analysis.method}: {analysis.method_reason}.")
+    headings = ("", "estimate", "95 % interval", "", "epochs", f"needed for\n±{WANTED_PERCENT:g} %")
+    return [Heading("All epochs together"), Table(headings, rows, "<>=>>>")]
 
 
-def _delays(analysis: Analysis) -> list[str]:
+def _method(analysis: Analysis) -> list[Block]:
+    return (
+        [f"Method {analysis.method}: {analysis.method_reason}."] if analysis.method_reason else []
+    )
+
+
+def _delays(analysis: Analysis) -> list[Block]:
     """Say how late the torque is in each source, where that is known."""
-    lines = []
+    lines: list[Block] = []
     for delay in analysis.delays:
         if math.isfinite(delay.delay_s):
             done = "corrected" if delay.corrected else delay.remark
             side = "later" if delay.delay_s > 0 else "earlier"
-            text = (
+            lines.append(
                 f"Torque {1e3 * abs(delay.delay_s):.3g} ± {1e3 * delay.delay_s_se:.2g} ms {side} "
                 f"than the motion in {delay.source}: {done}."
             )
-            lines += wrapped(text)
         elif delay.remark and any(fit.source == delay.source for fit in analysis.fits):
-            lines += wrapped(f"{delay.source}: {delay.remark}.")
+            lines.append(f"{delay.source}: {delay.remark}.")
     return lines
 
 
-def _fits(analysis: Analysis) -> list[str]:
+def _fits(analysis: Analysis) -> list[Block]:
     if not analysis.fits:
         return []
     bands = sorted({fit.band_hz for fit in analysis.fits if fit.n_samples})
     band = "".join(f", {low:.4g} to {high:.4g} Hz" for low, high in bands[:1])
     heading = f"J, B, K of each epoch ± one standard error, {analysis.method}{band}"
-    return [heading, *_fit_table(analysis.fits, analysis.fits)]
+    return [Heading(heading), _fit_table(analysis.fits, analysis.fits)]
 
 
-def _fixed_inertia(analysis: Analysis) -> list[str]:
+def _fixed_inertia(analysis: Analysis) -> list[Block]:
+    from rigidimeter.reporting.numbers import amount
+
     if not analysis.fits:
         return []
     if not any(fit.outcome.included for fit in analysis.fits):
         return ["No epoch could be included, so there is no median inertia to hold."]
-    inertia = f"{analysis.inertia_kg_m2:.5g} kg·m²"
+    inertia = amount(analysis.inertia_kg_m2, "kg·m²", 5)
     return [
-        f"B, K with the inertia held at the median, {inertia}",
-        *_fit_table(analysis.fixed_inertia, analysis.fits),
+        Heading(f"B, K with the inertia held at the median, {inertia}"),
+        _fit_table(analysis.fixed_inertia, analysis.fits, first=1),
     ]
 
 
-def _pooled(analysis: Analysis) -> list[str]:
+def _pooled(analysis: Analysis) -> list[Block]:
     from rigidimeter.records import PARAMETERS
 
     rows = [
@@ -151,35 +161,46 @@ def _pooled(analysis: Analysis) -> list[str]:
         for fit in analysis.pooled
         for i, parameter in enumerate(PARAMETERS)
     ]
-    heading = "J, B, K of all epochs together, 95 % intervals"
-    return [heading, *text_table(rows, "<<>><", "  ")] if rows else []
+    headings = ("condition", "", "estimate", "95 % interval", "unit")
+    return [Heading("All epochs together"), Table(headings, rows, "<<>>=")] if rows else []
 
 
-def _findings(analysis: Analysis) -> list[str]:
+def _findings(analysis: Analysis) -> list[Block]:
     """Return each kind of finding once: in which epochs, the first in full, and what to do."""
-    lines = []
+    lines: list[Block] = []
     for first, found_in in analysis.findings:
         fits = [fit for fit in found_in if fit.epoch != "pooled"]
         where = "all epochs together"
         if fits:
             count = "1 epoch" if len(fits) == 1 else f"{len(fits)} epochs"
             where = f"{count} of {len(analysis.fits)}, first epoch {fits[0].epoch}"
-        lines += wrapped(
-            f"{first.level}, {first.name}: {where}: {first.text}. Remedy: {first.remedy}.",
-            " ",
+        lines.append(
+            f"  {first.level}, {first.name}: {where}: {first.text}. Remedy: {first.remedy}."
         )
-    return ["What the checks found (the JSON file has all of it)", *lines] if lines else []
+    return [Heading("What the checks found (the JSON file has all of it)"), *lines] if lines else []
 
 
-def _fit_table(fits: Sequence[Fit], checked: Sequence[Fit]) -> list[str]:
-    """Return a table with a line for each fit, and what casts doubt on its epoch."""
+def _fit_table(fits: Sequence[Fit], checked: Sequence[Fit], first: int = 0) -> Table:
+    """Return a table with a row for each fit, and what casts doubt on its epoch.
+
+    `first` is the first of J, B and K that is shown.
+    """
+    from rigidimeter.records import PARAMETERS
+    from rigidimeter.reporting.numbers import scaled
+
+    shown = range(first, len(PARAMETERS))
+    scales = {
+        i: scaled(max((abs(fit.value[i]) for fit in fits), default=0.0), PARAMETERS[i].unit)
+        for i in shown
+    }
+    headings = [f"{PARAMETERS[i].symbol}\n{unit}" for i, (_, unit) in scales.items()]
     rows = [
         (
             fit.epoch,
             fit.condition,
             *(
-                with_error(value, se, digits)
-                for value, se, digits in zip(fit.value, fit.se, _DIGITS, strict=True)
+                with_error(factor * fit.value[i], factor * fit.se[i], _DIGITS[i])
+                for i, (factor, _) in scales.items()
             ),
             number_text(fit.r_squared, ".4f"),
             number_text(fit.vaf_percent, ".2f"),
@@ -187,10 +208,15 @@ def _fit_table(fits: Sequence[Fit], checked: Sequence[Fit]) -> list[str]:
         for fit in fits
     ]
     doubts = [f"doubt: {', '.join(fit.doubts)}" if fit.doubts else "" for fit in checked]
-    return _by_source(fits, [_FIT_HEADING, *rows], "<<>>>>><", doubts)
+    return Table(
+        ("epoch", "condition", *headings, "R²", "VAF\n%"),
+        _by_source(fits, rows, doubts),
+        "<<" + ">" * (len(shown) + 2),
+    )
 
 
-def _scores(analysis: Analysis) -> list[str]:
+def _scores(analysis: Analysis) -> list[Block]:
+    scores = analysis.scores
     rows = [
         (
             score.epoch,
@@ -198,33 +224,26 @@ def _scores(analysis: Analysis) -> list[str]:
             number_text(score.impulse_nm_s, ".5g"),
             number_text(score.work_j, ".5g"),
         )
-        for score in analysis.scores
+        for score in scores
     ]
     if not rows:
         return []
-    lines = _by_source(analysis.scores, [_SCORE_HEADING, *rows], "<<>><", [""] * len(rows))
-    return ["Scores of each sinusoidal epoch, per cycle", *lines]
+    headings = ("epoch", "condition", "impulse\nN·m·s", "work\nJ")
+    table = Table(headings, _by_source(scores, rows, [""] * len(rows)), "<<>>")
+    return [Heading("Scores of each sinusoidal epoch, per cycle"), table]
 
 
 def _by_source(
-    results: Sequence[Fit | Score],
-    rows: Sequence[tuple[str, ...]],
-    align: str,
-    doubts: Sequence[str],
-) -> list[str]:
-    """Return a table of results by source; the last column says what is wrong with one."""
-    remarks = [
-        doubt if result.outcome.included else f"{result.outcome.kind}: {result.outcome.reason}"
-        for result, doubt in zip(results, doubts, strict=True)
-    ]
-    heading, *lines = text_table(
-        [rows[0], *((*row, remark) for row, remark in zip(rows[1:], remarks, strict=True))],
-        align,
-        "  ",
-    )
-    shown = [heading]
+    results: Sequence[Fit | Score], rows: Sequence[tuple[str, ...]], doubts: Sequence[str]
+) -> list[Sequence[str] | str]:
+    """Return rows below the name of their source, and below a row what is wrong with it."""
+    shown: list[Sequence[str] | str] = []
     for source, of_source in groupby(
-        zip(results, lines, strict=True), key=lambda each: each[0].source
+        zip(results, rows, doubts, strict=True), key=lambda each: each[0].source
     ):
-        shown += [f" {source}", *(line for _, line in of_source)]
+        shown.append(source)
+        for result, row, doubt in of_source:
+            outcome = result.outcome
+            remark = doubt if outcome.included else f"{outcome.kind}: {outcome.reason}"
+            shown += [row, f"    {remark}"] if remark else [row]
     return shown

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rigidimeter.cli.inputs import analyse_recordings, say, study_of
+from rigidimeter.cli.inputs import analyse_recordings, say, say_analysed, study_of
 from rigidimeter.cli.options import KeyOption, Recordings, reads_recordings
 from rigidimeter.cli.output import echo
 from rigidimeter.errors import UserError
@@ -109,7 +109,8 @@ def _of_recordings(
 
     analysis = None
     if estimates:
-        read, analysis, status = analyse_recordings(recordings)
+        read, analysis = analyse_recordings(recordings)
+        status = say_analysed(read, analysis)
     else:
         read = recordings.read()
         say(read.notices)

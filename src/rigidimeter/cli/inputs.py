@@ -6,9 +6,9 @@ import os
 import shlex
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rigidimeter.cli.options import Recordings
 from rigidimeter.cli.output import echo
@@ -40,13 +40,8 @@ _OF_RECORDINGS = (
 """Options that say how to read a single recording."""
 
 
-def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysis, int]:
-    """Read, fit and score recordings with progress, and say what is wrong with them.
-
-    Returns
-    -------
-    tuple of (Recording, Analysis, int)
-        The exit status is 1 if an input was bad or an epoch failed, else 0.
+def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysis]:
+    """Read, fit and score recordings with progress, and say what is wrong with the inputs.
 
     Raises
     ------
@@ -55,17 +50,29 @@ def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysis, int
     """
     from rigidimeter.cli.progress import Meter
     from rigidimeter.estimation import method_names, no_such_method
-    from rigidimeter.study import analysis_warnings, estimate
+    from rigidimeter.study import estimate
 
     read = recordings.read()
     say(read.notices)
     if recordings.method not in method_names():
         raise UserError(f"--method {recordings.method}: {no_such_method(recordings.method)}")
     with Meter("estimate", 1.0) as meter:
-        analysis = estimate(read, recordings.method, progress=meter.advance)
+        return read, estimate(read, recordings.method, progress=meter.advance)
+
+
+def say_analysed(read: Recording, analysis: Analysis) -> int:
+    """Say what is wrong with the results, after they were shown.
+
+    Returns
+    -------
+    int
+        The exit status: 1 if an input was bad or an epoch failed, else 0.
+    """
+    from rigidimeter.study import analysis_warnings
+
     say(analysis_warnings(analysis))
     failed = _say_failed(analysis)
-    return read, analysis, int(read.failed or failed)
+    return int(read.failed or failed)
 
 
 def command_line() -> str:
@@ -114,13 +121,20 @@ def _say_failed(analysis: Analysis) -> bool:
     return bool(failed)
 
 
-@dataclass(frozen=True)
-class AnalysedStudy:
-    """An analysed study, whether it was kept, and the exit status: 1 with a bad input."""
+class AnalysedStudy(NamedTuple):
+    """An analysed study, and why the analysis was not kept in its folder, if it was not."""
 
     result: StudyResult
-    kept: bool
-    status: int
+    not_kept: str
+
+    def say(self) -> int:
+        """Say what is wrong with it, after it was shown; return the exit status."""
+        say(self.result.notices)
+        bad = any(notice.level == "error" for notice in self.result.notices)
+        bad |= _say_failed(self.result.analysis)
+        if self.not_kept:
+            echo(f"error: the analysis is not kept: {self.not_kept}", err=True)
+        return int(bad or bool(self.not_kept))
 
 
 def study_of(recordings: Recordings, key: Path | None) -> Path | None:
@@ -173,7 +187,7 @@ def analyse_study_folder(
     seed: int = 1,
     resamples: int = 9999,
 ) -> AnalysedStudy:
-    """Read and analyse a study folder, keep the analysis in it, and say what is wrong or new.
+    """Read and analyse a study folder, and keep the analysis in it.
 
     Raises
     ------
@@ -197,19 +211,15 @@ def analyse_study_folder(
     read = replace(read, settings=recordings.adjust(read.settings))
     with Meter("study", 1.0) as meter:
         result = analyse_study(read, seed=seed, resamples=resamples, progress=meter.advance)
-    say(result.notices)
-    bad = any(notice.level == "error" for notice in result.notices)
-    bad |= _say_failed(result.analysis)
-    changes, kept = [], True
+    changes, not_kept = [], ""
     try:
         changes = keep(read, result)
     except UserError as error:
-        echo(f"error: the analysis is not kept: {error}", err=True)
-        kept = False
+        not_kept = str(error)
     sessions = (folder / session.path for session in result.sessions)
     tables = (path for name, path in read.folder.files.items() if name != "key")
     named = {path: read.folder.digests[name] for name, path in read.folder.files.items()}
     below = {folder / name: digest for name, digest in read.gathered.digests.items()}
     facts = provenance((*tables, *sessions), named | below, result.settings, command_line())
     result = replace(result, changes=tuple(changes), provenance=facts)
-    return AnalysedStudy(result, kept, int(bad or not kept))
+    return AnalysedStudy(result, not_kept)

@@ -10,10 +10,11 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import Recordings, reads_recordings
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.table_lines import text_table, wrapped
+from rigidimeter.cli.tables import Table, show
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
+    from rigidimeter.recording.channels.inspection import Inspection
     from rigidimeter.recording.formats import ReadOptions
 
 
@@ -118,16 +119,10 @@ def _joining_words(recordings: Recordings, given: ReadOptions) -> list[str]:
     return words
 
 
-def _show(found: object) -> None:
-    from rigidimeter.recording.channels.inspection import Inspection, column_rows, remarks
+def _show(found: Inspection) -> None:
+    from rigidimeter.recording.channels.inspection import column_rows, remarks
 
-    assert isinstance(found, Inspection)
-    for line in text_table(column_rows(found), "<<>>>><<", "  "):
-        echo(f" {line}")
-    for text in remarks(found):
-        for line in wrapped(text, " "):
-            echo(line)
+    headings, *rows = column_rows(found)
+    show([Table(headings, rows, "<<>>>><<"), *(f" {text}" for text in remarks(found))])
     if found.proposal.unsaid:
-        echo("only you can say:")
-        for text in found.proposal.unsaid:
-            echo(f" {text}")
+        show(["only you can say:", *(f" {text}" for text in found.proposal.unsaid)])

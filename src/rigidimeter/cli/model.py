@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption, Recordings, reads_recordings
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.table_lines import Rows, text_table, with_error, wrapped
+from rigidimeter.cli.tables import Block, Heading, Table, show, with_error
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -19,9 +20,7 @@ if TYPE_CHECKING:
 
 USUAL = "inertia,damping,stiffness"
 COMPARED = f"{USUAL},reflex,cubic,directional-damping,coulomb"
-_HEADING = (
-    *("", "parameters", "VAF %", "held out, 95 %", "AIC", "BIC", "white p", "input p", "model"),
-)
+_HEADING = (*("", "n", "VAF\n%", "held out\n95 %", "AIC", "BIC", "white\np", "input\np", "model"),)
 
 
 @reads_recordings
@@ -89,36 +88,37 @@ def model(
             echo(f"error: {each.epoch.name}: {problem}", err=True)
     if json_out is not None:
         write_json(json_out, model_document(found))
-    echo("\n\n".join("\n".join(_lines(each)) for each in found))
+    for place, each in enumerate(found):
+        show([*([""] if place else []), *_blocks(each)])
     raise typer.Exit(int(read.failed or any(each.failed for each in found)))
 
 
-def _lines(found: ModelledEpoch) -> list[str]:
+def _blocks(found: ModelledEpoch) -> list[Block]:
     if found.models is None:
         return [f"{found.epoch.name}: failed, {found.problem}"]
     low, high = found.models.band_hz
     compared = found.models.compared
-    heading = f"{found.epoch.name}, {low:.4g} to {high:.4g} Hz"
-    heading += f"\n  {found.clock}" if found.clock else ""
+    heading: list[Block] = [Heading(f"{found.epoch.name}, {low:.4g} to {high:.4g} Hz")]
+    if found.clock:
+        heading.append(f"  {found.clock}")
     findings = [
-        line
+        f"  {finding.level}: {finding.text}. Remedy: {finding.remedy}."
         for finding in found.models.findings
-        for line in wrapped(f"{finding.level}: {finding.text}. Remedy: {finding.remedy}.", "  ")
     ]
     if not found.compared:
-        fits = (line for row in compared.rows for line in _fit_lines(row))
-        return [heading, *fits, *findings]
+        fits = (block for row in compared.rows for block in _fit_blocks(row))
+        return [*heading, *fits, *findings]
     recommended = compared.recommended
-    shown = _fit_lines(recommended) if recommended is not None else []
-    return [heading, *_table(compared), *shown, *findings]
+    shown = _fit_blocks(recommended) if recommended is not None else []
+    return [*heading, *_table(compared), *shown, *findings]
 
 
-def _table(compared: Comparison) -> list[str]:
-    rows: Rows = [_HEADING]
+def _table(compared: Comparison) -> list[Block]:
+    rows: list[Sequence[str] | str] = []
     for row in compared.rows:
         name = row.name
         if row.fit is None:
-            rows.append(("", *[""] * 7, f"{name}: {row.problem}"))
+            rows.append(f"{name}: {row.problem}")
             continue
         fit = row.fit
         numbers = (
@@ -133,8 +133,8 @@ def _table(compared: Comparison) -> list[str]:
         rows.append(("*" if row is compared.recommended else "", *numbers, name))
     pushing = [f"  {row.name}: {row.problem}" for row in compared.rows if row.fit and row.problem]
     verdict = "no model is recommended" if compared.recommended is None else "recommended"
-    lines = wrapped(f"{verdict}: {compared.reason}", "  ")
-    return [*text_table(rows, "<>>>>>>><"), *pushing, *lines]
+    table = Table(_HEADING, rows, "=>>=>>>><", indent=0)
+    return [table, *pushing, f"  {verdict}: {compared.reason}"]
 
 
 def _held_out(row: ModelRow) -> str:
@@ -143,7 +143,7 @@ def _held_out(row: ModelRow) -> str:
     return "{:.2f} [{:.2f}, {:.2f}]".format(*row.held_out)
 
 
-def _fit_lines(row: ModelRow) -> list[str]:
+def _fit_blocks(row: ModelRow) -> list[Block]:
     if row.fit is None:
         return [f"  {'+'.join(row.terms)}: {row.problem}"]
     fit = row.fit
@@ -158,7 +158,7 @@ def _fit_lines(row: ModelRow) -> list[str]:
     ]
     return [
         f"  {'+'.join(row.terms)}, VAF {fit.vaf_percent:.2f} %",
-        *text_table(rows, "<><", "    "),
+        Table(("", "", "unit"), rows, "<>=", indent=4),
         *(f"    {remark}" for remark in fit.remarks),
         *(
             f"    {one.term} from what no linear loop explains: "

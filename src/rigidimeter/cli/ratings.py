@@ -11,8 +11,7 @@ import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption
-from rigidimeter.cli.output import echo
-from rigidimeter.cli.table_lines import text_table
+from rigidimeter.cli.tables import Block, Heading, Table, show
 
 if TYPE_CHECKING:
     from rigidimeter.study import RatingsFound
@@ -103,14 +102,14 @@ def ratings(
     say(tuple(Notice("warning", text) for text in found.notices))
     if json_out is not None:
         write_json(json_out, ratings_document(found))
-    echo("\n".join(_lines(found)))
+    show(_blocks(found))
 
 
-def _lines(found: RatingsFound) -> Iterator[str]:
+def _blocks(found: RatingsFound) -> Iterator[Block]:
     """Yield the table and its sentences."""
     fit = found.fit
     offsets = " + ".join(f"offset of {name}" for name in fit.variances)
-    yield f"{found.source}: {fit.n} ratings in {len(fit.conditions)} conditions"
+    yield Heading(f"{found.source}: {fit.n} ratings in {len(fit.conditions)} conditions")
     yield f"score = mean of condition + {offsets} + error, fitted by REML"
     rows = [
         (name, f"{found.counts[name]}", f"{mean:.4f}", f"{math.sqrt(variance):.4f}")
@@ -118,17 +117,17 @@ def _lines(found: RatingsFound) -> Iterator[str]:
             fit.conditions, fit.means, fit.covariance.diagonal(), strict=True
         )
     ]
-    yield from ("", *text_table([("condition", "n", "mean", "SE"), *rows], "<>>>", "  "))
+    yield from ("", Table(("condition", "n", "mean", "SE"), rows, "<>>>"))
     for group, offsets_of in fit.offsets.items():
         counts = found.counts_of(group)
         groups = [(name, f"{counts[name]}", f"{value:.4f}") for name, value in offsets_of.items()]
-        yield from ("", *text_table([(group, "n", "offset"), *groups], "<>>", "  "))
+        yield from ("", Table((group, "n", "offset"), groups, "<>>"))
         variance = fit.variances[group]
         yield f"Variance of {group}: {variance:.4g} (SD {math.sqrt(variance):.4g})."
     residual = fit.variance_residual
     yield f"Variance of the residual: {residual:.4g} (SD {math.sqrt(residual):.4g})."
     yield ""
-    yield from _contrast_lines(found)
+    yield from _contrast(found)
     if len(fit.conditions) > 2:
         yield from ("", "All pairs (p unadjusted; Holm's are in the JSON file):")
         for pair in found.pairs:
@@ -148,7 +147,7 @@ def _lines(found: RatingsFound) -> Iterator[str]:
         yield from ("", "Note:", *(f"  - {text}" for text in found.model_notices))
 
 
-def _contrast_lines(found: RatingsFound) -> Iterator[str]:
+def _contrast(found: RatingsFound) -> Iterator[Block]:
     first, second = found.reference, found.other
     c, (low, high) = found.contrast, found.interval
     way = "higher" if c.estimate > 0 else "lower" if c.estimate < 0 else "neither higher nor lower"

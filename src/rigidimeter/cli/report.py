@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,10 +14,12 @@ from rigidimeter.cli.inputs import (
     analyse_recordings,
     analyse_study_folder,
     command_line,
+    say_analysed,
     study_of,
 )
 from rigidimeter.cli.options import KeyOption, Recordings, reads_recordings
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.tables import Heading, show
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -47,8 +51,8 @@ def report(
       rigidimeter report study --out study/report
       rigidimeter report ankle.csv --reaction --epoch-length-s 20 --out report
     """
-    from rigidimeter.recording import is_session, write_estimates_json
-    from rigidimeter.reporting import recording_result
+    from rigidimeter.recording import is_session
+    from rigidimeter.study import recording_result
 
     if any(is_session(folder) for folder in (out, *out.resolve().parents)):
         raise UserError(
@@ -61,14 +65,17 @@ def report(
                 f"--out {out}: is the study or its kept analysis; name another folder, such as "
                 f"{folder / 'report'}"
             )
-        found = analyse_study_folder(folder, recordings, key)
-        result, status = found.result, found.status
+        study = analyse_study_folder(folder, recordings, key)
+        last: Callable[[], int] = study.say
+        result = study.result
     else:
-        read, analysis, status = analyse_recordings(recordings)
+        read, analysis = analyse_recordings(recordings)
+        last = partial(say_analysed, read, analysis)
         result = recording_result(read, analysis, command_line())
-    page = write_page(result, out, title)
-    write_estimates_json(out / "estimates.json", result.analysis)
-    echo(str(page))
+    try:
+        echo(str(write_page(result, out, title)))
+    finally:
+        status = last()
     raise typer.Exit(status)
 
 
@@ -81,9 +88,14 @@ def can_be_made(out: Path) -> None:
 
 
 def write_page(result: StudyResult, out: Path, title: str | None = None) -> Path:
-    """Write the report of a result with progress; return the page's path."""
+    """Write the report of a result with progress, and show its verdict; return the page's path."""
     from rigidimeter import reporting
     from rigidimeter.cli.progress import Meter
+    from rigidimeter.recording import write_estimates_json
+    from rigidimeter.reporting.verdict_text import verdict
 
     with Meter("report", 1.0) as meter:
-        return reporting.report(result, out, title, progress=meter.reach)
+        page = reporting.report(result, out, title, progress=meter.reach)
+    write_estimates_json(out / "estimates.json", result.analysis)
+    show([Heading(verdict(result).lead), ""])
+    return page

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.tables import Heading, Table, show
 from rigidimeter.errors import UserError
 
 
@@ -63,8 +64,10 @@ def reproduce(
         except OSError as error:
             reason = error.strerror or error
             raise UserError(f"--out {out}: cannot be written ({reason})") from None
-    width = max(len(row.id) for row in rows)
-    for row in rows:
-        echo(f"{row.id:{width}}  {row.verdict}")
-    echo("; ".join(f"{count} {verdict}" for verdict, count in tally(rows).items()))
+    show(
+        [
+            Heading("; ".join(f"{count} {verdict}" for verdict, count in tally(rows).items())),
+            Table(("row", "verdict"), [(row.id, row.verdict) for row in rows], "<<"),
+        ]
+    )
     echo(str(page))

@@ -1,11 +1,11 @@
-"""How soon the guard would find a torque sensor of the wrong sign, as lines for a terminal."""
+"""How soon the guard would find a torque sensor of the wrong sign, as a terminal shows it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from rigidimeter.cli.table_lines import Rows, text_table, wrapped
+from rigidimeter.cli.tables import Block, Table
 from rigidimeter.guard import Cause
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ DAILY = (
 IMPOSED = "In an imposed sinusoid the guard does not see the sign."
 
 
-def sign_lines(settings: Settings, checks: Sequence[Check]) -> Iterator[str]:
+def sign_blocks(settings: Settings, checks: Sequence[Check]) -> Iterator[Block]:
     """Simulate epochs with the sign turned, and yield what became of them.
 
     Parameters
@@ -35,29 +35,26 @@ def sign_lines(settings: Settings, checks: Sequence[Check]) -> Iterator[str]:
     )
 
     if not perturbed_conditions(settings):
-        yield from wrapped(
+        yield (
             "This protocol has no torque perturbation: the guard cannot find a wrong sign of the "
             f"torque. So {DAILY}"
         )
         return
     noise_nm = measured_noise_nm(checks)
     shown_nm = settings.rig.torque.noise_sd_nm if noise_nm is None else noise_nm
-    yield from wrapped(
+    yield (
         "If the torque sensor had the wrong sign: simulated PRBS epochs, perturbation "
         f"±{settings.prbs.amplitude_nm:g} N·m, noise of the torque {shown_nm:.2g} N·m (SD)."
     )
-    yield from found_lines(search_for_turned_sign(settings, noise_nm))
+    yield from found_blocks(search_for_turned_sign(settings, noise_nm))
     if any(block.task == "sinusoid" for block in settings.protocol.blocks):
         yield IMPOSED
 
 
-def found_lines(search: Search) -> Iterator[str]:
-    """Yield a line for each own torque, and what follows from them."""
-    rows: Rows = [
-        ("subject", "own torque (SD)", "found", "after, median (range)", "arm at most", "else")
-    ]
-    rows += [_row(epochs) for epochs in search.tried]
-    yield from text_table(rows, "<<<<<<", indent="  ")
+def found_blocks(search: Search) -> Iterator[Block]:
+    """Yield a row for each own torque, and what follows from them."""
+    headings = ("subject", "own\ntorque", "found", "after\n(range)", "arm at\nmost", "else")
+    yield Table(headings, [_row(epochs) for epochs in search.tried], "<====<")
     hidden = [epochs for epochs in search.tried if not epochs.all_found]
     if not hidden:
         return
@@ -76,7 +73,7 @@ def found_lines(search: Search) -> Iterator[str]:
             f"{min(better.found_s):.1f} to {max(better.found_s):.1f} s, the arm at up to "
             f"{better.farthest_deg:.0f} deg"
         )
-    yield from wrapped(f"{words}; {larger}. {'So' if better is None else 'Otherwise'} {DAILY}")
+    yield (f"{words}; {larger}. {'So' if better is None else 'Otherwise'} {DAILY}")
 
 
 def _row(epochs: TurnedEpochs) -> tuple[str, ...]:

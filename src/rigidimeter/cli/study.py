@@ -139,10 +139,13 @@ def demo(
     )
     _simulated(out, two_day_design(prbs_epochs, sinusoid_epochs), seed)
     found = analyse_study_folder(out, Recordings([out]))
-    page = write_page(found.result, out / "report")
-    echo(f"Done in {time.monotonic() - start_s:.0f} s. Open the report in a browser:")
-    echo(str(page.resolve()))
-    raise typer.Exit(found.status)
+    try:
+        page = write_page(found.result, out / "report")
+        echo(f"Done in {time.monotonic() - start_s:.0f} s. Open the report in a browser:")
+        echo(str(page.resolve()))
+    finally:
+        status = found.say()
+    raise typer.Exit(status)
 
 
 def _simulated(out: Path, design: StudyDesign, seed: int, processes: int = 2) -> list[DayPlan]:

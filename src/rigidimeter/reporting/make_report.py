@@ -14,11 +14,10 @@ from rigidimeter.records import Analysis
 from rigidimeter.reporting.page import write_report
 from rigidimeter.study import (
     StudyResult,
-    analysis_warnings,
     compare,
     compare_analysis,
     estimate,
-    provenance,
+    recording_result,
 )
 
 TITLE = "Joint rigidity"
@@ -85,15 +84,3 @@ def _result(
     if len(paths) == 1 and is_study(paths[0]):
         return compare(paths[0])
     return _result(read(paths))
-
-
-def recording_result(recording: Recording, analysis: Analysis, command: str = "") -> StudyResult:
-    """Return the comparison of a recording's first two conditions, with all that a report shows."""
-    return replace(
-        compare_analysis(analysis, resamples=0),
-        settings=recording.settings,
-        epochs=recording.epochs,
-        notices=(*recording.notices, *analysis_warnings(analysis)),
-        own_rig=recording.own_rig,
-        provenance=provenance(recording.paths, recording.digests, recording.settings, command),
-    )

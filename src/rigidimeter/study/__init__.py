@@ -11,6 +11,7 @@ from rigidimeter.study.compared import TEST, Comparison, DayMedian
 from rigidimeter.study.comparison import (
     compare_analysis,
     compare_measures,
+    recording_result,
     split_pooled,
 )
 from rigidimeter.study.conclusions import Conclusion, Conclusions, conclude, conclusion_rows
@@ -85,6 +86,7 @@ __all__ = [
     "precisions",
     "provenance",
     "read_study",
+    "recording_result",
     "relations",
     "result_tables",
     "split_pooled",

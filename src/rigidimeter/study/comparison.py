@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Fit, Score
 from rigidimeter.statistics import (
     DayDifference,
@@ -27,7 +28,9 @@ from rigidimeter.statistics import (
 )
 from rigidimeter.study.compared import Comparison, DayMedian
 from rigidimeter.study.measures import MEASURES, Measure, Observation, conditions
+from rigidimeter.study.provenance import provenance
 from rigidimeter.study.results import EffectPair, SessionEntry, StudyResult
+from rigidimeter.study.warnings import analysis_warnings
 
 FEWEST_FOR_TEST = 3
 """Below this many values in a condition there is no rank-sum test."""
@@ -63,6 +66,18 @@ def compare_analysis(
     comparisons, differences = compare_measures(comparisons, seed=seed, resamples=resamples)
     return StudyResult(
         title, first, second, comparisons, differences, (), seed, resamples, analysis=analysis
+    )
+
+
+def recording_result(recording: Recording, analysis: Analysis, command: str = "") -> StudyResult:
+    """Return the comparison of a recording's first two conditions, with all that a report shows."""
+    return replace(
+        compare_analysis(analysis, resamples=0),
+        settings=recording.settings,
+        epochs=recording.epochs,
+        notices=(*recording.notices, *analysis_warnings(analysis)),
+        own_rig=recording.own_rig,
+        provenance=provenance(recording.paths, recording.digests, recording.settings, command),
     )
 
 

@@ -113,8 +113,8 @@ def test_prints_what_is_predicted() -> None:
         "subject OFF 28.3 dB 92.1 deg 1472 ms 0.95 stable",
         "worst joint around it 16.2 dB",
         "each of J, B, K from 0.25 to 4 times its value",
-        "iv, 0.1–30 Hz 2.8e-06 (0.0621 %) 8.71e-05 (0.0637 %) 0.000468 (0.0267 %)",
-        "passive arm, 0.15–10 Hz 3.57e-06 (0.0794 %) 9.21e-05 (0.0673 %) 0.000547 (0.0312 %)",
+        "iv, 0.1–30 Hz 2.8e-06 (0.062 %) 8.7e-05 (0.064 %) 0.00047 (0.027 %)",
+        "least squares, 3.6e-06 (0.079 %) 9.2e-05 (0.067 %) 0.00055 (0.031 %) passive arm,",
         "iv, 4 epochs pooled",
     ):
         assert expected in words

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from rigidimeter.cli.sign_text import found_lines, sign_lines
+from rigidimeter.cli.sign_text import found_blocks, sign_blocks
+from rigidimeter.cli.tables import text_lines
 from rigidimeter.commissioning import Search, TurnedEpochs
 from rigidimeter.commissioning.checks import below
 from rigidimeter.commissioning.static_tests import NOISE, measured_noise_nm
@@ -17,14 +18,13 @@ HIDDEN = TurnedEpochs(
 LARGER = TurnedEpochs("OFF", 0.1, 3.0, 35.2, {Cause.TORQUE_SIGN: [2.0, 3.3]})
 
 
-def test_each_own_torque_has_a_line_with_what_else_ended_its_epochs():
-    lines = list(found_lines(Search((FOUND, HIDDEN), LARGER)))
-    assert lines[1].split()[:6] == ["OFF", "0", "N·m", "3", "of", "3"]
-    assert "0.40 s (0.38–0.50)" in lines[1]
-    assert lines[1].endswith("15 deg")
-    assert "1 of 4" in lines[2]
-    assert lines[2].endswith("1 not within 4 s, 2 held at limit (1.50–2.00 s)")
-    said = " ".join(" ".join(lines[3:]).split())
+def test_each_own_torque_has_a_row_with_what_else_ended_its_epochs():
+    table, sentence = found_blocks(Search((FOUND, HIDDEN), LARGER))
+    first, second = table.rows
+    assert first == ("OFF", "0 N·m", "3 of 3", "0.40 s (0.38–0.50)", "15 deg", "")
+    assert second[2] == "1 of 4"
+    assert second[-1] == "1 not within 4 s, 2 held at limit (1.50–2.00 s)"
+    said = " ".join(sentence.split())
     assert said.startswith("With 0.1 N·m of own torque the guard does not always find it; with ")
     assert "prbs.amplitude_nm = 3 it does, after 2.0 to 3.3 s, the arm at up to 35 deg" in said
     assert "deg. Otherwise repeat `rigidimeter check`, which" in said
@@ -32,12 +32,12 @@ def test_each_own_torque_has_a_line_with_what_else_ended_its_epochs():
 
 
 def test_nothing_more_is_said_where_it_is_always_found():
-    assert len(list(found_lines(Search((FOUND,), None)))) == 2
+    assert len(list(found_blocks(Search((FOUND,), None)))) == 1
 
 
 def test_no_perturbation_is_named_that_does_not_help():
     hidden = HIDDEN._replace(own_torque_nm=0.0)
-    said = " ".join(" ".join(found_lines(Search((hidden,), None))).split())
+    said = " ".join(" ".join(text_lines(found_blocks(Search((hidden,), None)))).split())
     assert "Even of a subject without any own torque the guard does not always find it; no " in said
     assert "prbs.amplitude_nm" not in said
     assert "that was tried helps. So repeat `rigidimeter check`" in said
@@ -45,7 +45,7 @@ def test_no_perturbation_is_named_that_does_not_help():
 
 def test_a_protocol_without_perturbation_is_said_to_show_no_sign():
     settings = parse_settings({"protocol": {"blocks": [{"task": "sinusoid"}]}})
-    said = " ".join(sign_lines(settings, ()))
+    said = " ".join(sign_blocks(settings, ()))
     assert said.startswith("This protocol has no torque perturbation: the guard cannot find a ")
     assert "rigidimeter check" in said
 
@@ -57,7 +57,9 @@ def test_the_noise_is_the_one_that_was_measured(monkeypatch):
         lambda _, noise_nm: asked.append(noise_nm) or Search((FOUND,), None),
     )
     measured = below(NOISE, 0.0123, "N·m", 0.1, "")
-    lines = [list(sign_lines(parse_settings({}), checks)) for checks in ((measured,), ())]
+    lines = [
+        text_lines(sign_blocks(parse_settings({}), checks), 100) for checks in ((measured,), ())
+    ]
     assert asked == [0.0123, None]
     assert "0.012 N·m (SD)" in " ".join(lines[0])
     assert "0.005 N·m (SD)" in " ".join(lines[1])

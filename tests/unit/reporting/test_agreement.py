@@ -3,7 +3,7 @@
 import csv
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,9 @@ import pytest
 from tests.unit.reporting.cohorts import Design, made_study
 from tests.unit.reporting.parsed_page import ParsedPage
 
-from rigidimeter.cli.comparison_text import comparison_lines
-from rigidimeter.cli.estimate import estimate_lines
+from rigidimeter.cli.comparison_text import comparison_blocks
+from rigidimeter.cli.estimate import estimate_blocks
+from rigidimeter.cli.tables import Block, Table, text_lines
 from rigidimeter.documents import read_json, write_json
 from rigidimeter.recording import estimates_document
 from rigidimeter.reporting import SECTIONS
@@ -75,6 +76,16 @@ def page(folder: Path) -> ParsedPage:
     return ParsedPage((folder / "report.html").read_text(encoding="utf-8"))
 
 
+def cells_below(blocks: Iterable[Block], heading: str) -> list[Sequence[str]]:
+    """Return the rows of the table that a heading of the terminal announces."""
+    announced = False
+    for block in blocks:
+        if announced and isinstance(block, Table):
+            return [row for row in block.rows if not isinstance(row, str)]
+        announced |= isinstance(block, str) and block.startswith(heading)
+    raise AssertionError(heading)
+
+
 def rows_of(folder: Path, table: str) -> list[Row]:
     with (folder / "tables" / f"{table}.csv").open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
@@ -89,10 +100,12 @@ def assert_same(row: Row, values: dict[str, Any], prefix: str = "") -> None:
 
 
 def test_comparisons_over_epochs(study, json, folder: Path, page: ParsedPage) -> None:
-    lines = comparison_lines(study)
+    blocks = list(comparison_blocks(study))
     shown = page.table("OFF against DBS: each epoch counted")[2:]
-    for c, row, cells in zip(
-        json["comparison"]["comparisons"], rows_of(folder, "comparisons"), shown, strict=True
+    conditions = cells_below(blocks, "Each condition")
+    tests = cells_below(blocks, "OFF − DBS, Wilcoxon")
+    for place, (c, row, cells) in enumerate(
+        zip(json["comparison"]["comparisons"], rows_of(folder, "comparisons"), shown, strict=True)
     ):
         assert row["measure"] == c["measure"]
         test = {name: c[name] for name in ("shift", "shift_low", "shift_high", "z", "p", "p_holm",
@@ -107,19 +120,25 @@ def test_comparisons_over_epochs(study, json, folder: Path, page: ParsedPage) ->
         assert_shows(cells[8], [c["p"], c["p_holm"]], 2)
         for cell, name in ((cells[2], "OFF"), (cells[4], "DBS")):
             assert_shows(cell, [c["groups"][name][key] for key in ("median", "q1", "q3")], 3)
-        place = next(k for k, line in enumerate(lines) if line == f"{c['title']} ({c['unit']})")
-        line = lines[place + 3]
-        ends = [c["shift"], c["shift_low"], c["shift_high"]]
-        assert_shows(line.split(", z")[0], ends, 4)
-        assert_shows(line.split(", p")[1].split(", r")[0], [c["p"], c["p_holm"]], 2)
+        for name, terminal in zip(("OFF", "DBS"), conditions[2 * place :], strict=False):
+            group = c["groups"][name]
+            assert terminal[0] == name
+            assert_shows(" ".join(terminal[3:]), [group[key] for key in ("median", "q1", "q3")], 4)
+        title, shift, ends, z, p, p_holm, r = tests[place]
+        assert title == c["title"]
+        assert_shows(f"{shift} {ends}", [c["shift"], c["shift_low"], c["shift_high"]], 4)
+        assert_shows(f"{p} {p_holm}", [c["p"], c["p_holm"]], 2)
+        assert_shows(f"{z} {r}", [c["z"], c["r"]], 2)
 
 
 def test_comparisons_by_days(study, json, folder: Path, page: ParsedPage) -> None:
-    lines = comparison_lines(study)
     shown = page.table("OFF against DBS: days counted")[1:]
-    begin = next(k for k, line in enumerate(lines) if line.startswith("Days, not epochs"))
-    for c, row, cells in zip(
-        json["comparison"]["comparisons"], rows_of(folder, "comparisons"), shown, strict=True
+    for c, row, cells, terminal in zip(
+        json["comparison"]["comparisons"],
+        rows_of(folder, "comparisons"),
+        shown,
+        cells_below(comparison_blocks(study), "OFF − DBS: days, not epochs"),
+        strict=True,
     ):
         days = c["days"]
         names = ("estimate", "low", "high", "p", "p_holm", "df", "p_days", "day_share")
@@ -127,35 +146,35 @@ def test_comparisons_by_days(study, json, folder: Path, page: ParsedPage) -> Non
         assert_shows(cells[1], [days["estimate"], days["low"], days["high"]], 4)
         assert_shows(cells[5], [days["p"], days["p_holm"]], 2)
         assert_shows(cells[6], [days["p_days"]], 2)
-        place = next(k for k, line in enumerate(lines) if k > begin and line.startswith(c["title"]))
-        estimate, _, rest = lines[place + 1].partition(", p ")
-        assert_shows(estimate, [days["estimate"], days["low"], days["high"]], 4)
-        assert_shows(rest, [days["p"], days["p_holm"], days["df"], days["p_days"]], 2)
+        _, estimate, ends, p, p_holm, df, medians, share = terminal
+        assert_shows(f"{estimate} {ends}", [days["estimate"], days["low"], days["high"]], 4)
+        assert_shows(f"{p} {p_holm}", [days["p"], days["p_holm"]], 2)
+        assert_shows(f"{df} {medians}", [days["df"], days["p_days"]], 2)
+        if days["day_share"] is None:
+            assert share == "–"
+        else:
+            assert float(share) == pytest.approx(100 * days["day_share"], abs=0.5)
 
 
 def test_differences_between_effects(study, json, folder: Path, page: ParsedPage) -> None:
-    lines = comparison_lines(study)
     shown = page.table("Differences between effect sizes")[1:]
-    begin = next(k for k, line in enumerate(lines) if "difference of rank-biserial" in line)
-    for number, (d, row, cells) in enumerate(
-        zip(
-            json["comparison"]["effect_differences"],
-            rows_of(folder, "effect_differences"),
-            shown,
-            strict=True,
-        )
+    for d, row, cells, terminal in zip(
+        json["comparison"]["effect_differences"],
+        rows_of(folder, "effect_differences"),
+        shown,
+        cells_below(comparison_blocks(study), "Which separates the conditions better"),
+        strict=True,
     ):
         assert (row["first"], row["second"]) == (d["first"], d["second"])
         assert_same(row, d)
         assert_shows(cells[2], [d["estimate"], d["low"], d["high"]], 4)
         assert_shows(cells[3], [d["p"]], 2)
         assert_shows(cells[4], [d["p_holm"]], 2)
-        line = lines[begin + 1 + number].partition(": ")[2]
-        ends, _, rest = line.partition(", p ")
-        values = [d[name] for name in ("estimate", "low", "high") if rest or name == "estimate"]
-        for one, value in zip(numbers(ends), values, strict=True):
+        _, estimate, ends, p, p_holm, _ = terminal
+        values = [d["estimate"], d["low"], d["high"]] if ends else [d["estimate"]]
+        for one, value in zip(numbers(f"{estimate} {ends}"), values, strict=True):
             assert one == pytest.approx(value, abs=0.000501)
-        assert_shows(rest, [d["p"], d["p_holm"]] if rest else [], 2)
+        assert_shows(f"{p} {p_holm}", [d["p"], d["p_holm"]] if ends else [], 2)
 
 
 def test_ratings(study, json, folder: Path, page: ParsedPage) -> None:
@@ -172,7 +191,7 @@ def test_ratings(study, json, folder: Path, page: ParsedPage) -> None:
         contrast["p_kenward_roger"],
         by_days["p_kenward_roger"],
     ]
-    lines = comparison_lines(study)
+    lines = text_lines(comparison_blocks(study), 200)
     begin = next(k for k, line in enumerate(lines) if line.startswith("Examiners' ratings"))
     assert_shows(lines[begin + 2].rpartition("Kenward-Roger p")[2], [float(rows[2]["p"])], 2)
     for row in rows_of(folder, "rating_offsets"):
@@ -185,12 +204,11 @@ def test_ratings(study, json, folder: Path, page: ParsedPage) -> None:
 
 
 def test_sensitivity(study, json, folder: Path, page: ParsedPage) -> None:
-    lines = [line for line in comparison_lines(study) if ": shift " in line and ", J " in line]
-    for s, row, cells, line in zip(
+    for s, row, cells, terminal in zip(
         json["comparison"]["sensitivity"],
         rows_of(folder, "sensitivity"),
         page.table("The shift by each method")[1:],
-        lines,
+        cells_below(comparison_blocks(study), "By other methods"),
         strict=True,
     ):
         assert (row["measure"], row["method"], row["inertia"]) == (
@@ -202,7 +220,8 @@ def test_sensitivity(study, json, folder: Path, page: ParsedPage) -> None:
         assert_shows(cells[5], [s["shift"], s["shift_low"], s["shift_high"]], 4)
         assert_shows(cells[7], [s["p"]], 2)
         assert_shows(cells[8], [s["p_day"]], 2)
-        assert_shows(line.partition(": shift ")[2], [s["shift"], s["p"], s["p_day"]], 2)
+        assert terminal[2:4] == (s["method"], s["inertia"])
+        assert_shows(" ".join(terminal[4:]), [s["shift"], s["p"], s["p_day"]], 2)
 
 
 def test_estimates_and_scores_of_every_epoch(study, json, folder: Path, page: ParsedPage) -> None:
@@ -210,8 +229,9 @@ def test_estimates_and_scores_of_every_epoch(study, json, folder: Path, page: Pa
     rows = rows_of(folder, "estimates")
     free = page.table("Inertia, damping and stiffness, epoch by epoch")
     held = page.table("Damping and stiffness with the inertia fixed")
-    lines = [line for line in estimate_lines(study.analysis) if " ±" in line and "0.9700" in line]
-    assert len(lines) == len(epochs) + len(fixed)
+    blocks = estimate_blocks(study)
+    shown_free = cells_below(blocks, "J, B, K of each epoch")
+    shown_held = cells_below(blocks, "B, K with the inertia held")
     for place, (one, two, row) in enumerate(zip(epochs, fixed, rows, strict=True)):
         assert (row["source"], row["epoch"]) == (one["source"], one["epoch"])
         assert_same(row, one)
@@ -223,47 +243,47 @@ def test_estimates_and_scores_of_every_epoch(study, json, folder: Path, page: Pa
                 )
                 ends = [found[name], found[f"{name}_low"], found[f"{name}_high"]]
                 assert_shows(table[1 + place][heading], ends, 4)
-        for line, found in ((lines[place], one), (lines[len(epochs) + place], two)):
-            assert line.split()[0] == found["epoch"]
-            values = [value for name in PARAMETERS for value in (found[name], found[f"{name}_se"])]
-            assert_shows(line.split(found["condition"])[1].split("0.9700")[0], values, 2)
-            for name in PARAMETERS:
-                assert f" {found[name]:.4g}" in line or f" {found[name]:.5g}" in line
+        for terminal, found, names in (
+            (shown_free[place], one, PARAMETERS),
+            (shown_held[place], two, PARAMETERS[1:]),
+        ):
+            assert terminal[:2] == (found["epoch"], found["condition"])
+            for name, cell in zip(names, terminal[2:], strict=False):
+                factor = 1e3 if name == "inertia_kg_m2" else 1.0
+                value, error = (factor * found[key] for key in (name, f"{name}_se"))
+                assert_shows(cell, [value, error], 2)
+                assert cell.startswith((f"{value:#.4g}±", f"{value:#.5g}±"))
     for score, row in zip(json["estimates"]["scores"], rows_of(folder, "scores"), strict=True):
         assert_same(row, score)
 
 
 def test_scores_of_every_epoch(study, json, folder: Path, page: ParsedPage) -> None:
-    lines = estimate_lines(study.analysis)
-    begin = next(k for k, line in enumerate(lines) if line.startswith("Scores of each"))
-    lines = [line for line in lines[begin + 2 :] if line.startswith("  ")]
+    terminal = cells_below(estimate_blocks(study), "Scores of each")
     shown = page.table("Scores of the epochs")
     columns = [shown[0].index(next(h for h in shown[0] if h.startswith(name)))
                for name in ("Angular impulse", "Work", "Cycles", "Frequency")]  # fmt: skip
     for score, row, cells, line in zip(
-        json["estimates"]["scores"], rows_of(folder, "scores"), shown[1:], lines, strict=True
+        json["estimates"]["scores"], rows_of(folder, "scores"), shown[1:], terminal, strict=True
     ):
         assert (row["source"], row["epoch"]) == (score["source"], score["epoch"])
-        assert line.split()[:2] == [score["epoch"], score["condition"]]
+        assert line[:2] == (score["epoch"], score["condition"])
         values = [score[name] for name in ("impulse_nm_s", "work_j", "n_cycles", "frequency_hz")]
         for column, value in zip(columns, values, strict=True):
             assert_shows(cells[column], [value], 4)
-        assert_shows(" ".join(line.split()[2:4]), values[:2], 5)
+        assert_shows(" ".join(line[2:]), values[:2], 5)
 
 
 def test_pooled_estimates(study, json, folder: Path, page: ParsedPage) -> None:
     whole = json["estimates"]["pooled"]
     found = {**whole["conditions"], "all": whole}
-    lines = estimate_lines(study.analysis)
-    begin = next(k for k, line in enumerate(lines) if line.startswith("J, B, K of all epochs"))
+    terminal = cells_below(estimate_blocks(study), "All epochs together")
     shown = page.table("All epochs of a condition together")
     rows = rows_of(folder, "pooled")
     assert [row["condition"] for row in rows] == ["OFF", "DBS", "(all)"]
     for place, ((name, fit), row) in enumerate(zip(found.items(), rows, strict=True)):
         assert_same(row, fit)
-        assert lines[begin + 1 + 3 * place].split()[0] == name
+        assert terminal[3 * place][0] == name
         for k, parameter in enumerate(PARAMETERS):
             ends = [fit[parameter], fit[f"{parameter}_low"], fit[f"{parameter}_high"]]
             assert_shows(shown[1 + place][1 + k], ends, 4)
-            line = lines[begin + 1 + 3 * place + k].partition(" " + "JBK"[k] + " ")[2]
-            assert_shows(line.partition("]")[0], ends, 5)
+            assert_shows(" ".join(terminal[3 * place + k][2:4]), ends, 5)

@@ -9,16 +9,18 @@ from pathlib import Path
 import pytest
 from tests.unit.reporting.cohorts import Design, made_study
 from tests.unit.reporting.parsed_page import ParsedPage
-from tests.unit.reporting.test_agreement import assert_shows
+from tests.unit.reporting.test_agreement import assert_shows, cells_below
 
-from rigidimeter.cli.comparison_text import comparison_lines
-from rigidimeter.cli.estimate import estimate_lines
+from rigidimeter.cli.comparison_text import comparison_blocks
+from rigidimeter.cli.estimate import estimate_blocks
+from rigidimeter.cli.tables import Table, text_lines
 from rigidimeter.documents import read_json, write_json
 from rigidimeter.reporting import page as page_module
 from rigidimeter.reporting.first_screen import difference_words, gravest_words, light_words
 from rigidimeter.reporting.interval_plot import interval_plot, reach
 from rigidimeter.reporting.page import contents, parts, render_page, write_report
 from rigidimeter.reporting.sections.study_overview import NUMBERS
+from rigidimeter.reporting.verdict_text import verdict
 from rigidimeter.study import (
     Difference,
     StudyResult,
@@ -71,9 +73,11 @@ def test_page_table_document_and_terminal_agree(
     document = read_json(tmp_path / "c.json")
     with (tmp_path / "tables" / "conclusion.csv").open(encoding="utf-8", newline="") as file:
         stored = list(csv.DictReader(file))
-    lines = comparison_lines(study)
+    blocks = list(comparison_blocks(study))
+    terminal = cells_below(blocks, "In short")
+    verdicts = [row for block in blocks if isinstance(block, Table) for row in block.rows]
     shown = page.table("DBS against OFF, means of days")[1:]
-    for one, row, cells in zip(document["conclusion"], stored, shown, strict=True):
+    for one, row, cells, line in zip(document["conclusion"], stored, shown, terminal, strict=True):
         for name, value in one.items():
             if isinstance(value, float):
                 assert float(row[name]) == value
@@ -93,15 +97,19 @@ def test_page_table_document_and_terminal_agree(
             assert_shows(cells[4].partition("[")[0], [abs(one["percent"])], 2)
         assert_shows(cells[6], [one["p"], one["p_holm"]], 2)
         assert cells[7] == one["verdict"]
-        place = lines.index(next(x for x in lines if x.startswith(f"{one['title']} (")))
-        values = lines[place].rpartition(": OFF")[2]
-        assert_shows(values, [one["value_reference"], one["value_other"]], 4)
-        assert lines[place + 1].startswith(f"  DBS {'lower' if one['estimate'] > 0 else 'higher'}")
-        assert_shows(lines[place + 2], [one["p"], one["p_holm"]], 2)
+        assert any(str(x).endswith(f": {one['verdict']}") for x in verdicts)
+        values = [factor * one["value_reference"], factor * one["value_other"]]
+        assert_shows(" ".join(line[:2]), values, 3)
+        assert line[2].endswith("lower" if one["estimate"] > 0 else "higher")
+        assert_shows(line[2], [abs(factor * one["estimate"])], 3)
+        assert_shows(line[4], ends, 3)
+        assert_shows(" ".join(line[5:]), [one["p"], one["p_holm"]], 2)
     light = document["quality"]
     assert "Data quality: good." in page.words()
     assert f"{light['sound']} of {light['epochs']} epochs are sound" in page.words()
-    assert any(f"{light['sound']} of {light['epochs']} epochs are sound" in x for x in lines)
+    sound = f"{light['sound']} of {light['epochs']} epochs are sound"
+    assert sound in " ".join(text_lines(blocks))
+    assert text_lines(blocks, 1000)[0] == verdict(study).lead
 
 
 def test_the_light_is_words(study: StudyResult) -> None:
@@ -159,14 +167,15 @@ def test_what_has_nothing_to_show_is_neither_on_the_page_nor_in_its_contents(stu
 
 def test_the_terminal_has_the_precision_of_one_condition(make_analysis) -> None:
     analysis = make_analysis({"DBS": 3})
-    lines = estimate_lines(analysis)
-    begin = lines.index("All epochs together, with 95 % intervals")
-    for one, line in zip(
-        precisions(compare_analysis(analysis, resamples=0)), lines[begin + 1 :], strict=False
-    ):
-        assert line.startswith(f"  {one.measure.label}: ")
-        needed = [one.epochs_needed or 0, one.n] if (one.epochs_needed or 0) > one.n else []
-        numbers = [one.value, one.low, one.high, one.percent, *([5.0] if needed else []), *needed]
-        assert_shows(line.partition("): ")[2], numbers, 2)
-    (work,) = (line for line in estimate_lines(make_analysis({"DBS": 1})) if "Work" in line)
-    assert work.endswith(", from one epoch, so without an interval")
+    result = compare_analysis(analysis, resamples=0)
+    shown = cells_below(estimate_blocks(result), "All epochs together")
+    for one, line in zip(precisions(result), shown, strict=True):
+        assert line[0].startswith(f"{one.measure.title}, ")
+        factor = 1e3 if "10⁻³" in line[0] else 1.0
+        values = [factor * one.value, factor * one.low, factor * one.high, one.percent]
+        assert_shows(" ".join(line[1:4]), values, 2)
+        assert line[4:] == (f"{one.n}", f"{one.epochs_needed}")
+    one_epoch = compare_analysis(make_analysis({"DBS": 1}), resamples=0)
+    rows = cells_below(estimate_blocks(one_epoch), "All epochs together")
+    (work,) = (row for row in rows if "Work" in row[0])
+    assert work[2:] == ("not known from one epoch", "", "1", "")

@@ -11,9 +11,9 @@ import pytest
 from rigidimeter.errors import UserError
 from rigidimeter.recording import Recording, read
 from rigidimeter.records import Epoch, Notice
-from rigidimeter.reporting import recording_result, report
+from rigidimeter.reporting import report
 from rigidimeter.settings import Settings
-from rigidimeter.study import StudyResult, analysis_warnings, compare
+from rigidimeter.study import StudyResult, analysis_warnings, compare, recording_result
 
 
 @pytest.fixture(scope="module")
