@@ -97,8 +97,9 @@ def correlation_samples(scores: Array) -> Array:
     scores : array, shape (n, p)
     """
     n = len(scores)
-    power = np.abs(np.fft.rfft(scores, 2 * n, axis=0)) ** 2
-    autocovariance = np.fft.irfft(power, axis=0)[:n]
+    length = fft.next_fast_len(2 * n, real=True)
+    power = np.abs(np.fft.rfft(scores, length, axis=0)) ** 2
+    autocovariance = np.fft.irfft(power, length, axis=0)[:n]
     times = []
     for column in autocovariance.T:
         if column[0] <= 0:
