@@ -114,7 +114,8 @@ def held_out_vaf(signals: Signals, settings: DiagnosticsSettings) -> Look:
     regressors = np.column_stack(
         [signals.acceleration_rad_s2, signals.velocity_rad_s, signals.angle_rad]
     )
-    lengths = np.maximum(np.linalg.norm(regressors[:half], axis=0), 1e-300)
+    squares = np.einsum("ij,ij->j", regressors[:half], regressors[:half])
+    lengths = np.maximum(np.sqrt(squares), 1e-300)
     scaled, torque = regressors / lengths, signals.torque_nm
     parameters = np.linalg.lstsq(scaled[:half], torque[:half], rcond=None)[0]
     left = torque[half:] - scaled[half:] @ parameters

@@ -29,7 +29,6 @@ from rigidimeter.estimation.terms.catalogue import REFLEXES
 from rigidimeter.estimation.terms.explained import (
     Complex,
     explained,
-    stacked,
     strongest,
     triangle,
 )
@@ -121,6 +120,6 @@ class _Refit:
         (name,) = reflexes
         columns = self._columns[:, used]
         late = self._beyond.reflex_lines(name)[self._inside]
-        best = strongest(*(stacked(lines) for lines in (columns, late, self._torque)))
+        best = strongest(columns, late, self._torque)
         upper = triangle(np.column_stack([columns, late[:, best]]), self._torque)
         return explained(upper[:, :-1], upper[:, -1]).values[:3]

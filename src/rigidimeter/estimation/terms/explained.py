@@ -44,17 +44,45 @@ def explained(columns: Array, target: Array) -> Explained:
     return Explained(float(target @ target - products @ products), np.asarray(values))
 
 
-def strongest(base: Array, tried: Array, target: Array) -> int:
-    """Return which of the columns tried explains most of the target beside those of the base."""
-    basis, _ = np.linalg.qr(base / _lengths(base))
+def strongest(base: Complex, tried: Complex, target: Complex, sizes: Array | None = None) -> int:
+    """Return which of the columns tried explains most of the target beside those of the base.
+
+    Parameters
+    ----------
+    base, tried, target : complex arrays, shapes (n, p), (n, q) and (n,)
+    sizes : array, shape (q,), optional
+        Σ |tried|², if it is known. Columns may then hold a part beside that is at right angles to
+        base and target and not counted.
+    """
+    columns = stacked(base)
+    basis, _ = np.linalg.qr(columns / _lengths(columns))
+    goal = stacked(target)
     # What one more column explains is its projection beside those that are there.
-    left = target - basis @ (basis.T @ target)
-    sizes = np.einsum("ij,ij->j", tried, tried)
-    beside = sizes - np.sum((basis.T @ tried) ** 2, axis=0)
+    left = goal - basis @ (basis.T @ goal)
+    n = len(target)
+    rows = np.column_stack([basis, left])
+    along = ((rows[:n] - 1j * rows[n:]).T @ tried).real
+    if sizes is None:
+        sizes = np.sum(tried.real**2 + tried.imag**2, axis=0)
+    beside = sizes - np.sum(along[:-1] ** 2, axis=0)
     new = beside > COLLINEAR * sizes
-    power = np.where(new, (left @ tried) ** 2 / np.where(new, beside, 1.0), 0.0)
+    power = np.where(new, along[-1] ** 2 / np.where(new, beside, 1.0), 0.0)
     return int(np.argmax(power))
 
 
+def one_more(base: Array, tried: Array, target: Array) -> tuple[Array, Array]:
+    """Return what each of the columns tried takes from the sum of squares, and its coefficient.
+
+    Each alone beside the columns of the base; nothing where it is one of them.
+    """
+    basis, _ = np.linalg.qr(base / _lengths(base))
+    left = target - basis @ (basis.T @ target)
+    beside = tried - basis @ (basis.T @ tried)
+    power = np.einsum("ij,ij->j", beside, beside)
+    new = np.sqrt(power) > COLLINEAR * _lengths(tried)
+    values = np.where(new, (left @ beside) / np.where(new, power, 1.0), 0.0)
+    return np.asarray(values**2 * power), np.asarray(values)
+
+
 def _lengths(columns: Array) -> Array:
-    return np.asarray(np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+    return np.asarray(np.maximum(np.sqrt(np.einsum("ij,ij->j", columns, columns)), 1e-300))

@@ -71,7 +71,8 @@ def linear_term(beyond: BeyondLinear) -> LinearTerm | None:
     """Return the linear term that is there; None where there is none, or none that is known."""
     size = beyond.line_size_nm
     omega = 2 * np.pi * beyond.frequency_hz
-    target = stacked(beyond.torque_lines / size)
+    lines = beyond.torque_lines / size
+    target = stacked(lines)
     motion = beyond.linear / size[:, None]
     rest, joint = explained(stacked(motion), target)
     free = float(np.sum(np.abs(beyond.torque) ** 2))
@@ -83,7 +84,7 @@ def linear_term(beyond: BeyondLinear) -> LinearTerm | None:
         return None
     found = [
         _coupling(joint, omega, motion[:, 2], target),
-        _both_directions(motion, omega, target),
+        _both_directions(motion, omega, lines),
     ]
     (name, value, delay_s, values), remains = min(found, key=lambda one: one[1])
     share = (rest - remains) / (rest - free)
@@ -127,12 +128,11 @@ def _coupling(joint: Array, omega: Array, angle: Complex, target: Array) -> Foun
     return ("coupling", value, 0.0, np.asarray(best.x[:3] * start)), 2.0 * float(best.cost)
 
 
-def _both_directions(motion: Complex, omega: Array, target: Array) -> Found:
+def _both_directions(motion: Complex, omega: Array, target: Complex) -> Found:
     turns = np.exp(-1j * omega[:, None] * DELAYS_S)
-    late = stacked(turns * motion[:, [1]])
-    columns = stacked(motion)
-    best = strongest(columns, late, target)
-    rest, values = explained(np.column_stack([columns, late[:, best]]), target)
+    late = turns * motion[:, [1]]
+    best = strongest(motion, late, target)
+    rest, values = explained(stacked(np.column_stack([motion, late[:, best]])), stacked(target))
     return ("reflex", float(values[3]), float(DELAYS_S[best]), values[:3]), rest
 
 

@@ -28,7 +28,7 @@ from rigidimeter.estimation.terms.explained import (
     Complex,
     Explained,
     explained,
-    stacked,
+    one_more,
     strongest,
     triangle,
 )
@@ -114,8 +114,7 @@ def omitted_terms(beyond: BeyondLinear) -> tuple[OmittedTerm, ...]:
     left = list(TESTED)
     search = _Search(beyond)
     while left:
-        before = search.fit(found)
-        tests = [search.test(found, before, name) for name in left]
+        tests = search.tests(found, left)
         adjusted = holm([test.p for test in tests])
         fits = [
             (*search.best(found, test), p)
@@ -153,7 +152,7 @@ class _Search:
     def __init__(self, beyond: BeyondLinear) -> None:
         self._beyond = beyond
         self._terms: dict[_Found, int] = {}
-        self._tried: dict[str, tuple[list[_Found], Array]] = {}
+        self._tried: dict[str, tuple[list[_Found], Complex, Array]] = {}
         self._take([term for name in TESTED for term in _tested(name)])
 
     def _take(self, terms: Sequence[_Found]) -> None:
@@ -167,11 +166,28 @@ class _Search:
         columns = [self._terms[term] for term in terms]
         return explained(self._upper[:, columns], self._upper[:, -1])
 
-    def test(self, found: Sequence[_Found], before: Explained, name: str) -> _Test:
-        """Test a term beside those that were found; `before` is the fit without it."""
+    def tests(self, found: Sequence[_Found], names: Sequence[str]) -> list[_Test]:
+        """Test each term beside those that were found."""
+        before = self.fit(found)
+        alone = [name for name in names if name not in REFLEXES]
+        base, tried = (
+            self._upper[:, [self._terms[term] for term in terms]]
+            for terms in (found, [_Found(name, ()) for name in alone])
+        )
+        gained, values = one_more(base, tried, self._upper[:, -1])
+        fits = {
+            name: Explained(max(before.left - gain, 0.0), value)
+            for name, gain, value in zip(alone, gained, values[:, None], strict=True)
+        }
+        return [self._test(found, before, name, fits.get(name)) for name in names]
+
+    def _test(
+        self, found: Sequence[_Found], before: Explained, name: str, fit: Explained | None
+    ) -> _Test:
         beyond, tested = self._beyond, _tested(name)
         more = len(tested)
-        fit = self.fit([*found, *tested])
+        if fit is None:
+            fit = self.fit([*found, *tested])
         degrees = beyond.free_values - len(found) - more
         gained = max(before.left - fit.left, 0.0) / more / beyond.taper_loss
         ratio = gained / (fit.left / degrees) if fit.left > 0 else np.inf
@@ -182,24 +198,27 @@ class _Search:
         """Return the term and its fit, a reflex with its delay of least residual."""
         if test.name not in REFLEXES:
             return _Found(test.name, ()), test.fit
-        base, torque = (
-            stacked(lines) for lines in (_columns(self._beyond, found), self._beyond.torque)
-        )
+        base, torque = _columns(self._beyond, found), self._beyond.torque
         best = []
         for kind in ("reflex+", "reflex-second-order+"):
-            terms, tried = self._reflexes(kind)
-            best.append(terms[strongest(base, tried, torque)])
+            terms, tried, sizes = self._reflexes(kind)
+            best.append(terms[strongest(base, tried, torque, sizes)])
         self._take(best)
         delayed, slow = ((term, self.fit([*found, term])) for term in best)
         return slow if delayed[1].left - slow[1].left > DYNAMICS else delayed
 
-    def _reflexes(self, kind: str) -> tuple[list[_Found], Array]:
-        """Return the reflexes that are tried, and their columns, real parts above imaginary."""
+    def _reflexes(self, kind: str) -> tuple[list[_Found], Complex, Array]:
+        """Return the reflexes that are tried, their lines as they are, and their white sizes.
+
+        What is linear in the lines is at right angles to whatever is white.
+        """
         if kind not in self._tried:
             inners = self._beyond.grid([kind])
             late = np.flatnonzero([inner[0] >= EARLIEST_S for inner in inners])
-            tried = self._beyond.white(self._beyond.reflex_lines(kind)[:, late])
-            self._tried[kind] = [_Found(kind, inners[i]) for i in late], stacked(tried)
+            lines = self._beyond.reflex_lines(kind)[:, late]
+            sizes = self._beyond.white_sizes(lines)
+            tried = lines / self._beyond.line_size_nm[:, None]
+            self._tried[kind] = [_Found(kind, inners[i]) for i in late], tried, sizes
         return self._tried[kind]
 
 
