@@ -41,6 +41,9 @@ SHAPE_HIGH_HZ = 10.0
 CLEARLY = 1.25
 """So many times as much of the torque must the worse motion leave unexplained to be called it."""
 
+EDGE_SAMPLES = 3
+"""A spline feels the end of a stretch that is left out for so many samples."""
+
 STRETCH_S = 0.25
 
 
@@ -117,7 +120,10 @@ def velocity_shape(
         return None
     kept = sound(epoch, time_s, 1.0)
     kept[:trim] = kept[time_s.size - trim :] = False
-    signals = (values_and_slopes(angle, time_s)[1], *values_and_slopes(velocity, time_s))
+    signals = [values_and_slopes(angle, time_s)[1], *values_and_slopes(velocity, time_s)]
+    # Lines across what is left out are not each other's slopes, and the band remembers for seconds.
+    there = sound(epoch, time_s, EDGE_SAMPLES / rate_hz)
+    signals[0] = np.where(there, signals[0], signals[1])
     derived, measured, changing = (zero_phase_band(one, rate_hz, band)[kept] for one in signals)
     size = float(np.linalg.norm(derived))
     if not (size > 0 and np.any(measured)):

@@ -1,6 +1,7 @@
 """The velocity against the angle: scale and delay put in are found."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from rigidimeter.estimation.diagnostics.motion_checks import (
     velocity_scale,
     velocity_shape,
 )
-from rigidimeter.records import Channel, Epoch
+from rigidimeter.estimation.stretches import bridged
+from rigidimeter.records import Channel, Epoch, LeftOut
 from rigidimeter.settings import DiagnosticsSettings
 
 SETTINGS = DiagnosticsSettings()
@@ -92,6 +94,16 @@ def test_a_ripple_in_one_of_them_is_found_and_the_torque_says_in_which(worse, sa
     assert look.value == pytest.approx(15.0, rel=0.1)
     assert said in look.meaning
     assert f"leave {worse} out" in look.remedy
+
+
+@pytest.mark.parametrize("worse", [None, "velocity_rad_s"])
+@pytest.mark.parametrize("length_s", [0.1, 1.0, 3.0])
+def test_what_is_left_out_has_no_shape(worse, length_s):
+    """A line across the angle has another slope than the line across the velocity."""
+    whole = joint(worse)
+    part = bridged(replace(whole, left_out=(LeftOut(5.0, 5.0 + length_s),)))
+    before, after = (velocity_shape(each, (0.15, 50.0), SETTINGS).value for each in (whole, part))
+    assert after == pytest.approx(before, rel=0.05, abs=0.1)
 
 
 def test_scale_delay_and_noise_are_no_other_shape():
