@@ -108,6 +108,10 @@ EQUIVALENT: dict[str, str] = {
     "tick.py TickResult: 0 → -1": GIVEN,
     "tick.py TickResult: interrupted: bool = False → interrupted: bool = -1": GIVEN,
     "tick.py TickResult: False → True": GIVEN,
+    "tick.py run_tick: sent != allowed and math.isfinite(sent) → math.isfinite(sent)": "what was "
+    "sent as it was allowed is the guard's velocity already",
+    "tick.py run_tick: loop.limit_time_s <= due_s → loop.limit_time_s < due_s": "a later tick is "
+    "due later",
     "ramp.py ramp_to_rest: 0 → 1": RAMP,
     "ramp.py ramp_to_rest: 0 → -1": RAMP,
     "tick.py run_tick: 0 → 1": RAMP,

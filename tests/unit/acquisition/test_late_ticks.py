@@ -61,6 +61,9 @@ def test_missed_deadlines_stop_only_in_a_row():
     loop, samples = made(settings, late={0: 0.001, 2: 0.001, 4: 0.001})
     assert run_ticks(loop, 1, 20, constant(0.0)).cause is Cause.DEADLINES_MISSED
     assert [s.tick for s in samples] == [1, 3, 5]
+    loop, samples = made(settings, late={2: 0.001, 4: 0.001, 6: 0.001})  # also after some on time
+    assert run_ticks(loop, 1, 20, constant(0.0)).cause is Cause.DEADLINES_MISSED
+    assert [s.tick for s in samples] == [0, 1, 3, 5, 7]
 
 
 @pytest.mark.parametrize(("late_s", "stalled"), [(0.0399, False), (0.0401, True)])

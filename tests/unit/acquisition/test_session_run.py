@@ -81,7 +81,33 @@ def test_an_epoch_in_which_a_limit_held_is_a_fail_and_repeated_last_if_wanted():
     assert (ran.result.outcome, ran.result.epochs_run, ran.result.epochs_good) == ("success", 4, 0)
 
 
+def test_an_epoch_that_went_well_is_not_repeated():
+    ran = session(values={"protocol": {**VALUES["protocol"], "repeat_limited": True}})
+    assert (ran.labels, ran.result.epochs_good) == (["1", "2"], 2)
+
+
+def test_a_sinusoid_is_what_the_settings_describe():
+    """θ = A sin(2π t) with ends of 0.1 s, and its derivative."""
+    protocol = {**VALUES["protocol"], "blocks": [{"task": "sinusoid", "epochs": 1}]}
+    ran = session(values={"protocol": protocol})
+    samples = [s for s in ran.sink.samples if s.epoch == 1]
+    amplitude_rad = math.radians(1.0)
+    for k in range(10, 40):  # between the ends
+        expected = amplitude_rad * math.sin(2 * math.pi * k / RATE_HZ)
+        assert samples[k].target_angle_rad == pytest.approx(expected, abs=1e-12)
+        led = 2 * math.pi * amplitude_rad * math.cos(2 * math.pi * k / RATE_HZ)
+        error = samples[k].target_angle_rad - samples[k].angle_rad
+        assert samples[k].velocity_request_rad_s == pytest.approx(led + error, abs=1e-12)
+
+
 # Orders
+
+
+def test_an_epoch_in_which_a_limit_held_is_a_fail_also_if_an_operator_ends_it():
+    values = {"guard": {**VALUES["guard"], "position_limit_deg": 1.5}}
+    ran = session(Desk(orders={48: Command.PAUSE_NOW, 100: Command.RESUME}), values=values)
+    assert ran.epochs[0] == (1, "fail")
+    assert "position limit of ±1.5 deg" in ran.sink.of("epoch_ended")[0]["reason"]
 
 
 def test_a_pause_waits_for_the_epoch_and_goes_back_before_the_next():
@@ -289,3 +315,15 @@ def test_resumed_while_the_arm_still_moves_it_waits_for_rest():
     assert max(steps) <= math.radians(30.0) / RATE_HZ * (1 + 1e-9)
     released = next(s for s in ran.sink.samples[46:] if s.cause == 0)
     assert ran.sink.samples[released.tick - 1].velocity_command_rad_s == 0.0
+
+
+@pytest.mark.parametrize(
+    ("causes", "orders", "outcome"),
+    [({}, {52: Command.ABORT}, "abort"), ({52: Cause.DRIVE_FAULT}, {}, "fail")],
+)
+def test_ended_while_the_arm_still_comes_to_rest_no_epoch_begins(causes, orders, outcome):
+    guard = {**VALUES["guard"], "acceleration_limit_deg_s2": 30.0}
+    desk = Desk({45: Cause.TORQUE_HIGH, **causes}, {47: Command.RESUME, **orders})
+    ran = session(desk, values={"guard": guard})
+    assert ran.sink.samples[52].velocity_command_rad_s != 0.0
+    assert (ran.result.outcome, ran.labels) == (outcome, ["1"])

@@ -263,3 +263,14 @@ def test_the_admittance_is_made_for_one_tick_and_for_as_many_as_may_be_missed():
     assert (loop.inertia_kg_m2, loop.damping_nm_s_rad) == (0.05, 2.0)
     expected = [admittance(0.05, 2.0, n * INTERVAL_S) for n in range(1, LONGEST_STEP + 1)]
     assert loop.admittances == expected
+
+
+@pytest.mark.parametrize(
+    ("slow", "cause"), [("torque", Cause.NONE), ("motion", Cause.SELDOM_FRESH)]
+)
+def test_each_reading_is_as_old_as_its_own_sensor_may_make_it(slow, cause):
+    """Torque 50 times and motion 1000 times a second: 13 to 19 ms are old for the motion alone."""
+    settings = parse_settings({"rig": {"torque": {"rate_hz": 50.0}}})
+    stamp = f"{slow}_time_s"
+    loop, _ = made(settings, change=lambda k, r: r._replace(**{stamp: k // 20 * 20 * INTERVAL_S}))
+    assert run_ticks(loop, 1, 1500, constant(0.0)).cause is cause

@@ -7,8 +7,12 @@ from tests.unit.acquisition.exact_rig import Desk
 from tests.unit.acquisition.whole_session import RATE_HZ, SENSOR, VALUES, session
 
 from rigidimeter.acquisition.run_states import Command
-from rigidimeter.acquisition.zeroing import FEWEST_ZEROING_SAMPLES
+from rigidimeter.acquisition.zeroing import FEWEST_ZEROING_SAMPLES, moved
+from rigidimeter.devices import Reading
 from rigidimeter.guard import Cause
+from rigidimeter.settings import parse_settings
+
+SETTINGS = parse_settings(VALUES)
 
 
 def torque(bias_nm, ripple_nm=0.01):
@@ -162,3 +166,15 @@ def test_a_hold_that_nobody_ends_leaves_no_zero_and_no_epoch(causes, orders):
     assert ran.rig.of("zero") == []
     assert ran.labels == []
     assert ran.result.cause is Cause.TORQUE_HIGH
+
+
+@pytest.mark.parametrize("angle_rad", [-0.2, 0.2])
+def test_a_joint_at_rest_away_from_the_middle_did_not_move(angle_rad):
+    readings = [Reading(0.0, 0.0, angle_rad, 0.0, 0.0)] * 20
+    assert moved(readings, SETTINGS) == ""
+    limit_rad = math.radians(
+        SETTINGS.zeroing.motion_limit_deg + SETTINGS.rig.motion.angle_resolution_deg
+    )
+    for share, refused in ((0.99, False), (1.01, True)):
+        last = readings[0]._replace(angle_rad=angle_rad + share * limit_rad)
+        assert bool(moved([*readings, last], SETTINGS)) == refused
