@@ -112,7 +112,7 @@ def test_the_comparison_as_json_is_the_kept_one(compared, study, tmp_path) -> No
     assert json.loads((tmp_path / "out.json").read_text()) == found
 
 
-def test_a_report_of_a_study(rigidimeter, study, tmp_path) -> None:
+def test_a_report_of_a_study(rigidimeter, study, tmp_path, no_figures) -> None:
     ran = rigidimeter("report", study, "--out", tmp_path / "page")
     assert ran.status == 0
     assert (tmp_path / "page/report.html").is_file()

@@ -74,7 +74,7 @@ def test_what_is_made_by_hand_stands_once_in_the_source_and_changes_it(fault):
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--every", "80", "step.py"], ["--hand-made", "--every", "20"]]
+    "arguments", [["--every", "160", "step.py"], ["--hand-made", "--every", "40"]]
 )
 def test_a_sample_of_the_faults_is_seen(arguments):
     ran = run(*arguments)

@@ -260,7 +260,9 @@ def test_a_session_in_which_an_epoch_failed_is_recorded_and_ends_with_1(rigidime
     assert "1 of 2 epochs did not end with success; events.jsonl holds the reason" in ran.err
 
 
-def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(rigidimeter, tmp_path, monkeypatch):
+def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(
+    rigidimeter, tmp_path, monkeypatch, no_figures
+):
     def short(*epochs):
         return replace(two_day_design(*epochs), settings=SHORT)
 
