@@ -30,6 +30,9 @@ from rigidimeter.records import PARAMETERS, Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings
 
 MIDDLE_PERCENT = 90.0
+TAPERED_LINES = 1.5
+"""The equivalent noise bandwidth of Hann's window, in lines."""
+
 SEGMENTS = 8
 """Stretches, half overlapping, over which a coherence is averaged: 4 s each in an epoch of 18 s.
 
@@ -144,9 +147,17 @@ def perturbation_nm(channel: Channel, time_s: Array) -> Array:
 
 
 def _share(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> float:
+    """Return the share of the power of a signal about its mean that lies in a band.
+
+    The first line of a perturbation may lie less than a line above the lower edge: what the taper
+    does not tell from the band is not outside it.
+    """
     frequency, power = power_lines(values, rate_hz, tapered=True)
-    total = float(np.sum(power))
-    return float(np.sum(power[lines_inside(frequency, band_hz)])) / total if total > 0 else 0.0
+    reach_hz = TAPERED_LINES / 2 * rate_hz / values.size
+    total = float(np.sum(power[1:]))
+    low_hz, high_hz = band_hz
+    inside = lines_inside(frequency, (low_hz - reach_hz, high_hz + reach_hz))
+    return float(np.sum(power[inside])) / total if total > 0 else 0.0
 
 
 def _middle_hz(signals: Signals) -> tuple[float, float]:

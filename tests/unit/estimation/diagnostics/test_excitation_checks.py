@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from tests.unit.estimation.diagnostics.sound_epoch import (
     RATE_HZ,
     SETTINGS,
@@ -21,8 +22,10 @@ from tests.unit.estimation.diagnostics.sound_epoch import (
 
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import Signals
+from rigidimeter.estimation.bandlimited import bandlimited_signals
 from rigidimeter.estimation.diagnostics import excitation_checks
 from rigidimeter.records import Channel
+from rigidimeter.settings import EstimationSettings
 
 __all__ = ["pushed", "sound"]
 
@@ -80,6 +83,20 @@ def test_drift_below_the_band_is_told(sound):
     assert_failed(band_share(with_channel(epoch, "torque_nm", drifting), signals, SETTINGS),
                   "the torque's power lies in the band")  # fmt: skip
     assert passed(band_share(epoch, signals, SETTINGS))
+
+
+@pytest.mark.parametrize("duration_s", [8.0, 10.0, 12.0, 15.0, 20.0])
+@pytest.mark.parametrize("phase", [0.0, 1.0, 2.0])
+def test_the_slowest_line_of_a_perturbation_is_no_drift(sound, duration_s, phase):
+    """A PRBS of 127 chips of 50 ms begins at 0.157 Hz, the band at 0.15 Hz."""
+    t = np.arange(round(200 * duration_s)) / 200
+    x = np.sin(2 * np.pi * t / 6.35 + phase) + 0.3 * np.sin(2 * np.pi * 2.0 * t)
+    channels = {name: Channel(name, t, x) for name in ("torque_nm", "angle_rad")}
+    epoch = replace(sound[0], channels=channels)
+    signals = bandlimited_signals(epoch, EstimationSettings())
+    finding = band_share(epoch, signals, SETTINGS)
+    assert passed(finding)
+    assert finding.value > 70.0
 
 
 def test_an_imposed_sinusoid_is_no_prbs(sound):
