@@ -79,7 +79,7 @@ def run(
     from rigidimeter.cli.realtime_rig import run_loop
     from rigidimeter.cli.sharing import require_packages, write_nwb_beside
     from rigidimeter.commissioning import check_record, require_daily_check, with_measured_floor
-    from rigidimeter.console import SessionPlan, Terminal
+    from rigidimeter.console import SessionPlan, new_folder, next_steps, terminal_view
     from rigidimeter.devices.rigfile import load_rig
     from rigidimeter.recording.resume import count_epochs, require_all
 
@@ -107,24 +107,28 @@ def run(
     )
     shown = SessionPlan(settings, planned.epochs, done, virtual=rig is None)
     attended = not unattended and sys.stdin is not None and sys.stdin.isatty()
-    ended = supervise(
-        partial(run_loop, settings, planned, rig, home_rad),
-        recording,
-        realtime=Realtime(priority=priority, cpu=cpu, attended=attended),
-        console=Terminal(sys.stdin if attended else None, sys.stdout, shown),
-    )
-    for remark in ended.remarks:
+    with terminal_view(sys.stdin if attended else None, sys.stdout, shown) as console:
+        ended = supervise(
+            partial(run_loop, settings, planned, rig, home_rad),
+            recording,
+            realtime=Realtime(priority=priority, cpu=cpu, attended=attended),
+            console=console,
+        )
+    for remark in (*console.remarks, *ended.remarks):
         echo(remark, err=True)
     folder = ended.folder if ended.folder != out.absolute() else out
     good, of = count_epochs(folder)
     echo(f"{good} of {of} epochs ended with success; session in {folder}")
     if settings.sharing.nwb_at_close:
         echo(write_nwb_beside(folder))
+    closed = bool(ended.outcome)
+    steps = next_steps(
+        folder, closed=closed, good=good, planned=of, rig=rig, out=new_folder(folder)
+    )
+    echo("\n".join(["What to do next:", *(f"  {step}" for step in steps)]))
     if ended.outcome != "success":
-        again = f"; continue it with `{_resume_command(folder, rig)}`" if good < of else ""
         raise UserError(
-            f"{folder}: the session ended with {ended.outcome or 'no outcome'}: "
-            f"{ended.reason}{again}"
+            f"{folder}: the session ended with {ended.outcome or 'no outcome'}: {ended.reason}"
         )
     require_all(folder, good, of)
 
@@ -168,6 +172,7 @@ def _planned(
 
 def _offer(out: Path) -> None:
     """Say how to continue if the folder holds a session that was interrupted."""
+    from rigidimeter.console import new_folder, resume_command
     from rigidimeter.recording import is_session
     from rigidimeter.recording.resume import rest_of
 
@@ -175,17 +180,11 @@ def _offer(out: Path) -> None:
         return
     rest = rest_of(out)
     if rest.epochs:
+        again = resume_command(out, None if rest.virtual else "RIG.toml", new_folder(out))
         raise UserError(
             f"{out}: holds a session of which {len(rest.epochs)} epochs are left; continue it with "
-            f"`{_resume_command(out, None if rest.virtual else 'RIG.toml')}`, or name a new folder"
+            f"`{again}`, or name a new folder"
         )
-
-
-def _resume_command(out: Path, rig: Path | str | None) -> str:
-    """Return the command that continues a session."""
-    return " ".join(
-        ["rigidimeter run --resume", str(out), *(["--rig", str(rig)] if rig else []), "--out NEW"]
-    )
 
 
 def recover(

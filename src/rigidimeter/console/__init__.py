@@ -4,10 +4,12 @@ from rigidimeter.console.facts import ConditionCount, EpochFacts, Facts, facts
 from rigidimeter.console.lamps import Lamp, Level, RecorderState
 from rigidimeter.console.limit_distances import LimitDistance
 from rigidimeter.console.live_values import LiveValue
+from rigidimeter.console.next_steps import new_folder, next_steps, resume_command
 from rigidimeter.console.observer import Observer
+from rigidimeter.console.orders import KEYS
 from rigidimeter.console.progress import EndedEpoch, Progress
 from rigidimeter.console.session_plan import SessionPlan
-from rigidimeter.console.terminal import KEYS, Terminal
+from rigidimeter.console.terminal import terminal_view
 from rigidimeter.console.trace_reader import TraceReader, Traces
 
 __all__ = [
@@ -24,8 +26,11 @@ __all__ = [
     "Progress",
     "RecorderState",
     "SessionPlan",
-    "Terminal",
     "TraceReader",
     "Traces",
     "facts",
+    "new_folder",
+    "next_steps",
+    "resume_command",
+    "terminal_view",
 ]

@@ -45,6 +45,8 @@ class Progress:
     started_s : float
         When it began.
     ended : tuple of EndedEpoch
+    remarks : tuple of str
+        What the loop's process was refused, and which checks of the rig were never made.
     zeroed : bool
         Whether the torque sensor was zeroed.
     stop : str
@@ -59,6 +61,7 @@ class Progress:
     running: bool = False
     started_s: float = 0.0
     ended: tuple[EndedEpoch, ...] = ()
+    remarks: tuple[str, ...] = ()
     zeroed: bool = False
     stop: str = ""
     outcome: str = ""
@@ -79,6 +82,11 @@ def progress_after(progress: Progress, event: Mapping[str, Any]) -> Progress:
         return _ended(progress, event)
     if kind == "sensor_zeroed":
         return replace(progress, zeroed=not event["refused"])
+    if kind == "loop_prepared":
+        return replace(progress, remarks=(*progress.remarks, *event["refused"]))
+    if kind == "not_commissioned":
+        never = f"Not tried when the rig was commissioned: {', '.join(event['checks'])}."
+        return replace(progress, remarks=(*progress.remarks, never))
     if kind == "guard_latched":
         return replace(progress, stop=event["sentence"])
     if kind == "session_ended":

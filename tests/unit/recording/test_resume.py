@@ -115,7 +115,7 @@ def test_the_way_on_is_offered(session, rigidimeter, virtual, option):
     folder = session("s", virtual=virtual)
     ran = rigidimeter("run", "--out", folder)
     assert ran.status != 0
-    assert f"rigidimeter run --resume {folder}{option} --out NEW" in ran.err
+    assert f"rigidimeter run --resume {folder}{option} --out {folder}-2`" in ran.err
 
 
 def test_a_session_without_a_protocol_cannot_go_on(tmp_path):

@@ -19,8 +19,9 @@ from rigidimeter.acquisition.processes.status_values import (
 )
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order, State
 from rigidimeter.console import SessionPlan, facts
+from rigidimeter.console.line_view import LineView, status_line
+from rigidimeter.console.orders import KEYS, order_of
 from rigidimeter.console.recent_samples import RecentSamples
-from rigidimeter.console.terminal import KEYS, Terminal, order_of, status_line
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
 
@@ -92,7 +93,7 @@ class Desk:
         self.keyboard = os.fdopen(keys)
         self.out = os.fdopen(screen, "w")
         self.now_s = 0.0
-        self.terminal = Terminal(self.keyboard, self.out, PLAN, lambda: self.now_s)
+        self.terminal = LineView(self.keyboard, self.out, PLAN, lambda: self.now_s)
         self.said()
 
     def type(self, text: str) -> None:
@@ -202,7 +203,7 @@ def test_what_was_typed_before_the_keyboard_went_still_counts(desk):
 
 
 def test_without_an_operator_nothing_is_asked(desk):
-    terminal = Terminal(None, desk.out, PLAN)
+    terminal = LineView(None, desk.out, PLAN)
     desk.said()
     os.write(desk.keys, b"e\n")
     terminal(desk.shared)

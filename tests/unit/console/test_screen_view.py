@@ -1,0 +1,269 @@
+"""The full screen on a pseudo-terminal: keys, sizes, a terminal that takes nothing, the end."""
+
+import fcntl
+import json
+import os
+import pty
+import re
+import select
+import struct
+import termios
+import time
+
+import pytest
+from tests.unit.console.test_progress import EPOCHS, ended, started
+
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.status_values import Condition, Flag, LoopStatus, Role
+from rigidimeter.acquisition.run_states import NOTHING, Command, Order, State
+from rigidimeter.console import SessionPlan, terminal_view
+from rigidimeter.console.line_view import LineView
+from rigidimeter.console.screen_view import ScreenView
+from rigidimeter.console.tty import ENTER, LEAVE, Tty
+from rigidimeter.settings import Settings
+
+PLAN = SessionPlan(Settings(), EPOCHS, virtual=True)
+RUNNING = LoopStatus(State.RUNNING, 30_000, 1, time_s=30.0, angle_rad=0.1, until_s=45.0)
+
+
+class Person:
+    """Who sits at the other end of the terminal."""
+
+    def __init__(self) -> None:
+        self.far, self.near = pty.openpty()
+        os.set_blocking(self.far, False)
+        self.resize(80, 24)
+        self.shared = SessionMemory.create(100.0, 1.0)
+        self.status = self.shared.status
+        self.now_s = 100.0
+        self.before = termios.tcgetattr(self.near)
+        self.view = ScreenView(Tty(self.near, self.near), PLAN, lambda: self.now_s)
+
+    def resize(self, width: int, height: int) -> None:
+        fcntl.ioctl(self.near, termios.TIOCSWINSZ, struct.pack("HHHH", height, width, 0, 0))
+
+    def press(self, keys: bytes) -> None:
+        os.write(self.far, keys)
+        self.look()
+
+    def look(self) -> None:
+        self.now_s += 1.0
+        self.view(self.shared)
+
+    def sees(self) -> bytes:
+        """Return what came on the screen since."""
+        seen = b""
+        while select.select([self.far], [], [], 0.05)[0]:
+            seen += os.read(self.far, 1 << 20)
+        return seen
+
+    def reads(self) -> list[str]:
+        """Return the lines of the last frame."""
+        self.look()
+        frame = self.sees().rpartition(b"\x1b[H")[2]
+        return re.sub(rb"\x1b\[[?0-9;]*[a-zA-Z]|\r", b"", frame).decode().split("\n")
+
+    def orders(self) -> list[Command]:
+        found = []
+        while (order := self.status.take()) is not NOTHING:
+            found.append(order.command)
+        return found
+
+    def close(self) -> None:
+        os.close(self.far)
+        os.close(self.near)
+        self.shared.unlink()
+        self.shared.close()
+
+
+@pytest.fixture
+def person():
+    person = Person()
+    person.view.__enter__()
+    person.status.show_loop(RUNNING)
+    person.look()
+    yield person
+    person.close()
+
+
+def test_the_facts_of_a_running_session_are_on_80_by_24(person):
+    for event in (started(1, "1"), ended(1), started(2, "2")):
+        assert person.shared.events.push(0, event)
+    lines = person.reads()
+    assert len(lines) <= 24
+    assert all(len(line) < 80 for line in lines)
+    assert lines[1] == "epoch 2 of 3: OFF, sinusoid"
+    assert lines[2] == "EPOCH RUNS   epoch: 15 s left   session: 1 min 05 s left"
+    assert lines[3] == "OFF: 1 good, 0 bad, 1 left   DBS: 0 good, 0 bad, 1 left"
+    text = "\n".join(lines)
+    for name in ("angle", "energy", "limits", "sensor", "drive", "lateness", "recorder", "disk"):
+        assert re.search(rf"^[○●▲■] {name} ", text, re.M)
+    assert lines[-1].startswith("SPACE or e: EMERGENCY STOP")
+    assert "…" not in lines[-2]
+
+
+@pytest.mark.parametrize(("width", "height"), [(40, 10), (20, 3), (200, 60), (1, 1)])
+def test_whatever_the_size_nothing_is_wider_or_higher(person, width, height):
+    person.resize(width, height)
+    lines = person.reads()
+    assert len(lines) <= height
+    assert all(len(line) <= max(width - 1, 1) for line in lines)
+    if width >= 20:
+        assert lines[-1].startswith("SPACE or e")
+
+
+def test_a_new_size_is_drawn_at_once(person):
+    person.reads()
+    person.resize(100, 30)
+    person.view(person.shared)  # no time has passed
+    assert b"EMERGENCY" in person.sees()
+
+
+@pytest.mark.parametrize("key", [b"e", b"E", b" "])
+def test_an_emergency_stop_never_asks(person, key):
+    person.press(key)
+    assert person.status.flag(Flag.EMERGENCY_STOP)
+    assert person.orders() == []
+
+
+@pytest.mark.parametrize(
+    ("key", "command"),
+    [
+        *((b"p", Command.PAUSE), (b"n", Command.PAUSE_NOW), (b"s", Command.STOP)),
+        *((b"a", Command.ABORT), (b"H", Command.HALT), (b"r", Command.RESUME)),
+        *((b"x", Command.PAUSE_NOW), (b"\x1b", Command.PAUSE_NOW), (b"\xff", Command.PAUSE_NOW)),
+    ],
+)
+def test_one_key_is_one_order(person, key, command):
+    person.press(key)
+    assert person.orders() == [command]
+    assert any("pausing now" in line for line in person.reads()) is (key in b"x\x1b\xff")
+
+
+@pytest.mark.parametrize("keys", [b"\x1b[A", b"\x1bOP", b"\x1b[5~", b"\x1b[<0;3;4M", b"\r", b"\n"])
+def test_arrows_and_enter_are_no_orders(person, keys):
+    person.press(keys)
+    assert person.orders() == []
+
+
+def test_what_sets_the_arm_going_asks_for_its_key_again(person):
+    person.status.show_loop(RUNNING._replace(state=State.PAUSED))
+    person.look()
+    person.press(b"r")
+    assert person.orders() == []
+    assert any("press r again" in line for line in person.reads())
+    person.press(b"r")
+    assert person.orders() == [Command.RESUME]
+    person.press(b"r")
+    person.now_s += 10.0
+    person.press(b"r")  # too late: it asks again
+    assert person.orders() == []
+
+
+def test_what_takes_more_than_a_key_is_typed_after_a_colon(person):
+    person.press(b":set perturbation_scale 0.x\x7f5")
+    assert ": set perturbation_scale 0.5_" in person.reads()[-2]
+    assert not person.status.flag(Flag.EMERGENCY_STOP)
+    person.press(b"\r")
+    assert person.status.take() == Order(Command.CHANGE, "perturbation_scale", 0.5)
+    person.press(b":note he coughed\r")
+    order = person.status.take()
+    assert json.loads(order.name) == {"what": "note", "text": "he coughed", "by": ""}
+    person.press(b":nonsense\r:save to /tmp\r")
+    lines = "\n".join(person.reads())
+    assert "'nonsense' is neither" in lines
+    assert "the recorder can write" in lines
+    person.press(b":p\x1b")
+    person.press(b"p")
+    assert person.orders() == [Command.PAUSE]
+
+
+def test_one_who_walks_away_while_typing_has_keys_again(person):
+    person.press(b":no")
+    person.now_s += 20.0
+    person.press(b"e")
+    assert person.status.flag(Flag.EMERGENCY_STOP)
+
+
+def test_a_keyboard_that_is_gone_ends_the_run(person):
+    os.close(person.far)
+    person.look()
+    assert person.status.flag(Flag.END_ASKED)
+    person.look()
+    person.far = os.open("/dev/null", os.O_RDWR)
+
+
+def test_a_terminal_that_takes_nothing_holds_nobody_up(person):
+    begin_s = time.monotonic()
+    for _ in range(200):
+        person.look()  # nobody reads: after some frames the terminal is full
+    assert time.monotonic() - begin_s < 20.0
+    os.write(person.far, b"p")
+    person.look()
+    assert person.orders() == [Command.PAUSE]
+    # When it takes output again, the frame that was begun is finished before the next.
+    seen = person.sees()
+    for _ in range(3):
+        person.look()
+        seen += person.sees()
+    for frame in seen.split(b"\x1b[H")[1:]:
+        assert frame.endswith(b"\x1b[J")
+        assert frame.count(b"EMERGENCY STOP") == 1
+
+
+def test_at_the_end_the_terminal_is_as_it_was_and_nothing_typed_is_left(person):
+    person.sees()
+    during = termios.tcgetattr(person.near)
+    assert not during[3] & (termios.ICANON | termios.ECHO)
+    assert during[3] & termios.ISIG  # Ctrl-C stays a signal
+    os.write(person.far, b"rm -rf half an order\n")
+    time.sleep(0.05)
+    person.view.__exit__(None, None, None)
+    assert termios.tcgetattr(person.near) == person.before
+    assert person.sees().endswith(LEAVE)
+    assert not select.select([person.near], [], [], 0.1)[0]
+    assert os.get_blocking(person.near)
+
+
+def test_the_end_does_not_wait_for_a_terminal_that_takes_nothing(person):
+    for _ in range(50):
+        person.look()
+    begin_s = time.monotonic()
+    person.view.__exit__(None, None, None)
+    assert time.monotonic() - begin_s < 5.0
+    assert termios.tcgetattr(person.near) == person.before
+
+
+def test_what_a_note_or_a_name_holds_does_not_steer_the_terminal(person):
+    person.status.set_condition(Role.RECORDER, Condition.TROUBLE, "full \x1b[2J\x07 disk")
+    person.look()
+    frame = person.sees().rpartition(b"\x1b[H")[2]
+    assert b"\x1b[2J" not in frame
+    assert b"full ?[2J? disk" in frame
+
+
+def test_it_begins_with_the_other_screen():
+    far, near = pty.openpty()
+    with ScreenView(Tty(near, near), PLAN):
+        assert os.read(far, 100) == ENTER
+    os.close(far)
+    os.close(near)
+
+
+def test_without_a_terminal_there_are_lines(tmp_path, monkeypatch):
+    far, near = pty.openpty()
+    with os.fdopen(near, "r+b", buffering=0) as raw, (tmp_path / "out").open("w") as file:
+        keyboard = open(os.dup(raw.fileno()))  # noqa: SIM115
+        screen = open(os.dup(raw.fileno()), "w")  # noqa: SIM115
+        with keyboard, screen:
+            monkeypatch.setenv("TERM", "xterm")
+            with terminal_view(keyboard, file, PLAN) as view:
+                assert isinstance(view, LineView)
+            with terminal_view(None, screen, PLAN) as view:
+                assert isinstance(view, LineView)
+            with terminal_view(keyboard, screen, PLAN) as view:
+                assert isinstance(view, ScreenView)
+            monkeypatch.setenv("TERM", "dumb")
+            with terminal_view(keyboard, screen, PLAN) as view:
+                assert isinstance(view, LineView)
+    os.close(far)
