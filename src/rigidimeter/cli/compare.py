@@ -100,6 +100,7 @@ def compare(
       rigidimeter compare ratings.csv --value score --by condition --json comparison.json
     """
     from rigidimeter import study as studies
+    from rigidimeter.cli.progress import Meter
 
     outputs = (json_out, csv_out)
     paths = recordings.paths
@@ -124,16 +125,18 @@ def compare(
     analysed = None if value or is_json else analyse_recordings(recordings)
     status = 0
     try:
-        found = studies.compare(
-            paths[0] if analysed is None else analysed[1],
-            other,
-            reference=reference,
-            value=value,
-            by=by,
-            session=session,
-            seed=seed,
-            resamples=resamples,
-        )
+        with Meter("compare", 1.0) as meter:
+            found = studies.compare(
+                paths[0] if analysed is None else analysed[1],
+                other,
+                reference=reference,
+                value=value,
+                by=by,
+                session=session,
+                seed=seed,
+                resamples=resamples,
+                progress=meter.advance,
+            )
         _write(found, *outputs)
         show(comparison_blocks(found))
         say(found.notices)

@@ -76,6 +76,7 @@ def design(
       rigidimeter design --settings rig.toml --optimise --multisine
     """
     from rigidimeter.cli.design_text import design_blocks
+    from rigidimeter.cli.progress import Meter
     from rigidimeter.documents import write_json
     from rigidimeter.dynamics import refuse_unstable
     from rigidimeter.experiment import check_criterion, design_document
@@ -83,14 +84,16 @@ def design(
 
     keep_inputs((json_out,), [settings] if settings is not None else [])
     check_criterion(criterion)
-    designed = compute(
-        settings,
-        differences=detect or (),
-        power=power,
-        alpha=alpha,
-        search=criterion if optimise else None,
-        with_multisine=multisine,
-    )
+    with Meter("design", 1.0) as meter:
+        designed = compute(
+            settings,
+            differences=detect or (),
+            power=power,
+            alpha=alpha,
+            search=criterion if optimise else None,
+            with_multisine=multisine,
+            progress=meter.advance,
+        )
     show(design_blocks(designed, power, alpha))
     if out is not None:
         from rigidimeter.reporting.design_folder import write_design_folder

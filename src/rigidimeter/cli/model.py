@@ -58,6 +58,7 @@ def model(
           --reaction --terms inertia,damping,stiffness,reflex --compare
       rigidimeter model elbow.csv --terms inertia,damping,stiffness,offset,coulomb --band-hz 0 20
     """
+    from rigidimeter.cli.progress import Meter
     from rigidimeter.documents import write_json
     from rigidimeter.estimation.terms import candidates, parse_terms
     from rigidimeter.study.torque_models import model_document, model_recording
@@ -81,7 +82,10 @@ def model(
     keep_inputs((json_out,), recordings.paths)
     read = recordings.read()
     say(read.notices)
-    found = model_recording(read, models, compare=compare, grow=grow, high_hz=high_hz)
+    with Meter("model", 1.0) as meter:
+        found = model_recording(
+            read, models, compare=compare, grow=grow, high_hz=high_hz, progress=meter.advance
+        )
     for each in found:
         problems = () if compare else each.unfitted
         for problem in problems or ((each.problem,) if each.problem else ()):

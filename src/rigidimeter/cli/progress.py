@@ -37,6 +37,8 @@ class Meter:
         Gives the time in s.
     from_first : bool
         The speed counts from the first report on: before that processes are started.
+    at_most : bool
+        The work may end before all of it is done.
     """
 
     def __init__(
@@ -46,6 +48,7 @@ class Meter:
         clock: Callable[[], float] = time.monotonic,
         *,
         from_first: bool = False,
+        at_most: bool = False,
     ) -> None:
         self._title = title
         self._total = max(total, 1e-12)
@@ -53,6 +56,7 @@ class Meter:
         self._clock = clock
         self._start_s = clock()
         self._first = None if from_first else (self._start_s, 0.0)
+        self._about = "at most" if at_most else "about"
         self._line_s: float | None = None
         self._replaces = sys.stderr.isatty()
 
@@ -96,7 +100,7 @@ class Meter:
         ):
             return
         self._line_s = now_s
-        left = "" if self.left_s is None else f", about {self.left_s:.0f} s left"
+        left = "" if self.left_s is None else f", {self._about} {self.left_s:.0f} s left"
         line = f"{self._title}: {100 * self.share:.0f} %{left}"
         start, end = ("\r\x1b[K", "") if self._replaces else ("", "\n")
         print(f"{start}{line}", end=end, file=sys.stderr, flush=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.tables import Block, Table
 from rigidimeter.guard import Cause
 
@@ -46,7 +47,9 @@ def sign_blocks(settings: Settings, checks: Sequence[Check]) -> Iterator[Block]:
         "If the torque sensor had the wrong sign: simulated PRBS epochs, perturbation "
         f"±{settings.prbs.amplitude_nm:g} N·m, noise of the torque {shown_nm:.2g} N·m (SD)."
     )
-    yield from found_blocks(search_for_turned_sign(settings, noise_nm))
+    with Meter("simulate the wrong sign", 1.0, at_most=True) as meter:
+        found = search_for_turned_sign(settings, noise_nm, meter.advance)
+    yield from found_blocks(found)
     if any(block.task == "sinusoid" for block in settings.protocol.blocks):
         yield IMPOSED
 

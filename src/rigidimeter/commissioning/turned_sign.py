@@ -26,7 +26,7 @@ the virtual rig, with the settings of the rig that is checked and the noise meas
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -158,7 +158,11 @@ def perturbed_conditions(settings: Settings) -> list[str]:
     return list(dict.fromkeys(block.condition for block in blocks if block.task == "prbs"))
 
 
-def search_for_turned_sign(settings: Settings, noise_nm: float | None = None) -> Search:
+def search_for_turned_sign(
+    settings: Settings,
+    noise_nm: float | None = None,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Search:
     """Return how the sign is found, for more and more own torque until it is not.
 
     Parameters
@@ -167,14 +171,20 @@ def search_for_turned_sign(settings: Settings, noise_nm: float | None = None) ->
         Of the protocol and the rig.
     noise_nm : float, optional
         Of the torque sensor (SD), as measured on the rig; else that of the settings.
+    progress : callable
+        Called with the share that was done since of all that may have to be tried.
     """
     if noise_nm is not None:
         torque = settings.rig.torque.model_copy(update={"noise_sd_nm": noise_nm})
         rig = settings.rig.model_copy(update={"torque": torque})
         settings = settings.model_copy(update={"rig": rig})
+    conditions = perturbed_conditions(settings)
+    share = 1.0 / (len(conditions) * (len(OWN_SHARES) + 1) + len(LARGER))
     tried: list[TurnedEpochs] = []
-    for condition in perturbed_conditions(settings):
-        tried += _until_hidden(settings, condition)
+    for condition in conditions:
+        for epochs in _until_hidden(settings, condition):
+            tried.append(epochs)
+            progress(share)
     hidden = [epochs for epochs in tried if not epochs.all_found]
     if not hidden:
         return Search(tuple(tried), None)

@@ -107,11 +107,16 @@ def assess(settings: Settings, criterion: str = "minimax") -> Candidate | None:
     return _candidate(settings, unit, criterion, lambda _: settings.prbs.amplitude_nm)
 
 
-def optimise(settings: Settings, criterion: str = "minimax") -> tuple[Candidate, ...]:
+def optimise(
+    settings: Settings,
+    criterion: str = "minimax",
+    progress: Callable[[float], None] = lambda _: None,
+) -> tuple[Candidate, ...]:
     """Return the sequences of the search, best first.
 
     The first entry may be worse than the settings' own sequence if that is stronger than the
-    margins of the search allow.
+    margins of the search allow. `progress` is called with the share of the sequences that was done
+    since, 1 in all.
 
     Raises
     ------
@@ -140,11 +145,13 @@ def optimise(settings: Settings, criterion: str = "minimax") -> tuple[Candidate,
         # Rounded down to the digits that are printed and written.
         return math.floor(1000.0 * strongest_amplitude_nm(motions, settings)) / 1000.0
 
-    found = [
-        candidate
-        for prbs in _sequences(settings)
-        if (candidate := _candidate(settings, prbs, criterion, strongest)) is not None
-    ]
+    sequences = list(_sequences(settings))
+    found = []
+    for prbs in sequences:
+        candidate = _candidate(settings, prbs, criterion, strongest)
+        if candidate is not None:
+            found.append(candidate)
+        progress(1.0 / len(sequences))
     if not found:
         raise UserError(
             "no sequence within [optimise] stays within the guard's limits at any amplitude"

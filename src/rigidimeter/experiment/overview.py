@@ -8,7 +8,7 @@ better PRBS and a multisine. `rigidimeter design` prints what it returns.
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -125,6 +125,7 @@ def design(
     alpha: float = 0.05,
     search: str | None = None,
     with_multisine: bool = False,
+    progress: Callable[[float], None] = lambda _: None,
     **changes: Any,
 ) -> Design:
     """Compute what will be commanded and what will come of it.
@@ -144,6 +145,8 @@ def design(
         Search for a better PRBS by this criterion.
     with_multisine : bool
         Compare with a multisine.
+    progress : callable
+        Called with the share of the search that was done since, 1 in all.
     **changes
         Tables of the settings with values that differ, such as ``prbs={"clock_hz": 10.0}``.
 
@@ -197,7 +200,7 @@ def design(
         ),
         criterion=search,
         present=assess(chosen, search) if searched and search else None,
-        ranked=optimise(chosen, search) if searched and search else None,
+        ranked=optimise(chosen, search, progress) if searched and search else None,
         multisine=compare_multisine(chosen, perturbation_nm) if with_multisine and stable else None,
     )
 

@@ -69,7 +69,7 @@ def compare(
     seed, resamples : int
         Of the bootstrap.
     progress : callable
-        Called with the share of the work on a study folder that was done since, 1 in all.
+        Called with the share of the work that was done since, 1 in all.
 
     Raises
     ------
@@ -87,7 +87,14 @@ def compare(
     if tabled:
         table = _as_text(x) if path is None else read_text_table(path)
         return _compare_columns(
-            table, _names(value), by, wanted, session=session, seed=seed, resamples=resamples
+            table,
+            _names(value),
+            by,
+            wanted,
+            session=session,
+            seed=seed,
+            resamples=resamples,
+            progress=progress,
         )
     if path is not None and is_study(path):
         secret = None if key is None else Path(key)
@@ -103,7 +110,7 @@ def compare(
         )
     analysis = x if isinstance(x, Analysis) else read_estimates(Path(x))
     pair = chosen_pair(conditions(analysis), wanted)
-    return compare_analysis(analysis, *pair, seed=seed, resamples=resamples)
+    return compare_analysis(analysis, *pair, seed=seed, resamples=resamples, progress=progress)
 
 
 def _names(value: str | Sequence[str] | None) -> list[str]:
@@ -135,6 +142,7 @@ def _compare_columns(
     session: str | None = None,
     seed: int = 1,
     resamples: int = 9999,
+    progress: Progress = lambda _: None,
 ) -> StudyResult:
     """Compare two groups of a table in one column or several.
 
@@ -151,6 +159,7 @@ def _compare_columns(
         A column whose labels are resampled as units; else each row is one.
     seed, resamples : int
         Of the bootstrap.
+    progress : callable
 
     Raises
     ------
@@ -174,7 +183,9 @@ def _compare_columns(
         one, said = _column(table, name, labels, units, names, rows)
         comparisons.append(one)
         notices += said
-    tested, differences = compare_measures(comparisons, seed=seed, resamples=resamples)
+    tested, differences = compare_measures(
+        comparisons, seed=seed, resamples=resamples, progress=progress
+    )
     for each in tested:
         notices += _cautions(table.source, each, units is not None)
     return StudyResult(

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rigidimeter.estimation.method_record import Progress
 from rigidimeter.recording import Recording
 from rigidimeter.records import Analysis, Fit, Score
 from rigidimeter.statistics import (
@@ -44,6 +45,7 @@ def compare_analysis(
     seed: int = 1,
     resamples: int = 9999,
     title: str = "",
+    progress: Progress = lambda _: None,
 ) -> StudyResult:
     """Compare two conditions of an analysis in J, B, K, impulse and work.
 
@@ -58,12 +60,16 @@ def compare_analysis(
     seed, resamples : int
         Of the bootstrap; with 0 resamples there are no effect sizes with intervals.
     title : str
+    progress : callable
+        Called with the share of the work that was done since, 1 in all.
     """
     names = conditions(analysis) or ("",)
     first = reference if reference is not None else names[0]
     second = other if other is not None else next((n for n in names if n != first), "")
     comparisons = gathered(analysis, (first, second))
-    comparisons, differences = compare_measures(comparisons, seed=seed, resamples=resamples)
+    comparisons, differences = compare_measures(
+        comparisons, seed=seed, resamples=resamples, progress=progress
+    )
     return StudyResult(
         title, first, second, comparisons, differences, (), seed, resamples, analysis=analysis
     )
@@ -155,26 +161,32 @@ def measured(
 
 
 def compare_measures(
-    comparisons: Sequence[Comparison], *, seed: int = 1, resamples: int = 9999
+    comparisons: Sequence[Comparison],
+    *,
+    seed: int = 1,
+    resamples: int = 9999,
+    progress: Progress = lambda _: None,
 ) -> tuple[tuple[Comparison, ...], tuple[EffectPair, ...]]:
     """Test every measure, and compare the effect sizes of every two.
 
     Every measure and every pair draws from a random stream of its own, so one more measure changes
     no other number. Two measures are resampled together where they share units in both conditions.
+    `progress` is called with the share of the work that was done since, 1 in all.
     """
     tested = [rank_test(each) for each in comparisons]
     adjusted = holm([each.test.p if each.test else math.nan for each in tested])
     tested = [replace(each, p_holm=p) for each, p in zip(tested, adjusted, strict=True)]
-    if not resamples:
-        return tuple(tested), ()
     groups = {each.measure.name: _groups(each) for each in tested if each.test is not None}
-    tested = [
-        replace(each, effects=effect_sizes(groups[name], _stream(seed, name), resamples=resamples))
-        if (name := each.measure.name) in groups
-        else each
-        for each in tested
-    ]
+    if not resamples or not groups:
+        progress(1.0)
+        return tuple(tested), ()
     pairs = list(itertools.combinations(groups, 2))
+    share = 1.0 / (len(groups) + len(pairs))
+    for place, each in enumerate(tested):
+        if (name := each.measure.name) in groups:
+            sizes = effect_sizes(groups[name], _stream(seed, name), resamples=resamples)
+            tested[place] = replace(each, effects=sizes)
+            progress(share)
     differences = []
     for first, second in pairs:
         one, two = groups[first], groups[second]
@@ -183,6 +195,7 @@ def compare_measures(
         )
         rng = _stream(seed, first, second)
         differences.append(compare_effects(one, two, rng, paired=paired, resamples=resamples))
+        progress(share)
     return tuple(tested), tuple(
         EffectPair(*names, difference, p)
         for names, difference, p in zip(

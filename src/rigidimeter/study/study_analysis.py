@@ -153,12 +153,16 @@ def analyse_study(
     ratings, said = rated(read.folder, read.names)
     if ratings is not None:
         comparisons = (*comparisons, ratings_comparison(ratings))
-    comparisons, differences = compare_measures(comparisons, seed=seed, resamples=resamples)
+    comparisons, differences = compare_measures(
+        comparisons,
+        seed=seed,
+        resamples=resamples,
+        progress=lambda share: done(share * statistics),
+    )
     notices += [*lacking([c for c in comparisons if c.measure is not RATING], pair), *said]
     comparisons = day_tests(
         comparisons, {} if ratings is None else {RATING.name: ratings_days(ratings)}
     )
-    done(statistics)
     rows: list[SensitivityRow] = []
     if others:
         analyses = {main.method: main}

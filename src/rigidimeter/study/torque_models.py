@@ -9,6 +9,7 @@ from typing import Any
 
 from rigidimeter.errors import UserError
 from rigidimeter.estimation.epoch_models import EpochModels, clock_of_models, model_epoch
+from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.terms import ModelRow, TermsFit
 from rigidimeter.recording import Recording
 from rigidimeter.records import Epoch
@@ -61,6 +62,7 @@ def model_recording(
     compare: bool = False,
     grow: bool = False,
     high_hz: float | None = None,
+    progress: Progress = lambda _: None,
 ) -> tuple[ModelledEpoch, ...]:
     """Fit models to each perturbed epoch of a recording, or compare them.
 
@@ -71,6 +73,8 @@ def model_recording(
         The terms of each.
     compare, grow, high_hz
         As for `model_epoch`.
+    progress : callable
+        Called with the share of the epochs that was done since, 1 in all.
 
     Raises
     ------
@@ -78,9 +82,9 @@ def model_recording(
         If every epoch is an imposed sinusoid.
     """
     preparation = Preparation(recording.epochs, recording.settings)
-    both = zip(preparation.perturbed(), preparation.perturbed(as_recorded=True), strict=True)
+    every = preparation.perturbed()
     found = []
-    for aligned, recorded in both:
+    for aligned, recorded in zip(every, preparation.perturbed(as_recorded=True), strict=True):
         epoch = aligned.epoch
         try:
             prepared, remark = clock_of_models(aligned, recorded, models, high_hz=high_hz)
@@ -89,6 +93,7 @@ def model_recording(
             found.append(ModelledEpoch(epoch, None, str(error), compare))
         else:
             found.append(ModelledEpoch(epoch, fits, "", compare, remark))
+        progress(1.0 / len(every))
     if not found:
         raise UserError("every epoch is an imposed sinusoid; a model needs a perturbed one")
     return tuple(found)

@@ -1,14 +1,17 @@
 """The time left that is shown, by a clock that the test sets."""
 
 import time
+from collections.abc import Callable
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from rigidimeter.cli.progress import LEAST_SHARE, Meter
+from rigidimeter.experiment import design
 from rigidimeter.records import Epoch
 from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.study import Preparation
+from rigidimeter.study import Preparation, compare
 from rigidimeter.study.analysis import analyse_prepared, estimate
 from rigidimeter.virtual.batch import simulate_epochs
 
@@ -66,6 +69,41 @@ def test_no_time_is_guessed_before_a_tenth_is_done(capsys: pytest.CaptureFixture
     clock.now_s += 3.0
     meter.advance()
     assert capsys.readouterr().err == "work: 1 %\n"
+
+
+def test_work_that_may_end_early_takes_at_most_so_long(capsys: pytest.CaptureFixture[str]) -> None:
+    clock = Clock()
+    meter = Meter("search", 4.0, clock, at_most=True)
+    clock.now_s += 3.0
+    meter.advance()
+    assert capsys.readouterr().err == "search: 25 %, at most 9 s left\n"
+
+
+def made(progress: Callable[[Callable[[float], None]], object]) -> list[float]:
+    """Return the shares of the work that were reported."""
+    shares: list[float] = []
+    progress(shares.append)
+    return shares
+
+
+@pytest.mark.parametrize(("resamples", "parts"), [(0, 1), (100, 6)])
+def test_a_comparison_reports_all_of_its_work(resamples: int, parts: int) -> None:
+    """Of three columns, and of the three pairs of them."""
+    rng = np.random.default_rng(1)
+    table = pd.DataFrame({name: rng.standard_normal(9) for name in "abc"})
+    table["condition"] = ["OFF"] * 5 + ["DBS"] * 4
+    shares = made(
+        lambda progress: compare(table, value=["a", "b", "c"], resamples=resamples,
+                                 progress=progress)
+    )  # fmt: skip
+    assert sum(shares) == pytest.approx(1.0)
+    assert len(shares) == parts
+
+
+def test_a_search_for_a_perturbation_reports_each_sequence() -> None:
+    small = {"bits_low": 6, "bits_high": 7, "clocks": 2}
+    shares = made(lambda progress: design(search="minimax", progress=progress, optimise=small))
+    assert shares == 4 * [0.25]
 
 
 def simulated(delay_s: float) -> tuple[list[Epoch], Settings]:

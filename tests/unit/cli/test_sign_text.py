@@ -54,7 +54,7 @@ def test_the_noise_is_the_one_that_was_measured(monkeypatch):
     asked = []
     monkeypatch.setattr(
         "rigidimeter.commissioning.search_for_turned_sign",
-        lambda _, noise_nm: asked.append(noise_nm) or Search((FOUND,), None),
+        lambda _, noise_nm, __: asked.append(noise_nm) or Search((FOUND,), None),
     )
     measured = below(NOISE, 0.0123, "N·m", 0.1, "")
     lines = [
