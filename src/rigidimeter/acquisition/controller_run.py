@@ -114,9 +114,8 @@ class ControllerRun:
         ends_rest = order.command is Command.STOP and self.open_epoch is None
         return self.run.at_once or ends_rest
 
-    def _latched(self, stop: StopAccount) -> None:
-        """Record why the guard stopped or holds the rig."""
-        time_s = self.loop.sample.time_s if self.loop.sample is not None else self.loop.time_s
+    def _latched(self, stop: StopAccount, time_s: float) -> None:
+        """Record why the guard stopped or holds the rig, and since when."""
         self._sink.event("guard_latched", time_s=time_s, epoch=self.open_epoch, **stop.facts())
 
     def fail(self, cause: Cause, reason: str) -> None:

@@ -91,7 +91,7 @@ class ControlLoop:
     take_order : callable
         Takes an order of the operator; returns whether the stretch that runs ends now.
     latched : callable
-        Takes what a stop or a hold says, at the tick at which the guard latches.
+        Takes what a stop or a hold says, and when the tick was at which the guard latched.
     """
 
     inertia_kg_m2: float
@@ -107,7 +107,7 @@ class ControlLoop:
         progress: Callable[[float], None] = lambda _: None,
         supervision: Supervision | None = None,
         take_order: Callable[[Order], bool] = lambda _: False,
-        latched: Callable[[StopAccount], None] = lambda _: None,
+        latched: Callable[[StopAccount, float], None] = lambda _, __: None,
     ) -> None:
         controller = settings.controller
         self.rig, self.clock, self.record = rig, clock, record
@@ -230,7 +230,7 @@ def _account(loop: ControlLoop) -> None:
     """Say why the guard latched; the first cause is kept."""
     if loop.stop is None and loop.sample is not None:
         loop.stop = stop_account(Latched.of(loop, loop.sample))
-        loop.latched(loop.stop)
+        loop.latched(loop.stop, loop.sample.time_s)
 
 
 def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: int = 0) -> int:

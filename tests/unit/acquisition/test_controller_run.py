@@ -73,3 +73,12 @@ def test_a_hold_in_the_last_epoch_is_told_though_all_was_run():
     assert run.outcome == "success"
     assert run.cause is Cause.POWER_HIGH
     assert run.reason == f"the guard held the rig in the last epoch: {Cause.POWER_HIGH.sentence}"
+
+
+def test_a_run_that_the_guard_stopped_does_not_go_on_whoever_is_there():
+    run, states = controller_run(Desk())
+    run.change_state(Run(State.RUNNING))
+    run.loop.guard = run.loop.guard._replace(cause=int(Cause.DRIVE_FAULT), reaction=2)
+    assert not run.may_go_on()
+    assert states[-1] == Run(State.FAULTED)
+    assert (run.outcome, run.cause) == ("fail", Cause.DRIVE_FAULT)

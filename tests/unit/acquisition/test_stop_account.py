@@ -23,7 +23,9 @@ def stopped(change=None, *, late=None, desk=None, values=None, speed_rad_s=0.0, 
     changed = (lambda tick, r: change(r) if tick >= RELEASED else r) if change else None
     options |= {"change": changed} if changed else {}
     heard = []
-    loop, _ = made(settings, late=late, desk=desk, latched=heard.append, **options)
+    loop, _ = made(
+        settings, late=late, desk=desk, latched=lambda stop, _: heard.append(stop), **options
+    )
     run_ticks(loop, 1, 2000, constant(speed_rad_s))
     assert heard == [loop.stop]
     assert json.dumps(loop.stop.facts(), allow_nan=False)
@@ -220,7 +222,7 @@ def test_readings_that_come_too_seldom():
 def test_the_first_cause_is_told_and_the_next_one_after_a_release():
     heard = []
     desk = Desk({3: Cause.TORQUE_HIGH, 6: Cause.EMERGENCY_STOP})
-    loop, _ = made(SETTINGS, desk=desk, latched=heard.append)
+    loop, _ = made(SETTINGS, desk=desk, latched=lambda stop, _: heard.append(stop))
     run_ticks(loop, 1, 10, constant(0.0))
     run_ticks(loop, -1, 10, constant(0.0), latched=True)
     assert [account.cause for account in heard] == [Cause.TORQUE_HIGH]
@@ -228,7 +230,7 @@ def test_the_first_cause_is_told_and_the_next_one_after_a_release():
     assert loop.why == heard[0].sentence
 
     desk = Desk({3: Cause.TORQUE_HIGH, 12: Cause.POWER_HIGH})
-    loop, _ = made(SETTINGS, desk=desk, latched=heard.append)
+    loop, _ = made(SETTINGS, desk=desk, latched=lambda stop, _: heard.append(stop))
     assert loop.why == Cause.NONE.sentence
     run_ticks(loop, 1, 10, constant(0.0))
     release(loop)
