@@ -14,7 +14,7 @@ from rigidimeter.documents import read_json, read_toml
 from rigidimeter.documents.bounds import CELLS, COLUMNS, DIGITS, NESTING, TABLE_ROWS
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.read_options import ReadOptions
-from rigidimeter.recording.formats.readers import read_recording
+from rigidimeter.recording.formats.readers import read_recording, recorded_settings
 from rigidimeter.recording.formats.text_table import read_text_table
 from rigidimeter.recording.resume import rest_of
 from rigidimeter.recording.session_folder import SessionWriter
@@ -87,6 +87,13 @@ def test_only_regular_files(tmp_path, read):
     with (tmp_path / "large").open("wb") as file:
         file.truncate(10**12)
     assert "has 931 GiB, and at most" in refusal(read, tmp_path / "large")
+
+
+@pytest.mark.parametrize("suffix", ["nwb", "xdf"])
+def test_settings_are_not_sought_in_a_pipe(tmp_path, suffix):
+    pipe = tmp_path / f"pipe.{suffix}"
+    os.mkfifo(pipe)
+    assert "cannot be read (it is a named pipe)" in refusal(recorded_settings, pipe)
 
 
 @pytest.mark.parametrize("suffix", ["csv", "npz", "mat"])

@@ -225,7 +225,10 @@ def recorded_settings(path: Path) -> Settings | None:
         If there is no reader of the path, or it is damaged.
     """
     reader = reader_of(path)
-    return None if reader.settings is None else _called(reader, reader.settings, path)
+    if reader.settings is None:
+        return None
+    _check_file(path)
+    return _called(reader, reader.settings, path)
 
 
 def read_table(path: Path, options: ReadOptions | None = None) -> Table:
@@ -268,12 +271,7 @@ def _layout(options: ReadOptions) -> Layout:
 
 def _read(path: Path, layout: Layout) -> Table | Epochs:
     reader = reader_of(path)
-    if not path.is_dir():
-        with open_regular(path, RECORDING_BYTES) as file:
-            if not file.read(1):
-                raise UserError(
-                    f"{path} is empty; a recording in a {path.suffix} file was expected"
-                )
+    _check_file(path)
 
     def read(path: Path) -> Table | Epochs:
         return reader.read(path, layout) if reader.of_text else reader.read(path)
@@ -283,6 +281,15 @@ def _read(path: Path, layout: Layout) -> Table | Epochs:
         columns = found.columns.refusing(functools.partial(_refusal, reader, path))
         return replace(found, columns=columns)
     return found
+
+
+def _check_file(path: Path) -> None:
+    """Refuse a pipe or a device, which a library would wait for, and an empty file."""
+    if path.is_dir():
+        return
+    with open_regular(path, RECORDING_BYTES) as file:
+        if not file.read(1):
+            raise UserError(f"{path} is empty; a recording in a {path.suffix} file was expected")
 
 
 def _called(reader: Reader, function: Callable[[Path], Found], path: Path) -> Found:
