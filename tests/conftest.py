@@ -117,6 +117,7 @@ REALTIME = {
     "tests/faults/test_faults_processes": {},  # true processes, as in life
     "tests/faults/test_faults_": {"priority": 10, "resolves_s": 0.02},
     "tests/faults/test_realtime_": {"resolves_s": 0.2},
+    "tests/console/": {"resolves_s": 0.2, "ordinary_probe": True},
     "tests/faults/test_session_ends": {"resolves_s": 0.5},  # its processes wait 1 s for each other
 }
 """What keeps real time, the first that fits: priority and what can be resolved, see `lateness`."""

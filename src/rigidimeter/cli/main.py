@@ -20,6 +20,7 @@ from rigidimeter.cli.batch import batch
 from rigidimeter.cli.check import check
 from rigidimeter.cli.commission import commission
 from rigidimeter.cli.compare import compare
+from rigidimeter.cli.console import console
 from rigidimeter.cli.design import design
 from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
@@ -95,6 +96,7 @@ for command in (
     design,
     simulate,
     run,
+    console,
     commission,
     check,
     emulate,

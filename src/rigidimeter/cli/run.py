@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,8 +13,8 @@ from rigidimeter.cli.output import echo
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.experiment import Protocol
-    from rigidimeter.settings import Settings
+    from rigidimeter.acquisition.processes.supervise import Ended
+    from rigidimeter.cli.planned_session import PlannedSession
 
 
 def run(
@@ -74,52 +72,36 @@ def run(
     """
     from rigidimeter.acquisition.processes.left_memory import complete_left
     from rigidimeter.acquisition.processes.loop_process import Realtime
-    from rigidimeter.acquisition.processes.recorder import Recording
-    from rigidimeter.acquisition.processes.supervise import supervise
-    from rigidimeter.cli.realtime_rig import run_loop
-    from rigidimeter.cli.sharing import require_packages, write_nwb_beside
-    from rigidimeter.commissioning import check_record, require_daily_check, with_measured_floor
-    from rigidimeter.console import SessionPlan, new_folder, next_steps, terminal_view
-    from rigidimeter.devices.rigfile import load_rig
-    from rigidimeter.recording.resume import count_epochs, require_all
+    from rigidimeter.cli.planned_session import checked_rig, run_planned
+    from rigidimeter.cli.sharing import require_packages
+    from rigidimeter.console import terminal_view
 
     for line in complete_left():
         echo(line, err=True)
-    settings, planned, continues, done = _planned(protocol, resume, seed, virtual=rig is None)
-    require_packages(settings)
-    home_rad = continues.get("origin_rad") if rig is not None else None
+    planned = _planned(protocol, resume, seed, virtual=rig is None)
+    require_packages(planned.settings)
     _offer(out)
-    if rig is not None:
-        # What is wrong with the rig or its record is said before any process starts, and so is
-        # that another has the rig; the loop's process then claims it.
-        rigfile = load_rig(rig)
-        commissioned = check_record(rigfile, None, settings)
-        today = require_daily_check(rigfile, commissioned, settings, settings_path=protocol)
-        settings = with_measured_floor(settings, today)
-        rigfile.claim().close()
-    recording = Recording(
-        out,
-        settings,
-        tuple(asdict(epoch) for epoch in planned.epochs),
-        {"session": settings.seed},
-        virtual=rig is None,
-        continues=continues,
-    )
-    shown = SessionPlan(settings, planned.epochs, done, virtual=rig is None)
+    planned = checked_rig(planned, rig)
     attended = not unattended and sys.stdin is not None and sys.stdin.isatty()
+    shown = planned.shown(virtual=rig is None)
+    realtime = Realtime(priority=priority, cpu=cpu, attended=attended)
     with terminal_view(sys.stdin if attended else None, sys.stdout, shown) as console:
-        ended = supervise(
-            partial(run_loop, settings, planned, rig, home_rad),
-            recording,
-            realtime=Realtime(priority=priority, cpu=cpu, attended=attended),
-            console=console,
-        )
+        ended = run_planned(planned, out, rig, realtime, console)
     for remark in (*console.remarks, *ended.remarks):
         echo(remark, err=True)
+    _conclude(ended, out, rig, nwb=planned.settings.sharing.nwb_at_close)
+
+
+def _conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
+    """Say how the session ended; a session that is not whole ends the program with status 1."""
+    from rigidimeter.cli.sharing import write_nwb_beside
+    from rigidimeter.console import new_folder, next_steps
+    from rigidimeter.recording.resume import count_epochs, require_all
+
     folder = ended.folder if ended.folder != out.absolute() else out
     good, of = count_epochs(folder)
     echo(f"{good} of {of} epochs ended with success; session in {folder}")
-    if settings.sharing.nwb_at_close:
+    if nwb:
         echo(write_nwb_beside(folder))
     closed = bool(ended.outcome)
     steps = next_steps(
@@ -135,39 +117,22 @@ def run(
 
 def _planned(
     path: Path | None, resume: Path | None, seed: int | None, *, virtual: bool
-) -> tuple[Settings, Protocol, dict[str, Any], int]:
-    """Return settings, the epochs to run, what they continue, and how many epochs were done."""
-    from rigidimeter.experiment import Protocol, plan
-    from rigidimeter.recording.resume import rest_of
+) -> PlannedSession:
+    """Return what is to be run: a new session, or the rest of one."""
+    from rigidimeter.cli.planned_session import new_session, rest_of_session
     from rigidimeter.settings import changed_settings, load_settings
 
     if resume is None:
         settings = load_settings(path)
         if seed is not None:
             settings = changed_settings(settings, {"seed": seed}, "the options")
-        planned = plan(settings.protocol, settings.prbs, settings.sinusoid, settings.seed)
-        return settings, planned, {}, 0
+        return new_session(settings, {}, path)
     if path is not None or seed is not None:
         raise UserError(
             "--resume uses the settings and the seed of that session; leave out "
             + (f"{path}" if path is not None else "--seed")
         )
-    rest = rest_of(resume)
-    if rest.virtual != virtual:
-        raise UserError(
-            f"{resume}: was recorded on "
-            + (
-                "the virtual rig and can only be continued there; leave out --rig"
-                if rest.virtual
-                else "hardware and can only be continued there; name its rig file with --rig "
-                "RIG.toml"
-            )
-        )
-    if not rest.epochs:
-        raise UserError(f"{resume}: nothing is left to run, all {rest.done} epochs are done")
-    echo(f"{rest.done} epochs are done; {len(rest.epochs)} are left")
-    protocol = Protocol(rest.settings.seed, rest.epochs)
-    return rest.settings, protocol, dict(rest.continues), rest.done
+    return rest_of_session(resume, virtual=virtual)
 
 
 def _offer(out: Path) -> None:

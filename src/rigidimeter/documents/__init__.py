@@ -18,6 +18,7 @@ from rigidimeter.documents.writing import (
     plain_values,
     replace_file,
     text_bytes,
+    toml_text,
     write_json,
     write_text,
 )
@@ -39,6 +40,7 @@ __all__ = [
     "read_toml",
     "replace_file",
     "text_bytes",
+    "toml_text",
     "visible",
     "write_json",
     "write_text",

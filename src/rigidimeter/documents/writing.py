@@ -1,9 +1,10 @@
-"""Files of text, JSON and CSV: the one place where they are written."""
+"""Files of text, JSON, TOML and CSV: the one place where they are written."""
 
 from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +14,8 @@ import numpy as np
 
 from rigidimeter.documents.escaping import as_written
 from rigidimeter.errors import UserError
+
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def write_text(path: Path, text: str) -> None:
@@ -61,6 +64,37 @@ def json_line(event: Mapping[str, Any]) -> bytes:
         If it holds a number that is not finite.
     """
     return json.dumps(event, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+
+
+def toml_text(values: Mapping[str, Any]) -> str:
+    """Return nested plain values as TOML, one line for each value; None is left out.
+
+    Examples
+    --------
+    >>> print(toml_text({"seed": 1, "prbs": {"clock_hz": 20.0}, "protocol": {"rests_s": [1.0]}}))
+    seed = 1
+    prbs.clock_hz = 20.0
+    protocol.rests_s = [1.0]
+    """
+    return "\n".join(_toml_lines(values, ""))
+
+
+def _toml_lines(values: Mapping[str, Any], before: str) -> Iterator[str]:
+    for key, value in values.items():
+        name = f"{before}{key if _BARE_KEY.fullmatch(key) else json.dumps(key)}"
+        if isinstance(value, Mapping) and value:
+            yield from _toml_lines(value, f"{name}.")
+        elif value is not None:
+            yield f"{name} = {_toml_value(value)}"
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        inner = (f"{json.dumps(k)} = {_toml_value(v)}" for k, v in value.items() if v is not None)
+        return "{" + ", ".join(inner) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml_value, value)) + "]"
+    return json.dumps(value, allow_nan=False)
 
 
 def plain_values(value: Any) -> Any:

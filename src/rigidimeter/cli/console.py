@@ -1,0 +1,187 @@
+"""`rigidimeter console`: the operator's page in a browser."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rigidimeter.cli.output import echo
+from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.acquisition.processes.loop_process import Realtime
+    from rigidimeter.acquisition.processes.supervise import Ended
+    from rigidimeter.cli.planned_session import PlannedSession
+    from rigidimeter.console.page.desk import Desk, StartRequest
+
+HostOption = Annotated[
+    str,
+    typer.Option("--host", metavar="ADDRESS", help="Address of the page; any but this computer's "
+                 "own loopback needs a token, which is printed."),
+]  # fmt: skip
+PortOption = Annotated[
+    int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port; 0 for a free one.")
+]
+TokenOption = Annotated[
+    str, typer.Option("--token", metavar="TEXT", help="Token of the page. Default: a random one.")
+]
+
+
+def console(
+    protocol: Annotated[
+        Path | None,
+        typer.Argument(metavar="[PROTOCOL.toml]", help="Settings that the form begins with."),
+    ] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option("--rig", metavar="RIG.toml", help="The rig file. Default: the virtual rig."),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder of the sessions.")
+    ] = Path("sessions"),
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8765,
+    token: TokenOption = "",
+    priority: Annotated[
+        int,
+        typer.Option(
+            "--priority",
+            metavar="N",
+            min=0,
+            max=99,
+            help="Real-time priority (SCHED_FIFO) of the loop; 0 for none.",
+        ),
+    ] = 80,
+    cpu: Annotated[
+        int | None,
+        typer.Option("--cpu", metavar="N", help="Processor of the loop. Default: the last one."),
+    ] = None,
+) -> None:
+    """Run sessions from a page in a browser: plan, run, look, repeat.
+
+    The page's heartbeat is a dead-man's switch: a page that is closed, frozen or cut off stops the
+    arm. Needs the extra `console`. Ctrl-C ends the program.
+
+    \b
+    For example:
+      rigidimeter console
+      rigidimeter console protocol.toml --rig rig.toml --out study
+    """
+    from rigidimeter.acquisition.processes.left_memory import complete_left
+    from rigidimeter.acquisition.processes.loop_process import Realtime
+    from rigidimeter.console.page.desk import Desk, Place
+    from rigidimeter.settings import load_settings
+
+    for line in complete_left():
+        echo(line, err=True)
+    settings = load_settings(protocol)
+    require_page()
+    out.mkdir(parents=True, exist_ok=True)
+    name = protocol.name if protocol is not None else "the defaults"
+    desk = Desk(Place(out.absolute(), settings, name, rig))
+    with serving(desk, host, port, token):
+        while not desk.told_to_end:
+            lead_session(desk, desk.next_request(), Realtime(priority=priority, cpu=cpu), protocol)
+
+
+@contextmanager
+def serving(desk: Desk, host: str, port: int, token: str) -> Iterator[None]:
+    """Serve the page meanwhile."""
+    from rigidimeter.console.page.server import PageServer
+    from rigidimeter.console.page.work import Work
+
+    server = PageServer(desk, Work(rig_lines(desk.place.rig)), host, port, token)
+    server.start()
+    echo(f"Open {server.address} in a browser; Ctrl-C ends the program")
+    try:
+        yield
+    finally:
+        server.stop()
+
+
+def lead_session(
+    desk: Desk, request: StartRequest, realtime: Realtime, source: Path | None
+) -> Ended | None:
+    """Run what the page asked for, and say on the page how it ended; None if it did not begin."""
+    from rigidimeter.cli.planned_session import checked_rig, run_planned
+    from rigidimeter.cli.sharing import require_packages, write_nwb_beside
+    from rigidimeter.console.page.session_form import codes
+    from rigidimeter.recording.resume import count_epochs
+
+    folder, rig = desk.place.root / request.folder, desk.place.rig
+    try:
+        planned = checked_rig(_planned(desk, request, source), rig)
+        require_packages(planned.settings)
+        names = [epoch.condition for epoch in planned.protocol.epochs]
+        hidden = codes(names, request.folder) if request.blinded else {}
+        look = desk.console(planned.shown(virtual=rig is None, codes=hidden), folder)
+        ended = run_planned(planned, folder, rig, realtime, look, desk.operator_seen_ns)
+        good, of = count_epochs(ended.folder)
+    except UserError as error:
+        desk.over(folder, "not run", error.lines)
+        for line in error.lines:
+            echo(line, err=True)
+        return None
+    sentences = [f"{good} of {of} epochs ended with success; session in {ended.folder}."]
+    if ended.outcome != "success":
+        sentences.append(f"It ended with {ended.outcome or 'no outcome'}: {ended.reason}.")
+    if planned.settings.sharing.nwb_at_close:
+        sentences.append(write_nwb_beside(ended.folder))
+    sentences += ended.remarks
+    echo(" ".join(sentences))
+    desk.over(ended.folder, ended.outcome or "no outcome", tuple(sentences))
+    return ended
+
+
+def _planned(desk: Desk, request: StartRequest, source: Path | None) -> PlannedSession:
+    """Return what is to be run, in which a silent page is lost sooner than a silent terminal."""
+    from rigidimeter.cli.planned_session import new_session, rest_of_session
+    from rigidimeter.console.page.presence import SILENT_S
+    from rigidimeter.settings import changed_settings
+
+    if request.settings is None:
+        virtual = desk.place.rig is None
+        planned = rest_of_session(desk.place.root / request.resume, virtual=virtual)
+    else:
+        planned = new_session(request.settings, request.about, source)
+    lost_s = min(SILENT_S, planned.settings.loop.console_lost_s)
+    settings = changed_settings(planned.settings, {"loop": {"console_lost_s": lost_s}})
+    return replace(planned, settings=settings)
+
+
+def rig_lines(rig: Path | None) -> tuple[str, ...]:
+    """Return what the operator should know of the rig before a session."""
+    from rigidimeter.commissioning import check_record, require_daily_check
+    from rigidimeter.devices.rigfile import load_rig
+    from rigidimeter.settings import Settings
+
+    if rig is None:
+        return ("The virtual rig moves nobody; it needs no commissioning and no daily check.",)
+    try:
+        rigfile = load_rig(rig)
+        record = check_record(rigfile, None, Settings())
+        today = require_daily_check(rigfile, record, Settings())
+    except UserError as error:
+        return error.lines
+    return (f"Commissioned {record.made_utc}, checked {today.made_utc}.",)
+
+
+def require_page() -> None:
+    """Refuse to begin without the packages of the page.
+
+    Raises
+    ------
+    UserError
+        With the command that installs them.
+    """
+    if importlib.util.find_spec("nicegui") is None:
+        raise UserError(
+            "the page needs more packages: pip install 'rigidimeter[console]'; "
+            "`rigidimeter run` shows a session in the terminal"
+        )

@@ -1,0 +1,148 @@
+"""A session in real time from its plan to its end, whoever leads it: `run` and `console`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rigidimeter.cli.output import echo
+from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.acquisition.processes.loop_process import Realtime
+    from rigidimeter.acquisition.processes.session_memory import SessionMemory
+    from rigidimeter.acquisition.processes.supervise import Ended
+    from rigidimeter.console import SessionPlan
+    from rigidimeter.experiment import Protocol
+    from rigidimeter.settings import Settings
+
+Console = Callable[["SessionMemory"], object]
+
+
+@dataclass(frozen=True)
+class PlannedSession:
+    """What is to be run.
+
+    Attributes
+    ----------
+    settings : Settings
+    protocol : Protocol
+    continues : dict
+        What the manifest says of the session that this one continues.
+    done : int
+        How many epochs that session did.
+    about : dict
+        What the operator said of subject, condition and stimulation.
+    source : Path or None
+        The file of the settings.
+    """
+
+    settings: Settings
+    protocol: Protocol
+    continues: Mapping[str, Any] = field(default_factory=dict)
+    done: int = 0
+    about: Mapping[str, Any] = field(default_factory=dict)
+    source: Path | None = None
+
+    def shown(self, *, virtual: bool, codes: Mapping[str, str] | None = None) -> SessionPlan:
+        """Return the plan as consoles take it."""
+        from rigidimeter.console import SessionPlan
+
+        return SessionPlan(self.settings, self.protocol.epochs, self.done, codes or {}, virtual)
+
+
+def new_session(
+    settings: Settings, about: Mapping[str, Any], source: Path | None
+) -> PlannedSession:
+    """Return a new session of these settings."""
+    from rigidimeter.experiment import plan
+
+    planned = plan(settings.protocol, settings.prbs, settings.sinusoid, settings.seed)
+    return PlannedSession(settings, planned, about=about, source=source)
+
+
+def rest_of_session(resume: Path, *, virtual: bool) -> PlannedSession:
+    """Return what is left of a session.
+
+    Raises
+    ------
+    UserError
+        If nothing is, or it was recorded on another kind of rig.
+    """
+    from rigidimeter.experiment import Protocol
+    from rigidimeter.recording.resume import rest_of
+
+    rest = rest_of(resume)
+    if rest.virtual != virtual:
+        raise UserError(
+            f"{resume}: was recorded on "
+            + (
+                "the virtual rig and can only be continued there; leave out --rig"
+                if rest.virtual
+                else "hardware and can only be continued there; name its rig file with --rig "
+                "RIG.toml"
+            )
+        )
+    if not rest.epochs:
+        raise UserError(f"{resume}: nothing is left to run, all {rest.done} epochs are done")
+    echo(f"{rest.done} epochs are done; {len(rest.epochs)} are left")
+    protocol = Protocol(rest.settings.seed, rest.epochs)
+    return PlannedSession(rest.settings, protocol, dict(rest.continues), rest.done)
+
+
+def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
+    """Return the session as it can be run on the rig.
+
+    What is wrong with the rig or its record is said before any process starts, and so is that
+    another has the rig; the loop's process then claims it.
+
+    Raises
+    ------
+    UserError
+        If the rig was not commissioned or not checked, or another program has it.
+    """
+    from rigidimeter.commissioning import check_record, require_daily_check, with_measured_floor
+    from rigidimeter.devices.rigfile import load_rig
+
+    if rig is None:
+        return planned
+    rigfile, settings = load_rig(rig), planned.settings
+    commissioned = check_record(rigfile, None, settings)
+    today = require_daily_check(rigfile, commissioned, settings, settings_path=planned.source)
+    rigfile.claim().close()
+    return replace(planned, settings=with_measured_floor(settings, today))
+
+
+def run_planned(
+    planned: PlannedSession,
+    out: Path,
+    rig: Path | None,
+    realtime: Realtime,
+    console: Console,
+    operator_seen_ns: Callable[[], int] | None = None,
+) -> Ended:
+    """Run a session that was checked, to its end."""
+    from rigidimeter.acquisition.processes.recorder import Recording
+    from rigidimeter.acquisition.processes.supervise import supervise
+    from rigidimeter.cli.realtime_rig import run_loop
+
+    home_rad = planned.continues.get("origin_rad") if rig is not None else None
+    recording = Recording(
+        out,
+        planned.settings,
+        tuple(asdict(epoch) for epoch in planned.protocol.epochs),
+        {"session": planned.settings.seed},
+        virtual=rig is None,
+        continues=planned.continues,
+        about=planned.about,
+    )
+    return supervise(
+        partial(run_loop, planned.settings, planned.protocol, rig, home_rad),
+        recording,
+        realtime=realtime,
+        console=console,
+        operator_seen_ns=operator_seen_ns,
+    )

@@ -1,0 +1,206 @@
+"""The part of the page before a session: the form, what is predicted, and the start."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from rigidimeter.console.page.desk import Desk, StartRequest
+from rigidimeter.console.page.session_form import (
+    METADATA,
+    MOST_BLOCKS,
+    NOTE,
+    SETTINGS,
+    STIMULATION,
+    EnteredSession,
+    Field,
+    block_form,
+    blocks_of,
+    empty_form,
+    kept_form,
+    read_form,
+)
+from rigidimeter.console.page.work import Work
+from rigidimeter.documents import read_json, toml_text, write_json
+from rigidimeter.errors import UserError
+from rigidimeter.settings import dump_settings
+
+DRAFT = "draft.json"
+DETECTED = ("--detect", "damping=20%", "--detect", "stiffness=20%")
+
+
+class BeforeView:
+    """The form of one page.
+
+    Parameters
+    ----------
+    desk : Desk
+    work : Work
+    in_control : callable
+        Whether the page may act.
+    """
+
+    def __init__(self, desk: Desk, work: Work, in_control: Callable[[], bool]) -> None:
+        self._desk, self._work, self._in_control = desk, work, in_control
+        self._base = desk.place.settings
+        self._form = kept_form(_stored(desk.place.root / DRAFT), self._base)
+        self._inputs: dict[str, Any] = {}
+        self._entered: EnteredSession | None = None
+        self._blinded = False
+        place = desk.place
+        rig = "the virtual rig" if place.rig is None else f"rig {place.rig.name}"
+        ui.label(f"Protocol: {place.settings_name}. Rig: {rig}.").classes("text-lg")
+        for line in work.rig_lines:
+            ui.label(line)
+        with ui.row().classes("w-full"):
+            for one in (*METADATA, NOTE):
+                self._input(one)
+        self._blocks()
+        with ui.row().classes("w-full items-start"):
+            self._input(Field("rests", "Rests, drawn from (several by ;)", "s"))
+            ui.checkbox("Blinded: show codes for conditions", on_change=self._blind).mark("blinded")
+        with ui.expansion("Perturbation, controller and limits").classes("w-full").props("dense"):
+            with ui.row().classes("w-full"):
+                for one in SETTINGS:
+                    self._input(one)
+            ui.button("Back to the protocol's values", on_click=self._reset)
+        with (
+            ui.expansion("Stimulation (leave empty if there is none)")
+            .classes("w-full")
+            .props("dense"),
+            ui.row().classes("w-full"),
+        ):
+            for one in STIMULATION:
+                self._input(one)
+        self._problem = ui.label("").classes("problem").props('role="alert"')
+        with ui.row():
+            self._start = ui.button("Start session", on_click=self._ask).mark("start")
+            self._start.props("size=lg")
+            ui.button("Predict precision, margin, epochs needed", on_click=self._predict)
+            ui.button("Dry run on the virtual rig", on_click=self._dry_run)
+        self._answer = ui.html("", sanitize=False).classes("answer")
+        self._check()
+
+    def _input(self, one: Field) -> None:
+        label = f"{one.label} [{one.unit}]" if one.unit else one.label
+        made = ui.input(label, value=self._form.get(one.key, "")).classes("entry")
+        made.without_auto_validation()  # what is wrong is said by `_check`
+        made.props(f"maxlength=400 data-field={one.key} debounce=150")
+        made.on_value_change(lambda event, key=one.key: self._change(key, event.value))
+        self._inputs[one.key] = made
+
+    @ui.refreshable_method
+    def _blocks(self) -> None:
+        blocks = blocks_of(self._form)
+        for k in blocks:
+            with ui.row().classes("w-full items-center"):
+                ui.label(f"Block {k + 1}").classes("text-base")
+                task = ui.select(
+                    {"prbs": "PRBS: J, B, K", "sinusoid": "sinusoid: work, impulse"},
+                    value=self._form[f"task{k}"]
+                    if self._form[f"task{k}"] == "sinusoid"
+                    else "prbs",
+                    label="Task",
+                ).classes("entry")
+                task.on_value_change(lambda event, k=k: self._change(f"task{k}", event.value))
+                self._input(Field(f"condition{k}", "Condition, or its code"))
+                self._input(Field(f"epochs{k}", "Epochs"))
+        with ui.row():
+            if len(blocks) < MOST_BLOCKS:
+                ui.button("Add a block", on_click=self._add)
+            if len(blocks) > 1:
+                ui.button("Remove the last block", on_click=self._remove)
+
+    def _add(self) -> None:
+        k = len(blocks_of(self._form))
+        last = {part: self._form[f"{part}{k - 1}"] for part in ("task", "condition", "epochs")}
+        self._form |= block_form(k, **last)
+        self._redraw()
+
+    def _remove(self) -> None:
+        k = len(blocks_of(self._form)) - 1
+        for key in block_form(k, "", "", ""):
+            del self._form[key]
+            self._inputs.pop(key, None)
+        self._redraw()
+
+    def _reset(self) -> None:
+        fresh = empty_form(self._base)
+        for one in SETTINGS:
+            self._inputs[one.key].value = fresh[one.key]
+
+    def _redraw(self) -> None:
+        self._blocks.refresh()
+        self._check()
+
+    def _blind(self, event: Any) -> None:
+        self._blinded = bool(event.value)
+
+    def _change(self, key: str, value: Any) -> None:
+        self._form[key] = str(value or "")[:400]
+        self._check()
+        if self._in_control():
+            write_json(self._desk.place.root / DRAFT, self._form)
+
+    def _check(self) -> None:
+        """Say under each field what is wrong with it."""
+        self._entered = read_form(self._form, self._base)
+        errors = self._entered.errors
+        for key, made in self._inputs.items():
+            made.error = errors.get(key)
+        general = [text for key, text in errors.items() if key not in self._inputs]
+        wrong = f"{len(errors)} fields are not right yet" if errors else ""
+        self._problem.text = " ".join([*general, wrong]) if general or wrong else ""
+        self._start.set_enabled(not errors)
+
+    def _ask(self) -> None:
+        entered = self._entered
+        if not self._in_control():
+            ui.notify("this page can only look: another one has control")
+            return
+        if entered is None or entered.settings is None:
+            return
+        now = time.localtime()
+        folder = f"{entered.subject}-{time.strftime('%Y%m%d-%H%M%S', now)}"
+        request = StartRequest(
+            self._desk.place.one_session or folder,
+            entered.settings,
+            entered.about,
+            blinded=self._blinded,
+        )
+        if not self._desk.ask(request):
+            ui.notify("a session runs already")
+
+    async def _predict(self) -> None:
+        await self._compute("design", "--settings", "{settings}", *DETECTED)
+
+    async def _dry_run(self) -> None:
+        await self._compute("simulate", "--settings", "{settings}", "--out", "{folder}/dry-run")
+
+    async def _compute(self, *arguments: str) -> None:
+        """Show what a command says of the settings that were entered."""
+        if self._desk.busy or not self._in_control():
+            ui.notify("not while a session runs, and only on the page in control")
+            return
+        if self._entered is None or self._entered.settings is None:
+            return
+        self._answer.set_content("<p>computing …</p>")
+        with tempfile.TemporaryDirectory(prefix="rigidimeter-form-") as name:
+            path = Path(name) / "protocol.toml"
+            path.write_text(toml_text(dump_settings(self._entered.settings)), encoding="utf-8")
+            places = {"{settings}": str(path), "{folder}/dry-run": f"{name}/dry-run"}
+            answer = await self._work.command(*(places.get(one, one) for one in arguments))
+        self._answer.set_content(answer.html(name))
+
+
+def _stored(path: Path) -> Any:
+    """Return a form that was kept; None if there is none that can be read."""
+    try:
+        return read_json(path) if path.is_file() else None
+    except UserError:
+        return None

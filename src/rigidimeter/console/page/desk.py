@@ -1,0 +1,151 @@
+"""What the server of the page and the session beside it know of each other.
+
+The session is seen through by the program's first thread, as in a terminal; the server has a thread
+of its own. They share this desk. Each attribute is written by one of the two.
+"""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.status_values import Flag
+from rigidimeter.acquisition.run_states import State
+from rigidimeter.console.page.presence import Presence
+from rigidimeter.console.session_plan import SessionPlan
+from rigidimeter.settings import Settings
+
+
+@dataclass(frozen=True)
+class StartRequest:
+    """What the operator wants to run: a new session, or the rest of one.
+
+    Attributes
+    ----------
+    folder : str
+        Name of the new session's folder.
+    settings : Settings or None
+        None where a session is continued.
+    about : dict
+        What was said of subject, operator, condition and stimulation.
+    resume : str
+        Name of the folder of the session to be continued; empty for none.
+    blinded : bool
+        Whether the page names conditions by codes alone.
+    """
+
+    folder: str
+    settings: Settings | None = None
+    about: Mapping[str, Any] = field(default_factory=dict)
+    resume: str = ""
+    blinded: bool = False
+
+
+@dataclass(frozen=True)
+class RunningSession:
+    """A session as the server sees it: its names in shared memory, its plan, its folder."""
+
+    number: int
+    names: tuple[str, str, str]
+    plan: SessionPlan
+    folder: Path
+
+
+@dataclass(frozen=True)
+class FinishedSession:
+    """How the last session ended, and what is said of it."""
+
+    number: int
+    folder: Path
+    outcome: str
+    sentences: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where this console works: rig, folder of its sessions, settings that a form begins with."""
+
+    root: Path
+    settings: Settings
+    settings_name: str
+    rig: Path | None = None
+    one_session: str = ""
+
+
+class Desk:
+    """Requests to the session's thread, and the session to the server's.
+
+    Parameters
+    ----------
+    place : Place
+    now_ns : callable
+        CLOCK_MONOTONIC in nanoseconds.
+    """
+
+    def __init__(self, place: Place, now_ns: Callable[[], int] = time.monotonic_ns) -> None:
+        self.place = place
+        self.presence = Presence()
+        self.running: RunningSession | None = None
+        self.finished: FinishedSession | None = None
+        self.starting = ""
+        self.told_to_end = False
+        self._now_ns = now_ns
+        self._requests: queue.SimpleQueue[StartRequest] = queue.SimpleQueue()
+        self._still = True
+        self._count = 0
+
+    # For the server
+
+    @property
+    def busy(self) -> bool:
+        """Whether a session runs or is about to."""
+        return bool(self.starting) or self.running is not None
+
+    def ask(self, request: StartRequest) -> bool:
+        """Ask for a session; return False if there is one already."""
+        if self.busy:
+            return False
+        self.starting = request.folder
+        self._requests.put(request)
+        return True
+
+    # For the session's thread
+
+    def next_request(self) -> StartRequest:
+        """Wait for the operator; a signal ends the wait."""
+        while True:
+            try:
+                return self._requests.get(timeout=0.2)
+            except queue.Empty:
+                continue
+
+    def console(self, plan: SessionPlan, folder: Path) -> Callable[[SessionMemory], None]:
+        """Return what `supervise` calls about 20 times a second."""
+        self._count += 1
+        self._still = True
+
+        def look(shared: SessionMemory) -> None:
+            # A signal to this program; the page raises neither.
+            flags = (Flag.END_ASKED, Flag.ABORT_ASKED)
+            self.told_to_end |= any(map(shared.status.flag, flags))
+            loop = shared.status.loop()
+            self._still = loop is None or loop.tick < 0 or loop.state == State.PAUSED
+            if self.running is None:
+                self.running = RunningSession(self._count, shared.names, plan, folder)
+
+        return look
+
+    def operator_seen_ns(self) -> int:
+        """Return the operator's heartbeat: when the page in control was last heard of."""
+        return self.presence.seen_ns(self._now_ns(), still=self._still)
+
+    def over(self, folder: Path, outcome: str, sentences: tuple[str, ...]) -> None:
+        """Say how the session ended."""
+        self.finished = FinishedSession(self._count, folder, outcome, sentences)
+        self.running = None
+        self.starting = ""

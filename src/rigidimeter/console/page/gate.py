@@ -1,0 +1,161 @@
+"""Who may reach the page: the name it was asked by, where a request comes from, and the token.
+
+A browser on the operator's computer also shows pages of strangers. Such a page can send requests to
+127.0.0.1, and a name of its own can be made to point there (DNS rebinding). So a request must name
+this computer by an address or one of its own names, and one that acts, or opens a socket, must come
+from a page of this server. On any other address than the loopback there is a token beside that.
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+from collections.abc import Awaitable, Callable, Iterable, Mapping, MutableMapping
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+COOKIE = "rigidimeter_token"
+LONGEST_BODY = 200_000
+"""Bytes of a request; the largest that the page sends is a protocol."""
+
+Scope = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
+Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+App = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address is reached from this computer alone."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def host_allowed(header: str, names: Iterable[str]) -> bool:
+    """Whether a Host header names this computer: by an address, or one of `names`.
+
+    A name of a stranger that was made to point here is none of them.
+
+    Examples
+    --------
+    >>> host_allowed("127.0.0.1:8080", ["localhost"]), host_allowed("evil.example:8080", [])
+    (True, False)
+    """
+    try:
+        name = urlsplit(f"//{header}").hostname or ""
+    except ValueError:
+        return False
+    if name in {one.lower() for one in names}:
+        return True
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def same_origin(origin: str, host: str) -> bool:
+    """Whether an Origin header is that of a page that this server sent.
+
+    Examples
+    --------
+    >>> same_origin("http://127.0.0.1:8080", "127.0.0.1:8080")
+    True
+    >>> same_origin("http://127.0.0.1:9999", "127.0.0.1:8080"), same_origin("null", "null")
+    (False, False)
+    """
+    scheme, _, rest = origin.partition("://")
+    return scheme in ("http", "https") and bool(host) and rest.lower() == host.lower()
+
+
+def same_token(given: str, token: str) -> bool:
+    """Whether two tokens are equal, in a time that does not tell where they differ."""
+    return hmac.compare_digest(given.encode(), token.encode())
+
+
+class Gate:
+    """Answers in place of the application where a request may not pass.
+
+    Parameters
+    ----------
+    app : ASGI application
+    token : str
+        Empty for none.
+    names : iterable of str
+        Names of this computer.
+    """
+
+    def __init__(self, app: App, token: str, names: Iterable[str]) -> None:
+        self._app, self._token, self._names = app, token, tuple(names)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, or refuse it."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        headers = {
+            name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]
+        }
+        if scope["type"] == "http" and self._token and _token_in_query(scope):
+            await self._admit(scope, send)
+            return
+        why = self._refusal(scope, headers)
+        if why:
+            await _refuse(scope, receive, send, why)
+        else:
+            await self._app(scope, receive, send)
+
+    def _refusal(self, scope: Scope, headers: Mapping[str, str]) -> str:
+        """Return why a request may not pass, nothing if it may."""
+        host, origin = headers.get("host", ""), headers.get("origin", "")
+        if not host_allowed(host, self._names):
+            return "this server is not known by that name; open the address that it printed"
+        acts = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
+        if (acts or origin) and not same_origin(origin, host):
+            return "requests of other pages are refused"
+        if self._token and not same_token(_cookie(headers.get("cookie", "")), self._token):
+            return "the token is missing or wrong; open the address that the server printed"
+        length = headers.get("content-length", "0")
+        if not length.isdecimal() or int(length) > LONGEST_BODY or "transfer-encoding" in headers:
+            return f"a request may have {LONGEST_BODY} bytes"
+        return ""
+
+    async def _admit(self, scope: Scope, send: Send) -> None:
+        """Take the token out of the address, and keep it in a cookie."""
+        headers: list[tuple[bytes, bytes]] = [(b"location", b"/"), (b"content-length", b"0")]
+        if same_token(_token_in_query(scope), self._token):
+            cookie = f"{COOKIE}={self._token}; Path=/; HttpOnly; SameSite=Strict"
+            headers.append((b"set-cookie", cookie.encode()))
+        await send({"type": "http.response.start", "status": 303, "headers": headers})
+        await send({"type": "http.response.body", "body": b""})
+
+
+def _token_in_query(scope: Scope) -> str:
+    values = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])
+    return str(values[0])
+
+
+def _cookie(header: str) -> str:
+    try:
+        morsel = SimpleCookie(header).get(COOKIE)
+    except CookieError:
+        return ""
+    return str(morsel.value) if morsel is not None else ""
+
+
+async def _refuse(scope: Scope, receive: Receive, send: Send, why: str) -> None:
+    if scope["type"] == "websocket":
+        await receive()  # its wish to connect
+        await send({"type": "websocket.close", "code": 1008, "reason": why})
+        return
+    body = why.encode()
+    headers = [
+        (b"content-type", b"text/plain; charset=utf-8"),
+        (b"content-length", str(len(body)).encode()),
+    ]
+    await send({"type": "http.response.start", "status": 403, "headers": headers})
+    await send({"type": "http.response.body", "body": body})

@@ -1,0 +1,230 @@
+"""The socket between the server and each open page: beats and orders in, samples and state out.
+
+What a page says is acted upon as it comes. What it is told waits in a short queue of its own: a
+page that is slow misses samples, and nothing waits for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.status_values import Flag, Role
+from rigidimeter.acquisition.run_states import Command, Order
+from rigidimeter.console.observer import Observer
+from rigidimeter.console.page.desk import Desk, RunningSession
+from rigidimeter.console.page.messages import Message, RefusedMessage, parse_message
+from rigidimeter.console.page.session_state import points, session_state
+from rigidimeter.console.trace_reader import TraceReader
+from rigidimeter.documents import json_line
+
+FRAME_S = 1 / 30
+"""How often samples are sent."""
+
+POINTS_PER_S = 125.0
+"""Pieces of time in a second; of each the page draws two points."""
+
+STATE_FRAMES = 3
+"""Every so many frames the state is sent."""
+
+MOST_WAITING = 30
+"""Frames that wait for a slow page; older ones are dropped."""
+
+MOST_PAGES = 8
+MOST_KNOWN = 1000
+"""Pages that were sent and may open a socket; the oldest are forgotten."""
+
+MOST_NOTES = 20
+"""Notes that wait for the loop to take them."""
+
+_HELLO_S = 5.0
+
+
+@dataclass(eq=False)
+class _Page:
+    socket: WebSocket
+    secret: str
+    waiting: deque[bytes | str] = field(default_factory=lambda: deque(maxlen=MOST_WAITING))
+    wake: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def tell(self, frame: bytes | str) -> None:
+        self.waiting.append(frame)
+        self.wake.set()
+
+
+class _Attached:
+    """A running session as the server's thread has it."""
+
+    def __init__(self, running: RunningSession) -> None:
+        self.running = running
+        self.memory = SessionMemory.attach(running.names)
+        rate_hz = running.plan.settings.rig.tick_rate_hz
+        self._traces = TraceReader(self.memory.samples, rate_hz, POINTS_PER_S)
+        self._observer = Observer(running.plan, self.memory)
+        self.notes: deque[str] = deque()
+
+    def samples(self) -> bytes:
+        return points(self._traces.read())
+
+    def state(self) -> dict[str, Any]:
+        facts = self._observer.look()
+        return session_state(facts, self._observer.progress) | {"number": self.running.number}
+
+    def post_notes(self) -> None:
+        while self.notes and self.memory.status.post_note(self.notes[0]) is not None:
+            self.notes.popleft()
+
+
+class LiveSockets:
+    """All open pages.
+
+    Parameters
+    ----------
+    desk : Desk
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._pages: set[_Page] = set()
+        self._attached: _Attached | None = None
+        self._known: deque[str] = deque(maxlen=MOST_KNOWN)
+
+    def admit(self, secret: str) -> None:
+        """Let a page come that was just sent; the secret is its own."""
+        self._known.append(secret)
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Serve one page until it is gone."""
+        await socket.accept()
+        try:
+            hello = parse_message(await asyncio.wait_for(socket.receive_text(), _HELLO_S))
+        except (RefusedMessage, TimeoutError, WebSocketDisconnect, KeyError):
+            await _close(socket)
+            return
+        if hello.kind != "hello" or hello.page not in self._known or len(self._pages) >= MOST_PAGES:
+            await _close(socket)
+            return
+        page = _Page(socket, hello.page)
+        presence, now_ns = self._desk.presence, time.monotonic_ns()
+        presence.arrive(page.secret, hello.tab, now_ns, session=self._desk.busy)
+        self._pages.add(page)
+        sender = asyncio.create_task(_send(page))
+        try:
+            while True:
+                self._hear(page, await socket.receive_text())
+        except (WebSocketDisconnect, KeyError):  # it is gone, or sent bytes
+            pass
+        finally:
+            self._pages.discard(page)
+            presence.gone(page.secret)
+            sender.cancel()
+
+    def _hear(self, page: _Page, text: str) -> None:
+        try:
+            self._obey(page, parse_message(text))
+        except (RefusedMessage, ValueError) as error:
+            page.tell(json.dumps({"say": str(error)}))
+
+    def _obey(self, page: _Page, message: Message) -> None:
+        """Do what a page in control says; a page that looks is told so."""
+        presence, now_ns = self._desk.presence, time.monotonic_ns()
+        if message.kind == "beat":
+            presence.beat(page.secret, now_ns)
+            if self._attached is not None and presence.has_control(page.secret):
+                # At once, and not when the session's thread looks next.
+                self._attached.memory.status.beat(Role.CONSOLE, now_ns)
+            return
+        if message.kind == "hello":
+            return
+        if not presence.has_control(page.secret):
+            page.tell(json.dumps({"say": "this page can only look: another one has control"}))
+            return
+        if message.kind == "leave":
+            presence.leave(page.secret, now_ns)
+        attached = self._attached
+        if attached is None:
+            return
+        status = attached.memory.status
+        if message.kind == "emergency":
+            status.raise_flag(Flag.EMERGENCY_STOP)
+        elif message.kind == "leave":
+            status.post(Order(Command.PAUSE_NOW))
+        elif message.kind == "order":
+            status.post(Order(message.command))
+        elif message.note is not None:
+            if len(attached.notes) < MOST_NOTES:
+                attached.notes.append(json_line(message.note).decode())
+                attached.post_notes()
+            else:
+                page.tell(json.dumps({"say": "the loop takes no notes now; write it again later"}))
+
+    async def pump(self) -> None:
+        """Send samples and state to every page, for ever."""
+        count, due_s = 0, time.monotonic()
+        while True:
+            due_s = max(due_s + FRAME_S, time.monotonic())
+            await asyncio.sleep(due_s - time.monotonic())
+            count += 1
+            self._follow()
+            attached = self._attached
+            if attached is not None:
+                attached.post_notes()
+                samples = attached.samples()
+                if samples:
+                    for page in self._pages:
+                        page.tell(samples)
+            if count % STATE_FRAMES == 0:
+                self._tell_state()
+
+    def _follow(self) -> None:
+        """Attach to a session that began, let go of one that ended."""
+        running, attached = self._desk.running, self._attached
+        if attached is not None and attached.running is not running:
+            attached.memory.leave()
+            self._attached = None
+        if running is not None and self._attached is None:
+            with suppress(FileNotFoundError):  # it ended meanwhile
+                self._attached = _Attached(running)
+
+    def _tell_state(self) -> None:
+        desk, attached = self._desk, self._attached
+        state: dict[str, Any] = {"starting": desk.starting, "session": None, "finished": None}
+        if attached is not None:
+            state["session"] = attached.state()
+        elif desk.finished is not None and not desk.busy:
+            finished = desk.finished
+            state["finished"] = {
+                "number": finished.number,
+                "folder": finished.folder.name,
+                "outcome": finished.outcome,
+                "sentences": list(finished.sentences),
+            }
+        for page in self._pages:
+            control = desk.presence.has_control(page.secret)
+            page.tell(json.dumps({"state": state, "control": control}))
+
+
+async def _send(page: _Page) -> None:
+    while True:
+        await page.wake.wait()
+        page.wake.clear()
+        while page.waiting:
+            frame = page.waiting.popleft()
+            with suppress(WebSocketDisconnect, RuntimeError):
+                if isinstance(frame, bytes):
+                    await page.socket.send_bytes(frame)
+                else:
+                    await page.socket.send_text(frame)
+
+
+async def _close(socket: WebSocket) -> None:
+    with suppress(WebSocketDisconnect, RuntimeError):
+        await socket.close(1008)

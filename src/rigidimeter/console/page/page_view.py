@@ -1,0 +1,49 @@
+"""One page: the top bar with the emergency stop, and its three parts."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from nicegui import ui
+
+from rigidimeter.console.page.after_view import AfterView
+from rigidimeter.console.page.before_view import BeforeView
+from rigidimeter.console.page.desk import Desk
+from rigidimeter.console.page.work import Work
+from rigidimeter.version import __version__
+
+ASSETS = Path(__file__).parent / "assets"
+
+
+def show_page(desk: Desk, work: Work, secret: str) -> None:
+    """Build a page.
+
+    Parameters
+    ----------
+    desk : Desk
+    work : Work
+    secret : str
+        Of this page alone: the script says it to the socket, so the server knows both as one.
+    """
+
+    def in_control() -> bool:
+        return desk.presence.has_control(secret)
+
+    ui.add_head_html(
+        f'<meta name="rig-page" content="{secret}">'
+        f'<link rel="stylesheet" href="/assets/uPlot.min.css?{__version__}">'
+        f'<link rel="stylesheet" href="/assets/page.css?{__version__}">'
+        f'<script src="/assets/uPlot.iife.min.js?{__version__}"></script>'
+        f'<script src="/assets/page.js?{__version__}" defer></script>'
+    )
+    ui.html(_during(), sanitize=False).classes("rig")
+    with ui.element("section").classes("view").props("id=view-before"):
+        BeforeView(desk, work, in_control)
+    with ui.element("section").classes("view").props("id=view-after"):
+        AfterView(desk)
+
+
+@cache
+def _during() -> str:
+    return (ASSETS / "page.html").read_text(encoding="utf-8")

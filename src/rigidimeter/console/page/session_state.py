@@ -1,0 +1,104 @@
+"""Facts and samples in the form in which the page gets them: text to show, numbers to draw."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rigidimeter.acquisition.run_states import State
+from rigidimeter.console.facts import ConditionCount, Facts
+from rigidimeter.console.lamps import Level
+from rigidimeter.console.limit_distances import LimitDistance
+from rigidimeter.console.progress import Progress
+from rigidimeter.console.trace_reader import TRACES, Traces
+
+LEVELS = {Level.UNKNOWN: "off", Level.GOOD: "ok", Level.WATCH: "warn", Level.BAD: "bad"}
+"""What the page calls the levels of a lamp; each has a sign and a colour there."""
+
+ORDERS = {
+    State.IDLE: ("abort",),
+    State.RUNNING: ("pause", "pause_now", "resume", "stop", "abort"),
+    State.PAUSED: ("resume", "stop", "abort"),
+    State.STOPPING: (),
+    State.FAULTED: (),
+}
+"""Which orders mean something in which state."""
+
+_DEGREES = ("angle_rad", "velocity_command_rad_s")
+
+
+def session_state(facts: Facts, progress: Progress) -> dict[str, Any]:
+    """Return what the page shows of a session that runs; `progress` tells what can be rated."""
+    epoch = facts.epoch or facts.next_epoch
+    words = {"epoch": "Epoch: time left", "rest": "Rest: time left"}
+    again = ", again" if epoch is not None and epoch.again else ""
+    place = f"{epoch.place} of {epoch.of}{again}" if epoch is not None else "all done"
+    rated = progress.ended[-1] if progress.ended and not progress.running else None
+    return {
+        "state": facts.state_words,
+        "condition": epoch.condition if epoch is not None else "–",
+        "epoch": place,
+        "epoch_of": "Epoch" if facts.epoch is not None or epoch is None else "Next epoch",
+        "countdown": duration(facts.countdown_s),
+        "countdown_of": words.get(facts.countdown_words, facts.countdown_words or "Time left"),
+        "counts": [
+            *(_count(count) for count in facts.counts),
+            f"session: {duration(facts.session_left_s)} left",
+        ],
+        "live": [value.text for value in facts.live],
+        "live_of": facts.live_words,
+        "limits": [_limit(one) for one in facts.distances if math.isfinite(one.part)],
+        "lamps": [
+            {"level": LEVELS[lamp.level], "text": f"{lamp.name}: {lamp.words}"}
+            for lamp in facts.lamps
+        ],
+        "alert": facts.stop_words,
+        "orders": [] if progress.outcome else list(ORDERS[facts.state]),
+        "rate": {"number": rated.number, "place": rated.place} if rated is not None else None,
+    }
+
+
+def duration(seconds: float) -> str:
+    """Return a time that is left, rounded up.
+
+    Examples
+    --------
+    >>> duration(12.2), duration(75.0)
+    ('13 s', '1:15 min')
+    """
+    if not math.isfinite(seconds):
+        return "–"
+    whole = math.ceil(max(seconds, 0.0))
+    return f"{whole} s" if whole < 60 else f"{whole // 60}:{whole % 60:02d} min"
+
+
+def points(traces: Traces) -> bytes:
+    """Return samples as little-endian float64: of each piece of time two points.
+
+    A point is a time in s and a value of each trace, angles in degrees: first the least values,
+    then the largest.
+    """
+    n = traces.time_s.size
+    made = np.empty((n, 2, 1 + len(TRACES)))
+    made[:, 0, 0] = made[:, 1, 0] = traces.time_s
+    for place, name in enumerate(TRACES, start=1):
+        factor = 180 / math.pi if name in _DEGREES else 1.0
+        made[:, 0, place] = factor * traces.low[name]
+        made[:, 1, place] = factor * traces.high[name]
+    return made.astype("<f8").tobytes()
+
+
+def _count(count: ConditionCount) -> str:
+    bad = f", {count.bad} not good" if count.bad else ""
+    return f"{count.condition}: {count.good} done{bad}, {count.left} left"
+
+
+def _limit(one: LimitDistance) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "text": f"{one.value:.1f} of {one.limit:g} {one.unit}",
+        "part": round(one.part, 3),
+        "near": one.near,
+    }

@@ -1,0 +1,132 @@
+"""A console in a process of its own and a browser in front of it; not a test itself."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import Browser, Page, sync_playwright
+
+CHROMIUM = "/usr/bin/chromium"
+STARTS_S = 90.0
+"""Processes that load take so long on a machine that does a dozen other things at once."""
+
+
+class Console:
+    """A running `rigidimeter console`.
+
+    Attributes
+    ----------
+    sessions : Path
+        The folder of its sessions.
+    address : str
+        Of its page.
+    """
+
+    def __init__(self, folder: Path, *options: str, protocol: str = "") -> None:
+        self.sessions = folder / "sessions"
+        arguments = [sys.executable, "-m", "rigidimeter", "console"]
+        if protocol:
+            (folder / "protocol.toml").write_text(protocol)
+            arguments.append(str(folder / "protocol.toml"))
+        self.process = subprocess.Popen(
+            [*arguments, "--out", str(self.sessions), "--port", "0", *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        self.said: list[str] = []
+        assert self.process.stdout is not None
+        lines = iter(self.process.stdout)
+        self.address = ""
+        for line in lines:
+            self.said.append(line)
+            found = re.search(r"Open (\S+) in", line)
+            if found:
+                self.address = found[1]
+                break
+        self._listener = threading.Thread(target=lambda: self.said.extend(lines), daemon=True)
+        self._listener.start()
+        assert self.address, "".join(self.said)
+
+    def close(self) -> None:
+        """End it in order."""
+        if self.process.poll() is None:
+            self.process.terminate()
+            self.process.wait(60)
+        self._listener.join(60)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
+    def folder(self) -> Path:
+        """Return the newest session."""
+        return max(self.sessions.glob("*/manifest.json"), key=lambda p: p.stat().st_mtime).parent
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return what happened in the newest session so far."""
+        path = self.folder() / "events.jsonl"
+        lines = path.read_text().splitlines() if path.exists() else []
+        return [json.loads(line) for line in lines]
+
+    def ended(self) -> dict[str, Any]:
+        """Wait until the newest session is closed; return how."""
+
+        def end() -> dict[str, Any] | None:
+            events = self.events()
+            return events[-1] if events and events[-1]["event"] == "session_ended" else None
+
+        return wait_for(end)
+
+
+def wait_for(what: Callable[[], Any], timeout_s: float = STARTS_S) -> Any:
+    """Return what the function returns, once that is true."""
+    until_s = time.monotonic() + timeout_s
+    while True:
+        found = what()
+        if found:
+            return found
+        assert time.monotonic() < until_s, f"{what} did not come true within {timeout_s} s"
+        time.sleep(0.02)
+
+
+@contextmanager
+def browser() -> Iterator[Browser]:
+    """Open Debian's Chromium."""
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-dev-shm-usage"]
+        )
+        yield opened
+        opened.close()
+
+
+def open_page(opened: Browser, console: Console, **options: Any) -> Page:
+    """Open the page and wait until its script runs."""
+    page = opened.new_context(viewport={"width": 1280, "height": 800}, **options).new_page()
+    page.set_default_timeout(20e3)
+    page.goto(console.address)
+    page.wait_for_function("document.body.dataset.view !== undefined", timeout=1e3 * STARTS_S)
+    page.wait_for_function("document.getElementById('state').textContent !== 'connecting …'")
+    return page
+
+
+def fill(page: Page, key: str, value: str) -> None:
+    """Fill a field of the form."""
+    page.locator(f"input[data-field={key}]").fill(value)
+
+
+def start(page: Page, subject: str = "S01", operator: str = "Op") -> None:
+    """Fill in what must be given, and start; return once samples are drawn."""
+    fill(page, "subject", subject)
+    fill(page, "operator", operator)
+    page.get_by_role("button", name="Start session").click()
+    page.wait_for_function("window.rigDrawnS > 0", timeout=1e3 * STARTS_S)

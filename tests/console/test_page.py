@@ -1,0 +1,137 @@
+"""The page in a real browser, over the real loop on the virtual rig."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+from tests.console.opened import fill, open_page, start, wait_for
+
+from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.recording.session_folder import read_manifest
+
+MARKUP = "<img src=x onerror=alert(1)>"
+RUNS = "document.getElementById('state').textContent === 'epoch runs'"
+
+
+def text(page, name):
+    return page.locator(f"#{name}").text_content()
+
+
+def monotonic_origin_s(console):
+    """Return when the session began, on CLOCK_MONOTONIC."""
+    return next(e["monotonic_s"] for e in console.events() if e["event"] == "clock_started")
+
+
+def test_a_session_from_the_form_to_its_end(console, chromium):
+    """Bad fields are said and nothing starts; a second page only looks; a reload pauses."""
+    desk = console()
+    page, other = open_page(chromium, desk), open_page(chromium, desk)
+    begin = page.get_by_role("button", name="Start session")
+    fill(page, "subject", "../S01")
+    page.get_by_text("use 1 to 40 letters").wait_for()
+    assert begin.is_disabled()
+    page.get_by_text("Perturbation, controller and limits").click()
+    fill(page, "prbs_amplitude", "1,500")
+    page.get_by_text("may be 1.500 or 1500").wait_for()
+    fill(page, "prbs_amplitude", "1,1")
+    start(page, operator=MARKUP)
+    other.get_by_text("this page can only look").wait_for()
+    assert other.locator("#emergency").is_disabled()
+    other.close()
+    page.wait_for_function(RUNS)
+    page.locator("#note").fill("<b>coughs</b>")
+    page.keyboard.press("Enter")
+    page.reload()
+    page.wait_for_function("document.getElementById('state').textContent.startsWith('paused')")
+    page.locator("[data-order=resume]").click()
+    page.wait_for_function("document.getElementById('rated').textContent === 'epoch 1'")
+    page.locator("#examiner").fill("E1")
+    page.locator("#score").fill("1,5")
+    page.keyboard.press("Enter")
+    assert desk.ended()["outcome"] == "success"
+    page.wait_for_function("document.body.dataset.view === 'after'")
+    events, about = desk.events(), read_manifest(desk.folder())["about"]
+    notes = {event["what"]: event for event in events if event["event"] == "note"}
+    assert notes["note"]["text"] == "<b>coughs</b>"
+    assert (notes["rating"]["score"], notes["rating"]["by"]) == (1.5, "E1")
+    outcomes = [e["outcome"] for e in events if e["event"] == "epoch_ended"]
+    assert outcomes[1:] == ["success"] * (len(outcomes) - 1)
+    assert outcomes.count("success") == 2
+    assert about["subject"] == "S01"
+    assert about["operator"] == MARKUP
+    assert read_manifest(desk.folder())["settings"]["prbs"]["amplitude_nm"] == 1.1
+    ticks = read_samples(desk.folder() / "samples.arrows")["tick"]
+    assert np.unique(ticks).size == ticks.size
+
+
+def test_the_emergency_stop_stops(console, chromium, lateness):
+    desk = console()
+    page = open_page(chromium, desk)
+    start(page)
+    page.wait_for_function(RUNS)
+    clicked_s = time.monotonic()
+    page.keyboard.press("Escape")
+    assert "emergency stop" in desk.ended()["reason"]
+    stopped_s = monotonic_origin_s(desk) + desk.ended()["time_s"]
+    assert stopped_s - clicked_s < 0.3 + lateness.worst_s(clicked_s)
+    assert read_samples(desk.folder() / "samples.arrows")["velocity_command_rad_s"][-1] == 0.0
+    page.wait_for_function("document.getElementById('state').textContent === 'ended: fail'")
+
+
+def test_a_frozen_page_stops_the_arm(console, chromium, lateness):
+    desk = console()
+    page = open_page(chromium, desk)
+    start(page)
+    page.wait_for_function(RUNS)
+    found = chromium.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
+    pids = [one["id"] for one in found["processInfo"] if one["type"] == "renderer"]
+    frozen_s = time.monotonic()
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        assert "console no longer answered" in desk.ended()["reason"]
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
+    stopped_s = monotonic_origin_s(desk) + desk.ended()["time_s"]
+    assert 0.2 < stopped_s - frozen_s < 0.5 + lateness.worst_s(frozen_s)
+
+
+def test_a_closed_tab_pauses_at_once(console, chromium, lateness):
+    desk = console()
+    page = open_page(chromium, desk)
+    start(page)
+    page.wait_for_function(RUNS)
+    closed_s = time.monotonic()
+    page.close(run_before_unload=True)
+    wait_for(lambda: [e for e in desk.events() if e["event"] == "order"])
+    order = next(e for e in desk.events() if e["event"] == "order")
+    assert (order["command"], order["state"]) == ("pause_now", "paused")
+    paused_s = monotonic_origin_s(desk) + order["time_s"]
+    assert paused_s - closed_s < 0.5 + lateness.worst_s(closed_s)
+
+
+def test_a_killed_server_stops_the_arm_and_keeps_the_record(console, chromium):
+    desk = console()
+    page = open_page(chromium, desk)
+    start(page)
+    page.wait_for_function(RUNS)
+    desk.process.kill()
+    assert "console no longer answered" in desk.ended()["reason"]
+    ticks = read_samples(desk.folder() / "samples.arrows")["tick"]
+    np.testing.assert_array_equal(np.unique(ticks), ticks)
+    page.get_by_text("The connection to the program is lost").wait_for()
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", ""])
+def test_a_stranger_opens_no_socket(console, origin):
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    address = console().address.replace("http", "ws") + "live"
+    with pytest.raises(InvalidStatus, match="403"), connect(address, origin=origin or None):
+        pass

@@ -1,0 +1,84 @@
+"""From what was entered to a session, and what is wrong under which field."""
+
+import pytest
+
+from rigidimeter.console.page.session_form import codes, empty_form, kept_form, read_form
+from rigidimeter.documents import toml_text
+from rigidimeter.settings import Settings, dump_settings, load_settings, parse_settings
+
+BASE = Settings()
+
+
+@pytest.fixture
+def form():
+    return empty_form(BASE) | {"subject": "S01", "operator": "Op"}
+
+
+def test_an_untouched_form_is_the_protocol(form):
+    entered = read_form(form, BASE)
+    assert entered.errors == {}
+    assert entered.settings is not None
+    assert entered.settings.protocol == BASE.protocol
+    assert entered.settings.controller.inertia_kg_m2 == pytest.approx(
+        BASE.controller.inertia_kg_m2, rel=1e-9
+    )
+
+
+def test_subject_and_operator_must_be_given():
+    assert read_form(empty_form(BASE), BASE).errors.keys() == {"subject", "operator"}
+
+
+def test_numbers_are_read_with_a_comma_and_refused_by_the_settings(form):
+    entered = read_form(form | {"prbs_amplitude": "1,5", "rests": "10; 12,5"}, BASE)
+    assert entered.settings is not None
+    assert entered.settings.prbs.amplitude_nm == 1.5
+    assert entered.settings.protocol.rests_s == [10.0, 12.5]
+    errors = read_form(form | {"prbs_amplitude": "99"}, BASE).errors
+    assert errors.keys() == {"prbs_amplitude"}
+    assert "at most 50 N·m" in errors["prbs_amplitude"]
+    assert read_form(form | {"rests": "1"}, BASE).errors.keys() == {"rests"}
+    assert read_form(form | {"prbs_clock": "fast"}, BASE).errors.keys() == {"prbs_clock"}
+
+
+def test_conditions_may_be_codes_that_the_settings_do_not_know(form):
+    entered = read_form(form | {"condition0": "K7"}, BASE)
+    assert entered.settings is not None
+    assert entered.settings.protocol.blocks[0].condition == "K7"
+    assert entered.settings.subject["K7"] == BASE.subject["OFF"]
+    assert entered.about["conditions"] == ["K7", "OFF"]
+    assert "condition0" in read_form(form | {"condition0": "a/b"}, BASE).errors
+
+
+def test_stimulation_is_numbers_with_units(form):
+    given = {"stim_frequency": "130", "stim_ma": "2,5", "stim_width": "60"}
+    assert read_form(form | given, BASE).about["stimulation"] == {
+        "frequency_hz": 130.0,
+        "amplitude_ma": 2.5,
+        "pulse_width_us": 60.0,
+    }
+    assert read_form(form | {"stim_width": "-1"}, BASE).errors.keys() == {"stim_width"}
+    both = read_form(form | {"stim_ma": "2", "stim_volts": "3"}, BASE)
+    assert both.settings is None
+    assert both.errors
+    assert "stimulation" not in read_form(form, BASE).about
+
+
+def test_a_kept_form_comes_back_and_a_damaged_one_does_not(form):
+    kept = form | {"prbs_amplitude": "wrong"}
+    for key in ("task1", "condition1", "epochs1"):
+        del kept[key]
+    assert kept_form(kept, BASE) == kept
+    for damaged in (None, [], {"subject": 1}, {"task0": "prbs"}, {"more": "x"}):
+        assert kept_form(damaged, BASE) == empty_form(BASE)
+
+
+def test_codes_do_not_tell_the_order_of_the_names():
+    drawn = {codes(["DBS", "OFF"], f"S01-{k}")["DBS"] for k in range(20)}
+    assert drawn == {"code A", "code B"}
+
+
+def test_settings_are_the_same_as_a_file(tmp_path):
+    settings = parse_settings({"protocol": {"blocks": [{"condition": "OFF"}]}, "seed": 7})
+    path = tmp_path / "protocol.toml"
+    path.write_text(toml_text(dump_settings(settings)))
+    assert load_settings(path) == settings
