@@ -5,6 +5,10 @@ the sensor's torque has the opposite sign. A twin with the same random numbers k
 where the two arms are apart, the motion is wrong. Each row is of `MOMENTS_S` and of some epochs.
 
     python -m benchmarks.torque_sign
+    python -m benchmarks.torque_sign --ratios
+
+The second prints what bounds all that: which ratio S/N of the perturbation's answer to all other
+torque a window needs (`commissioning.turned_sign`), and which one it has while the sign is right.
 """
 
 from __future__ import annotations
@@ -13,12 +17,16 @@ import argparse
 import math
 from collections import Counter
 from typing import Any
+from unittest import mock
 
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
 from benchmarks.false_alarms import RATES, SIZES
 from rigidimeter.commissioning.turned_sign import turned_epoch
-from rigidimeter.guard import Cause
+from rigidimeter.guard import Cause, torque_answer
+from rigidimeter.guard.torque_sign import BEFORE, INSTRUMENTS, PASSES, explained, table, whitened
 from rigidimeter.settings import Settings, parse_settings
 
 MOMENTS_S = (0.0, 1.0, 1.37, 2.05, 3.13)
@@ -61,14 +69,57 @@ def row(settings: Settings, epochs: int) -> str:
     )
 
 
+def ratios_needed() -> list[str]:
+    """Return S/N > (f/n) (1/x − 1) of windows, by the chance α of a false alarm in a look."""
+    chances = (1e-10, 1e-8, 1e-6, 1e-4)
+    head = " | ".join(f"α = {chance:g}" for chance in chances)
+    lines = [f"| rows | s | {head} |", "| --- " * (2 + len(chances)) + "|"]
+    of_16 = (16, torque_answer.NOISE_ORDERS[0])
+    for rows, order in (of_16, *zip(torque_answer.ROWS, torque_answer.NOISE_ORDERS, strict=True)):
+        free = rows - INSTRUMENTS - 2 * order
+        left = scipy.special.betaincinv(0.5 * free, 0.5 * INSTRUMENTS, np.array(chances))
+        needed = " | ".join(f"{free / rows * (1 / x - 1):.2g}" for x in left)
+        lines.append(f"| {rows} | {rows * torque_answer.ROW_S:.2f} | {needed} |")
+    return lines
+
+
+def ratios(settings: Settings, epochs: int) -> str:
+    """Return S/N of the shortest window: its median, and what a tenth of the windows is below."""
+    rows, order = torque_answer.ROWS[0], torque_answer.NOISE_ORDERS[0]
+    free, found = rows - INSTRUMENTS - 2 * order, []
+
+    def look(_: object, window: NDArray[np.float64], count: int) -> bool:
+        half = window.shape[0] // 2
+        end = count % half + half + 1
+        if count >= rows:
+            columns, weights = table(window[end - rows - BEFORE : end]), np.zeros(INSTRUMENTS)
+            for _ in range(PASSES):
+                noise, answer, weights = explained(whitened(columns, weights, order))
+            by_chance = noise * INSTRUMENTS / free
+            found.append(max(float(answer[-1, -1]) - by_chance, 0.0) / noise * free / rows)
+        return False
+
+    with mock.patch.object(torque_answer, "a_window_shows_the_wrong_sign", look):
+        for seed in range(epochs):
+            turned_epoch(settings, "OFF", seed, math.inf, LONGEST_S)
+    half, tenth = (float(f"{value:.2g}") for value in np.quantile(found, [0.5, 0.1]))
+    return f"{half:g} ({tenth:g})"
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--epochs", type=int, default=4, help="for each moment")
     parser.add_argument("--sizes", nargs="*", choices=list(SIZES), default=list(SIZES))
+    parser.add_argument("--ratios", action="store_true", help="what bounds the time: S/N")
     given = parser.parse_args()
-    print("| size | ticks/s | subject | found | after s | wrong by deg (most) | else |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    if given.ratios:
+        print(*ratios_needed(), "", sep="\n")
+        print("| size | ticks/s | subject | S/N, median (a tenth is below) |")
+        print("| --- | --- | --- | --- |")
+    else:
+        print("| size | ticks/s | subject | found | after s | wrong by deg (most) | else |")
+        print("| --- | --- | --- | --- | --- | --- | --- |")
     for size in given.sizes:
         values = SIZES[size]
         for tick_hz, torque_hz, guard, controller in RATES:
@@ -87,7 +138,7 @@ def main() -> None:
                     },
                 }
                 of = f"{tick_hz:g}" if torque_hz == tick_hz else f"{tick_hz:g}, {torque_hz:g}"
-                columns = row(parse_settings(tables), given.epochs)
+                columns = (ratios if given.ratios else row)(parse_settings(tables), given.epochs)
                 print(f"| {size} | {of} | {name} | {columns} |", flush=True)
 
 
