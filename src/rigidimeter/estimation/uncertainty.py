@@ -213,15 +213,17 @@ def cramer_rao_coloured(regressors: Array, density: Array, rate_hz: float) -> Ar
     rate_hz : float
     """
     n = regressors.shape[0]
-    lines = np.fft.rfft(regressors, axis=0)
-    if density.shape != (lines.shape[0],):
-        raise ValueError(f"density has shape {density.shape}; {n} samples need {lines.shape[:1]}")
+    count = n // 2 + 1
+    if density.shape != (count,):
+        raise ValueError(f"density has shape {density.shape}; {n} samples need {(count,)}")
     # A one-sided density holds both sides of a line, and so does the sum, but for 0 and Nyquist.
-    weight = np.full(lines.shape[0], 4.0)
+    weight = np.full(count, 4.0)
     weight[0] = 1.0
     if n % 2 == 0:
         weight[-1] = 1.0
-    matrix = np.sqrt(weight / (n * rate_hz * density))[:, None] * lines
+    known = np.flatnonzero(np.isfinite(density))
+    lines = fft.rfft(np.ascontiguousarray(regressors.T)).T[known]
+    matrix = np.sqrt(weight[known] / (n * rate_hz * density[known]))[:, None] * lines
     stacked = np.concatenate([matrix.real, matrix.imag])
     scale = np.linalg.norm(stacked, axis=0)
     _, singular, right = np.linalg.svd(stacked / scale, full_matrices=False)
