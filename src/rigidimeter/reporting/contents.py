@@ -6,12 +6,13 @@ The rows of a table are unrounded. Its CSV has all of their values; the page sho
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from markupsafe import Markup
 from matplotlib.figure import Figure as Drawing
 
+from rigidimeter.reporting.epoch_marks import Mark
 from rigidimeter.study import StudyResult
 
 Kind = Literal[
@@ -120,6 +121,8 @@ class Figure:
         Returns the drawing; called when the report is written.
     size : {"broad", "tall", "small"}
         On the page; small figures are side by side.
+    marks : mapping of str to sequence of Mark
+        The epochs that points stand for, in the order of the points, by the `gid` of their line.
 
     What is drawn, as numbers, is written to ``figures/NAME.csv``.
     """
@@ -129,6 +132,7 @@ class Figure:
     alt: str
     draw: Callable[[], Drawing]
     size: Literal["broad", "tall", "small"] = "broad"
+    marks: Mapping[str, Sequence[Mark]] = field(default_factory=dict)
 
 
 Block = Markup | Table | Figure

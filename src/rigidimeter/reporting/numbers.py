@@ -46,6 +46,17 @@ def scaled(size: float, unit: str) -> tuple[float, str]:
     return 1.0, unit
 
 
+def axis_unit(sizes: Iterable[float], unit: str) -> tuple[float, str]:
+    """Return the factor and the unit of an axis that holds these numbers.
+
+    Examples
+    --------
+    >>> axis_unit([0.0045, -0.0041], "kg·m²")
+    (1000.0, '10⁻³ kg·m²')
+    """
+    return scaled(max((abs(size) for size in sizes if math.isfinite(size)), default=0.0), unit)
+
+
 def amount(value: float, unit: str, digits: int = 4) -> str:
     """Return a number with its unit, scaled, unbroken between the two.
 

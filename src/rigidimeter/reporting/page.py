@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +19,8 @@ from rigidimeter.documents import csv_text, visible
 from rigidimeter.reporting import first_screen
 from rigidimeter.reporting.contents import Block, Column, Figure, Section, Table
 from rigidimeter.reporting.drawn_data import drawn_csv
+from rigidimeter.reporting.epoch_traces import epoch_traces, traces_json
+from rigidimeter.reporting.inline_svg import inline_svg
 from rigidimeter.reporting.numbers import interval, number, p_value, short_names
 from rigidimeter.reporting.sections import SECTIONS
 from rigidimeter.reporting.sections.methods_prose import methods_prose
@@ -24,6 +28,8 @@ from rigidimeter.reporting.style import svg_text
 from rigidimeter.reporting.verdict_text import verdict
 from rigidimeter.study import StudyResult, traffic_light
 from rigidimeter.version import __version__
+
+_PLOT_STYLE = "vendored/uPlot.min.css"
 
 Contents = Sequence[tuple[Section, Sequence[Block]]]
 """The sections of a result, each with its text, tables and figures."""
@@ -169,12 +175,22 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
     environment.globals["heads"] = _heads
     environment.globals["file_stem"] = file_stem
     light = traffic_light(result)
+    traces = epoch_traces(result)
+    script = _script(folder) if traces else ""
     return environment.get_template("page.html").render(
         result=result,
         # The style is this package's own file and needs no escaping.
-        css=Markup((folder / "page.css").read_text(encoding="utf-8")),
+        css=Markup(
+            "\n".join(
+                (folder / name).read_text(encoding="utf-8")
+                for name in ("page.css", *([_PLOT_STYLE] if traces else []))
+            )
+        ),
         parts=parts(made),
-        images={name: data_uri(text) for name, text in svg.items()},
+        images=_images(made, svg, {key: place for place, key in enumerate(traces)}),
+        traces=Markup(traces_json(traces.values())) if traces else "",
+        script=Markup(script),
+        script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii"),
         verdict=verdict(result),
         strip=first_screen.strip(result),
         tested=first_screen.tested_words(result),
@@ -185,6 +201,28 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
         virtual=sum(epoch.virtual for epoch in result.epochs),
         version=__version__,
     )
+
+
+def _images(
+    made: Contents, svg: Mapping[str, str], places: Mapping[tuple[str, str], int]
+) -> dict[str, Markup]:
+    """Return the figures that are drawn as elements of the page."""
+    return {
+        block.name: inline_svg(svg[block.name], block.name, block.alt, block.marks, places)
+        for _, blocks in made
+        for block in blocks
+        if isinstance(block, Figure) and block.name in svg
+    }
+
+
+def _script(folder: Traversable) -> str:
+    """Return what the page runs: uPlot with its licence, and what opens the traces of an epoch."""
+    licence, plot, page = (
+        (folder / name).read_text(encoding="utf-8").strip()
+        for name in ("vendored/uPlot.LICENSE", "vendored/uPlot.iife.min.js", "page.js")
+    )
+    # Its first line names an address, and the page names none outside itself.
+    return f"/*! uPlot 1.6.32\n{licence}\n*/\n{plot.partition('*/')[2].strip()}\n{page}"
 
 
 def shown_text(value: Any) -> Any:

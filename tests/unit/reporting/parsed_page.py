@@ -11,6 +11,7 @@ class ParsedPage(HTMLParser):
         self.tags: set[str] = set()
         self.text = ""
         self.rows: dict[str, list[list[str]]] = {}
+        self.scripts: list[str] = []
         self._caption = ""
         self._inside = ""
         self._sections: list[str] = []
@@ -39,6 +40,9 @@ class ParsedPage(HTMLParser):
             self._sections.pop()
 
     def handle_data(self, data: str) -> None:
+        if self.cdata_elem == "script":
+            self.scripts.append(data)
+            return
         self.text += data
         if self._sections:
             place = self._sections[-1]

@@ -13,7 +13,8 @@ from rigidimeter.records import BandEstimate, Channel
 from rigidimeter.reporting.sections.distribution import distribution
 from rigidimeter.reporting.sections.other_bands import band_sensitivity
 from rigidimeter.reporting.sections.perturbation_figure import changes, perturbation, spectrum
-from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits
+from rigidimeter.reporting.sections.recorded_signals import recorded
+from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits, loops
 from rigidimeter.reporting.sections.torque_fit import torque_limit_nm, torque_parts
 from rigidimeter.reporting.style import condition_colours, svg_text
 from rigidimeter.study import StudyResult
@@ -113,14 +114,15 @@ def test_parts_of_the_model_add_up_to_it(study: StudyResult) -> None:
     epoch = study.epochs[1]
     signals = epoch_signals(epoch, fit.method, study.settings.estimation)
     limit_nm = torque_limit_nm(signals, fit, 7.0)
-    figure = torque_parts(
-        signals, fit, "black", origin_s=100.0, window_s=7.0, limit_nm=limit_nm, perturbation=PRBS
-    )
-    _, torque, *parts = figure.axes
+    figure = torque_parts(signals, fit, "black", origin_s=100.0, window_s=7.0, limit_nm=limit_nm)
+    torque, left, *parts = figure.axes
     assert len(parts) == 3
     model = np.asarray(torque.lines[1].get_ydata())
     assert np.allclose(sum(np.asarray(axes.lines[1].get_ydata()) for axes in parts), model)
-    misfit = np.asarray(torque.lines[0].get_ydata()) - model
+    measured, modelled = torque.lines
+    assert measured.get_linewidth() > 2 * modelled.get_linewidth()
+    misfit = np.asarray(measured.get_ydata()) - model
+    assert np.allclose(np.asarray(left.lines[0].get_ydata()), misfit)
     for axes in parts:
         grey, part = (np.asarray(line.get_ydata()) for line in axes.lines)
         assert np.allclose(grey - part, misfit)
@@ -129,11 +131,23 @@ def test_parts_of_the_model_add_up_to_it(study: StudyResult) -> None:
         assert axes.get_xlim() == pytest.approx((1.0, 8.0), abs=0.02)
 
 
-def test_torque_without_a_perturbation_has_one_panel_less(study: StudyResult) -> None:
-    fit, epoch = study.analysis.fits[1], study.epochs[1]
-    signals = epoch_signals(epoch, fit.method, study.settings.estimation)
-    figure = torque_parts(signals, fit, "black", origin_s=0.0, window_s=60.0, limit_nm=1.0)
-    assert len(figure.axes) == 4
+def test_what_was_recorded_is_drawn_as_it_was() -> None:
+    angle = Channel("angle_rad", STAMPS, np.radians(STAMPS))
+    held, turned = recorded({"perturbation_nm": PRBS, "angle_rad": angle}, -1.0).axes
+    assert held.lines[0].get_drawstyle() == "steps-post"
+    across, degrees = (np.asarray(d) for d in turned.lines[0].get_data())
+    np.testing.assert_allclose(degrees, across - 1.0)
+    assert across[-1] >= 7.0
+    assert [axes.get_ylabel() for axes in (held, turned)] == ["Perturbation\n(N·m)", "Angle\n(deg)"]
+
+
+def test_loops_of_the_conditions_share_a_panel(study: StudyResult) -> None:
+    epoch = next(epoch for epoch in study.epochs if epoch.task == "sinusoid")
+    cycles = scoring_cycles(epoch, study.settings.scores)
+    figure = loops([("OFF: 1 J", cycles, "black"), ("_DBS: 1 J", cycles, "red")])
+    (axes,) = figure.axes
+    assert [line.get_color() for line in axes.lines] == ["black", "red"]
+    assert len(figure.legends[0].get_texts()) == 2
 
 
 def test_loop_is_in_degrees(study: StudyResult) -> None:

@@ -114,7 +114,7 @@ def test_every_point_is_drawn_and_those_without_coherence_are_hollow() -> None:
     np.testing.assert_allclose(
         curve.get_ydata(), np.abs(model_nm_rad(OFF, np.asarray(curve.get_xdata())))
     )
-    assert curve.get_label() == "OFF, model"
+    assert curve.get_label() == f"OFF, model: K {OFF.stiffness_nm_rad:.2f} N·m/rad"
     assert [axes.get_ylabel() for axes in (magnitude, phase, coherence)] == [
         "Torque over angle\n(N·m/rad)",
         "Phase (deg)",
@@ -161,7 +161,19 @@ def test_any_condition_is_in_the_legends(name: str) -> None:
     over = impedance({name: responses()["OFF"]}, colours)
     for figure, entries in ((below, 1), (over, 2)):
         svg_text(figure)
-        assert len(figure.axes[0].get_legend().get_texts()) == entries
+        legend = figure.axes[0].get_legend() or figure.legends[0]
+        assert len(legend.get_texts()) == entries
+
+
+def test_the_plateau_can_be_read_off() -> None:
+    figure = impedance(responses(), condition_colours(["OFF", "DBS"]))
+    svg_text(figure)
+    axes = figure.axes[0]
+    low, high = axes.get_ylim()
+    ticks = [t for t in axes.get_yticks() if low <= t <= high]
+    near = [t for t in ticks if 0.6 < t / OFF.stiffness_nm_rad < 1.7]
+    assert len(near) >= 2
+    assert {f"{t:g}" for t in near} <= {text.get_text() for text in axes.get_yticklabels()}
 
 
 def test_the_sd_that_the_spectrum_quotes_is_that_of_the_noise(periodic_study: StudyResult) -> None:

@@ -21,7 +21,9 @@ pytestmark = pytest.mark.skipif(
 )
 DESKTOP, PHONE = (1280, 800), (390, 844)
 SCREENS = Path(__file__).parents[3] / "build" / "screens"
-LONG = ("perturbation", "torque", "voluntary", "loops", "impedance")
+READY_MS = 5000
+"""Of a small page on a machine that does other work too."""
+LONG = ("perturbation", "torque", "voluntary", "loops", "impedance", "recorded")
 """Figures of recordings, which take long to draw."""
 
 
@@ -128,6 +130,8 @@ def test_the_dark_scheme_is_dark_and_its_text_light(
 ) -> None:
     page = opened(browser, reports["study"], PHONE)
     page.emulate_media(color_scheme="dark")
+    label = page.locator("#effects svg text").first
+    assert "rgb(232, 232, 230)" in label.evaluate("one => getComputedStyle(one).fill")
     style = "getComputedStyle(document.body)"
     ground, ink = (
         sum(map(int, re.findall(r"\d+", page.evaluate(f"{style}.{name}"))[:3])) / 765
@@ -135,4 +139,52 @@ def test_the_dark_scheme_is_dark_and_its_text_light(
     )
     assert ground < 0.15
     assert ink > 0.8
+    page.close()
+
+
+def test_a_point_names_its_epoch_and_opens_its_traces(
+    browser: Browser, reports: dict[str, Path]
+) -> None:
+    page = opened(browser, reports["study"], DESKTOP)
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda said: wrong.append(said.text))
+    ready_ms = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
+    assert 0 < ready_ms < READY_MS
+    point = (
+        page.locator("#distributions figure", has_text="Stiffness K").locator("[data-epoch]").first
+    )
+    point.scroll_into_view_if_needed()
+    point.hover()
+    tip = page.locator("#tip")
+    assert re.match(r"OFF, M1, day \d+, epoch \w+: Stiffness K [\d.]+ \[", tip.inner_text())
+    point.click()
+    dialog = page.locator("#epoch")
+    assert "K " in dialog.locator(".remark").inner_text()
+    titles = dialog.locator(".u-title").all_inner_texts()
+    assert titles == ["Torque (N·m)", "Measured less model (N·m)", "Angle (deg)"]
+    plot = dialog.locator("canvas").first
+    drawn = plot.evaluate(
+        "one => one.getContext('2d').getImageData(0, 0, one.width, one.height).data.some(x => x)"
+    )
+    assert drawn
+    first = dialog.locator(".title").inner_text()
+    dialog.get_by_text("Next epoch").click()
+    assert dialog.locator(".title").inner_text() != first
+    page.screenshot(path=SCREENS / "traces.png")
+    page.keyboard.press("Escape")
+    assert not dialog.is_visible()
+    assert wrong == []
+    page.close()
+
+
+def test_without_scripts_the_figures_and_their_words_remain(
+    browser: Browser, reports: dict[str, Path]
+) -> None:
+    page = browser.new_page(java_script_enabled=False)
+    page.goto(reports["study"].as_uri())
+    figure = page.locator("#distributions figure", has_text="Stiffness K")
+    assert figure.locator("svg").is_visible()
+    assert "Stiffness K" in str(figure.locator("use title").first.text_content())
+    assert not page.locator("#epoch").is_visible()
     page.close()

@@ -49,18 +49,18 @@ def test_conditions_keep_one_order(study: StudyResult) -> None:
     assert study.condition_names == ("OFF", "DBS")
 
 
-def test_the_representative_is_the_included_fit_with_the_median_vaf(
+def test_the_representative_is_the_included_fit_with_the_median_stiffness(
     make_study, make_analysis
 ) -> None:
     analysis = make_analysis({"OFF": 5, "DBS": 4})
-    vaf = [90.0, 60.0, 80.0, 99.0, 70.0, 50.0, 10.0, 30.0, 20.0]
+    values = [2.3, 1.6, 1.8, 2.9, 1.7, 1.5, 1.1, 1.3, 1.2]
     fits = [
-        dataclasses.replace(fit, vaf_percent=percent)
-        for fit, percent in zip(analysis.fits, vaf, strict=True)
+        dataclasses.replace(fit, value=(0.004, 0.1, stiffness))
+        for fit, stiffness in zip(analysis.fits, values, strict=True)
     ]
     fits[3] = dataclasses.replace(fits[3], outcome=Outcome("excluded", "limit"))
     fits[0] = dataclasses.replace(fits[0], outcome=Outcome("excluded", "limit"))
     made = make_study([], analysis=dataclasses.replace(analysis, fixed_inertia=tuple(fits)))
-    chosen = [(fit.condition, fit.vaf_percent) for fit in representative_fits(made)]
+    chosen = [(fit.condition, fit.stiffness_nm_rad) for fit in representative_fits(made)]
     # Three are left of OFF; of the four of DBS the lower middle one is taken.
-    assert chosen == [("OFF", 70.0), ("DBS", 20.0)]
+    assert chosen == [("OFF", 1.7), ("DBS", 1.2)]

@@ -53,7 +53,7 @@ def test_a_section_from_outside_is_in_the_page_and_its_files(
     assert "<h2>From outside</h2>" in text
     section = text[text.index("<h2>From outside") :]
     for shown in ("From outside", "Of 3 &lt;fits&gt;.", "Toy (N·m)", "0.3333", "A note.",
-                  "A caption.", 'alt="A line that rises."'):  # fmt: skip
+                  "A caption.", 'aria-label="A line that rises."'):  # fmt: skip
         assert shown in section
     assert "only_in_file_s" not in section
     with (tmp_path / "tables" / "toys.csv").open(encoding="utf-8", newline="") as file:

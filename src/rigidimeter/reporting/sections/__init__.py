@@ -17,6 +17,7 @@ from rigidimeter.reporting.sections import (
     perturbation_figure,
     rating_points,
     rating_scatter,
+    recorded_signals,
     recordings,
     study_overview,
     torque_angle_loop,
@@ -56,7 +57,13 @@ SECTIONS: list[Section] = [
     *_part("Ratings", rating_points.SECTION, rating_scatter.SECTION, printed=2),
     *_part("What rests on the method", method_sensitivity.SECTION, other_bands.SECTION),
     *_part("Joint over frequency", impedance.SECTION, unexplained_torque.SECTION),
-    *_part("Examples", torque_fit.SECTION, torque_angle_loop.SECTION, perturbation_figure.SECTION),
+    *_part(
+        "Examples",
+        recorded_signals.SECTION,
+        torque_fit.SECTION,
+        torque_angle_loop.SECTION,
+        perturbation_figure.SECTION,
+    ),
     *_part("Quality", data_quality.FINDINGS, recordings.NOTICES, printed=2),
     *_part("Exclusions", data_quality.STUDY_EXCLUSIONS, data_quality.EXCLUSIONS),
     *_part(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -18,7 +19,8 @@ from rigidimeter.reporting.contents import (
     from_study_folder,
     paragraph,
 )
-from rigidimeter.reporting.numbers import condition_name, number
+from rigidimeter.reporting.epoch_marks import Mark, mark_of
+from rigidimeter.reporting.numbers import axis_unit, condition_name, number
 from rigidimeter.reporting.style import (
     GREY,
     condition_colours,
@@ -29,7 +31,7 @@ from rigidimeter.reporting.style import (
     styled,
     wrapped,
 )
-from rigidimeter.study import Comparison, DayMedian, StudyResult, result_tables
+from rigidimeter.study import Comparison, DayMedian, Observation, StudyResult, result_tables
 
 MOST_IN_A_ROW = 26
 """More days than this continue in another row of the same figure."""
@@ -40,10 +42,20 @@ _BESIDE = 0.3
 
 
 class Day(NamedTuple):
-    """The epochs of one day in one condition: their median and quartiles, and their values."""
+    """The epochs of one day in one condition: their median and quartiles, and their values.
+
+    `group` names their line of points, so that a page can say which epoch each of them is.
+    """
 
     median: DayMedian
     values: Sequence[float]
+    group: str = ""
+
+    def times(self, factor: float) -> Day:
+        """Return the same in another unit."""
+        m = self.median
+        median = replace(m, median=factor * m.median, q1=factor * m.q1, q3=factor * m.q3)
+        return self._replace(median=median, values=[factor * value for value in self.values])
 
     @property
     def condition(self) -> str:
@@ -58,14 +70,14 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         return
     yield paragraph(
         "Each small point is an included epoch. Beside the points of a day are their median and, "
-        "as a bar, their quartiles."
+        "as a bar, their quartiles; a line joins the medians of a day that has both conditions."
     )
     order = [condition_name(name) for name in result.condition_names]
     for c, found in by_measure:
         words = "; ".join(
             f"{m.subject} day {m.day} {condition_name(m.condition)}: median {number(m.median)}, "
             f"n = {m.n}"
-            for m, _ in found
+            for m, *_ in found
         )
         count = sum(len(one.values) for one in found)
         n_days = len({(one.median.subject, one.median.day) for one in found})
@@ -73,16 +85,38 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             f"days_{c.measure.name}",
             f"{c.measure.title}: {count} included epochs of {n_days} days.",
             f"{c.measure.title} by day. {words} ({c.measure.unit}).",
-            partial(days, f"{c.measure.title}\n({c.measure.unit})", found, order),
+            partial(_in_unit, c, found, order),
+            marks=_marks(c),
         )
 
 
 def _days(c: Comparison) -> list[Day]:
     """Return the days of a measure in the order of recording."""
-    values: dict[tuple[str, str, str], list[float]] = {}
+    own = _by_day(c)
+    return [
+        Day(m, [o.value for o in own[m.subject, m.day, m.condition]], f"epochs-{place}")
+        for place, m in enumerate(c.day_medians)
+    ]
+
+
+def _by_day(c: Comparison) -> dict[tuple[str, str, str], list[Observation]]:
+    own: dict[tuple[str, str, str], list[Observation]] = {}
     for o in c.observations:
-        values.setdefault((o.subject, o.day, o.condition), []).append(o.value)
-    return [Day(m, values[m.subject, m.day, m.condition]) for m in c.day_medians]
+        own.setdefault((o.subject, o.day, o.condition), []).append(o)
+    return own
+
+
+def _marks(c: Comparison) -> dict[str, list[Mark]]:
+    own = _by_day(c)
+    return {
+        f"epochs-{place}": [mark_of(o, c.measure) for o in own[m.subject, m.day, m.condition]]
+        for place, m in enumerate(c.day_medians)
+    }
+
+
+def _in_unit(c: Comparison, found: Sequence[Day], order: Sequence[str]) -> Drawing:
+    factor, unit = axis_unit((value for one in found for value in one.values), c.measure.unit)
+    return days(f"{c.measure.title}\n({unit})", [one.times(factor) for one in found], order)
 
 
 class _Slot(NamedTuple):
@@ -165,9 +199,12 @@ def _row(axes: Axes, slots: Sequence[_Slot], order: Sequence[str], several: bool
                 color=GREY,
             )
         share = len(slot.found)
-        for k, one in enumerate(slot.found):
-            # Two conditions of one day are drawn side by side.
-            centre = place + (k - (share - 1) / 2) * 0.9 / share
+        # Two conditions of one day are drawn side by side, their medians joined.
+        centres = [place + (k - (share - 1) / 2) * 0.9 / share for k in range(share)]
+        medians = [one.median.median for one in slot.found]
+        joined = [centre + _BESIDE / share for centre in centres]
+        axes.plot(joined[: share * (share > 1)], medians[: share * (share > 1)], color=GREY)
+        for centre, one in zip(centres, slot.found, strict=True):
             _strip(axes, centre, 1.0 / share, one, order)
         places.append(place)
         previous = slot.subject
@@ -184,7 +221,8 @@ def _strip(axes: Axes, centre: float, width: float, one: Day, order: Sequence[st
     marker = condition_markers(order)[one.condition]
     values = np.asarray(one.values, dtype=np.float64)
     across = centre - 0.12 * width + spread(values.size, _HALF) * width
-    axes.plot(across, values, marker, color=colour, alpha=0.5, markersize=2.8, markeredgewidth=0)
+    (points,) = axes.plot(across, values, marker, color=colour, alpha=0.5, ms=2.8, mew=0)
+    points.set_gid(one.group or None)
     beside = centre + _BESIDE * width
     axes.vlines(beside, one.median.q1, one.median.q3, color=colour, linewidth=1.8)
     axes.plot(beside, one.median.median, marker, color=colour, markersize=6, mec="white", mew=0.7)

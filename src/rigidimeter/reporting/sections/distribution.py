@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -11,7 +12,14 @@ from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
-from rigidimeter.reporting.numbers import condition_name, interval, number, p_and_r
+from rigidimeter.reporting.epoch_marks import mark_of
+from rigidimeter.reporting.numbers import (
+    axis_unit,
+    condition_name,
+    interval,
+    number,
+    p_and_r,
+)
 from rigidimeter.reporting.style import condition_colours, note, spread, styled, wrapped
 from rigidimeter.statistics import summarise
 from rigidimeter.study import Comparison, StudyResult
@@ -37,23 +45,31 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     )
     colours = condition_colours(result.condition_names)
     for c in shown:
-        named = {condition_name(key): key for key in c.summaries}
+        factor, unit = axis_unit((o.value for o in c.observations), c.measure.unit)
         yield Figure(
             f"distribution_{c.measure.name}",
             f"{c.measure.title}.",
             f"{c.measure.title}, every included epoch a point. {_in_words(c)}",
             partial(
                 distribution,
-                c.measure.label,
-                {name: c.values[key] for name, key in named.items()},
-                {name: colours[key] for name, key in named.items()},
+                replace(c.measure, unit=unit).label,
+                {condition_name(key): [factor * v for v in c.values[key]] for key in c.summaries},
+                {condition_name(key): colours[key] for key in c.summaries},
                 "" if c.test is None else p_and_r(c.test.p, c.test.r),
-                ends={name: [(o.low, o.high) for o in c.of(key)] for name, key in named.items()},
+                ends={
+                    condition_name(key): [(factor * o.low, factor * o.high) for o in c.of(key)]
+                    for key in c.summaries
+                },
                 pooled={
-                    condition_name(key): (o.value, o.low, o.high) for key, o in c.pooled.items()
+                    condition_name(key): (factor * o.value, factor * o.low, factor * o.high)
+                    for key, o in c.pooled.items()
                 },
             ),
             "small",
+            marks={
+                f"epochs-{place}": [mark_of(o, c.measure) for o in c.of(key)]
+                for place, key in enumerate(c.summaries)
+            },
         )
 
 
@@ -129,7 +145,7 @@ def _strip(axes: Axes, position: int, sample: Array, intervals: Array, colour: s
         axes.vlines(
             across[drawn], *intervals[drawn].T, color=colour, alpha=0.4, linewidth=0.7, zorder=1.5
         )
-    axes.plot(
+    (points,) = axes.plot(
         across,
         sample,
         "o",
@@ -138,6 +154,7 @@ def _strip(axes: Axes, position: int, sample: Array, intervals: Array, colour: s
         markersize=3.6 if sample.size <= 60 else 2.6,
         markeredgewidth=0,
     )
+    points.set_gid(f"epochs-{position}")
     beside = position + _STRIP
     axes.plot([beside, beside], [summary.q1, summary.q3], color=colour, linewidth=2.0)
     axes.plot(beside, summary.median, "D", color=colour, markersize=6, mec="white", mew=0.7)

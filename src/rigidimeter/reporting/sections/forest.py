@@ -19,11 +19,10 @@ from rigidimeter.reporting.contents import (
     paragraph,
 )
 from rigidimeter.reporting.numbers import condition_name, interval, number
-from rigidimeter.reporting.style import GREY, styled, wrapped
+from rigidimeter.reporting.style import GREY, INK, styled, wrapped
 from rigidimeter.statistics import Effects, largest_r
 from rigidimeter.study import Comparison, StudyResult, result_tables
 
-_INK = "#1C1C1C"
 COHEN = (0.1, 0.3, 0.5)
 """What is called a small, a medium and a large r."""
 
@@ -99,9 +98,9 @@ def forest(found: Sequence[tuple[Comparison, Effects]], label: str) -> Drawing:
         for place, (_, effects) in enumerate(found):
             low, high = effects.r_low, effects.r_high
             if np.isfinite(low) and np.isfinite(high):
-                axes.hlines(place, low, high, color=_INK, linewidth=1.6)
-                axes.plot([low, high], [place] * 2, "|", color=_INK, markersize=7)
-            axes.plot(effects.r, place, "s", color=_INK, markersize=6)
+                axes.hlines(place, low, high, color=INK, linewidth=1.6)
+                axes.plot([low, high], [place] * 2, "|", color=INK, markersize=7)
+            axes.plot(effects.r, place, "s", color=INK, markersize=6)
             for x in (-most[place], most[place]):
                 axes.plot(x, place, "|", color=GREY, markersize=13, markeredgewidth=0.7, alpha=0.7)
             axes.text(

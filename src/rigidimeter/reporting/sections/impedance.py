@@ -14,7 +14,7 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
-from matplotlib.ticker import LogLocator, MultipleLocator
+from matplotlib.ticker import LogLocator, MultipleLocator, NullLocator
 from numpy.typing import NDArray
 
 from rigidimeter.dynamics.joint import JointDynamics
@@ -36,6 +36,8 @@ COHERENT = 0.5
 _MARKERS = "osD^v"
 _DASHES = ("-", "--", "-.", ":")
 _POINTS = 400
+_READABLE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+"""The labelled ticks of a decade: so close that K can be read off between them."""
 
 
 class Response(NamedTuple):
@@ -79,7 +81,8 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             "Torque over angle at the frequencies of the perturbation, without any model, averaged "
             "over the epochs of each condition. Hollow points have a coherence below 0.5. The line "
             "is the model of all epochs together, "
-            '<span class="formula">K − J ω² + i B ω</span>. Bottom panel: the coherence of the '
+            '<span class="formula">K − J ω² + i B ω</span>; the broken line across is its K, which '
+            "the magnitude approaches at low frequency. Bottom panel: the coherence of the "
             "torque with what repeats, 1 where nothing but the perturbation moved the joint. A "
             "point of coherence γ² has a relative uncertainty of about √(1/γ² − 1): a tenth at "
             "0.99, a third at 0.9."
@@ -174,6 +177,7 @@ def impedance(responses: Mapping[str, Response], colours: Mapping[str, str]) -> 
             for axes, points in zip((magnitude, phase, coherence), measured, strict=True):
                 _points(axes, response, points, colours[name], marker, listed(name))
             if response.joint is not None:
+                stiffness = response.joint.stiffness_nm_rad
                 _model(
                     magnitude,
                     phase,
@@ -181,10 +185,13 @@ def impedance(responses: Mapping[str, Response], colours: Mapping[str, str]) -> 
                     np.geomspace(lowest, highest, _POINTS),
                     colours[name],
                     _DASHES[place % len(_DASHES)],
-                    f"{listed(name)}, model",
+                    f"{listed(name)}, model: K {number(stiffness, 3)} N·m/rad",
                 )
+                magnitude.axhline(stiffness, color=colours[name], linewidth=0.7, dashes=(2, 3))
         magnitude.set_xscale("log")
         magnitude.set_yscale("log")
+        low, high = magnitude.get_ylim()
+        magnitude.set_ylim(0.75 * low, high)  # K lies between two ticks
         magnitude.set_ylabel("Torque over angle\n(N·m/rad)")
         phase.set_ylabel("Phase (deg)")
         phase.set_ylim(-190, 190)
@@ -194,9 +201,10 @@ def impedance(responses: Mapping[str, Response], colours: Mapping[str, str]) -> 
         coherence.set_xlabel("Frequency (Hz)")
         coherence.set_xlim(lowest / 1.1, highest * 1.1)
         coherence.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        magnitude.yaxis.set_major_locator(LogLocator(subs=_READABLE, numticks=30))
+        magnitude.yaxis.set_minor_locator(NullLocator())
         plain_ticks(coherence.xaxis, magnitude.yaxis)
-        magnitude.grid(visible=False, which="minor")
-        magnitude.legend(loc="upper left", ncols=2)
+        figure.legend(*magnitude.get_legend_handles_labels(), loc="outside upper left", ncols=2)
         coherence.axhline(COHERENT, color=GREY, linewidth=0.6, dashes=(2, 2))
         figure.align_ylabels()
     return figure
@@ -237,4 +245,4 @@ def _model(
     phase.plot(frequency_hz, angles_deg, **style)
 
 
-SECTION = Section("impedance", "The joint over frequency", _blocks)
+SECTION = Section("impedance", "Torque over angle", _blocks)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -22,12 +23,11 @@ from rigidimeter.reporting.contents import (
     from_study_folder,
     paragraph,
 )
-from rigidimeter.reporting.numbers import condition_name, interval, number
-from rigidimeter.reporting.style import GREY, drawable, styled, wrapped
+from rigidimeter.reporting.numbers import axis_unit, condition_name, interval, number
+from rigidimeter.reporting.style import GREY, INK, drawable, styled, wrapped
 from rigidimeter.reporting.verdict_text import dependence_sentences
-from rigidimeter.study import SensitivityRow, StudyResult, result_tables
+from rigidimeter.study import Measure, SensitivityRow, StudyResult, result_tables
 
-_CHOSEN = "#1C1C1C"
 _OTHER = "#0072B2"
 MOST_BESIDE = 3
 
@@ -87,9 +87,9 @@ def sensitivity(found: Sequence[SensitivityRow], label: str) -> Drawing:
     label : str
         Of the horizontal axes, without a unit.
     """
-    measures: dict[str, list[SensitivityRow]] = {}
+    measures: dict[Measure, list[SensitivityRow]] = {}
     for row in found:
-        measures.setdefault(row.measure.label, []).append(row)
+        measures.setdefault(row.measure, []).append(row)
     methods = [
         (method, inertia)
         for method in dict.fromkeys(row.method for row in found)
@@ -103,25 +103,35 @@ def sensitivity(found: Sequence[SensitivityRow], label: str) -> Drawing:
         grid = figure.subplots(down, across, squeeze=False)
         for axes in grid.flat[len(measures) :]:
             axes.set_visible(False)
-        for place, ((name, own), axes) in enumerate(zip(measures.items(), grid.flat, strict=False)):
-            _panel(axes, own, methods)
-            axes.set_title(wrapped(name, 30), fontsize=8.5)
+        for place, ((measure, own), axes) in enumerate(
+            zip(measures.items(), grid.flat, strict=False)
+        ):
+            sizes = [size for row in own for size in (row.shift, row.shift_low, row.shift_high)]
+            factor, unit = axis_unit(sizes, measure.unit)
+            _panel(axes, own, methods, factor)
+            axes.set_title(wrapped(replace(measure, unit=unit).label, 30), fontsize=8.5)
             axes.set_xlabel(drawable(label))
             if place % across:
                 axes.set_yticklabels([])
     return figure
 
 
-def _panel(axes: Axes, own: Sequence[SensitivityRow], methods: Sequence[tuple[str, str]]) -> None:
+def _panel(
+    axes: Axes,
+    own: Sequence[SensitivityRow],
+    methods: Sequence[tuple[str, str]],
+    factor: float,
+) -> None:
     axes.axvline(0.0, color=GREY, linewidth=0.9, zorder=1)
     for row in own:
+        shift, low, high = (factor * x for x in (row.shift, row.shift_low, row.shift_high))
         place = methods.index((row.method, row.inertia))
-        colour = _CHOSEN if row.chosen else _OTHER
-        if np.isfinite(row.shift_low) and np.isfinite(row.shift_high):
+        colour = INK if row.chosen else _OTHER
+        if np.isfinite(low) and np.isfinite(high):
             width = 2.2 if row.chosen else 1.2
-            axes.hlines(place, row.shift_low, row.shift_high, color=colour, linewidth=width)
+            axes.hlines(place, low, high, color=colour, linewidth=width)
         axes.plot(
-            row.shift,
+            shift,
             place,
             "s" if row.inertia == "fixed" else "o",
             color=colour,

@@ -16,10 +16,9 @@ from rigidimeter.records import Channel, Epoch
 from rigidimeter.reporting.contents import Block, Figure, Section
 from rigidimeter.reporting.numbers import condition_name, number, short_names
 from rigidimeter.reporting.representative import analysed_epoch, origin_s, representative_fits
-from rigidimeter.reporting.style import GREY, note, plain_ticks, styled
+from rigidimeter.reporting.style import GREY, INK, note, plain_ticks, styled
 from rigidimeter.study import StudyResult
 
-_INK = "#222222"
 _BAND = "#009E73"
 
 
@@ -88,7 +87,7 @@ def perturbation(channel: Channel, origin_s: float, first_s: float = 7.0) -> Dra
         figure = Drawing(figsize=(7.4, 3.1))
         above, below = figure.subplots(2, 1)
         for axes in (above, below):
-            axes.step(time_s, values, where="post", color=_INK, linewidth=0.9)
+            axes.step(time_s, values, where="post", color=INK, linewidth=0.9)
             axes.set_ylabel("Perturbation\n(N·m)")
         above.set_xlim(time_s[0], min(time_s[0] + first_s, time_s[-1]))
         below.set_xlim(time_s[0], time_s[-1])
@@ -124,7 +123,7 @@ def spectrum(channel: Channel, wanted_hz: tuple[float, float]) -> Drawing:
         axes = figure.add_subplot()
         axes.axvspan(low, high, color=_BAND, alpha=0.12, linewidth=0)
         floor = density.max() * 1e-5
-        axes.loglog(frequency_hz, np.maximum(density, floor), color=_INK, linewidth=0.8)
+        axes.loglog(frequency_hz, np.maximum(density, floor), color=INK, linewidth=0.8)
         axes.set_ylim(floor, density.max() * 6)
         axes.set_xlim(min(frequency_hz[0], low / 2), max(frequency_hz[-1], 2 * high))
         axes.set_xlabel("Frequency (Hz)")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -18,7 +19,7 @@ from rigidimeter.reporting.contents import (
     from_study_folder,
     paragraph,
 )
-from rigidimeter.reporting.numbers import condition_name, interval, number, plural
+from rigidimeter.reporting.numbers import axis_unit, condition_name, interval, number, plural
 from rigidimeter.reporting.style import condition_colours, condition_markers, listed, note, styled
 from rigidimeter.study import Relation, StudyResult, agreement, relations, result_tables
 
@@ -85,10 +86,11 @@ def scatter(found: Sequence[Relation], order: Sequence[str]) -> Drawing:
         panels = np.atleast_1d(figure.subplots(1, len(found), sharey=True))
         for axes, one in zip(panels, found, strict=True):
             conditions = [condition_name(condition) for _, _, condition in one.visits]
+            factor, unit = axis_unit(one.values, one.measure.unit)
             for name in dict.fromkeys(conditions):
                 own = [k for k, other in enumerate(conditions) if other == name]
                 axes.plot(
-                    [one.values[k] for k in own],
+                    [factor * one.values[k] for k in own],
                     [one.ratings[k] for k in own],
                     markers[name],
                     color=colours[name],
@@ -97,7 +99,7 @@ def scatter(found: Sequence[Relation], order: Sequence[str]) -> Drawing:
                     alpha=0.85,
                     label=listed(name),
                 )
-            axes.set_xlabel(one.measure.label)
+            axes.set_xlabel(replace(one.measure, unit=unit).label)
             note(axes, _in_words(one))
         panels[0].set_ylabel("Rating less offsets")
         figure.legend(

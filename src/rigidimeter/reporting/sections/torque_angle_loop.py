@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from rigidimeter.estimation import Cycles, scoring_cycles
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
 from rigidimeter.reporting.numbers import condition_name, number
-from rigidimeter.reporting.representative import analysed_epoch, place, representatives, slug
-from rigidimeter.reporting.style import condition_colours, note, styled
+from rigidimeter.reporting.representative import analysed_epoch, place, representatives
+from rigidimeter.reporting.style import condition_colours, listed, note, styled
 from rigidimeter.study import StudyResult
 
 _POINTS = 2000
@@ -30,21 +31,28 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         return
     yield paragraph(
         "Torque against angle during the imposed sinusoid, both band-pass filtered in the same "
-        "way. The area of a loop is the work of one cycle. All panels have the same axes."
+        "way. The area of a loop is the work of one cycle."
     )
-    limits = loop_limits(cycles for _, cycles in found)
-    for position, (score, cycles) in enumerate(found, start=1):
+    epochs, works = [], []
+    for score, cycles in found:
         name = condition_name(score.condition)
-        work = f"{number(score.work_j)} J"
-        yield Figure(
-            f"loop_{position}_{slug(score.condition)}",
-            f"{name}: {place(result, score)}, the included epoch with the median work; "
-            f"{cycles.n_cycles} cycles.",
-            f"{name}: torque against angle of epoch {score.epoch}, {cycles.n_cycles} cycles "
-            f"at {number(cycles.frequency_hz, 3)} Hz, work {work} per cycle.",
-            partial(loop, cycles, colours[score.condition], limits, f"{work} per cycle"),
-            "small",
+        works.append(f"{name}: {number(score.work_j)} J per cycle")
+        epochs.append(
+            f"{name}: {place(result, score)}, {cycles.n_cycles} cycles at "
+            f"{number(cycles.frequency_hz, 3)} Hz"
         )
+    yield Figure(
+        "loops",
+        f"The included epochs with the median work. {'; '.join(epochs)}.",
+        f"Torque against angle. {'; '.join(works)}. {'; '.join(epochs)}.",
+        partial(
+            loops,
+            [
+                (words, cycles, colours[score.condition])
+                for words, (score, cycles) in zip(works, found, strict=True)
+            ],
+        ),
+    )
 
 
 def loop_limits(epochs: Iterable[Cycles]) -> tuple[float, float]:
@@ -54,6 +62,24 @@ def loop_limits(epochs: Iterable[Cycles]) -> tuple[float, float]:
         for c in epochs
     ]
     return 1.08 * max(angle for angle, _ in sizes), 1.08 * max(torque for _, torque in sizes)
+
+
+def loops(shown: Sequence[tuple[str, Cycles, str]]) -> Drawing:
+    """Draw the loops of an epoch of each condition in one panel.
+
+    Parameters
+    ----------
+    shown : sequence of (str, Cycles, str)
+        What the legend says of an epoch, the cycles that were scored, and the colour.
+    """
+    limits = loop_limits(cycles for _, cycles, _ in shown)
+    with styled():
+        figure = Drawing(figsize=(5.2, 3.6))
+        axes = figure.add_subplot()
+        for label, cycles, colour in shown:
+            _draw(axes, cycles, colour, limits, listed(label))
+        figure.legend(loc="outside upper left", ncols=min(len(shown), 2))
+    return figure
 
 
 def loop(cycles: Cycles, colour: str, limits: tuple[float, float], remark: str = "") -> Drawing:
@@ -70,22 +96,24 @@ def loop(cycles: Cycles, colour: str, limits: tuple[float, float], remark: str =
     remark : str
         A few words above the axes.
     """
-    every = slice(None, None, max(1, cycles.time_s.size // _POINTS))
     with styled():
         figure = Drawing(figsize=(3.4, 3.0))
         axes = figure.add_subplot()
-        axes.plot(
-            np.degrees(cycles.angle_rad[every]),
-            cycles.torque_nm[every],
-            color=colour,
-            linewidth=0.8,
-        )
-        axes.set_xlim(-limits[0], limits[0])
-        axes.set_ylim(-limits[1], limits[1])
-        axes.set_xlabel("Angle (deg)")
-        axes.set_ylabel("Torque (N·m)")
+        _draw(axes, cycles, colour, limits)
         note(axes, remark)
     return figure
+
+
+def _draw(
+    axes: Axes, cycles: Cycles, colour: str, limits: tuple[float, float], label: str = ""
+) -> None:
+    every = slice(None, None, max(1, cycles.time_s.size // _POINTS))
+    angle_deg, torque_nm = np.degrees(cycles.angle_rad[every]), cycles.torque_nm[every]
+    axes.plot(angle_deg, torque_nm, color=colour, linewidth=0.8, label=label or None)
+    axes.set_xlim(-limits[0], limits[0])
+    axes.set_ylim(-limits[1], limits[1])
+    axes.set_xlabel("Angle (deg)")
+    axes.set_ylabel("Torque (N·m)")
 
 
 SECTION = Section("loops", "Torque–angle loops", _blocks)

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
 from rigidimeter.estimation import Signals, epoch_signals
-from rigidimeter.records import Channel, Fit
+from rigidimeter.records import Fit
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
 from rigidimeter.reporting.method_words import is_least_squares
-from rigidimeter.reporting.numbers import condition_name, number
+from rigidimeter.reporting.numbers import amount, condition_name, number
 from rigidimeter.reporting.representative import (
     analysed_epoch,
     origin_s,
@@ -22,8 +22,7 @@ from rigidimeter.reporting.representative import (
     representative_fits,
     slug,
 )
-from rigidimeter.reporting.sections.perturbation_figure import changes, drawable_perturbation
-from rigidimeter.reporting.style import GREY, condition_colours, note, styled
+from rigidimeter.reporting.style import GREY, INK, condition_colours, note, styled
 from rigidimeter.study import StudyResult
 
 Array = NDArray[np.float64]
@@ -56,14 +55,15 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     limit_nm = max(torque_limit_nm(signals, fit, WINDOW_S) for fit, _, signals in found)
     for position, (fit, epoch, signals) in enumerate(found, start=1):
         name = condition_name(fit.condition)
+        stiffness = amount(fit.stiffness_nm_rad, "N·m/rad", 3)
         vaf = f"{number(fit.vaf_percent)} %"
         yield Figure(
             f"torque_{position}_{slug(fit.condition)}",
-            f"{name}: {place(result, fit)}, the included epoch with the median VAF ({vaf}); its "
-            f"first {WINDOW_S:g} s in the band {_hz(signals.band_hz)}"
+            f"{name}: {place(result, fit)}, the included epoch with the median stiffness "
+            f"({stiffness}); its first {WINDOW_S:g} s in the band {_hz(signals.band_hz)}"
             f"{_fitted_elsewhere(signals, fit)}.",
-            f"{name}: measured and modelled torque of epoch {fit.epoch}, and the terms of inertia, "
-            f"damping and stiffness. VAF {vaf}.",
+            f"{name}: measured and modelled torque of epoch {fit.epoch}, what the model leaves, "
+            f"and the terms of inertia, damping and stiffness. K {stiffness}, VAF {vaf}.",
             partial(
                 torque_parts,
                 signals,
@@ -72,7 +72,6 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
                 origin_s=origin_s(epoch),
                 window_s=WINDOW_S,
                 limit_nm=limit_nm,
-                perturbation=drawable_perturbation(epoch),
             ),
             "tall",
         )
@@ -102,7 +101,7 @@ def _parts(signals: Signals, fit: Fit) -> tuple[Array, Array, Array]:
 
 
 def torque_limit_nm(signals: Signals, fit: Fit, window_s: float) -> float:
-    """Return the largest size of any torque that `torque_parts` would draw."""
+    """Return the largest size of any torque that `torque_parts` draws."""
     shown = _window(signals, window_s)
     parts = _parts(signals, fit)
     residual = signals.torque_nm - (parts[0] + parts[1] + parts[2])
@@ -119,9 +118,8 @@ def torque_parts(
     origin_s: float,
     window_s: float,
     limit_nm: float,
-    perturbation: Channel | None = None,
 ) -> Drawing:
-    """Draw the torque of an epoch and what inertia, damping and stiffness contribute.
+    """Draw the torque of an epoch, the model, the residual below, and the terms of the model.
 
     The panel of each term also shows what is left for it to explain: the measured torque less the
     two other terms of the model.
@@ -140,8 +138,6 @@ def torque_parts(
         How much is shown, from the first sample of the signals.
     limit_nm : float
         The vertical axes reach from minus to plus this.
-    perturbation : Channel or None
-        Drawn in a panel of its own where it was recorded.
     """
     shown = _window(signals, window_s)
     time_s = signals.time_s[shown] - origin_s
@@ -149,26 +145,26 @@ def torque_parts(
     model = parts[0] + parts[1] + parts[2]
     residual = signals.torque_nm - model
     titles = (
-        f"Inertia term J θ″, J = {fit.inertia_kg_m2:.4g} kg·m²",
-        f"Damping term B θ′, B = {fit.damping_nm_s_rad:.4g} N·m·s/rad",
-        f"Stiffness term K θ, K = {fit.stiffness_nm_rad:.4g} N·m/rad",
+        f"Inertia term J θ″, J = {amount(fit.inertia_kg_m2, 'kg·m²')}",
+        f"Damping term B θ′, B = {amount(fit.damping_nm_s_rad, 'N·m·s/rad')}",
+        f"Stiffness term K θ, K = {amount(fit.stiffness_nm_rad, 'N·m/rad')}",
     )
     with styled():
-        rows = 4 if perturbation is None else 5
-        figure = Drawing(figsize=(7.4, 1.5 * rows + 0.3))
-        panels = list(figure.subplots(rows, 1, sharex=True))
-        if perturbation is not None:
-            _draw_perturbation(panels.pop(0), perturbation, origin_s)
-        top, *below = panels
+        figure = Drawing(figsize=(7.4, 7.4))
+        panels = list(figure.subplots(5, 1, sharex=True, height_ratios=(1.4, 0.7, 1, 1, 1)))
+        top, left, *below = panels
         _pair(top, time_s, signals.torque_nm[shown], model[shown], colour, ("measured", "model"))
         top.set_title("Torque")
         note(top, f"VAF {fit.vaf_percent:.4g} %, R² {fit.r_squared:.4g}")
+        left.plot(time_s, residual[shown], color=INK, linewidth=0.8)
+        left.set_title("Residual: measured less model")
         for axes, title, part in zip(below, titles, parts, strict=True):
             labels = ("measured less the other terms", "this term of the model")
             _pair(axes, time_s, (residual + part)[shown], part[shown], colour, labels)
             axes.set_title(title)
         for axes in panels:
-            axes.set_ylim(-1.35 * limit_nm, 1.35 * limit_nm)
+            reach = 0.7 if axes is left else 1.35
+            axes.set_ylim(-reach * limit_nm, reach * limit_nm)
             axes.set_ylabel("Torque (N·m)")
         below[-1].set_xlabel("Time since the start of the epoch (s)")
         below[-1].set_xlim(time_s[0], time_s[-1])
@@ -183,16 +179,9 @@ def _pair(
     colour: str,
     labels: tuple[str, str],
 ) -> None:
-    axes.plot(time_s, measured, color=GREY, linewidth=1.0, alpha=0.75, label=labels[0])
-    axes.plot(time_s, model, color=colour, linewidth=1.2, dashes=(4, 1), label=labels[1])
+    axes.plot(time_s, measured, color=GREY, linewidth=2.4, alpha=0.45, label=labels[0])
+    axes.plot(time_s, model, color=colour, linewidth=0.9, label=labels[1])
     axes.legend(loc="upper right", ncols=2, borderaxespad=0.1)
-
-
-def _draw_perturbation(axes: Axes, channel: Channel, origin_s: float) -> None:
-    time_s, values = changes(channel)
-    axes.step(time_s - origin_s, values, where="post", color="#222222", linewidth=0.9)
-    axes.set_title("Perturbation")
-    axes.set_ylabel("Torque (N·m)")
 
 
 SECTION = Section("torque", "Measured and modelled torque", _blocks)
