@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from rigidimeter.cli.inputs import keep_inputs
-from rigidimeter.cli.options import Recordings, reads_recordings
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.errors import UserError
 
 _SHOWN = 20

@@ -13,7 +13,7 @@ from rigidimeter.cli.commission import claimed, table
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.tables import show
+from rigidimeter.cli.terminal_tables import show
 from rigidimeter.errors import UserError
 
 

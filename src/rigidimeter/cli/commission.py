@@ -17,7 +17,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.tables import Table, show
+from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

@@ -17,15 +17,10 @@ from rigidimeter.cli.inputs import (
     study_files,
     study_of,
 )
-from rigidimeter.cli.options import (
-    CsvOption,
-    JsonOption,
-    KeyOption,
-    Recordings,
-    reads_recordings,
-)
+from rigidimeter.cli.options import CsvOption, JsonOption, KeyOption
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.tables import show
+from rigidimeter.cli.reading_options import Recordings, reads_recordings
+from rigidimeter.cli.terminal_tables import show
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

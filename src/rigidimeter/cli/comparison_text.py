@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from rigidimeter.cli.tables import Block, Heading, Table, number_text
+from rigidimeter.cli.terminal_tables import Block, Heading, Table, number_text
 
 if TYPE_CHECKING:
     from rigidimeter.study import RatingsFound, StudyResult

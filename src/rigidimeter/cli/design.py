@@ -10,7 +10,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import JsonOption, SettingsOption
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.tables import show
+from rigidimeter.cli.terminal_tables import show
 
 
 def design(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from rigidimeter.cli.tables import Block, Heading, Table
+from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.dynamics import Margins
 from rigidimeter.experiment import (
     Candidate,

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.inputs import analyse_recordings, keep_inputs, say_analysed
-from rigidimeter.cli.options import CsvOption, JsonOption, Recordings, reads_recordings
-from rigidimeter.cli.tables import Block, Heading, Table, number_text, show, with_error
+from rigidimeter.cli.options import CsvOption, JsonOption
+from rigidimeter.cli.reading_options import Recordings, reads_recordings
+from rigidimeter.cli.terminal_tables import Block, Heading, Table, number_text, show, with_error
 
 if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Score

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.inputs import analyse_recordings, say, say_analysed, study_of
-from rigidimeter.cli.options import KeyOption, Recordings, reads_recordings
+from rigidimeter.cli.options import KeyOption
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

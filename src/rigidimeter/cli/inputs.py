@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rigidimeter.cli.options import Recordings
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.reading_options import Recordings
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
@@ -19,25 +19,8 @@ if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Notice, Score
     from rigidimeter.study import StudyResult
 
-_OF_RECORDINGS = (
-    "column",
-    "unit",
-    "scale",
-    "offset",
-    "mapping",
-    "join",
-    "clock_offset",
-    "skip_rows",
-    "names",
-    "table",
-    "rate_hz",
-    "reaction",
-    "epoch_length_s",
-    "condition",
-    "task",
-    "leave_out",
-)
-"""Options that say how to read a single recording."""
+_OF_STUDIES_TOO = ("paths", "method", "band_hz", "controller", "settings")
+"""Fields of `Recordings` that do not say how to read a single recording."""
 
 
 def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysis]:
@@ -161,8 +144,8 @@ def study_of(recordings: Recordings, key: Path | None) -> Path | None:
             f"{studies[0]}: is a study folder and names its own recordings; give it alone, or add "
             "the other recordings to its sessions.csv"
         )
-    for name in _OF_RECORDINGS:
-        if getattr(recordings, name):
+    for name, given in vars(recordings).items():
+        if given and name not in _OF_STUDIES_TOO:
             raise UserError(
                 f"--{name.replace('_', '-')}: is for single recordings; those of a study folder "
                 "are session folders or files that a mapping in study.toml describes"

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
-from rigidimeter.cli.options import Recordings, reads_recordings
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.tables import Table, show
+from rigidimeter.cli.reading_options import Recordings, reads_recordings
+from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
-from rigidimeter.cli.options import JsonOption, Recordings, reads_recordings
+from rigidimeter.cli.options import JsonOption
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.tables import Block, Heading, Table, show, with_error
+from rigidimeter.cli.reading_options import Recordings, reads_recordings
+from rigidimeter.cli.terminal_tables import Block, Heading, Table, show, with_error
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

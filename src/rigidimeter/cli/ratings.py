@@ -11,7 +11,7 @@ import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption
-from rigidimeter.cli.tables import Block, Heading, Table, show
+from rigidimeter.cli.terminal_tables import Block, Heading, Table, show
 
 if TYPE_CHECKING:
     from rigidimeter.study import RatingsFound

@@ -1,134 +1,315 @@
-"""Options that say how a recording is read."""
+"""The options that say how recordings are read and fitted, and what they make of a command."""
 
 from __future__ import annotations
 
+import functools
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, cast, get_type_hints
 
 import typer
 
-ColumnOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--column",
-        metavar="NAME=COLUMN",
-        help="What the file calls a quantity, for example torque=Fz; torque_nm=Fz says that it "
-        "is in N·m. Repeat as needed.",
-    ),
-]
-UnitOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--unit",
-        metavar="NAME=UNIT",
-        help="The unit of a column, where the file does not state it, for example angle=deg or "
-        "time=ms; repeat as needed.",
-    ),
-]
-ScaleOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--scale",
-        metavar="NAME=FACTOR",
-        help='What a column is multiplied by, for example "torque=2.5 Nm/V", or "torque=0.25 '
-        'm" for a force with a lever arm; repeat as needed.',
-    ),
-]
-OffsetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--offset",
-        metavar="NAME=VALUE",
-        help='What a column reads at zero, for example "torque=0.1 V"; repeat as needed.',
-    ),
-]
-SkipRowsOption = Annotated[
-    int,
-    typer.Option(
-        "--skip-rows", metavar="N", min=0, help="Lines at the beginning of a text not to read."
-    ),
-]
-NamesOption = Annotated[
-    str | None,
-    typer.Option(
-        "--names",
-        metavar="A,B,...",
-        help="The names of the columns of a text that does not name them.",
-    ),
-]
-TableOption = Annotated[
-    str | None,
-    typer.Option("--table", metavar="NAME", help="The sheet that is read, of a file with several."),
-]
-MappingOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--mapping",
-        metavar="FILE",
-        help="A mapping file, which says columns, units and the like for the files of one "
-        "laboratory; `rigidimeter inspect` writes one.",
-    ),
-]
-JoinOption = Annotated[
-    bool,
-    typer.Option(
-        "--join", help="The inputs are one recording, such as torque and motion in two files."
-    ),
-]
-ClockOffsetOption = Annotated[
-    str | None,
-    typer.Option(
-        "--clock-offset",
-        metavar="S|found",
-        help="With --join: seconds to add to the clocks of the second and later inputs; found: "
-        "estimated from torque and motion.",
-    ),
-]
-RateHzOption = Annotated[
-    float | None,
-    typer.Option(
-        "--rate-hz", metavar="HZ", help="Sampling rate of a file without a time_s column."
-    ),
-]
-ReactionOption = Annotated[
-    bool,
-    typer.Option(
-        "--reaction",
-        help="The file holds the reaction torque of the joint, the negative of the torque that "
-        "drives it.",
-    ),
-]
-EpochLengthSOption = Annotated[
-    float | None,
-    typer.Option(
-        "--epoch-length-s",
-        metavar="S",
-        help="Cut a file without an epoch column into epochs of this length.",
-    ),
-]
-ConditionOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--condition",
-        metavar="NAME",
-        help="Condition of files without a condition column: once for all of them, or once "
-        "for each input in their order.",
-    ),
-]
-TaskOption = Annotated[
-    str | None,
-    typer.Option(
-        "--task",
-        metavar="prbs|sinusoid",
-        help="Fit J, B and K (prbs) or score (sinusoid). Default: found from the motion.",
-    ),
-]
-LeaveOutOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--leave-out",
-        metavar='"[NAME=]START:STOP REASON"',
-        help="Seconds on the recording's clock that no estimate uses, for example "
-        '"12.3:14.0 cough"; NAME is a recording, where there are several. Repeat as needed.',
-    ),
-]
+from rigidimeter.cli.options import SettingsOption
+from rigidimeter.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.recording import Recording
+    from rigidimeter.records import Task
+    from rigidimeter.settings import Settings
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """What the user named, and how to read and fit it; the fields are options of the commands."""
+
+    paths: Annotated[
+        list[Path], typer.Argument(metavar="INPUT", help="What to read.", show_default=False)
+    ]
+    method: Annotated[
+        str, typer.Option("--method", metavar="NAME", help="The estimator, by its name.")
+    ] = "auto"
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--column",
+            metavar="NAME=COLUMN",
+            help="What the file calls a quantity, for example torque=Fz; torque_nm=Fz says that it "
+            "is in N·m. Repeat as needed.",
+        ),
+    ] = None
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--unit",
+            metavar="NAME=UNIT",
+            help="The unit of a column, where the file does not state it, for example angle=deg or "
+            "time=ms; repeat as needed.",
+        ),
+    ] = None
+    scale: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--scale",
+            metavar="NAME=FACTOR",
+            help='What a column is multiplied by, for example "torque=2.5 Nm/V", or "torque=0.25 '
+            'm" for a force with a lever arm; repeat as needed.',
+        ),
+    ] = None
+    offset: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--offset",
+            metavar="NAME=VALUE",
+            help='What a column reads at zero, for example "torque=0.1 V"; repeat as needed.',
+        ),
+    ] = None
+    skip_rows: Annotated[
+        int,
+        typer.Option(
+            "--skip-rows", metavar="N", min=0, help="Lines at the beginning of a text not to read."
+        ),
+    ] = 0
+    names: Annotated[
+        str | None,
+        typer.Option(
+            "--names",
+            metavar="A,B,...",
+            help="The names of the columns of a text that does not name them.",
+        ),
+    ] = None
+    table: Annotated[
+        str | None,
+        typer.Option(
+            "--table", metavar="NAME", help="The sheet that is read, of a file with several."
+        ),
+    ] = None
+    mapping: Annotated[
+        Path | None,
+        typer.Option(
+            "--mapping",
+            metavar="FILE",
+            help="A mapping file, which says columns, units and the like for the files of one "
+            "laboratory; `rigidimeter inspect` writes one.",
+        ),
+    ] = None
+    join: Annotated[
+        bool,
+        typer.Option(
+            "--join", help="The inputs are one recording, such as torque and motion in two files."
+        ),
+    ] = False
+    clock_offset: Annotated[
+        str | None,
+        typer.Option(
+            "--clock-offset",
+            metavar="S|found",
+            help="With --join: seconds to add to the clocks of the second and later inputs; found: "
+            "estimated from torque and motion.",
+        ),
+    ] = None
+    rate_hz: Annotated[
+        float | None,
+        typer.Option(
+            "--rate-hz", metavar="HZ", help="Sampling rate of a file without a time_s column."
+        ),
+    ] = None
+    reaction: Annotated[
+        bool,
+        typer.Option(
+            "--reaction",
+            help="The file holds the reaction torque of the joint, the negative of the torque that "
+            "drives it.",
+        ),
+    ] = False
+    epoch_length_s: Annotated[
+        float | None,
+        typer.Option(
+            "--epoch-length-s",
+            metavar="S",
+            help="Cut a file without an epoch column into epochs of this length.",
+        ),
+    ] = None
+    condition: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--condition",
+            metavar="NAME",
+            help="Condition of files without a condition column: once for all of them, or once "
+            "for each input in their order.",
+        ),
+    ] = None
+    task: Annotated[
+        str | None,
+        typer.Option(
+            "--task",
+            metavar="prbs|sinusoid",
+            help="Fit J, B and K (prbs) or score (sinusoid). Default: found from the motion.",
+        ),
+    ] = None
+    leave_out: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--leave-out",
+            metavar='"[NAME=]START:STOP REASON"',
+            help="Seconds on the recording's clock that no estimate uses, for example "
+            '"12.3:14.0 cough"; NAME is a recording, where there are several. Repeat as needed.',
+        ),
+    ] = None
+    band_hz: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            "--band-hz",
+            metavar="LOW HIGH",
+            help="Band of the fit. Default: bandlimited 0.15 to 10 where the perturbation is "
+            "known, else to 50; iv and spectral 0.15 to 30; at most 0.4 times the slowest "
+            "channel's rate.",
+        ),
+    ] = None
+    controller: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            "--controller",
+            metavar="J_C B_C",
+            help="Inertia in kg·m² and damping in N·m·s/rad of the admittance, for files without "
+            "a manifest. Default: those of the settings, else the paper's. A wrong value makes iv "
+            "less precise but does not bias it.",
+        ),
+    ] = None
+    settings: SettingsOption = None
+
+    def read(self) -> Recording:
+        """Read every input, with the band and the controller of the options in its settings.
+
+        Raises
+        ------
+        UserError
+            If an option is wrong, or not one input can be read.
+        """
+        from rigidimeter.recording import read
+
+        recording = read(
+            self.paths,
+            condition=self.condition,
+            leave_out=self.leave_out or (),
+            settings=self.settings,
+            join=self.join,
+            clock_offset=self.asked_clock_offset,
+            **self.of_files(),
+        )
+        return replace(recording, settings=self.adjust(recording.settings))
+
+    @property
+    def asked_clock_offset(self) -> float | str | None:
+        """The clock offset in s, or ``found``."""
+        try:
+            return None if self.clock_offset is None else float(self.clock_offset)
+        except ValueError:
+            return self.clock_offset
+
+    def of_files(self) -> dict[str, Any]:
+        """Return the arguments of `recording.read` that say how a file is read.
+
+        Raises
+        ------
+        UserError
+            If an option is not written as NAME=VALUE.
+        """
+        return {
+            "column": _pairs("column", self.column, "torque=Fz"),
+            "unit": _pairs("unit", self.unit, "angle=deg"),
+            "scale": _pairs("scale", self.scale, "'torque=2.5 Nm/V'"),
+            "offset": _pairs("offset", self.offset, "'torque=0.1 V'"),
+            "rate_hz": self.rate_hz,
+            "reaction": self.reaction,
+            "epoch_length_s": self.epoch_length_s,
+            "task": cast("Task | None", self.task),
+            "skip_rows": self.skip_rows,
+            "names": [name.strip() for name in self.names.split(",")] if self.names else (),
+            "table": self.table or "",
+            "mapping": self.mapping,
+        }
+
+    def adjust(self, settings: Settings) -> Settings:
+        """Return settings with the band and the controller of the options.
+
+        Raises
+        ------
+        UserError
+            If a value is out of its range.
+        """
+        from rigidimeter.settings import changed_settings
+
+        for option, change in self._changes():
+            settings = changed_settings(settings, change, option)
+        return settings
+
+    def changes(self) -> dict[str, Any]:
+        """Return the band and the controller of the options as values of settings.
+
+        Raises
+        ------
+        UserError
+            If a value is out of its range.
+        """
+        from rigidimeter.settings import Settings
+
+        self.adjust(Settings())
+        return {table: values for _, change in self._changes() for table, values in change.items()}
+
+    def _changes(self) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Yield what each option changes in the settings, with the option as it was given."""
+        if self.band_hz is not None:
+            low, high = self.band_hz
+            band = {
+                "band_low_hz": low,
+                "band_high_hz": high,
+                "band_high_unknown_hz": high,
+                "band_high_closed_loop_hz": high,
+            }
+            yield f"--band-hz {low:g} {high:g}", {"estimation": band}
+        if self.controller is not None:
+            inertia, damping = self.controller
+            values = {"inertia_kg_m2": inertia, "damping_nm_s_rad": damping}
+            yield f"--controller {inertia:g} {damping:g}", {"controller": values}
+
+
+def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:
+    """Replace a command's first parameter, a `Recordings`, by the options that make one."""
+    shared = inspect.signature(Recordings).parameters
+    own = list(inspect.signature(command).parameters.values())[1:]
+    hints = {
+        **get_type_hints(command, include_extras=True),
+        **get_type_hints(Recordings, include_extras=True),
+    }
+
+    @functools.wraps(command)
+    def with_options(**given: object) -> None:
+        reading = {name: given.pop(name) for name in shared}
+        command(Recordings(**reading), **given)  # type: ignore[arg-type]
+
+    with_options.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [
+            parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=hints[parameter.name])
+            for parameter in (*shared.values(), *own)
+        ]
+    )
+    with_options.__annotations__ = {**hints, "return": None}
+    del with_options.__wrapped__
+    return with_options
+
+
+def _pairs(option: str, pairs: list[str] | None, example: str) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for pair in pairs or ():
+        name, equals, text = pair.partition("=")
+        if not (name and equals and text):
+            raise UserError(
+                f"--{option} {pair}: write NAME={'COLUMN' if option == 'column' else 'VALUE'}, for "
+                f"example --{option} {example}"
+            )
+        if name in found:
+            raise UserError(f"--{option} {pair}: {name} was already given as {found[name]}")
+        found[name] = text
+    return found

@@ -17,9 +17,10 @@ from rigidimeter.cli.inputs import (
     say_analysed,
     study_of,
 )
-from rigidimeter.cli.options import KeyOption, Recordings, reads_recordings
+from rigidimeter.cli.options import KeyOption
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.tables import Heading, show
+from rigidimeter.cli.reading_options import Recordings, reads_recordings
+from rigidimeter.cli.terminal_tables import Heading, show
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

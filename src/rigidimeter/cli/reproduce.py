@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.tables import Heading, Table, show
+from rigidimeter.cli.terminal_tables import Heading, Table, show
 from rigidimeter.errors import UserError
 
 

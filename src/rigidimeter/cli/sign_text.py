@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from rigidimeter.cli.progress import Meter
-from rigidimeter.cli.tables import Block, Table
+from rigidimeter.cli.terminal_tables import Block, Table
 from rigidimeter.guard import Cause
 
 if TYPE_CHECKING:

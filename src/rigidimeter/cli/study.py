@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.inputs import analyse_study_folder
-from rigidimeter.cli.options import NewStudyOption, Recordings, StudySeedOption
+from rigidimeter.cli.options import NewStudyOption, StudySeedOption
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.reading_options import Recordings
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:

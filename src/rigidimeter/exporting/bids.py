@@ -23,8 +23,7 @@ import pyarrow.compute
 import pyarrow.csv
 
 from rigidimeter.documents import write_json, write_text
-from rigidimeter.exporting.document_tables import document_tables
-from rigidimeter.exporting.exclusion_reasons import exclusion_reasons
+from rigidimeter.exporting.document_tables import document_tables, exclusion_reasons
 from rigidimeter.exporting.names import entities, joined, label
 from rigidimeter.recording.exported_session import ExportedSession, Stream
 

@@ -33,6 +33,19 @@ def document_tables(about: Mapping[str, Any]) -> dict[str, list[Row]]:
     return {name: rows for name, rows in tables.items() if rows}
 
 
+def exclusion_reasons(about: Mapping[str, Any]) -> dict[str, str]:
+    """Return why epochs do not count, by label: as they ended, or as the estimation found."""
+    estimates = about.get("estimates") or {}
+    results = [*estimates.get("epochs", ()), *estimates.get("scores", ())]
+    found = [(each["epoch"], each) for each in results]
+    found += [(each["label"], each) for each in about["epochs"]]
+    return {
+        name: str(each["reason"]) or str(each["outcome"])
+        for name, each in found
+        if each["outcome"] != "included"
+    }
+
+
 def columns_of(rows: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
     """Return rows as columns: numbers with NaN, or texts with an empty one, where there is none."""
     listed = list(rows)

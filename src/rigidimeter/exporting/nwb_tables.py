@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rigidimeter.exporting.document_tables import columns_of, document_tables
-from rigidimeter.exporting.exclusion_reasons import exclusion_reasons
+from rigidimeter.exporting.document_tables import columns_of, document_tables, exclusion_reasons
 
 if TYPE_CHECKING:
     from pynwb import NWBFile

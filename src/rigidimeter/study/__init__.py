@@ -17,7 +17,7 @@ from rigidimeter.study.comparison import (
 from rigidimeter.study.conclusions import Conclusion, Conclusions, conclude, conclusion_rows
 from rigidimeter.study.dependence import Dependence, dependences
 from rigidimeter.study.differences import Difference
-from rigidimeter.study.doubts import doubt_sentence
+from rigidimeter.study.doubted_epochs import doubt_sentence
 from rigidimeter.study.leading_effect import Leader, leader
 from rigidimeter.study.measures import MEASURES, RATING, Measure, Observation, conditions
 from rigidimeter.study.provenance import provenance

@@ -1,9 +1,10 @@
-"""The epochs and conditions of a comparison that a check doubts, and the doubt that comes first."""
+"""Which checks cast doubt on the epochs of an analysis, or of a comparison and its conditions."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from rigidimeter.records import Analysis, Finding, Fit
 from rigidimeter.study.compared import Comparison
@@ -29,6 +30,39 @@ ALIKE_IN_BOTH = ("between_samples", "varying_between_epochs")
 """Checks that make no difference: of the rig, and of a scatter that is in the test."""
 
 Doubted = Mapping[tuple[str, str], Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A check that casts doubt on `epochs` of the `counting` epochs that count.
+
+    On none of them where it is the fit to all of them together that it casts doubt on.
+    """
+
+    check: str
+    epochs: int
+    counting: int
+
+
+def doubts(analysis: Analysis) -> tuple[Doubt, ...]:
+    """Return which checks cast doubt on epochs that count, those of most epochs first."""
+    counting = [fit for fit in analysis.fits if fit.outcome.included]
+    of_epochs = Counter(name for fit in counting for name in fit.doubts)
+    of_pool = {name for fit in analysis.pooled for name in fit.doubts}
+    names = [name for name, _ in of_epochs.most_common()]
+    names += sorted(of_pool - of_epochs.keys())
+    return tuple(Doubt(name, of_epochs[name], len(counting)) for name in names)
+
+
+def doubt_sentence(analysis: Analysis) -> list[str]:
+    """Return the sentence on doubts that goes with whatever is concluded; nothing without any."""
+    parts = [
+        f"{doubt.check} in {doubt.epochs} of {doubt.counting} epochs"
+        if doubt.epochs
+        else f"{doubt.check} in all epochs together"
+        for doubt in doubts(analysis)
+    ]
+    return [f"Checks cast doubt on J, B or K: {', '.join(parts)}."] if parts else []
 
 
 def doubted_epochs(c: Comparison, analysis: Analysis) -> Doubted:

@@ -11,8 +11,7 @@ from typing import Any, Literal
 
 from rigidimeter.records import Finding, Fit, Score
 from rigidimeter.study.conclusions import conclude
-from rigidimeter.study.doubted_epochs import ALIKE_IN_BOTH
-from rigidimeter.study.doubts import Doubt, doubts
+from rigidimeter.study.doubted_epochs import ALIKE_IN_BOTH, Doubt, doubts
 from rigidimeter.study.results import StudyResult
 
 Level = Literal["good", "caution", "poor"]

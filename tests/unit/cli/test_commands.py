@@ -11,7 +11,7 @@ from tests.unit.virtual.tiny import SHORT
 
 from rigidimeter.cli.estimate import estimate_blocks
 from rigidimeter.cli.study import _simulated
-from rigidimeter.cli.tables import text_lines
+from rigidimeter.cli.terminal_tables import text_lines
 from rigidimeter.records import Analysis, Fit, Outcome, Score
 from rigidimeter.study import compare_analysis
 from rigidimeter.virtual.study_design import two_day_design

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rigidimeter.cli.sign_text import found_blocks, sign_blocks
-from rigidimeter.cli.tables import text_lines
+from rigidimeter.cli.terminal_tables import text_lines
 from rigidimeter.commissioning import Search, TurnedEpochs
 from rigidimeter.commissioning.checks import below
 from rigidimeter.commissioning.static_tests import NOISE, measured_noise_nm

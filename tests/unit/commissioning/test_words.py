@@ -9,7 +9,7 @@ import pytest
 
 from rigidimeter.cli.commission import commission as command
 from rigidimeter.cli.commission import table
-from rigidimeter.cli.tables import text_lines
+from rigidimeter.cli.terminal_tables import text_lines
 from rigidimeter.commissioning.checks import above, below, untried
 from rigidimeter.commissioning.coverage import check_record
 from rigidimeter.errors import UserError

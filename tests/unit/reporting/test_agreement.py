@@ -14,7 +14,7 @@ from tests.unit.reporting.parsed_page import ParsedPage
 
 from rigidimeter.cli.comparison_text import comparison_blocks
 from rigidimeter.cli.estimate import estimate_blocks
-from rigidimeter.cli.tables import Block, Table, text_lines
+from rigidimeter.cli.terminal_tables import Block, Table, text_lines
 from rigidimeter.documents import read_json, write_json
 from rigidimeter.recording import estimates_document
 from rigidimeter.reporting import SECTIONS

@@ -13,7 +13,7 @@ from tests.unit.reporting.test_agreement import assert_shows, cells_below
 
 from rigidimeter.cli.comparison_text import comparison_blocks
 from rigidimeter.cli.estimate import estimate_blocks
-from rigidimeter.cli.tables import Table, text_lines
+from rigidimeter.cli.terminal_tables import Table, text_lines
 from rigidimeter.documents import read_json, write_json
 from rigidimeter.reporting import page as page_module
 from rigidimeter.reporting.first_screen import difference_words, gravest_words, light_words

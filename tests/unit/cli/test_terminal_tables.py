@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigidimeter.cli.tables import Heading, Table, paragraph, show, text_lines
+from rigidimeter.cli.terminal_tables import Heading, Table, paragraph, show, text_lines
 
 NUMBERS = Table(
     ("epoch", "condition", "J\n10⁻³ kg·m²", "K\nN·m/rad"),
