@@ -147,7 +147,8 @@ def _planned(desk: Desk, request: StartRequest, source: Path | None) -> PlannedS
 
     if request.settings is None:
         virtual = desk.place.rig is None
-        planned = rest_of_session(desk.place.root / request.resume, virtual=virtual)
+        folder = desk.place.root / request.resume
+        planned = rest_of_session(folder, virtual=virtual, epoch=request.epoch)
     else:
         planned = new_session(request.settings, request.about, source)
     lost_s = min(SILENT_S, planned.settings.loop.console_lost_s)

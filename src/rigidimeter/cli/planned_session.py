@@ -64,18 +64,18 @@ def new_session(
     return PlannedSession(settings, planned, about=about, source=source)
 
 
-def rest_of_session(resume: Path, *, virtual: bool) -> PlannedSession:
-    """Return what is left of a session.
+def rest_of_session(resume: Path, *, virtual: bool, epoch: int | None = None) -> PlannedSession:
+    """Return what is left of a session, or one epoch of it again.
 
     Raises
     ------
     UserError
-        If nothing is, or it was recorded on another kind of rig.
+        If nothing is left, or it was recorded on another kind of rig.
     """
     from rigidimeter.experiment import Protocol
-    from rigidimeter.recording.resume import rest_of
+    from rigidimeter.recording.resume import again, rest_of
 
-    rest = rest_of(resume)
+    rest = rest_of(resume) if epoch is None else again(resume, epoch)
     if rest.virtual != virtual:
         raise UserError(
             f"{resume}: was recorded on "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +106,25 @@ def rest_of(folder: Path) -> Rest:
             **origin,
         },
     )
+
+
+def again(folder: Path, number: int) -> Rest:
+    """Return one epoch of a session, however it ended, to be run again.
+
+    Raises
+    ------
+    UserError
+        As `rest_of`, and if the session has no such epoch.
+    """
+    rest = rest_of(folder)
+    for event in _events(folder, read_manifest(folder)):
+        if event.get("event") == "epoch_started" and event["epoch"] == number:
+            label = str(event["label"]).removesuffix("r")
+            planned = (PlannedEpoch(**entry) for entry in read_manifest(folder)["protocol"])
+            found = next((epoch for epoch in planned if epoch.label == label), None)
+            if found is not None:
+                return replace(rest, epochs=(found,), done=0)
+    raise UserError(f"{folder}: no epoch {number} of its plan was run")
 
 
 def _unplanned(folder: Path, entry: Any) -> UserError:

@@ -1,33 +1,168 @@
-"""The part of the page after a session: what the folder of sessions holds."""
+"""The part of the page after a session: the sessions of the folder, their epochs, what to do."""
 
 from __future__ import annotations
 
+import json
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 from nicegui import ui
 
-from rigidimeter.console.page.desk import Desk
+from rigidimeter.console.page.desk import Desk, StartRequest
+from rigidimeter.console.page.epoch_traces import epoch_traces
+from rigidimeter.console.page.sessions_found import (
+    FoundEpoch,
+    FoundSession,
+    exclude,
+    found_sessions,
+)
+from rigidimeter.console.page.work import Work
+from rigidimeter.errors import UserError
 
 
 class AfterView:
-    """How the last session ended.
+    """The sessions as one page shows them.
 
     Parameters
     ----------
     desk : Desk
+    work : Work
+    in_control : callable
+        Whether the page may act.
     """
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
-        ui.label(f"Sessions are in {desk.place.root}").classes("text-lg")
-        ui.timer(1.0, self._show)
-        self._last = ui.label("")
-        self._next = ui.label("")
+    def __init__(self, desk: Desk, work: Work, in_control: Callable[[], bool]) -> None:
+        self._desk, self._work, self._in_control = desk, work, in_control
+        self._root = desk.place.root
+        self._chosen = ""
+        self._shown = -1
+        ui.label(f"Sessions in {self._root}").classes("text-lg")
+        self._list()
+        self._answer = ui.html("", sanitize=False).classes("answer")
+        ui.element("div").props('id=epoch-panes aria-label="Epoch"')
+        ui.timer(1.0, self._follow)
 
-    def _show(self) -> None:
+    def _follow(self) -> None:
+        """Show the list anew when a session has ended."""
         finished = self._desk.finished
-        if finished is None:
+        if finished is not None and finished.number != self._shown and not self._desk.busy:
+            self._shown, self._chosen = finished.number, finished.folder.name
+            self._list.refresh()
+
+    @ui.refreshable_method
+    def _list(self) -> None:
+        sessions, problems = found_sessions(self._root)
+        for problem in problems:
+            ui.label(problem).classes("problem")
+        if not sessions:
+            ui.label("There is no session yet.")
+        for session in sessions:
+            self._session(session)
+
+    def _session(self, session: FoundSession) -> None:
+        how = session.outcome or session.reason
+        with ui.expansion(
+            f"{session.name}: {session.good} of {session.planned} epochs good, {how}",
+            value=session.name == self._chosen,
+        ).classes("w-full session"):
+            if session.reason:
+                ui.label(session.reason)
+            with ui.row():
+                if not session.outcome and not session.recording:
+                    ui.button("Recover", on_click=lambda: self._recover(session.name))
+                if session.good < session.planned and session.outcome:
+                    ui.button(
+                        f"Run what is left: {session.planned - session.good}",
+                        on_click=lambda: self._run(session.name),
+                    )
+                ui.button("Estimate", on_click=lambda: self._command("estimate", session.name))
+                ui.button("Report", on_click=lambda: self._report(session.name))
+            for epoch in session.epochs:
+                self._epoch(session, epoch)
+
+    def _epoch(self, session: FoundSession, epoch: FoundEpoch) -> None:
+        said = [f"epoch {epoch.label}", epoch.condition, epoch.task, epoch.outcome, epoch.reason]
+        if epoch.rating:
+            said.append(f"rated {epoch.rating}")
+        if epoch.excluded:
+            said.append(f"left out: {epoch.excluded}")
+        with ui.row().classes("items-center w-full"):
+            ui.label(" · ".join(filter(None, said))).classes("grow")
+            ui.button("Show", on_click=lambda: self._show(session.name, epoch.label))
+            if session.outcome:
+                ui.button("Repeat", on_click=lambda: self._run(session.name, epoch.number))
+            if not epoch.excluded:
+                ui.button("Leave out", on_click=lambda: self._ask_reason(session.name, epoch.label))
+
+    def _may_act(self) -> bool:
+        if self._in_control() and not self._desk.busy:
+            return True
+        ui.notify("not while a session runs, and only on the page in control")
+        return False
+
+    def _run(self, session: str, epoch: int | None = None) -> None:
+        """Run what is left of a session, or one epoch of it again, in a new folder."""
+        if not self._may_act():
             return
-        self._last.text = " ".join(finished.sentences)
-        self._next.text = (
-            f"rigidimeter report {finished.folder} --out report: the report; "
-            f"rigidimeter run --resume {finished.folder} --out NEW: the epochs that are left"
-        )
+        folder = f"{session.rpartition('-')[0] or session}-{time.strftime('%H%M%S')}"
+        self._desk.ask(StartRequest(folder, resume=session, epoch=epoch))
+
+    def _ask_reason(self, session: str, epoch: str) -> None:
+        with ui.dialog() as dialog, ui.card():
+            ui.label(f"Leave epoch {epoch} of {session} out of results; nothing is deleted.")
+            reason = ui.input("Reason").props("maxlength=200 data-field=reason")
+            by = ui.input("Your name").props("maxlength=40 data-field=by")
+
+            def leave_out() -> None:
+                if not self._may_act():
+                    return
+                try:
+                    exclude(self._root, session, epoch, reason.value, by.value)
+                except UserError as error:
+                    ui.notify(str(error))
+                    return
+                dialog.close()
+                self._chosen = session
+                self._list.refresh()
+
+            ui.button("Leave out", on_click=leave_out)
+        dialog.open()
+
+    async def _recover(self, session: str) -> None:
+        await self._command("recover", session)
+        self._list.refresh()
+
+    async def _report(self, session: str) -> None:
+        out = f"{session}-report"
+        await self._command("report", session, "--out", str(self._root / out))
+
+    async def _command(self, command: str, session: str, *options: str) -> None:
+        if not self._may_act():
+            return
+        self._answer.set_content("<p>computing …</p>")
+        answer = await self._work.command(command, str(self._root / session), *options)
+        self._answer.set_content(answer.html())
+
+    async def _show(self, session: str, epoch: str) -> None:
+        """Draw an epoch: raw signals, and measured and modelled torque with their difference."""
+        if self._desk.busy:
+            ui.notify("not while a session runs")
+            return
+        self._answer.set_content("<p>reading …</p>")
+        with tempfile.TemporaryDirectory(prefix="rigidimeter-epoch-") as name:
+            fitted = Path(name) / "torque.csv"
+            await self._work.command(
+                "estimate", str(self._root / session), "--subject-torque", str(fitted)
+            )
+            try:
+                panes: list[dict[str, Any]] = epoch_traces(self._root / session, epoch, fitted)
+            except UserError as error:
+                self._answer.set_content("")
+                ui.notify(str(error))
+                return
+        self._answer.set_content("")
+        title = json.dumps(f"{session}, epoch {epoch}")
+        ui.run_javascript(f"rigEpoch({title}, {json.dumps(panes)})")

@@ -170,7 +170,7 @@ class BeforeView:
         request = StartRequest(
             self._desk.place.one_session or folder,
             entered.settings,
-            entered.about,
+            {**entered.about, "blinded": self._blinded},
             blinded=self._blinded,
         )
         if not self._desk.ask(request):

@@ -35,6 +35,8 @@ class StartRequest:
         What was said of subject, operator, condition and stimulation.
     resume : str
         Name of the folder of the session to be continued; empty for none.
+    epoch : int or None
+        Of that session, the one epoch to be run again; None for all that are left.
     blinded : bool
         Whether the page names conditions by codes alone.
     """
@@ -43,6 +45,7 @@ class StartRequest:
     settings: Settings | None = None
     about: Mapping[str, Any] = field(default_factory=dict)
     resume: str = ""
+    epoch: int | None = None
     blinded: bool = False
 
 

@@ -30,6 +30,7 @@ def show_page(desk: Desk, work: Work, secret: str) -> None:
     def in_control() -> bool:
         return desk.presence.has_control(secret)
 
+    ui.colors(primary="#0050a0")  # white on it has a contrast of 8 to 1
     ui.add_head_html(
         f'<meta name="rig-page" content="{secret}">'
         f'<link rel="stylesheet" href="/assets/uPlot.min.css?{__version__}">'
@@ -41,7 +42,7 @@ def show_page(desk: Desk, work: Work, secret: str) -> None:
     with ui.element("section").classes("view").props("id=view-before"):
         BeforeView(desk, work, in_control)
     with ui.element("section").classes("view").props("id=view-after"):
-        AfterView(desk)
+        AfterView(desk, work, in_control)
 
 
 @cache

@@ -152,6 +152,26 @@
     requestAnimationFrame(draw);
   }
 
+  // Lines are told apart by their dashes too.
+  const DASHES = [[], [8, 4], [2, 3]];
+  window.rigEpoch = (title, panes) => {
+    const style = getComputedStyle(document.body), ink = style.getPropertyValue("--ink").trim();
+    const colours = ["--accent", "--bad", "--ok"].map((name) => style.getPropertyValue(name).trim());
+    const at = $("epoch-panes");
+    at.replaceChildren(node("h2", "", title));
+    panes.forEach((one, k) => {
+      at.append(node("div", "pane-title", one.title));
+      const axis = { stroke: ink, grid: { stroke: style.getPropertyValue("--line").trim(), width: 0.5 }, font: "14px system-ui" };
+      new uPlot({
+        width: at.clientWidth, height: k === panes.length - 1 ? 240 : 150, scales: { x: { time: false } },
+        legend: { show: one.names.length > 1 },
+        axes: [{ ...axis, label: k === panes.length - 1 ? "time of the session [s]" : undefined }, { ...axis, size: 60 }],
+        series: [{ label: "time [s]" }, ...one.names.map((label, j) => ({ label, stroke: colours[j], dash: DASHES[j], width: 1.5, points: { show: false } }))],
+      }, one.data, at);
+    });
+    at.scrollIntoView();
+  };
+
   function leave() { away = true; say({ kind: "leave" }); }
   function note(what, text) { say({ kind: "note", what, text, by: "" }); remark(`${what}: ${text}`); }
   function emergency() { say({ kind: "emergency" }); if (control) remark("emergency stop"); }

@@ -1,0 +1,182 @@
+"""The sessions of a folder, their epochs, and what was said of them; nothing here changes them.
+
+An epoch is left out of results by a row in `exclusions.csv`, as in a study folder: path, epoch,
+reason, by. The samples stay as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.console.page.entered import line, name
+from rigidimeter.documents import csv_text, write_text
+from rigidimeter.errors import UserError
+from rigidimeter.recording import is_session, read_manifest
+from rigidimeter.recording.event_log import read_events
+from rigidimeter.recording.formats import read_text_table
+from rigidimeter.recording.session_folder import EVENTS, locked
+
+EXCLUSIONS = "exclusions.csv"
+COLUMNS = ("path", "epoch", "reason", "by")
+MOST_SESSIONS = 200
+
+
+@dataclass(frozen=True)
+class FoundEpoch:
+    """An epoch that was begun; `excluded` is the reason why it is left out, and who said so.
+
+    Of a session in which conditions were hidden, they stay so.
+    """
+
+    number: int
+    label: str
+    task: str
+    condition: str
+    outcome: str
+    reason: str
+    rating: str
+    excluded: str
+
+
+@dataclass(frozen=True)
+class FoundSession:
+    """A session folder; `outcome` is empty where the session was not closed."""
+
+    name: str
+    created_utc: str
+    subject: str
+    virtual: bool
+    outcome: str
+    reason: str
+    planned: int
+    recording: bool
+    epochs: tuple[FoundEpoch, ...]
+
+    @property
+    def good(self) -> int:
+        """How many epochs ended with success."""
+        return sum(epoch.outcome == "success" for epoch in self.epochs)
+
+
+def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
+    """Return the sessions of a folder, newest first, and a sentence for each that is not read."""
+    folders = [path for path in root.iterdir() if path.is_dir() and is_session(path)]
+    folders = sorted(folders, key=lambda path: path.stat().st_mtime, reverse=True)
+    excluded, problems = _exclusions(root)
+    found = []
+    for folder in folders[:MOST_SESSIONS]:
+        try:
+            found.append(_session(folder, excluded))
+        except (UserError, OSError, KeyError, TypeError) as error:
+            problems.append(f"{folder.name}: {error}")
+    return found, problems
+
+
+def exclude(root: Path, session: str, epoch: str, reason: str, by: str) -> None:
+    """Leave an epoch out of results, with a reason and a name.
+
+    Raises
+    ------
+    UserError
+        If there is no such epoch, it is left out already, or reason or name is missing.
+    """
+    folder = root / name(session, "session")
+    found = _session(folder, {})
+    reason, by = line(reason, "reason"), line(by, "name", 40)
+    if not reason or not by:
+        raise UserError("to leave an epoch out, give a reason and your name")
+    if epoch not in {one.label for one in found.epochs}:
+        raise UserError(f"{session} has no epoch {epoch}")
+    rows = _rows(root)
+    if any((row["path"], row["epoch"]) == (session, epoch) for row in rows):
+        raise UserError(f"epoch {epoch} of {session} is left out already")
+    rows.append({"path": session, "epoch": epoch, "reason": reason, "by": by})
+    write_text(root / EXCLUSIONS, csv_text(COLUMNS, rows))
+
+
+def _session(folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession:
+    manifest = read_manifest(folder)
+    about = manifest.get("about", {})
+    path = folder / EVENTS
+    events, _ = read_events(path)
+    end = next((event for event in events if event["event"] == "session_ended"), {})
+    recording = False
+    if not end:
+        try:
+            with locked(path, ""):
+                pass
+        except UserError:
+            recording = True
+    return FoundSession(
+        folder.name,
+        manifest["created_utc"],
+        str(about.get("subject", "")),
+        manifest["virtual"],
+        end.get("outcome", ""),
+        end.get("reason", "still being recorded" if recording else "it was interrupted"),
+        len(manifest["protocol"]),
+        recording,
+        tuple(_epochs(folder.name, events, excluded, blinded=about.get("blinded") is True)),
+    )
+
+
+def _epochs(
+    session: str,
+    events: Sequence[dict[str, Any]],
+    excluded: dict[tuple[str, str], str],
+    *,
+    blinded: bool,
+) -> list[FoundEpoch]:
+    ends = {event["epoch"]: event for event in events if event["event"] == "epoch_ended"}
+    ratings: dict[int, list[str]] = {}
+    for event in events:
+        if event["event"] == "note" and event.get("what") == "rating":
+            ratings.setdefault(event["epoch"], []).append(f"{event['score']:g} ({event['by']})")
+    return [
+        FoundEpoch(
+            begun["epoch"],
+            begun["label"],
+            begun["task"],
+            "condition hidden" if blinded else begun["condition"],
+            ends.get(begun["epoch"], {}).get("outcome", ""),
+            ends.get(begun["epoch"], {}).get("reason", "not ended"),
+            "; ".join(ratings.get(begun["epoch"], ())),
+            excluded.get((session, begun["label"]), ""),
+        )
+        for begun in events
+        if begun["event"] == "epoch_started"
+    ]
+
+
+def _exclusions(root: Path) -> tuple[dict[tuple[str, str], str], list[str]]:
+    try:
+        rows = _rows(root)
+    except UserError as error:
+        return {}, [str(error)]
+    return {(row["path"], row["epoch"]): f"{row['reason']} ({row['by']})" for row in rows}, []
+
+
+def _rows(root: Path) -> list[dict[str, str]]:
+    """Return the exclusions that were written down.
+
+    Raises
+    ------
+    UserError
+        If the table cannot be read, or has other columns: it is not written over.
+    """
+    path = root / EXCLUSIONS
+    if not path.exists():
+        return []
+    table = read_text_table(path, may_be_empty=True)
+    other = table.columns.keys() ^ set(COLUMNS)
+    if other and table.columns:
+        raise UserError(
+            f"{path}: the columns must be {', '.join(COLUMNS)}; different are "
+            f"{', '.join(sorted(other))}"
+        )
+    return [
+        {column: table.columns[column][k] for column in COLUMNS} for k in range(len(table.lines))
+    ]

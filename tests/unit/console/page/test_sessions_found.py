@@ -1,0 +1,98 @@
+"""The sessions of a folder, and epochs that are left out of results."""
+
+import pytest
+
+from rigidimeter.console.page.epoch_traces import epoch_traces
+from rigidimeter.console.page.sessions_found import EXCLUSIONS, exclude, found_sessions
+from rigidimeter.errors import UserError
+from rigidimeter.recording import SessionWriter
+from rigidimeter.recording.resume import again
+from rigidimeter.settings import Settings
+
+
+@pytest.fixture
+def root(simulate, tmp_path):
+    simulate(epochs=2, name="S01-1")
+    return tmp_path
+
+
+def test_a_session_is_found_with_its_epochs(root):
+    (root / "other").mkdir()
+    (found,), problems = found_sessions(root)
+    assert problems == []
+    assert (found.name, found.outcome, found.good, found.planned) == ("S01-1", "success", 2, 2)
+    assert [epoch.label for epoch in found.epochs] == ["1", "2"]
+    assert not found.recording
+
+
+def test_an_interrupted_session_and_one_that_is_recorded_are_told_apart(tmp_path):
+    about = {"subject": "S02", "blinded": True}
+    writer = SessionWriter(tmp_path / "s", Settings(), [], {}, virtual=True, about=about)
+    begun = {"label": "1", "task": "prbs", "condition": "DBS", "time_s": 0.0}
+    writer.event("epoch_started", epoch=1, **begun)
+    writer.event("note", what="rating", epoch=1, score=1.5, by="E1")
+    (found,), _ = found_sessions(tmp_path)
+    assert found.recording
+    writer.close_files()
+    (found,), _ = found_sessions(tmp_path)
+    assert (found.recording, found.outcome, found.reason) == (False, "", "it was interrupted")
+    assert found.subject == "S02"
+    assert found.epochs[0].condition == "condition hidden"
+    assert found.epochs[0].rating == "1.5 (E1)"
+
+
+def test_an_epoch_is_left_out_with_a_reason_and_a_name_and_nothing_deleted(root):
+    before = {path: path.read_bytes() for path in (root / "S01-1").iterdir()}
+    exclude(root, "S01-1", "2", "=cough, twice", "Op")
+    (found,), _ = found_sessions(root)
+    assert [epoch.excluded for epoch in found.epochs] == ["", "=cough, twice (Op)"]
+    exclude(root, "S01-1", "1", "moved", "Op")
+    assert (root / EXCLUSIONS).read_text().splitlines()[0] == "path,epoch,reason,by"
+    assert before == {path: path.read_bytes() for path in (root / "S01-1").iterdir()}
+    with pytest.raises(UserError, match="left out already"):
+        exclude(root, "S01-1", "2", "again", "Op")
+
+
+@pytest.mark.parametrize(
+    ("session", "epoch", "reason", "by", "said"),
+    [
+        ("../x", "1", "r", "b", "session: '../x' is not possible"),
+        ("S01-1", "9", "r", "b", "has no epoch 9"),
+        ("S01-1", "1", " ", "b", "give a reason"),
+        ("S01-1", "1", "r", "", "give a reason"),
+        ("S01-1", "1", "two\nlines", "b", "cannot be shown"),
+    ],
+)
+def test_bad_exclusions_are_refused(root, session, epoch, reason, by, said):
+    with pytest.raises(UserError, match=said):
+        exclude(root, session, epoch, reason, by)
+    assert not (root / EXCLUSIONS).exists()
+
+
+def test_a_table_of_another_form_is_not_written_over(root):
+    (root / EXCLUSIONS).write_text("path,epoch,reason,by,note\ns,1,r,b,n\n")
+    with pytest.raises(UserError, match="different are note"):
+        exclude(root, "S01-1", "1", "r", "b")
+    _, problems = found_sessions(root)
+    assert "different are note" in problems[0]
+
+
+def test_an_epoch_is_drawn_from_its_samples(root):
+    panes = epoch_traces(root / "S01-1", "2", root / "none.csv")
+    assert [pane["title"] for pane in panes] == [
+        "torque [N·m]",
+        "angle [deg]",
+        "perturbation [N·m]",
+    ]
+    time_s = panes[0]["data"][0]
+    assert time_s[-1] - time_s[0] == pytest.approx(20.0, abs=0.02)
+    assert {len(line) for pane in panes for line in pane["data"]} == {len(time_s)}
+    with pytest.raises(UserError, match="no samples of epoch 3"):
+        epoch_traces(root / "S01-1", "3", root / "none.csv")
+
+
+def test_one_epoch_is_planned_again(root):
+    rest = again(root / "S01-1", 2)
+    assert [epoch.number for epoch in rest.epochs] == [2]
+    with pytest.raises(UserError, match="no epoch 7"):
+        again(root / "S01-1", 7)
