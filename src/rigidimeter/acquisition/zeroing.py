@@ -25,20 +25,25 @@ def bias_and_noise(
             torques_nm.append(reading.torque_nm)
     n = len(torques_nm)
     if n < FEWEST_ZEROING_SAMPLES:
-        return math.nan, math.nan, f"only {n} torque samples came in {limits.duration_s:g} s"
+        why = (
+            f"only {n} torque samples came in {limits.duration_s:g} s, fewer than "
+            f"{FEWEST_ZEROING_SAMPLES}; check the sensor's connection and its rate, or raise "
+            "zeroing.duration_s"
+        )
+        return math.nan, math.nan, why
     bias_nm, noise_sd_nm = statistics.fmean(torques_nm), statistics.stdev(torques_nm)
     why = ""
     if abs(bias_nm) > limits.bias_limit_nm:
         why = (
             f"at rest the torque sensor reads {bias_nm:.3g} N·m, more than "
             f"zeroing.bias_limit_nm = {limits.bias_limit_nm:g} N·m: it was zeroed under load, "
-            "or its calibration is another"
+            "or its calibration is another; unload it and start again"
         )
     elif noise_sd_nm > limits.noise_limit_nm:
         why = (
             f"at rest the torque varies by {noise_sd_nm:.3g} N·m (SD), more than "
             f"zeroing.noise_limit_nm = {limits.noise_limit_nm:g} N·m: the subject moves, or "
-            "the sensor is noisy"
+            "the sensor is noisy; wait until the subject is relaxed, or check the cable"
         )
     return bias_nm, noise_sd_nm, why
 
@@ -52,5 +57,6 @@ def moved(readings: Sequence[Reading], settings: Settings) -> str:
         return ""
     return (
         f"the joint moved by {moved_deg:.3g} deg while the torque sensor was zeroed, more than "
-        f"zeroing.motion_limit_deg = {limit_deg:g} deg: the drive does not hold it still"
+        f"zeroing.motion_limit_deg = {limit_deg:g} deg: the drive does not hold it still; check "
+        "its tuning and whether somebody pushes, then `rigidimeter check`"
     )

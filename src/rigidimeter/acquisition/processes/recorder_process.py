@@ -201,7 +201,10 @@ def _loop_lost(
             return "the loop was never started"
         return ""
     if not loop.alive():
-        return "the loop's process ended without closing the session"
+        return (
+            "the loop's process ended without closing the session; see what it printed, and "
+            "continue with `rigidimeter run --resume`"
+        )
     # While it starts it may wait for devices, and nothing moves.
     limits_s = {
         Condition.RUNNING: patience.loop_lost_s,
@@ -211,5 +214,8 @@ def _loop_lost(
     if status.age_s(Role.LOOP) > limit_s:
         # It must not go on one day: its record is closed, and nobody knows where the arm is then.
         loop.kill()
-        return f"the loop's process did not answer for {limit_s:g} s"
+        return (
+            f"the loop's process did not answer for {limit_s:g} s and was ended; give it a "
+            "processor of its own (`--cpu N`), and continue with `rigidimeter run --resume`"
+        )
     return ""
