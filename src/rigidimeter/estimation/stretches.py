@@ -78,23 +78,26 @@ def _evenly(channel: Channel, lost: list[LeftOut]) -> Channel:
 def longest_part(epoch: Epoch) -> Epoch:
     """Return the longest part of the epoch in which nothing is left out, as an epoch of its own.
 
-    Command and perturbation stay whole: what was before the part has caused some of its motion.
+    Where an imposed motion is recorded, the part that has most of that. Command and perturbation
+    stay whole: what was before the part has caused some of its motion.
     """
     if not epoch.left_out:
         return epoch
     start_s, stop_s = _span(epoch)
-    best = at_s = start_s
-    length_s = -np.inf
+    parts, at_s = [], start_s
     for stretch in sorted(epoch.left_out):
-        if stretch.start_s - at_s > length_s:
-            best, length_s = at_s, stretch.start_s - at_s
+        parts.append((at_s, stretch.start_s))
         at_s = max(at_s, stretch.stop_s)
-    if stop_s - at_s > length_s:
-        best, length_s = at_s, stop_s - at_s
+    parts.append((at_s, stop_s))
+    motion = epoch.motion
+    if motion is not None:
+        start_s, stop_s = motion.start_s, motion.start_s + motion.duration_s
+    # The first of those that are equally long.
+    low_s, high_s = max(parts, key=lambda part: min(part[1], stop_s) - max(part[0], start_s))
     channels = dict(epoch.channels)
     for channel in _fitted(epoch):
         # The ends of a stretch are left out with it.
-        rows = (channel.time_s >= best) & (channel.time_s <= best + length_s)
+        rows = (channel.time_s >= low_s) & (channel.time_s <= high_s)
         rows &= sound(epoch, channel.time_s)
         channels[channel.name] = Channel(channel.name, channel.time_s[rows], channel.values[rows])
     return replace(epoch, channels=channels, left_out=())

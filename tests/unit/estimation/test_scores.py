@@ -1,6 +1,7 @@
 """A sinusoid has both scores in closed form: work π B ω A², and an impulse from the amplitude."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ import pytest
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import find_motion, score_epoch, scoring_cycles, single_frequency_share
 from rigidimeter.estimation.scores import loop_area_j
-from rigidimeter.records import Channel, Epoch, Motion, Outcome
+from rigidimeter.estimation.stretches import longest_part
+from rigidimeter.records import Channel, Epoch, LeftOut, Motion, Outcome
 from rigidimeter.settings import EstimationSettings, ScoreSettings
 
 A, F = math.radians(20.0), 1.0
@@ -136,3 +138,21 @@ def test_the_scores_hold_at_other_frequencies_than_the_papers(frequency_hz):
     fast = Motion(9.0, 0.0, 20.0)
     outside = score_epoch(Epoch("f", "1", channels, motion=fast), SCORES, SCREEN)
     assert "outside the band of the scores" in outside.outcome.reason
+
+
+def test_what_is_left_out_of_a_motion_leaves_its_longest_part():
+    """Motion for 10 s and a rest of 10 s, with a hole at 9 s: most of the motion is before it."""
+    joint = JointDynamics(0.0045, 0.1368, 1.751)
+    t = np.arange(20_001) / 1000.0
+    there = [np.where(t <= 10.0, part, 0.0) for part in motion(t)]
+    channels = {
+        "torque_nm": Channel("torque_nm", t, joint.torque_nm(*there)),
+        "angle_rad": Channel("angle_rad", t, there[0]),
+    }
+    said = Motion(F, 0.0, 10.0)
+    whole = Epoch("file", "1", channels, task="sinusoid", motion=said)
+    part = longest_part(replace(whole, left_out=(LeftOut(9.0, 9.1),)))
+    assert part.channels["angle_rad"].time_s[-1] == pytest.approx(9.0, abs=2e-3)
+    score = score_epoch(part, SCORES, SCREEN)
+    assert score.n_cycles == 7  # of the 8 that the whole has
+    assert score.work_j == pytest.approx(math.pi * 0.1368 * W * A**2, rel=0.01)
