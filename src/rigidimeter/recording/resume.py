@@ -26,6 +26,9 @@ _PLANNED: Mapping[str, type | tuple[type, ...]] = {
 }
 
 
+_BY_GUARD = "the guard stopped the rig: "
+
+
 @dataclass(frozen=True)
 class Rest:
     """What is left of a session.
@@ -167,6 +170,12 @@ def _events(folder: Path, manifest: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _went_on(events: list[dict[str, Any]], last: dict[str, Any]) -> bool:
-    """Whether the session outlived its last epoch: it did not end with that one's reason."""
+    """Whether the session outlived its last epoch: it did not end with that one's reason.
+
+    Of a stop by the guard the session also says limit, value and remedy, the epoch only the cause.
+    """
     end = next((event for event in events if event.get("event") == "session_ended"), None)
-    return end is not None and end["reason"] != last["reason"]
+    if end is None:
+        return False
+    by_guard = all(event["reason"].startswith(_BY_GUARD) for event in (end, last))
+    return not by_guard and end["reason"] != last["reason"]

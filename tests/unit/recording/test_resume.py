@@ -58,6 +58,23 @@ def test_an_epoch_whose_repetition_is_done_is_done(tmp_path):
     assert rest_of(tmp_path / "s").epochs == EPOCHS[1:]
 
 
+@pytest.mark.parametrize(
+    ("why", "reason", "left"),
+    [
+        ("the guard stopped the rig: stall", "the guard stopped the rig: still for 41 ms", 0),
+        ("the arm came to the position limit", "the guard stopped the rig: stall", 1),
+        ("the guard stopped the rig: torque", "aborted by the operator", 1),
+        ("killed", "killed", 0),
+    ],
+)
+def test_the_epoch_in_which_the_session_was_stopped_is_run_again(tmp_path, why, reason, left):
+    """One that failed before the session went on would fail again."""
+    writer = SessionWriter(tmp_path / "s", SETTINGS, [asdict(e) for e in EPOCHS], {}, virtual=True)
+    writer.event("epoch_ended", epoch=1, time_s=1.0, outcome="fail", reason=why)
+    writer.close(1.0, "fail", reason)
+    assert rest_of(tmp_path / "s").epochs == EPOCHS[left:]
+
+
 @pytest.mark.parametrize("closed", [True, False])
 def test_it_goes_on_from_where_the_joint_stood(session, closed):
     rest = rest_of(session("s", origin_rad=-0.25, closed=closed))
