@@ -1,6 +1,9 @@
 """The one exception that is meant for the person at the keyboard."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 _PAIR = re.compile(
     r"--(column|unit|scale|offset) (?:([a-z_]+)='?([^\s',;:)]+)'?|'([a-z_]+)=([^']+)')"
@@ -19,6 +22,21 @@ class UserError(Exception):
     def __init__(self, *lines: str) -> None:
         super().__init__("\n".join(lines))
         self.lines = lines
+
+
+@contextmanager
+def refused(path: Path, what: str) -> Iterator[None]:
+    """Say of a file or folder what the operating system refuses, such as ``cannot be written``.
+
+    Raises
+    ------
+    UserError
+        In place of an `OSError`, with its reason.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{path}: {what} ({error.strerror or error})") from None
 
 
 def arguments_named(message: str) -> str:

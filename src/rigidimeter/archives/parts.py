@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from rigidimeter.documents import json_text, read_json, replace_file
-from rigidimeter.errors import UserError
+from rigidimeter.errors import UserError, refused
 
 Row = dict[str, Any]
 
@@ -36,11 +36,9 @@ class Parts:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._held: dict[str, list[Row]] = {}
-        try:
+        with refused(folder, "cannot be written"):
             folder.mkdir(exist_ok=True)
             self._lock = (folder / _LOCK).open("wb")
-        except OSError as error:
-            raise UserError(f"{folder}: cannot be written ({error.strerror or error})") from None
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:

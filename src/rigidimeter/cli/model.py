@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 USUAL = "inertia,damping,stiffness"
 COMPARED = f"{USUAL},reflex,cubic,directional-damping,coulomb"
-_HEADING = (*("", "n", "VAF\n%", "held out\n95 %", "AIC", "BIC", "white\np", "input\np", "model"),)
+_HEADING = ("parameters", "VAF %", "held out, 95 %", "AIC", "BIC", "white p", "input p")
 
 
 @reads_recordings
@@ -121,24 +121,25 @@ def _blocks(found: ModelledEpoch) -> list[Block]:
 def _table(compared: Comparison) -> list[Block]:
     rows: list[Sequence[str] | str] = []
     for row in compared.rows:
-        name = row.name
         if row.fit is None:
-            rows.append(f"{name}: {row.problem}")
+            rows.append(f"  {row.name}: {row.problem}")
             continue
         fit = row.fit
-        numbers = (
-            f"{fit.n_parameters}",
-            f"{fit.vaf_percent:.2f}",
-            _held_out(row),
-            f"{fit.aic:.1f}",
-            f"{fit.bic:.1f}",
-            f"{fit.test.ljung_box_p:.2g}",
-            f"{fit.test.input_p:.2g}",
+        rows.append(f"{'*' if row is compared.recommended else ' '} {row.name}")
+        rows.append(
+            (
+                f"{fit.n_parameters}",
+                f"{fit.vaf_percent:.2f}",
+                _held_out(row),
+                f"{fit.aic:.1f}",
+                f"{fit.bic:.1f}",
+                f"{fit.test.ljung_box_p:.2g}",
+                f"{fit.test.input_p:.2g}",
+            )
         )
-        rows.append(("*" if row is compared.recommended else "", *numbers, name))
     pushing = [f"  {row.name}: {row.problem}" for row in compared.rows if row.fit and row.problem]
     verdict = "no model is recommended" if compared.recommended is None else "recommended"
-    table = Table(_HEADING, rows, "=>>=>>>><", indent=0)
+    table = Table(_HEADING, rows, ">>=>>>>")
     return [table, *pushing, f"  {verdict}: {compared.reason}"]
 
 

@@ -12,7 +12,7 @@ from rigidimeter.cli.inputs import analyse_study_folder
 from rigidimeter.cli.options import NewStudyOption, StudySeedOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings
-from rigidimeter.errors import UserError
+from rigidimeter.errors import UserError, refused
 
 if TYPE_CHECKING:
     from rigidimeter.virtual.study_design import StudyDesign
@@ -168,8 +168,6 @@ def _move_aside(out: Path) -> None:
     number = 1
     while (aside := out.with_name(f"{out.name}-{number}")).exists():
         number += 1
-    try:
+    with refused(out, "cannot be moved aside"):
         out.rename(aside)
-    except OSError as error:
-        raise UserError(f"{out}: cannot be moved aside ({error.strerror or error})") from None
     echo(f"{out} was there already and is now {aside}")

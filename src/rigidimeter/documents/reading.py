@@ -23,7 +23,7 @@ from rigidimeter.documents.bounds import (
     SETTINGS_BYTES,
     size_text,
 )
-from rigidimeter.errors import UserError
+from rigidimeter.errors import UserError, refused
 
 _KINDS = (
     (stat.S_ISDIR, "a folder"),
@@ -114,13 +114,9 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
     UserError
         As `open_regular`.
     """
-    with open_regular(path, most_bytes) as file:
-        try:
-            # Not read(most_bytes), which would make room for as much.
-            data = file.read(os.fstat(file.fileno()).st_size)
-        except OSError as error:
-            raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
-    return data
+    with open_regular(path, most_bytes) as file, refused(path, "cannot be read"):
+        # Not read(most_bytes), which would make room for as much.
+        return file.read(os.fstat(file.fileno()).st_size)
 
 
 def read_json(path: Path) -> Any:

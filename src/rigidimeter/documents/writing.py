@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rigidimeter.documents.escaping import as_written
-from rigidimeter.errors import UserError
+from rigidimeter.errors import refused
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -27,15 +27,13 @@ def write_text(path: Path, text: str) -> None:
         If the file cannot be written; an older file of that name is still there then.
     """
     content = text_bytes(text)
-    try:
+    with refused(path, "cannot be written"):
         if path.is_dir():
             raise IsADirectoryError(21, "Is a directory", str(path))
         if path.exists() and not path.is_file():  # such as /dev/stdout
             path.write_bytes(content)
         else:
             replace_file(path, content)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
 def write_json(path: Path, document: Any) -> None:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.documents import json_text, read_json, text_bytes, write_text
-from rigidimeter.errors import UserError
+from rigidimeter.errors import UserError, refused
 from rigidimeter.recording import estimates_document
 from rigidimeter.settings import dump_settings
 from rigidimeter.study.measures import RATING
@@ -79,11 +79,9 @@ def keep(read: StudyRead, study: StudyResult) -> list[str]:
     elif (folder / INPUTS).exists():
         said.append(f"{ANALYSIS}/{INPUTS} is damaged, so what has changed since is unknown")
     _write(folder, texts, edited)
-    try:
+    with refused(folder, "cannot be written"):
         for name in sorted({*_results(before)} - {*texts} - {*edited}):
             (folder / name).unlink(missing_ok=True)  # ours, unedited, and no longer a result
-    except OSError as error:
-        raise UserError(f"{folder}: cannot be written ({error.strerror or error})") from None
     _write_new(folder / INPUTS, json_text({**inputs, "results": results}))
     if before is not None and not said:
         said.append(UNCHANGED)
@@ -117,7 +115,7 @@ def _edited(
     One that is as it will be written now is none of them: a run that was cut off left it.
     """
     edited = {}
-    try:
+    with refused(folder, "cannot be read"):
         for name, digest in (_results(before) or dict.fromkeys(results, "")).items():
             path = folder / name
             if not path.is_file():
@@ -130,8 +128,6 @@ def _edited(
                     f"{ANALYSIS}/{name} {how}; it is written again, and the one that was there is "
                     f"kept as {edited[name]}"
                 )
-    except OSError as error:
-        raise UserError(f"{folder}: cannot be read ({error.strerror or error})") from None
     return edited
 
 
@@ -249,12 +245,10 @@ def _leaves(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, 
 
 
 def _write(folder: Path, texts: Mapping[str, str], edited: Mapping[str, str]) -> None:
-    try:
+    with refused(folder, "cannot be written"):
         folder.mkdir(exist_ok=True)
         for name, aside in edited.items():
             (folder / name).replace(folder / aside)
-    except OSError as error:
-        raise UserError(f"{folder}: cannot be written ({error.strerror or error})") from None
     for name, text in texts.items():
         _write_new(folder / name, text)
 

@@ -18,7 +18,7 @@ from rigidimeter.records import Analysis, Notice
 from rigidimeter.settings import Settings, settings_from
 from rigidimeter.study.compared import Comparison
 from rigidimeter.study.comparison import compare_analysis, compare_measures, measured
-from rigidimeter.study.measures import Measure, Observation, chosen_pair, conditions
+from rigidimeter.study.measures import Measure, Observation, chosen_pair, conditions, off_first
 from rigidimeter.study.results import StudyResult
 from rigidimeter.study.study_analysis import analyse_study, read_study
 
@@ -170,7 +170,7 @@ def _compare_columns(
     for name in values:
         table.column(name, "--value")
     units = table.column(session, "--session") if session is not None else None
-    known = sorted((name for name in dict.fromkeys(labels) if name), key=lambda n: n != "OFF")
+    known = off_first(labels)
     names = chosen_pair(
         known,
         pair,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -98,8 +98,12 @@ class Observation:
 def conditions(analysis: Analysis) -> tuple[str, ...]:
     """Return the named conditions in order of appearance, ``OFF`` first where it occurs."""
     results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
-    seen = dict.fromkeys(result.condition for result in results if result.condition)
-    return tuple(sorted(seen, key=lambda condition: condition != "OFF"))
+    return off_first(result.condition for result in results)
+
+
+def off_first(names: Iterable[str]) -> tuple[str, ...]:
+    """Return each name once in order of appearance, ``OFF`` first; empty ones are left out."""
+    return tuple(sorted(dict.fromkeys(filter(None, names)), key=lambda name: name != "OFF"))
 
 
 def chosen_pair(

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from rigidimeter.documents import write_text
-from rigidimeter.errors import UserError
+from rigidimeter.errors import UserError, refused
 from rigidimeter.recording.study_folder import TABLE_COLUMNS
 from rigidimeter.recording.study_toml import STUDY_FILE
 
@@ -68,10 +68,8 @@ def write_new_study(folder: Path, title: str = "") -> None:
             f"{folder / there[0]}: is there already; a study is never written over, so name "
             "another folder"
         )
-    try:
+    with refused(folder, "cannot be made"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"{folder}: cannot be made ({error.strerror or error})") from None
     for name, about in ABOUT.items():
         needed, allowed = TABLE_COLUMNS[name]
         columns = [*needed, *(column for column in allowed if name == "sessions" or column == "by")]

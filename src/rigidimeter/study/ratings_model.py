@@ -17,7 +17,7 @@ from rigidimeter.statistics import DayDifference, Mixed, fit_mixed, interval_of
 from rigidimeter.study.blinding import Naming
 from rigidimeter.study.compared import Comparison
 from rigidimeter.study.comparison import measured, no_days
-from rigidimeter.study.measures import RATING, Observation
+from rigidimeter.study.measures import RATING, Observation, off_first
 from rigidimeter.study.rating_table import RANDOM, Rating, groupings, oddities, ratings_of
 from rigidimeter.study.ratings_found import RatingsFound, fit_ratings, with_days
 
@@ -212,7 +212,7 @@ def model_ratings(
         )
     found = ratings_of(table, columns, chosen, scale, step)
     conditions = [row.condition for row in found.rows]
-    first, second = pair or _first_two(conditions)
+    first, second = pair or off_first(conditions)[:2]
     for name in (first, second):
         if name not in conditions:
             known = ", ".join(dict.fromkeys(conditions))
@@ -225,8 +225,3 @@ def model_ratings(
         )
     except (ValueError, ArithmeticError) as error:
         raise UserError(f"{table.source}: {error}") from None
-
-
-def _first_two(conditions: Sequence[str]) -> tuple[str, str]:
-    first, second, *_ = sorted(dict.fromkeys(conditions), key=lambda name: name != "OFF")
-    return first, second

@@ -17,7 +17,7 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from rigidimeter.documents import as_written, in_place
-from rigidimeter.errors import UserError
+from rigidimeter.errors import UserError, refused
 from rigidimeter.estimation import aligned, epoch_signals
 from rigidimeter.estimation.stretches import longest_part
 from rigidimeter.recording import Recording
@@ -89,9 +89,11 @@ def write_subject_torque(path: Path, recording: Recording, analysis: Analysis) -
     first = next(tables, None)
     if first is None:
         raise UserError(f"{path}: not written, since no epoch has an included estimate")
-    try:
-        with in_place(path) as beside, _WRITERS[path.suffix.lower()](beside, first.schema) as out:
-            for table in itertools.chain([first], tables):
-                out.write_table(table)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
+    write = _WRITERS[path.suffix.lower()]
+    with (
+        refused(path, "cannot be written"),
+        in_place(path) as beside,
+        write(beside, first.schema) as out,
+    ):
+        for table in itertools.chain([first], tables):
+            out.write_table(table)
