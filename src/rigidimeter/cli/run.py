@@ -74,7 +74,7 @@ def run(
     from rigidimeter.acquisition.processes.loop_process import Realtime
     from rigidimeter.cli.planned_session import checked_rig, run_planned
     from rigidimeter.cli.sharing import require_packages
-    from rigidimeter.console import terminal_view
+    from rigidimeter.console import discard_typed, terminal_view
 
     for line in complete_left():
         echo(line, err=True)
@@ -89,14 +89,18 @@ def run(
         ended = run_planned(planned, out, rig, realtime, console)
     for remark in (*console.remarks, *ended.remarks):
         echo(remark, err=True)
-    _conclude(ended, out, rig, nwb=planned.settings.sharing.nwb_at_close)
+    try:
+        _conclude(ended, out, rig, nwb=planned.settings.sharing.nwb_at_close)
+    finally:
+        if attended:
+            discard_typed(sys.stdin)
 
 
 def _conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
     """Say how the session ended; a session that is not whole ends the program with status 1."""
     from rigidimeter.cli.sharing import write_nwb_beside
     from rigidimeter.console import new_folder, next_steps
-    from rigidimeter.recording.resume import count_epochs, require_all
+    from rigidimeter.recording.resume import count_epochs, require_all, rest_of
 
     folder = ended.folder if ended.folder != out.absolute() else out
     good, of = count_epochs(folder)
@@ -104,9 +108,8 @@ def _conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
     if nwb:
         echo(write_nwb_beside(folder))
     closed = bool(ended.outcome)
-    steps = next_steps(
-        folder, closed=closed, good=good, planned=of, rig=rig, out=new_folder(folder)
-    )
+    left = len(rest_of(folder).epochs)
+    steps = next_steps(folder, closed=closed, good=good, left=left, rig=rig, out=new_folder(folder))
     echo("\n".join(["What to do next:", *(f"  {step}" for step in steps)]))
     if ended.outcome != "success":
         raise UserError(

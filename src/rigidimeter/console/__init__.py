@@ -11,6 +11,7 @@ from rigidimeter.console.progress import EndedEpoch, Progress
 from rigidimeter.console.session_plan import SessionPlan
 from rigidimeter.console.terminal import terminal_view
 from rigidimeter.console.trace_reader import TraceReader, Traces
+from rigidimeter.console.tty import discard_typed
 
 __all__ = [
     "KEYS",
@@ -28,6 +29,7 @@ __all__ = [
     "SessionPlan",
     "TraceReader",
     "Traces",
+    "discard_typed",
     "facts",
     "new_folder",
     "next_steps",

@@ -15,7 +15,7 @@ def resume_command(folder: Path, rig: Path | str | None, out: Path | str) -> str
 
 
 def next_steps(
-    folder: Path, *, closed: bool, good: int, planned: int, rig: Path | None, out: Path
+    folder: Path, *, closed: bool, good: int, left: int, rig: Path | None, out: Path
 ) -> tuple[str, ...]:
     """Return what to do next, a command with its purpose on each line, the most pressing first.
 
@@ -25,8 +25,8 @@ def next_steps(
         Of the session.
     closed : bool
         Whether it was closed with an outcome.
-    good, planned : int
-        Epochs that ended with success, and those that were planned.
+    good, left : int
+        Epochs that ended with success, and those that are left to run.
     rig : Path or None
         The rig file; None for the virtual rig.
     out : Path
@@ -35,8 +35,9 @@ def next_steps(
     steps = []
     if not closed:
         steps.append((shlex.join(["rigidimeter", "recover", str(folder)]), "close the session"))
-    if good < planned:
-        steps.append((resume_command(folder, rig, out), f"run the {planned - good} epochs left"))
+    if left:
+        what = "the epoch that is left" if left == 1 else f"the {left} epochs that are left"
+        steps.append((resume_command(folder, rig, out), f"run {what}"))
     if good:
         report = folder.with_name(f"{folder.name}-report")
         steps += [

@@ -13,6 +13,7 @@ import termios
 import time
 import tty
 from contextlib import suppress
+from typing import IO
 
 ENTER = b"\x1b[?1049h\x1b[?25l\x1b[2J"
 LEAVE = b"\x1b[0m\x1b[?25h\x1b[?1049l"
@@ -20,6 +21,13 @@ LEAVE = b"\x1b[0m\x1b[?25h\x1b[?1049l"
 
 LEAVE_S = 0.5
 """For so long it is tried to leave the other screen on a terminal that takes no output."""
+
+
+def discard_typed(keyboard: IO[str]) -> None:
+    """Throw away what was typed and not read: it was meant for a session, not for a shell."""
+    with suppress(OSError, termios.error):
+        if keyboard.isatty():
+            termios.tcflush(keyboard.fileno(), termios.TCIFLUSH)
 
 
 class Tty:

@@ -10,7 +10,7 @@ OUT = Path("s-2")
 
 
 def steps(folder="s", **more):
-    values = {"closed": True, "good": 8, "planned": 8, "rig": None, "out": OUT, **more}
+    values = {"closed": True, "good": 8, "left": 0, "rig": None, "out": OUT, **more}
     return [step.split("  # ")[0] for step in next_steps(Path(folder), **values)]
 
 
@@ -19,19 +19,19 @@ def test_a_whole_session_is_analysed():
 
 
 def test_one_that_was_interrupted_is_continued_first():
-    assert steps(good=3)[0] == "rigidimeter run --resume s --out s-2"
-    assert steps(good=3, rig=Path("rig.toml"))[0] == (
+    assert steps(good=3, left=5)[0] == "rigidimeter run --resume s --out s-2"
+    assert steps(good=3, left=5, rig=Path("rig.toml"))[0] == (
         "rigidimeter run --resume s --rig rig.toml --out s-2"
     )
     assert (
-        "run the 5 epochs left"
-        in next_steps(Path("s"), closed=True, good=3, planned=8, rig=None, out=OUT)[0]
+        "run the 5 epochs that are left"
+        in next_steps(Path("s"), closed=True, good=3, left=5, rig=None, out=OUT)[0]
     )
-    assert len(steps(good=0)) == 1  # nothing to analyse
+    assert len(steps(good=0, left=8)) == 1  # nothing to analyse
 
 
 def test_one_that_was_not_closed_is_closed_first():
-    assert steps(closed=False, good=3)[:2] == [
+    assert steps(closed=False, good=3, left=5)[:2] == [
         "rigidimeter recover s",
         "rigidimeter run --resume s --out s-2",
     ]
