@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from rigidimeter.acquisition.processes.supervise import Ended
     from rigidimeter.cli.planned_session import PlannedSession
     from rigidimeter.console.page.desk import Desk, StartRequest
+
+SHOWN_S = 3.0
 
 HostOption = Annotated[
     str,
@@ -88,6 +91,36 @@ def console(
     with serving(desk, host, port, token):
         while not desk.told_to_end:
             lead_session(desk, desk.next_request(), Realtime(priority=priority, cpu=cpu), protocol)
+
+
+def run_on_page(
+    planned: PlannedSession,
+    out: Path,
+    rig: Path | None,
+    realtime: Realtime,
+    address: tuple[str, int, str],
+) -> Ended:
+    """Serve the page for one session, which begins when the operator says so there.
+
+    Raises
+    ------
+    UserError
+        If the program was told to end before.
+    """
+    from rigidimeter.console.page.desk import Desk, Place
+
+    require_page()
+    out = out.absolute()
+    out.parent.mkdir(parents=True, exist_ok=True)
+    name = planned.source.name if planned.source is not None else "the defaults"
+    desk = Desk(Place(out.parent, planned.settings, name, rig, one_session=out.name))
+    with serving(desk, *address):
+        while not desk.told_to_end:
+            ended = lead_session(desk, desk.next_request(), realtime, planned.source)
+            if ended is not None:
+                time.sleep(SHOWN_S)  # for the page to say how it ended
+                return ended
+    raise UserError("the program was told to end before a session was run")
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.console import HostOption, PortOption, TokenOption, run_on_page
 from rigidimeter.cli.options import NewSessionOption, SeedOption
 from rigidimeter.cli.output import echo
 from rigidimeter.errors import UserError
@@ -55,6 +56,16 @@ def run(
         int | None,
         typer.Option("--cpu", metavar="N", help="Processor of the loop. Default: the last one."),
     ] = None,
+    page: Annotated[
+        bool,
+        typer.Option(
+            "--console",
+            help="Lead the session from a page in a browser, as `rigidimeter console` does.",
+        ),
+    ] = False,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8765,
+    token: TokenOption = "",
 ) -> None:
     """Run a protocol in real time, on the virtual rig or on hardware.
 
@@ -81,6 +92,16 @@ def run(
     planned = _planned(protocol, resume, seed, virtual=rig is None)
     require_packages(planned.settings)
     _offer(out)
+    if page:
+        if unattended or resume is not None:
+            raise UserError(
+                "--console goes with neither --unattended nor --resume; continue a session under "
+                "After on the page of `rigidimeter console`"
+            )
+        realtime = Realtime(priority=priority, cpu=cpu)
+        ended = run_on_page(planned, out, rig, realtime, (host, port, token))
+        _conclude(ended, out, rig, nwb=False)
+        return
     planned = checked_rig(planned, rig)
     attended = not unattended and sys.stdin is not None and sys.stdin.isatty()
     shown = planned.shown(virtual=rig is None)

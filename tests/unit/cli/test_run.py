@@ -170,3 +170,9 @@ def test_a_session_that_still_runs_is_not_gone_on_with(tmp_path, monkeypatch, ri
     assert result.status == 1
     assert "s: is still being recorded; end that session first" in result.err
     assert not (tmp_path / "n").exists()
+
+
+def test_a_page_is_for_a_new_session_with_an_operator(tmp_path, rigidimeter):
+    result = rigidimeter("run", "--out", tmp_path / "s", "--console", "--unattended")
+    assert result.status == 1
+    assert "--console goes with neither --unattended nor --resume" in result.err
