@@ -59,7 +59,9 @@ TESTS = {
     "acquisition/run_states.py": ("acquisition/test_states.py", "acquisition/test_session_run.py"),
     "acquisition/session_run.py": ("acquisition/test_session_run.py", *_RUN),
     "acquisition/zeroing.py": ("acquisition/test_zeroing.py", "acquisition/test_session_run.py"),
-    "acquisition/supervision.py": ("acquisition/test_session_run.py",),
+    "acquisition/supervision.py": (
+        *("acquisition/test_session_run.py", "acquisition/test_stop_account.py"),
+    ),
     "acquisition/tick.py": _RUN,
     "acquisition/processes/sink.py": ("acquisition/test_shared_status.py",),
     "devices/ascii/drive.py": ("devices/test_serial_stop_paths.py",),

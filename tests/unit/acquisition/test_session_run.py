@@ -230,6 +230,8 @@ def test_a_stop_of_the_guard_ends_the_session_with_its_cause():
         ("drive_fault", "ramp", 1)
     ]
     assert latched[0]["sentence"] == account
+    first = next(sample for sample in ran.sink.samples if sample.cause)
+    assert latched[0]["time_s"] == first.time_s
     assert latched[0]["time_s"] == pytest.approx(20 / RATE_HZ)
     assert ran.states[-1].state is State.FAULTED
     assert ran.rig.calls[-1] == ("disable",)

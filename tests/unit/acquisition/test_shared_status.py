@@ -10,6 +10,8 @@ from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import NOTE_BYTES, SharedStatus
 from rigidimeter.acquisition.processes.sink import RingSink, SharedSupervision
 from rigidimeter.acquisition.processes.status_values import (
+    PAUSE_NEXT,
+    STOP_NEXT,
     Condition,
     Flag,
     LiveEstimate,
@@ -17,8 +19,9 @@ from rigidimeter.acquisition.processes.status_values import (
     Role,
 )
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order, Run, State
-from rigidimeter.guard import Cause
+from rigidimeter.guard import Cause, guard_limits, guard_state
 from rigidimeter.recording.sample_log import Sample
+from rigidimeter.settings import Settings
 
 
 class Time:
@@ -285,3 +288,30 @@ def test_the_sink_keeps_events_in_their_place(shared_status, rings):
     status = shared_status.loop()
     assert (status.state, status.tick, status.missed_deadlines) == (State.RUNNING, 4, 1)
     assert shared_status.condition(Role.LOOP) is Condition.STOPPING
+
+
+class Loop:
+    """What the sink looks at of a loop."""
+
+    until_tick, rate_hz = 30, 10.0
+    guard = guard_state(guard_limits(Settings()))._replace(energy_j=0.7)
+
+
+def test_the_sink_shows_what_comes_next(shared_status, rings):
+    sink = RingSink(SessionMemory(*rings, shared_status), 10.0)
+    sink.sample(sample(0))
+    first = shared_status.loop()
+    assert (first.pending, math.isnan(first.until_s), math.isnan(first.energy_j)) == (0, True, True)
+    sink.watch(Loop())
+    for k, (run, pending) in enumerate(
+        (
+            (Run(State.RUNNING, pause_next=True), PAUSE_NEXT),
+            (Run(State.RUNNING, stop_next=True), STOP_NEXT),
+            (Run(State.RUNNING, pause_next=True, stop_next=True), PAUSE_NEXT + STOP_NEXT),
+        ),
+        start=1,
+    ):
+        sink.state_changed(run)
+        sink.sample(sample(k))
+        shown = shared_status.loop()
+        assert (shown.pending, shown.until_s, shown.energy_j) == (pending, 3.0, 0.7)

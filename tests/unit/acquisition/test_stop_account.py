@@ -164,6 +164,18 @@ def test_what_a_reading_shows(change, cause, said):
     assert account.sentence.startswith(f"{cause.sentence}: {said}")
 
 
+def test_a_joint_that_is_left_behind():
+    """It is named at the first tick beyond the limit, so by no more than what one tick adds."""
+
+    def change(r):
+        return r._replace(angle_rad=min(r.angle_rad, 0.05))
+
+    account = stopped(change, speed_rad_s=1.0, inertia_kg_m2=0.0045)
+    assert account.cause is Cause.NOT_FOLLOWING
+    beyond_deg = account.found.value - account.found.limit
+    assert 0.0 < beyond_deg <= math.degrees(1.0 * 0.001)
+
+
 def test_a_joint_that_moves_at_rest():
     drift = math.radians(1.5) / 1000
 

@@ -34,6 +34,15 @@ def test_the_guards_output_is_written_once_a_tick_and_the_request_recorded_besid
     assert {s.limited for s in samples} == {int(Limited.ACCELERATION)}
 
 
+def test_when_a_stretch_ends_is_known_from_its_first_tick_on():
+    loop, _ = made(SETTINGS)
+    assert loop.until_tick == 0
+    run_ticks(loop, 3, 10, constant(0.0))
+    known = []
+    run_ticks(loop, 3, 7, lambda r, t, k: known.append(loop.until_tick) or (0.0, 0.0, 0.0))
+    assert known == [17] * 7
+
+
 def test_what_the_drive_sent_is_recorded_not_what_was_allowed():
     loop, samples = made(SETTINGS)
     write = loop.rig.write
