@@ -84,7 +84,7 @@ def design(
 
     keep_inputs((json_out,), [settings] if settings is not None else [])
     check_criterion(criterion)
-    with Meter("design", 1.0) as meter:
+    with Meter("design", 1.0, from_first=True) as meter:
         designed = compute(
             settings,
             differences=detect or (),

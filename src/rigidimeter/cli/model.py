@@ -83,7 +83,7 @@ def model(
     keep_inputs((json_out,), recordings.paths)
     read = recordings.read()
     say(read.notices)
-    with Meter("model", 1.0) as meter:
+    with Meter("model", 1.0, from_first=True) as meter:
         found = model_recording(
             read, models, compare=compare, grow=grow, high_hz=high_hz, progress=meter.advance
         )

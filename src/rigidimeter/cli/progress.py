@@ -36,9 +36,10 @@ class Meter:
     clock : callable
         Gives the time in s.
     from_first : bool
-        The speed counts from the first report on: before that processes are started.
-    at_most : bool
-        The work may end before all of it is done.
+        The speed counts from the first report on: before that processes are started, or libraries
+        loaded.
+    foreseen : bool
+        Whether it is known how long the work takes; without that no time left is shown.
     """
 
     def __init__(
@@ -48,7 +49,7 @@ class Meter:
         clock: Callable[[], float] = time.monotonic,
         *,
         from_first: bool = False,
-        at_most: bool = False,
+        foreseen: bool = True,
     ) -> None:
         self._title = title
         self._total = max(total, 1e-12)
@@ -56,7 +57,7 @@ class Meter:
         self._clock = clock
         self._start_s = clock()
         self._first = None if from_first else (self._start_s, 0.0)
-        self._about = "at most" if at_most else "about"
+        self._foreseen = foreseen
         self._line_s: float | None = None
         self._replaces = sys.stderr.isatty()
 
@@ -81,7 +82,7 @@ class Meter:
     def left_s(self) -> float | None:
         """The time left at the mean speed so far; None before a tenth of the work is done."""
         first_s, first = self._first or (0.0, self._done)
-        if self.share < LEAST_SHARE or self._done <= first:
+        if not self._foreseen or self.share < LEAST_SHARE or self._done <= first:
             return None
         return (self._clock() - first_s) * (self._total - self._done) / (self._done - first)
 
@@ -100,7 +101,7 @@ class Meter:
         ):
             return
         self._line_s = now_s
-        left = "" if self.left_s is None else f", {self._about} {self.left_s:.0f} s left"
+        left = "" if self.left_s is None else f", about {self.left_s:.0f} s left"
         line = f"{self._title}: {100 * self.share:.0f} %{left}"
         start, end = ("\r\x1b[K", "") if self._replaces else ("", "\n")
         print(f"{start}{line}", end=end, file=sys.stderr, flush=True)

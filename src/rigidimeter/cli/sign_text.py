@@ -47,7 +47,8 @@ def sign_blocks(settings: Settings, checks: Sequence[Check]) -> Iterator[Block]:
         "If the torque sensor had the wrong sign: simulated PRBS epochs, perturbation "
         f"±{settings.prbs.amplitude_nm:g} N·m, noise of the torque {shown_nm:.2g} N·m (SD)."
     )
-    with Meter("simulate the wrong sign", 1.0, at_most=True) as meter:
+    # Epochs end when the sign is found, and no further ones follow once it is not.
+    with Meter("simulate the wrong sign", 1.0, foreseen=False) as meter:
         found = search_for_turned_sign(settings, noise_nm, meter.advance)
     yield from found_blocks(found)
     if any(block.task == "sinusoid" for block in settings.protocol.blocks):
