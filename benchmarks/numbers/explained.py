@@ -51,8 +51,6 @@ EXPLANATIONS = (
     Explanation("full", "estimates/*", 3e-4, LOOP),
     Explanation("full", "study/inertia_kg_m2", 2e-5, LOOP),
     Explanation("full", "study/days/*", 3e-4, LOOP),
-    Explanation("study", "*day_tests/*", math.inf, DAYS),
-    Explanation("study", "*sensitivity/p_day*", math.inf, DAYS),
     Explanation("full", "study/day_tests/*", math.inf, DAYS),
     Explanation("full", "study/sensitivity/p_day", math.inf, DAYS),
     Explanation("full", "study/epochs/of_*", 1e-4, LOOP),
