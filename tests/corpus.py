@@ -18,6 +18,7 @@ from tests import instrument_files as instruments
 from tests.dialects import ANGLE_DEG, ANGLE_RAD, DIALECTS, MILLI, SEED, TIME_S, TORQUE_NM, csv
 from tests.instrument_files import Signal
 from tests.known_joint import angle_rad
+from tests.laboratory_files import LABORATORY
 
 
 @dataclass(frozen=True)
@@ -191,7 +192,7 @@ FILES: Mapping[str, Entry] = {
 CORPUS: Mapping[str, Entry] = {
     **{
         name: Entry((one.file,), _text(one.file, one.content), one.said, one.refused)
-        for name, one in DIALECTS.items()
+        for name, one in {**DIALECTS, **LABORATORY}.items()
     },
     **{name if name not in DIALECTS else f"{name}, binary": one for name, one in FILES.items()},
 }

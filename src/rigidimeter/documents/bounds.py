@@ -64,6 +64,9 @@ It is 10,000 ratings by 500 examiners, or 100,000 by 170."""
 BOOTSTRAP_COUNTS = 25_000_000
 """Of a bootstrap, resamples times units, each 16 bytes: 9,999 resamples of 2,500 units."""
 
+RANKED_PAIRS = 50_000_000
+"""Of a rank-sum test, whose shift is the median of all differences: 7,000 values a condition."""
+
 SHOWN_LINES = 5
 """Of the lines that one sentence is about; the others are counted."""
 

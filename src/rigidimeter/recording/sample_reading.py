@@ -27,7 +27,7 @@ from rigidimeter.recording.sample_log import SCHEMA, Sample, columns_text, sampl
 _FIRST = len(Sample._fields) - len(Sample._field_defaults)
 """Columns that every recording has; later versions added the others."""
 _READING = pa.ipc.IpcReadOptions(use_threads=False)
-_REFUSALS = (pa.ArrowException, MemoryError, OSError)
+_REFUSALS = (pa.ArrowException, MemoryError, OSError, UnicodeDecodeError)
 """What Arrow raises for bytes that are no stream; a damaged length is one that asks for memory."""
 
 
@@ -125,7 +125,9 @@ def _read_schema(content: bytes) -> tuple[bytes, pa.Schema, Message | None]:
     if message is not None:
         header = content[: message.stop]
         try:
-            return header, pa.ipc.read_schema(pa.py_buffer(header)), message
+            schema = pa.ipc.read_schema(pa.py_buffer(header))
+            columns_text(schema)  # names may be no text
+            return header, schema, message
         except _REFUSALS:
             pass
     return SCHEMA.serialize().to_pybytes(), SCHEMA, None

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import mannwhitneyu, norm
 
+from rigidimeter.documents.bounds import RANKED_PAIRS
+from rigidimeter.errors import UserError
 from rigidimeter.statistics.summary import checked_sample
 
 
@@ -85,6 +87,8 @@ def ranksum(x: ArrayLike, y: ArrayLike, *, confidence: float = 0.95) -> RankSum:
     ValueError
         If a sample is empty, not one-dimensional or not finite, or `confidence` is not between
         0 and 1.
+    UserError
+        If there are too many pairs of values.
 
     Notes
     -----
@@ -113,9 +117,15 @@ def ranksum(x: ArrayLike, y: ArrayLike, *, confidence: float = 0.95) -> RankSum:
     sample_x, sample_y = checked_sample("x", x), checked_sample("y", y)
     if not 0 < confidence < 1:
         raise ValueError(f"confidence must be between 0 and 1, got {confidence}")
-    differences = np.sort(np.subtract.outer(sample_x, sample_y), axis=None)
+    pairs = sample_x.size * sample_y.size
+    if pairs > RANKED_PAIRS:
+        raise UserError(
+            f"{sample_x.size} and {sample_y.size} values make {pairs:.2g} pairs, and a rank-sum "
+            f"test with the interval of its shift takes at most {RANKED_PAIRS:.2g}; compare means "
+            "of days or subjects instead"
+        )
     sigma = u_sigma(sample_x, sample_y)
-    u, p, p_uncorrected = differences.size / 2, 1.0, 1.0
+    u, p, p_uncorrected = pairs / 2, 1.0, 1.0
     if sigma > 0:
         corrected, plain = (
             mannwhitneyu(sample_x, sample_y, method="asymptotic", use_continuity=flag)
@@ -124,23 +134,27 @@ def ranksum(x: ArrayLike, y: ArrayLike, *, confidence: float = 0.95) -> RankSum:
         u, p, p_uncorrected = (
             float(value) for value in (corrected.statistic, corrected.pvalue, plain.pvalue)
         )
-    excess = u - differences.size / 2
+    excess = u - pairs / 2
     z = _z(excess, sigma, 0.5)
-    low, high, bounded = _interval(sample_x, sample_y, differences, confidence)
+    first = _first_kept(sample_x, sample_y, confidence)
+    ends = max(first, 1) - 1, pairs - max(first, 1)
+    differences = np.subtract.outer(sample_x, sample_y).reshape(-1)
+    differences.partition(sorted({*ends, (pairs - 1) // 2, pairs // 2}))
+    low, high = (float(differences[end]) for end in ends)
     return RankSum(
         n_x=sample_x.size,
         n_y=sample_y.size,
         z=z,
         p=p,
         r=z / math.sqrt(sample_x.size + sample_y.size),
-        shift=float(np.median(differences)),
+        shift=float(differences[(pairs - 1) // 2] + differences[pairs // 2]) / 2,
         shift_low=low,
         shift_high=high,
         confidence=confidence,
         z_uncorrected=_z(excess, sigma, 0.0),
         p_uncorrected=p_uncorrected,
         u=u,
-        shift_bounded=bounded,
+        shift_bounded=first > 0,
     )
 
 
@@ -170,21 +184,13 @@ def _z(excess: float, sigma: float, correction: float) -> float:
     return math.copysign(size, excess) / sigma
 
 
-def _interval(
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    differences: NDArray[np.float64],
-    confidence: float,
-) -> tuple[float, float, bool]:
-    """Invert the test over the sorted differences; see the notes of `ranksum`.
+def _first_kept(x: NDArray[np.float64], y: NDArray[np.float64], confidence: float) -> int:
+    """Return which of the sorted differences is the lower end, from 1 on; see `ranksum`.
 
     Above k of the differences, U(d) − m n / 2 = m n / 2 − k. The test does not reject while its
-    size, less ½, is at most z σ; so the k that are kept lie symmetrically about m n / 2.
+    size, less ½, is at most z σ; so the k that are kept lie symmetrically about m n / 2. Below 1
+    the interval has no end.
     """
-    pairs = differences.size
     sigma = _sigma_from_ties(x.size, y.size, _tie_term(x) + _tie_term(y))
     reach = float(norm.isf((1 - confidence) / 2)) * sigma + 0.5
-    first = math.ceil(pairs / 2 - reach)
-    bounded = first > 0
-    first = max(first, 1)
-    return float(differences[first - 1]), float(differences[pairs - first]), bounded
+    return math.ceil(x.size * y.size / 2 - reach)

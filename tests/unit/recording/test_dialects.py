@@ -40,10 +40,10 @@ def outcome(folder: Path, entry: Entry):
         found = inspect_table(table, options)
         if found.proposal.unsaid:
             return "\n".join(found.proposal.unsaid)
-        (epoch,), _ = epochs_from_table(table, found.options)
+        epochs, _ = epochs_from_table(table, found.options)
     except UserError as error:
         return str(error)
-    return fit_epoch(epoch, "bandlimited", load_settings(None))
+    return fit_epoch(epochs[-1], "bandlimited", load_settings(None))
 
 
 def says_the_truth(fit) -> bool:

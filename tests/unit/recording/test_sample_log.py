@@ -104,3 +104,11 @@ def test_a_stream_of_other_columns_is_refused(tmp_path, change):
         stream.write_table(table)
     with pytest.raises(UserError, match="holds other columns than a recording of this version"):
         read_samples(path)
+
+
+def test_a_schema_whose_names_are_no_text_is_damaged(tmp_path):
+    path = tmp_path / "samples.arrows"
+    write(path, 500)
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b"torque_nm", b"torque\xff\xff\xff"))
+    assert read_samples(path)["torque_nm"].size == 500

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from rigidimeter.errors import UserError
 from rigidimeter.statistics import ranksum
 
 
@@ -126,3 +127,8 @@ def test_bad_samples_are_refused(x: list[float], y: list[float], message: str) -
 def test_bad_confidence_is_refused(confidence: float) -> None:
     with pytest.raises(ValueError, match="between 0 and 1"):
         ranksum([1.0], [2.0], confidence=confidence)
+
+
+def test_more_pairs_than_fit_into_memory_are_refused() -> None:
+    with pytest.raises(UserError, match=r"make 6\.4e\+07 pairs"):
+        ranksum(np.zeros(8000), np.arange(8000.0))

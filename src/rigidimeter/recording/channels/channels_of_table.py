@@ -134,7 +134,11 @@ def _time(table: Table, choice: Choice, raw: Mapping[str, Array], rate_hz: float
         return np.arange(table.columns[first].size) / (rate_hz or 1.0)
     if taken.to_si is None or "time_s" not in raw:
         return np.empty(0)
-    return time_stamps(table, taken.column, raw["time_s"], taken.to_si, rate_hz)
+    label = choice.taken.get("epoch")
+    labels = None if label is None else table.columns.get(label.column)
+    if labels is not None and labels.size != raw["time_s"].size:
+        labels = None
+    return time_stamps(table, taken.column, raw["time_s"], taken.to_si, rate_hz, labels)
 
 
 def _unstated(

@@ -97,7 +97,7 @@ def _look(torque: tuple[Array, Array], motion: tuple[Array, Array], *, is_angle:
         angle = values
         over = 1
         if SPEED_OVER_S / values.size < step_s < SPEED_OVER_S:
-            over = round(SPEED_OVER_S / step_s)
+            over = min(round(SPEED_OVER_S / step_s), values.size - 1)
         velocity = (values[over:] - values[:-over]) / np.maximum(
             time_s[over:] - time_s[:-over], 1e-12
         )

@@ -21,7 +21,7 @@ from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.channels.looks import Array, Look
 from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.readings import doubts, look_at, usual_units
-from rigidimeter.recording.formats.columns import numbers, own_rate, own_rates
+from rigidimeter.recording.formats.columns import numbers, own_rate, own_rates, restarts
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
 
@@ -56,7 +56,9 @@ class Proposal:
 def propose(table: Table, options: ReadOptions) -> Proposal:
     """Return how a table should be read, with the options that are given already."""
     reasons: list[str] = []
-    options = _torque_of_several(table, options, reasons)
+    for standard in ("torque_nm", *MOTION):
+        options = _one_of_several(table, standard, options, reasons)
+    options = _trials(table, options, reasons)
     options = _units(table, options, reasons)
     choice = _chosen(table, options)
     raw, rate_hz = _raw(table, choice, options)
@@ -74,11 +76,15 @@ def propose(table: Table, options: ReadOptions) -> Proposal:
     return Proposal(options, tuple(reasons), unsaid, choice, seen)
 
 
-def _torque_of_several(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOptions:
-    candidates = _chosen(table, options).several.get("torque_nm", [])
+def _one_of_several(
+    table: Table, standard: str, options: ReadOptions, reasons: list[str]
+) -> ReadOptions:
+    """Choose the torque, or the motion, that alone belongs to the other."""
+    name = BY_STANDARD[standard].name
+    candidates = _chosen(table, options).several.get(standard, [])
     explained: dict[str, float] = {}
     for column in candidates:
-        tried = replace(options, columns={**options.columns, "torque": column})
+        tried = replace(options, columns={**options.columns, name: column})
         choice = _chosen(table, tried)
         seen = _seen(choice.taken, *_raw(table, choice, tried), {})
         if seen is not None and seen.fit is not None:
@@ -86,9 +92,25 @@ def _torque_of_several(table: Table, options: ReadOptions, reasons: list[str]) -
     ranked = sorted(explained, key=lambda column: -explained[column])
     if len(ranked) < 2 or explained[ranked[0]] < _BELONGS or explained[ranked[1]] > _DOES_NOT:
         return options
-    shown = ", ".join(f"{explained[column]:.2f} of {column!r}" for column in ranked[:4])
-    reasons.append(f"the motion explains {shown} of the torque")
-    return replace(options, columns={**options.columns, "torque": ranked[0]})
+    shown = ", ".join(f"{explained[column]:.2f} with {column!r}" for column in ranked[:4])
+    reasons.append(f"the share of the torque that the motion explains is {shown} as the {name}")
+    return replace(options, columns={**options.columns, name: ranked[0]})
+
+
+def _trials(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOptions:
+    """Take for the epochs the column that changes where the time starts anew, and only there."""
+    choice = _chosen(table, options)
+    raw, _ = _raw(table, choice, options)
+    starts = restarts(raw["time_s"]) if "time_s" in raw else np.empty(0)
+    if not starts.size or "epoch" in choice.taken:
+        return options
+    for name, column in table.columns.items():
+        if column.size == raw["time_s"].size and np.array_equal(
+            np.flatnonzero(column[1:] != column[:-1]) + 1, starts
+        ):
+            reasons.append(f"the time starts anew where {name!r} changes")
+            return replace(options, columns={**options.columns, "epoch": name})
+    return options
 
 
 def _units(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOptions:

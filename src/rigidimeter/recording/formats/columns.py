@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ RATE_NAMES = ("rate_hz", "fs_hz", "fs", "sampling_rate_hz")
 STRAY_SHARE = 0.01
 """Up to this share of entries may be text in a column of numbers and still be left out singly."""
 _AGREEMENT = 0.01
+APART_S = 1.0
+"""Between epochs that each have a time of their own."""
 
 
 def numbers(
@@ -65,6 +68,7 @@ def time_stamps(
     values: NDArray[np.float64],
     to_si: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     rate_hz: float | None,
+    labels: NDArray[Any] | None = None,
 ) -> NDArray[np.float64]:
     """Return the time of each row in s, shape (n_rows,), strictly increasing.
 
@@ -80,17 +84,32 @@ def time_stamps(
         Turns it into seconds.
     rate_hz : float or None
         The sampling rate, if the user gave one.
+    labels : array, shape (n_rows,), optional
+        Of the epochs. Where the time starts anew with each of them, they are put `APART_S` apart.
 
     Raises
     ------
     UserError
         If time and rate disagree, or if the time does not increase.
     """
-    _increasing(table, name, values)
     time_s = to_si(values)
+    starts = restarts(values)
+    if labels is not None and starts.size and np.all(labels[starts] != labels[starts - 1]):
+        ends_s = time_s[starts - 1] + APART_S - time_s[starts]
+        time_s = time_s + np.repeat(
+            np.concatenate([[0.0], np.cumsum(ends_s)]),
+            np.diff(starts, prepend=0, append=values.size),
+        )
+        values = time_s
+    _increasing(table, name, values)
     if rate_hz is not None:
         _agreeing(table, name, time_s, rate_hz)
     return time_s
+
+
+def restarts(values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the rows in which a time goes back."""
+    return np.flatnonzero(np.diff(values) < 0) + 1
 
 
 def seconds(value: float) -> str:
@@ -166,7 +185,10 @@ def _increasing(table: Table, name: str, time_s: NDArray[np.float64]) -> None:
         row = int(back[0]) + 1
         before, now = float(time_s[row - 1]), float(time_s[row])
         what = f"repeats {now!r}" if now == before else f"goes back from {before!r} to {now!r}"
-        raise UserError(f"{table.where(row)}: {name} {what}; time must increase from row to row")
+        text = f"{table.where(row)}: {name} {what}; time must increase from row to row"
+        if now <= float(time_s[0]):
+            text += "; if it starts anew with each trial, say --column epoch=NAME of their numbers"
+        raise UserError(text)
 
 
 def _agreeing(table: Table, name: str, time_s: NDArray[np.float64], rate_hz: float) -> None:

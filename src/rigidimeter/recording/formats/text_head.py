@@ -15,6 +15,7 @@ from rigidimeter.documents.bounds import COLUMNS
 from rigidimeter.documents.escaping import NUMBER
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.unit_text import expression
+from rigidimeter.recording.formats.clocked_table import unique
 from rigidimeter.recording.formats.table import MISSING, printable
 
 DELIMITERS = ("\t", ";", ",", "|", "")
@@ -24,6 +25,7 @@ _RUN = 5
 _FEW = 2
 _LABEL = re.compile(r"[^\W\d_][\w .-]*")
 _STAMP = re.compile(r"[\d:./T -]*:[\d:.,]+Z?")
+_RATE = re.compile(r"(?i)\b(?:sampl|abtast|[ée]chant|campion|muestr)\D*?(\d+(?:[.,]\d+)?)\s*(k?)Hz")
 
 
 @dataclass(frozen=True)
@@ -69,8 +71,8 @@ class Layout:
     table: str = ""
 
 
-def first_line_head(source: str, text: str, example: str) -> Head:
-    """Return the head of a table whose first line names the columns.
+def first_line_head(source: str, text: str, example: str, *, once: bool = False) -> Head:
+    """Return the head of a table whose first line names the columns, each `once` where asked.
 
     Raises
     ------
@@ -85,11 +87,11 @@ def first_line_head(source: str, text: str, example: str) -> Head:
             f"{', ...' if len(names) > 3 else ''}), but it must name the columns, as in {example}; "
             "or name them with --names"
         )
-    return Head(delimiter, checked_names(source, names), 1)
+    return Head(delimiter, checked_names(source, names, once=once), 1)
 
 
-def checked_names(source: str, names: Sequence[str]) -> list[str]:
-    """Return names of columns as messages can show them, each once.
+def checked_names(source: str, names: Sequence[str], *, once: bool = False) -> list[str]:
+    """Return names of columns as messages can show them; a second one of a name has a number.
 
     Raises
     ------
@@ -104,9 +106,9 @@ def checked_names(source: str, names: Sequence[str]) -> list[str]:
     shown = [printable(name.strip().strip("\"'").strip()) for name in names]
     shown = [name or f"column {index}" for index, name in enumerate(shown, start=1)]
     twice = next((name for index, name in enumerate(shown) if name in shown[:index]), None)
-    if twice is not None:
+    if twice is not None and once:
         raise UserError(f"{source}: two columns are named {twice}; each must have its own name")
-    return shown
+    return unique(shown, but=())
 
 
 def found_head(
@@ -174,7 +176,7 @@ def _named(
             raise UserError(
                 f"{source}: its rows have {count} columns, but --names gives {len(names)}"
             )
-        return Head(delimiter, checked_names(source, names), start)
+        return Head(delimiter, checked_names(source, names, once=True), start)
     at = start - 1
     units = units_row(lines[at], delimiter) if at >= 0 else None
     if units is not None and len(units) == count and at > 0:
@@ -189,13 +191,24 @@ def _named(
             if len(found) == count and not any(_is_number(cell) for cell in found):
                 shown = checked_names(source, found)
                 stated = dict(zip(shown, units or [""] * count, strict=True))
-                return Head(delimiter, shown, start, {n: u for n, u in stated.items() if u})
+                stated = {name: unit for name, unit in stated.items() if unit}
+                return Head(delimiter, shown, start, stated, _rate([*lines[:start], comment]))
     if start <= _FEW:
         return first_line_head(source, lines[0], example)
     raise UserError(
         f"{source}: the rows have {count} columns, but the line before them does not name as many; "
         "name them with --names"
     )
+
+
+def _rate(lines: Sequence[str]) -> dict[str, float | str]:
+    """Return the sampling rate that lines before the rows state in Hz, if they state one."""
+    found = {
+        float(number.replace(",", ".")) * (1000.0 if kilo else 1.0)
+        for line in lines
+        for number, kilo in _RATE.findall(line)
+    }
+    return {"rate_hz": found.pop()} if len(found) == 1 else {}
 
 
 def _run_of_rows(lines: Sequence[str], delimiter: str) -> int:

@@ -63,6 +63,19 @@ def _labview(source: str, lines: Sequence[str]) -> Head:
     return Head(delimiter, checked_names(source, names), ends[1] + 2, units, scalars)
 
 
+def without_later_heads(text: bytes) -> bytes:
+    """Return an .lvm file with one head: blank lines for those of later blocks of its columns."""
+    if not text.startswith(b"LabVIEW Measurement"):
+        return text
+    end = re.escape(_END.encode())
+    found = re.search(rb"\A(?s:.*?)" + end + rb"(?s:.*?)" + end + rb"[^\n]*\n([^\n]*)\n", text)
+    if found is None:
+        return text
+    later = rb"\n\s*\nChannels\t(?s:.*?)" + end + rb"[^\n]*\n" + re.escape(found[1]) + rb"\n"
+    body = re.sub(later, lambda head: b"\n" * head[0].count(b"\n"), text[found.end() :])
+    return text[: found.end()] + body
+
+
 def _opensim(source: str, lines: Sequence[str], end: int) -> Head:
     """Read the head of a .sto or .mot file, which is in SI units but for angles in degrees."""
     keys: dict[str, str] = {}

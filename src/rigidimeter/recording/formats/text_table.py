@@ -34,7 +34,7 @@ from rigidimeter.recording.formats.text_head import (
     found_head,
 )
 from rigidimeter.recording.formats.text_lines import content, read_utf8, records
-from rigidimeter.recording.formats.text_preambles import known_head
+from rigidimeter.recording.formats.text_preambles import known_head, without_later_heads
 
 _DECIMAL_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
 _STAMP = re.compile(r"(\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d([.,]\d+)?")
@@ -157,7 +157,7 @@ def read_text_recording(path: Path, layout: Layout | None = None) -> Table:
         If it is not such a file; the sentence names the line where there is one.
     """
     example = "time_s,torque_nm,angle_rad"
-    whole = read_utf8(path, RECORDING_BYTES)
+    whole = without_later_heads(read_utf8(path, RECORDING_BYTES))
     if whole.startswith(SPIKE2):
         return spike2_table(str(path), whole)
     text = _open(str(path), whole, "samples", example, layout or Layout())
@@ -201,6 +201,8 @@ def _stamps(column: NDArray[Any]) -> NDArray[np.float64] | None:
     try:
         if re.match(r"\d{1,2}:", texts[0]):
             since = pd.to_timedelta(texts)
+            midnights = (since.diff() < -pd.Timedelta(hours=12)).cumsum()
+            since = since + pd.to_timedelta(midnights, unit="D")
         else:
             when = pd.to_datetime(texts, format="ISO8601")
             since = when - when[0]
@@ -298,7 +300,7 @@ def _open(
 
 def _head(source: str, whole: bytes, data: bytes, example: str, layout: Layout | None) -> Head:
     if layout is None:
-        return first_line_head(source, data.partition(b"\n")[0].decode("utf-8"), example)
+        return first_line_head(source, data.partition(b"\n")[0].decode("utf-8"), example, once=True)
     first = [line.decode("utf-8") for line in data.split(b"\n", HEAD_LINES)[:HEAD_LINES]]
     known = None if layout.names else known_head(source, first)
     if known is not None:
@@ -306,6 +308,15 @@ def _head(source: str, whole: bytes, data: bytes, example: str, layout: Layout |
     before, _, _ = whole.partition(data[: data.find(b"\n")] if b"\n" in data else data)
     comments = [line[1:].strip() for line in before.decode("utf-8").splitlines() if line[:1] == "#"]
     return found_head(source, first, comments[-1] if comments else "", layout.names, example)
+
+
+def _is_text(line: bytes, is_whole: bool, first: bytes, mark: bytes) -> bool:
+    """Whether a line is no row: it begins with no number, though the first row does."""
+    start = line.decode("utf-8").strip()
+    if not is_whole:
+        return not NUMBER.match(start)
+    cells = [row.split(mark)[0].strip().decode("utf-8") for row in (first, line)]
+    return bool(NUMBER.fullmatch(cells[0])) and cells[1][:1].isalpha() and not is_missing(cells[1])
 
 
 def _trimmed(
@@ -320,9 +331,13 @@ def _trimmed(
     if counts.size and b'"' not in body:
         lines = body.split(b"\n")
         kept = len(lines)
-        while kept > 1 and len(lines) - kept < _FOOTER and counts[kept - 1] not in (
-            n_columns, n_columns + 1,
-        ) and not NUMBER.match(lines[kept - 1].decode("utf-8").strip()):  # fmt: skip
+        while (
+            kept > 1
+            and len(lines) - kept < _FOOTER
+            and _is_text(
+                lines[kept - 1], counts[kept - 1] in (n_columns, n_columns + 1), lines[0], mark
+            )
+        ):
             kept -= 1
         if kept < len(lines):
             body = b"\n".join(lines[:kept])

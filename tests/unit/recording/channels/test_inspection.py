@@ -54,7 +54,7 @@ def test_the_one_torque_that_belongs_to_the_motion_is_found():
     columns = {"t [s]": TIME_S, **other, "Mz [Nm]": TORQUE_NM, "angle_deg": ANGLE_DEG}
     found = inspected(**columns)
     assert found.options.columns == {"torque": "Mz [Nm]"}
-    assert "the motion explains 1.00 of 'Mz [Nm]'" in found.proposal.reasons[0]
+    assert "the motion explains is 1.00 with 'Mz [Nm]'" in found.proposal.reasons[0]
     both = inspected(**columns | {"Mx [Nm]": TORQUE_NM})
     assert "3 columns may be the torque" in both.proposal.unsaid[0]
 

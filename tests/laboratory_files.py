@@ -1,0 +1,99 @@
+"""Files of a known joint as laboratories keep them, each with a trap of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime, timedelta
+
+import numpy as np
+from tests.dialects import ANGLE_DEG, MILLI, TIME_S, TORQUE_NM, VELOCITY_RAD_S, Dialect, csv
+
+T, M, D = TIME_S, TORQUE_NM, ANGLE_DEG
+HALF = T.size // 2
+
+_FILE_HEAD = (
+    "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
+    "Decimal_Separator\t.\nMulti_Headings\tYes\nX_Columns\tOne\nTime_Pref\tRelative\n"
+    "Operator\tlab\nDate\t2024/05/06\nTime\t10:11:12.5\n***End_of_Header***\t\n\t\n"
+)
+_BLOCK_HEAD = (
+    "Channels\t2\t\t\nSamples\t2000\t2000\t\nDate\t2024/05/06\t2024/05/06\t\n"
+    "Time\t10:11:12.5\t10:11:12.5\t\nY_Unit_Label\tNewton_Meters\tDegrees\t\n"
+    "X_Dimension\tTime\tTime\t\nX0\t0.0E+0\t0.0E+0\t\nDelta_X\t0.005\t0.005\t\n"
+    "***End_of_Header***\t\t\t\nX_Value\tTorque\tAngle\tComment"
+)
+
+
+def _block(part: slice) -> bytes:
+    return csv(_BLOCK_HEAD, T[part], M[part], D[part], mark="\t", end="\t")
+
+
+def _clock(mark: str, midnight_at_s: float = 5.0) -> list[str]:
+    """Return times of day to the millisecond, past midnight."""
+    start = datetime(2024, 5, 7) - timedelta(seconds=midnight_at_s)
+    return [
+        (start + timedelta(seconds=float(t))).strftime(f"%H:%M:%S{mark}%f")[:-3] for t in T.round(3)
+    ]
+
+
+def _lines(head: str, *columns, mark: str = ";", decimal: str = ",") -> bytes:
+    def cell(value: object) -> str:
+        return value if isinstance(value, str) else f"{value:.6f}".replace(".", decimal)
+
+    rows = (mark.join(map(cell, row)) for row in zip(*columns, strict=True))
+    return "\n".join([head, *rows]).encode()
+
+
+_RESTART_S = np.concatenate([T[:HALF], T[:HALF]])
+_NOISE = np.random.default_rng(4).normal(size=T.size)
+_GERMAN = csv("Messung;Ellbogen rechts\nDatum;06.05.2024\n\nZeit [s];Drehmoment [Nm];Winkel [Grad]",
+              T, M, D, mark=";", decimal=",")  # fmt: skip
+
+LABORATORY: Mapping[str, Dialect] = {
+    "LabVIEW, two blocks": Dialect(
+        "r.lvm", _FILE_HEAD.encode() + _block(slice(HALF)) + b"\n" + _block(slice(HALF, None))
+    ),
+    "German, UTF-16, a footer with numbers": Dialect(
+        "r.csv",
+        (_GERMAN.decode() + "\nEnde der Messung\nMittelwert;0,123;0,456\n").encode("utf-16"),
+    ),
+    "times of day, past midnight": Dialect(
+        "r.csv", _lines("Uhrzeit;Drehmoment (Nm);Winkel (°)", _clock(","), M, D)
+    ),
+    "date and time of day apart": Dialect(
+        "r.csv",
+        _lines("Date,Time,Torque (Nm),Angle (deg)", ["2024-05-06"] * T.size, _clock("."), M, D,
+               mark=",", decimal="."),
+    ),
+    "two angles, the second first": Dialect(
+        "r.csv", csv("t [s],angle2 [deg],angle1 [deg],torque [Nm]", T, 30 + np.sin(T), D, M)
+    ),
+    "a name twice": Dialect(
+        "r.csv", csv("Time (s),Torque (Nm),Angle (deg),Torque (Nm)", T, M, D, _NOISE)
+    ),
+    "counts, the gain in a comment": Dialect(
+        "r.csv",
+        csv("# torque gain: 0.001 Nm/count\ntime_ms,torque_counts,angle_deg", MILLI * T,
+            (1e3 * M).round(), D),
+        refused="stated nowhere",
+    ),
+    "counts with their gain": Dialect(
+        "r.csv", csv("time_ms,torque_counts,angle_deg", MILLI * T, (1e6 * M).round(), D),
+        {"scale": {"torque": "1e-6 Nm"}},
+    ),
+    "the time starts anew with each trial": Dialect(
+        "r.csv",
+        csv("Trial,time (s),torque (Nm),angle (deg)", np.repeat([1, 2], HALF), _RESTART_S, M, D),
+    ),
+    "sample numbers, the rate in a line of text": Dialect(
+        "r.csv", csv("Sampling rate: 200 Hz\nSample,Torque (Nm),Angle (deg)", np.arange(T.size), M,
+                     D),
+    ),
+    "milliseconds since 1970": Dialect(
+        "r.csv", csv("timestamp,torque (Nm),angle (deg)", 1.714e12 + MILLI * T, M, D, digits=16)
+    ),
+    "velocity alone, reaction": Dialect(
+        "r.csv",
+        csv("t_ms;Mz_Nm;omega_deg_s", MILLI * T, -M, np.degrees(VELOCITY_RAD_S), mark=";"),
+    ),
+}  # fmt: skip
