@@ -168,7 +168,8 @@ def read(
         epochs, notices = epochs_from_table(joined, of_joined)
     used = chosen or load_settings(None)
     if found_offset is not None and epochs:
-        notices.insert(0, offset_notice(found_offset, tables, epochs, used))
+        notices.insert(0, offset_notice(found_offset, tables[1].source))
+        epochs = [replace(epoch, clock_error_s=found_offset.error_s) for epoch in epochs]
     paths_read = tuple(dict.fromkeys(asked))
     joined_recording = Recording(tuple(epochs), tuple(notices), used, paths_read, digests)
     return _complete(joined_recording, leave_out)

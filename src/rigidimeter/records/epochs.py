@@ -181,6 +181,8 @@ class Epoch:
         Whether a simulation made it.
     left_out : tuple of LeftOut
         What of it is not used.
+    clock_error_s : float
+        Standard error of the offset between the clocks of torque and motion, where it was found.
     """
 
     source: str
@@ -193,6 +195,7 @@ class Epoch:
     closed: Outcome = field(default_factory=Outcome)
     virtual: bool = False
     left_out: tuple[LeftOut, ...] = ()
+    clock_error_s: float = 0.0
 
     @property
     def name(self) -> str:

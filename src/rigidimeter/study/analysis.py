@@ -21,6 +21,7 @@ from rigidimeter.estimation import (
 )
 from rigidimeter.estimation.alignment import MOST_EPOCHS, aligned_prepared
 from rigidimeter.estimation.between_epochs import between_epochs
+from rigidimeter.estimation.clock_error import with_clock_error
 from rigidimeter.estimation.closedloop.observation import closed_loop_obstacle
 from rigidimeter.estimation.diagnostics import checked, checked_together
 from rigidimeter.estimation.diagnostics.delay_check import torque_delay
@@ -183,7 +184,14 @@ def analyse_prepared(
         progress(costs.score)
     if estimator.uses_perturbation:
         reason += _without_drive(fitted, bool(reason))
-    found, pooled = estimator.fit(fitted, None, fit_progress, not fits_alone)
+
+    def fitted_by(
+        epochs: Sequence[PreparedEpoch], inertia_kg_m2: float | None, pooled: bool
+    ) -> tuple[list[Fit], list[Fit]]:
+        made = estimator.fit(epochs, inertia_kg_m2, fit_progress, pooled)
+        return with_clock_error(estimator.fit, epochs, inertia_kg_m2, made, delays)
+
+    found, pooled = fitted_by(fitted, None, not fits_alone)
     fits = []
     for prepared, fit in zip(fitted, found, strict=True):
         found_fit = checked(prepared, fit)
@@ -199,7 +207,8 @@ def analyse_prepared(
         for prepared, fit in zip(fitted, fits, strict=True)
     ]
     if pooled and counted != fitted:  # what a check excludes must not be in the pool either
-        _, pooled = estimator.fit(counted, None, lambda _: None, True)
+        made = estimator.fit(counted, None, lambda _: None, True)
+        _, pooled = with_clock_error(estimator.fit, counted, None, made, delays)
     by_perturbation = estimator.uses_perturbation
     pooled = [_with_differences(fit, fits, by_perturbation, preparation.settings) for fit in pooled]
     together = checked_together(fitted, fits, pooled, estimator)
@@ -207,7 +216,7 @@ def analyse_prepared(
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
     if included:
-        second, _ = estimator.fit(fitted, inertia_kg_m2, fit_progress, False)
+        second, _ = fitted_by(fitted, inertia_kg_m2, False)
         # What did not count in the first stage does not in the second.
         fixed = [
             two if one.outcome.included else replace(two, outcome=one.outcome)

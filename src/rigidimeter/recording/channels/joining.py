@@ -20,8 +20,7 @@ from rigidimeter.recording.channels.readings import options_text
 from rigidimeter.recording.formats.columns import numbers, own_rate, own_rates, time_stamps
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
-from rigidimeter.records import Epoch, Notice
-from rigidimeter.settings import Settings
+from rigidimeter.records import Notice
 
 Array = NDArray[np.float64]
 FOUND = "found"
@@ -71,41 +70,14 @@ def join_tables(
     return _union([parts[0], *moved]), found
 
 
-def offset_notice(
-    found: Offset, tables: Sequence[Table], epochs: Sequence[Epoch], settings: Settings
-) -> Notice:
-    """Say what offset was added to the second clock, and what its error does to J, B and K.
-
-    The longest epoch is fitted with its motion moved by the error forth and back: how much that
-    changes depends on the band, since J θ‴ times the error is part of it.
-    """
-    from rigidimeter.estimation import fit_epoch  # seconds to load; the loop's process has no use
-
+def offset_notice(found: Offset, source: str) -> Notice:
+    """Say what offset was added to the clock of the second source."""
     text = (
-        f"{tables[1].source}: {found.value_s:.4f} ± {found.error_s:.2g} s is added to its clock; "
-        f"the motion then explains {100 * found.r_squared:.1f} % of the torque"
+        f"{source}: {found.value_s:.4f} ± {found.error_s:.2g} s is added to its clock; the motion "
+        f"then explains {100 * found.r_squared:.1f} % of the torque. The intervals of J, B and K "
+        "contain the error"
     )
-    longest = max(epochs, key=lambda epoch: len(epoch.channels["torque_nm"]))
-    early, late = (
-        fit_epoch(_moved(longest, sign * found.error_s), "bandlimited", settings)
-        for sign in (-1.0, 1.0)
-    )
-    if early.outcome.included and late.outcome.included:
-        change = np.abs(late.value - early.value) / 2
-        text += (
-            f". Its error alone makes ± {change[0]:.2g} kg·m² of J, ± {change[1]:.2g} N·m·s/rad of "
-            f"B and ± {change[2]:.2g} N·m/rad of K, which their intervals do not contain"
-        )
     return Notice("warning", text)
-
-
-def _moved(epoch: Epoch, by_s: float) -> Epoch:
-    """Return an epoch whose motion is `by_s` later."""
-    channels = {
-        name: replace(channel, time_s=channel.time_s + by_s) if name in MOTION else channel
-        for name, channel in epoch.channels.items()
-    }
-    return replace(epoch, channels=channels)
 
 
 def _part(table: Table, options: ReadOptions) -> _Part:

@@ -1,24 +1,18 @@
 """Two recordings of one joint, each with its clock: their offset, and the samples of both."""
 
-import re
-
 import numpy as np
 import pytest
 from tests.known_joint import (
-    DAMPING_NM_S_RAD,
-    INERTIA_KG_M2,
-    STIFFNESS_NM_RAD,
     angle_rad,
     torque_nm,
 )
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.channels.clock_offset import Offset, find_offset
+from rigidimeter.recording.channels.clock_offset import find_offset
 from rigidimeter.recording.channels.joining import join_tables, offset_notice
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.table_epochs import epochs_from_table
-from rigidimeter.settings import load_settings
 
 TORQUE_S = 0.0013 + np.arange(12_000) / 750.0
 MOTION_S = np.arange(3_000) / 200.0
@@ -56,39 +50,13 @@ def test_the_offset_is_found_within_its_error(offset_s, seed):
 def test_it_is_added_to_the_second_clock_and_said():
     joined, offset = join_tables(tables(0.3712), ReadOptions(), "found")
     (epoch,), _ = epochs_from_table(joined, ReadOptions())
-    notice = offset_notice(offset, tables(), [epoch], load_settings(None))
+    notice = offset_notice(offset, "a.csv")
     np.testing.assert_allclose(epoch.channels["angle_rad"].time_s, MOTION_S[1:], atol=1e-3)
     assert "a.csv: 0.371" in notice.text
     _, other = join_tables(tables(0.3712)[::-1], ReadOptions(), "found")
     assert other.value_s == pytest.approx(-0.3712, abs=1e-3)
     given, _ = join_tables(tables(0.25), ReadOptions(), 0.25)
     assert np.max(given.columns["time_s"]) == pytest.approx(MOTION_S[-1])
-
-
-def test_what_the_error_of_an_offset_does_to_each_parameter_is_said():
-    """Of a motion that is late by e at one frequency ω, B is wrong by e (K − J ω²)."""
-    error_s, omega = 1e-3, 2 * np.pi
-    slow = np.cos(omega * MOTION_S) + np.cos(1.5 * omega * MOTION_S)
-    joint = INERTIA_KG_M2, DAMPING_NM_S_RAD, STIFFNESS_NM_RAD
-    torque = sum(
-        value * order for value, order in zip(joint[::-1], (slow, *derivatives(omega)), strict=True)
-    )
-    columns = {"time_s": MOTION_S, "torque_nm": torque, "angle_rad": 0.1 * slow}
-    columns["torque_nm"] = 0.1 * torque
-    epochs, _ = epochs_from_table(Table("m.csv", columns), ReadOptions())
-    text = offset_notice(Offset(0.0, error_s, 0.99), tables(), epochs, load_settings(None)).text
-    told = re.search(r"± (\S+) kg·m² of J, ± (\S+) N·m·s/rad of B", text)
-    low, high = (
-        error_s * (STIFFNESS_NM_RAD - INERTIA_KG_M2 * (k * omega) ** 2) for k in (1.5, 1.0)
-    )
-    assert low < float(told[2]) < high
-
-
-def derivatives(omega):
-    """Return velocity and acceleration of the motion above."""
-    first = -omega * np.sin(omega * MOTION_S) - 1.5 * omega * np.sin(1.5 * omega * MOTION_S)
-    second = -(omega**2) * np.cos(omega * MOTION_S)
-    return first, second - (1.5 * omega) ** 2 * np.cos(1.5 * omega * MOTION_S)
 
 
 def test_a_label_holds_in_the_rows_of_the_other_clock():
