@@ -21,11 +21,11 @@ from rigidimeter.study.comparison import compare_analysis, compare_measures, mea
 from rigidimeter.study.measures import Measure, Observation, chosen_pair, conditions, off_first
 from rigidimeter.study.results import StudyResult
 from rigidimeter.study.study_analysis import analyse_study, read_study
+from rigidimeter.study.tested import LEVEL
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_ALPHA = 0.05
 _FEW_SESSIONS = 10
 
 
@@ -257,7 +257,7 @@ def _cautions(source: str, found: Comparison, by_session: bool) -> list[str]:
     counts = " and ".join(f"{n} in {group}" for n, group in zip(sizes, found.pair, strict=True))
     said = []
     least = 2 / math.comb(sum(sizes), sizes[0])
-    if least > _ALPHA:
+    if least > LEVEL:
         said.append(
             f"{source}: {name} has {counts}; even groups that do not overlap have an exact p of "
             f"{least:.2g}, so this test cannot show a difference"

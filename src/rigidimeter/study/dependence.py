@@ -13,8 +13,8 @@ from typing import Literal
 
 from rigidimeter.estimation import method_named
 from rigidimeter.study.results import SensitivityRow, StudyResult
+from rigidimeter.study.tested import LEVEL
 
-LEVEL = 0.05
 Reason = Literal[
     "", "size", "alike", "least squares alone", "imprecise", "not voluntary", "voluntary"
 ]

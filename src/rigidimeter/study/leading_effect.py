@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from rigidimeter.study.compared import Comparison
 from rigidimeter.study.results import StudyResult
+from rigidimeter.study.tested import LEVEL
 
-LEVEL = 0.05
 SAME = 1e-12
 
 

@@ -18,10 +18,8 @@ from rigidimeter.study.blinding import Naming
 from rigidimeter.study.compared import Comparison
 from rigidimeter.study.comparison import measured, no_days
 from rigidimeter.study.measures import RATING, Observation, off_first
-from rigidimeter.study.rating_table import RANDOM, Rating, groupings, oddities, ratings_of
+from rigidimeter.study.rating_table import FEWEST, RANDOM, Rating, groupings, oddities, ratings_of
 from rigidimeter.study.ratings_found import RatingsFound, fit_ratings, with_days
-
-FEWEST = 3
 
 
 def rated(read: StudyFolder, names: Naming) -> tuple[RatingsFound | None, list[Notice]]:
