@@ -28,6 +28,16 @@ from rigidimeter.study import StudyResult, comparison_document
 OFF, DBS = Session("1", "OFF"), Session("1", "DBS")
 NAMES = ("OFF", "DBS")
 SOFTER = (1.0, 1.0, 0.8)
+INSISTS_ON_RADIANS = """schema = "rigidimeter.mapping/1"
+
+[angle]
+column = "angle_rad"
+unit = "rad"
+
+[velocity]
+column = "velocity_rad_s"
+unit = "rad/s"
+"""
 DAYS = 4
 Told = tuple[dict[str, dict[str, str]], str]
 Make = Callable[..., Path]
@@ -128,13 +138,18 @@ def test_stiffness_that_varies_within_the_recording(recorded):
 @pytest.mark.parametrize(
     ("amplitude_nm", "cause"),
     [(1.0, "an angle of"), (0.3, "degrees are read as radians")],
-    ids=["refused", "slipped through"],
+    ids=["refused", "insisted on"],
 )
 def test_degrees_under_a_header_of_radians(recorded, amplitude_nm, cause):
-    """More than one turn is refused when it is read; of a smaller motion J gives it away."""
+    """It is refused when it is read; if a mapping file says that it is rad, J gives it away."""
     off = replace(OFF, columns=MOTION, perturbation_nm=amplitude_nm)
     degrees = replace(DBS, columns=MOTION, perturbation_nm=amplitude_nm, degrees=True)
-    found = compared(recorded(f"degrees {amplitude_nm}", both_each_day(3, off, degrees)))
+    study = recorded(f"degrees {amplitude_nm}", both_each_day(3, off, degrees))
+    if amplitude_nm < 1.0:
+        (study / "lab.toml").write_text(INSISTS_ON_RADIANS)
+        with (study / "study.toml").open("a") as about:
+            about.write('mapping = "lab.toml"\n')
+    found = compared(study)
     assert_none_claimed(found)
     rows, sentence = found
     for measure in ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"):

@@ -117,7 +117,9 @@ def _strip_row(one: Conclusion, to: float, other: str) -> StripRow:
             to,
             kind=_KIND.get(one.verdict, ""),
             words=words,
-        ),
+        )
+        if math.isfinite(value)
+        else Markup(""),
     )
 
 
@@ -221,7 +223,8 @@ def light_words(light: TrafficLight) -> str:
 def gravest_words(light: TrafficLight) -> str:
     """Return the name of the gravest doubt and where it is; what was found, if it is no check."""
     if not light.doubt:
-        return light.text or "No check casts doubt on an epoch."
+        text = light.text or "No check casts doubt on an epoch"
+        return f"{text[:1].upper()}{text[1:].removesuffix('.')}."
     name = light.doubt.replace("_", " ")
     where = f"{light.doubt_epochs} of them" if light.doubt_epochs else "all epochs together"
     return f"Gravest doubt: {name}, in {where}."

@@ -61,7 +61,7 @@
       }
       plots.push(new uPlot({ title, width: into.clientWidth - 4, height, series,
         scales: { x: { time: false } }, cursor: { sync: { key: "epoch", setSeries: false } },
-        axes: [{ ...axis, size: 30 }, { ...axis, size: 60 }] }, data, into));
+        axes: [{ ...axis, size: 30 }, { ...axis, size: 60, space: 25 }] }, data, into));
     }
   }
 

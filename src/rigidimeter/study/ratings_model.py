@@ -161,6 +161,8 @@ def rated_one_condition(found: RatingsFound) -> tuple[str, ...]:
 def without_examiners(found: RatingsFound, examiners: Sequence[str]) -> DayDifference:
     """Return the test by days without some examiners; NaN and a remark where there is none."""
     rows = [row for row in found.rows if row.examiner not in examiners]
+    if not rows:
+        return no_days(0, 0, "no score is left")
     random, pair = tuple(found.fit.offsets), (found.reference, found.other)
     try:
         rest = fit_ratings(found.source, rows, random, pair)

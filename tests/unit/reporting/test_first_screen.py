@@ -16,11 +16,17 @@ from rigidimeter.cli.estimate import estimate_blocks
 from rigidimeter.cli.terminal_tables import Table, text_lines
 from rigidimeter.documents import read_json, write_json
 from rigidimeter.reporting import page as page_module
-from rigidimeter.reporting.first_screen import difference_words, gravest_words, light_words
+from rigidimeter.reporting.first_screen import (
+    difference_words,
+    gravest_words,
+    light_words,
+    strip,
+)
 from rigidimeter.reporting.interval_plot import interval_plot, reach
 from rigidimeter.reporting.page import contents, parts, render_page, write_report
 from rigidimeter.reporting.sections.study_overview import NUMBERS
 from rigidimeter.reporting.verdict_text import verdict
+from rigidimeter.statistics import summarise
 from rigidimeter.study import (
     Difference,
     StudyResult,
@@ -122,6 +128,22 @@ def test_the_light_is_words(study: StudyResult) -> None:
         "39 of 49 epochs are sound (checks cast doubt on 7, 3 are excluded)."
     )
     assert gravest_words(worse) == "Gravest doubt: voluntary torque, in 7 of them."
+    assert gravest_words(replace(light, text="all days came later")) == "All days came later."
+
+
+def test_a_difference_that_is_unknown_has_no_picture(study: StudyResult) -> None:
+    assert all("<svg" in row.plot for row in strip(study))
+    one_sided = tuple(
+        replace(
+            c,
+            test=None,
+            days=None,
+            observations=c.of("OFF"),
+            summaries={"OFF": c.summaries["OFF"], "DBS": summarise([])},
+        )
+        for c in study.comparisons
+    )
+    assert [row.plot for row in strip(replace(study, comparisons=one_sided))] == [""] * 6
 
 
 def test_the_plot_has_its_text_as_text_and_arrows_beyond_its_axis() -> None:

@@ -13,6 +13,7 @@ from tests.unit.reporting.cohorts import Design, made_study
 from rigidimeter.records import Epoch, Finding, Outcome
 from rigidimeter.study import (
     Difference,
+    LeftOut,
     StudyResult,
     compare,
     compare_analysis,
@@ -126,6 +127,12 @@ class TestTrafficLight:
         assert (light.level, light.sound, light.doubted) == ("caution", 59, 19)
         assert (light.doubt, light.doubt_epochs) == ("tremor", 19)
         assert (light.text, light.remedy) == ("a tremor at 5 Hz", "repeat it at rest")
+
+    def test_a_recording_that_could_not_be_used_is_no_good_quality(self, study):
+        refused = LeftOut("b.csv", "M1", "1", "DBS", "its angle is in degrees")
+        light = traffic_light(replace(study, left_out=(refused,)))
+        assert light.level == "caution"
+        assert light.text == "1 of the study's recordings could not be used"
 
     def test_fewer_than_half_sound_is_poor(self, study):
         fits = doubted(doubted(study, 99), 99, "OFF").analysis
