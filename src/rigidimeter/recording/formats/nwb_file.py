@@ -178,8 +178,9 @@ def _read(dataset: Any, expansion: Expansion) -> NDArray[np.float64]:
 
 
 def _with_trials(table: Table, file: Any, expansion: Expansion) -> Table:
-    """Add labels of the trials of a file: their column `epoch`, or their number."""
-    trials = _inside(file, "intervals/trials")
+    """Add labels of the trials of a file, or else its epochs: their column `epoch`, or number."""
+    tables = (_inside(file, place) for place in ("intervals/trials", "intervals/epochs"))
+    trials = next((table for table in tables if table is not None), None)
     if trials is None or _inside(trials, "start_time") is None:
         return table
     starts, stops = (

@@ -21,8 +21,8 @@ TORQUE_S = np.arange(2000) / 200.0
 ANGLE_S = 0.0013 + np.arange(1000) / 100.0
 
 
-def write_nwb(path: Path, unit: str = "degrees") -> Path:
-    """Write torque at 200 Hz with a rate, angle at 100 Hz with stamps, and two trials."""
+def write_nwb(path: Path, unit: str = "degrees", intervals: str = "trial") -> Path:
+    """Write torque at 200 Hz with a rate, angle at 100 Hz with stamps, and two intervals."""
     pynwb = pytest.importorskip("pynwb")
     from pynwb.behavior import Position, SpatialSeries
 
@@ -41,15 +41,16 @@ def write_nwb(path: Path, unit: str = "degrees") -> Path:
     module = file.create_processing_module("behavior", "motion")
     module.add(Position(spatial_series=angle))
     for start_s in (0.0, 5.0):
-        file.add_trial(start_time=start_s, stop_time=start_s + 4.5)
+        getattr(file, f"add_{intervals}")(start_time=start_s, stop_time=start_s + 4.5)
     with pynwb.NWBHDF5IO(path, "w") as io:
         io.write(file)
     return path
 
 
-def test_nwb_of_another_program(tmp_path: Path) -> None:
-    """Units and trials are taken from the file, and each series keeps its clock."""
-    found = read(write_nwb(tmp_path / "joint.nwb"))
+@pytest.mark.parametrize("intervals", ["trial", "epoch"])
+def test_nwb_of_another_program(tmp_path: Path, intervals: str) -> None:
+    """Units and intervals are taken from the file, and each series keeps its clock."""
+    found = read(write_nwb(tmp_path / "joint.nwb", intervals=intervals))
     assert [epoch.label for epoch in found.epochs] == ["1", "2"]
     channels = found.epochs[0].channels
     within = TORQUE_S <= 4.5
