@@ -128,5 +128,6 @@ def start(page: Page, subject: str = "S01", operator: str = "Op") -> None:
     """Fill in what must be given, and start; return once samples are drawn."""
     fill(page, "subject", subject)
     fill(page, "operator", operator)
+    page.evaluate("window.rigDrawnS = 0")
     page.get_by_role("button", name="Start session").click()
     page.wait_for_function("window.rigDrawnS > 0", timeout=1e3 * STARTS_S)

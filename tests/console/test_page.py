@@ -115,7 +115,7 @@ def test_a_closed_tab_pauses_at_once(console, chromium, lateness):
     assert paused_s - closed_s < 0.5 + lateness.worst_s(closed_s)
 
 
-def test_a_killed_server_stops_the_arm_and_keeps_the_record(console, chromium):
+def test_a_killed_server_stops_the_arm_and_a_new_page_goes_on(console, chromium):
     desk = console()
     page = open_page(chromium, desk)
     start(page)
@@ -125,6 +125,14 @@ def test_a_killed_server_stops_the_arm_and_keeps_the_record(console, chromium):
     ticks = read_samples(desk.folder() / "samples.arrows")["tick"]
     np.testing.assert_array_equal(np.unique(ticks), ticks)
     page.get_by_text("The connection to the program is lost").wait_for()
+    broken, again = desk.folder(), console()
+    page = open_page(chromium, again)
+    page.get_by_role("button", name="After").click()
+    page.get_by_text(f"{broken.name}:").click()
+    page.get_by_role("button", name="Run what is left: 2").click()
+    wait_for(lambda: again.folder() != broken)
+    assert again.ended()["outcome"] == "success"
+    assert read_manifest(again.folder())["continues"]["folder"] == broken.name
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", ""])

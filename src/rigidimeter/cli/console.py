@@ -155,6 +155,7 @@ def lead_session(
         hidden = codes(names, request.folder) if request.blinded else {}
         look = desk.console(planned.shown(virtual=rig is None, codes=hidden), folder)
         ended = run_planned(planned, folder, rig, realtime, look, desk.operator_seen_ns)
+        desk.told_to_end = bool(ended.signals)
         good, of = count_epochs(ended.folder)
     except UserError as error:
         desk.over(folder, "not run", error.lines)

@@ -65,22 +65,23 @@ def held_back() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def signals_are_orders(status: SharedStatus) -> Iterator[None]:
-    """Turn the signals to the console into orders; a second SIGINT stops as for a fault."""
-    interrupted = False
+def signals_are_orders(status: SharedStatus) -> Iterator[list[int]]:
+    """Turn the signals to the console into orders; a second SIGINT stops as for a fault.
+
+    Gives the signals that came, a list that grows until the end.
+    """
+    came: list[int] = []
 
     def asked(number: int, _: FrameType | None) -> None:
-        nonlocal interrupted
-        if number == signal.SIGINT and not interrupted:
-            interrupted = True
-            status.raise_flag(Flag.ABORT_ASKED)
-        else:
-            status.raise_flag(Flag.END_ASKED)
+        first = signal.SIGINT not in came
+        came.append(number)
+        abort = number == signal.SIGINT and first
+        status.raise_flag(Flag.ABORT_ASKED if abort else Flag.END_ASKED)
 
     main = threading.current_thread() is threading.main_thread()
     before = {number: signal.signal(number, asked) for number in ENDINGS} if main else {}
     try:
-        yield
+        yield came
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

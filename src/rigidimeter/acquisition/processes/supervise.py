@@ -20,7 +20,7 @@ import os
 import signal
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -62,6 +62,8 @@ class Ended:
         What had to be brought from the rings by another process than the recorder.
     remarks : tuple of str
         What else the operator should know.
+    signals : sequence of int
+        The signals that this process was sent meanwhile.
     """
 
     folder: Path
@@ -71,6 +73,7 @@ class Ended:
     samples: int
     recovered: Recovered | None
     remarks: tuple[str, ...]
+    signals: Sequence[int] = ()
 
 
 def supervise(
@@ -124,7 +127,7 @@ def supervise(
         processes.append(process)
         return process
 
-    with signals_are_orders(status):
+    with signals_are_orders(status) as signals:
         try:
             me = os.getpid()
             recorder = start("recorder", recorder_main, recording, shared.names, patience, me)
@@ -163,6 +166,7 @@ def supervise(
                 shared.samples.written,
                 recovered,
                 (*look.remarks, *remarks),
+                signals,
             )
         finally:
             # Whatever happened here, the loop is given the time to stop the rig in order.

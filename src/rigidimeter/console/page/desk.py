@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.status_values import Flag
 from rigidimeter.acquisition.run_states import State
 from rigidimeter.console.page.presence import Presence
 from rigidimeter.console.session_plan import SessionPlan
@@ -133,9 +132,6 @@ class Desk:
         self._still = True
 
         def look(shared: SessionMemory) -> None:
-            # A signal to this program; the page raises neither.
-            flags = (Flag.END_ASKED, Flag.ABORT_ASKED)
-            self.told_to_end |= any(map(shared.status.flag, flags))
             loop = shared.status.loop()
             self._still = loop is None or loop.tick < 0 or loop.state == State.PAUSED
             if self.running is None:

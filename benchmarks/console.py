@@ -1,0 +1,147 @@
+"""How soon the operator's page stops the arm, and how far its traces are behind.
+
+`python -m benchmarks.console --clicks 30 --freezes 5` opens the page in Debian's Chromium over the
+real loop on the virtual rig, at 1 kHz with four panes live. Each stop is a session of its own:
+
+click       from the time stamp of the pointer event in the browser to the first recorded tick with
+            the cause and a velocity command of zero
+freeze      from SIGSTOP to all renderers of the browser to the first recorded tick with the cause,
+            and to the first with a velocity command of zero
+behind      from the newest sample on the screen to now, looked at by the page
+server      share of one processor that the server's process took while the epoch ran
+
+The browser's clock is the wall clock; its difference to CLOCK_MONOTONIC is read beside each click.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+from playwright.sync_api import Browser, Page
+from tests.console.opened import Console, browser, open_page, start, wait_for
+
+from rigidimeter.guard import Cause
+from rigidimeter.recording.sample_reading import read_samples
+
+PROTOCOL = """
+prbs.duration_s = 60.0
+protocol.rests_s = [2.0]
+protocol.return_s = 1.0
+protocol.blocks = [{task = "prbs", condition = "OFF", epochs = 1}]
+zeroing.duration_s = 0.2
+"""
+NOTE_CLICK = """addEventListener("pointerdown", (event) => {
+  window.clickedS = (performance.timeOrigin + event.timeStamp) / 1000; }, true)"""
+BEHIND = "[(performance.timeOrigin + performance.now()) / 1000, window.rigDrawnS]"
+RUNS = "document.getElementById('state').textContent === 'epoch runs'"
+
+
+def begin(page: Page, measured: dict[str, list[float]], console: Console) -> float:
+    """Start a session; return when it began on CLOCK_MONOTONIC, 2 s into its epoch."""
+    page.locator(".tab[data-view=before]").click()
+    before = set(console.sessions.glob("*/manifest.json"))
+    start(page)
+    wait_for(lambda: set(console.sessions.glob("*/manifest.json")) - before)
+    page.wait_for_function(RUNS)
+    started = next(e for e in console.events() if e["event"] == "clock_started")
+    origin_s = float(started["monotonic_s"])
+    server = psutil.Process(console.process.pid)
+    server.cpu_percent()
+    for _ in range(20):
+        page.wait_for_timeout(100)
+        wall_s, drawn_s = page.evaluate(BEHIND)
+        measured["behind"].append(monotonic_s(wall_s) - origin_s - drawn_s)
+    measured["server"].append(server.cpu_percent() / 100)
+    return origin_s
+
+
+def monotonic_s(wall_s: float) -> float:
+    """Return a time of the wall clock on CLOCK_MONOTONIC."""
+    return wall_s + time.monotonic() - time.time()
+
+
+def stopped_s(console: Console, cause: Cause) -> tuple[float, float]:
+    """Return the session times of the first tick with the cause, and with a command of zero."""
+    reason = console.ended()["reason"]
+    assert cause.sentence in reason, reason
+    samples: dict[str, Any] = read_samples(console.folder() / "samples.arrows")
+    latched = samples["cause"] == int(cause)
+    at_rest = latched & (samples["velocity_command_rad_s"] == 0.0)
+    return float(samples["time_s"][latched][0]), float(samples["time_s"][at_rest][0])
+
+
+def click(page: Page, console: Console, measured: dict[str, list[float]]) -> None:
+    """Click on the emergency stop once."""
+    origin_s = begin(page, measured, console)
+    page.evaluate(NOTE_CLICK)
+    page.locator("#emergency").click()
+    clicked_s = monotonic_s(page.evaluate("window.clickedS"))
+    _, zero_s = stopped_s(console, Cause.EMERGENCY_STOP)
+    measured["click"].append(origin_s + zero_s - clicked_s)
+    page.wait_for_function("document.body.dataset.view === 'after'")
+
+
+def freeze(opened: Browser, page: Page, console: Console, measured: dict[str, list[float]]) -> None:
+    """Stop the renderer once."""
+    origin_s = begin(page, measured, console)
+    found = opened.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
+    pids = [one["id"] for one in found["processInfo"] if one["type"] == "renderer"]
+    frozen_s = time.monotonic()
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        named_s, zero_s = stopped_s(console, Cause.CONSOLE_LOST)
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
+    measured["frozen, cause"].append(origin_s + named_s - frozen_s)
+    measured["frozen, zero"].append(origin_s + zero_s - frozen_s)
+    page.wait_for_function("document.body.dataset.view === 'after'")
+
+
+def row(name: str, values: list[float]) -> str:
+    """Return a line of the table: median, 95th percentile, largest, how many."""
+    if not values:
+        return f"| {name} | – | – | – | 0 |"
+    shown = (np.median(values), np.percentile(values, 95), max(values))
+    if name == "server":
+        cells = [f"{100 * value:.0f} %" for value in shown]
+    else:
+        cells = [f"{1e3 * value:.0f} ms" for value in shown]
+    return f"| {name} | {' | '.join(cells)} | {len(values)} |"
+
+
+def main() -> None:
+    """Measure and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--clicks", type=int, default=30)
+    parser.add_argument("--freezes", type=int, default=5)
+    asked = parser.parse_args()
+    names = ("click", "frozen, cause", "frozen, zero", "behind", "server")
+    measured: dict[str, list[float]] = {name: [] for name in names}
+    with tempfile.TemporaryDirectory() as name:
+        console = Console(Path(name), protocol=PROTOCOL)
+        try:
+            with browser() as opened:
+                page = open_page(opened, console)
+                for _ in range(asked.clicks):
+                    click(page, console, measured)
+                for _ in range(asked.freezes):
+                    freeze(opened, page, console, measured)
+        finally:  # also of a study that was ended early
+            console.close()
+            print("| | median | 95 % | largest | n |\n| --- | --- | --- | --- | --- |")
+            for what, values in measured.items():
+                print(row(what, values))
+
+
+if __name__ == "__main__":
+    main()
