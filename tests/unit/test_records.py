@@ -8,6 +8,7 @@ from rigidimeter.records import (
     PARAMETER_VECTORS,
     PARAMETERS,
     Analysis,
+    Channel,
     Finding,
     Fit,
     Outcome,
@@ -92,3 +93,14 @@ def test_a_notebook_shows_estimates_with_intervals_and_what_was_found():
     assert "work (J)" in page
     many = analysis(fits=(FIT,) * 50, fixed_inertia=(FIT,) * 50)
     assert "The first 20 of 50 epochs." in many._repr_html_()
+
+
+def test_a_channel_lies_alike_in_memory_whatever_it_was_a_column_of():
+    """Sums round by the layout, and a search may then end in another of two equal valleys."""
+    table = np.arange(30.0).reshape(10, 3)
+    channel = Channel("torque_nm", table[:, 0], table[:, 1])
+    for column in (channel.time_s, channel.values):
+        assert column.flags["C_CONTIGUOUS"]
+        assert not column.flags["WRITEABLE"]
+    np.testing.assert_array_equal(channel.values, table[:, 1])
+    assert table.flags["WRITEABLE"]

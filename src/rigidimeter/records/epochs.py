@@ -26,8 +26,12 @@ CHANNEL_UNITS: Mapping[str, str] = {
 
 
 def readonly(values: ArrayLike) -> NDArray[np.float64]:
-    """Return a read-only float64 view (or copy, where the type differs) of an array."""
-    array = np.asarray(values, dtype=np.float64).view()
+    """Return a read-only float64 array without gaps in memory, a copy only where it must be.
+
+    Sums over an array round by how it lies in memory; the same values are to give the same numbers
+    whatever table they were a column of.
+    """
+    array = np.asarray(values, dtype=np.float64, order="C").view()
     array.setflags(write=False)
     return array
 
