@@ -37,7 +37,7 @@ def refusal(path, **options) -> str:
         (HEAD + ROWS + b"0.49,1,1\n", "line 52: time_s repeats 0.49"),
         (HEAD + b",1,1\n" + ROWS, "line 2: time_s is missing"),
         (HEAD + ROWS + b"inf,1,1\n", "line 52: time_s is infinite"),
-        (b"a,a\n1,2\n", "two columns are named a"),
+        (b"a,a\n1,2\n", "its columns are a, a (2)"),
         (b"\x89PNG\r\n\x1a\n\x00\xff\xfe", "is not a text file in UTF-8"),
         (b"a,b\n1,\x002\n", "is not a text file: it holds zero bytes"),
         (HEAD.decode().encode("utf-16")[:-1], "is not a text file in UTF-8"),

@@ -7,8 +7,8 @@ from rigidimeter.console.live_values import LiveValue
 from rigidimeter.console.next_steps import new_folder, next_steps, resume_command
 from rigidimeter.console.observer import Observer
 from rigidimeter.console.orders import KEYS
-from rigidimeter.console.progress import EndedEpoch, Progress
 from rigidimeter.console.session_plan import SessionPlan
+from rigidimeter.console.session_progress import EndedEpoch, Progress
 from rigidimeter.console.terminal import terminal_view
 from rigidimeter.console.trace_reader import TraceReader, Traces
 from rigidimeter.console.tty import discard_typed

@@ -20,9 +20,9 @@ from rigidimeter.acquisition.run_states import State
 from rigidimeter.console.lamps import Lamp, RecorderState, lamps
 from rigidimeter.console.limit_distances import LimitDistance, limit_distances
 from rigidimeter.console.live_values import LiveValue, live_values
-from rigidimeter.console.progress import Progress
 from rigidimeter.console.recent_samples import RecentSamples
 from rigidimeter.console.session_plan import SessionPlan
+from rigidimeter.console.session_progress import Progress
 from rigidimeter.experiment import PlannedEpoch
 from rigidimeter.guard import Cause, Reaction
 from rigidimeter.units import deg_from_rad

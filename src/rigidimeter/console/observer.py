@@ -12,9 +12,9 @@ from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.status_values import LiveEstimate, LoopStatus, Role
 from rigidimeter.console.facts import Facts, facts
 from rigidimeter.console.lamps import RecorderState
-from rigidimeter.console.progress import Progress, progress_after, progress_at_start
 from rigidimeter.console.recent_samples import RECENT_S, recent_samples
 from rigidimeter.console.session_plan import SessionPlan
+from rigidimeter.console.session_progress import Progress, progress_after, progress_at_start
 
 MOST_ESTIMATES = 4000
 """Live estimates that are remembered, which come ten times a second: more than five minutes."""

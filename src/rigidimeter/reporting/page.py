@@ -8,7 +8,6 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,8 +27,6 @@ from rigidimeter.reporting.style import svg_text
 from rigidimeter.reporting.verdict_text import verdict
 from rigidimeter.study import StudyResult, traffic_light
 from rigidimeter.version import __version__
-
-_PLOT_STYLE = "vendored/uPlot.min.css"
 
 Contents = Sequence[tuple[Section, Sequence[Block]]]
 """The sections of a result, each with its text, tables and figures."""
@@ -154,13 +151,12 @@ def _mark(result: StudyResult) -> str:
 
 def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> str:
     """Return the page as text, with its style inside, and the figures that `svg` has by name."""
-    folder = resources.files("rigidimeter.reporting")
     analysis = result.analysis
     sources = [epoch.source for epoch in result.epochs]
     sources += [fit.source for fit in (*analysis.fits, *analysis.fixed_inertia)]
     names = short_names([*sources, *(score.source for score in analysis.scores)])
     environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
+        loader=jinja2.FunctionLoader(_text),
         autoescape=True,
         finalize=shown_text,
         undefined=jinja2.StrictUndefined,
@@ -176,16 +172,11 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
     environment.globals["file_stem"] = file_stem
     light = traffic_light(result)
     traces = epoch_traces(result)
-    script = _script(folder) if traces else ""
+    script = _script() if traces else ""
     return environment.get_template("page.html").render(
         result=result,
         # The style is this package's own file and needs no escaping.
-        css=Markup(
-            "\n".join(
-                (folder / name).read_text(encoding="utf-8")
-                for name in ("page.css", *([_PLOT_STYLE] if traces else []))
-            )
-        ),
+        css=Markup("\n".join([_text("page.css"), *([_plot(".min.css")] if traces else [])])),
         parts=parts(made),
         images=_images(made, svg, {key: place for place, key in enumerate(traces)}),
         traces=Markup(traces_json(traces.values())) if traces else "",
@@ -215,14 +206,23 @@ def _images(
     }
 
 
-def _script(folder: Traversable) -> str:
+def _text(name: str) -> str:
+    """Return a file of this room."""
+    return (resources.files("rigidimeter.reporting") / name).read_text(encoding="utf-8")
+
+
+def _plot(ending: str) -> str:
+    """Return a file of uPlot, which the operator's page shows, too."""
+    place = resources.files("rigidimeter") / "vendored" / f"uPlot{ending}"
+    return place.read_text(encoding="utf-8")
+
+
+def _script() -> str:
     """Return what the page runs: uPlot with its licence, and what opens the traces of an epoch."""
-    licence, plot, page = (
-        (folder / name).read_text(encoding="utf-8").strip()
-        for name in ("vendored/uPlot.LICENSE", "vendored/uPlot.iife.min.js", "page.js")
-    )
     # Its first line names an address, and the page names none outside itself.
-    return f"/*! uPlot 1.6.32\n{licence}\n*/\n{plot.partition('*/')[2].strip()}\n{page}"
+    plot = _plot(".iife.min.js").partition("*/")[2].strip()
+    licence, page = _plot(".LICENSE").strip(), _text("page.js").strip()
+    return f"/*! uPlot 1.6.32\n{licence}\n*/\n{plot}\n{page}"
 
 
 def shown_text(value: Any) -> Any:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.unit.console.test_progress import EPOCHS, ended, started, told
+from tests.unit.console.test_session_progress import EPOCHS, ended, started, told
 
 from rigidimeter.acquisition.processes.ring import ROW
 from rigidimeter.acquisition.processes.status_values import (

@@ -7,7 +7,7 @@ import os
 
 import pytest
 from tests.unit.console.test_live_values import estimate
-from tests.unit.console.test_progress import EPOCHS, started, told
+from tests.unit.console.test_session_progress import EPOCHS, started, told
 
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.status_values import (

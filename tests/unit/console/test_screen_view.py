@@ -11,7 +11,7 @@ import termios
 import time
 
 import pytest
-from tests.unit.console.test_progress import EPOCHS, ended, started
+from tests.unit.console.test_session_progress import EPOCHS, ended, started
 
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.status_values import Condition, Flag, LoopStatus, Role

@@ -12,7 +12,7 @@ from typing import Any
 from nicegui import ui
 
 from rigidimeter.console.page.desk import Desk, StartRequest
-from rigidimeter.console.page.epoch_traces import epoch_traces
+from rigidimeter.console.page.recorded_traces import epoch_traces
 from rigidimeter.console.page.sessions_found import (
     FoundEpoch,
     FoundSession,

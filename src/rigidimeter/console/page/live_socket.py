@@ -21,7 +21,7 @@ from rigidimeter.acquisition.processes.status_values import Flag, Role
 from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.console.observer import Observer
 from rigidimeter.console.page.desk import Desk, RunningSession
-from rigidimeter.console.page.messages import Message, RefusedMessage, parse_message
+from rigidimeter.console.page.page_messages import Message, RefusedMessage, parse_message
 from rigidimeter.console.page.session_state import points, session_state
 from rigidimeter.console.trace_reader import TraceReader
 from rigidimeter.documents import json_line

@@ -33,9 +33,9 @@ def show_page(desk: Desk, work: Work, secret: str) -> None:
     ui.colors(primary="#0050a0")  # white on it has a contrast of 8 to 1
     ui.add_head_html(
         f'<meta name="rig-page" content="{secret}">'
-        f'<link rel="stylesheet" href="/assets/uPlot.min.css?{__version__}">'
+        f'<link rel="stylesheet" href="/vendored/uPlot.min.css?{__version__}">'
         f'<link rel="stylesheet" href="/assets/page.css?{__version__}">'
-        f'<script src="/assets/uPlot.iife.min.js?{__version__}"></script>'
+        f'<script src="/vendored/uPlot.iife.min.js?{__version__}"></script>'
         f'<script src="/assets/page.js?{__version__}" defer></script>'
     )
     ui.html(_during(), sanitize=False).classes("rig")

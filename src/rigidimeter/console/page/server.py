@@ -106,6 +106,7 @@ class PageServer:
 
         app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
         app.mount("/assets", StaticFiles(directory=ASSETS), name="assets")
+        app.mount("/vendored", StaticFiles(packages=[("rigidimeter", "vendored")]), name="vendored")
 
         @app.websocket("/live")
         async def live(one: WebSocket) -> None:

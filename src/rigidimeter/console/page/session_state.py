@@ -11,7 +11,7 @@ from rigidimeter.acquisition.run_states import State
 from rigidimeter.console.facts import ConditionCount, Facts
 from rigidimeter.console.lamps import Level
 from rigidimeter.console.limit_distances import LimitDistance
-from rigidimeter.console.progress import Progress
+from rigidimeter.console.session_progress import Progress
 from rigidimeter.console.trace_reader import TRACES, Traces
 
 LEVELS = {Level.UNKNOWN: "off", Level.GOOD: "ok", Level.WATCH: "warn", Level.BAD: "bad"}

@@ -15,10 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.documents import open_regular
+from rigidimeter.documents.escaping import NUMBER
 from rigidimeter.errors import UserError
 
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _HEAD_BYTES = 2**16
+_FOOTER = 50
+_MISSING = {"", "na", "n/a", "#n/a", "nan", "null", "none", "-", "–", "."}
 
 
 def read_utf8(path: Path, most_bytes: int) -> bytes:
@@ -108,3 +111,50 @@ def records(body: bytes, delimiter: str) -> tuple[NDArray[np.intp], NDArray[np.i
         counts.append(len(cells))
         begins = reader.line_num
     return np.array(starts), np.array(counts)
+
+
+def is_missing(text: str) -> bool:
+    """Return whether a cell says that nothing is there."""
+    return text.lower() in _MISSING
+
+
+def _is_text(line: bytes, is_whole: bool, first: bytes, mark: bytes) -> bool:
+    """Whether a line is no row: it begins with no number, though the first row does."""
+    start = line.decode("utf-8").strip()
+    if not is_whole:
+        return not NUMBER.match(start)
+    cells = [row.split(mark)[0].strip().decode("utf-8") for row in (first, line)]
+    if is_missing(cells[1]) or cells[1].lower() in ("inf", "infinity"):
+        return False
+    return bool(NUMBER.fullmatch(cells[0])) and cells[1][:1].isalpha()
+
+
+def trimmed(
+    body: bytes,
+    starts: NDArray[np.intp],
+    counts: NDArray[np.intp],
+    n_columns: int,
+    delimiter: str,
+) -> tuple[bytes, NDArray[np.intp], NDArray[np.intp]]:
+    """Leave out an empty last column that has no name, and lines of text after the last row."""
+    mark = delimiter.encode()
+    if counts.size and b'"' not in body:
+        lines = body.split(b"\n")
+        kept = len(lines)
+        while (
+            kept > 1
+            and len(lines) - kept < _FOOTER
+            and _is_text(
+                lines[kept - 1], counts[kept - 1] in (n_columns, n_columns + 1), lines[0], mark
+            )
+        ):
+            kept -= 1
+        if kept < len(lines):
+            body = b"\n".join(lines[:kept])
+            starts, counts = starts[:kept], counts[:kept]
+    if counts.size and np.all(counts == n_columns + 1):
+        bare = re.sub(rb"(?m)" + re.escape(mark) + rb"[ ]*$", b"", body)
+        starts, new_counts = records(bare, delimiter)
+        if np.all(new_counts == n_columns):
+            return bare, starts, new_counts
+    return body, starts, counts

@@ -33,13 +33,17 @@ from rigidimeter.recording.formats.text_head import (
     first_line_head,
     found_head,
 )
-from rigidimeter.recording.formats.text_lines import content, read_utf8, records
+from rigidimeter.recording.formats.text_lines import (
+    content,
+    is_missing,
+    read_utf8,
+    records,
+    trimmed,
+)
 from rigidimeter.recording.formats.text_preambles import known_head, without_later_heads
 
 _DECIMAL_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
 _STAMP = re.compile(r"(\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d([.,]\d+)?")
-_FOOTER = 50
-_MISSING = {"", "na", "n/a", "#n/a", "nan", "null", "none", "-", "–", "."}
 
 
 @dataclass(frozen=True)
@@ -85,11 +89,6 @@ class TextTable:
             If it is neither.
         """
         return cell_number(self.columns[name][row], name, f"{self.source}, line {self.lines[row]}")
-
-
-def is_missing(text: str) -> bool:
-    """Return whether a cell says that nothing is there."""
-    return text.lower() in _MISSING
 
 
 def cell_number(text: str, name: str, where: str) -> float | None:
@@ -280,7 +279,7 @@ def _open(
     try:
         starts, counts = records(body, delimiter)
         if layout is not None:
-            body, starts, counts = _trimmed(body, starts, counts, len(head.names), delimiter)
+            body, starts, counts = trimmed(body, starts, counts, len(head.names), delimiter)
     except csv.Error as error:  # such as a quote that is never closed
         raise UserError(f"{source} is not a readable table: {error}") from None
     rest = lines[head.n_before :]
@@ -308,43 +307,3 @@ def _head(source: str, whole: bytes, data: bytes, example: str, layout: Layout |
     before, _, _ = whole.partition(data[: data.find(b"\n")] if b"\n" in data else data)
     comments = [line[1:].strip() for line in before.decode("utf-8").splitlines() if line[:1] == "#"]
     return found_head(source, first, comments[-1] if comments else "", layout.names, example)
-
-
-def _is_text(line: bytes, is_whole: bool, first: bytes, mark: bytes) -> bool:
-    """Whether a line is no row: it begins with no number, though the first row does."""
-    start = line.decode("utf-8").strip()
-    if not is_whole:
-        return not NUMBER.match(start)
-    cells = [row.split(mark)[0].strip().decode("utf-8") for row in (first, line)]
-    return bool(NUMBER.fullmatch(cells[0])) and cells[1][:1].isalpha() and not is_missing(cells[1])
-
-
-def _trimmed(
-    body: bytes,
-    starts: NDArray[np.intp],
-    counts: NDArray[np.intp],
-    n_columns: int,
-    delimiter: str,
-) -> tuple[bytes, NDArray[np.intp], NDArray[np.intp]]:
-    """Leave out an empty last column that has no name, and lines of text after the last row."""
-    mark = delimiter.encode()
-    if counts.size and b'"' not in body:
-        lines = body.split(b"\n")
-        kept = len(lines)
-        while (
-            kept > 1
-            and len(lines) - kept < _FOOTER
-            and _is_text(
-                lines[kept - 1], counts[kept - 1] in (n_columns, n_columns + 1), lines[0], mark
-            )
-        ):
-            kept -= 1
-        if kept < len(lines):
-            body = b"\n".join(lines[:kept])
-            starts, counts = starts[:kept], counts[:kept]
-    if counts.size and np.all(counts == n_columns + 1):
-        bare = re.sub(rb"(?m)" + re.escape(mark) + rb"[ ]*$", b"", body)
-        starts, new_counts = records(bare, delimiter)
-        if np.all(new_counts == n_columns):
-            return bare, starts, new_counts
-    return body, starts, counts

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rigidimeter.console.page.epoch_traces import epoch_traces
+from rigidimeter.console.page.recorded_traces import epoch_traces
 from rigidimeter.console.page.sessions_found import EXCLUSIONS, exclude, found_sessions
 from rigidimeter.errors import UserError
 from rigidimeter.recording import SessionWriter

@@ -1,6 +1,6 @@
 """How far a session has come, told by its events."""
 
-from rigidimeter.console.progress import progress_after, progress_at_start
+from rigidimeter.console.session_progress import progress_after, progress_at_start
 from rigidimeter.experiment import PlannedEpoch
 
 EPOCHS = (

@@ -6,7 +6,7 @@ import pytest
 
 from rigidimeter.acquisition.processes.shared_status import NOTE_BYTES
 from rigidimeter.acquisition.run_states import Command
-from rigidimeter.console.page.messages import LONGEST_TEXT, RefusedMessage, parse_message
+from rigidimeter.console.page.page_messages import LONGEST_TEXT, RefusedMessage, parse_message
 
 RATING = {"kind": "note", "what": "rating", "by": "E1", "epoch": 3, "score": 1.5}
 
