@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.options import CpuOption, PriorityOption, RigOption
 from rigidimeter.cli.output import echo
 from rigidimeter.errors import UserError
 
@@ -41,30 +42,15 @@ def console(
         Path | None,
         typer.Argument(metavar="[PROTOCOL.toml]", help="Settings that the form begins with."),
     ] = None,
-    rig: Annotated[
-        Path | None,
-        typer.Option("--rig", metavar="RIG.toml", help="The rig file. Default: the virtual rig."),
-    ] = None,
+    rig: RigOption = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder of the sessions.")
     ] = Path("sessions"),
     host: HostOption = "127.0.0.1",
     port: PortOption = 8765,
     token: TokenOption = "",
-    priority: Annotated[
-        int,
-        typer.Option(
-            "--priority",
-            metavar="N",
-            min=0,
-            max=99,
-            help="Real-time priority (SCHED_FIFO) of the loop; 0 for none.",
-        ),
-    ] = 80,
-    cpu: Annotated[
-        int | None,
-        typer.Option("--cpu", metavar="N", help="Processor of the loop. Default: the last one."),
-    ] = None,
+    priority: PriorityOption = 80,
+    cpu: CpuOption = None,
 ) -> None:
     """Run sessions from a page in a browser: plan, run, look, repeat.
 

@@ -60,6 +60,24 @@ CsvOption = Annotated[
 NewSessionOption = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="New folder for the session.")
 ]
+RigOption = Annotated[
+    Path | None,
+    typer.Option("--rig", metavar="RIG.toml", help="The rig file. Default: the virtual rig."),
+]
+PriorityOption = Annotated[
+    int,
+    typer.Option(
+        "--priority",
+        metavar="N",
+        min=0,
+        max=99,
+        help="Real-time priority (SCHED_FIFO) of the loop; 0 for none.",
+    ),
+]
+CpuOption = Annotated[
+    int | None,
+    typer.Option("--cpu", metavar="N", help="Processor of the loop. Default: the last one."),
+]
 NewStudyOption = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="New folder for the study.")
 ]

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.console import HostOption, PortOption, TokenOption, run_on_page
-from rigidimeter.cli.options import NewSessionOption, SeedOption
+from rigidimeter.cli.options import (
+    CpuOption,
+    NewSessionOption,
+    PriorityOption,
+    RigOption,
+    SeedOption,
+)
 from rigidimeter.cli.output import echo
 from rigidimeter.errors import UserError
 
@@ -24,10 +30,7 @@ def run(
         Path | None,
         typer.Argument(metavar="[PROTOCOL.toml]", help="Settings with the protocol."),
     ] = None,
-    rig: Annotated[
-        Path | None,
-        typer.Option("--rig", metavar="RIG.toml", help="The rig file. Default: the virtual rig."),
-    ] = None,
+    rig: RigOption = None,
     resume: Annotated[
         Path | None,
         typer.Option(
@@ -42,20 +45,8 @@ def run(
             help="Run without an operator: what would pause the session ends it instead.",
         ),
     ] = False,
-    priority: Annotated[
-        int,
-        typer.Option(
-            "--priority",
-            metavar="N",
-            min=0,
-            max=99,
-            help="Real-time priority (SCHED_FIFO) of the loop; 0 for none.",
-        ),
-    ] = 80,
-    cpu: Annotated[
-        int | None,
-        typer.Option("--cpu", metavar="N", help="Processor of the loop. Default: the last one."),
-    ] = None,
+    priority: PriorityOption = 80,
+    cpu: CpuOption = None,
     page: Annotated[
         bool,
         typer.Option(

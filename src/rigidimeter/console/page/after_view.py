@@ -78,8 +78,8 @@ class AfterView:
                         f"Run what is left: {session.planned - session.good}",
                         on_click=lambda: self._run(session.name),
                     )
-                ui.button("Estimate", on_click=lambda: self._command("estimate", session.name))
-                ui.button("Report", on_click=lambda: self._report(session.name))
+                ui.button("Estimate", on_click=lambda: self._estimate(session))
+                ui.button("Report", on_click=lambda: self._report(session))
             for epoch in session.epochs:
                 self._epoch(session, epoch)
 
@@ -135,9 +135,12 @@ class AfterView:
         await self._command("recover", session)
         self._list.refresh()
 
-    async def _report(self, session: str) -> None:
-        out = f"{session}-report"
-        await self._command("report", session, "--out", str(self._root / out))
+    async def _estimate(self, session: FoundSession) -> None:
+        await self._command("estimate", session.name, *session.left_out)
+
+    async def _report(self, session: FoundSession) -> None:
+        out = self._root / f"{session.name}-report"
+        await self._command("report", session.name, "--out", str(out), *session.left_out)
 
     async def _command(self, command: str, session: str, *options: str) -> None:
         if not self._may_act():

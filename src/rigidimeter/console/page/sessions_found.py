@@ -22,6 +22,8 @@ from rigidimeter.recording.session_folder import EVENTS, locked
 EXCLUSIONS = "exclusions.csv"
 COLUMNS = ("path", "epoch", "reason", "by")
 MOST_SESSIONS = 200
+NEVER_S = 1e9
+"""When an epoch ended that nobody ended: later than any."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class FoundEpoch:
     reason: str
     rating: str
     excluded: str
+    begun_s: float = 0.0
+    ended_s: float = NEVER_S
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,16 @@ class FoundSession:
     def good(self) -> int:
         """How many epochs ended with success."""
         return sum(epoch.outcome == "success" for epoch in self.epochs)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Options of `estimate` and `report` that leave out the excluded epochs, and say why."""
+        return tuple(
+            word
+            for epoch in self.epochs
+            if epoch.excluded
+            for word in ("--leave-out", f"{epoch.begun_s}:{epoch.ended_s} {epoch.excluded}")
+        )
 
 
 def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
@@ -145,6 +159,8 @@ def _epochs(
             ends.get(begun["epoch"], {}).get("reason", "not ended"),
             "; ".join(ratings.get(begun["epoch"], ())),
             excluded.get((session, begun["label"]), ""),
+            begun["time_s"],
+            ends.get(begun["epoch"], {}).get("time_s", NEVER_S),
         )
         for begun in events
         if begun["event"] == "epoch_started"

@@ -1,5 +1,7 @@
 """The sessions of a folder, and epochs that are left out of results."""
 
+import json
+
 import pytest
 
 from rigidimeter.console.page.recorded_traces import epoch_traces
@@ -51,6 +53,19 @@ def test_an_epoch_is_left_out_with_a_reason_and_a_name_and_nothing_deleted(root)
     assert before == {path: path.read_bytes() for path in (root / "S01-1").iterdir()}
     with pytest.raises(UserError, match="left out already"):
         exclude(root, "S01-1", "2", "again", "Op")
+
+
+def test_what_is_estimated_from_the_page_is_without_the_epochs_left_out(root, rigidimeter):
+    (found,), _ = found_sessions(root)
+    assert found.left_out == ()
+    exclude(root, "S01-1", "2", "cough", "Op")
+    (found,), _ = found_sessions(root)
+    out = root / "e.json"
+    assert rigidimeter("estimate", root / "S01-1", "--json", out, *found.left_out).status == 1
+    one, two = json.loads(out.read_text())["epochs"]
+    assert (one["outcome"], two["outcome"]) == ("included", "failed")
+    ran = rigidimeter("report", root / "S01-1", "--out", root / "page", *found.left_out)
+    assert "left out: cough (Op)" in ran.err
 
 
 @pytest.mark.parametrize(
