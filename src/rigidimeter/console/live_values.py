@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 from rigidimeter.acquisition.processes.status_values import LiveEstimate
 from rigidimeter.settings import OnlineSettings
@@ -27,7 +28,7 @@ from rigidimeter.settings import OnlineSettings
 MOST_PART = 0.5
 """Half an interval, and a shift, above this part of the value say that it is not known yet."""
 
-NORMAL_95 = 1.959963984540054
+NORMAL_95 = NormalDist().inv_cdf(0.975)
 
 _VALUES = (
     ("J", "inertia_kg_m2", "kg·m²"),

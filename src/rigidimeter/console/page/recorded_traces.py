@@ -14,11 +14,12 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.sample_reading import read_samples
 from rigidimeter.recording.session_folder import EVENTS, SAMPLES
+from rigidimeter.units import deg_from_rad
 
 MOST_POINTS = 4000
 RAW = (
     ("torque [N·m]", "torque_nm", 1.0),
-    ("angle [deg]", "angle_rad", 180 / math.pi),
+    ("angle [deg]", "angle_rad", deg_from_rad(1.0)),
     ("perturbation [N·m]", "perturbation_nm", 1.0),
 )
 FITTED = ("torque_nm", "joint_torque_nm", "subject_torque_nm")

@@ -13,6 +13,7 @@ from rigidimeter.console.lamps import Level
 from rigidimeter.console.limit_distances import LimitDistance
 from rigidimeter.console.session_progress import Progress
 from rigidimeter.console.trace_reader import TRACES, Traces
+from rigidimeter.units import deg_from_rad
 
 LEVELS = {Level.UNKNOWN: "off", Level.GOOD: "ok", Level.WATCH: "warn", Level.BAD: "bad"}
 """What the page calls the levels of a lamp; each has a sign and a colour there."""
@@ -84,7 +85,7 @@ def points(traces: Traces) -> bytes:
     made = np.empty((n, 2, 1 + len(TRACES)))
     made[:, 0, 0] = made[:, 1, 0] = traces.time_s
     for place, name in enumerate(TRACES, start=1):
-        factor = 180 / math.pi if name in _DEGREES else 1.0
+        factor = deg_from_rad(1.0) if name in _DEGREES else 1.0
         made[:, 0, place] = factor * traces.low[name]
         made[:, 1, place] = factor * traces.high[name]
     return made.astype("<f8").tobytes()
