@@ -51,7 +51,7 @@
       const values = numbers(epoch[name]);
       const time = values.map((_, k) => epoch.start + k * epoch.step);
       const data = [time, values];
-      const series = [{ label: "s", value: (_, value) => value == null ? "–" : value.toFixed(3) }];
+      const series = [{ label: "time of the epoch (s)", value: (_, value) => value == null ? "–" : value.toFixed(3) }];
       if (name === "torque" && epoch.residual) {
         const residual = numbers(epoch.residual);
         data.push(values.map((value, k) => value - residual[k]));
