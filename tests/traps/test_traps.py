@@ -22,7 +22,7 @@ from tests.traps.recorded_studies import (
 )
 
 import rigidimeter as rm
-from rigidimeter.reporting.verdict_text import verdict_sentence
+from rigidimeter.reporting.verdict_text import verdict
 from rigidimeter.study import StudyResult, comparison_document
 
 OFF, DBS = Session("1", "OFF"), Session("1", "DBS")
@@ -73,7 +73,8 @@ def one_day_each(study: Path) -> None:
 def told(result: StudyResult) -> Told:
     """Return the conclusions of the JSON file by measure, and the page's first sentence."""
     rows = {row["measure"]: row for row in comparison_document(result)["conclusion"]}
-    return rows, verdict_sentence(result)
+    found = verdict(result)
+    return rows, " ".join([found.lead, *found.rest])
 
 
 def compared(study: Path) -> Told:

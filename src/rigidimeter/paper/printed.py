@@ -55,9 +55,6 @@ FIG_4 = JointDynamics(0.0044, 0.1300, 1.310)
 FIG_6 = JointDynamics(0.0044, 0.1300, 1.130)
 """Caption of Fig. 6, "the median estimates"."""
 
-FIG_8_INERTIA = 0.0045
-"""Caption of Fig. 8: the inertia that was held fixed, the median of all epochs (Sec. 2.4.4)."""
-
 EPOCHS_A_CONDITION, SESSION_MIN = 15, 10.0
 """Sec. 2.3: epochs of a condition, and how long they last."""
 

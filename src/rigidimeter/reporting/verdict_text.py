@@ -64,12 +64,6 @@ def verdict(result: StudyResult) -> Verdict:
     return Verdict(prefix + lead, (*rest, *doubt_sentence(result.analysis)))
 
 
-def verdict_sentence(result: StudyResult) -> str:
-    """Return what is shown and what is not, and which effect is the largest."""
-    found = verdict(result)
-    return " ".join([found.lead, *found.rest])
-
-
 def _sentences(result: StudyResult, concluded: Conclusions) -> list[str]:
     """Return a sentence for each kind of verdict, the most important first, and the test."""
     reference, other = condition_name(result.reference), condition_name(result.other)

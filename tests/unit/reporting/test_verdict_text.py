@@ -9,11 +9,16 @@ import pytest
 from tests.unit.reporting.cohorts import Design, altered, made_study, sensitivity_row, untested
 
 from rigidimeter.records import Finding, Outcome
-from rigidimeter.reporting.verdict_text import dependence_sentences, verdict_sentence
+from rigidimeter.reporting.verdict_text import dependence_sentences, verdict
 from rigidimeter.statistics import two_groups
 from rigidimeter.study import Comparison, Measure, SensitivityRow, StudyResult
 
 SMALL = Design(days=(5, 4), epochs=(5, 5), scores=(4, 4))
+
+
+def all_sentences(result: StudyResult) -> str:
+    found = verdict(result)
+    return " ".join([found.lead, *found.rest])
 
 
 @pytest.fixture(scope="module")
@@ -49,13 +54,13 @@ def said(study: StudyResult, *methods: tuple[str, str, float, float]) -> str:
 
 
 def test_a_clear_effect_is_shown_and_none_is_not(study: StudyResult) -> None:
-    text = verdict_sentence(study)
+    text = all_sentences(study)
     plain = text.replace("\N{NO-BREAK SPACE}", " ")
     assert plain.startswith(
         "DBS is lower than OFF in stiffness K by 0.31 N·m/rad, 18 % (p = 0.0212)"
     )
     assert "Tested by days; p adjusted by Holm’s method for 6 measures." in text
-    none = verdict_sentence(made_study(dataclasses.replace(SMALL, effect=0.0)))
+    none = all_sentences(made_study(dataclasses.replace(SMALL, effect=0.0)))
     assert "is lower" not in none
     assert none.startswith("No difference between OFF and DBS is shown in stiffness K, viscous")
 
@@ -68,7 +73,7 @@ def test_the_sign_is_that_of_the_estimate(study: StudyResult) -> None:
             c, days=dataclasses.replace(d, estimate=-d.estimate, low=-d.high, high=-d.low)
         )
 
-    text = verdict_sentence(altered(study, turned))
+    text = all_sentences(altered(study, turned))
     assert "DBS is higher than OFF in" in text
     assert "lower" not in text
 
@@ -79,7 +84,7 @@ def test_a_p_that_only_one_measure_alone_would_bear_is_not_claimed(study: StudyR
         p = 0.03 if c.measure.name == "work_j" else 0.6
         return dataclasses.replace(c, days=dataclasses.replace(c.days, p=p))
 
-    text = verdict_sentence(altered(study, weaker))
+    text = all_sentences(altered(study, weaker))
     assert "is lower" not in text
     assert "(p\N{NO-BREAK SPACE}≥\N{NO-BREAK SPACE}0.18)" in text
 
@@ -94,27 +99,27 @@ def test_the_lead_is_claimed_only_where_it_is_beyond_chance(study: StudyResult) 
         ]
         return dataclasses.replace(study, differences=tuple(pairs))
 
-    text = verdict_sentence(with_p(lambda pair: 1e-5 if "inertia_kg_m2" in pair else 1.0))
+    text = all_sentences(with_p(lambda pair: 1e-5 if "inertia_kg_m2" in pair else 1.0))
     assert "it is significantly larger than that of inertia J" in text
     assert "it is not significantly larger than that of" in text
-    text = verdict_sentence(with_p(lambda pair: 1.0))
+    text = all_sentences(with_p(lambda pair: 1.0))
     assert "it is not significantly larger than that of any other" in text
-    text = verdict_sentence(with_p(lambda pair: math.nan if first in pair else 1.0))
+    text = all_sentences(with_p(lambda pair: math.nan if first in pair else 1.0))
     assert "significantly" not in text
     assert "could not be tested" in text
 
 
 def test_prefixes_and_missing_tests(study: StudyResult) -> None:
     other = dataclasses.replace(study, virtual=True, blinded=True)
-    assert verdict_sentence(other).startswith(
+    assert all_sentences(other).startswith(
         "Virtual data. Blinded: the names of the conditions are codes. DBS is lower than OFF"
     )
     lacking = untested(study, "work_j", "one day in each condition")
     assert (
         "It cannot be decided whether the conditions differ in work: one day in each condition."
-    ) in verdict_sentence(lacking)
+    ) in all_sentences(lacking)
     alone = dataclasses.replace(study, comparisons=())
-    assert "No epoch could be included" in verdict_sentence(alone)
+    assert "No epoch could be included" in all_sentences(alone)
 
 
 def test_agreeing_methods(study: StudyResult) -> None:
@@ -179,18 +184,18 @@ def test_opposite_signs_and_held_inertia(study: StudyResult) -> None:
 
 def test_reasons_that_measures_share_are_said_once(make_study, make_analysis, epochs) -> None:
     """One recording in each condition: what a difference comes from cannot be known."""
-    text = verdict_sentence(make_study(epochs))
+    text = all_sentences(make_study(epochs))
     assert text.startswith(
         "It cannot be decided whether the conditions differ in stiffness K, viscous damping B, "
         "inertia J, angular impulse and work: there is one recording in each condition, so "
         "recording and condition cannot be separated."
     )
-    text = verdict_sentence(make_study([], analysis=make_analysis({"OFF": 40, "DBS": 40})))
+    text = all_sentences(make_study([], analysis=make_analysis({"OFF": 40, "DBS": 40})))
     assert "there is only one recording" in text
 
 
 def test_that_few_days_show_only_large_differences_is_said_once() -> None:
-    text = verdict_sentence(made_study(dataclasses.replace(SMALL, days=(2, 2), both_on_a_day=True)))
+    text = all_sentences(made_study(dataclasses.replace(SMALL, days=(2, 2), both_on_a_day=True)))
     assert text.count("with 1 degree of freedom only a difference above 12.7 standard errors") == 1
     assert text.index("No difference between OFF and DBS is shown in") < text.index(
         "with 1 degree of freedom"
@@ -206,7 +211,7 @@ def test_what_was_found_and_is_not_supported(study: StudyResult) -> None:
     shaken = dataclasses.replace(
         study, sensitivity=(), analysis=dataclasses.replace(study.analysis, fits=fits)
     )
-    text = verdict_sentence(shaken)
+    text = all_sentences(shaken)
     assert text.startswith("DBS is lower than OFF in angular impulse")
     lead = text.partition(". A difference was found")[0]
     assert lead.endswith("a difference in stiffness K and viscous damping B is not supported")
@@ -215,7 +220,7 @@ def test_what_was_found_and_is_not_supported(study: StudyResult) -> None:
 
 
 def test_verdict_without_comparison_gives_the_values(make_study, make_analysis) -> None:
-    text = verdict_sentence(make_study([], analysis=make_analysis({"": 3})))
+    text = all_sentences(make_study([], analysis=make_analysis({"": 3})))
     assert text.startswith("Stiffness K ")
     assert "±" in text
     assert text.endswith("(95 % intervals); no two conditions are compared.")
@@ -224,4 +229,4 @@ def test_verdict_without_comparison_gives_the_values(make_study, make_analysis) 
 def test_verdict_of_nothing(make_study, make_analysis) -> None:
     failed = make_analysis({"OFF": 2}, Outcome("failed", "no torque"), scores=False)
     for analysis in (failed, make_analysis({})):
-        assert "No epoch could be included" in verdict_sentence(make_study([], analysis=analysis))
+        assert "No epoch could be included" in all_sentences(make_study([], analysis=analysis))
