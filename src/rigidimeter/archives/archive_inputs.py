@@ -13,14 +13,14 @@ from rigidimeter.documents import open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import READERS, reader_of
-from rigidimeter.recording.study_folder import StudyFolder, is_study, read_study_folder
+from rigidimeter.recording.study_folder import Row, StudyFolder, is_study, read_study_folder
 from rigidimeter.study.blinding import Naming, naming
 from rigidimeter.study.sessions import place_of
 
 
 @dataclass(frozen=True)
 class OfStudy:
-    """A session of a study: its folder with this row and its exclusions alone, and the names."""
+    """A session of a study: its folder with its own rows and exclusions alone, and the names."""
 
     folder: StudyFolder
     names: Naming
@@ -148,8 +148,10 @@ def _of_study(folder: Path) -> Iterator[Input]:
     for notice in (*read.notices, *said):
         if notice.level == "error":
             yield Input(folder, refused=notice.text)
+    rows_at: dict[Path, list[Row]] = {}
     for row in read.sessions:
-        place = place_of(folder / row["path"])
+        rows_at.setdefault(place_of(folder / row["path"]), []).append(row)
+    for place, rows in rows_at.items():
         own = tuple(out for out in read.exclusions if place_of(folder / out["path"]) == place)
-        alone = replace(read, sessions=(row,), exclusions=own, ratings=(), notices=())
-        yield Input(folder / row["path"], OfStudy(alone, names))
+        alone = replace(read, sessions=tuple(rows), exclusions=own, ratings=(), notices=())
+        yield Input(folder / rows[0]["path"], OfStudy(alone, names))

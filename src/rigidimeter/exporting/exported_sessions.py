@@ -29,6 +29,7 @@ from rigidimeter.recording.study_toml import SubjectTable
 from rigidimeter.records import CHANNEL_UNITS, Analysis, Delay, Epoch, Fit, Score
 from rigidimeter.settings import Settings, dump_settings
 from rigidimeter.study.results import Condition
+from rigidimeter.study.sessions import Session
 from rigidimeter.study.study_analysis import StudyRead
 from rigidimeter.version import __version__
 
@@ -123,13 +124,18 @@ def sessions_of_study(read: StudyRead, analysis: Analysis | None) -> list[Export
     epochs = _by_source(read.epochs)
     about, names = read.folder.about, read.names
     found = []
+    rows: dict[str, list[Session]] = {}
     for session in read.gathered.sessions:
+        rows.setdefault(session.entry.source, []).append(session)
+    for session, *more in rows.values():
         entry = session.entry
+        conditions = [entry.condition, *(other.entry.condition for other in more)]
         ratings = [
             {"examiner": row["examiner"], "score": row.number("score")}
+            | ({"condition": names.named(row["condition"])} if more else {})
             for row in read.folder.ratings
             if (row["subject"], row["day"]) == (entry.subject, entry.day)
-            and names.named(row["condition"]) == entry.condition
+            and names.named(row["condition"]) in conditions
         ]
         exclusions = [
             {"epoch": label, "by": row["by"], "reason": row["reason"]}
@@ -151,7 +157,7 @@ def sessions_of_study(read: StudyRead, analysis: Analysis | None) -> list[Export
         described = Described(
             entry.subject,
             entry.day,
-            entry.condition,
+            "" if more else entry.condition,
             session.row["part"],
             about.archive.joint,
             facts=facts,

@@ -132,7 +132,7 @@ class Context:
             write_json(made, wanted)
         read = read_study(folder)
         analysis = estimate(read.epochs, settings=read.settings)
-        sessions = {session.entry.source: session.entry for session in read.gathered.sessions}
+        sessions = read.gathered.entries
         pair = read.names.pair
         comparisons, _ = compare_measures(gathered(analysis, pair, sessions), resamples=0)
         ratings, _ = rated(read.folder, read.names)
@@ -145,7 +145,7 @@ class Context:
             analysis=analysis,
             epochs=read.epochs,
             settings=read.settings,
-            sessions=tuple(sessions.values()),
+            sessions=tuple(session.entry for session in read.gathered.sessions),
             virtual=True,
             ratings=ratings,
         )

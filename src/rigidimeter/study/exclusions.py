@@ -76,7 +76,7 @@ def exclusions_of(
         yield Exclusion(
             entry.subject,
             entry.day,
-            entry.condition,
+            epoch.condition,
             epoch.source,
             epoch.label,
             epoch.task or "",

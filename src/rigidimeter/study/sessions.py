@@ -73,6 +73,11 @@ class Gathered:
         return tuple(epoch for session in self.sessions for epoch in session.epochs)
 
     @property
+    def entries(self) -> dict[str, SessionEntry]:
+        """An entry of each source, for its subject and day, which all rows of a source share."""
+        return {session.entry.source: session.entry for session in self.sessions}
+
+    @property
     def settings(self) -> Settings | None:
         """The settings of the first session that has any."""
         return next((s.settings for s in self.sessions if s.settings is not None), None)
@@ -109,8 +114,11 @@ def gather(
     left_out: list[LeftOut] = []
     notices: list[Notice] = []
     digests: dict[str, str] = {}
-    at: dict[Path, Row] = {}
+    at: dict[Path, list[Row]] = {}
     samples: dict[str, Row] = {}
+    rows_at: dict[Path, list[Row]] = {}
+    for row in read.sessions:
+        rows_at.setdefault(place_of(read.folder / row["path"]), []).append(row)
 
     def leave_out(row: Row, reason: str) -> None:
         text = reason if reason.startswith(row.where) else f"{row.where}: {reason}"
@@ -124,7 +132,8 @@ def gather(
         try:
             # One that is changed while it is read is refused, so digest and result belong together.
             with noted_digests() as noted:
-                session, said = _read(read, row, names, at, samples, digests, noted)
+                beside = rows_at[place_of(read.folder / row["path"])]
+                session, said = _read(read, row, names, beside, at, samples, digests, noted)
         except (_Refused, UserError) as error:
             leave_out(row, " / ".join(str(error).splitlines()))
         except OSError as error:  # such as a path too long for the file system
@@ -143,14 +152,15 @@ def gather(
             f"{read.folder}: no session is left to analyse: "
             + " / ".join(n.text for n in notices if n.level == "error")
         )
-    return Gathered(tuple(sessions), tuple(left_out), digests, tuple(notices))
+    return Gathered(tuple(sessions), tuple(left_out), digests, tuple(dict.fromkeys(notices)))
 
 
 def _read(
     read: StudyFolder,
     row: Row,
     names: Naming,
-    at: dict[Path, Row],
+    beside: Sequence[Row],
+    at: dict[Path, list[Row]],
     samples: dict[str, Row],
     digests: dict[str, str],
     noted: Mapping[Path, str],
@@ -162,9 +172,9 @@ def _read(
             f"{read.folder} and write its path from there"
         )
     place = place_of(path)
-    if place in at:
-        raise _Refused(f"{path} is in the table already ({_line(at[place])})")
-    at[place] = row
+    before = at.setdefault(place, [])
+    _differs(path, row, before, names)
+    before.append(row)
     if not path.exists():
         raise _Refused(f"{path}: there is no such session folder or recording")
     from_session = is_session(path)
@@ -176,12 +186,12 @@ def _read(
             digests[str(PurePath(source) / name)] = noted[path / name]
     # Before the condition is looked at: a copy under another name is no less a copy.
     digest = digests.get(str(PurePath(source) / (SAMPLES if from_session else "")), "")
-    if digest and digest in samples:
-        first = samples[digest]
+    first = samples.get(digest, row) if digest else row
+    if first not in before:
         raise _Refused(
             f"{path} holds the same samples as {first['path']} ({_line(first)}); take the copy out"
         )
-    samples[digest] = row
+    samples.setdefault(digest, row)
     condition = names.named(row["condition"])
     if condition is None:
         raise _Refused(names.unknown(row["condition"]))
@@ -194,7 +204,8 @@ def _read(
                 f"`rigidimeter recover {path}`"
             )
     epochs, said = read_recording(path, _options(read, row, noted, digests))
-    said = [*said, *_agrees(path, row, condition, epochs, names)]
+    epochs, differing = _of_condition(path, row, condition, beside, epochs, names)
+    said = [*said, *differing]
     tasks = [task_of(epoch, settings or Settings()) for epoch in epochs]
     entry = SessionEntry(
         row["subject"], row["day"], condition, row["condition"], row["path"], source
@@ -220,28 +231,65 @@ def _options(
     return options
 
 
-def _agrees(
-    path: Path, row: Row, condition: str, epochs: Sequence[Epoch], names: Naming
-) -> list[Notice]:
-    """Hold the condition of the table against those that the recording names."""
-    said = []
-    for recorded in dict.fromkeys(epoch.condition for epoch in epochs if epoch.condition):
-        if names.blinded and recorded in names.defined and recorded not in names.known:
+def _differs(path: Path, row: Row, before: Sequence[Row], names: Naming) -> None:
+    """Refuse a row of a recording that has one already, but for another of its conditions."""
+    for other in before:
+        there = f"{path} is in the table already ({_line(other)})"
+        if names.named(other["condition"]) == names.named(row["condition"]):
+            raise _Refused(there)
+        if any(other[key] != row[key] for key in ("subject", "day")):
+            raise _Refused(
+                f"{there}, of subject {other['subject']} on day {other['day']}; rows of one "
+                "recording must agree on both"
+            )
+
+
+def _of_condition(
+    path: Path,
+    row: Row,
+    condition: str,
+    beside: Sequence[Row],
+    epochs: Sequence[Epoch],
+    names: Naming,
+) -> tuple[list[Epoch], list[Notice]]:
+    """Return the epochs of the row's condition, held against what the recording names itself.
+
+    A recording of several conditions has a row for each (`beside`), and must say which epoch is of
+    which.
+    """
+    others = {names.named(other["condition"]) for other in beside} - {condition}
+    said, kept = [], []
+    for epoch in epochs:
+        recorded = epoch.condition
+        if others and not recorded:
+            raise _Refused(
+                f"{path}: has rows of several conditions, but does not record which epoch "
+                f"{epoch.label} is of"
+            )
+        hidden = names.blinded and recorded in names.defined and recorded not in names.known
+        if hidden and others:
+            raise _Refused(
+                f"{path}: has rows of several codes, but names conditions; it can be analysed with "
+                "a key"
+            )
+        if hidden:
             text = (
                 f"{path}: records its condition by name, so who sees the folder is not blinded; "
                 "the code of the table is used"
             )
             said.append(Notice("warning", text))
-            continue
-        found = names.named(recorded)
+        found = names.named(recorded) if recorded and not hidden else condition
         if found is None:
             raise _Refused(f"{path} records a condition of its own: {names.unknown(recorded)}")
-        if found != condition:
+        if found == condition:
+            kept.append(epoch)
+        elif found not in others:
             by = "" if recorded == found else f" (code {recorded})"
-            raise _Refused(
-                f"the table says {condition}, but {path} records {found}{by}; one of them is wrong"
-            )
-    return said
+            more = f"a row for {found} is missing" if others else "one of them is wrong"
+            raise _Refused(f"the table says {condition}, but {path} records {found}{by}; {more}")
+    if others and not kept:
+        raise _Refused(f"{path} records no epoch of {condition}; take the row out")
+    return kept, said
 
 
 def _twice(sessions: Sequence[Session]) -> list[tuple[Row, str]]:

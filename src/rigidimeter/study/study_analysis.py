@@ -134,7 +134,7 @@ def analyse_study(
     progress : callable
         Called with the share of the work that was done since, 1 in all.
     """
-    sessions = {s.entry.source: s.entry for s in read.gathered.sessions}
+    sessions = read.gathered.entries
     pair = read.names.pair
     subjects = _by_subject(read.epochs, sessions, read.settings)
     fitted = [epoch for epoch in read.epochs if epoch.task == "prbs"]
@@ -190,7 +190,7 @@ def analyse_study(
         ),
         settings=read.settings,
         conditions=read.names.conditions,
-        sessions=tuple(sessions.values()),
+        sessions=tuple(session.entry for session in read.gathered.sessions),
         blinded=read.names.blinded,
         virtual=all(epoch.virtual for epoch in read.epochs),
         ratings=ratings,
@@ -212,7 +212,7 @@ def estimate_study(
     progress : callable
         Called with the share of the work that was done since, 1 in all.
     """
-    sessions = {s.entry.source: s.entry for s in read.gathered.sessions}
+    sessions = read.gathered.entries
     subjects = _by_subject(read.epochs, sessions, read.settings)
     work = sum(own.work([read.method]) for own in subjects.values()) or 1.0
     return _analysed(subjects, read.method, lambda done: progress(done / work))

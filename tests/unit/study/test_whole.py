@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from tests.small_study import DAYS, record
+from tests.small_study import DAYS, record, tiny
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read_session
@@ -25,6 +25,7 @@ from rigidimeter.study import (
     estimate,
     read_study,
 )
+from rigidimeter.virtual.virtual_session import run_virtual_session
 
 RESAMPLES = 200
 
@@ -227,3 +228,31 @@ def test_a_table_and_its_file_give_the_same(study: Path) -> None:
     assert from_table.comparisons == from_file.comparisons
     with pytest.raises(UserError, match="value="):
         compare(pd.read_csv(path))
+
+
+def test_one_recording_of_both_conditions_has_a_row_for_each(study: Path) -> None:
+    """Each row takes the epochs of its condition, as two recordings would give them."""
+    settings = tiny("OFF", 55, task="sinusoid", protocol={
+        "blocks": [
+            {"task": "sinusoid", "condition": "OFF", "epochs": 2},
+            {"task": "sinusoid", "condition": "DBS", "epochs": 1},
+        ],
+        "rests_s": [0.5],
+        "return_s": 0.5,
+    })  # fmt: skip
+    run_virtual_session(settings, study / "sessions/both")
+    before = analysed(study)
+    table = study / "sessions.csv"
+    rows = table.read_text() + "sessions/both,M1,9,OFF\n"
+    table.write_text(rows)
+    alone = analysed(study)
+    assert any("the table says OFF, but" in n.text for n in alone.notices)
+    table.write_text(rows + "sessions/both,M1,9,DBS\n")
+    found = analysed(study)
+    assert found.notices == before.notices
+    added = [found.comparisons[0].summaries[c].n - before.comparisons[0].summaries[c].n
+             for c in ("OFF", "DBS")]  # fmt: skip
+    assert added == [2, 1]
+    assert [(s.day, s.condition) for s in found.sessions[-2:]] == [("9", "OFF"), ("9", "DBS")]
+    table.write_text(rows + "sessions/both,M1,8,DBS\n")
+    assert any("must agree on both" in n.text for n in analysed(study).notices)
