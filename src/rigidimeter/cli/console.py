@@ -65,6 +65,7 @@ def console(
     from rigidimeter.acquisition.processes.left_memory import complete_left
     from rigidimeter.acquisition.processes.loop_process import Realtime
     from rigidimeter.console.page.desk import Desk, Place
+    from rigidimeter.console.page.kept_study import extended
     from rigidimeter.settings import load_settings
 
     for line in complete_left():
@@ -74,6 +75,8 @@ def console(
     out.mkdir(parents=True, exist_ok=True)
     name = protocol.name if protocol is not None else "the defaults"
     desk = Desk(Place(out.absolute(), settings, name, rig))
+    for line in extended(desk.place):
+        echo(line)
     with serving(desk, host, port, token):
         while not desk.told_to_end:
             lead_session(desk, desk.next_request(), Realtime(priority=priority, cpu=cpu), protocol)
@@ -130,6 +133,7 @@ def lead_session(
     """Run what the page asked for, and say on the page how it ended; None if it did not begin."""
     from rigidimeter.cli.planned_session import checked_rig, run_planned
     from rigidimeter.cli.sharing import require_packages, write_nwb_beside
+    from rigidimeter.console.page.kept_study import extended
     from rigidimeter.console.page.session_form import codes
     from rigidimeter.recording.resume import count_epochs
 
@@ -138,7 +142,7 @@ def lead_session(
         planned = checked_rig(_planned(desk, request, source), rig)
         require_packages(planned.settings)
         names = [epoch.condition for epoch in planned.protocol.epochs]
-        hidden = codes(names, request.folder) if request.blinded else {}
+        hidden = codes(names, request.folder) if planned.about.get("blinded") else {}
         look = desk.console(planned.shown(virtual=rig is None, codes=hidden), folder)
         ended = run_planned(planned, folder, rig, realtime, look, desk.operator_seen_ns)
         desk.told_to_end = bool(ended.signals)
@@ -153,7 +157,7 @@ def lead_session(
         sentences.append(f"It ended with {ended.outcome or 'no outcome'}: {ended.reason}.")
     if planned.settings.sharing.nwb_at_close:
         sentences.append(write_nwb_beside(ended.folder))
-    sentences += ended.remarks
+    sentences += [*ended.remarks, *extended(desk.place)]
     echo(" ".join(sentences))
     desk.over(ended.folder, ended.outcome or "no outcome", tuple(sentences))
     return ended

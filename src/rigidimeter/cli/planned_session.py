@@ -90,7 +90,7 @@ def rest_of_session(resume: Path, *, virtual: bool, epoch: int | None = None) ->
         raise UserError(f"{resume}: nothing is left to run, all {rest.done} epochs are done")
     echo(f"{rest.done} epochs are done; {len(rest.epochs)} are left")
     protocol = Protocol(rest.settings.seed, rest.epochs)
-    return PlannedSession(rest.settings, protocol, dict(rest.continues), rest.done)
+    return PlannedSession(rest.settings, protocol, rest.continues, rest.done, rest.about)
 
 
 def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:

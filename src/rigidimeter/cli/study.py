@@ -1,4 +1,4 @@
-"""`rigidimeter study` and `rigidimeter demo`: make a study folder, empty or virtual."""
+"""`rigidimeter study` and `rigidimeter demo`: make a study folder, or add sessions to one."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ study = typer.Typer(
     name="study",
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Make a study folder: an empty one, or one from the virtual rig.",
+    help="Make a study folder: an empty one, one of sessions that were run, or a virtual one.",
 )
 
 
@@ -45,6 +45,46 @@ def new(
 
     write_new_study(folder, title)
     echo(f"{folder}: write your sessions into {folder / 'sessions.csv'}")
+
+
+@study.command()
+def add(
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            metavar="STUDY", help="Study folder; made if it is none.", show_default=False
+        ),
+    ],
+    sessions: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[SESSION]...",
+            help="Session folders in it. Default: all in it "
+            "and in its folder sessions that sessions.csv does not name.",
+        ),
+    ] = None,
+    subject: Annotated[
+        str,
+        typer.Option("--subject", metavar="CODE", help="Subject of sessions that do not say it."),
+    ] = "",
+) -> None:
+    """Add recorded sessions to a study folder: subject, day, conditions, stimulation, ratings.
+
+    `console` does so after each session. What was written or changed by hand stays as it is; a
+    session whose row is made a comment (#) is not added again.
+
+    \b
+    For example:
+      rigidimeter run protocol.toml --out study/monday
+      rigidimeter study add study study/monday --subject S01
+      rigidimeter report study --out study/report
+    """
+    from rigidimeter.study.extended_folder import extend_study
+
+    for line in extend_study(folder, sessions or None, subject=subject) or [
+        f"{folder}: nothing is new"
+    ]:
+        echo(line)
 
 
 @study.command()

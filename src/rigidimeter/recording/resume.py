@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,8 @@ class Rest:
     continues : dict
         What the manifest of the new session says of the old one; its `origin_rad`, where it is
         known, is where the joint stood when the first of them was begun.
+    about : dict
+        What the operator said of subject, condition and stimulation.
     """
 
     settings: Settings
@@ -53,6 +55,7 @@ class Rest:
     done: int
     virtual: bool
     continues: dict[str, Any]
+    about: dict[str, Any] = field(default_factory=dict)
 
 
 def rest_of(folder: Path) -> Rest:
@@ -108,6 +111,7 @@ def rest_of(folder: Path) -> Rest:
             "created_utc": manifest["created_utc"],
             **origin,
         },
+        dict(manifest.get("about", {})),
     )
 
 

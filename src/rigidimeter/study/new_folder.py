@@ -2,55 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from rigidimeter.documents import write_text
 from rigidimeter.errors import UserError, refused
-from rigidimeter.recording.study_folder import TABLE_COLUMNS
-from rigidimeter.recording.study_toml import STUDY_FILE
+from rigidimeter.recording.study_tables import empty_table
+from rigidimeter.recording.study_toml import STUDY_FILE, ConditionTable
+from rigidimeter.study.study_text import DBS, OFF, study_text
 
-SKELETON = """\
-schema = "rigidimeter.study/1"
-title = {title}
-
-# Differences are reference - other.
-reference = "OFF"
-other = "DBS"
-
-# The tables, below this folder. Only that of the sessions must exist.
-sessions = "sessions.csv"       # path,subject,day,condition,part,note
-ratings = "ratings.csv"         # subject,day,condition,examiner,score
-exclusions = "exclusions.csv"   # path,epoch,reason,by
-# A blinding key (code,condition) is key.csv in this folder, or given with --key FILE. Without one,
-# codes stay codes.
-
-[conditions.OFF]
-title = "stimulation off"
-
-# What was not written down may be left out; the amplitude is amplitude_v or amplitude_ma.
-[conditions.DBS]
-title = "stimulation on"
-# frequency_hz = 130.0
-# amplitude_ma = 2.5
-# pulse_width_us = 60.0
-# electrodes = "1-2+"
-# wash_in_min = 15.0
-
-[rating]
-scale = [0.0, 3.0]   # lowest and highest score
-step = 0.5           # 0 for none
-
-[analysis]
-method = "auto"      # as --method takes it
-"""
-
-ABOUT = {
-    "sessions": "# One row a recording: a session folder, or a file with the standard names.\n"
-    "# part distinguishes two sessions of one day in one condition.\n",
-    "ratings": "# One row a score.\n",
-    "exclusions": "# Epochs that you take out: which, why, and who says so.\n",
-}
+_TABLES = ("sessions", "ratings", "exclusions")
 
 
 def write_new_study(folder: Path, title: str = "") -> None:
@@ -61,7 +21,7 @@ def write_new_study(folder: Path, title: str = "") -> None:
     UserError
         If one of its files is there already, or the folder cannot be written.
     """
-    names = (STUDY_FILE, *(f"{name}.csv" for name in ABOUT))
+    names = (STUDY_FILE, *(f"{name}.csv" for name in _TABLES))
     there = [name for name in names if (folder / name).exists()]
     if there:
         raise UserError(
@@ -70,9 +30,8 @@ def write_new_study(folder: Path, title: str = "") -> None:
         )
     with refused(folder, "cannot be made"):
         folder.mkdir(parents=True, exist_ok=True)
-    for name, about in ABOUT.items():
-        needed, allowed = TABLE_COLUMNS[name]
-        columns = [*needed, *(column for column in allowed if name == "sessions" or column == "by")]
-        write_text(folder / f"{name}.csv", f"{about}{','.join(columns)}\n")
-    shown = json.dumps(title.strip() or folder.resolve().name, ensure_ascii=False)
-    write_text(folder / STUDY_FILE, SKELETON.format(title=shown))
+    for name in _TABLES:
+        write_text(folder / f"{name}.csv", empty_table(name))
+    shown = title.strip() or folder.resolve().name
+    conditions = {OFF: ConditionTable(), DBS: ConditionTable()}
+    write_text(folder / STUDY_FILE, study_text(shown, OFF, DBS, conditions))

@@ -139,3 +139,11 @@ def test_a_session_without_a_protocol_cannot_go_on(tmp_path):
     SessionWriter(tmp_path / "s", SETTINGS, [], {}, virtual=True).close(0.0, "fail", "")
     with pytest.raises(UserError, match="no protocol, so it cannot be"):
         rest_of(tmp_path / "s")
+
+
+def test_what_was_said_of_the_subject_goes_on(tmp_path):
+    about = {"subject": "S01", "stimulation": {"frequency_hz": 130.0}, "blinded": True}
+    planned = [asdict(epoch) for epoch in EPOCHS]
+    writer = SessionWriter(tmp_path / "s", SETTINGS, planned, {}, virtual=True, about=about)
+    writer.close(1.0, "abort", "aborted by the operator")
+    assert rest_of(tmp_path / "s").about == about

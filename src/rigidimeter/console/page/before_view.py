@@ -171,7 +171,6 @@ class BeforeView:
             self._desk.place.one_session or folder,
             entered.settings,
             {**entered.about, "blinded": self._blinded},
-            blinded=self._blinded,
         )
         if not self._desk.ask(request):
             ui.notify("a session runs already")

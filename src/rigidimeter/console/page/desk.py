@@ -31,13 +31,12 @@ class StartRequest:
     settings : Settings or None
         None where a session is continued.
     about : dict
-        What was said of subject, operator, condition and stimulation.
+        What was said of subject, operator, condition and stimulation, and whether the page names
+        conditions by codes alone (`blinded`).
     resume : str
         Name of the folder of the session to be continued; empty for none.
     epoch : int or None
         Of that session, the one epoch to be run again; None for all that are left.
-    blinded : bool
-        Whether the page names conditions by codes alone.
     """
 
     folder: str
@@ -45,7 +44,6 @@ class StartRequest:
     about: Mapping[str, Any] = field(default_factory=dict)
     resume: str = ""
     epoch: int | None = None
-    blinded: bool = False
 
 
 @dataclass(frozen=True)

@@ -6,21 +6,19 @@ reason, by. The samples stay as they are.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rigidimeter.console.page.entered import line, name
-from rigidimeter.documents import csv_text, write_text
 from rigidimeter.errors import UserError
 from rigidimeter.recording import is_session, read_manifest
 from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.formats import read_text_table
 from rigidimeter.recording.session_folder import EVENTS, locked
+from rigidimeter.recording.study_tables import add_rows, table_path, table_rows
 
-EXCLUSIONS = "exclusions.csv"
-COLUMNS = ("path", "epoch", "reason", "by")
 MOST_SESSIONS = 200
 NEVER_S = 1e9
 """When an epoch ended that nobody ended: later than any."""
@@ -104,11 +102,11 @@ def exclude(root: Path, session: str, epoch: str, reason: str, by: str) -> None:
         raise UserError("to leave an epoch out, give a reason and your name")
     if epoch not in {one.label for one in found.epochs}:
         raise UserError(f"{session} has no epoch {epoch}")
-    rows = _rows(root)
-    if any((row["path"], row["epoch"]) == (session, epoch) for row in rows):
+    path = table_path(root, "exclusions")
+    if any((row["path"], row["epoch"]) == (session, epoch) for row in _rows(path)):
         raise UserError(f"epoch {epoch} of {session} is left out already")
-    rows.append({"path": session, "epoch": epoch, "reason": reason, "by": by})
-    write_text(root / EXCLUSIONS, csv_text(COLUMNS, rows))
+    row = {"path": session, "epoch": epoch, "reason": reason, "by": by}
+    add_rows(path, "exclusions", [row])
 
 
 def _session(folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession:
@@ -169,30 +167,16 @@ def _epochs(
 
 def _exclusions(root: Path) -> tuple[dict[tuple[str, str], str], list[str]]:
     try:
-        rows = _rows(root)
+        rows = _rows(table_path(root, "exclusions"))
     except UserError as error:
         return {}, [str(error)]
-    return {(row["path"], row["epoch"]): f"{row['reason']} ({row['by']})" for row in rows}, []
+    return {
+        (row["path"], row["epoch"]): row["reason"] + (f" ({row['by']})" if row.get("by") else "")
+        for row in rows
+    }, []
 
 
-def _rows(root: Path) -> list[dict[str, str]]:
-    """Return the exclusions that were written down.
-
-    Raises
-    ------
-    UserError
-        If the table cannot be read, or has other columns: it is not written over.
-    """
-    path = root / EXCLUSIONS
-    if not path.exists():
-        return []
-    table = read_text_table(path, may_be_empty=True)
-    other = table.columns.keys() ^ set(COLUMNS)
-    if other and table.columns:
-        raise UserError(
-            f"{path}: the columns must be {', '.join(COLUMNS)}; different are "
-            f"{', '.join(sorted(other))}"
-        )
-    return [
-        {column: table.columns[column][k] for column in COLUMNS} for k in range(len(table.lines))
-    ]
+def _rows(path: Path) -> list[dict[str, str]]:
+    """Return the exclusions that were written down, each path as `found_sessions` names it."""
+    rows = table_rows(path, "exclusions")
+    return [row | {"path": os.path.normpath(row["path"])} for row in rows]

@@ -58,11 +58,14 @@ class TextTable:
         By name, in the file's order; cells without the blanks around them.
     lines : tuple of int
         The line of the file in which each row begins; the header is line 1.
+    delimiter : str
+        What separates the columns.
     """
 
     source: str
     columns: Mapping[str, tuple[str, ...]]
     lines: tuple[int, ...]
+    delimiter: str = ","
 
     def column(self, name: str, option: str) -> tuple[str, ...]:
         """Return a column.
@@ -139,7 +142,7 @@ def read_text_table(path: Path, *, may_be_empty: bool = False) -> TextTable:
         name: tuple(map(as_read, column.iloc[kept]))
         for name, column in zip(text.names, cells, strict=True)
     }
-    return TextTable(text.source, columns, tuple(text.lines[kept].tolist()))
+    return TextTable(text.source, columns, tuple(text.lines[kept].tolist()), text.delimiter)
 
 
 def read_text_recording(path: Path, layout: Layout | None = None) -> Table:

@@ -5,11 +5,13 @@ import json
 import pytest
 
 from rigidimeter.console.page.recorded_traces import epoch_traces
-from rigidimeter.console.page.sessions_found import EXCLUSIONS, exclude, found_sessions
+from rigidimeter.console.page.sessions_found import exclude, found_sessions
 from rigidimeter.errors import UserError
 from rigidimeter.recording import SessionWriter
 from rigidimeter.recording.resume import again
 from rigidimeter.settings import Settings
+
+EXCLUSIONS = "exclusions.csv"
 
 
 @pytest.fixture
@@ -49,7 +51,11 @@ def test_an_epoch_is_left_out_with_a_reason_and_a_name_and_nothing_deleted(root)
     (found,), _ = found_sessions(root)
     assert [epoch.excluded for epoch in found.epochs] == ["", "=cough, twice (Op)"]
     exclude(root, "S01-1", "1", "moved", "Op")
-    assert (root / EXCLUSIONS).read_text().splitlines()[0] == "path,epoch,reason,by"
+    assert (root / EXCLUSIONS).read_text().splitlines()[1:] == [
+        "path,epoch,reason,by",
+        'S01-1,2,"\'=cough, twice",Op',
+        "S01-1,1,moved,Op",
+    ]
     assert before == {path: path.read_bytes() for path in (root / "S01-1").iterdir()}
     with pytest.raises(UserError, match="left out already"):
         exclude(root, "S01-1", "2", "again", "Op")
@@ -84,12 +90,23 @@ def test_bad_exclusions_are_refused(root, session, epoch, reason, by, said):
     assert not (root / EXCLUSIONS).exists()
 
 
-def test_a_table_of_another_form_is_not_written_over(root):
-    (root / EXCLUSIONS).write_text("path,epoch,reason,by,note\ns,1,r,b,n\n")
-    with pytest.raises(UserError, match="different are note"):
+def test_a_table_as_a_spreadsheet_left_it_keeps_its_form_and_its_comments(root):
+    before = "\ufeffpath;epoch;reason;note;by\r\n# Müller asked\r\nS01-1;1;moved;n;Op"
+    (root / EXCLUSIONS).write_bytes(before.encode())
+    exclude(root, "S01-1", "2", "cough; twice", "Op")
+    after = (root / EXCLUSIONS).read_bytes().decode()
+    assert after == before + '\r\nS01-1;2;"cough; twice";;Op\r\n'
+    (found,), problems = found_sessions(root)
+    assert [epoch.excluded for epoch in found.epochs] == ["moved (Op)", "cough; twice (Op)"]
+    assert problems == []
+
+
+def test_a_table_that_is_none_is_not_written_over(root):
+    (root / EXCLUSIONS).write_text("path,epoch\ns,1\n")
+    with pytest.raises(UserError, match="there is no column reason"):
         exclude(root, "S01-1", "1", "r", "b")
     _, problems = found_sessions(root)
-    assert "different are note" in problems[0]
+    assert "there is no column reason" in problems[0]
 
 
 def test_an_epoch_is_drawn_from_its_samples(root):
