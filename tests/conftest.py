@@ -26,6 +26,13 @@ pytest_plugins = ["pytester"]
 
 Simulate = Callable[..., Path]
 
+RIG_250_HZ = {
+    "tick_rate_hz": 250.0,
+    "torque": {"rate_hz": 250.0},
+    "motion": {"rate_hz": 250.0},
+}
+"""The standard rig at a quarter of its rate, which is simulated and estimated in a quarter."""
+
 # The same examples in every run, however long they take: a failure is the change's, not the day's.
 hypothesis.settings.register_profile(
     "fixed",
@@ -54,7 +61,10 @@ def simulated_sessions(tmp_path_factory: pytest.TempPathFactory) -> Callable[...
 
 @pytest.fixture
 def simulate(tmp_path: Path, simulated_sessions: Callable[..., Path]) -> Simulate:
-    """Return a folder with a virtual session; sessions of two names are run one by one."""
+    """Return a folder with a virtual session; sessions of two names are run one by one.
+
+    The rig has 250 ticks a second if no other is given.
+    """
 
     def run(
         *, task: str = "prbs", epochs: int = 1, seed: int = 1, name: str = "session", **tables: Any
@@ -66,6 +76,7 @@ def simulate(tmp_path: Path, simulated_sessions: Callable[..., Path]) -> Simulat
                 "rests_s": [1.0],
                 "return_s": 1.0,
             },
+            "rig": RIG_250_HZ,
             **tables,
         }
         return Path(shutil.copytree(simulated_sessions(values, name), tmp_path / name))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 import re
@@ -121,14 +123,22 @@ def csv_text(
         Cells by name, or in the order of the columns; None, NaN and absent cells stay empty. Text
         is written by `as_written`, so that no cell is a formula or holds a control character.
     """
-    import pandas as pd
+    written: dict[str, str] = {}  # most texts of a column are those of the row before
 
-    frame = pd.DataFrame(list(rows), columns=list(columns), dtype=object)
-    for name in frame:  # not DataFrame.map, which would make numbers beside gaps floats
-        cells = [as_written(cell) if isinstance(cell, str) else cell for cell in frame[name]]
-        frame[name] = pd.Series(cells, dtype=object)
-    frame.columns = pd.Index([as_written(name) for name in columns])
-    return str(frame.to_csv(index=False, lineterminator="\n"))
+    def cell(value: Any) -> Any:
+        if isinstance(value, str):
+            if value not in written:
+                written[value] = as_written(value)
+            return written[value]
+        return None if isinstance(value, float | np.floating) and math.isnan(value) else value
+
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(map(cell, columns))
+    for row in rows:
+        values = map(row.get, columns) if isinstance(row, Mapping) else row
+        writer.writerow(map(cell, values))
+    return file.getvalue()
 
 
 def text_bytes(text: str) -> bytes:

@@ -21,22 +21,17 @@ def drawn_csv(figure: Figure) -> str:
     `series` counts the lines of a panel; an interval is a series of its two ends. What only marks a
     place across the whole of an axis is left out.
     """
-    return csv_text(COLUMNS, list(_rows(figure)))
+    return csv_text(COLUMNS, _rows(figure))
 
 
-def _rows(figure: Figure) -> Iterator[dict[str, Any]]:
+def _rows(figure: Figure) -> Iterator[tuple[Any, ...]]:
     for panel, axes in enumerate(figure.axes, start=1):
         title = axes.get_title("left") or axes.get_title()
-        about = {
-            "panel": panel,
-            "title": title,
-            "x_axis": axes.get_xlabel(),
-            "y_axis": axes.get_ylabel(),
-        }
-        about = {name: " ".join(str(text).split()) for name, text in about.items()}
+        texts = (title, axes.get_xlabel(), axes.get_ylabel())
+        about = (panel, *(" ".join(str(text).split()) for text in texts))
         for series, (label, points) in enumerate(_series(axes), start=1):
-            for x, y in points:
-                yield about | {"series": series, "label": label, "x": float(x), "y": float(y)}
+            for x, y in points.tolist():
+                yield (*about, series, label, x, y)
 
 
 def _series(axes: Axes) -> Iterator[tuple[str, np.ndarray]]:

@@ -236,7 +236,7 @@ def test_a_band_beyond_half_the_rate_is_refused():
 
 
 def test_over_a_virtual_session_it_comes_to_the_joint(simulate):
-    (epoch,), _ = read_session(simulate())
+    (epoch,), _ = read_session(simulate(rig={}))
     motion = epoch.channels["angle_rad"].time_s
     torque = np.interp(
         motion, *(getattr(epoch.channels["torque_nm"], n) for n in ("time_s", "values"))

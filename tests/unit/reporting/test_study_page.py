@@ -209,7 +209,7 @@ def test_the_same_study_gives_the_same_bytes(
     study: StudyResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The figures of recordings have their own test, and take long.
-    long = ("days", "distributions", "perturbation", "torque", "voluntary", "loops")
+    long = ("days", "distributions", "perturbation", "torque", "voluntary", "loops", "recorded")
     monkeypatch.setattr(page_module, "SECTIONS", [s for s in SECTIONS if s.name not in long])
     first = write_report(study, tmp_path / "a")
     again = write_report(study, tmp_path / "b")

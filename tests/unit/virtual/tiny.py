@@ -8,6 +8,7 @@ from rigidimeter.virtual.study_design import PAPER, StudyDesign
 
 SHORT = {
     **PAPER.settings,
+    "rig": {**PAPER.settings["rig"], "tick_rate_hz": 250.0},
     "prbs": {"register_bits": 6, "duration_s": 5.0},
     "sinusoid": {"duration_s": 5.0, "motion_s": 5.0},
     "scores": {"cycles": 3},
