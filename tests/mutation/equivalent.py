@@ -114,6 +114,7 @@ EQUIVALENT: dict[str, str] = {
     "due later",
     "ramp.py ramp_to_rest: 0 → 1": RAMP,
     "ramp.py ramp_to_rest: 0 → -1": RAMP,
+    "sink.py SharedSupervision.__init__: 3 → 4": "one look at both clocks more",
     "tick.py run_tick: 0 → 1": RAMP,
     "tick.py run_tick: 0 → -1": RAMP,
 }

@@ -63,7 +63,11 @@ TESTS = {
         *("acquisition/test_session_run.py", "acquisition/test_stop_account.py"),
     ),
     "acquisition/tick.py": _RUN,
-    "acquisition/processes/sink.py": ("acquisition/test_shared_status.py",),
+    "acquisition/stop_account.py": ("acquisition/test_stop_account.py",),
+    "acquisition/stop_remedies.py": ("acquisition/test_stop_account.py",),
+    "acquisition/processes/sink.py": (
+        *("acquisition/test_sink.py", "acquisition/test_shared_status.py"),
+    ),
     "devices/ascii/drive.py": ("devices/test_serial_stop_paths.py",),
     "devices/cia402/drive.py": ("devices/test_stop_paths.py",),
     "devices/composed.py": ("devices/test_composed.py",),

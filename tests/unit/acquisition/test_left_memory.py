@@ -128,6 +128,14 @@ def test_a_folder_that_cannot_be_completed_is_named_and_the_memory_kept(made, tm
     assert there(made) == [True] * 3
 
 
+def test_memory_of_no_folder_is_removed_whatever_is_in_it():
+    shared = SessionMemory.create(100.0, 1.0)
+    shared.samples.push(sample(0))
+    shared.close()
+    assert complete_left() == []
+    assert there(shared) == [False] * 3
+
+
 def test_a_record_that_was_closed_is_not_gone_on_with(made, tmp_path):
     made.close()
     recover(tmp_path / "s", "closed before")

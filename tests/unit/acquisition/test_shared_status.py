@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from rigidimeter.acquisition.processes import shared_memory
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import NOTE_BYTES, SharedStatus
@@ -32,6 +33,11 @@ class Time:
         return self.ns
 
 
+@pytest.fixture(autouse=True)
+def where(tmp_path, monkeypatch):
+    monkeypatch.setattr(shared_memory, "WHERE", tmp_path)  # goes with the test, also a killed one
+
+
 @pytest.fixture
 def now():
     return Time()
@@ -40,9 +46,7 @@ def now():
 @pytest.fixture
 def shared_status(now):
     made = SharedStatus.create()
-    shared_status = SharedStatus(made.memory, now)
-    yield shared_status
-    made.memory.unlink()
+    yield SharedStatus(made.memory, now)
     made.close()
 
 
@@ -51,7 +55,6 @@ def rings():
     rings = SampleRing.create(10), EventRing.create(16, 512)
     yield rings
     for ring in rings:
-        ring.memory.unlink()
         ring.close()
 
 

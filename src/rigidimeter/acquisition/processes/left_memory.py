@@ -62,9 +62,9 @@ def complete_left(only: Path | None = None, reason: str = KILLED) -> list[str]:
                     raise UserError(
                         f"{only}: is still being recorded; recover it once that has ended"
                     )
-            elif not shared.needed():
+            elif folder is None or not shared.needed():  # a session has its folder before it begins
                 shared.unlink()
-            elif folder is not None and (mine or wanted is None):
+            elif mine or wanted is None:
                 line, done = _complete(shared, folder, reason)
                 if mine and not done:
                     raise UserError(line)
