@@ -133,9 +133,10 @@ def lead_session(
     """Run what the page asked for, and say on the page how it ended; None if it did not begin."""
     from rigidimeter.cli.planned_session import checked_rig, run_planned
     from rigidimeter.cli.sharing import require_packages, write_nwb_beside
+    from rigidimeter.console.page.button_words import in_buttons, next_buttons
     from rigidimeter.console.page.kept_study import extended
     from rigidimeter.console.page.session_form import codes
-    from rigidimeter.recording.resume import count_epochs
+    from rigidimeter.recording.resume import count_epochs, rest_of
 
     folder, rig = desk.place.root / request.folder, desk.place.rig
     try:
@@ -147,8 +148,9 @@ def lead_session(
         ended = run_planned(planned, folder, rig, realtime, look, desk.operator_seen_ns)
         desk.told_to_end = bool(ended.signals)
         good, of = count_epochs(ended.folder)
+        left = len(rest_of(ended.folder).epochs)
     except UserError as error:
-        desk.over(folder, "not run", error.lines)
+        desk.over(folder, "not run", tuple(map(in_buttons, error.lines)))
         for line in error.lines:
             echo(line, err=True)
         return None
@@ -159,7 +161,8 @@ def lead_session(
         sentences.append(write_nwb_beside(ended.folder))
     sentences += [*ended.remarks, *extended(desk.place)]
     echo(" ".join(sentences))
-    desk.over(ended.folder, ended.outcome or "no outcome", tuple(sentences))
+    sentences.append(next_buttons(closed=bool(ended.outcome), good=good, left=left))
+    desk.over(ended.folder, ended.outcome or "no outcome", tuple(map(in_buttons, sentences)))
     return ended
 
 
@@ -172,7 +175,7 @@ def _planned(desk: Desk, request: StartRequest, source: Path | None) -> PlannedS
     if request.settings is None:
         virtual = desk.place.rig is None
         folder = desk.place.root / request.resume
-        planned = rest_of_session(folder, virtual=virtual, epoch=request.epoch)
+        planned = rest_of_session(folder, virtual=virtual, epoch=request.epoch, left=request.left)
     else:
         planned = new_session(request.settings, request.about, source)
     lost_s = min(SILENT_S, planned.settings.loop.console_lost_s)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -64,8 +64,10 @@ def new_session(
     return PlannedSession(settings, planned, about=about, source=source)
 
 
-def rest_of_session(resume: Path, *, virtual: bool, epoch: int | None = None) -> PlannedSession:
-    """Return what is left of a session, or one epoch of it again.
+def rest_of_session(
+    resume: Path, *, virtual: bool, epoch: int | None = None, left: Collection[int] = ()
+) -> PlannedSession:
+    """Return what is left of a session, of that the epochs `left` if any, or one epoch again.
 
     Raises
     ------
@@ -76,6 +78,9 @@ def rest_of_session(resume: Path, *, virtual: bool, epoch: int | None = None) ->
     from rigidimeter.recording.resume import again, rest_of
 
     rest = rest_of(resume) if epoch is None else again(resume, epoch)
+    if left:
+        epochs = tuple(one for one in rest.epochs if one.number in left)
+        rest = replace(rest, epochs=epochs, done=rest.done + len(rest.epochs) - len(epochs))
     if rest.virtual != virtual:
         raise UserError(
             f"{resume}: was recorded on "

@@ -26,6 +26,7 @@ from rigidimeter.study import (
     TrafficLight,
     conclude,
     precisions,
+    precisions_untested,
 )
 
 DIGITS = 3
@@ -52,7 +53,7 @@ class StripRow(NamedTuple):
 
 
 class PrecisionRow(NamedTuple):
-    """One measure of one condition as the first screen shows it."""
+    """One measure of a condition as the first screen shows it."""
 
     title: str
     unit: str
@@ -155,11 +156,20 @@ def _sided_interval(low: float, high: float, digits: int = DIGITS, unit: str = "
     return f"{number(ends[0], digits)} to {number(ends[1], digits)}{unit} {side}"
 
 
-def precision_rows(result: StudyResult) -> list[PrecisionRow]:
-    """Return a row for each measure of the only condition; none where two were compared."""
-    found = precisions(result)
-    to = reach([WANTED_PERCENT, *(one.percent for one in found)], MOST_PERCENT)
-    return [_precision_row(one, to) for one in found]
+def precision_tables(result: StudyResult) -> dict[str, list[PrecisionRow]]:
+    """Return by caption a row for each measure of the only condition, or of two without a test."""
+    where = f" in {result.reference}" if result.reference else ""
+    found = {f"All epochs together{where}": precisions(result)} | {
+        f"All epochs in {name} together; what differs between days is not in these intervals": each
+        for name, each in precisions_untested(result).items()
+    }
+    halves = [one.percent for each in found.values() for one in each]
+    to = reach([WANTED_PERCENT, *halves], MOST_PERCENT)
+    return {
+        caption: [_precision_row(one, to) for one in each]
+        for caption, each in found.items()
+        if each
+    }
 
 
 def _precision_row(one: Precision, to: float) -> PrecisionRow:

@@ -185,7 +185,7 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
         verdict=verdict(result),
         strip=first_screen.strip(result),
         tested=first_screen.tested_words(result),
-        precision=first_screen.precision_rows(result),
+        precision=first_screen.precision_tables(result),
         light=light,
         screen=first_screen,
         advice=() if result.other else first_screen.advice(result, light),

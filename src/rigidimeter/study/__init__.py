@@ -23,7 +23,12 @@ from rigidimeter.study.measures import MEASURES, RATING, Measure, Observation, c
 from rigidimeter.study.provenance import provenance
 from rigidimeter.study.rating_relation import Agreement, Relation, agreement, relations
 from rigidimeter.study.ratings_found import RatingMean, RatingsFound
-from rigidimeter.study.reached_precision import WANTED_PERCENT, Precision, precisions
+from rigidimeter.study.reached_precision import (
+    WANTED_PERCENT,
+    Precision,
+    precisions,
+    precisions_untested,
+)
 from rigidimeter.study.results import (
     Condition,
     EffectPair,
@@ -84,6 +89,7 @@ __all__ = [
     "keep",
     "leader",
     "precisions",
+    "precisions_untested",
     "provenance",
     "read_study",
     "recording_result",

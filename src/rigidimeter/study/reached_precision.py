@@ -1,4 +1,4 @@
-"""How precise the estimates of one condition are, and how many epochs would make them better.
+"""How precise the estimates of a condition are, and how many epochs would make them better.
 
     N ≈ n (1.96 SE / (0.05 |K|))²,   SE the standard error from n epochs
 
@@ -11,16 +11,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as t_distribution
 
-from rigidimeter.records import PARAMETERS, Fit
+from rigidimeter.records import PARAMETERS, Analysis, Fit
 from rigidimeter.study.compared import measure_names
 from rigidimeter.study.comparison import split_pooled
+from rigidimeter.study.conclusions import conclude
 from rigidimeter.study.measures import MEASURES, Measure
 from rigidimeter.study.results import StudyResult
 
@@ -81,12 +82,32 @@ class Precision:
 
 def precisions(result: StudyResult) -> tuple[Precision, ...]:
     """Return each measure of the only condition that was recorded, with its interval."""
-    if result.other:
-        return ()
-    analysis = result.analysis
+    return () if result.other else _of_epochs(result.analysis, result.reference)
+
+
+def precisions_untested(result: StudyResult) -> dict[str, tuple[Precision, ...]]:
+    """Return each measure of two conditions, if no difference between them could be tested.
+
+    As on a single day: the intervals are of its epochs alone, and hold nothing of other days.
+    """
+    concluded = conclude(result)
+    if concluded is None or concluded.tested:
+        return {}
+    analysis, found = result.analysis, {}
+    for name in (result.reference, result.other):
+        own = replace(
+            analysis,
+            fits=tuple(fit for fit in analysis.fits if fit.condition == name),
+            scores=tuple(score for score in analysis.scores if score.condition == name),
+        )
+        found[name] = _of_epochs(own, name)
+    return {name: each for name, each in found.items() if each}
+
+
+def _of_epochs(analysis: Analysis, condition: str) -> tuple[Precision, ...]:
     counting = [fit for fit in analysis.fits if fit.outcome.included]
     by_condition, overall = split_pooled(analysis)
-    fit = by_condition.get(result.reference) or overall
+    fit = by_condition.get(condition) or overall
     if fit is None and len(counting) == 1:
         fit = counting[0]
     symbols = {parameter.name: k for k, parameter in enumerate(PARAMETERS)}

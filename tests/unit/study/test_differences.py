@@ -19,6 +19,7 @@ from rigidimeter.study import (
     compare_analysis,
     conclude,
     precisions,
+    precisions_untested,
     traffic_light,
 )
 
@@ -200,3 +201,22 @@ class TestPrecision:
 
     def test_two_conditions_have_none(self, study):
         assert precisions(study) == ()
+
+    def test_a_single_day_has_those_of_each_condition(self, study):
+        """No test by days exists; what the epochs of the day give is shown, for each condition."""
+        assert precisions_untested(study) == {}
+        analysis = replace(study.analysis, pooled=())
+        no_test = tuple(
+            replace(c, days=c.days and replace(c.days, p=math.nan)) for c in study.comparisons
+        )
+        one_day = replace(study, analysis=analysis, comparisons=no_test)
+        found = precisions_untested(one_day)
+        for name in ("OFF", "DBS"):
+            own = [
+                fit.stiffness_nm_rad
+                for fit in analysis.fits
+                if fit.condition == name and fit.outcome.included
+            ]
+            stiffness = found[name][0]
+            assert (stiffness.n, stiffness.value) == (len(own), pytest.approx(np.mean(own)))
+            assert stiffness.low < stiffness.value < stiffness.high

@@ -11,8 +11,17 @@ from typing import Any
 
 from nicegui import ui
 
+from rigidimeter.console.page.button_words import in_buttons, unfinished_words
 from rigidimeter.console.page.desk import Desk, StartRequest
+from rigidimeter.console.page.kept_study import extended
 from rigidimeter.console.page.recorded_traces import epoch_traces
+from rigidimeter.console.page.report_files import (
+    OF_STUDY,
+    PAGE,
+    report_file,
+    report_folder,
+    report_link,
+)
 from rigidimeter.console.page.sessions_found import (
     FoundEpoch,
     FoundSession,
@@ -32,10 +41,15 @@ class AfterView:
     work : Work
     in_control : callable
         Whether the page may act.
+    notice : label
+        Says elsewhere on the page which sessions are unfinished.
     """
 
-    def __init__(self, desk: Desk, work: Work, in_control: Callable[[], bool]) -> None:
+    def __init__(
+        self, desk: Desk, work: Work, in_control: Callable[[], bool], notice: ui.label
+    ) -> None:
         self._desk, self._work, self._in_control = desk, work, in_control
+        self._notice = notice
         self._root = desk.place.root
         self._chosen = ""
         self._shown = -1
@@ -55,10 +69,15 @@ class AfterView:
     @ui.refreshable_method
     def _list(self) -> None:
         sessions, problems = found_sessions(self._root)
+        self._notice.text = unfinished_words(sessions)
         for problem in problems:
-            ui.label(problem).classes("problem")
+            ui.label(in_buttons(problem)).classes("problem")
         if not sessions:
             ui.label("There is no session yet.")
+        elif not self._desk.place.one_session:
+            with ui.row().classes("items-center"):
+                ui.button("Report of the study", on_click=self._study_report)
+                self._link(OF_STUDY, "Open the report of the study")
         for session in sessions:
             self._session(session)
 
@@ -69,17 +88,18 @@ class AfterView:
             value=session.name == self._chosen,
         ).classes("w-full session"):
             if session.reason:
-                ui.label(session.reason)
+                ui.label(in_buttons(session.reason))
             with ui.row():
                 if not session.outcome and not session.recording:
                     ui.button("Recover", on_click=lambda: self._recover(session.name))
-                if session.good < session.planned and session.outcome:
+                if session.left:
                     ui.button(
-                        f"Run what is left: {session.planned - session.good}",
-                        on_click=lambda: self._run(session.name),
+                        f"Run what is left: {len(session.left)}",
+                        on_click=lambda: self._run(session.name, left=session.left),
                     )
                 ui.button("Estimate", on_click=lambda: self._estimate(session))
                 ui.button("Report", on_click=lambda: self._report(session))
+                self._link(report_folder(session.name), "Open its report")
             for epoch in session.epochs:
                 self._epoch(session, epoch)
 
@@ -93,7 +113,7 @@ class AfterView:
             ui.label(" · ".join(filter(None, said))).classes("grow")
             ui.button("Show", on_click=lambda: self._show(session.name, epoch.label))
             if session.outcome:
-                ui.button("Repeat", on_click=lambda: self._run(session.name, epoch.number))
+                ui.button("Repeat", on_click=lambda: self._repeat(session.name, epoch))
             if not epoch.excluded:
                 ui.button("Leave out", on_click=lambda: self._ask_reason(session.name, epoch.label))
 
@@ -103,12 +123,22 @@ class AfterView:
         ui.notify("not while a session runs, and only on the page in control")
         return False
 
-    def _run(self, session: str, epoch: int | None = None) -> None:
+    def _link(self, folder: str, text: str) -> None:
+        """Link to a report if it was made; a page of one session shows none of other folders."""
+        if report_file(self._root, folder, PAGE) is not None:
+            ui.link(text, report_link(folder), new_tab=True)
+
+    def _repeat(self, session: str, epoch: FoundEpoch) -> None:
+        if epoch.outcome == "success" and not epoch.excluded:
+            ui.notify("both runs of this epoch count, until you leave one out")
+        self._run(session, epoch.number)
+
+    def _run(self, session: str, epoch: int | None = None, left: tuple[int, ...] = ()) -> None:
         """Run what is left of a session, or one epoch of it again, in a new folder."""
         if not self._may_act():
             return
         folder = f"{session.rpartition('-')[0] or session}-{time.strftime('%H%M%S')}"
-        self._desk.ask(StartRequest(folder, resume=session, epoch=epoch))
+        self._desk.ask(StartRequest(folder, resume=session, epoch=epoch, left=left))
 
     def _ask_reason(self, session: str, epoch: str) -> None:
         with ui.dialog() as dialog, ui.card():
@@ -132,22 +162,34 @@ class AfterView:
         dialog.open()
 
     async def _recover(self, session: str) -> None:
-        await self._command("recover", session)
+        if not await self._command("recover", session):
+            return
+        for line in extended(self._desk.place):
+            ui.notify(line)
+        self._chosen = session
         self._list.refresh()
 
     async def _estimate(self, session: FoundSession) -> None:
         await self._command("estimate", session.name, *session.left_out)
 
     async def _report(self, session: FoundSession) -> None:
-        out = self._root / f"{session.name}-report"
-        await self._command("report", session.name, "--out", str(out), *session.left_out)
+        out = self._root / report_folder(session.name)
+        if await self._command("report", session.name, "--out", str(out), *session.left_out):
+            self._chosen = session.name
+            self._list.refresh()
 
-    async def _command(self, command: str, session: str, *options: str) -> None:
+    async def _study_report(self) -> None:
+        if await self._command("report", "", "--out", str(self._root / OF_STUDY)):
+            self._list.refresh()
+
+    async def _command(self, command: str, session: str, *options: str) -> bool:
+        """Show what a command says of a session, or of the study; return whether it was run."""
         if not self._may_act():
-            return
+            return False
         self._answer.set_content("<p>computing …</p>")
         answer = await self._work.command(command, str(self._root / session), *options)
         self._answer.set_content(answer.html())
+        return True
 
     async def _show(self, session: str, epoch: str) -> None:
         """Draw an epoch: raw signals, and measured and modelled torque with their difference."""

@@ -37,6 +37,8 @@ class StartRequest:
         Name of the folder of the session to be continued; empty for none.
     epoch : int or None
         Of that session, the one epoch to be run again; None for all that are left.
+    left : tuple of int
+        The planned epochs that are left, by number; empty for those that this session lacks.
     """
 
     folder: str
@@ -44,6 +46,7 @@ class StartRequest:
     about: Mapping[str, Any] = field(default_factory=dict)
     resume: str = ""
     epoch: int | None = None
+    left: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

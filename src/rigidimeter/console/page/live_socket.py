@@ -17,9 +17,10 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.status_values import Flag, Role
+from rigidimeter.acquisition.processes.status_values import Condition, Flag, Role
 from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.console.observer import Observer
+from rigidimeter.console.orders import save_to
 from rigidimeter.console.page.desk import Desk, RunningSession
 from rigidimeter.console.page.page_messages import Message, RefusedMessage, parse_message
 from rigidimeter.console.page.session_state import points, session_state
@@ -76,7 +77,9 @@ class _Attached:
 
     def state(self) -> dict[str, Any]:
         facts = self._observer.look()
-        return session_state(facts, self._observer.progress) | {"number": self.running.number}
+        full = self.memory.status.condition(Role.RECORDER) is Condition.TROUBLE
+        state = session_state(facts, self._observer.progress)
+        return state | {"number": self.running.number, "save": full}
 
     def post_notes(self) -> None:
         while self.notes and self.memory.status.post_note(self.notes[0]) is not None:
@@ -159,6 +162,8 @@ class LiveSockets:
             status.post(Order(Command.PAUSE_NOW))
         elif message.kind == "order":
             status.post(Order(message.command))
+        elif message.kind == "save":
+            page.tell(json.dumps({"say": save_to(message.folder, status)}))
         elif message.note is not None:
             if len(attached.notes) < MOST_NOTES:
                 attached.notes.append(json_line(message.note).decode())

@@ -27,8 +27,8 @@ ORDERS = {
 }
 """What the buttons of the page order; the emergency stop is a message of its own."""
 
-Kind = Literal["hello", "beat", "leave", "emergency", "order", "note"]
-KINDS = ("hello", "beat", "leave", "emergency", "order", "note")
+Kind = Literal["hello", "beat", "leave", "emergency", "order", "note", "save"]
+KINDS = ("hello", "beat", "leave", "emergency", "order", "note", "save")
 
 
 class RefusedMessage(ValueError):
@@ -50,6 +50,8 @@ class Message:
     note : dict
         Of a note, what is to be recorded: `what` (note, mark or rating), `text`, `by`, and of a
         rating its `epoch` and `score`.
+    folder : str
+        Where to go on recording when the disk takes nothing.
     """
 
     kind: Kind
@@ -57,6 +59,7 @@ class Message:
     tab: str = ""
     command: Command = Command.NONE
     note: dict[str, Any] | None = None
+    folder: str = ""
 
 
 def parse_message(text: str) -> Message:
@@ -88,6 +91,11 @@ def parse_message(text: str) -> Message:
         if command is None:
             raise RefusedMessage(f"an order is one of {', '.join(ORDERS)}")
         return Message(kind, command=command)
+    if kind == "save":
+        folder = _text(said, "folder", LONGEST_TEXT)
+        if not folder.startswith(("/", "~/")):
+            raise RefusedMessage("name the whole path of a new folder, as in /media/disk/session")
+        return Message(kind, folder=folder)
     return Message(kind, note=_note(said) if kind == "note" else None)
 
 

@@ -40,9 +40,10 @@ def show_page(desk: Desk, work: Work, secret: str) -> None:
     )
     ui.html(_during(), sanitize=False).classes("rig")
     with ui.element("section").classes("view").props("id=view-before"):
+        unfinished = ui.label("").classes("problem").props('role="status"')
         BeforeView(desk, work, in_control)
     with ui.element("section").classes("view").props("id=view-after"):
-        AfterView(desk, work, in_control)
+        AfterView(desk, work, in_control, unfinished)
 
 
 @cache

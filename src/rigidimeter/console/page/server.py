@@ -17,12 +17,14 @@ from pathlib import Path
 import uvicorn
 from fastapi import FastAPI, WebSocket
 from nicegui import ui
+from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from rigidimeter.console.page.desk import Desk
 from rigidimeter.console.page.gate import Gate, is_loopback
 from rigidimeter.console.page.live_socket import LiveSockets
 from rigidimeter.console.page.page_view import show_page
+from rigidimeter.console.page.report_files import POLICY, report_file
 from rigidimeter.console.page.work import Work
 from rigidimeter.errors import UserError
 
@@ -107,6 +109,13 @@ class PageServer:
         app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
         app.mount("/assets", StaticFiles(directory=ASSETS), name="assets")
         app.mount("/vendored", StaticFiles(packages=[("rigidimeter", "vendored")]), name="vendored")
+
+        @app.get("/report/{folder}/{path:path}")
+        def report(folder: str, path: str) -> Response:
+            found = report_file(self._desk.place.root, folder, path)
+            if found is None:
+                return PlainTextResponse("there is no such report", 404)
+            return FileResponse(found, headers={"Content-Security-Policy": POLICY})
 
         @app.websocket("/live")
         async def live(one: WebSocket) -> None:

@@ -11,6 +11,7 @@ from rigidimeter.acquisition.run_states import State
 from rigidimeter.console.facts import ConditionCount, Facts
 from rigidimeter.console.lamps import Level
 from rigidimeter.console.limit_distances import LimitDistance
+from rigidimeter.console.page.button_words import in_buttons
 from rigidimeter.console.session_progress import Progress
 from rigidimeter.console.trace_reader import TRACES, Traces
 from rigidimeter.units import deg_from_rad
@@ -52,10 +53,10 @@ def session_state(facts: Facts, progress: Progress) -> dict[str, Any]:
         "live_of": facts.live_words,
         "limits": [_limit(one) for one in facts.distances if math.isfinite(one.part)],
         "lamps": [
-            {"level": LEVELS[lamp.level], "text": f"{lamp.name}: {lamp.words}"}
+            {"level": LEVELS[lamp.level], "text": f"{lamp.name}: {in_buttons(lamp.words)}"}
             for lamp in facts.lamps
         ],
-        "alert": facts.stop_words,
+        "alert": in_buttons(facts.stop_words),
         "orders": [] if progress.outcome else list(ORDERS[facts.state]),
         "rate": {"number": rated.number, "place": rated.place} if rated is not None else None,
     }

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from rigidimeter.console.page.entered import line, name
 from rigidimeter.errors import UserError
 from rigidimeter.recording import is_session, read_manifest
 from rigidimeter.recording.event_log import read_events
+from rigidimeter.recording.resume import rest_of
 from rigidimeter.recording.session_folder import EVENTS, locked
 from rigidimeter.recording.study_tables import add_rows, table_path, table_rows
 
@@ -45,7 +46,11 @@ class FoundEpoch:
 
 @dataclass(frozen=True)
 class FoundSession:
-    """A session folder; `outcome` is empty where the session was not closed."""
+    """A session folder; `outcome` is empty where the session was not closed.
+
+    `left` are the numbers of the planned epochs that neither it nor a session that continues it
+    ran, or will run.
+    """
 
     name: str
     created_utc: str
@@ -56,6 +61,15 @@ class FoundSession:
     planned: int
     recording: bool
     epochs: tuple[FoundEpoch, ...]
+    session_id: str = ""
+    continues: str = ""
+    plan: tuple[int, ...] = ()
+    left: tuple[int, ...] = ()
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether it was interrupted, or epochs are left."""
+        return not self.recording and (not self.outcome or bool(self.left))
 
     @property
     def good(self) -> int:
@@ -84,7 +98,24 @@ def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
             found.append(_session(folder, excluded))
         except (UserError, OSError, KeyError, TypeError) as error:
             problems.append(f"{folder.name}: {error}")
-    return found, problems
+    return [_with_left(one, root, found) for one in found], problems
+
+
+def _with_left(one: FoundSession, root: Path, found: Sequence[FoundSession]) -> FoundSession:
+    """Return a session with what is left of it."""
+    if not one.outcome or one.good >= one.planned:
+        return one
+    continued = {
+        number
+        for other in found
+        if one.session_id and other.continues == one.session_id
+        for number in other.plan
+    }
+    try:
+        rest = [epoch.number for epoch in rest_of(root / one.name).epochs]
+    except UserError:  # such as one without a protocol
+        rest = []
+    return replace(one, left=tuple(number for number in rest if number not in continued))
 
 
 def exclude(root: Path, session: str, epoch: str, reason: str, by: str) -> None:
@@ -122,6 +153,7 @@ def _session(folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession
                 pass
         except UserError:
             recording = True
+    plan = manifest["protocol"]
     return FoundSession(
         folder.name,
         manifest["created_utc"],
@@ -129,9 +161,12 @@ def _session(folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession
         manifest["virtual"],
         end.get("outcome", ""),
         end.get("reason", "still being recorded" if recording else "it was interrupted"),
-        len(manifest["protocol"]),
+        len(plan),
         recording,
         tuple(_epochs(folder.name, events, excluded, blinded=about.get("blinded") is True)),
+        manifest.get("session_id", ""),
+        manifest.get("continues", {}).get("session_id", ""),
+        tuple(entry["number"] for entry in plan),
     )
 
 

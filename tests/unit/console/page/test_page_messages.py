@@ -77,3 +77,11 @@ def test_the_longest_note_fits_into_the_memory_for_it():
 def test_anything_else_is_refused(text):
     with pytest.raises(RefusedMessage):
         parse_message(text)
+
+
+def test_another_folder_is_named_by_its_whole_path():
+    said = parse_message('{"kind": "save", "folder": " /media/disk/s "}')
+    assert (said.kind, said.folder) == ("save", "/media/disk/s")
+    for folder in ("s", "../s", "", "/a\nb", "/" + "x" * 300, 1):
+        with pytest.raises(RefusedMessage):
+            parse_message(json.dumps({"kind": "save", "folder": folder}))

@@ -1,17 +1,20 @@
 """The sessions of a folder, and epochs that are left out of results."""
 
 import json
+from dataclasses import asdict
 
 import pytest
 
 from rigidimeter.console.page.recorded_traces import epoch_traces
 from rigidimeter.console.page.sessions_found import exclude, found_sessions
 from rigidimeter.errors import UserError
+from rigidimeter.experiment import plan
 from rigidimeter.recording import SessionWriter
 from rigidimeter.recording.resume import again
-from rigidimeter.settings import Settings
+from rigidimeter.settings import Settings, parse_settings
 
 EXCLUSIONS = "exclusions.csv"
+TWICE = parse_settings({"protocol": {"blocks": [{"epochs": 4}], "rests_s": [4.0]}})
 
 
 @pytest.fixture
@@ -128,3 +131,28 @@ def test_one_epoch_is_planned_again(root):
     assert [epoch.number for epoch in rest.epochs] == [2]
     with pytest.raises(UserError, match="no epoch 7"):
         again(root / "S01-1", 7)
+
+
+def test_what_is_left_is_what_no_session_goes_on_with(tmp_path):
+    """Also where epochs were repeated or continued in other folders; each is offered once."""
+    planned = plan(TWICE.protocol, TWICE.prbs, TWICE.sinusoid, 1).epochs
+
+    def session(name, epochs, done, **continues):
+        writer = SessionWriter(tmp_path / name, TWICE, [asdict(e) for e in epochs], {},
+                               virtual=True, continues=continues)  # fmt: skip
+        for epoch in epochs[: done + 1]:
+            begun = {"label": epoch.label, "task": "prbs", "condition": "OFF", "time_s": 0.0}
+            writer.event("epoch_started", epoch=epoch.number, **begun)
+            how = "success" if epoch in epochs[:done] else "abort"
+            writer.event("epoch_ended", epoch=epoch.number, time_s=1.0, outcome=how, reason="r")
+        writer.close(1.0, "abort", "r")
+        return writer.session_id
+
+    first = session("a", planned, 1)
+    assert found_sessions(tmp_path)[0][0].left == (2, 3, 4)
+    session("b", planned[1:2], 1, folder="a", session_id=first)
+    left = {one.name: one.left for one in found_sessions(tmp_path)[0]}
+    assert left == {"a": (3, 4), "b": ()}
+    session("c", planned[2:], 1, folder="a", session_id=first)
+    left = {one.name: one.left for one in found_sessions(tmp_path)[0]}
+    assert left == {"a": (), "b": (), "c": (4,)}

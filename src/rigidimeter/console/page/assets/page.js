@@ -42,6 +42,7 @@
     $("take").hidden = control;
     show("role", control ? "" : "this page can only look");
     $("emergency").disabled = !(control && session);
+    $("save-form").hidden = !(control && session && session.save);
     const can = session ? session.orders : [];
     for (const one of document.querySelectorAll("[data-order]")) one.disabled = !control || !can.includes(one.dataset.order);
     for (const one of document.querySelectorAll("#note-form *, #rating-form *")) one.disabled = !control || !session;
@@ -191,6 +192,7 @@
     addEventListener("keydown", (event) => { if (event.key === "Escape") emergency(); }, true);
     $("take").onclick = () => socket.close();
     $("note-form").onsubmit = (event) => { event.preventDefault(); if ($("note").value.trim()) note("note", $("note").value); $("note").value = ""; };
+    $("save-form").onsubmit = (event) => { event.preventDefault(); say({ kind: "save", folder: $("save-folder").value }); };
     $("mark").onclick = () => note("mark", "moment marked");
     $("rating-form").onsubmit = (event) => {
       event.preventDefault();
