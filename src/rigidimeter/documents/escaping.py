@@ -1,9 +1,10 @@
 r"""Text as it may be shown and as a cell of a table: nothing in it commands a terminal or a sheet.
 
 A control character, such as ESC, which begins the commands of a terminal, is written as its
-escape (``\x1b``). A cell of a CSV file that begins with ``=``, ``+``, ``-``, ``@`` or a tab and is
-no number would be a formula to a spreadsheet; an apostrophe before it makes it text there. Readers
-of tables take one such apostrophe off again. Source: OWASP, "CSV Injection".
+escape (``\x1b``). A cell of a table that begins with ``=``, ``+``, ``-``, ``@``, one of these in
+full width, a tab or a line feed and is no number would be a formula to a spreadsheet; an apostrophe
+before it makes it text there. Readers of tables take one such apostrophe off again. Source: OWASP,
+"CSV Injection".
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import re
 # C0 and C1, and what turns the direction of text or breaks lines.
 _COMMANDS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 _LINES = re.compile(_COMMANDS.pattern.replace("\x00-\x1f", "\x00-\x08\x0b-\x1f"))
-_FORMULA = re.compile(r"'*[=+\-@\t]")
+_FORMULA = re.compile("'*[=+\\-@\t\n\uff1d\uff0b\uff0d\uff20]")
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 """A number as tables hold it, with a decimal point or comma."""
 

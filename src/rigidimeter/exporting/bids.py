@@ -22,7 +22,7 @@ import pyarrow as pa
 import pyarrow.compute
 import pyarrow.csv
 
-from rigidimeter.documents import write_json, write_text
+from rigidimeter.documents import as_written, write_json, write_text
 from rigidimeter.exporting.document_tables import document_tables, exclusion_reasons
 from rigidimeter.exporting.names import entities, joined, label
 from rigidimeter.recording.exported_session import ExportedSession, Stream
@@ -262,4 +262,5 @@ def _write_tsv(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
 def _cell(value: Any) -> str:
     if value is None or value == "" or value != value:
         return "n/a"
-    return " ".join(str(value).split())
+    text = " ".join(str(value).split())
+    return as_written(text) if isinstance(value, str) else text  # -inf is a number

@@ -73,6 +73,15 @@ def test_an_error_of_usage_shows_a_word_without_commands(rigidimeter, given):
     assert "\\x1b]0;t\\x07" in ran.err
 
 
+@pytest.mark.parametrize(
+    "sign", ["=", "+", "-", "@", "\t=", "\n=", "\uff1d", "\uff0b", "\uff0d", "\uff20"]
+)
+def test_no_cell_is_a_formula_also_in_full_width_or_after_a_line_feed(sign):
+    (_, row) = csv.reader(csv_text(["name"], [[f"{sign}1+A1"]]).splitlines(keepends=True))
+    assert row == [f"'{sign}1+A1"]
+    assert as_read(row[0]) == f"{sign}1+A1"
+
+
 @settings(max_examples=60)
 @given(text=st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=8))
 def test_text_of_a_table_is_read_as_it_was_written(text):

@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -89,3 +90,17 @@ def test_a_study_with_ratings_and_stimulation(fitted_study: Path, tmp_path: Path
     assert first["stimulation_frequency_hz"] == "130.0"
     off = rows(motion / "sub-M1_ses-2_task-rigidity_acq-OFF_events.tsv")[0]
     assert (off["trial_type"], off["condition"], off["excluded"]) == ("prbs", "OFF", "false")
+
+
+def test_what_an_operator_wrote_is_no_formula_and_commands_no_terminal(exported, tmp_path) -> None:
+    written = {"=1+1": "'=1+1", "-cough\x1b[31m": "'-cough\\x1b[31m", "\uff1d1": "'\uff1d1"}
+    for number, (reason, cell) in enumerate(written.items()):
+        (first, *others) = exported.about["epochs"]
+        epochs = [{**first, "outcome": "excluded", "reason": reason}, *others]
+        out = tmp_path / str(number)
+        export_sessions(
+            [replace(exported, about={**exported.about, "epochs": epochs})], "bids", out
+        )
+        (events,) = out.glob("sub-*/ses-*/motion/*_events.tsv")
+        assert rows(events)[0]["exclusion_reason"] == cell
+        assert float(rows(events)[0]["onset"]) == first["start_s"]
