@@ -25,6 +25,8 @@ class Console:
 
     Attributes
     ----------
+    place : Path
+        The folder of its protocol.
     sessions : Path
         The folder of its sessions.
     address : str
@@ -32,7 +34,7 @@ class Console:
     """
 
     def __init__(self, folder: Path, *options: str, protocol: str = "") -> None:
-        self.sessions = folder / "sessions"
+        self.place, self.sessions = folder, folder / "sessions"
         arguments = [sys.executable, "-m", "rigidimeter", "console"]
         if protocol:
             (folder / "protocol.toml").write_text(protocol)
@@ -77,14 +79,20 @@ class Console:
         lines = path.read_text().splitlines() if path.exists() else []
         return [json.loads(line) for line in lines]
 
+    def _end(self) -> dict[str, Any] | None:
+        events = self.events()
+        return events[-1] if events and events[-1]["event"] == "session_ended" else None
+
     def ended(self) -> dict[str, Any]:
         """Wait until the newest session is closed; return how."""
+        found: dict[str, Any] = wait_for(self._end)
+        return found
 
-        def end() -> dict[str, Any] | None:
-            events = self.events()
-            return events[-1] if events and events[-1]["event"] == "session_ended" else None
-
-        return wait_for(end)
+    def leads_session(self) -> bool:
+        """Whether a session of this program has not been closed."""
+        if self.process.poll() is not None or not any(self.sessions.glob("*/manifest.json")):
+            return False
+        return self._end() is None
 
 
 def wait_for(what: Callable[[], Any], timeout_s: float = STARTS_S) -> Any:

@@ -26,6 +26,16 @@ def monotonic_origin_s(console):
     return next(e["monotonic_s"] for e in console.events() if e["event"] == "clock_started")
 
 
+@pytest.mark.parametrize("origin", ["http://evil.example", ""])
+def test_a_stranger_opens_no_socket(console, origin):
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    address = console().address.replace("http", "ws") + "live"
+    with pytest.raises(InvalidStatus, match="403"), connect(address, origin=origin or None):
+        pass
+
+
 def test_a_session_from_the_form_to_its_end(console, chromium):
     """Bad fields are said and nothing starts; a second page only looks; a reload pauses."""
     desk = console()
@@ -101,6 +111,28 @@ def test_a_frozen_page_stops_the_arm(console, chromium, lateness):
     assert 0.2 < stopped_s - frozen_s < 0.5 + lateness.worst_s(frozen_s)
 
 
+def test_a_killed_server_stops_the_arm_and_a_new_page_goes_on(console, chromium):
+    desk = console()
+    page = open_page(chromium, desk)
+    start(page)
+    page.wait_for_function(RUNS)
+    desk.process.kill()
+    broken = desk.folder()
+    assert "console no longer answered" in desk.ended()["reason"]
+    ticks = read_samples(broken / "samples.arrows")["tick"]
+    np.testing.assert_array_equal(np.unique(ticks), ticks)
+    page.get_by_text("The connection to the program is lost").wait_for()
+    page.context.close()
+    again = console()
+    page = open_page(chromium, again)
+    page.get_by_role("button", name="After").click()
+    page.get_by_text(f"{broken.name}:").click()
+    page.get_by_role("button", name="Run what is left: 2").click()
+    wait_for(lambda: again.folder() != broken)
+    assert again.ended()["outcome"] == "success"
+    assert read_manifest(again.folder())["continues"]["folder"] == broken.name
+
+
 def test_a_closed_tab_pauses_at_once(console, chromium, lateness):
     desk = console()
     page = open_page(chromium, desk)
@@ -113,33 +145,3 @@ def test_a_closed_tab_pauses_at_once(console, chromium, lateness):
     assert (order["command"], order["state"]) == ("pause_now", "paused")
     paused_s = monotonic_origin_s(desk) + order["time_s"]
     assert paused_s - closed_s < 0.5 + lateness.worst_s(closed_s)
-
-
-def test_a_killed_server_stops_the_arm_and_a_new_page_goes_on(console, chromium):
-    desk = console()
-    page = open_page(chromium, desk)
-    start(page)
-    page.wait_for_function(RUNS)
-    desk.process.kill()
-    assert "console no longer answered" in desk.ended()["reason"]
-    ticks = read_samples(desk.folder() / "samples.arrows")["tick"]
-    np.testing.assert_array_equal(np.unique(ticks), ticks)
-    page.get_by_text("The connection to the program is lost").wait_for()
-    broken, again = desk.folder(), console()
-    page = open_page(chromium, again)
-    page.get_by_role("button", name="After").click()
-    page.get_by_text(f"{broken.name}:").click()
-    page.get_by_role("button", name="Run what is left: 2").click()
-    wait_for(lambda: again.folder() != broken)
-    assert again.ended()["outcome"] == "success"
-    assert read_manifest(again.folder())["continues"]["folder"] == broken.name
-
-
-@pytest.mark.parametrize("origin", ["http://evil.example", ""])
-def test_a_stranger_opens_no_socket(console, origin):
-    from websockets.exceptions import InvalidStatus
-    from websockets.sync.client import connect
-
-    address = console().address.replace("http", "ws") + "live"
-    with pytest.raises(InvalidStatus, match="403"), connect(address, origin=origin or None):
-        pass

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import select
+import signal
 import subprocess
 import sys
 import tempfile
@@ -28,6 +29,12 @@ START_S = 30.0
 
 class RigProcessError(AssertionError):
     """The emulated rig refused a command, died or did not answer."""
+
+
+def _as_in_a_terminal() -> None:
+    """Obey Ctrl-C, which is ignored in a shell's background; give up a real-time priority."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    ordinary_priority()
 
 
 class RigProcess:
@@ -60,7 +67,7 @@ class RigProcess:
             stderr=self._errors,
             bufsize=0,
             start_new_session=True,  # Ctrl-C in a test run is for the test run
-            preexec_fn=ordinary_priority,
+            preexec_fn=_as_in_a_terminal,
         )
         try:
             self.ready = self._answer("start", START_S)

@@ -318,5 +318,8 @@ def compiled_online_step() -> Callable[..., float]:
         import numba
     except ImportError:
         return online_step
-    compiled: Any = numba.njit(online_step)
+    try:  # kept for the next session, which need not wait for the compiler
+        compiled: Any = numba.njit(online_step, cache=True)
+    except RuntimeError:  # there is no folder to keep it in
+        compiled = numba.njit(online_step)
     return compiled  # type: ignore[no-any-return]
