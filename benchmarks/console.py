@@ -1,7 +1,7 @@
 """How soon the operator's page stops the arm, and how far its traces are behind.
 
 `python -m benchmarks.console --clicks 30 --freezes 5` opens the page in Debian's Chromium over the
-real loop on the virtual rig, at 1 kHz with four panes live. Each stop is a session of its own:
+real loop on the virtual rig, at 1 kHz with five panes live. Each stop is a session of its own:
 
 click       from the time stamp of the pointer event in the browser to the first recorded tick with
             the cause and a velocity command of zero
@@ -10,7 +10,13 @@ freeze      from SIGSTOP to all renderers of the browser to the first recorded t
 behind      from the newest sample on the screen to now, looked at by the page
 server      share of one processor that the server's process took while the epoch ran
 
+gaps        ticks that are missing in the records of these sessions
+
 The browser's clock is the wall clock; its difference to CLOCK_MONOTONIC is read beside each click.
+
+`python -m benchmarks.console lateness --runs 5` compares the loop's lateness with the page open and
+without it, and `python -m benchmarks.console memory --minutes 20` follows the memory of server and
+browser; see `benchmarks.console_running`.
 """
 
 from __future__ import annotations
@@ -26,8 +32,9 @@ from typing import Any
 import numpy as np
 import psutil
 from playwright.sync_api import Browser, Page
-from tests.console.opened import Console, browser, open_page, start, wait_for
+from tests.console.opened import Console, browser, open_page
 
+from benchmarks.console_running import lateness, memory, missing_ticks, renderers, renew
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_reading import read_samples
 
@@ -41,16 +48,11 @@ zeroing.duration_s = 0.2
 NOTE_CLICK = """addEventListener("pointerdown", (event) => {
   window.clickedS = (performance.timeOrigin + event.timeStamp) / 1000; }, true)"""
 BEHIND = "[(performance.timeOrigin + performance.now()) / 1000, window.rigDrawnS]"
-RUNS = "document.getElementById('state').textContent === 'epoch runs'"
 
 
 def begin(page: Page, measured: dict[str, list[float]], console: Console) -> float:
     """Start a session; return when it began on CLOCK_MONOTONIC, 2 s into its epoch."""
-    page.locator(".tab[data-view=before]").click()
-    before = set(console.sessions.glob("*/manifest.json"))
-    start(page)
-    wait_for(lambda: set(console.sessions.glob("*/manifest.json")) - before)
-    page.wait_for_function(RUNS)
+    renew(page, console)
     started = next(e for e in console.events() if e["event"] == "clock_started")
     origin_s = float(started["monotonic_s"])
     server = psutil.Process(console.process.pid)
@@ -68,11 +70,14 @@ def monotonic_s(wall_s: float) -> float:
     return wall_s + time.monotonic() - time.time()
 
 
-def stopped_s(console: Console, cause: Cause) -> tuple[float, float]:
+def stopped_s(
+    console: Console, cause: Cause, measured: dict[str, list[float]]
+) -> tuple[float, float]:
     """Return the session times of the first tick with the cause, and with a command of zero."""
     reason = console.ended()["reason"]
     assert cause.sentence in reason, reason
     samples: dict[str, Any] = read_samples(console.folder() / "samples.arrows")
+    measured["gaps"].append(float(missing_ticks(samples["tick"])))
     latched = samples["cause"] == int(cause)
     at_rest = latched & (samples["velocity_command_rad_s"] == 0.0)
     return float(samples["time_s"][latched][0]), float(samples["time_s"][at_rest][0])
@@ -84,7 +89,7 @@ def click(page: Page, console: Console, measured: dict[str, list[float]]) -> Non
     page.evaluate(NOTE_CLICK)
     page.locator("#emergency").click()
     clicked_s = monotonic_s(page.evaluate("window.clickedS"))
-    _, zero_s = stopped_s(console, Cause.EMERGENCY_STOP)
+    _, zero_s = stopped_s(console, Cause.EMERGENCY_STOP, measured)
     measured["click"].append(origin_s + zero_s - clicked_s)
     page.wait_for_function("document.body.dataset.view === 'after'")
 
@@ -92,13 +97,12 @@ def click(page: Page, console: Console, measured: dict[str, list[float]]) -> Non
 def freeze(opened: Browser, page: Page, console: Console, measured: dict[str, list[float]]) -> None:
     """Stop the renderer once."""
     origin_s = begin(page, measured, console)
-    found = opened.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
-    pids = [one["id"] for one in found["processInfo"] if one["type"] == "renderer"]
+    pids = renderers(opened)
     frozen_s = time.monotonic()
     for pid in pids:
         os.kill(pid, signal.SIGSTOP)
     try:
-        named_s, zero_s = stopped_s(console, Cause.CONSOLE_LOST)
+        named_s, zero_s = stopped_s(console, Cause.CONSOLE_LOST, measured)
     finally:
         for pid in pids:
             os.kill(pid, signal.SIGCONT)
@@ -112,35 +116,51 @@ def row(name: str, values: list[float]) -> str:
     if not values:
         return f"| {name} | – | – | – | 0 |"
     shown = (np.median(values), np.percentile(values, 95), max(values))
-    if name == "server":
+    if name == "gaps":
+        cells = [f"{value:.0f}" for value in shown]
+    elif name == "server":
         cells = [f"{100 * value:.0f} %" for value in shown]
     else:
         cells = [f"{1e3 * value:.0f} ms" for value in shown]
     return f"| {name} | {' | '.join(cells)} | {len(values)} |"
 
 
-def main() -> None:
-    """Measure and print a table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--clicks", type=int, default=30)
-    parser.add_argument("--freezes", type=int, default=5)
-    asked = parser.parse_args()
-    names = ("click", "frozen, cause", "frozen, zero", "behind", "server")
+def stops(clicks: int, freezes: int) -> None:
+    """Measure how soon the page stops the arm, and print a table."""
+    names = ("click", "frozen, cause", "frozen, zero", "behind", "server", "gaps")
     measured: dict[str, list[float]] = {name: [] for name in names}
     with tempfile.TemporaryDirectory() as name:
         console = Console(Path(name), protocol=PROTOCOL)
         try:
             with browser() as opened:
                 page = open_page(opened, console)
-                for _ in range(asked.clicks):
+                for _ in range(clicks):
                     click(page, console, measured)
-                for _ in range(asked.freezes):
+                for _ in range(freezes):
                     freeze(opened, page, console, measured)
         finally:  # also of a study that was ended early
             console.close()
             print("| | median | 95 % | largest | n |\n| --- | --- | --- | --- | --- |")
             for what, values in measured.items():
                 print(row(what, values))
+
+
+def main() -> None:
+    """Measure what is asked for and print it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("mode", nargs="?", choices=("stops", "lateness", "memory"), default="stops")
+    parser.add_argument("--clicks", type=int, default=30)
+    parser.add_argument("--freezes", type=int, default=5)
+    parser.add_argument("--runs", type=int, default=5, help="pairs of sessions of `lateness`")
+    parser.add_argument("--seconds", type=float, default=20.0, help="of each of them")
+    parser.add_argument("--minutes", type=float, default=20.0, help="of `memory`")
+    asked = parser.parse_args()
+    if asked.mode == "stops":
+        stops(asked.clicks, asked.freezes)
+    elif asked.mode == "lateness":
+        lateness(asked.runs, asked.seconds)
+    else:
+        memory(asked.minutes)
 
 
 if __name__ == "__main__":

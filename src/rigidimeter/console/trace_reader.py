@@ -7,15 +7,19 @@ learns how many. Least and largest, so that no peak is lost however few points a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.acquisition.processes.ring import ROW, SampleReader, SampleRing
+from rigidimeter.acquisition.tick import REST
+from rigidimeter.console.band_torque import BandTorque
 
 TRACES = ("torque_nm", "angle_rad", "velocity_command_rad_s", "perturbation_nm")
+AT_ONCE = ("angle_rad", "torque_nm", "measured_nm", "modelled_nm")
+"""What is drawn one over the other, so of each piece the values of one sample."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,9 @@ class Traces:
         The epoch of its last sample, -1 in a rest.
     missed : int
         Samples before these that could not be read in time.
+    first : dict of str to float array, shape (n,)
+        Of its first sample: `AT_ONCE`, NaN in a rest. The last two are torques in the band of the
+        live estimate; empty without a `BandTorque`.
     """
 
     time_s: NDArray[np.float64]
@@ -39,6 +46,7 @@ class Traces:
     high: dict[str, NDArray[np.float64]]
     epoch: NDArray[np.int64]
     missed: int
+    first: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
 class TraceReader:
@@ -54,6 +62,7 @@ class TraceReader:
     back_s : float
         So much of what is already in the ring comes with the first call.
     columns : tuple of str
+    band : BandTorque, optional
     """
 
     def __init__(
@@ -63,11 +72,12 @@ class TraceReader:
         points_per_s: float = 250.0,
         back_s: float = 0.0,
         columns: tuple[str, ...] = TRACES,
+        band: BandTorque | None = None,
     ) -> None:
         first = max(0, ring.written - round(back_s * rate_hz), ring.written - ring.capacity + 1)
         self._reader = SampleReader(ring, first)
         self._ticks = max(1, math.ceil(rate_hz / points_per_s))
-        self._columns = columns
+        self._columns, self._band, self._gap = columns, band, 0
         self._rest: NDArray[np.void] = np.empty(0, ROW)
 
     def read(self) -> Traces:
@@ -82,7 +92,17 @@ class TraceReader:
             starts = starts[:-1]
         else:
             self._rest = rows[:0]
-        return traces_of(rows, starts, self._columns, missed)
+        traces = traces_of(rows, starts, self._columns, missed)
+        if self._band is None:
+            return traces
+        self._gap += missed
+        measured_nm, modelled_nm = self._band.take(rows, self._gap)
+        self._gap = 0 if rows.size else self._gap
+        in_epoch = np.where(rows["epoch"] == REST, np.nan, 1.0)
+        angle_rad, torque_nm = rows["angle_rad"] * in_epoch, rows["torque_nm"] * in_epoch
+        values = (angle_rad, torque_nm, measured_nm, modelled_nm)
+        first = {name: column[starts] for name, column in zip(AT_ONCE, values, strict=True)}
+        return replace(traces, first=first)
 
 
 def traces_of(

@@ -42,7 +42,8 @@ _INNOVATION = 34
 _GAIN = 35
 _POWER = 36  # of the velocity, lately
 _RESTING = 37
-STATE_SIZE = 38
+_BAND_TORQUE = 38
+STATE_SIZE = 39
 """A state is this many numbers, zero at first: a list, or an array for the compiled step."""
 
 UNDETERMINED = 1e-9
@@ -214,7 +215,7 @@ def online_step(
 
     J, B, K = state[_VALUES], state[_VALUES + 1], state[_VALUES + 2]
     innovation = m - J * x0 - B * x1 - K * x2
-    state[_INNOVATION] = innovation
+    state[_BAND_TORQUE], state[_INNOVATION] = m, innovation
     power = power_forgetting * state[_POWER] + (1.0 - power_forgetting) * x1 * x1
     state[_POWER] = power
     r01, r11, weight = state[_R + 1], state[_R + 3], state[_WEIGHT]
@@ -293,6 +294,15 @@ def online_reading(
         memory_s=float(weight) / rate_hz,
         resting=state[_RESTING] > 0.0,
     )  # fmt: skip
+
+
+def online_torque(state: Sequence[float]) -> tuple[float, float]:
+    """Return the torque of the last sample in the band in N·m: as measured, and as modelled.
+
+    The model is J θ″ + B θ′ + K θ with the parameters as they were before this sample.
+    """
+    measured_nm = state[_BAND_TORQUE]
+    return measured_nm, measured_nm - state[_INNOVATION]
 
 
 def _root_inverse(state: MutableSequence[float]) -> tuple[float, float, float]:

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from rigidimeter.acquisition.processes.ring import SampleRing
-from rigidimeter.console.trace_reader import TraceReader
+from rigidimeter.console.band_torque import BandTorque
+from rigidimeter.console.trace_reader import AT_ONCE, TraceReader
 from rigidimeter.recording.sample_log import Sample
+from rigidimeter.settings import OnlineSettings
 
 RATE_HZ = 1000.0
 
@@ -96,3 +98,25 @@ def test_the_past_that_is_still_there_comes_with_the_first_call(ring):
     assert traces.time_s[[0, -1]].tolist() == [0.06, 0.096]
     assert traces.missed == 0
     assert TraceReader(ring, RATE_HZ, back_s=60.0).read().time_s[0] == 0.0
+
+
+def test_what_is_drawn_one_over_the_other_is_of_one_sample(ring):
+    band = BandTorque(OnlineSettings(), RATE_HZ)
+    reader = TraceReader(ring, RATE_HZ, band=band)
+    push(ring, 0, 10, lambda k: (-1.0) ** k * k)
+    first = reader.read().first
+    assert set(first) == set(AT_ONCE)
+    assert first["torque_nm"].tolist() == [0.0, 4.0]
+    assert np.isfinite(first["measured_nm"]).all()
+    assert band.since_s == 0.0
+
+
+def test_after_a_gap_the_filters_begin_anew(ring):
+    """Also where the first samples after it wait for the rest of their piece."""
+    band = BandTorque(OnlineSettings(), RATE_HZ)
+    reader = TraceReader(ring, RATE_HZ, band=band)
+    push(ring, 0, 8)
+    reader.read()
+    push(ring, 8, 404)
+    assert reader.read().missed > 0
+    assert band.since_s > 0.2

@@ -21,7 +21,7 @@ from rigidimeter.reporting.sections.impedance import (
     model_nm_rad,
     same_lines,
 )
-from rigidimeter.reporting.sections.unexplained_torque import density, voluntary_spectrum
+from rigidimeter.reporting.sections.unexplained_torque import voluntary_spectrum
 from rigidimeter.reporting.style import condition_colours, svg_text
 from rigidimeter.settings import Settings
 from rigidimeter.study import StudyResult
@@ -131,13 +131,6 @@ def test_the_figure_is_made_of_epochs_that_repeat(
     (again,) = impedance_figures(periodic_study)
     assert svg_text(figure.draw()) == svg_text(again.draw())
     assert impedance_figures(study) == []  # random levels do not repeat
-
-
-def test_a_density_holds_the_variance_and_a_line_peaks_where_it_is() -> None:
-    time_s = np.arange(5000) / 250
-    frequency_hz, power = density(0.3 * np.sin(2 * np.pi * 5 * time_s), 250.0)
-    assert frequency_hz[np.argmax(power)] == pytest.approx(5.0)
-    assert np.sum(power) * frequency_hz[1] == pytest.approx(0.3**2 / 2, rel=0.01)
 
 
 def test_each_epoch_is_a_line_of_the_spectrum_and_the_mean_is_thick() -> None:

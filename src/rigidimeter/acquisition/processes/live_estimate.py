@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import os
 import time
+from collections import deque
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,8 @@ from rigidimeter.estimation.online import (
     compiled_online_step,
     online_design,
     online_reading,
+    online_step,
+    online_torque,
 )
 from rigidimeter.settings import OnlineSettings
 
@@ -40,45 +44,65 @@ class Estimator:
     ----------
     settings : OnlineSettings
     rate_hz : float
+    compiled : bool
+        Whether to compile the step, which takes seconds and is then forty times as fast.
     """
 
-    def __init__(self, settings: OnlineSettings, rate_hz: float) -> None:
+    def __init__(self, settings: OnlineSettings, rate_hz: float, *, compiled: bool = True) -> None:
         self._rate_hz = rate_hz
         self._design = online_design(settings, rate_hz)
-        self._values = np.array(self._design)
-        self._step = compiled_online_step()
-        self._step(self._values, np.zeros(STATE_SIZE), 0.0, 0.0, 0.0)  # compile now, not later
-        self._state: Any = np.zeros(STATE_SIZE)
+        self._compiled = compiled
+        self._values: Any = self._design
+        self._step: Callable[..., float] = online_step
+        if compiled:
+            self._values, self._step = np.array(self._design), compiled_online_step()
+            self._step(self._values, self._at_rest(), 0.0, 0.0, 0.0)  # compile now, not later
+        self._state = self._at_rest()
         self._missed = 0
         self._tick, self._epoch = -1, REST
-        self._since_s = self._time_s = 0.0
+        self.since_s = self._time_s = 0.0
         self._last: NDArray[np.void] = np.empty(0, ROW)
 
     def take(self, rows: NDArray[np.void], missed: int) -> LiveEstimate:
-        """Take samples; after a gap, and with a new epoch, filters and memory begin anew."""
-        begins = np.flatnonzero(np.diff(rows["epoch"])) + 1
-        for k, part in enumerate(np.split(rows, begins)):
-            epoch, gap = int(part["epoch"][0]), missed and k == 0
-            if gap:
-                self._missed += missed
-            if epoch == REST:
-                continue
-            if gap or epoch != self._epoch:
-                self._epoch, self._since_s = epoch, float(part["time_s"][0])
-                self._state, self._last = np.zeros(STATE_SIZE), part[:0]
-            self._take(part)
+        """Take samples; return what is known after them."""
+        deque(self.steps(rows, missed), maxlen=0)
         found = online_reading(self._design, self._state, self._rate_hz)
         return LiveEstimate(
             tick=self._tick,
             resting=int(found.resting),
             missed_samples=self._missed,
             epoch=self._epoch,
-            since_s=self._since_s,
+            since_s=self.since_s,
             time_s=self._time_s,
             **{name: getattr(found, name) for name in LiveEstimate._fields[6:]},
         )
 
-    def _take(self, rows: NDArray[np.void]) -> None:
+    def steps(self, rows: NDArray[np.void], missed: int) -> Iterator[int]:
+        """Take samples, and give the tick of each once it is taken.
+
+        After a gap, and with a new epoch, filters and memory begin anew.
+        """
+        begins = np.flatnonzero(np.diff(rows["epoch"])) + 1
+        for k, part in enumerate(np.split(rows, begins) if rows.size else ()):
+            epoch, gap = int(part["epoch"][0]), missed and k == 0
+            if gap:
+                self._missed += missed
+            if epoch == REST:
+                continue
+            if gap or epoch != self._epoch:
+                self._epoch, self.since_s = epoch, float(part["time_s"][0])
+                self._state, self._last = self._at_rest(), part[:0]
+            yield from self._take(part)
+
+    def torque(self) -> tuple[float, float]:
+        """Return the torque of the last sample in the band in N·m: measured, and modelled."""
+        return online_torque(self._state)
+
+    def _at_rest(self) -> Any:
+        state = [0.0] * STATE_SIZE
+        return np.array(state) if self._compiled else state
+
+    def _take(self, rows: NDArray[np.void]) -> Iterator[int]:
         """Take samples of one epoch; ticks that the loop left out lie on straight lines.
 
         Passed over they would make the motion shorter, and so faster, than it was.
@@ -89,10 +113,11 @@ class Estimator:
             rows, ticks = np.concatenate((self._last, rows)), np.append(self._last["tick"], ticks)
         every = np.arange(ticks[0] + self._last.size, ticks[-1] + 1)
         columns = [np.interp(every, ticks, rows[name]).tolist() for name in _TAKEN]
-        for torque_nm, angle_rad, velocity_rad_s in zip(*columns, strict=True):
-            step(values, state, torque_nm, angle_rad, velocity_rad_s)
         self._last = rows[-1:].copy()
         self._tick, self._time_s = int(ticks[-1]), float(rows["time_s"][-1])
+        for tick, *sample in zip(every.tolist(), *columns, strict=True):
+            step(values, state, *sample)
+            yield tick
 
 
 def estimator_main(

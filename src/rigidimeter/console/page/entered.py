@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 from rigidimeter.errors import UserError
@@ -35,8 +36,11 @@ def number(text: str, what: str) -> float:
         )
     plain = plain.replace(",", ".") if comma is not None else plain
     if _PLAIN.fullmatch(plain) is None:
-        raise UserError(f"{what}: {text.strip()!r} is no number; write one like 1.5 or 1,5")
-    return float(plain.replace("\u2212", "-"))
+        raise UserError(f"{what}: {text.strip()[:60]!r} is no number; write one like 1.5 or 1,5")
+    value = float(plain.replace("\u2212", "-"))
+    if not math.isfinite(value):
+        raise UserError(f"{what}: {text.strip()[:60]} is too large; at most 1e308 is possible")
+    return value
 
 
 def whole_number(text: str, what: str) -> int:

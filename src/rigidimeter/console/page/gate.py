@@ -3,13 +3,18 @@
 A browser on the operator's computer also shows pages of strangers. Such a page can send requests to
 127.0.0.1, and a name of its own can be made to point there (DNS rebinding). So a request must name
 this computer by an address or one of its own names, and one that acts, or opens a socket, must come
-from a page of this server. On any other address than the loopback there is a token beside that.
+from a page of this server. What a browser loads for a page of a stranger, a frame or an image, is
+refused too: a page in a frame could be clicked on unseen, and to make many pages takes time from
+the beats. On any other address than the loopback there is a token beside that.
+
+Sockets that say too much are closed: what they say is heard in the thread that hears the beats.
 """
 
 from __future__ import annotations
 
 import hmac
 import ipaddress
+import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, MutableMapping
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
@@ -18,6 +23,20 @@ from urllib.parse import parse_qs, urlsplit
 COOKIE = "rigidimeter_token"
 LONGEST_BODY = 200_000
 """Bytes of a request; the largest that the page sends is a protocol."""
+
+MOST_MESSAGES_S = 200.0
+"""Messages a second on a socket, on average over `MOST_MESSAGES` of them; a page sends some 20."""
+
+MOST_MESSAGES = 400
+
+SENT_WITH_ALL = (
+    (b"content-security-policy", b"frame-ancestors 'none'"),
+    (b"x-frame-options", b"DENY"),
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+)
+"""Headers of every answer: no frames of others, no guessed types, no address to other sites."""
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -72,6 +91,23 @@ def same_origin(origin: str, host: str) -> bool:
     return scheme in ("http", "https") and bool(host) and rest.lower() == host.lower()
 
 
+def for_another_page(headers: Mapping[str, str]) -> bool:
+    """Whether a browser says that it loads this for a page of another server.
+
+    To follow a link to here is not that.
+
+    Examples
+    --------
+    >>> for_another_page({"sec-fetch-site": "cross-site", "sec-fetch-dest": "iframe"})
+    True
+    >>> for_another_page({"sec-fetch-site": "same-origin"}), for_another_page({})
+    (False, False)
+    """
+    if headers.get("sec-fetch-site", "none") in ("none", "same-origin"):
+        return False
+    return headers.get("sec-fetch-dest") != "document"
+
+
 def same_token(given: str, token: str) -> bool:
     """Whether two tokens are equal, in a time that does not tell where they differ."""
     return hmac.compare_digest(given.encode(), token.encode())
@@ -97,6 +133,7 @@ class Gate:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
+        send = _with_headers(send)
         headers = {
             name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]
         }
@@ -106,6 +143,8 @@ class Gate:
         why = self._refusal(scope, headers)
         if why:
             await _refuse(scope, receive, send, why)
+        elif scope["type"] == "websocket":
+            await self._app(scope, slow_enough(receive, send), send)
         else:
             await self._app(scope, receive, send)
 
@@ -115,12 +154,13 @@ class Gate:
         if not host_allowed(host, self._names):
             return "this server is not known by that name; open the address that it printed"
         acts = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
-        if (acts or origin) and not same_origin(origin, host):
+        if ((acts or origin) and not same_origin(origin, host)) or for_another_page(headers):
             return "requests of other pages are refused"
         if self._token and not same_token(_cookie(headers.get("cookie", "")), self._token):
             return "the token is missing or wrong; open the address that the server printed"
         length = headers.get("content-length", "0")
-        if not length.isdecimal() or int(length) > LONGEST_BODY or "transfer-encoding" in headers:
+        long = not length.isdecimal() or len(length) > 9 or int(length) > LONGEST_BODY
+        if long or "transfer-encoding" in headers:
             return f"a request may have {LONGEST_BODY} bytes"
         return ""
 
@@ -132,6 +172,37 @@ class Gate:
             headers.append((b"set-cookie", cookie.encode()))
         await send({"type": "http.response.start", "status": 303, "headers": headers})
         await send({"type": "http.response.body", "body": b""})
+
+
+def _with_headers(send: Send) -> Send:
+    async def sent(message: MutableMapping[str, Any]) -> None:
+        if message["type"] == "http.response.start":
+            message = {**message, "headers": [*message.get("headers", ()), *SENT_WITH_ALL]}
+        await send(message)
+
+    return sent
+
+
+def slow_enough(
+    receive: Receive, send: Send, now_s: Callable[[], float] = time.monotonic
+) -> Receive:
+    """Return what receives a socket's messages, until they come too fast; then it is closed."""
+    left, before_s = float(MOST_MESSAGES), now_s()
+
+    async def received() -> MutableMapping[str, Any]:
+        nonlocal left, before_s
+        message = await receive()
+        if message["type"] != "websocket.receive":
+            return message
+        passed_s, before_s = now_s() - before_s, now_s()
+        left = min(left + MOST_MESSAGES_S * passed_s, MOST_MESSAGES) - 1.0
+        if left >= 0.0:
+            return message
+        why = f"a page may send {MOST_MESSAGES_S:g} messages a second"
+        await send({"type": "websocket.close", "code": 1008, "reason": why})
+        return {"type": "websocket.disconnect", "code": 1008}
+
+    return received
 
 
 def _token_in_query(scope: Scope) -> str:

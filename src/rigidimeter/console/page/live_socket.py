@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import time
 from collections import deque
 from contextlib import suppress
@@ -19,11 +20,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.status_values import Condition, Flag, Role
 from rigidimeter.acquisition.run_states import Command, Order
+from rigidimeter.console.band_torque import BandTorque
 from rigidimeter.console.observer import Observer
 from rigidimeter.console.orders import save_to
 from rigidimeter.console.page.desk import Desk, RunningSession
 from rigidimeter.console.page.page_messages import Message, RefusedMessage, parse_message
-from rigidimeter.console.page.session_state import points, session_state
+from rigidimeter.console.page.session_state import is_known, points, session_state
 from rigidimeter.console.trace_reader import TraceReader
 from rigidimeter.documents import json_line
 
@@ -67,16 +69,23 @@ class _Attached:
     def __init__(self, running: RunningSession) -> None:
         self.running = running
         self.memory = SessionMemory.attach(running.names)
-        rate_hz = running.plan.settings.rig.tick_rate_hz
-        self._traces = TraceReader(self.memory.samples, rate_hz, POINTS_PER_S)
+        settings = running.plan.settings
+        rate_hz = settings.rig.tick_rate_hz
+        self._band = BandTorque(settings.online, rate_hz)
+        self._traces = TraceReader(self.memory.samples, rate_hz, POINTS_PER_S, band=self._band)
+        self._known_since_s = math.nan
         self._observer = Observer(running.plan, self.memory)
         self.notes: deque[str] = deque()
 
     def samples(self) -> bytes:
-        return points(self._traces.read())
+        traces = self._traces.read()
+        return points(traces, modelled=self._band.since_s == self._known_since_s)
 
     def state(self) -> dict[str, Any]:
+        live = self.memory.status.live()
         facts = self._observer.look()
+        # Of the epoch in which J, B and K are known, and of no other.
+        self._known_since_s = live.since_s if live is not None and is_known(facts) else math.nan
         full = self.memory.status.condition(Role.RECORDER) is Condition.TROUBLE
         state = session_state(facts, self._observer.progress)
         return state | {"number": self.running.number, "save": full}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -114,7 +113,7 @@ def _note(said: dict[str, Any]) -> dict[str, Any]:
             raise RefusedMessage("a rating needs the number of its epoch")
         if isinstance(score, bool) or not isinstance(score, int | float):
             raise RefusedMessage("a rating needs a score")
-        if not math.isfinite(score) or abs(score) > 1000:
+        if not abs(score) <= 1000:
             raise RefusedMessage("a score must be a number between -1000 and 1000")
         if not note["by"]:
             raise RefusedMessage("a rating needs the examiner's name or code")

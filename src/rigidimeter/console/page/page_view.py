@@ -36,6 +36,7 @@ def show_page(desk: Desk, work: Work, secret: str) -> None:
         f'<link rel="stylesheet" href="/vendored/uPlot.min.css?{__version__}">'
         f'<link rel="stylesheet" href="/assets/page.css?{__version__}">'
         f'<script src="/vendored/uPlot.iife.min.js?{__version__}"></script>'
+        f'<script src="/assets/traces.js?{__version__}" defer></script>'
         f'<script src="/assets/page.js?{__version__}" defer></script>'
     )
     ui.html(_during(), sanitize=False).classes("rig")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 import secrets
 import socket
 import threading
@@ -32,6 +33,8 @@ ASSETS = Path(__file__).parent / "assets"
 LARGEST_MESSAGE = 65_536
 START_S = 30.0
 
+_TOKEN = re.compile(r"[A-Za-z0-9_-]{16,200}")
+
 
 class PageServer:
     """Serves the page until the program ends.
@@ -46,9 +49,19 @@ class PageServer:
         0 for any that is free.
     token : str
         Of an address that is not the loopback; made if empty and needed.
+
+    Raises
+    ------
+    UserError
+        If the token is too short, or the address cannot be served.
     """
 
     def __init__(self, desk: Desk, work: Work, host: str, port: int, token: str = "") -> None:
+        if token and _TOKEN.fullmatch(token) is None:
+            raise UserError(
+                f"--token: {len(token)} characters, which can be guessed or do not fit into an "
+                "address; use 16 or more of A-Z, a-z, digits, - and _"
+            )
         self._token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
         self._desk, self._work = desk, work
         self._socket = _listening(host, port)

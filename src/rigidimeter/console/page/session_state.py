@@ -13,11 +13,11 @@ from rigidimeter.console.lamps import Level
 from rigidimeter.console.limit_distances import LimitDistance
 from rigidimeter.console.page.button_words import in_buttons
 from rigidimeter.console.session_progress import Progress
-from rigidimeter.console.trace_reader import TRACES, Traces
+from rigidimeter.console.trace_reader import AT_ONCE, TRACES, Traces
 from rigidimeter.units import deg_from_rad
 
 LEVELS = {Level.UNKNOWN: "off", Level.GOOD: "ok", Level.WATCH: "warn", Level.BAD: "bad"}
-"""What the page calls the levels of a lamp; each has a sign and a colour there."""
+"""What the page calls the levels of a lamp; each has a colour there."""
 
 ORDERS = {
     State.IDLE: ("abort",),
@@ -38,6 +38,7 @@ def session_state(facts: Facts, progress: Progress) -> dict[str, Any]:
     again = ", again" if epoch is not None and epoch.again else ""
     place = f"{epoch.place} of {epoch.of}{again}" if epoch is not None else "all done"
     rated = progress.ended[-1] if progress.ended and not progress.running else None
+    drawn = progress.current or (progress.to_run[0] if progress.to_run else None)
     return {
         "state": facts.state_words,
         "condition": epoch.condition if epoch is not None else "–",
@@ -51,9 +52,15 @@ def session_state(facts: Facts, progress: Progress) -> dict[str, Any]:
         ],
         "live": [value.text for value in facts.live],
         "live_of": facts.live_words,
+        "task": drawn.task if drawn is not None else "",
+        "modelled": is_known(facts),
         "limits": [_limit(one) for one in facts.distances if math.isfinite(one.part)],
         "lamps": [
-            {"level": LEVELS[lamp.level], "text": f"{lamp.name}: {in_buttons(lamp.words)}"}
+            {
+                "level": LEVELS[lamp.level],
+                "sign": lamp.level.sign,
+                "text": f"{lamp.name}: {in_buttons(lamp.words)}",
+            }
             for lamp in facts.lamps
         ],
         "alert": in_buttons(facts.stop_words),
@@ -76,20 +83,30 @@ def duration(seconds: float) -> str:
     return f"{whole} s" if whole < 60 else f"{whole // 60}:{whole % 60:02d} min"
 
 
-def points(traces: Traces) -> bytes:
-    """Return samples as little-endian float64: of each piece of time two points.
+def is_known(facts: Facts) -> bool:
+    """Whether J, B and K are shown, all of them, and so what they say of the torque."""
+    return bool(facts.live) and all(value.settled for value in facts.live)
 
-    A point is a time in s and a value of each trace, angles in degrees: first the least values,
-    then the largest.
+
+def points(traces: Traces, *, modelled: bool) -> bytes:
+    """Return samples as little-endian float64, 13 numbers for each piece of time.
+
+    The time in s; the least values of the traces, then the largest; then those of the piece's
+    first sample: angle, torque, and the torque in the band of the live estimate, measured and
+    modelled. Angles are in degrees. The modelled torque is NaN unless `modelled`.
     """
-    n = traces.time_s.size
-    made = np.empty((n, 2, 1 + len(TRACES)))
-    made[:, 0, 0] = made[:, 1, 0] = traces.time_s
-    for place, name in enumerate(TRACES, start=1):
-        factor = deg_from_rad(1.0) if name in _DEGREES else 1.0
-        made[:, 0, place] = factor * traces.low[name]
-        made[:, 1, place] = factor * traces.high[name]
-    return made.astype("<f8").tobytes()
+    columns = [traces.time_s]
+    for values, names in (
+        (traces.low, TRACES),
+        (traces.high, TRACES),
+        (traces.first, AT_ONCE),
+    ):
+        columns += [
+            (deg_from_rad(1.0) if name in _DEGREES else 1.0) * values[name] for name in names
+        ]
+    if not modelled:
+        columns[-1] = np.full(traces.time_s.size, np.nan)
+    return np.column_stack(columns).astype("<f8").tobytes()
 
 
 def _count(count: ConditionCount) -> str:
@@ -100,6 +117,7 @@ def _count(count: ConditionCount) -> str:
 def _limit(one: LimitDistance) -> dict[str, Any]:
     return {
         "name": one.name,
+        "sign": (Level.WATCH if one.near else Level.GOOD).sign,
         "text": f"{one.value:.1f} of {one.limit:g} {one.unit}",
         "part": round(one.part, 3),
         "near": one.near,

@@ -10,10 +10,10 @@ from markupsafe import Markup
 from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
-from scipy import signal
 
 from rigidimeter.estimation.bandlimited import bandlimited_signals
 from rigidimeter.estimation.diagnostics import reconstructed_torque_nm
+from rigidimeter.estimation.spectrum import SEGMENT_S, density
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
 from rigidimeter.reporting.method_words import is_least_squares
 from rigidimeter.reporting.numbers import condition_name, number
@@ -22,9 +22,6 @@ from rigidimeter.reporting.style import condition_colours, listed, plain_ticks, 
 from rigidimeter.study import StudyResult
 
 Array = NDArray[np.float64]
-
-SEGMENT_S = 5.0
-"""Of Welch's method: lines 0.2 Hz apart, which separates a tremor from slower movements."""
 
 _DOWN_TO = 1e-6
 """Densities this far below the largest are drawn at the foot of the axes."""
@@ -80,13 +77,6 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             band_hz,
         ),
     )
-
-
-def density(torque_nm: Array, rate_hz: float) -> tuple[Array, Array]:
-    """Return frequencies in Hz and the one-sided power spectral density in (N·m)²/Hz."""
-    segment = min(torque_nm.size, max(round(SEGMENT_S * rate_hz), 8))
-    frequency_hz, power = signal.welch(torque_nm, rate_hz, nperseg=segment)
-    return frequency_hz, power
 
 
 def voluntary_spectrum(

@@ -39,6 +39,13 @@ def test_what_is_no_number_is_refused(text):
         number(text, "amplitude")
 
 
+@pytest.mark.parametrize("read", [number, whole_number])
+@pytest.mark.parametrize("text", ["1e999", "-1e400", "9" * 400])
+def test_what_no_number_of_the_computer_holds_is_refused(read, text):
+    with pytest.raises(UserError, match="too large"):
+        read(text, "amplitude")
+
+
 def test_epochs_are_whole():
     assert whole_number("4", "epochs") == 4
     with pytest.raises(UserError, match="no whole number"):

@@ -1,6 +1,7 @@
 """Who gets past the gate: names, origins, tokens, sizes."""
 
 import asyncio
+import itertools
 
 import pytest
 
@@ -11,6 +12,7 @@ from rigidimeter.console.page.gate import (
     host_allowed,
     is_loopback,
     same_origin,
+    slow_enough,
 )
 
 OWN = {"host": "127.0.0.1:8765", "origin": "http://127.0.0.1:8765"}
@@ -106,7 +108,7 @@ def test_the_token_leaves_the_address_for_a_cookie():
 
 
 def test_large_requests_are_refused():
-    for length in (str(LONGEST_BODY + 1), "-1", "many"):
+    for length in (str(LONGEST_BODY + 1), "-1", "many", "9" * 5000):
         assert ask(method="POST", **OWN, content_length=length)[0] == 403
     assert ask(method="POST", **OWN, transfer_encoding="chunked")[0] == 403
 
@@ -117,3 +119,55 @@ def test_large_requests_are_refused():
 )
 def test_any_address_but_the_loopback_needs_a_token(host, loopback):
     assert is_loopback(host) == loopback
+
+
+@pytest.mark.parametrize(
+    ("site", "dest", "passes"),
+    [
+        ("none", "document", True),
+        ("same-origin", "script", True),
+        ("cross-site", "document", True),  # a link was followed
+        ("cross-site", "iframe", False),
+        ("cross-site", "image", False),
+        ("same-site", "empty", False),  # a server at another port
+    ],
+)
+def test_nothing_is_loaded_for_pages_of_others(site, dest, passes):
+    found, _ = ask(host=OWN["host"], sec_fetch_site=site, sec_fetch_dest=dest)
+    assert (found == "passed") == passes
+
+
+def socket_of(messages, now_s):
+    """Return what the application receives of a socket, and what is sent to it."""
+    heard, sent = [], []
+
+    async def app(scope, receive, send):
+        while (message := await receive())["type"] == "websocket.receive":
+            heard.append(message["text"])
+
+    async def receive():
+        return {"type": "websocket.receive", "text": next(messages)}
+
+    async def send(message):
+        sent.append(message)
+
+    async def one(scope, receive, send):
+        await app(scope, slow_enough(receive, send, now_s), send)
+
+    asyncio.run(one({}, receive, send))
+    return heard, sent
+
+
+def test_a_socket_that_says_too_much_is_closed():
+    """400 at once, then 200 a second: of 10,000 a second only the first 408 are heard."""
+    ticks = itertools.count()
+    heard, sent = socket_of(("x" for _ in itertools.count()), lambda: next(ticks) / 2 / 10_000)
+    assert 400 <= len(heard) <= 412
+    assert [(one["type"], one["code"]) for one in sent] == [("websocket.close", 1008)]
+
+
+def test_a_page_that_beats_is_heard_for_ever():
+    ticks = itertools.count()
+    words = iter(["beat"] * 20_000)
+    with pytest.raises(RuntimeError, match="StopIteration"):
+        socket_of(words, lambda: next(ticks) / 2 / 25)

@@ -48,7 +48,7 @@ def test_a_note_of_another_form_is_refused(change):
 
 
 def test_scores_that_are_no_number_are_refused():
-    for score in ("NaN", "Infinity", "-Infinity"):
+    for score in ("NaN", "Infinity", "-Infinity", "9" * 400, "1e999"):
         with pytest.raises(RefusedMessage):
             parse_message(json.dumps(RATING).replace("1.5", score))
 

@@ -9,7 +9,7 @@ from rigidimeter.console.page.recorded_traces import epoch_traces
 from rigidimeter.console.page.sessions_found import exclude, found_sessions
 from rigidimeter.errors import UserError
 from rigidimeter.experiment import plan
-from rigidimeter.recording import SessionWriter
+from rigidimeter.recording import SessionWriter, read_manifest
 from rigidimeter.recording.resume import again
 from rigidimeter.settings import Settings, parse_settings
 
@@ -122,6 +122,15 @@ def test_an_epoch_is_drawn_from_its_samples(root):
     time_s = panes[0]["data"][0]
     assert time_s[-1] - time_s[0] == pytest.approx(20.0, abs=0.02)
     assert {len(line) for pane in panes for line in pane["data"]} == {len(time_s)}
+    assert [pane["spectrum"]["title"] for pane in panes] == [
+        "spectrum [N·m/√Hz]",
+        "spectrum [deg/√Hz]",
+        "spectrum [N·m/√Hz]",
+    ]
+    rate_hz = read_manifest(root / "S01-1")["settings"]["rig"]["tick_rate_hz"]
+    for pane in panes:
+        assert len(pane["spectrum"]["data"]) == len(pane["data"])
+        assert pane["spectrum"]["data"][0][-1] == pytest.approx(rate_hz / 2)
     with pytest.raises(UserError, match="no samples of epoch 3"):
         epoch_traces(root / "S01-1", "3", root / "none.csv")
 
