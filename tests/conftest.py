@@ -16,6 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import hypothesis
 import pytest
 import typer
+import typer.testing
 from tests.lateness import PRESENT, LatenessProbe, run_beside_probe
 
 from rigidimeter.cli.main import main
@@ -90,16 +91,14 @@ class Ran(NamedTuple):
     err: str
 
 
-COMMANDS = functools.cache(typer.main.get_command)
+# Made anew for each call, the tree of all commands takes longer than most of what is tested.
+typer.main.get_command = typer.testing._get_command = functools.cache(typer.main.get_command)
 
 
 @pytest.fixture
 def rigidimeter(monkeypatch, capsys) -> Callable[..., Ran]:
     """Run a command line in this process and return its status and what it printed."""
     monkeypatch.setattr("rigidimeter.extensions._loaded", {})  # of --load: a batch depends on it
-
-    # Made anew for each call, the tree of all commands takes longer than most of what is tested.
-    monkeypatch.setattr("typer.main.get_command", COMMANDS)
 
     def run(*arguments: object) -> Ran:
         monkeypatch.setattr(sys, "argv", ["rigidimeter", *map(str, arguments)])

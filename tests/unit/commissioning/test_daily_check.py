@@ -10,6 +10,7 @@ import pytest
 from tests.unit.commissioning.conftest import QUICK
 
 from rigidimeter.commissioning import (
+    CommissioningRecord,
     Compared,
     DailyRecord,
     Operator,
@@ -23,10 +24,18 @@ CUFF = (0.002, 0.0, 0.0)
 MADE = "2026-01-02T08:00:00+00:00"
 
 
+@pytest.fixture(scope="module")
+def made() -> list[CommissioningRecord]:
+    """What `record` made."""
+    return []
+
+
 @pytest.fixture
-def record(commissioned: Any) -> Any:
+def record(commissioned: Any, made: list[CommissioningRecord]) -> Any:
     """The commissioning record of the fake rig; made once, with a load."""
-    return commissioned()
+    if not made:
+        made.append(commissioned())
+    return made[0]
 
 
 @pytest.fixture

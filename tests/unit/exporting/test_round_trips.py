@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -32,20 +33,30 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Recording]
     }
 
 
-def exported(recording: Recording, to: str, folder: Path) -> Path:
-    if to in NEEDS:
-        pytest.importorskip(NEEDS[to])
-    out = folder / NAMES.get(to, to)
-    export_sessions(sessions_of_recording(recording, None, subject="S1", day="1"), to, out)
-    return out
+@pytest.fixture(scope="module")
+def back(
+    recordings: dict[str, Recording], tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str, str], Recording]:
+    """Export a session to a format, once, and read it back."""
+
+    @cache
+    def exported(to: str, kind: str) -> Recording:
+        if to in NEEDS:
+            pytest.importorskip(NEEDS[to])
+        out = tmp_path_factory.mktemp("exported") / NAMES.get(to, to)
+        sessions = sessions_of_recording(recordings[kind], None, subject="S1", day="1")
+        export_sessions(sessions, to, out)
+        return read(out)
+
+    return exported
 
 
 @pytest.mark.parametrize("kind", ["even", "jittered", "sinusoid"])
 @pytest.mark.parametrize("to", ALL)
-def test_epochs_and_settings(recordings, tmp_path: Path, to: str, kind: str) -> None:
+def test_epochs_and_settings(recordings, back, to: str, kind: str) -> None:
     """Values to the bit; stamps too, but where a format has a rate for even ones."""
     recording = recordings[kind]
-    found = read(exported(recording, to, tmp_path))
+    found = back(to, kind)
     assert found.notices == recording.notices
     assert found.settings == recording.settings
     assert len(found.epochs) == len(recording.epochs)
@@ -75,8 +86,8 @@ def numbers(found: Any, path: str = "") -> dict[str, float]:
 
 @pytest.mark.parametrize("kind", ["even", "jittered", "sinusoid"])
 @pytest.mark.parametrize("to", ALL)
-def test_estimates(recordings, estimates, tmp_path: Path, to: str, kind: str) -> None:
-    found = numbers(estimates_document(estimate(read(exported(recordings[kind], to, tmp_path)))))
+def test_estimates(estimates, back, to: str, kind: str) -> None:
+    found = numbers(estimates_document(estimate(back(to, kind))))
     expected = estimates[kind]
     assert found.keys() == expected.keys()
     worst = max(

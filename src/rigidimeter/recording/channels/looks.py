@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -163,14 +164,12 @@ def _grid(
 def rough_fit(rate_hz: float, torque: Array, angle: Array) -> RoughFit | None:
     """Fit J, B and K to evenly sampled torque and angle; None where they cannot be told apart."""
     high_hz = min(BAND_HZ[1], 0.2 * rate_hz)
-    sos = scipy.signal.butter(2, [BAND_HZ[0], high_hz], "bandpass", fs=rate_hz, output="sos")
     velocity = np.gradient(angle, 1.0 / rate_hz)
-    columns = (np.gradient(velocity, 1.0 / rate_hz), velocity, angle, torque)
+    columns = np.stack((np.gradient(velocity, 1.0 / rate_hz), velocity, angle, torque))
     edge = max(1, min(int(rate_hz), angle.size // 10))
-    *motion, target = (
-        scipy.signal.sosfiltfilt(sos, column - column.mean())[edge:-edge] for column in columns
-    )
-    matrix = np.column_stack(motion)
+    columns -= columns.mean(axis=1, keepdims=True)
+    passed = scipy.signal.sosfiltfilt(_band(rate_hz, high_hz), columns)[:, edge:-edge]
+    matrix, target = np.ascontiguousarray(passed[:3].T), passed[3]
     scale = np.linalg.norm(matrix, axis=0)
     total = float(target @ target)
     if not (np.all(np.isfinite(scale)) and np.all(scale > 0) and 0 < total < math.inf):
@@ -184,3 +183,11 @@ def rough_fit(rate_hz: float, torque: Array, angle: Array) -> RoughFit | None:
     spread = np.linalg.inv((matrix / scale).T @ (matrix / scale))
     error = np.sqrt(np.diag(spread) * float(left @ left) / target.size * (target.size / free))
     return RoughFit(value / scale, error / scale, 1.0 - float(left @ left) / total)
+
+
+@lru_cache(maxsize=16)
+def _band(rate_hz: float, high_hz: float) -> Array:
+    """Return a band-pass; to design it takes as long as to filter a recording."""
+    return np.asarray(
+        scipy.signal.butter(2, [BAND_HZ[0], high_hz], "bandpass", fs=rate_hz, output="sos")
+    )
