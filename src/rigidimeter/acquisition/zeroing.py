@@ -51,12 +51,17 @@ def bias_and_noise(
 def moved(readings: Sequence[Reading], settings: Settings) -> str:
     """Return why a torque is none at rest, if so: a joint in motion needs torque by itself."""
     limit_deg = settings.zeroing.motion_limit_deg
-    angles_rad = [reading.angle_rad for reading in readings]
-    moved_deg = deg_from_rad(max(angles_rad) - min(angles_rad))
-    if moved_deg <= limit_deg + settings.rig.motion.angle_resolution_deg:
+    range_deg = angle_range_deg(readings)
+    if range_deg <= limit_deg + settings.rig.motion.angle_resolution_deg:
         return ""
     return (
-        f"the joint moved by {moved_deg:.3g} deg while the torque sensor was zeroed, more than "
+        f"the joint moved by {range_deg:.3g} deg while the torque sensor was zeroed, more than "
         f"zeroing.motion_limit_deg = {limit_deg:g} deg: the drive does not hold it still; check "
         "its tuning and whether somebody pushes, then `rigidimeter check`"
     )
+
+
+def angle_range_deg(readings: Sequence[Reading]) -> float:
+    """Return how far the joint moved meanwhile, from the smallest to the largest angle."""
+    angles_rad = [reading.angle_rad for reading in readings]
+    return deg_from_rad(max(angles_rad) - min(angles_rad))

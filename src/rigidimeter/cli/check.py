@@ -5,22 +5,34 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rigidimeter.cli.commission import claimed, table
 from rigidimeter.cli.inputs import keep_inputs
+from rigidimeter.cli.operator_answers import operator
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.terminal_tables import show
 from rigidimeter.errors import UserError
 
+if TYPE_CHECKING:
+    from rigidimeter.commissioning import DailyRecord, Operator, ZeroFound
+    from rigidimeter.devices.rigfile import RigFile
+    from rigidimeter.settings import Settings
+
 
 def check(
     rig: Annotated[
-        Path, typer.Argument(metavar="RIG.toml", help="The rig file.", show_default=False)
-    ],
+        Path | None,
+        typer.Argument(
+            metavar="[RIG.toml]",
+            help="The rig file. Without one: the virtual rig on a simulated clock, to see how it "
+            "is done; nothing is recorded.",
+            show_default=False,
+        ),
+    ] = None,
     settings: SettingsOption = None,
     known_inertia: Annotated[
         float | None,
@@ -38,9 +50,21 @@ def check(
             help="Keep today's inertia as the reference: the cuff or the handle was changed.",
         ),
     ] = False,
+    zero: Annotated[
+        bool,
+        typer.Option(
+            "--zero",
+            help="Only zero and noise of the torque sensor, without power, by the limits of "
+            "[zeroing], as `run` does when it begins; nothing is recorded.",
+        ),
+    ] = False,
     yes: Annotated[
         bool,
         typer.Option("--yes", help="Consent to the motions in advance; for an emulated rig only."),
+    ] = False,
+    piped: Annotated[
+        bool,
+        typer.Option("--piped", hidden=True, help="A program asks somebody and pipes the answer."),
     ] = False,
 ) -> None:
     """Check a commissioned rig in about 20 s, with nobody in it; `run` requires it every day.
@@ -54,10 +78,65 @@ def check(
     For example:
       rigidimeter check RIG.toml --settings study.toml
       rigidimeter check RIG.toml --known-inertia-kg-m2 0.012
+      rigidimeter check RIG.toml --zero
     """
+    from rigidimeter.cli.virtual_check import virtual_check, virtual_zero
+    from rigidimeter.devices.rigfile import load_rig
+    from rigidimeter.settings import load_settings
+
+    rigfile, chosen = None if rig is None else load_rig(rig), load_settings(settings)
+    if known_inertia is not None and not (math.isfinite(known_inertia) and known_inertia > 0):
+        raise UserError(
+            f"--known-inertia-kg-m2 {known_inertia:g}: must be a number above 0, in kg·m²"
+        )
+    if rigfile is None:
+        if known_inertia is not None or new_reference:
+            raise UserError("--known-inertia-kg-m2 and --new-reference need a RIG.toml")
+        asked = operator(yes=not piped, piped=piped)
+        if zero:
+            _say_zero(virtual_zero(chosen, asked), chosen)
+        else:
+            _say_checked(virtual_check(chosen, asked), chosen, "the virtual rig")
+        return
+    if zero:
+        _zero(rigfile, chosen, operator(yes=True))
+        return
+    _require_answers(rigfile, yes=yes, piped=piped)
+    asked = operator(yes=yes, piped=piped)
+    path, found = _check(rigfile, chosen, settings, asked, known_inertia, new=new_reference)
+    echo(f"Record: {path}")
+    _say_checked(found, chosen, f"{rig}")
+    kept = found.reference
+    if kept is not None and kept.made_utc == found.made_utc:
+        was = "" if kept.before_kg_m2 is None else f"; it was {kept.before_kg_m2:.3g} kg·m²"
+        echo(f"Kept as the reference: {kept.inertia_kg_m2:.3g} kg·m², {kept.reason}{was}.")
+    echo(f"Valid until {found.valid_until:%Y-%m-%d %H:%M} UTC.")
+
+
+def _require_answers(rigfile: RigFile, *, yes: bool, piped: bool) -> None:
+    if yes and not rigfile.emulated:
+        raise UserError(
+            f"{rigfile.path}: is real hardware; somebody must look that nobody's arm is in it and "
+            "answer, so leave out --yes"
+        )
+    if not yes and not piped and not sys.stdin.isatty():
+        raise UserError(
+            "nobody can answer the question; use a terminal, or --yes on an emulated rig"
+        )
+
+
+def _check(
+    rigfile: RigFile,
+    chosen: Settings,
+    settings: Path | None,
+    asked: Operator,
+    known_inertia: float | None,
+    *,
+    new: bool,
+) -> tuple[Path, DailyRecord]:
+    """Check a rig and write the record; return both."""
     from datetime import UTC, datetime
 
-    from rigidimeter.cli.sign_text import sign_blocks
     from rigidimeter.commissioning import (
         Compared,
         check_record,
@@ -66,50 +145,52 @@ def check(
         read_daily,
         write_daily,
     )
-    from rigidimeter.devices.rigfile import load_rig
-    from rigidimeter.settings import load_settings
     from rigidimeter.version import __version__
 
-    rigfile, chosen = load_rig(rig), load_settings(settings)
+    rig = rigfile.path
     path = daily_path(rig)
     keep_inputs((path,), (rig, settings) if settings is not None else (rig,))
-    if known_inertia is not None and not (math.isfinite(known_inertia) and known_inertia > 0):
-        raise UserError(
-            f"--known-inertia-kg-m2 {known_inertia:g}: must be a number above 0, in kg·m²"
-        )
-    if yes and not rigfile.emulated:
-        raise UserError(
-            f"{rig}: is real hardware; somebody must look that nobody's arm is in it and answer, "
-            "so leave out --yes"
-        )
-    if not yes and not sys.stdin.isatty():
-        raise UserError(
-            "nobody can answer the question; use a terminal, or --yes on an emulated rig"
-        )
     check_record(rigfile, None, chosen)
     try:
         before = read_daily(path).reference if path.exists() else None
     except UserError as error:
-        if not new_reference:
+        if not new:
             raise UserError(f"{error}; its reference is lost, so add --new-reference") from None
         before = None
-    with claimed(rigfile, chosen, path, "check the rig again", yes) as setup:
+    with claimed(rigfile, chosen, path, "check the rig again", asked) as setup:
         found = daily_check(
             setup,
             rigfile,
             lambda facts: check_record(rigfile, facts, chosen),
-            compared=Compared(known_inertia, before, new_reference),
+            compared=Compared(known_inertia, before, new),
             made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
             software=__version__,
         )
     write_daily(path, found)
+    return path, found
+
+
+def _say_checked(found: DailyRecord, settings: Settings, what: str) -> None:
+    """Show the checks; a rig that is not fit ends the program with status 1."""
+    from rigidimeter.cli.sign_text import sign_blocks
+
     show([table(found.checks)])
-    echo(f"Record: {path}")
     if found.objection:
-        raise UserError(f"{rig}: not fit for a person today: {found.objection}")
-    show(sign_blocks(chosen, found.checks))
-    kept = found.reference
-    if kept is not None and kept.made_utc == found.made_utc:
-        was = "" if kept.before_kg_m2 is None else f"; it was {kept.before_kg_m2:.3g} kg·m²"
-        echo(f"Kept as the reference: {kept.inertia_kg_m2:.3g} kg·m², {kept.reason}{was}.")
-    echo(f"Valid until {found.valid_until:%Y-%m-%d %H:%M} UTC.")
+        raise UserError(f"{what}: not fit for a person today: {found.objection}")
+    show(sign_blocks(settings, found.checks))
+
+
+def _zero(rigfile: RigFile, settings: Settings, asked: Operator) -> None:
+    from rigidimeter.commissioning import daily_path, zero_check
+
+    path = daily_path(rigfile.path)
+    with claimed(rigfile, settings, path, "do it again", asked) as setup:
+        found = zero_check(setup)
+    _say_zero(found, settings)
+
+
+def _say_zero(found: ZeroFound, settings: Settings) -> None:
+    """Show each value beside its limit; one above it ends the program with status 1."""
+    echo(f"At rest: {found.words(settings)}.")
+    if found.objection:
+        raise UserError(f"a session would not begin: {found.objection}")

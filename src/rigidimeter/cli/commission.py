@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.inputs import keep_inputs
+from rigidimeter.cli.operator_answers import operator
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.commissioning import Check, Setup
+    from rigidimeter.commissioning import Check, Operator, Setup
     from rigidimeter.devices.rigfile import RigFile
     from rigidimeter.settings import Settings
 
@@ -99,8 +100,8 @@ def commission(
         raise UserError(
             f"{rig}: is real hardware; name the person responsible for it with --signed-by NAME"
         )
-    known = {"known_torque_nm": known_torque, "known_angle_deg": known_angle}
-    with claimed(rigfile, chosen, path, "commission again", yes, **known) as setup:
+    asked = operator(yes=yes, known_torque_nm=known_torque, known_angle_deg=known_angle)
+    with claimed(rigfile, chosen, path, "commission again", asked) as setup:
         found = try_rig(
             setup,
             rigfile,
@@ -129,30 +130,22 @@ def claimed(
     settings: Settings,
     record: Path,
     again: str,
-    yes: bool,
-    **known: float | None,
+    asked: Operator,
 ) -> Iterator[Setup]:
     """Prepare this process for the loop and claim the rig; give it, not connected yet.
 
-    An interrupt says that `record` was not written, and to do it `again`. With `yes` nobody is
-    asked. `known` is what an `Operator` knows.
+    An interrupt says that `record` was not written, and to do it `again`.
     """
     from rigidimeter.acquisition.clock import DeadlineClock
     from rigidimeter.acquisition.processes.realtime_scheduling import prepare_loop_process
-    from rigidimeter.commissioning import Operator, Setup, Timebase
+    from rigidimeter.commissioning import Setup, Timebase
 
-    operator = Operator(
-        ask=(lambda _: True) if yes else _ask,
-        say=lambda what: echo(what, err=True),
-        present=not yes,
-        **known,
-    )
     for line in str(prepare_loop_process()).splitlines():
         echo(line, err=True)
     clock = DeadlineClock()
     with rigfile.claim() as lock, interrupted_once(record, again):
         rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, lock=lock)
-        yield Setup(rig, settings, Timebase(clock.now_s, clock.wait_until), operator)
+        yield Setup(rig, settings, Timebase(clock.now_s, clock.wait_until), asked)
 
 
 @contextlib.contextmanager
@@ -199,8 +192,3 @@ def table(checks: Sequence[Check]) -> Table:
         if check.remedy:
             rows.append(f"      {check.remedy}")
     return Table(("", "check", "found", "must be"), rows, "=<<<", indent=0)
-
-
-def _ask(question: str) -> bool:
-    """Put a question at the terminal; anything but yes is no."""
-    return typer.confirm(question, default=False, err=True)

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -115,10 +116,11 @@ def run_on_page(
 @contextmanager
 def serving(desk: Desk, host: str, port: int, token: str) -> Iterator[None]:
     """Serve the page meanwhile."""
+    from rigidimeter.cli.rig_steps import rig_steps
     from rigidimeter.console.page.server import PageServer
     from rigidimeter.console.page.work import Work
 
-    server = PageServer(desk, Work(rig_lines(desk.place.rig)), host, port, token)
+    server = PageServer(desk, Work(partial(rig_steps, desk.place.rig)), host, port, token)
     server.start()
     echo(f"Open {server.address} in a browser; Ctrl-C ends the program")
     try:
@@ -181,23 +183,6 @@ def _planned(desk: Desk, request: StartRequest, source: Path | None) -> PlannedS
     lost_s = min(SILENT_S, planned.settings.loop.console_lost_s)
     settings = changed_settings(planned.settings, {"loop": {"console_lost_s": lost_s}})
     return replace(planned, settings=settings)
-
-
-def rig_lines(rig: Path | None) -> tuple[str, ...]:
-    """Return what the operator should know of the rig before a session."""
-    from rigidimeter.commissioning import check_record, require_daily_check
-    from rigidimeter.devices.rigfile import load_rig
-    from rigidimeter.settings import Settings
-
-    if rig is None:
-        return ("The virtual rig moves nobody; it needs no commissioning and no daily check.",)
-    try:
-        rigfile = load_rig(rig)
-        record = check_record(rigfile, None, Settings())
-        today = require_daily_check(rigfile, record, Settings())
-    except UserError as error:
-        return error.lines
-    return (f"Commissioned {record.made_utc}, checked {today.made_utc}.",)
 
 
 def require_page() -> None:

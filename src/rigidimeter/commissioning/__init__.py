@@ -26,6 +26,7 @@ from rigidimeter.commissioning.turned_sign import (
     perturbed_conditions,
     search_for_turned_sign,
 )
+from rigidimeter.commissioning.zero_check import ZeroFound, zero_check
 
 __all__ = [
     "Check",
@@ -38,6 +39,7 @@ __all__ = [
     "Setup",
     "Timebase",
     "TurnedEpochs",
+    "ZeroFound",
     "check_record",
     "commission",
     "daily_check",
@@ -52,4 +54,5 @@ __all__ = [
     "with_measured_floor",
     "write_daily",
     "write_record",
+    "zero_check",
 ]

@@ -11,6 +11,9 @@ from typing import Any
 from nicegui import ui
 
 from rigidimeter.console.page.desk import Desk, StartRequest
+from rigidimeter.console.page.prediction import dry_run_lines, prediction_lines
+from rigidimeter.console.page.rig_steps import refusal
+from rigidimeter.console.page.rig_view import RigView
 from rigidimeter.console.page.session_form import (
     METADATA,
     MOST_BLOCKS,
@@ -28,7 +31,8 @@ from rigidimeter.console.page.session_form import (
 from rigidimeter.console.page.work import Work
 from rigidimeter.documents import read_json, toml_text, write_json
 from rigidimeter.errors import UserError
-from rigidimeter.settings import dump_settings
+from rigidimeter.recording.resume import count_epochs
+from rigidimeter.settings import Settings, dump_settings
 
 DRAFT = "draft.json"
 DETECTED = ("--detect", "damping=20%", "--detect", "stiffness=20%")
@@ -55,8 +59,7 @@ class BeforeView:
         place = desk.place
         rig = "the virtual rig" if place.rig is None else f"rig {place.rig.name}"
         ui.label(f"Protocol: {place.settings_name}. Rig: {rig}.").classes("text-lg")
-        for line in work.rig_lines:
-            ui.label(line)
+        self._rig = RigView(desk, work, self._may_act, in_control, self._settings)
         with ui.row().classes("w-full"):
             for one in (*METADATA, NOTE):
                 self._input(one)
@@ -78,6 +81,7 @@ class BeforeView:
             for one in STIMULATION:
                 self._input(one)
         self._problem = ui.label("").classes("problem").props('role="alert"')
+        self._refused = ui.label("").classes("problem").mark("refused").props('role="alert"')
         with ui.row():
             self._start = ui.button("Start session", on_click=self._ask).mark("start")
             self._start.props("size=lg")
@@ -85,6 +89,7 @@ class BeforeView:
             ui.button("Dry run on the virtual rig", on_click=self._dry_run)
         self._answer = ui.html("", sanitize=False).classes("answer")
         self._check()
+        ui.timer(5.0, self._show_steps)
 
     def _input(self, one: Field) -> None:
         label = f"{one.label} [{one.unit}]" if one.unit else one.label
@@ -156,12 +161,33 @@ class BeforeView:
         general = [text for key, text in errors.items() if key not in self._inputs]
         wrong = f"{len(errors)} fields are not right yet" if errors else ""
         self._problem.text = " ".join([*general, wrong]) if general or wrong else ""
-        self._start.set_enabled(not errors)
+        self._show_steps()
+
+    def _show_steps(self) -> None:
+        """Show the steps for what was entered, and why a session cannot start."""
+        if self._desk.busy or self._entered is None:
+            return
+        steps = self._work.rig_steps(self._entered.settings or self._base, None)
+        self._rig.show(steps)
+        why = refusal(steps)
+        self._refused.text = f"No session can start: {why}." if why else ""
+        self._start.set_enabled(not self._entered.errors and not why)
+
+    def _settings(self) -> Settings | None:
+        return self._entered.settings if self._entered is not None else None
+
+    def _may_act(self) -> bool:
+        if not self._in_control():
+            ui.notify("this page can only look: another one has control")
+        elif self._desk.busy:
+            ui.notify("not while a session runs or the rig is checked")
+        else:
+            return True
+        return False
 
     def _ask(self) -> None:
         entered = self._entered
-        if not self._in_control():
-            ui.notify("this page can only look: another one has control")
+        if not self._may_act():
             return
         if entered is None or entered.settings is None:
             return
@@ -172,29 +198,53 @@ class BeforeView:
             entered.settings,
             {**entered.about, "blinded": self._blinded},
         )
-        if not self._desk.ask(request):
-            ui.notify("a session runs already")
+        self._desk.ask(request)
 
     async def _predict(self) -> None:
-        await self._compute("design", "--settings", "{settings}", *DETECTED)
+        """Say what the session would tell, and what to change."""
+
+        def lines(folder: Path, settings: Settings) -> list[str]:
+            document = folder / "design.json"
+            if not document.is_file():
+                return []
+            return prediction_lines(read_json(document), settings.margins)
+
+        await self._compute(("design",), (*DETECTED, "--json", "design.json"), lines)
 
     async def _dry_run(self) -> None:
-        await self._compute("simulate", "--settings", "{settings}", "--out", "{folder}/dry-run")
+        """Run the protocol on a simulated clock; the folder is deleted."""
 
-    async def _compute(self, *arguments: str) -> None:
-        """Show what a command says of the settings that were entered."""
-        if self._desk.busy or not self._in_control():
-            ui.notify("not while a session runs, and only on the page in control")
+        def lines(folder: Path, _: Settings) -> list[str]:
+            return dry_run_lines(*count_epochs(folder / "dry-run"))
+
+        await self._compute(("simulate",), ("--out", "dry-run"), lines)
+
+    async def _compute(
+        self,
+        command: tuple[str, ...],
+        options: tuple[str, ...],
+        lines: Callable[[Path, Settings], list[str]],
+    ) -> None:
+        """Show what a command says of the settings that were entered, first in sentences."""
+        if not self._may_act():
             return
-        if self._entered is None or self._entered.settings is None:
+        settings = self._settings()
+        if settings is None:
+            ui.notify("first put right what is wrong in the form")
             return
         self._answer.set_content("<p>computing …</p>")
         with tempfile.TemporaryDirectory(prefix="rigidimeter-form-") as name:
-            path = Path(name) / "protocol.toml"
-            path.write_text(toml_text(dump_settings(self._entered.settings)), encoding="utf-8")
-            places = {"{settings}": str(path), "{folder}/dry-run": f"{name}/dry-run"}
-            answer = await self._work.command(*(places.get(one, one) for one in arguments))
-        self._answer.set_content(answer.html(name))
+            folder = Path(name)
+            path = folder / "protocol.toml"
+            path.write_text(toml_text(dump_settings(settings)), encoding="utf-8")
+            answer = await self._work.command(
+                *command, "--settings", str(path), *options, folder=folder
+            )
+            try:
+                said = lines(folder, settings)
+            except UserError as error:
+                said = [str(error)]
+        self._answer.set_content(answer.html(name, said))
 
 
 def _stored(path: Path) -> Any:

@@ -96,6 +96,8 @@ class Desk:
         self.running: RunningSession | None = None
         self.finished: FinishedSession | None = None
         self.starting = ""
+        self.checking = ""
+        self.check_stopped = False
         self.told_to_end = False
         self._now_ns = now_ns
         self._requests: queue.SimpleQueue[StartRequest] = queue.SimpleQueue()
@@ -105,12 +107,32 @@ class Desk:
     # For the server
 
     @property
-    def busy(self) -> bool:
+    def in_session(self) -> bool:
         """Whether a session runs or is about to."""
         return bool(self.starting) or self.running is not None
 
+    @property
+    def busy(self) -> bool:
+        """Whether something has the rig: a session, or a check of it."""
+        return self.in_session or bool(self.checking)
+
+    def begin_check(self, what: str) -> bool:
+        """Take the rig for a check; return False if something else has it."""
+        if self.busy:
+            return False
+        self.checking, self.check_stopped = what, False
+        return True
+
+    def stop_check(self) -> None:
+        """Stop the check of the rig, if one runs."""
+        self.check_stopped = True
+
+    def end_check(self) -> None:
+        """Give the rig back."""
+        self.checking = ""
+
     def ask(self, request: StartRequest) -> bool:
-        """Ask for a session; return False if there is one already."""
+        """Ask for a session; return False if something else has the rig."""
         if self.busy:
             return False
         self.starting = request.folder

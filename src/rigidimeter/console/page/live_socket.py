@@ -161,6 +161,8 @@ class LiveSockets:
             return
         if message.kind == "leave":
             presence.leave(page.secret, now_ns)
+        if message.kind in ("emergency", "leave"):
+            self._desk.stop_check()
         attached = self._attached
         if attached is None:
             return
@@ -210,10 +212,15 @@ class LiveSockets:
 
     def _tell_state(self) -> None:
         desk, attached = self._desk, self._attached
-        state: dict[str, Any] = {"starting": desk.starting, "session": None, "finished": None}
+        state: dict[str, Any] = {
+            "starting": desk.starting,
+            "checking": desk.checking,
+            "session": None,
+            "finished": None,
+        }
         if attached is not None:
             state["session"] = attached.state()
-        elif desk.finished is not None and not desk.busy:
+        elif desk.finished is not None and not desk.in_session:
             finished = desk.finished
             state["finished"] = {
                 "number": finished.number,

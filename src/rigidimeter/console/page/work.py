@@ -7,12 +7,24 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
+
+from rigidimeter.console.page.rig_steps import RigStep
+from rigidimeter.settings import Settings
 
 LONGEST_S = 300.0
+
+QUESTION = "question: "
+"""With which a command begins a line that somebody must answer."""
+
+LOOKS_S = 0.1
+"""How often it is looked whether a command is to be ended."""
+
+RigSteps = Callable[[Settings, Path | None], tuple[RigStep, ...]]
 
 
 @dataclass(frozen=True)
@@ -22,11 +34,29 @@ class Answer:
     good: bool
     text: str
 
-    def html(self, hidden: str = "") -> str:
-        """Return it for the page, without the name of a folder that is gone by then."""
+    @property
+    def last_lines(self) -> str:
+        """What it said at its end: the value, and the refusal if there is one."""
+        return " ".join(self.text.splitlines()[-2 if not self.good else -1 :])
+
+    def html(self, hidden: str = "", lines: Sequence[str] = ()) -> str:
+        """Return it for the page.
+
+        Parameters
+        ----------
+        hidden : str
+            The name of a folder that is gone by then; it is left out.
+        lines : sequence of str
+            What it comes to; the whole text is folded up below.
+        """
         text = self.text.replace(hidden, "…") if hidden else self.text
         sign = "" if self.good else "<p><b>✗ not good:</b></p>"
-        return f'{sign}<pre tabindex="0">{escape(text)}</pre>'
+        whole = f'<pre tabindex="0">{escape(text)}</pre>'
+        if not lines:
+            return sign + whole
+        listed = "".join(f"<li>{escape(line)}</li>" for line in lines)
+        begin = "<details>" if self.good else "<details open>"
+        return f"{sign}<ul>{listed}</ul>{begin}<summary>All numbers</summary>{whole}</details>"
 
 
 class Work:
@@ -34,19 +64,26 @@ class Work:
 
     Parameters
     ----------
-    rig_lines : tuple of str
-        What is known of the rig: whether it is virtual, when it was commissioned and checked.
+    rig_steps : callable
+        Gives what is to be done with the rig before a session of these settings, and their file.
     """
 
-    def __init__(self, rig_lines: tuple[str, ...] = ()) -> None:
-        self.rig_lines = rig_lines
+    def __init__(self, rig_steps: RigSteps = lambda *_: ()) -> None:
+        self.rig_steps = rig_steps
+        self.zero_read: Answer | None = None
         self._one = asyncio.Lock()
 
-    async def command(self, *arguments: str, timeout_s: float = LONGEST_S) -> Answer:
-        """Run a command and return what it printed; arguments come from this program alone."""
+    async def command(
+        self, *arguments: str, timeout_s: float = LONGEST_S, folder: Path | None = None
+    ) -> Answer:
+        """Run a command in a folder and return what it printed.
+
+        Its arguments come from this program alone.
+        """
         async with self._one:
             process = await asyncio.create_subprocess_exec(
                 *_python(), *arguments,
+                cwd=folder,
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.STDOUT,
@@ -60,6 +97,71 @@ class Work:
                     with suppress(ProcessLookupError):
                         process.kill()
         return Answer(process.returncode == 0, out.decode(errors="replace").strip())
+
+    async def conversation(
+        self,
+        *arguments: str,
+        said: Callable[[str], None],
+        asked: Callable[[str], Awaitable[bool]],
+        going_on: Callable[[], bool],
+    ) -> Answer:
+        """Run a command that moves a rig and asks before.
+
+        Parameters
+        ----------
+        *arguments : str
+            They come from this program alone.
+        said : callable
+            Takes all that it has printed so far.
+        asked : callable
+            Takes a question; True is consent.
+        going_on : callable
+            Whether it may go on. If not it is told to end, and stops the rig as it does so.
+        """
+        lines: list[str] = []
+        async with self._one:
+            process = await asyncio.create_subprocess_exec(
+                *_python(), *arguments,
+                stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.STDOUT,
+            )  # fmt: skip
+            watch = asyncio.create_task(_end_when(process, going_on))
+            try:
+                assert process.stdout is not None
+                async for raw in process.stdout:
+                    line = raw.decode(errors="replace").rstrip()
+                    if line.startswith(QUESTION):
+                        await _answer(process, asked(line.removeprefix(QUESTION)))
+                    else:
+                        lines.append(line)
+                        said("\n".join(lines))
+                await process.wait()
+            finally:
+                watch.cancel()
+                if process.returncode is None:
+                    with suppress(ProcessLookupError):
+                        process.terminate()
+        return Answer(process.returncode == 0, "\n".join(lines).strip())
+
+
+async def _answer(process: asyncio.subprocess.Process, asked: Awaitable[bool]) -> None:
+    """Give a command the answer; one that ended meanwhile needs none."""
+    question, ended = asyncio.ensure_future(asked), asyncio.create_task(process.wait())
+    await asyncio.wait({question, ended}, return_when=asyncio.FIRST_COMPLETED)
+    if question.done() and process.stdin is not None:
+        process.stdin.write(b"yes\n" if question.result() else b"no\n")
+        with suppress(ConnectionError):
+            await process.stdin.drain()
+    question.cancel()
+    ended.cancel()
+
+
+async def _end_when(process: asyncio.subprocess.Process, going_on: Callable[[], bool]) -> None:
+    while going_on():
+        await asyncio.sleep(LOOKS_S)
+    with suppress(ProcessLookupError):
+        process.terminate()
 
 
 def _python() -> Sequence[str]:

@@ -35,16 +35,16 @@
     heard = performance.now();
     if (message.say) return remark(message.say);
     control = message.control;
-    const { session, finished, starting } = message.state;
+    const { session, finished, starting, checking } = message.state;
     $("take").hidden = control;
     show("role", control ? "" : "this page can only look");
-    $("emergency").disabled = !(control && session);
+    $("emergency").disabled = !(control && (session || checking));
     $("save-form").hidden = !(control && session && session.save);
     const can = session ? session.orders : [];
     for (const one of document.querySelectorAll("[data-order]")) one.disabled = !control || !can.includes(one.dataset.order);
     for (const one of document.querySelectorAll("#note-form *, #rating-form *")) one.disabled = !control || !session;
     if (session) return during(session);
-    show("state", starting ? `starting ${starting} …` : finished ? `ended: ${finished.outcome}` : "no session runs");
+    show("state", starting ? `starting ${starting} …` : checking ? checking : finished ? `ended: ${finished.outcome}` : "no session runs");
     const key = finished ? `ended ${finished.number}` : starting ? `starting ${starting}` : "";
     if (seen !== key) {
       if (finished && seen !== null) view("after");

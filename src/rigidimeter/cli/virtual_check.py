@@ -1,0 +1,89 @@
+"""The checks of a rig on the virtual one, on a clock that moves as the rig is read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
+
+from rigidimeter.units import rad_from_deg
+from rigidimeter.version import __version__
+
+if TYPE_CHECKING:
+    from rigidimeter.commissioning import DailyRecord, Operator, Setup, ZeroFound
+    from rigidimeter.devices.base import Reading, Rig
+    from rigidimeter.devices.rigfile import RigFile
+    from rigidimeter.settings import Settings
+
+NAME = "virtual rig"
+
+
+class _VirtualRig:
+    """The virtual rig with a clock, and with the facts of a device; its arm pushes nothing."""
+
+    def __init__(self, settings: Settings) -> None:
+        import numpy as np
+
+        from rigidimeter.devices import SimulatedRig
+
+        first = next(iter(settings.subject.values()))
+        passive = first.model_copy(update={"voluntary_sd_nm": 0.0, "tremor_amplitude_nm": 0.0})
+        self._rig = SimulatedRig(settings.rig, passive, np.random.default_rng(settings.seed))
+        self._settings, self._reads = settings, 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._rig, name)
+
+    def now_s(self) -> float:
+        return max(self._reads - 1, 0) / self._settings.rig.tick_rate_hz
+
+    def read(self, elapsed_ticks: int = 1) -> Reading:
+        self._reads += elapsed_ticks
+        return self._rig.read(elapsed_ticks)
+
+    def configure(self) -> Mapping[str, Any]:
+        """Return facts of a drive that brakes and stops by itself as the settings need."""
+        from rigidimeter.commissioning.static_tests import BRAKING
+
+        guard, watchdog_s = self._settings.guard, 2.0 * self._settings.loop.stall_s
+        values = {BRAKING: rad_from_deg(guard.acceleration_limit_deg_s2)}
+        facts = {"model": NAME, "serial": "", "watchdog_s": watchdog_s, "values": values}
+        return {"torque_sensor": facts, "drive": facts}
+
+
+def virtual_setup(settings: Settings, operator: Operator) -> Setup:
+    """Return the virtual rig as one that is to be tried."""
+    from rigidimeter.commissioning import Setup, Timebase
+
+    rig = _VirtualRig(settings)
+    time = Timebase(rig.now_s, lambda deadline_s: deadline_s)
+    return Setup(cast("Rig", rig), settings, time, operator)
+
+
+def virtual_zero(settings: Settings, operator: Operator) -> ZeroFound:
+    """Return zero and noise of the virtual torque sensor."""
+    from rigidimeter.commissioning import zero_check
+
+    return zero_check(virtual_setup(settings, operator))
+
+
+def virtual_check(settings: Settings, operator: Operator) -> DailyRecord:
+    """Return the daily check of the virtual rig; it is commissioned by what its settings say."""
+    from rigidimeter.commissioning import CommissioningRecord, Compared, daily_check
+
+    torque, motion = settings.rig.torque, settings.rig.motion
+    behind_s = (torque.latency_s - torque.stamp_latency_s) - (
+        motion.latency_s - motion.stamp_latency_s
+    )
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    numbers = {"torque_after_motion_s": behind_s}
+    commissioned = CommissioningRecord(NAME, "", {}, {}, (), numbers, __version__, now)
+    return daily_check(
+        virtual_setup(settings, operator),
+        cast("RigFile", SimpleNamespace(name=NAME, digest="")),
+        lambda _: commissioned,
+        compared=Compared(),
+        made_utc=now,
+        software=__version__,
+    )
