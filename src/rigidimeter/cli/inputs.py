@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings
@@ -16,6 +16,7 @@ from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.recording import Recording
+    from rigidimeter.recording.study_folder import StudyFolder
     from rigidimeter.records import Analysis, Fit, Notice, Score
     from rigidimeter.study import StudyResult
 
@@ -179,7 +180,9 @@ def analyse_study_folder(
     """
     from rigidimeter.cli.progress import Meter
     from rigidimeter.settings import load_settings
-    from rigidimeter.study import analyse_study, keep, provenance, read_study
+    from rigidimeter.study import analyse_study, keep, read_study
+    from rigidimeter.study.drawing import drawn_signals
+    from rigidimeter.study.kept_result import keep_result
 
     chosen = load_settings(recordings.settings) if recordings.settings is not None else None
     with Meter("read", 1.0) as meter:
@@ -194,15 +197,75 @@ def analyse_study_folder(
     read = replace(read, settings=recordings.adjust(read.settings))
     with Meter("study", 1.0) as meter:
         result = analyse_study(read, seed=seed, resamples=resamples, progress=meter.advance)
+    with Meter("traces", 1.0) as meter:
+        result = replace(result, drawn=drawn_signals(result, meter.advance))
     changes, not_kept = [], ""
     try:
         changes = keep(read, result)
+        keep_result(read, result, asked_of(recordings, pair, seed, resamples))
     except UserError as error:
         not_kept = str(error)
-    sessions = (folder / session.path for session in result.sessions)
-    tables = (path for name, path in read.folder.files.items() if name != "key")
-    named = {path: read.folder.digests[name] for name, path in read.folder.files.items()}
-    below = {folder / name: digest for name, digest in read.gathered.digests.items()}
+    result = replace(result, changes=tuple(changes))
+    return AnalysedStudy(_with_provenance(result, read.folder, read.gathered.digests), not_kept)
+
+
+def kept_study(folder: Path, recordings: Recordings, key: Path | None = None) -> AnalysedStudy:
+    """Return what the last command kept of a study; analyse it where that does not hold.
+
+    Raises
+    ------
+    UserError
+        If there is nothing to analyse.
+    """
+    from rigidimeter.study.kept_result import take_kept
+
+    found, reason = take_kept(folder, asked_of(recordings), key)
+    if found is not None:
+        return AnalysedStudy(_with_provenance(found.result, found.folder, found.digests), "")
+    if reason:
+        echo(f"the study is analysed again: {reason}", err=True)
+    return analyse_study_folder(folder, recordings, key)
+
+
+def asked_of(
+    recordings: Recordings,
+    pair: tuple[str | None, str | None] = (None, None),
+    seed: int = 1,
+    resamples: int = 9999,
+) -> dict[str, Any]:
+    """Return the options of an analysis of a study as JSON has them.
+
+    Raises
+    ------
+    UserError
+        If the settings cannot be read.
+    """
+    from rigidimeter.documents import plain_values
+    from rigidimeter.settings import dump_settings, load_settings
+
+    given = recordings.settings
+    values = {
+        "--method": recordings.method,
+        "--settings": None if given is None else dump_settings(load_settings(given)),
+        "--band-hz": recordings.band_hz,
+        "--controller": recordings.controller,
+        "--reference": pair[0],
+        "--other": pair[1],
+        "--seed": seed,
+        "--resamples": resamples,
+    }
+    return dict(plain_values(values))
+
+
+def _with_provenance(
+    result: StudyResult, folder: StudyFolder, digests: Mapping[str, str]
+) -> StudyResult:
+    """Return a result with where it comes from: the tables and the sessions that count."""
+    from rigidimeter.study import provenance
+
+    sessions = (folder.folder / session.path for session in result.sessions)
+    tables = (path for name, path in folder.files.items() if name != "key")
+    named = {path: folder.digests[name] for name, path in folder.files.items()}
+    below = {folder.folder / name: digest for name, digest in digests.items()}
     facts = provenance((*tables, *sessions), named | below, result.settings, command_line())
-    result = replace(result, changes=tuple(changes), provenance=facts)
-    return AnalysedStudy(result, not_kept)
+    return replace(result, provenance=facts)

@@ -20,16 +20,16 @@ from rigidimeter.paper.paper_figures import torque_traces
 from rigidimeter.paper.printed_effects import ratings_of
 from rigidimeter.reporting.contents import Figure
 from rigidimeter.reporting.numbers import number, p_value
-from rigidimeter.reporting.representative import (
-    analysed_epoch,
-    representative_fits,
-    representatives,
-)
 from rigidimeter.reporting.sections.distribution import distribution
 from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits
 from rigidimeter.reporting.style import condition_colours
 from rigidimeter.statistics import difference, fit_mixed, summarise
 from rigidimeter.study import Comparison
+from rigidimeter.study.examples import (
+    analysed_epoch,
+    representative_fits,
+    representative_scores,
+)
 from rigidimeter.study.rating_table import groupings
 
 Array = NDArray[np.float64]
@@ -212,7 +212,7 @@ def figure_5a(context: Context) -> Row:
 def figure_7(context: Context) -> Row:
     """Compare torque against angle in the epoch of median work of each condition."""
     study = context.study
-    chosen = representatives(study, study.analysis.scores, lambda score: score.work_j)
+    chosen = representative_scores(study)
     epochs = [epoch for score in chosen if (epoch := analysed_epoch(study, score)) is not None]
     cycles = [scoring_cycles(epoch, study.settings.scores) for epoch in epochs]
     works = " and ".join(f"{number(s.work_j, 3)} J ({s.condition})" for s in chosen)

@@ -28,6 +28,7 @@ from rigidimeter.study import (
     precisions,
     precisions_untested,
 )
+from rigidimeter.study.drawing import channel_facts
 
 DIGITS = 3
 _PERCENT = "\N{NO-BREAK SPACE}%"
@@ -243,8 +244,12 @@ def gravest_words(light: TrafficLight) -> str:
 def advice(result: StudyResult, light: TrafficLight | None) -> list[str]:
     """Return what would make the estimates of one condition better."""
     found = []
-    epochs = [epoch for epoch in result.epochs if epoch.task != "sinusoid"]
-    if epochs and not any("perturbation_nm" in epoch.channels for epoch in epochs):
+    perturbed = [
+        {channel.name for channel in channels}
+        for epoch, channels in zip(result.epochs, channel_facts(result), strict=True)
+        if epoch.task != "sinusoid"
+    ]
+    if perturbed and not any("perturbation_nm" in names for names in perturbed):
         found.append(
             "Record the perturbation (perturbation_nm): without it the subject’s own torque biases "
             "J, B and K, whatever the number of epochs."

@@ -18,7 +18,7 @@ from rigidimeter.documents import csv_text, visible
 from rigidimeter.reporting import first_screen
 from rigidimeter.reporting.contents import Block, Column, Figure, Section, Table
 from rigidimeter.reporting.drawn_data import drawn_csv
-from rigidimeter.reporting.epoch_traces import epoch_traces, traces_json
+from rigidimeter.reporting.epoch_traces import page_traces, traces_json
 from rigidimeter.reporting.inline_svg import inline_svg
 from rigidimeter.reporting.numbers import interval, number, p_value, short_names
 from rigidimeter.reporting.sections import SECTIONS
@@ -171,7 +171,7 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
     environment.globals["heads"] = _heads
     environment.globals["file_stem"] = file_stem
     light = traffic_light(result)
-    traces = epoch_traces(result)
+    traces = page_traces(result)
     script = _script() if traces else ""
     return environment.get_template("page.html").render(
         result=result,

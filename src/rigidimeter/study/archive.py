@@ -4,6 +4,7 @@
     STUDY/analysis/estimates.json   the estimates, as `rigidimeter estimate` writes them
     STUDY/analysis/comparison.json  every conclusion
     STUDY/analysis/*.csv            the same as tables
+    STUDY/analysis/kept.json        the result for the next report (`study.kept_result`)
 
 A file whose bytes would be the same is not written again. `comparison.json` and then `inputs.json`
 are written last: a run that was cut off leaves those of the run before, and the next one says what
@@ -86,6 +87,15 @@ def keep(read: StudyRead, study: StudyResult) -> list[str]:
     if before is not None and not said:
         said.append(UNCHANGED)
     return said
+
+
+def results_changed(folder: Path) -> str:
+    """Return the first result in the folder that is not as it was written; empty if all are."""
+    for name, digest in _results(_object(folder / INPUTS)).items():
+        path = folder / name
+        if not path.is_file() or _file_digest(path) != digest:
+            return name
+    return ""
 
 
 def _inputs(read: StudyRead, study: StudyResult) -> dict[str, Any]:

@@ -60,12 +60,15 @@ class Gathered:
         SHA-256 of every file of every recording in the table, as it was read, by its path below the
         study.
     notices : tuple of Notice
+    elsewhere : tuple of Path
+        What was read of recordings that lies outside the study.
     """
 
     sessions: tuple[Session, ...]
     left_out: tuple[LeftOut, ...]
     digests: dict[str, str]
     notices: tuple[Notice, ...]
+    elsewhere: tuple[Path, ...] = ()
 
     @property
     def epochs(self) -> tuple[Epoch, ...]:
@@ -119,6 +122,7 @@ def gather(
     rows_at: dict[Path, list[Row]] = {}
     for row in read.sessions:
         rows_at.setdefault(place_of(read.folder / row["path"]), []).append(row)
+    elsewhere: list[Path] = []
 
     def leave_out(row: Row, reason: str) -> None:
         text = reason if reason.startswith(row.where) else f"{row.where}: {reason}"
@@ -133,7 +137,10 @@ def gather(
             # One that is changed while it is read is refused, so digest and result belong together.
             with noted_digests() as noted:
                 beside = rows_at[place_of(read.folder / row["path"])]
-                session, said = _read(read, row, names, beside, at, samples, digests, noted)
+                try:
+                    session, said = _read(read, row, names, beside, at, samples, digests, noted)
+                finally:
+                    elsewhere += _note_others(read.folder, noted, digests)
         except (_Refused, UserError) as error:
             leave_out(row, " / ".join(str(error).splitlines()))
         except OSError as error:  # such as a path too long for the file system
@@ -152,7 +159,8 @@ def gather(
             f"{read.folder}: no session is left to analyse: "
             + " / ".join(n.text for n in notices if n.level == "error")
         )
-    return Gathered(tuple(sessions), tuple(left_out), digests, tuple(dict.fromkeys(notices)))
+    told = tuple(dict.fromkeys(notices))
+    return Gathered(tuple(sessions), tuple(left_out), digests, told, tuple(elsewhere))
 
 
 def _read(
@@ -215,6 +223,13 @@ def _read(
         for epoch, task in zip(epochs, tasks, strict=True)
     )
     return Session(row, entry, kept, settings), said
+
+
+def _note_others(folder: Path, noted: Mapping[Path, str], digests: dict[str, str]) -> list[Path]:
+    """Note what else was read, such as a sidecar; return what lies outside the study."""
+    below = {path: path.relative_to(folder) for path in noted if path.is_relative_to(folder)}
+    digests.update({name.as_posix(): noted[path] for path, name in below.items()})
+    return [path for path in noted if path not in below]
 
 
 def _options(

@@ -11,20 +11,20 @@ from rigidimeter.estimation.closedloop.periodic_response import impedance as wit
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Channel, Delay, Outcome
 from rigidimeter.reporting.contents import Figure
-from rigidimeter.reporting.representative import analysed_epoch
 from rigidimeter.reporting.sections import impedance as impedance_section
 from rigidimeter.reporting.sections import unexplained_torque
 from rigidimeter.reporting.sections.impedance import (
     COHERENT,
-    Response,
     impedance,
     model_nm_rad,
-    same_lines,
 )
 from rigidimeter.reporting.sections.unexplained_torque import voluntary_spectrum
 from rigidimeter.reporting.style import condition_colours, svg_text
 from rigidimeter.settings import Settings
 from rigidimeter.study import StudyResult
+from rigidimeter.study.drawn_signals import Response
+from rigidimeter.study.examples import analysed_epoch
+from rigidimeter.study.over_frequency import same_lines
 
 from .conftest import OFF, periodic_epoch
 
@@ -93,16 +93,20 @@ def test_only_epochs_with_the_same_lines_are_added(observations) -> None:
 
 def responses() -> dict[str, Response]:
     frequency_hz = np.array([0.5, 2.0, 8.0])
+    off = 1.1 * model_nm_rad(OFF, frequency_hz)
     return {
-        "OFF": Response(
-            frequency_hz, 1.1 * model_nm_rad(OFF, frequency_hz), np.array([0.99, 0.4, 0.8]), OFF
-        ),
-        "DBS": Response(frequency_hz, model_nm_rad(OFF, frequency_hz), np.ones(3), None),
+        "OFF": Response(frequency_hz, off, np.array([0.99, 0.4, 0.8]), 1, 1),
+        "DBS": Response(frequency_hz, model_nm_rad(OFF, frequency_hz), np.ones(3), 1, 1),
     }
 
 
+JOINTS = {"OFF": OFF, "DBS": None}
+
+
 def test_every_point_is_drawn_and_those_without_coherence_are_hollow() -> None:
-    magnitude, phase, coherence = impedance(responses(), condition_colours(["OFF", "DBS"])).axes
+    magnitude, phase, coherence = impedance(
+        responses(), condition_colours(["OFF", "DBS"]), JOINTS
+    ).axes
     expected = responses()["OFF"]
     sure, unsure = magnitude.lines[:2]
     np.testing.assert_allclose(
@@ -151,7 +155,7 @@ def test_any_condition_is_in_the_legends(name: str) -> None:
     colours = {name: "red"}
     # A joint that explains all of the torque leaves nothing to draw but the foot of the axes.
     below = voluntary_spectrum({name: [(grid, np.zeros(61))]}, colours, {name: name}, (0.15, 10.0))
-    over = impedance({name: responses()["OFF"]}, colours)
+    over = impedance({name: responses()["OFF"]}, colours, {name: OFF})
     for figure, entries in ((below, 1), (over, 2)):
         svg_text(figure)
         legend = figure.axes[0].get_legend() or figure.legends[0]
@@ -159,7 +163,7 @@ def test_any_condition_is_in_the_legends(name: str) -> None:
 
 
 def test_the_plateau_can_be_read_off() -> None:
-    figure = impedance(responses(), condition_colours(["OFF", "DBS"]))
+    figure = impedance(responses(), condition_colours(["OFF", "DBS"]), JOINTS)
     svg_text(figure)
     axes = figure.axes[0]
     low, high = axes.get_ylim()

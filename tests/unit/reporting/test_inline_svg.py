@@ -9,18 +9,12 @@ import pytest
 from markupsafe import escape
 
 from rigidimeter.reporting.epoch_marks import Mark
-from rigidimeter.reporting.epoch_traces import (
-    MOST_POINTS,
-    POINTS_PER_CYCLE,
-    epoch_traces,
-    packed,
-    thinned,
-    traces_json,
-)
+from rigidimeter.reporting.epoch_traces import page_traces, traces_json
 from rigidimeter.reporting.inline_svg import inline_svg
 from rigidimeter.reporting.sections.distribution import distribution
 from rigidimeter.reporting.style import svg_text
 from rigidimeter.study import StudyResult
+from rigidimeter.study.drawing import MOST_POINTS, POINTS_PER_CYCLE, packed, thinned
 
 NAME = '<b> 0.12345 #0072b2 id="x"'
 
@@ -64,11 +58,11 @@ def test_thinned_traces_keep_enough_points_for_the_highest_frequency(
     rate_hz: float, span_s: float
 ) -> None:
     time_s = np.arange(int(rate_hz * span_s) + 1) / rate_hz
-    kept, told = thinned(time_s, 10.0)
+    kept, shown_s = thinned(time_s, 10.0)
     shown = time_s[kept]
     assert shown.size <= MOST_POINTS
     assert np.diff(shown)[0] <= max(1 / (POINTS_PER_CYCLE * 10.0), 1 / rate_hz) + 1e-9
-    assert bool(told) == (time_s[-1] - shown[-1] > np.diff(shown)[0])
+    assert (shown_s < time_s[-1]) == (time_s[-1] - shown[-1] > np.diff(shown)[0])
 
 
 def test_packed_numbers_are_within_half_a_step() -> None:
@@ -82,7 +76,7 @@ def test_packed_numbers_are_within_half_a_step() -> None:
 def test_every_epoch_with_numbers_has_traces_whose_residual_is_torque_less_model(
     study: StudyResult,
 ) -> None:
-    traces = epoch_traces(study)
+    traces = page_traces(study)
     analysed = study.analysis
     keys = {(one.source, one.epoch) for one in (*analysed.fixed_inertia, *analysed.scores)}
     assert set(traces) == keys

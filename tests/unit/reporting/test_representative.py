@@ -6,8 +6,8 @@ import math
 import pytest
 
 from rigidimeter.records import Outcome
-from rigidimeter.reporting.representative import representative_fits
 from rigidimeter.study import StudyResult, split_pooled
+from rigidimeter.study.examples import representative_fits
 
 
 def test_estimates_bring_their_intervals(study: StudyResult) -> None:

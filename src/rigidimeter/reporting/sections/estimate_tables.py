@@ -12,8 +12,9 @@ from rigidimeter.records import PARAMETER_VECTORS, PARAMETERS, Delay, Fit
 from rigidimeter.reporting.contents import INTERVAL, Block, Column, Section, Table, paragraph
 from rigidimeter.reporting.method_words import interval_basis, method_title
 from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.sections.recordings import epoch_duration_s
+from rigidimeter.reporting.sections.recordings import longest_s
 from rigidimeter.study import StudyResult, result_tables, split_pooled
+from rigidimeter.study.drawing import channel_facts
 
 ALL_CONDITIONS = "(all)"
 """What the column of conditions holds for the fit to all epochs of all of them."""
@@ -213,15 +214,13 @@ def _recorded(result: StudyResult) -> list[Mapping[str, Any]]:
             "epoch": epoch.label,
             "condition": epoch.condition,
             "task": epoch.task,
-            "duration_s": epoch_duration_s(epoch),
+            "duration_s": longest_s(channels),
             "virtual": epoch.virtual,
             "closed": epoch.closed.kind,
             "reason": epoch.closed.reason,
-            "channels": ", ".join(
-                f"{c.name} at {c.rate_hz:.4g} Hz" for c in epoch.channels.values()
-            ),
+            "channels": ", ".join(f"{c.name} at {c.rate_hz:.4g} Hz" for c in channels),
         }
-        for epoch in result.epochs
+        for epoch, channels in zip(result.epochs, channel_facts(result), strict=True)
     ]
 
 

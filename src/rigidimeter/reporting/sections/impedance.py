@@ -6,9 +6,9 @@ With Eq. 3 torque over angle is K − J ω² + i B ω: its magnitude is K at low
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -18,15 +18,13 @@ from matplotlib.ticker import LogLocator, MultipleLocator, NullLocator
 from numpy.typing import NDArray
 
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.estimation.closedloop.observation import Observation, observe_periods
-from rigidimeter.estimation.closedloop.periodic_response import impedance as without_model
-from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.records import Fit
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
 from rigidimeter.reporting.numbers import condition_name, number
-from rigidimeter.reporting.representative import prepared_epochs
 from rigidimeter.reporting.style import GREY, condition_colours, listed, plain_ticks, styled
 from rigidimeter.study import StudyResult, split_pooled
+from rigidimeter.study.drawn_signals import Response
+from rigidimeter.study.over_frequency import responses
 
 Array = NDArray[np.float64]
 
@@ -40,40 +38,8 @@ _READABLE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 """The labelled ticks of a decade: so close that K can be read off between them."""
 
 
-class Response(NamedTuple):
-    """The measured impedance of one condition, and the joint fitted to it if there is one."""
-
-    frequency_hz: Array
-    impedance_nm_rad: NDArray[np.complex128]
-    coherence: Array
-    joint: JointDynamics | None
-
-
-FEWEST_LINES = 2
-SAME_FREQUENCY = 1e-3
-"""Lines of two epochs that differ by less than this fraction are the same line."""
-
-
 def _blocks(result: StudyResult) -> Iterator[Block]:
-    fits, _ = split_pooled(result.analysis)
-    shown: dict[str, Response] = {}
-    used: dict[str, tuple[int, int]] = {}
-    prepared = prepared_epochs(result)
-    for condition in result.condition_names:
-        epochs = [
-            prepared[fit.source, fit.epoch]
-            for fit in result.analysis.fits
-            if fit.condition == condition and fit.outcome.included
-            if (fit.source, fit.epoch) in prepared
-        ]
-        observations = same_lines(_observations(epochs))
-        if not observations:
-            continue
-        found = without_model(observations)
-        if found.frequency_hz.size < FEWEST_LINES:
-            continue
-        shown[condition] = Response(*found, _joint(fits.get(condition)))
-        used[condition] = len(observations), len(epochs)
+    shown = responses(result)
     if not shown:
         return
     yield paragraph(
@@ -89,9 +55,10 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         )
     )
     colours = condition_colours(result.condition_names)
+    fits, _ = split_pooled(result.analysis)
     counts = "; ".join(
-        f"{condition_name(key)}: {some} of {every} included epochs"
-        for key, (some, every) in used.items()
+        f"{condition_name(key)}: {response.observed} of {response.included} included epochs"
+        for key, response in shown.items()
     )
     medians = "; ".join(
         f"{condition_name(key)} {number(float(np.median(response.coherence)), 3)}"
@@ -109,35 +76,10 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             impedance,
             {condition_name(key): response for key, response in shown.items()},
             {condition_name(key): colours[key] for key in shown},
+            {condition_name(key): _joint(fits.get(key)) for key in shown},
         ),
         "tall",
     )
-
-
-def _observations(epochs: Sequence[PreparedEpoch]) -> list[Observation]:
-    """Return the epochs that can be observed at the lines of their perturbation."""
-    found = []
-    for epoch in epochs:
-        try:
-            found.append(epoch.once(observe_periods))
-        except ValueError:
-            continue  # it does not repeat, or was not recorded: the page says what is needed
-    return found
-
-
-def same_lines(observations: Sequence[Observation]) -> list[Observation]:
-    """Return the largest set of epochs that have their excited lines at the same frequencies."""
-    groups: list[list[Observation]] = []
-    for observation in observations:
-        lines = observation.lines.grid.omega_rad_s[observation.excited]
-        for group in groups:
-            known = group[0].lines.grid.omega_rad_s[group[0].excited]
-            if known.size == lines.size and np.allclose(known, lines, rtol=SAME_FREQUENCY):
-                group.append(observation)
-                break
-        else:
-            groups.append([observation])
-    return max(groups, key=len, default=[])
 
 
 def _joint(fit: Fit | None) -> JointDynamics | None:
@@ -153,35 +95,41 @@ def model_nm_rad(joint: JointDynamics, frequency_hz: Array) -> NDArray[np.comple
     return np.asarray(K - J * omega**2 + 1j * B * omega, dtype=np.complex128)
 
 
-def impedance(responses: Mapping[str, Response], colours: Mapping[str, str]) -> Drawing:
+def impedance(
+    measured: Mapping[str, Response],
+    colours: Mapping[str, str],
+    joints: Mapping[str, JointDynamics | None],
+) -> Drawing:
     """Draw magnitude, phase and coherence of each condition.
 
     Parameters
     ----------
-    responses : mapping of str to Response
+    measured : mapping of str to Response
         By condition, at least one, each with at least two lines.
     colours : mapping of str to str
         By condition.
+    joints : mapping of str to JointDynamics or None
+        By condition, the joint that was fitted to all its epochs, if there is one.
     """
-    lowest = min(float(r.frequency_hz[0]) for r in responses.values())
-    highest = max(float(r.frequency_hz[-1]) for r in responses.values())
+    lowest = min(float(r.frequency_hz[0]) for r in measured.values())
+    highest = max(float(r.frequency_hz[-1]) for r in measured.values())
     with styled():
         figure = Drawing(figsize=(7.4, 6.4))
         magnitude, phase, coherence = figure.subplots(
             3, 1, sharex=True, height_ratios=(1.5, 1.1, 0.8)
         )
-        for place, (name, response) in enumerate(responses.items()):
+        for place, (name, response) in enumerate(measured.items()):
             marker = _MARKERS[place % len(_MARKERS)]
             values = response.impedance_nm_rad
-            measured = (np.abs(values), np.degrees(np.angle(values)), response.coherence)
-            for axes, points in zip((magnitude, phase, coherence), measured, strict=True):
+            panels = (np.abs(values), np.degrees(np.angle(values)), response.coherence)
+            for axes, points in zip((magnitude, phase, coherence), panels, strict=True):
                 _points(axes, response, points, colours[name], marker, listed(name))
-            if response.joint is not None:
-                stiffness = response.joint.stiffness_nm_rad
+            if (joint := joints[name]) is not None:
+                stiffness = joint.stiffness_nm_rad
                 _model(
                     magnitude,
                     phase,
-                    response.joint,
+                    joint,
                     np.geomspace(lowest, highest, _POINTS),
                     colours[name],
                     _DASHES[place % len(_DASHES)],

@@ -20,6 +20,7 @@ from rigidimeter.reporting.numbers import condition_name, number, plural, series
 from rigidimeter.reporting.prose_statistics import rating_sentences, test_sentences
 from rigidimeter.reporting.references import Cited, Prose
 from rigidimeter.study import Condition, StudyResult
+from rigidimeter.study.drawing import channel_facts
 from rigidimeter.version import __version__
 
 
@@ -145,13 +146,9 @@ def _perturbation(result: StudyResult, epochs: Sequence[Epoch], cite: Cited) -> 
 def _rates(result: StudyResult) -> list[str]:
     names = {"torque_nm": "torque", "angle_rad": "angle", "velocity_rad_s": "velocity"}
     rates: dict[str, list[str]] = {}
-    for channel, name in names.items():
-        found = [
-            rate
-            for epoch in result.epochs
-            if channel in epoch.channels
-            and math.isfinite(rate := epoch.channels[channel].mean_rate_hz)
-        ]
+    facts = [channel for channels in channel_facts(result) for channel in channels]
+    for key, name in names.items():
+        found = [c.mean_rate_hz for c in facts if c.name == key and math.isfinite(c.mean_rate_hz)]
         if found:
             rates.setdefault(number(float(np.median(found)), 3), []).append(name)
     if not rates:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from functools import partial
 
@@ -12,24 +11,22 @@ from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 from scipy import signal
 
-from rigidimeter.records import Channel, Epoch
+from rigidimeter.records import Channel
 from rigidimeter.reporting.contents import Block, Figure, Section
 from rigidimeter.reporting.numbers import condition_name, number, short_names
-from rigidimeter.reporting.representative import analysed_epoch, origin_s, representative_fits
+from rigidimeter.reporting.representative import origin_s
 from rigidimeter.reporting.style import GREY, INK, note, plain_ticks, styled
 from rigidimeter.study import StudyResult
+from rigidimeter.study.examples import perturbed_epoch
 
 _BAND = "#009E73"
 
 
 def _blocks(result: StudyResult) -> Iterator[Block]:
-    shown = [epoch for fit in representative_fits(result) if (epoch := analysed_epoch(result, fit))]
-    for epoch in (*shown, *result.epochs):
-        channel = drawable_perturbation(epoch)
-        if channel is not None:
-            break
-    else:
+    epoch = perturbed_epoch(result)
+    if epoch is None:
         return
+    channel = epoch.channels["perturbation_nm"]
     prbs = result.settings.prbs
     low, high = epoch.excitation_hz or (prbs.wanted_low_hz, prbs.wanted_high_hz)
     where = short_names(one.source for one in result.epochs)[epoch.source]
@@ -50,15 +47,6 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         f"{high:g} Hz, marked.",
         partial(spectrum, channel, (low, high)),
     )
-
-
-def drawable_perturbation(epoch: Epoch) -> Channel | None:
-    """Return the perturbation of an epoch if there is enough of it to draw."""
-    channel = epoch.channels.get("perturbation_nm")
-    if channel is None or len(channel) < 16:
-        return None
-    low, high = float(min(channel.values)), float(max(channel.values))
-    return channel if math.isfinite(high - low) and high > low else None
 
 
 def changes(channel: Channel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

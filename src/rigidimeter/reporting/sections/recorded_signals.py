@@ -11,14 +11,10 @@ from matplotlib.figure import Figure as Drawing
 from rigidimeter.records import Channel
 from rigidimeter.reporting.contents import Block, Figure, Section
 from rigidimeter.reporting.numbers import condition_name, series
-from rigidimeter.reporting.representative import (
-    analysed_epoch,
-    origin_s,
-    place,
-    representative_fits,
-)
+from rigidimeter.reporting.representative import origin_s, place
 from rigidimeter.reporting.style import INK, styled
 from rigidimeter.study import StudyResult
+from rigidimeter.study.examples import analysed_epoch, representative_fits
 
 WINDOW_S = 7.0
 _PANELS = {

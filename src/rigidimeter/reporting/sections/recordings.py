@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 from pydantic import BaseModel
 
-from rigidimeter.records import Epoch
 from rigidimeter.reporting.contents import SESSION, Block, Column, Section, Table, paragraph
 from rigidimeter.reporting.numbers import number, plural
 from rigidimeter.settings import Settings
 from rigidimeter.study import StudyResult, result_tables
+from rigidimeter.study.drawing import channel_facts
+from rigidimeter.study.drawn_signals import ChannelFacts
 from rigidimeter.units import rad_from_deg
 
 _TASKS = {"prbs": "torque perturbation", "sinusoid": "imposed sinusoid", None: "not stated"}
@@ -24,10 +25,9 @@ _OF_THE_RIG = ("Controller", "PRBS", "Sinusoid", "Limits")
 """Settings that recordings of another rig were not made with."""
 
 
-def epoch_duration_s(epoch: Epoch) -> float:
+def longest_s(channels: Iterable[ChannelFacts]) -> float:
     """Return how long the longest channel of an epoch lasts; NaN without samples."""
-    spans = [float(c.time_s[-1] - c.time_s[0]) for c in epoch.channels.values() if len(c)]
-    return max(spans, default=math.nan)
+    return max((c.span_s for c in channels if math.isfinite(c.span_s)), default=math.nan)
 
 
 def _about(result: StudyResult) -> Iterator[Block]:
@@ -116,17 +116,19 @@ def _design(result: StudyResult) -> Iterator[Block]:
 
 
 def _counts(result: StudyResult) -> Iterator[dict[str, Any]]:
+    lengths_s = [longest_s(channels) for channels in channel_facts(result)]
+    recorded = list(zip(result.epochs, lengths_s, strict=True))
     for task, title in _TASKS.items():
         for condition in result.condition_names:
-            group = [e for e in result.epochs if e.task == task and e.condition == condition]
+            group = [(e, s) for e, s in recorded if e.task == task and e.condition == condition]
             if not group:
                 continue
-            durations = [d for e in group if math.isfinite(d := epoch_duration_s(e))] or [math.nan]
+            durations = [s for _, s in group if math.isfinite(s)] or [math.nan]
             yield {
                 "task": title,
                 "condition": condition,
                 "epochs": len(group),
-                "virtual_epochs": sum(epoch.virtual for epoch in group),
+                "virtual_epochs": sum(epoch.virtual for epoch, _ in group),
                 "median_duration_s": float(np.median(durations)),
                 "shortest_s": min(durations),
                 "longest_s": max(durations),

@@ -12,9 +12,10 @@ from matplotlib.figure import Figure as Drawing
 from rigidimeter.estimation import Cycles, scoring_cycles
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
 from rigidimeter.reporting.numbers import condition_name, number
-from rigidimeter.reporting.representative import analysed_epoch, place, representatives
+from rigidimeter.reporting.representative import place
 from rigidimeter.reporting.style import condition_colours, listed, note, styled
 from rigidimeter.study import StudyResult
+from rigidimeter.study.examples import analysed_epoch, representative_scores
 
 _POINTS = 2000
 """Enough for any number of cycles at the size of the figure."""
@@ -24,7 +25,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     colours = condition_colours(result.condition_names)
     found = [
         (score, scoring_cycles(epoch, result.settings.scores))
-        for score in representatives(result, result.analysis.scores, lambda score: score.work_j)
+        for score in representative_scores(result)
         if (epoch := analysed_epoch(result, score)) is not None
     ]
     if not found:

@@ -15,15 +15,10 @@ from rigidimeter.records import Fit
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
 from rigidimeter.reporting.method_words import is_least_squares
 from rigidimeter.reporting.numbers import amount, condition_name, number
-from rigidimeter.reporting.representative import (
-    analysed_epoch,
-    origin_s,
-    place,
-    representative_fits,
-    slug,
-)
+from rigidimeter.reporting.representative import origin_s, place, slug
 from rigidimeter.reporting.style import GREY, INK, condition_colours, note, styled
 from rigidimeter.study import StudyResult
+from rigidimeter.study.examples import analysed_epoch, representative_fits
 
 Array = NDArray[np.float64]
 

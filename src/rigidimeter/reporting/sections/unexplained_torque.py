@@ -11,15 +11,13 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
-from rigidimeter.estimation.bandlimited import bandlimited_signals
-from rigidimeter.estimation.diagnostics import reconstructed_torque_nm
-from rigidimeter.estimation.spectrum import SEGMENT_S, density
+from rigidimeter.estimation.spectrum import SEGMENT_S
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
 from rigidimeter.reporting.method_words import is_least_squares
 from rigidimeter.reporting.numbers import condition_name, number
-from rigidimeter.reporting.representative import prepared_epochs
 from rigidimeter.reporting.style import condition_colours, listed, plain_ticks, styled
 from rigidimeter.study import StudyResult
+from rigidimeter.study.over_frequency import unexplained_spectra
 
 Array = NDArray[np.float64]
 
@@ -31,17 +29,10 @@ _NOTHING = 1e-30
 def _blocks(result: StudyResult) -> Iterator[Block]:
     spectra: dict[str, list[tuple[Array, Array]]] = {}
     sizes_nm: dict[str, list[float]] = {}
-    bands = []
-    by_name = prepared_epochs(result)
-    for fit in result.analysis.fits:
-        epoch = by_name.get((fit.source, fit.epoch))
-        if epoch is None or not fit.outcome.included:
-            continue
-        signals = epoch.signals(bandlimited_signals)
-        own_nm = reconstructed_torque_nm(signals, fit.value)
-        spectra.setdefault(fit.condition, []).append(density(own_nm, signals.rate_hz))
-        sizes_nm.setdefault(fit.condition, []).append(float(np.std(own_nm)))
-        bands.append(signals.band_hz)
+    found = unexplained_spectra(result)
+    for one in found:
+        spectra.setdefault(one.condition, []).append((one.frequency_hz, one.density))
+        sizes_nm.setdefault(one.condition, []).append(one.sd_nm)
     if not spectra:
         return
     text = Markup(
@@ -58,7 +49,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         f"(median of {len(sizes_nm[key])})"
         for key in order
     }
-    band_hz = max(low for low, _ in bands), min(high for _, high in bands)
+    band_hz = max(one.band_hz[0] for one in found), min(one.band_hz[1] for one in found)
     ranges = "; ".join(
         f"{condition_name(key)} {number(min(sizes_nm[key]), 3)} to {number(max(sizes_nm[key]), 3)}"
         for key in order
@@ -90,7 +81,7 @@ def voluntary_spectrum(
     Parameters
     ----------
     epochs : mapping of str to sequence of (array, array)
-        Frequencies and densities of each epoch, by condition, as `density` gives them.
+        Frequencies and densities of each epoch, by condition.
     colours, labels : mapping of str to str
         By condition.
     band_hz : (float, float)

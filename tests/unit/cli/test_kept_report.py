@@ -1,0 +1,141 @@
+"""A report takes what `compare` kept while it holds, and is the same as one made anew."""
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tests.small_study import TOML, record, scored_study, study
+
+from rigidimeter.documents import replace_file
+
+__all__ = ["scored_study", "study"]
+
+AGAIN = "the study is analysed again: "
+KEPT = "analysis/kept.json"
+
+
+@pytest.fixture(scope="module")
+def of_both(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make a study with fits and scores in both conditions, and keep its analysis."""
+    folder = tmp_path_factory.mktemp("both") / "study"
+    (folder / "sessions").mkdir(parents=True)
+    rows = ["path,subject,day,condition"]
+    repeating = {"duration_s": 8.0, "register_bits": 5}
+    for day, condition in (("1", "OFF"), ("2", "OFF"), ("1", "DBS"), ("2", "DBS")):
+        path = f"sessions/{day}-{condition}"
+        record(folder / path, condition, seed=10 * len(rows), epochs=1, prbs=repeating)
+        rows.append(f"{path},M1,{day},{condition}")
+        if day == "1":
+            record(folder / f"{path}-sine", condition, seed=40 + len(rows), task="sinusoid")
+            rows.append(f"{path}-sine,M1,{day},{condition}")
+    (folder / "study.toml").write_text(TOML)
+    (folder / "sessions.csv").write_text("\n".join(rows) + "\n")
+    return folder
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def timeless(found: dict[str, bytes]) -> dict[str, bytes]:
+    """Return files without the moment at which they were made."""
+    moment = re.compile(rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00")
+    return {name: moment.sub(b"", data) for name, data in found.items()}
+
+
+@pytest.fixture
+def no_analysis(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """Make every analysis fail from now on."""
+
+    def forbidden(*_: object, **__: object) -> None:
+        raise AssertionError("the study was analysed again")
+
+    def forbid() -> None:
+        monkeypatch.setattr("rigidimeter.cli.inputs.analyse_study_folder", forbidden)
+
+    return forbid
+
+
+def test_the_page_of_a_kept_result_is_that_of_a_new_one(
+    of_both: Path, tmp_path: Path, rigidimeter, no_analysis
+) -> None:
+    folder = Path(shutil.copytree(of_both, tmp_path / "study"))
+    compared = rigidimeter("compare", folder)
+    kept = (folder / KEPT).read_bytes()
+    (folder / KEPT).unlink()
+    anew = rigidimeter("report", folder, "--out", tmp_path / "report")
+    expected = files(tmp_path / "report")
+    shutil.rmtree(tmp_path / "report")
+    assert (folder / KEPT).read_bytes() == kept
+    no_analysis()
+    ran = rigidimeter("report", folder, "--out", tmp_path / "report")
+    assert (ran.status, ran.out) == (anew.status, anew.out)
+    warnings = [line for line in ran.err.splitlines() if line.startswith("warning")]
+    assert warnings == [line for line in compared.err.splitlines() if line.startswith("warning")]
+    found = files(tmp_path / "report")
+    assert {"figures/impedance.svg", "figures/loops.svg", "figures/recorded.svg"} <= set(found)
+    one, two = timeless(found), timeless(expected)
+    assert [name for name in {**one, **two} if one.get(name) != two.get(name)] == []
+
+
+@pytest.fixture
+def kept(study: Path, rigidimeter, no_figures) -> Path:
+    """Return a study of scores whose analysis is kept."""
+    assert rigidimeter("compare", study).status == 0
+    assert (study / KEPT).is_file()
+    return study
+
+
+def test_a_damaged_file_is_said_and_made_anew(kept: Path, tmp_path: Path, rigidimeter) -> None:
+    before = (kept / KEPT).read_bytes()
+    (kept / KEPT).write_bytes(before[:-1000])
+    ran = rigidimeter("report", kept, "--out", tmp_path / "report")
+    assert ran.status == 0
+    assert f"{AGAIN}{KEPT} is damaged" in ran.err
+    assert (kept / KEPT).read_bytes() == before
+
+
+def test_options_are_part_of_it(kept: Path, tmp_path: Path, rigidimeter) -> None:
+    rigidimeter("compare", kept, "--seed", "7", "--resamples", "100")
+    ran = rigidimeter("report", kept, "--band-hz", "0.5", "9", "--out", tmp_path / "report")
+    assert f"{AGAIN}--band-hz was null, and is [0.5, 9.0]" in ran.err
+    ran = rigidimeter("report", kept, "--out", tmp_path / "report")
+    assert f"{AGAIN}--band-hz was [0.5, 9.0], and is null" in ran.err
+
+
+def test_a_study_that_cannot_be_written_still_gives_a_report(
+    kept: Path, tmp_path: Path, rigidimeter, no_analysis, monkeypatch
+) -> None:
+    def read_only(path: Path, content: bytes) -> None:
+        if path.is_relative_to(kept):
+            raise OSError(30, "Read-only file system")
+        replace_file(path, content)
+
+    monkeypatch.setattr("rigidimeter.study.kept_result.replace_file", read_only)
+    monkeypatch.setattr("rigidimeter.documents.writing.replace_file", read_only)
+    ratings = kept / "ratings.csv"
+    before = ratings.read_bytes()
+    ratings.write_bytes(before.replace(b"M1,1,OFF,A,2.0", b"M1,1,OFF,A,2.5"))
+    ran = rigidimeter("report", kept, "--out", tmp_path / "one")
+    assert (tmp_path / "one/report.html").is_file()
+    assert f"{AGAIN}ratings.csv has changed" in ran.err
+    assert "the analysis is not kept" in ran.err
+    ratings.write_bytes(before)
+    no_analysis()
+    assert rigidimeter("report", kept, "--out", tmp_path / "two").status == 0
+
+
+def test_with_files_of_the_user_everything_is_computed(
+    kept: Path, tmp_path: Path, rigidimeter
+) -> None:
+    (tmp_path / "added.py").write_text("")
+    before = (kept / KEPT).read_bytes()
+    ran = rigidimeter("--load", tmp_path / "added.py", "report", kept, "--out", tmp_path / "r")
+    assert f"{AGAIN}files are loaded with --load" in ran.err
+    assert (kept / KEPT).read_bytes() == before
