@@ -3,7 +3,8 @@
 The study is the virtual one of the paper's size, made once, by the other tree if there is one: what
 an older version recorded is read by both. Each command runs by turns from both
 trees, on a fresh copy of the study, so that no run finds what another one kept. CPU time is user
-and system time of the process and its children.
+and system time of the process and its children. `kept-report` is a report after a comparison of the
+same copy, which is not counted.
 
     python -m benchmarks.cpu_commands --against ../other/src
     python -m benchmarks.cpu_commands --against ../other/src --command compare --repeats 5
@@ -24,7 +25,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 SOURCE = Path(__file__).parents[1] / "src"
-COMMANDS = ("compare", "estimate", "report", "reproduce")
+COMMANDS = ("compare", "estimate", "report", "kept-report", "reproduce")
 
 
 class Cost(NamedTuple):
@@ -64,7 +65,7 @@ def run(source: Path, folder: Path, *arguments: object) -> Cost:
 
 
 def measured(command: str, source: Path, study: Path) -> Cost:
-    """Run one of the commands on a fresh copy of the study."""
+    """Run one of the commands on a fresh copy of the study, `kept-report` after a comparison."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         if command == "reproduce":
@@ -80,7 +81,9 @@ def measured(command: str, source: Path, study: Path) -> Cost:
             ],
             "report": ["report", "study", "--out", "report"],
         }
-        return run(source, folder, *arguments[command])
+        if command == "kept-report":
+            run(source, folder, *arguments["compare"])
+        return run(source, folder, *arguments[command.removeprefix("kept-")])
 
 
 def made(study: Path, source: Path) -> Path:
@@ -111,7 +114,7 @@ def by_turns(command: str, sources: Sequence[Path], study: Path, repeats: int) -
 
 def _lines(command: str, found: Sequence[Cost]) -> str:
     here = found[0]
-    line = f"{command:<10} {here.cpu_s:8.1f} {here.wall_s:8.1f}"
+    line = f"{command:<12} {here.cpu_s:8.1f} {here.wall_s:8.1f}"
     if len(found) == 1:
         return line
     there = found[1]
@@ -146,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             study = made(study, sources[-1])
             for source in sources:  # compile what is not compiled yet
                 run(source, Path(temporary), "estimate", next((study / "sessions").iterdir()))
-        head = f"{'command':<10} {'CPU s':>8} {'wall s':>8}"
+        head = f"{'command':<12} {'CPU s':>8} {'wall s':>8}"
         if len(sources) > 1:
             head += f" {'other':>8} {'wall s':>8} {'CPU ×':>8} {'wall ×':>8}"
         print(head, flush=True)
