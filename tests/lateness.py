@@ -13,11 +13,13 @@ with the reason and what it last found: it has neither failed nor passed. That h
 passed with so wide a bound that it would have passed whatever happened. A failure is believed only
 where the machine was more punctual still, because on
 a wire one lateness adds to another (`FAILURE_SHARE`). The probes are processes and not threads:
-what the software under test does to its own interpreter must not widen a bound.
+what the software under test does to its own interpreter must not widen a bound. They are started
+once for each priority, and only look now and then whether a test needs them while none does.
 """
 
 from __future__ import annotations
 
+import atexit
 import gc
 import mmap
 import os
@@ -39,6 +41,9 @@ PAUSE_S = 1.0
 """Before a test is repeated, times the attempts so far: the test beside it may be what is late."""
 
 ROWS = 20_000
+HEAD_BYTES = 16
+"""Begin with whether a test needs the probe."""
+
 BYTES = 16 + 16 * ROWS
 MOST_PROCESSORS = 8
 FAILURE_SHARE = 0.2
@@ -50,19 +55,23 @@ NOTED_S = 0.0005
 PROBE = """
 import mmap, os, struct, sys, time
 view = mmap.mmap(int(sys.argv[1]), 0)
-rows, noted_s = int(sys.argv[2]), float(sys.argv[3])
-at = 0
-for processor in sys.argv[5:]:
+head, rows, noted_s = int(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4])
+at = head
+for processor in sys.argv[6:]:
     at += 16 + 16 * rows
     if os.fork() == 0:
         os.sched_setaffinity(0, [int(processor)])
         break
 else:
-    at = 0
-    os.sched_setaffinity(0, [int(sys.argv[4])])
+    at = head
+    os.sched_setaffinity(0, [int(sys.argv[5])])
 row, next_s = 0, time.monotonic()
 parent = os.getppid()
 while os.getppid() == parent:
+    if not view[0]:
+        time.sleep(0.008)
+        next_s = time.monotonic()
+        continue
     next_s += 0.001
     struct.pack_into("qd", view, at, row, next_s)
     time.sleep(max(next_s - time.monotonic(), 0.0))
@@ -72,6 +81,40 @@ while os.getppid() == parent:
         row += 1
         next_s = now_s
 """
+
+
+class _Processes:
+    """A process on each processor, of the present priority; it ends with this one."""
+
+    def __init__(self, ordinary: bool) -> None:
+        processors = sorted(os.sched_getaffinity(0))[:MOST_PROCESSORS]
+        self.starts = range(HEAD_BYTES, HEAD_BYTES + BYTES * len(processors), BYTES)
+        with tempfile.TemporaryFile() as file:
+            file.truncate(self.starts.stop)
+            self.view = mmap.mmap(file.fileno(), 0)
+            numbers = [file.fileno(), HEAD_BYTES, ROWS, NOTED_S, *processors]
+            self.process = subprocess.Popen(
+                [sys.executable, "-S", "-c", PROBE, *map(str, numbers)],
+                pass_fds=[file.fileno()],
+                preexec_fn=ordinary_priority if ordinary else None,
+            )
+        atexit.register(self._end)
+
+    def _end(self) -> None:
+        self.process.kill()
+        self.process.wait()
+
+
+STARTED: dict[tuple[bool, int, int], _Processes] = {}
+"""By whether they are ordinary, and the policy and priority that they have otherwise."""
+
+
+def _processes(ordinary: bool) -> _Processes:
+    """Return the processes of the present priority, started if there are none."""
+    key = ordinary, os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
+    if key not in STARTED or STARTED[key].process.poll() is not None:
+        STARTED[key] = _Processes(ordinary)
+    return STARTED[key]
 
 
 class LatenessProbe:
@@ -93,30 +136,19 @@ class LatenessProbe:
 
     def __enter__(self) -> Self:
         self.allowed_s = 0.0
-        self._file = tempfile.TemporaryFile()
-        processors = sorted(os.sched_getaffinity(0))[:MOST_PROCESSORS]
-        self._starts = range(0, BYTES * len(processors), BYTES)
-        self._file.truncate(BYTES * len(processors))
-        self._view = mmap.mmap(self._file.fileno(), 0)
-        descriptor = self._file.fileno()
-        command = [sys.executable, "-S", "-c", PROBE, descriptor, ROWS, NOTED_S, *processors]
-        self._process = subprocess.Popen(
-            list(map(str, command)),
-            pass_fds=[descriptor],
-            preexec_fn=ordinary_priority if self._ordinary else None,
-        )
-        until_s = time.monotonic() + 30.0
-        while not all(self._due_s(start) for start in self._starts):
-            assert time.monotonic() < until_s, "the lateness probe did not start"
+        processes = _processes(self._ordinary)
+        self._process, self._view = processes.process, processes.view
+        self._starts = processes.starts
+        asked_s = time.monotonic()
+        self._view[0] = 1
+        while not all(self._due_s(start) > asked_s for start in self._starts):
+            assert time.monotonic() < asked_s + 30.0, "the lateness probe did not start"
             time.sleep(0.001)
         self._began_s = time.monotonic()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        self._process.wait()
-        self._view.close()
-        self._file.close()
+        self._view[0] = 0
 
     def _due_s(self, start: int) -> float:
         return float(struct.unpack_from("d", self._view, start + 8)[0])

@@ -123,6 +123,9 @@ class Session:
                 os.killpg(self.process.pid, signal.SIGKILL)
                 self.process.communicate()
                 raise
+        for pipe in (self.process.stdout, self.process.stderr):
+            if pipe is not None:  # nobody has read it, if a test failed
+                pipe.close()
 
     def endings(self) -> list[tuple[str, str, str]]:
         """Return what was closed, with its outcome and reason: once each, and nothing follows."""

@@ -122,8 +122,14 @@ def test_fault_26_a_torque_that_does_not_answer(rig, case, tmp_path, measured):
         measured(26, rig, f"{case}: {deg:.1f} deg", trial, within_s)
 
 
-@pytest.mark.parametrize("rig", RIGS)
-@pytest.mark.parametrize("at_s", [0.9, 1.3])
+@pytest.mark.parametrize(
+    ("rig", "at_s"),
+    [
+        *(("virtual", at_s) for at_s in (0.9, 1.3)),
+        *((CANOPEN, 0.9), (ASCII, 1.3)),
+        *(pytest.param(*other, marks=pytest.mark.slow) for other in ((CANOPEN, 1.3), (ASCII, 0.9))),
+    ],
+)
 def test_fault_26_a_sign_that_turns_in_a_run(rig, at_s, tmp_path, measured):
     wrong, causes, _ = UNTRUE["sign"]
     with bench(rig, **LONG) as made:

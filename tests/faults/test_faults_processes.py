@@ -113,6 +113,7 @@ class Session:
             state = self.bench.state()
             moves = abs(state["velocity_rad_s"]) > 0.02
             still_s = None if moves else still_s or state["time_s"]
+            time.sleep(0.002)
         assert still_s is not None, "the arm still moves"
         return still_s - at_s
 
@@ -169,7 +170,12 @@ def test_fault_09_loop_process_lost(drive, number, tmp_path, measured):
         assert rest_s <= bound_s + slack_s(at_s)
         events, samples = running.closed()
         assert events[-1]["outcome"] == "fail"
-        assert "the loop's process" in events[-1]["reason"]
+        lost = {
+            signal.SIGKILL: "the loop's process ended without closing the session",
+            signal.SIGSTOP: "the loop's process did not answer",
+        }
+        assert events[-1]["reason"].startswith(lost[number])
+        assert [event["event"] for event in events].count("epoch_ended") == 1
         assert_whole(samples)
         measured(9, RIG[drive], signal.Signals(number).name, rest_s=rest_s, bound_s=bound_s)
 
@@ -190,6 +196,9 @@ def test_fault_19_console_process_lost(number, tmp_path, measured):
         assert samples["velocity_command_rad_s"][-1] == 0.0
         assert_whole(samples)
         assert not running.bench.state()["power"]
+        if number is signal.SIGSTOP:  # it goes on, and says what has happened meanwhile
+            os.kill(running.pids["CONSOLE"], signal.SIGCONT)
+            assert Cause.CONSOLE_LOST.sentence in running.line(15.0)["reason"]
         measured(19, "rdt_canopen", signal.Signals(number).name, rest_s=rest_s, bound_s=bound_s)
 
 

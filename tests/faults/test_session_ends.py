@@ -37,7 +37,8 @@ def session(tmp_path):
         return started[0]
 
     yield start
-    started[0].close()
+    for one in started:
+        one.close()
 
 
 OUTCOMES = {
@@ -147,6 +148,7 @@ def stopped_by_full_disk(run: Session, disk: Path) -> Path:
     return ballast
 
 
+@pytest.mark.slow  # always: one that is told to end before there is room, as below
 def test_a_full_disk_stops_the_arm_and_the_record_waits_for_room(session, small_disk):
     run = session(60.0, folder=small_disk / "session")
     ballast = stopped_by_full_disk(run, small_disk)
@@ -193,6 +195,7 @@ def test_a_full_disk_does_not_keep_the_program(number, session, small_disk):
     assert "Traceback" not in err
     ended = json.loads(out.splitlines()[-1])
     assert ended["outcome"] == ""
+    assert "No space left on device); 0.0 MB are free, " in ended["seen"]["trouble"]
     assert any("stay in memory" in remark for remark in ended["remarks"])
     assert run.mine <= memory()
     with pytest.raises(UserError, match="could not be written"):

@@ -147,6 +147,7 @@ def test_a_drive_that_brakes_slower_than_the_guard_counts_on_is_caught(
     assert record.failed[0].value == pytest.approx(math.degrees(20.0), rel=1e-3)
 
 
+@pytest.mark.slow  # the checks themselves, with these faults, are tested on a simulated clock
 def test_a_torque_of_the_wrong_sign_is_caught(can_bench: Any, tmp_path: Path) -> None:
     rig = changed(can_bench.rig, tmp_path, '"ati-rdt"', '"ati-rdt"\nsign = 1')
     _, failed = tried(rig, settings(250.0))
@@ -161,6 +162,7 @@ def test_an_angle_of_the_wrong_sign_is_caught(can_bench: Any) -> None:
     assert abs(can_bench.state()["angle_rad"] - before_rad) < 0.02
 
 
+@pytest.mark.slow
 def test_wrong_counts_are_caught_by_the_nudge(can_bench: Any, tmp_path: Path) -> None:
     rig = changed(can_bench.rig, tmp_path, '"cia402"', '"cia402"\ncounts_per_rev = 142.98')
     _, failed = tried(rig, settings(250.0))
