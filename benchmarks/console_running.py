@@ -145,6 +145,8 @@ def memory(minutes: float) -> None:
                     for what, of in pids.items():
                         found[what].append(sum(psutil.Process(pid).memory_info().rss for pid in of))
                     page.wait_for_timeout(1e3 * LOOK_S)
+                ended = console.ended()
+                print(f"the session ended: {ended['outcome']} {ended['reason'] or ''}")
         finally:  # also of a study that was ended early
             console.close()
             _print_memory(np.array(times_s), found)

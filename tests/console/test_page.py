@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
 
 import numpy as np
 import pytest
 from tests.console.opened import fill, open_page, start, wait_for
 
+from rigidimeter.recording import SessionWriter
 from rigidimeter.recording.sample_reading import read_samples
 from rigidimeter.recording.session_folder import read_manifest
+from rigidimeter.settings import Settings
 
 MARKUP = "<img src=x onerror=alert(1)>"
 RUNS = "document.getElementById('state').textContent === 'epoch runs'"
@@ -26,14 +31,86 @@ def monotonic_origin_s(console):
     return next(e["monotonic_s"] for e in console.events() if e["event"] == "clock_started")
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", ""])
-def test_a_stranger_opens_no_socket(console, origin):
-    from websockets.exceptions import InvalidStatus
-    from websockets.sync.client import connect
+@pytest.fixture
+def stranger():
+    """Serve a page of somebody else on this computer; return its address."""
 
-    address = console().address.replace("http", "ws") + "live"
-    with pytest.raises(InvalidStatus, match="403"), connect(address, origin=origin or None):
-        pass
+    class Page(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.send_header("content-type", "text/html")
+            self.end_headers()
+            self.wfile.write(b"<body></body>")
+
+        def log_message(self, *_):
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Page)
+    Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://localhost:{server.server_port}/"
+    server.shutdown()
+    server.server_close()
+
+
+ATTACK = """(address) => Promise.all([
+  ...["iframe", "script", "img"].map((name) => new Promise((done) => {
+    const one = document.createElement(name);
+    one.onload = () => done("loaded");
+    one.onerror = () => done("refused");
+    one.src = name === "script" ? address + "assets/page.js" : address;
+    document.body.append(one);
+  })),
+  new Promise((done) => {
+    const socket = new WebSocket(address.replace("http", "ws") + "live");
+    socket.onopen = () => done("open");
+    socket.onerror = () => done("refused");
+  }),
+  fetch(address, { method: "POST", headers: { "x-own": "1" } }).then(() => "done", () => "refused"),
+])"""
+
+
+def test_a_page_of_somebody_else_gets_nothing_from_the_browser_of_the_operator(
+    console, chromium, stranger
+):
+    page = chromium.new_context().new_page()
+    page.goto(stranger)
+    framed, *others = page.evaluate(ATTACK, console().address)
+    assert others == ["refused"] * 4
+    assert framed == "loaded"  # the browser's own page, which says why not
+    assert page.frames[1].locator("#emergency").count() == 0
+
+
+def test_names_in_the_files_of_others_are_text(console, chromium):
+    """A folder and a manifest that somebody copied here, with markup in every name."""
+    desk = console()
+    settings = Settings()
+    desk.sessions.mkdir(exist_ok=True)
+    writer = SessionWriter(
+        desk.sessions / MARKUP.replace("/", ""),
+        settings,
+        [],
+        {},
+        virtual=True,
+        about={"subject": MARKUP},
+    )
+    begun = {"label": MARKUP, "task": MARKUP, "condition": f"</script>{MARKUP}", "time_s": 0.0}
+    writer.event("epoch_started", epoch=1, **begun)
+    writer.event("epoch_ended", epoch=1, label=MARKUP, outcome="fail", reason=MARKUP, time_s=1.0)
+    writer.event("note", what="rating", epoch=1, score=1.5, by=MARKUP)
+    writer.event("session_ended", outcome="fail", reason=MARKUP)
+    writer.close_files()
+    page = chromium.new_context().new_page()
+    said = []
+    page.on("dialog", lambda dialog: (said.append(dialog.message), dialog.dismiss()))
+    page.goto(desk.address)
+    page.get_by_role("button", name="After").click()
+    page.get_by_text(f"{writer.folder.name}:").click()
+    page.get_by_text(f"rated 1.5 ({MARKUP})").wait_for()
+    page.get_by_role("button", name="Show").click()
+    page.get_by_text("has no samples").wait_for()
+    assert page.locator("img[src=x]").count() == 0
+    assert said == []
+    shutil.rmtree(writer.folder)
 
 
 def test_a_session_from_the_form_to_its_end(console, chromium):

@@ -45,7 +45,7 @@ class Estimator:
     settings : OnlineSettings
     rate_hz : float
     compiled : bool
-        Whether to compile the step, which takes seconds and is then forty times as fast.
+        Whether to compile the step; the compiler holds up its process for a second.
     """
 
     def __init__(self, settings: OnlineSettings, rate_hz: float, *, compiled: bool = True) -> None:
