@@ -5,7 +5,9 @@ file `pids.json` beside the folder names the processes and their memory. With `s
 orders another folder as soon as the recorder is in trouble.
 """
 
+import ctypes
 import json
+import signal
 import sys
 from dataclasses import asdict
 from functools import partial
@@ -21,6 +23,7 @@ from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import parse_settings
 
 RATE_HZ = 500
+PR_SET_PDEATHSIG = 1  # of prctl(2)
 PATIENCE = Patience(look_s=0.05, loop_lost_s=1.0, hung_s=2.0, disk_s=3.0)
 SETTINGS = parse_settings({"loop": {"console_lost_s": 1.0, "recorder_lost_s": 1.0}})
 
@@ -49,6 +52,8 @@ def ticks(duration_s, side):
 
 
 def main() -> None:
+    # A test that is killed ends nothing itself, and a full disk keeps a session for ever.
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     folder, duration_s = Path(sys.argv[1]), float(sys.argv[2])
     options = dict(option.partition("=")[::2] for option in sys.argv[3:])
     save_to = Path(options["save"]) if "save" in options else None

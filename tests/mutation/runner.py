@@ -63,7 +63,9 @@ TESTS = {
         *("acquisition/test_session_run.py", "acquisition/test_stop_account.py"),
     ),
     "acquisition/tick.py": _RUN,
-    "acquisition/stop_account.py": ("acquisition/test_stop_account.py",),
+    "acquisition/stop_account.py": (
+        *("acquisition/test_stop_numbers.py", "acquisition/test_stop_account.py"),
+    ),
     "acquisition/stop_remedies.py": ("acquisition/test_stop_account.py",),
     "acquisition/processes/sink.py": (
         *("acquisition/test_sink.py", "acquisition/test_shared_status.py"),

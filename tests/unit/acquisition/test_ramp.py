@@ -120,9 +120,10 @@ def test_a_tick_that_failed_after_the_guard_is_not_braked_in_twice(what, first, 
     assert recorded == sorted(set(recorded))
 
 
-def test_a_ramp_that_cannot_be_recorded_waits_for_each_tick():
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_ramp_that_cannot_be_recorded_waits_for_each_tick(sign):
     loop, samples = made(SETTINGS)
-    run_ticks(loop, 1, 10, constant(2.0))
+    run_ticks(loop, 1, 10, constant(sign * 2.0))
     began_s = loop.time_s
 
     def full(sample):
@@ -134,7 +135,7 @@ def test_a_ramp_that_cannot_be_recorded_waits_for_each_tick():
     loop.clock.deadlines_s.clear()
     with pytest.raises(OSError, match="disk full"):
         ramp_to_rest(loop)
-    assert_ramps(written(loop)[9:], 10)
+    assert_ramps([sign * v for v in written(loop)[9:]], 10)
     assert loop.at_rest
     waits = [round((t - began_s) / INTERVAL_S) for t in loop.clock.deadlines_s]
     # The tick that failed, how late that has made the next, and then one tick after the other.

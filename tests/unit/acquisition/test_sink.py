@@ -8,7 +8,7 @@ from rigidimeter.acquisition.processes import shared_memory
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.sink import RingSink, SharedSupervision
 from rigidimeter.acquisition.processes.status_values import Condition, Role
-from rigidimeter.acquisition.run_states import Run, State
+from rigidimeter.acquisition.run_states import NOTHING, Run, State
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample
 
@@ -82,6 +82,23 @@ def test_so_many_samples_may_wait_for_the_recorder(shared, limits, allowed):
     shared.samples.push(sample(0.1 * allowed))
     assert supervision.cause(0.0) == Cause.RECORD_OVERFLOW
     assert supervision.measured == allowed + 1
+
+
+def test_the_silence_of_a_console_that_was_killed_is_not_known(shared, monkeypatch):
+    monkeypatch.setattr("rigidimeter.acquisition.processes.sink.getppid", lambda: 41)
+    supervision = SharedSupervision(
+        shared, most_lag=0, console_pid=41, now_ns=lambda: START_NS, boot_ns=lambda: START_NS
+    )
+    shared.samples.push(sample(0.0))
+    assert supervision.cause(0.0) == Cause.RECORD_OVERFLOW
+    assert supervision.measured == 1
+    monkeypatch.setattr("rigidimeter.acquisition.processes.sink.getppid", lambda: 1)
+    assert supervision.cause(0.0) == Cause.CONSOLE_LOST
+    assert math.isnan(supervision.measured)
+
+
+def test_nobody_asked_for_an_end_so_none_is_ordered(shared):
+    assert SharedSupervision(shared).order() is NOTHING
 
 
 def test_an_operator_is_there_unless_it_is_said(shared):
