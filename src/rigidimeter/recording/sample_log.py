@@ -236,7 +236,8 @@ def append_line(file: BinaryIO, line: bytes) -> None:
         while rest:
             rest = rest[file.write(rest) :]
         file.flush()
-    except OSError:
+    except OSError as error:
         file.seek(start)
         file.truncate()
+        error.filename = file.name  # of a descriptor the system does not say it
         raise

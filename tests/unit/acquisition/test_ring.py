@@ -3,9 +3,12 @@ import time
 
 import numpy as np
 import pytest
+from tests.file_size import file_size_limit
 
+from rigidimeter.acquisition.processes import shared_memory
 from rigidimeter.acquisition.processes.ring import ROW, EventRing, SampleReader, SampleRing
 from rigidimeter.acquisition.processes.shared_memory import Memory
+from rigidimeter.errors import UserError
 from rigidimeter.recording.sample_log import Sample, sample_dtypes
 
 
@@ -132,6 +135,16 @@ def test_memory_may_be_closed_and_unlinked_twice():
     for each in (other, memory, memory, other):
         each.close()
         each.unlink()
+
+
+def test_memory_that_is_not_there_is_refused_with_its_size(tmp_path, monkeypatch):
+    monkeypatch.setattr(shared_memory, "WHERE", tmp_path)
+    with (
+        file_size_limit(1_000_000),
+        pytest.raises(UserError, match=r"no 4\.6 MB of shared memory .*\(File too large\)"),
+    ):
+        SampleRing.create(30_000)
+    assert list(tmp_path.iterdir()) == []
 
 
 def write(name: str, count: int) -> None:

@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pyarrow as pa
 import pytest
+from tests.file_size import file_size_limit
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.event_log import read_events
@@ -68,6 +69,20 @@ def test_a_recording_is_never_written_over(tmp_path):
     write(tmp_path / "s.arrows", 10)
     with pytest.raises(FileExistsError):
         SampleLog(tmp_path / "s.arrows", 1000.0)
+
+
+def test_a_batch_for_which_there_is_no_room_names_its_file_and_leaves_the_others(tmp_path):
+    path = tmp_path / "samples.arrows"
+    log = SampleLog(path, 1000.0, "s")
+    for tick in range(199):
+        log.append(sample(tick))
+    size = path.stat().st_size
+    with file_size_limit(size + 100), pytest.raises(OSError, match="File too large") as refused:
+        log.append(sample(199))  # which makes the batch full
+    assert refused.value.filename == str(path)
+    assert path.stat().st_size == size
+    log.close()
+    assert read_samples(path)["tick"].tolist() == list(range(200))
 
 
 def test_closing_twice_does_no_harm(tmp_path):

@@ -23,6 +23,8 @@ import secrets
 import tempfile
 from pathlib import Path
 
+from rigidimeter.errors import UserError
+
 ORDERED = platform.machine().lower() in {"x86_64", "amd64"}
 """Whether writes of one processor are seen by the others in their order."""
 
@@ -64,7 +66,7 @@ class Memory:
 
         Raises
         ------
-        OSError
+        UserError
             If there is not so much memory.
         """
         name = name or new_name()
@@ -74,9 +76,15 @@ class Memory:
             # All of it now: what is missing later would end the process that writes there.
             os.posix_fallocate(descriptor, 0, size)
             return cls(name, descriptor)
-        except BaseException:  # also when interrupted: what is not unlinked outlives this process
+        except BaseException as error:  # also when interrupted: it would outlive this process
             os.close(descriptor)
             path.unlink()
+            if isinstance(error, OSError):
+                raise UserError(
+                    f"{WHERE}: has no {size / 1e6:.1f} MB of shared memory for the session "
+                    f"({error.strerror}); remove what is not needed there, or make it larger "
+                    "(`df -h` shows it; of a container `--shm-size` sets it)"
+                ) from None
             raise
 
     @classmethod
