@@ -91,8 +91,8 @@ EQUIVALENT: dict[str, str] = {
     "step.py _stoppable_speed: distance_rad <= 0.0 → distance_rad < 0.0": "the root gives 0, too",
     "session_run.py run_session: 0 → 1": "the next number where no epoch is planned: none repeats",
     "session_run.py run_session: 0 → -1": "the next number where no epoch is planned: none repeats",
-    "zeroing.py moved: moved_deg <= limit_deg + settings.rig.motion.angle_resolution_deg → "
-    "moved_deg < limit_deg + settings.rig.motion.angle_resolution_deg": MOMENT,
+    "zeroing.py moved: range_deg <= limit_deg + settings.rig.motion.angle_resolution_deg → "
+    "range_deg < limit_deg + settings.rig.motion.angle_resolution_deg": MOMENT,
     LOOP + "self.elapsed_ticks = 1 → pass": SET,
     LOOP + "1 → 2": SET,
     LOOP + "1 → 0": SET,
@@ -112,6 +112,7 @@ EQUIVALENT: dict[str, str] = {
     "sent as it was allowed is the guard's velocity already",
     "tick.py run_tick: loop.limit_time_s <= due_s → loop.limit_time_s < due_s": "a later tick is "
     "due later",
+    "stop_account.py : if TYPE_CHECKING: ... → if False: ...": "it is never true where it runs",
     "ramp.py ramp_to_rest: 0 → 1": RAMP,
     "ramp.py ramp_to_rest: 0 → -1": RAMP,
     "sink.py SharedSupervision.__init__: 3 → 4": "one look at both clocks more",

@@ -44,9 +44,9 @@ class Latched(NamedTuple):
     guard: GuardState
     agreement: ConsistencyLimits
     consistency: ConsistencyState
-    elapsed_ticks: int = 1
-    late_in_a_row: int = 0
-    measured: float = math.nan
+    elapsed_ticks: int
+    late_in_a_row: int
+    measured: float
 
     @classmethod
     def of(cls, loop: ControlLoop, sample: Sample) -> Latched:
