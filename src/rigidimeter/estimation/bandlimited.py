@@ -26,6 +26,7 @@ from rigidimeter.estimation.closedloop.between_samples import (
     torque_filter_of,
     without_driven,
 )
+from rigidimeter.estimation.closedloop.drive_motion import DrivenAt
 from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares, intervals_text
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.signals import (
@@ -161,9 +162,10 @@ def _motion(
     command = epoch.channels.get("velocity_command_rad_s")
     if drive is None or command is None:
         return kinematics(epoch, time_s)
-    rest = kinematics(without_driven(epoch, drive, command), time_s)
+    driven_at = DrivenAt(drive, command)
+    rest = kinematics(without_driven(epoch, driven_at), time_s)
     torque = epoch.channels["torque_nm"]
-    caused = driven_behind(drive, torque_filter_of(settings), command, torque)
+    caused = driven_behind(driven_at, torque_filter_of(settings), torque)
     angle, velocity, acceleration = (
         beyond + values_at(replace(torque, values=part), time_s)
         for beyond, part in zip(rest, caused[::-1], strict=True)

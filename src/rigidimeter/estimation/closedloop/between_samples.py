@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.dynamics import EVEN, ArmMotion, DriveModel, lowpass
-from rigidimeter.estimation.closedloop.drive_motion import driven, since_ticks
+from rigidimeter.estimation.closedloop.drive_motion import DrivenAt, driven, since_ticks
 from rigidimeter.estimation.signals import Array, motion_channels
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import EstimationSettings, RigSettings
@@ -98,24 +98,26 @@ def seen_beyond_samples(
     return np.asarray(seen.T - filtered(torque_filter, omega_rad_s) * sampled.T)
 
 
-def without_driven(epoch: Epoch, drive: DriveModel, command: Channel) -> Epoch:
+def without_driven(epoch: Epoch, driven_at: DrivenAt) -> Epoch:
     """Return the epoch with what its motion sensors saw beyond the motion that the command causes.
 
     Each at its own stamps.
     """
     rest = dict(epoch.channels)
     for channel in motion_channels(epoch):
-        caused = driven(drive, command, channel.time_s)
+        caused = driven_at(channel.time_s)
         seen = caused.angle_rad if channel.name == "angle_rad" else caused.velocity_rad_s
         rest[channel.name] = Channel(channel.name, channel.time_s, channel.values - seen)
     return replace(epoch, channels=rest)
 
 
 def driven_behind(
-    drive: DriveModel, torque_filter: TorqueFilter | None, command: Channel, torque: Channel
+    driven_at: DrivenAt, torque_filter: TorqueFilter | None, torque: Channel
 ) -> ArmMotion:
     """Return the motion that the command causes, as the torque sensor sees it at its stamps."""
-    return driven(behind(drive, torque_filter), command, torque.time_s)
+    if torque_filter is None:
+        return driven_at(torque.time_s)
+    return driven(behind(driven_at.drive, torque_filter), driven_at.command, torque.time_s)
 
 
 def accelerations_seen(

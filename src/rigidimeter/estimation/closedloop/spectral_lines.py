@@ -36,6 +36,7 @@ from rigidimeter.estimation.closedloop.between_samples import (
     seen_beyond_samples,
     without_driven,
 )
+from rigidimeter.estimation.closedloop.drive_motion import DrivenAt
 from rigidimeter.estimation.signals import (
     Array,
     angle_at,
@@ -257,13 +258,13 @@ def _between_samples(
         sent = grid.transform(command_at(command, time_s))
         sampled = _spectra(grid, angle, velocity) * filtered(torque_filter, omega)
         return np.asarray(sampled + beyond * sent[:, None])
-    rest = without_driven(epoch, drive, command)
+    driven_at = DrivenAt(drive, command)
+    rest = without_driven(epoch, driven_at)
     motion = _spectra(grid, *_motion(rest, grid.time_s))
     motion *= filtered(torque_filter, grid.omega_rad_s)
     # At the stamps of the torque, and from there like the torque.
     torque = epoch.channels["torque_nm"]
-    seen_motion = driven_behind(drive, torque_filter, command, torque)
-    for column, part in enumerate(seen_motion):
+    for column, part in enumerate(driven_behind(driven_at, torque_filter, torque)):
         there = Channel(torque.name, torque.time_s, part)
         motion[:, column] += grid.transform(values_at(there, grid.time_s, SAME_TIME))
     return motion

@@ -25,7 +25,7 @@ from scipy.ndimage import uniform_filter1d
 
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_least
 from rigidimeter.estimation.diagnostics.excitation_checks import perturbation_nm
-from rigidimeter.estimation.signals import Array, Signals, motion_channels, values_at
+from rigidimeter.estimation.signals import Array, Signals, motion_channels, sampled, values_at
 from rigidimeter.estimation.stretches import sound
 from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings
@@ -59,6 +59,9 @@ def static_torque(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings)
 
 
 def _at(channel: Channel, time_s: Array) -> Array:
+    place = sampled(channel, time_s)
+    if place is not None:
+        return channel.values[place]
     return np.interp(time_s, channel.time_s, channel.values)
 
 

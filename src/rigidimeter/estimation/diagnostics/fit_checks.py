@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import fft, signal
+from scipy import fft
 from scipy.special import digamma
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
@@ -66,11 +66,14 @@ def residual_perturbation(
         cause = zero_phase_band(cause, signals.rate_hz, signals.band_hz)
     cause, residual = cause - cause.mean(), residual_nm - residual_nm.mean()
     size = float(np.linalg.norm(cause) * np.linalg.norm(residual))
-    together = signal.correlate(residual, cause, method="fft") / (size or math.inf)
-    middle, lag = residual.size - 1, round(LONGEST_LAG_S * signals.rate_hz)
-    near = together[max(middle - lag, 0) : middle + lag + 1]
+    lag = min(round(LONGEST_LAG_S * signals.rate_hz), residual.size - 1)
+    # As many zeros as lags, so that no end meets the other.
+    length = fft.next_fast_len(residual.size + lag, real=True)
+    both = fft.rfft(residual, length) * fft.rfft(cause, length).conj()
+    together = fft.irfft(both, length) / (size or math.inf)
+    near = together[np.arange(-lag, lag + 1)]
     at = int(np.argmax(np.abs(near)))
-    delay_s = (at - min(lag, middle)) / signals.rate_hz
+    delay_s = (at - lag) / signals.rate_hz
     r = float(abs(near[at]))
     chance = _chance_correlation(residual, cause, signals.rate_hz, lag)
     sd = float(np.std(signals.torque_nm))

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigidimeter.estimation.closedloop.line_noise import Smoother
 from rigidimeter.estimation.closedloop.linear_problems import Problem, instrumental
@@ -28,6 +27,7 @@ from rigidimeter.estimation.terms.beyond_linear import BeyondLinear
 from rigidimeter.estimation.terms.catalogue import REFLEXES
 from rigidimeter.estimation.terms.explained import (
     Complex,
+    Filtered,
     explained,
     strongest,
     triangle,
@@ -56,7 +56,8 @@ def moved(case: Case, beyond: BeyondLinear, groups: Sequence[Sequence[OmittedTer
         }
         return [np.sum([alone[term] for term in group], axis=0)[None] for group in groups]
     low, high = case.signals.band_hz
-    inside = (beyond.frequency_hz >= low) & (beyond.frequency_hz <= high)
+    first, last = np.searchsorted(beyond.frequency_hz, (low, np.nextafter(high, np.inf))).tolist()
+    inside = slice(first, last)
     motion = beyond.linear[inside]
     alone = {term: _added(motion, motion, term.lines(beyond)[inside]) for term in terms}
     refit = _Refit(beyond, [term.name for term in terms], inside)
@@ -95,9 +96,7 @@ def _added(weighted: Complex, regressors: Complex, torque: Complex) -> Array:
 class _Refit:
     """J, B and K by least squares with some of the terms, at lines of the band."""
 
-    def __init__(
-        self, beyond: BeyondLinear, names: Sequence[str], inside: NDArray[np.bool_]
-    ) -> None:
+    def __init__(self, beyond: BeyondLinear, names: Sequence[str], inside: slice) -> None:
         self._beyond, self._inside = beyond, inside
         self._plain = [name for name in names if name not in REFLEXES]
         lines = [beyond.linear, *(beyond.term_lines(name) for name in self._plain)]
@@ -119,7 +118,8 @@ class _Refit:
         # One reflex at most is looked for: its direction is decided by what is not linear.
         (name,) = reflexes
         columns = self._columns[:, used]
-        late = self._beyond.reflex_lines(name)[self._inside]
-        best = strongest(columns, late, self._torque)
-        upper = triangle(np.column_stack([columns, late[:, best]]), self._torque)
+        signal, gains = self._beyond.reflexes(name)
+        late = Filtered(signal[self._inside], gains.part(self._inside, slice(None)))
+        best = late.column(strongest(columns, late, self._torque))
+        upper = triangle(np.column_stack([columns, best]), self._torque)
         return explained(upper[:, :-1], upper[:, -1]).values[:3]

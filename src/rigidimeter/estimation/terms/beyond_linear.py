@@ -29,7 +29,7 @@ from scipy import fft
 
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
-from rigidimeter.estimation.terms.explained import COLLINEAR, Complex, stacked
+from rigidimeter.estimation.terms.explained import COLLINEAR, Complex, Filtered, Gains, stacked
 from rigidimeter.estimation.terms.reflex import kernel
 from rigidimeter.estimation.window import tapered_ends
 
@@ -139,18 +139,22 @@ class BeyondLinear:
             self._made[name] = self.lines(term.regressor(self.motion))[:, None]
         return self._made[name]
 
-    def reflex_lines(self, name: str) -> Complex:
-        """Return the lines of a reflex at each point of its grid as they are, shape (m, g)."""
+    def reflexes(self, name: str) -> Filtered:
+        """Return the lines of a reflex at each point of its grid as they are."""
+        (signal,) = self._stretch(name).T
+        return Filtered(signal, _gains(kernel(name).kind, *self._span))
+
+    @property
+    def _span(self) -> tuple[int, int, float]:
+        """The first line, how many there are, and the duration in s that they belong to."""
         duration_s = float(f"{self._window.size / self.motion.rate_hz:.9g}")
-        kind = kernel(name).kind
-        return self._stretch(name) * _gains(kind, self._first, self.frequency_hz.size, duration_s)
+        return self._first, self.frequency_hz.size, duration_s
 
     def _term(self, name: str, inner: tuple[float, ...]) -> Complex:
         if name not in REFLEXES:
             return self.term_lines(name)
         # Its gains change slowly over a stretch, as the filter that is free there.
-        gains = kernel(name).transfer(self.frequency_hz, np.asarray(inner, dtype=np.float64))
-        return self._stretch(name) * np.stack(gains, axis=1)
+        return self._stretch(name) * _gain(kernel(name).kind, inner, *self._span)
 
     def _stretch(self, name: str) -> Complex:
         """Return the lines of the velocity that stretches, that of the damping of one direction."""
@@ -206,12 +210,22 @@ class BeyondLinear:
         """Return the lines of a signal in time, shape (n,)."""
         return _lines(values, self._window, self._first, self.frequency_hz.size)
 
-    def white_sizes(self, lines: Complex) -> Array:
-        """Return Σ |white(lines)|², shape (p,), without making the lines white."""
-        parts = lines.reshape(*self._basis.shape[:2], lines.shape[1])
-        taken = self._basis.conj().transpose(0, 2, 1) @ parts
-        power = _power(parts) - _power(taken)
-        return np.asarray(self._size_nm**-2.0 @ power)
+    def white_sizes(self, columns: Filtered) -> Array:
+        """Return Σ |white(column)|², shape (q,), without making the columns."""
+        (stretches, each, _), signal = self._basis.shape, columns.signal.reshape(-1, 1)
+        turned = self._basis.conj() * signal.reshape(stretches, each, 1)
+        rows = np.concatenate([turned.real, turned.imag], axis=2).transpose(0, 2, 1)
+        real, imaginary, power = (
+            gain.reshape(stretches, each, gain.shape[1]) for gain in columns.gains
+        )
+        by_real, by_imaginary = rows @ real, rows @ imaginary
+        taken = np.sum(
+            (by_real[:, :3] - by_imaginary[:, 3:]) ** 2
+            + (by_imaginary[:, :3] + by_real[:, 3:]) ** 2,
+            axis=1,
+        )
+        size = (signal.real**2 + signal.imag**2).reshape(stretches, 1, each)
+        return np.asarray(self._size_nm**-2.0 @ ((size @ power)[:, 0] - taken))
 
     def white(self, lines: Complex) -> Complex:
         """Return what is left of lines, shape (m, p), as of the torque."""
@@ -279,19 +293,24 @@ def beyond_linear(
 
 
 @lru_cache(maxsize=8)
-def _gains(kind: str, first: int, count: int, duration_s: float) -> Complex:
+def _gains(kind: str, first: int, count: int, duration_s: float) -> Gains:
     """Return a reflex of gain 1 at each point of its grid, which epochs of one length share."""
     found = kernel(kind)
     # For each parameter inside a row of its values, shape (1, g).
     inner = np.asarray(found.starts).T[:, None, :]
     (gains,) = found.transfer((np.arange(first, first + count) / duration_s)[:, None], inner)
-    gains.setflags(write=False)
-    return gains
+    return Gains.of(gains)
 
 
-def _power(parts: Complex) -> Array:
-    """Return Σ |lines|² of each stretch, shape (b, p), of lines of shape (b, m, p)."""
-    return np.asarray(np.sum(parts.real**2 + parts.imag**2, axis=1))
+@lru_cache(maxsize=64)
+def _gain(
+    kind: str, inner: tuple[float, ...], first: int, count: int, duration_s: float
+) -> Complex:
+    """Return a reflex with a column for each linear parameter at 1, shape (m, p)."""
+    frequency_hz = np.arange(first, first + count) / duration_s
+    found = np.stack(kernel(kind).transfer(frequency_hz, np.asarray(inner)), axis=1)
+    found.setflags(write=False)
+    return found
 
 
 def _without(parts: Complex, basis: Complex) -> Complex:

@@ -44,15 +44,59 @@ def explained(columns: Array, target: Array) -> Explained:
     return Explained(float(target @ target - products @ products), np.asarray(values))
 
 
-def strongest(base: Complex, tried: Complex, target: Complex, sizes: Array | None = None) -> int:
+class Gains(NamedTuple):
+    """Several complex gains at every line: real and imaginary parts, and |gain|², (n, q) each."""
+
+    real: Array
+    imaginary: Array
+    power: Array
+
+    @classmethod
+    def of(cls, gains: Complex) -> Gains:
+        """Return gains, shape (n, q), which can then not be changed."""
+        parts = (gains.real.copy(), gains.imag.copy(), gains.real**2 + gains.imag**2)
+        for part in parts:
+            part.setflags(write=False)
+        return cls(*parts)
+
+    def part(self, lines: slice, columns: slice) -> Gains:
+        """Return those of some lines and columns."""
+        return Gains(*(one[lines, columns] for one in self))
+
+
+class Filtered(NamedTuple):
+    """The lines of one signal, shape (n,), behind each of several gains: q columns, not made."""
+
+    signal: Complex
+    gains: Gains
+
+    def along(self, rows: Complex) -> Array:
+        """Return Σ Re(rows* column), shape (p, q), for rows of shape (n, p)."""
+        turned = rows.conj() * self.signal[:, None]
+        return np.asarray(turned.real.T @ self.gains.real - turned.imag.T @ self.gains.imaginary)
+
+    @property
+    def sizes(self) -> Array:
+        """Σ |column|², shape (q,)."""
+        return np.asarray((self.signal.real**2 + self.signal.imag**2) @ self.gains.power)
+
+    def column(self, place: int) -> Complex:
+        """Return one of the columns, shape (n,)."""
+        gain = self.gains.real[:, place] + 1j * self.gains.imaginary[:, place]
+        return np.asarray(self.signal * gain)
+
+
+def strongest(base: Complex, tried: Filtered, target: Complex, sizes: Array | None = None) -> int:
     """Return which of the columns tried explains most of the target beside those of the base.
 
     Parameters
     ----------
-    base, tried, target : complex arrays, shapes (n, p), (n, q) and (n,)
+    base, target : complex arrays, shapes (n, p) and (n,)
+    tried : Filtered
+        q columns.
     sizes : array, shape (q,), optional
-        Σ |tried|², if it is known. Columns may then hold a part beside that is at right angles to
-        base and target and not counted.
+        Σ |tried|², if it is not that of the columns: they may hold a part beside that is at right
+        angles to base and target and not counted.
     """
     columns = stacked(base)
     basis, _ = np.linalg.qr(columns / _lengths(columns))
@@ -61,9 +105,9 @@ def strongest(base: Complex, tried: Complex, target: Complex, sizes: Array | Non
     left = goal - basis @ (basis.T @ goal)
     n = len(target)
     rows = np.column_stack([basis, left])
-    along = ((rows[:n] - 1j * rows[n:]).T @ tried).real
+    along = tried.along(rows[:n] + 1j * rows[n:])
     if sizes is None:
-        sizes = np.sum(tried.real**2 + tried.imag**2, axis=0)
+        sizes = tried.sizes
     beside = sizes - np.sum(along[:-1] ** 2, axis=0)
     new = beside > COLLINEAR * sizes
     power = np.where(new, along[-1] ** 2 / np.where(new, beside, 1.0), 0.0)

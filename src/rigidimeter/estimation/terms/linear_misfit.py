@@ -22,7 +22,14 @@ from scipy import optimize, special
 
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.terms.beyond_linear import BeyondLinear
-from rigidimeter.estimation.terms.explained import Complex, explained, stacked, strongest
+from rigidimeter.estimation.terms.explained import (
+    Complex,
+    Filtered,
+    Gains,
+    explained,
+    stacked,
+    strongest,
+)
 from rigidimeter.estimation.terms.omitted_terms import CHANCE
 
 NEARLY_ALL = 0.9
@@ -129,10 +136,11 @@ def _coupling(joint: Array, omega: Array, angle: Complex, target: Array) -> Foun
 
 
 def _both_directions(motion: Complex, omega: Array, target: Complex) -> Found:
-    turns = np.exp(-1j * omega[:, None] * DELAYS_S)
-    late = turns * motion[:, [1]]
+    turns = Gains.of(np.exp(-1j * omega[:, None] * DELAYS_S))
+    late = Filtered(motion[:, 1], turns)
     best = strongest(motion, late, target)
-    rest, values = explained(stacked(np.column_stack([motion, late[:, best]])), stacked(target))
+    columns = np.column_stack([motion, late.column(best)])
+    rest, values = explained(stacked(columns), stacked(target))
     return ("reflex", float(values[3]), float(DELAYS_S[best]), values[:3]), rest
 
 

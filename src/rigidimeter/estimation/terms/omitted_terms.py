@@ -27,6 +27,7 @@ from rigidimeter.estimation.terms.catalogue import REFLEXES, term_named
 from rigidimeter.estimation.terms.explained import (
     Complex,
     Explained,
+    Filtered,
     explained,
     one_more,
     strongest,
@@ -152,7 +153,7 @@ class _Search:
     def __init__(self, beyond: BeyondLinear) -> None:
         self._beyond = beyond
         self._terms: dict[_Found, int] = {}
-        self._tried: dict[str, tuple[list[_Found], Complex, Array]] = {}
+        self._tried: dict[str, tuple[list[_Found], Filtered, Array]] = {}
         self._take([term for name in TESTED for term in _tested(name)])
 
     def _take(self, terms: Sequence[_Found]) -> None:
@@ -207,18 +208,20 @@ class _Search:
         delayed, slow = ((term, self.fit([*found, term])) for term in best)
         return slow if delayed[1].left - slow[1].left > DYNAMICS else delayed
 
-    def _reflexes(self, kind: str) -> tuple[list[_Found], Complex, Array]:
-        """Return the reflexes that are tried, their lines as they are, and their white sizes.
+    def _reflexes(self, kind: str) -> tuple[list[_Found], Filtered, Array]:
+        """Return the reflexes that are tried, their lines over their size, and their white sizes.
 
         What is linear in the lines is at right angles to whatever is white.
         """
         if kind not in self._tried:
             inners = self._beyond.grid([kind])
-            late = np.flatnonzero([inner[0] >= EARLIEST_S for inner in inners])
-            lines = self._beyond.reflex_lines(kind)[:, late]
+            # The delay comes first and rises.
+            late = slice(sum(inner[0] < EARLIEST_S for inner in inners), None)
+            signal, gains = self._beyond.reflexes(kind)
+            lines = Filtered(signal, gains.part(slice(None), late))
             sizes = self._beyond.white_sizes(lines)
-            tried = lines / self._beyond.line_size_nm[:, None]
-            self._tried[kind] = [_Found(kind, inners[i]) for i in late], tried, sizes
+            tried = lines._replace(signal=signal / self._beyond.line_size_nm)
+            self._tried[kind] = [_Found(kind, inner) for inner in inners[late]], tried, sizes
         return self._tried[kind]
 
 

@@ -6,12 +6,17 @@ alike: the equation keeps its coefficients (see `estimation.bandlimited`). Deriv
 the frequency domain, where they are exact up to that low-pass:
 
     F(x^(k)) <-> (j 2 pi f)^k / (1 + (f / wide)^8) X(f)
+
+The line between the ends is taken out and its derivative put back, and the rest continued by its
+point reflection: position and velocity then have no step where the period closes. What is continued
+so is a sum of sines, b_k sin(π k i / (n − 1)), so that a sine and a cosine transform suffice.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, signal
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
@@ -26,8 +31,6 @@ from rigidimeter.estimation.signals import (
 )
 from rigidimeter.records import Epoch
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE
-
-Complex = NDArray[np.complex128]
 
 WIDE_OVER_BAND = 3.0
 """How far above the band the noise is cut before a term bends the signal."""
@@ -47,8 +50,8 @@ def wideband_from_angle(
         Where the low-pass has half its gain, well above the band of the fit; at or above half the
         rate nothing is cut.
     """
-    angle, velocity, acceleration = _derivatives(angle_rad, (0, 1, 2), rate_hz, wide_hz)
-    (torque,) = _derivatives(torque_nm, (0,), rate_hz, wide_hz)
+    torque, rest = _Sines(torque_nm, rate_hz, wide_hz).value(), _Sines(angle_rad, rate_hz, wide_hz)
+    angle, velocity, acceleration = rest.value(), rest.slope(), rest.curvature()
     return Signals(
         time_s=np.arange(angle_rad.size) / rate_hz,
         torque_nm=torque,
@@ -77,7 +80,7 @@ def wideband_signals(epoch: Epoch, high_hz: float) -> Signals:
         angle = values_at(epoch.channels["angle_rad"], time_s)
         return wideband_from_angle(torque, angle, rate_hz, wide_hz)
     everything = np.stack([torque, *kinematics(epoch, time_s)])
-    torque, angle, velocity, acceleration = _derivatives(everything, (0,), rate_hz, wide_hz)[0]
+    torque, angle, velocity, acceleration = _Sines(everything, rate_hz, wide_hz).value()
     return Signals(
         time_s=time_s,
         torque_nm=torque,
@@ -107,33 +110,50 @@ def banded(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> Array
     return np.asarray(passed, dtype=np.float64)
 
 
-def _derivatives(
-    values: Array, orders: tuple[int, ...], rate_hz: float, wide_hz: float
-) -> list[Array]:
-    """Return derivatives of signals, shape (..., n), along their last axis."""
-    # The line between the ends is taken out and its derivative put back, and the rest continued by
-    # its point reflection: position and velocity then have no step where the period closes.
-    n = values.shape[-1]
-    if n < 2:
-        raise ValueError(f"{n} sample(s) have no derivative")
-    first, last = values[..., :1], values[..., -1:]
-    line = first + (last - first) * np.linspace(0.0, 1.0, n)
-    rest = values - line
-    whole = np.concatenate((rest, -rest[..., -2:0:-1]), axis=-1)
-    frequency_hz = fft.rfftfreq(whole.shape[-1], 1.0 / rate_hz)
-    spectrum = fft.rfft(whole)
-    if wide_hz < rate_hz / 2:
-        fourth = ((frequency_hz / wide_hz) ** 2) ** 2
-        spectrum *= 1.0 / (1.0 + fourth * fourth)
-    back = (line, (last - first) * (rate_hz / (n - 1)), 0.0)
-    return [
-        np.asarray(fft.irfft(_differentiated(spectrum, order, frequency_hz), whole.shape[-1]))[
-            ..., :n
-        ]
-        + back[order]
-        for order in orders
-    ]
+class _Sines:
+    """Signals, shape (..., n), as a line and sines, low-passed."""
+
+    def __init__(self, values: Array, rate_hz: float, wide_hz: float) -> None:
+        n = values.shape[-1]
+        if n < 2:
+            raise ValueError(f"{n} sample(s) have no derivative")
+        first, self._rise = values[..., :1], values[..., -1:] - values[..., :1]
+        self._line = first + self._rise * np.linspace(0.0, 1.0, n)
+        self._rise_per_s = self._rise * (rate_hz / (n - 1))
+        lowpass, self._omega = _sine_lines(n, float(f"{rate_hz:.12g}"), wide_hz)
+        # Of two samples nothing but the line is left.
+        inner = (values - self._line)[..., 1:-1]
+        self._sines = fft.dst(inner, 1) * lowpass if n > 2 else inner
+
+    def value(self) -> Array:
+        """Return the signals."""
+        return self._sum(self._sines, self._line)
+
+    def slope(self) -> Array:
+        """Return their first derivative."""
+        n = self._line.shape[-1]
+        ends = [(0, 0)] * (self._line.ndim - 1) + [(1, 1)]
+        cosines = np.pad(self._sines * self._omega, ends)
+        return np.asarray(fft.dct(cosines, 1) / (2 * (n - 1)) + self._rise_per_s)
+
+    def curvature(self) -> Array:
+        """Return their second derivative."""
+        return self._sum(-self._sines * self._omega**2, np.zeros_like(self._line))
+
+    def _sum(self, sines: Array, beside: Array) -> Array:
+        found = beside.copy()
+        if sines.shape[-1]:
+            found[..., 1:-1] += fft.idst(sines, 1)
+        return found
 
 
-def _differentiated(spectrum: Complex, order: int, frequency_hz: Array) -> Complex:
-    return spectrum * (2j * np.pi * frequency_hz) ** order if order else spectrum
+@lru_cache(maxsize=4)
+def _sine_lines(n: int, rate_hz: float, wide_hz: float) -> tuple[Array, Array]:
+    """Return gain and angular frequency of the sines, which epochs of one length share."""
+    frequency_hz = np.arange(1, n - 1) * (rate_hz / (2 * (n - 1)))
+    fourth = ((frequency_hz / wide_hz) ** 2) ** 2
+    passed = 1.0 / (1.0 + fourth * fourth) if wide_hz < rate_hz / 2 else np.ones(n - 2)
+    lines = passed, np.asarray(2 * np.pi * frequency_hz, dtype=np.float64)
+    for one in lines:
+        one.setflags(write=False)
+    return lines

@@ -5,7 +5,14 @@ import pytest
 
 from rigidimeter.estimation.signals import Signals
 from rigidimeter.estimation.terms.beyond_linear import beyond_linear
-from rigidimeter.estimation.terms.explained import explained, one_more, stacked, strongest
+from rigidimeter.estimation.terms.explained import (
+    Filtered,
+    Gains,
+    explained,
+    one_more,
+    stacked,
+    strongest,
+)
 
 RNG = np.random.default_rng(5)
 
@@ -33,12 +40,23 @@ def test_a_column_that_is_in_the_base_gains_nothing():
 
 
 def test_the_strongest_is_that_of_the_best_fit():
-    base, tried, target = lines(20, 2), lines(20, 9), lines(20)
+    base, signal, gains, target = lines(20, 2), lines(20), lines(20, 9), lines(20)
+    columns = signal[:, None] * gains
     left = [
         explained(stacked(np.column_stack([base, column])), stacked(target)).left
-        for column in tried.T
+        for column in columns.T
     ]
-    assert strongest(base, tried, target) == int(np.argmin(left))
+    tried = Filtered(signal, Gains.of(gains))
+    best = strongest(base, tried, target)
+    assert best == int(np.argmin(left))
+    assert tried.column(best) == pytest.approx(columns[:, best], rel=1e-14)
+
+
+def test_columns_that_are_not_made_have_the_products_of_those_that_are():
+    rows, signal, gains = lines(20, 2), lines(20), lines(20, 9)
+    columns, tried = signal[:, None] * gains, Filtered(signal, Gains.of(gains))
+    assert tried.along(rows) == pytest.approx((rows.conj().T @ columns).real, rel=1e-12)
+    assert tried.sizes == pytest.approx(np.sum(np.abs(columns) ** 2, axis=0), rel=1e-12)
 
 
 def test_lines_as_they_are_stand_for_white_ones():
@@ -55,13 +73,16 @@ def test_lines_as_they_are_stand_for_white_ones():
         band_hz=(0.0, 50.0),
     )
     beyond = beyond_linear(motion, (0.5, 20.0))
-    as_they_are = lines(beyond.torque.size, 7)
-    white = beyond.white(as_they_are)
-    sizes = beyond.white_sizes(as_they_are)
+    signal, gains = lines(beyond.torque.size), lines(beyond.torque.size, 5)
+    columns = Filtered(signal, Gains.of(gains))
+    white = beyond.white(signal[:, None] * gains)
+    sizes = beyond.white_sizes(columns)
     assert sizes == pytest.approx(np.sum(np.abs(white) ** 2, axis=0), rel=1e-12)
-    base, scaled = white[:, :2], as_they_are / beyond.line_size_nm[:, None]
-    best = strongest(base, white[:, 2:], beyond.torque)
-    assert strongest(base, scaled[:, 2:], beyond.torque, sizes[2:]) == best
+    base = beyond.white(lines(beyond.torque.size, 2))
+    ones = np.ones(beyond.torque.size)
+    best = strongest(base, Filtered(ones, Gains.of(white)), beyond.torque)
+    scaled = columns._replace(signal=signal / beyond.line_size_nm)
+    assert strongest(base, scaled, beyond.torque, sizes) == best
 
 
 @pytest.mark.parametrize("n", [4000, 4002, 4005, 4001])
