@@ -22,6 +22,7 @@ from rigidimeter.estimation import (
 from rigidimeter.estimation.alignment import MOST_EPOCHS, aligned_prepared
 from rigidimeter.estimation.between_epochs import between_epochs
 from rigidimeter.estimation.clock_error import with_clock_error
+from rigidimeter.estimation.closedloop.as_sampled import delay_of_drive_s
 from rigidimeter.estimation.closedloop.observation import closed_loop_obstacle
 from rigidimeter.estimation.diagnostics import checked, checked_together
 from rigidimeter.estimation.diagnostics.delay_check import torque_delay
@@ -196,7 +197,8 @@ def analyse_prepared(
     for prepared, fit in zip(fitted, found, strict=True):
         found_fit = checked(prepared, fit)
         if closed_loop_obstacle(prepared.epoch):
-            late = torque_delay(found_fit, delays, prepared.settings.diagnostics)
+            diagnostics, of_drive_s = prepared.settings.diagnostics, delay_of_drive_s(prepared)
+            late = torque_delay(found_fit, delays, of_drive_s, diagnostics)
             found_fit = replace(found_fit, findings=(*found_fit.findings, *late))
         fits.append(found_fit)
         progress(costs.check if fits_alone else costs.first_check)

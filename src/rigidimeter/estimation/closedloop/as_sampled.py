@@ -20,6 +20,7 @@ from rigidimeter.estimation.closedloop.between_samples import (
     INEXACT,
     TorqueFilter,
     acceleration_by_settings,
+    acceleration_late_s,
     accelerations_seen,
     behind,
     filtered,
@@ -104,6 +105,19 @@ def moved_by_settings(
     gram = (motion.conj().T @ motion).real / np.outer(scale, scale)
     moment = (motion.conj().T @ (beyond * motion[:, 1])).real / scale
     return np.asarray(np.linalg.solve(gram, moment) / scale)
+
+
+def delay_of_drive_s(prepared: PreparedEpoch) -> float:
+    """Return which delay of the torque may be the drive's, where it was not followed; else 0.
+
+    Inertia is most of the torque where a delay shows, so an acceleration that is late at the ticks
+    looks like a late torque. Which drive it was is not known: that of the settings tells the size.
+    """
+    if prepared.source.drive is not None and "velocity_command_rad_s" in prepared.epoch.channels:
+        return 0.0
+    rig = prepared.settings.rig
+    drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
+    return abs(acceleration_late_s(drive, 1.0 / rig.tick_rate_hz))
 
 
 def as_they_are(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:

@@ -154,6 +154,18 @@ def accelerations_seen(
     return np.array(found)
 
 
+def acceleration_late_s(drive: DriveModel, interval_s: float) -> float:
+    """Return how late the acceleration at the ticks is against the slope of the velocity there.
+
+    Before its edge a command has not come yet, so the acceleration A at the ticks is that of the
+    command before. At low frequency A/(jω V) is a gain and a delay; the delay of a drive of second
+    order that is slow against the ticks is ζ ω₀ T²/6.
+    """
+    omega = np.array([LOW / interval_s])
+    acceleration, velocity, _ = drive.transfer(np.exp(1j * omega * interval_s), interval_s)
+    return float(-np.angle(acceleration / (1j * omega * velocity)).item() / omega.item())
+
+
 def acceleration_by_settings(rig: RigSettings, torque_filter: TorqueFilter | None) -> float:
     """Return that share for the drive and the ticks that the settings name, at the ticks."""
     drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)

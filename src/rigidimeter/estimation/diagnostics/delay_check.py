@@ -5,7 +5,9 @@ Torque that is stamped τ late makes of J s² + B s + K, to the first order in �
     (J − B τ) s² + (B − K τ) s + K
 
 Where the perturbation was recorded, a delay is told from a reflex, friction and a soft cuff, and is
-corrected or named as one of them. Without it a delay is known and its cause is not.
+corrected or named as one of them. Without it a delay is known and its cause is not. Where the drive
+is not known either, a delay as short as that of the acceleration at the ticks (`as_sampled`) may be
+the drive's, which is in the interval of J.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ SIGNIFICANT = 3.0
 
 
 def torque_delay(
-    fit: Fit, delays: Sequence[Delay], settings: DiagnosticsSettings
+    fit: Fit, delays: Sequence[Delay], of_drive_s: float, settings: DiagnosticsSettings
 ) -> tuple[Finding, ...]:
     """Return the finding where the delay moves J or B by more than half their intervals.
 
@@ -33,13 +35,15 @@ def torque_delay(
         By least squares, of an epoch whose perturbation is not known.
     delays : sequence of Delay
         Of all sources.
+    of_drive_s : float
+        Which delay may be the drive's.
     settings : DiagnosticsSettings
     """
     found = next((delay for delay in delays if delay.source == fit.source), None)
     if found is None or found.corrected or not fit.n_samples:
         return ()
     late_s = abs(found.delay_s)
-    if not late_s > SIGNIFICANT * found.delay_s_se:
+    if not late_s > of_drive_s + SIGNIFICANT * found.delay_s_se:
         return ()
     moved = late_s * np.abs(fit.value[1:])
     share = float(np.max(moved / half_widths(fit)[:2]))
