@@ -5,13 +5,16 @@ of their noise, the lines of a band b give
 
     p_b = G_b⁻¹ Σ_b Re(Zᴴ Y)/S        G_b = Σ_b Re(Zᴴ Φ)/S
 
-Let p be that of the band of the fit and R = Y − Φ p what it leaves. Then, exactly,
+Epochs of joints that differ weigh otherwise in another band, which moves p_b though no band says
+anything else of any of them. So each epoch e is compared with itself, p_e being its estimate in the
+band of the fit, and the change is the mean of theirs, with the weights of band b:
 
-    p_b − p = Σ_k Re(D_kᴴ R_k)        D_k = (Z_k [k in b] G_b⁻ᵀ − Z_k [k in fit] G⁻ᵀ)/S_k
+    Δ_b = G_b⁻¹ Σ_e G_be (p_be − p_e) = Σ_k Re(D_kᴴ R_k)
+    D_k = (Z_k [k in b] − Z_k [k in fit] G_e⁻ᵀ G_beᵀ) G_b⁻ᵀ/S_k
 
-so that the difference has its own standard error, from ½ Σ Re(Dᴴ D) S: what the noise does to both
-alike is not counted. Where Z is Φ without noise and one band holds the other this is the difference
-of the two variances (Hausman 1978).
+with R = Y − Φ p of any p. With one epoch this is p_b − p exactly. The change has its own standard
+error, from ½ Σ Re(Dᴴ D) S: what the noise does to both alike is not counted. Where Z is Φ without
+noise and one band holds the other this is the difference of the two variances (Hausman 1978).
 
 A half of an epoch is its window times ½ (1 ± sin 2πt/T), which adds up neighbouring lines:
 X_k becomes ½ X_k ± (X_{k−1} − X_{k+1})/4i. No signal is transformed again.
@@ -121,7 +124,7 @@ def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
         one._replace(residual=one.member.lines.torque_nm - one.member.lines.motion @ values)
         for one in weighted
     ]
-    own = [_only(one.instruments, one.member.fitted) @ inverse.T for one in left]
+    own = [_own(one) for one in left]
     first = left[0].member
     changes = []
     for low, high, part in _variants(first):
@@ -169,22 +172,21 @@ def _change(
 ) -> tuple[Array, Array, Array]:
     """Return change, standard error and probability."""
     sign = {"all": 0, "first half": 1, "second half": -1}[part]
-    gram = np.zeros((3, 3))
-    effects = []
+    grams, effects = [], []
     for one, within in zip(weighted, lines, strict=True):
         if sign:
             halved = _halved(one.member.instruments, sign) / one.power[:, None]
             used = _only(halved, within)
-            gram += (used.conj().T @ _halved(one.member.lines.motion, sign)).real
+            grams.append((used.conj().T @ _halved(one.member.lines.motion, sign)).real)
             effects.append(_halved_adjoint(used, sign))
         else:
             used = one.instruments[within]
-            gram += (used.conj().T @ one.member.lines.motion[within]).real
+            grams.append((used.conj().T @ one.member.lines.motion[within]).real)
             effects.append(_only(one.instruments, within))
-    inverse = _inverse(gram)
+    inverse = _inverse(np.sum(grams, axis=0))
     change, variance, squares = np.zeros(3), np.zeros(3), np.zeros(3)
-    for one, effect, of_fit in zip(weighted, effects, own, strict=True):
-        difference = effect @ inverse.T - of_fit
+    for one, effect, of_epoch, gram in zip(weighted, effects, own, grams, strict=True):
+        difference = (effect - of_epoch @ gram.T) @ inverse.T
         change += (difference.conj().T @ one.residual).real
         covariance, degrees = line_covariance(
             np.eye(3), difference, one.residual, one.smoother, one.power
@@ -195,6 +197,12 @@ def _change(
     se = np.sqrt(variance)
     p = 2 * stats.t.sf(np.abs(change) / se, variance**2 / squares)
     return change, se, np.asarray(p, dtype=np.float64)
+
+
+def _own(one: _Weighted) -> Complex:
+    """Return the effects of the lines on the epoch's own estimate in the band of the fit."""
+    used = _only(one.instruments, one.member.fitted)
+    return np.asarray(used @ _inverse((used.conj().T @ one.member.lines.motion).real).T)
 
 
 def _only(values: Complex, within: slice) -> Complex:

@@ -26,17 +26,17 @@ def noise(rng, size):
     return rng.standard_normal(size) + 1j * rng.standard_normal(size)
 
 
-def member(rng, sd_nm=1.0, missing_nm_s=0.0):
+def member(rng, sd_nm=1.0, missing_nm_s=0.0, truth=TRUTH):
     """Return lines of a joint, white noise on its torque; what is missing grows with frequency."""
     wide, fit = grid(WIDE_HZ), grid(FIT_HZ)
     omega = wide.omega_rad_s
     angle = noise(rng, omega.size)
     motion = angle[:, None] * np.stack([-(omega**2), 1j * omega, np.ones(omega.size)], axis=1)
     missing = missing_nm_s * np.abs(omega) * angle
-    torque = motion @ TRUTH + missing + sd_nm * noise(rng, omega.size)
+    torque = motion @ truth + missing + sd_nm * noise(rng, omega.size)
     first = int(fit.line[0] - wide.line[0])
     fitted = slice(first, first + fit.line.size)
-    return Member(Lines(wide, torque, motion), motion, fitted, TRUTH)
+    return Member(Lines(wide, torque, motion), motion, fitted, truth)
 
 
 def solved(member, power, part):
@@ -71,6 +71,15 @@ def test_bands_are_those_of_the_edges_moved_and_the_halves_those_of_the_fit():
         (0.1, 20.0, "first half"),
         (0.1, 20.0, "second half"),
     ]
+
+
+def test_joints_that_differ_between_epochs_are_no_change_with_the_band():
+    """Each alone says the same in every band."""
+    rng = np.random.default_rng(3)
+    joints = [TRUTH * factors for factors in ((1, 1, 0.8), (1, 1.2, 1), (1, 0.9, 1.3))]
+    _, changes = band_changes([member(rng, 1e-6, truth=joint) for joint in joints])
+    for found in changes:
+        assert found.change / TRUTH == pytest.approx(np.zeros(3), abs=1e-6)
 
 
 def test_the_error_of_a_change_is_its_own():
