@@ -16,6 +16,9 @@ def power_lines(
 ) -> tuple[Array, Array]:
     """Return frequencies and the power at each; without a taper it sums to the variance.
 
+    A few samples at the end are not used where the transform of all takes many times as long: that
+    of 18,001 takes 15 times as long as of 18,000. They are at most 2.2 % of a thousand or more.
+
     Parameters
     ----------
     values : array, shape (n,)
@@ -26,6 +29,7 @@ def power_lines(
     longer : int
         So many times as many lines, for a peak between two of them.
     """
+    values = values[: fft.prev_fast_len(values.size)]
     n = longer * values.size
     centred = values - np.mean(values)
     if tapered:

@@ -96,7 +96,7 @@ def _coherence(cause: Array, effects: Array, signals: Signals) -> Array:
 
     As `scipy.signal.coherence` has it with segments that overlap by half, but every spectrum once.
     """
-    length = max(2 * signals.time_s.size // (SEGMENTS + 1), 8)
+    length = fft.prev_fast_len(max(2 * signals.time_s.size // (SEGMENTS + 1), 8), real=True)
     frequency = fft.rfftfreq(length, 1.0 / signals.rate_hz)
     inside = lines_inside(frequency, signals.band_hz)
     whole = np.concatenate([cause[None], effects])
@@ -153,7 +153,7 @@ def _share(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> float
     does not tell from the band is not outside it.
     """
     frequency, power = power_lines(values, rate_hz, tapered=True)
-    reach_hz = TAPERED_LINES / 2 * rate_hz / values.size
+    reach_hz = TAPERED_LINES / 2 * float(frequency[1])
     total = float(np.sum(power[1:]))
     low_hz, high_hz = band_hz
     inside = lines_inside(frequency, (low_hz - reach_hz, high_hz + reach_hz))

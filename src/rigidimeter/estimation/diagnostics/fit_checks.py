@@ -98,14 +98,15 @@ def _chance_correlation(a: Array, b: Array, rate_hz: float, lag: int) -> float:
     1935). As the lag runs, a Gaussian correlation of rms frequency ν passes ±u standard deviations
     2 ν T exp(−u²/2) times on average (Rice 1944), which is set to 1/20.
     """
-    power_a, power_b = np.abs(fft.rfft(a)) ** 2, np.abs(fft.rfft(b)) ** 2
+    n = fft.prev_fast_len(a.size)  # a transform of any number may take many times as long
+    power_a, power_b = np.abs(fft.rfft(a[:n])) ** 2, np.abs(fft.rfft(b[:n])) ** 2
     power = power_a * power_b
     total = float(np.sum(power_a) * np.sum(power_b))
     if total == 0.0:
         return 0.0
     # One-sided sums hold half of each: ½ remains.
     deviation = math.sqrt(0.5 * float(np.sum(power)) / total)
-    frequency = fft.rfftfreq(a.size, 1.0 / rate_hz)
+    frequency = fft.rfftfreq(n, 1.0 / rate_hz)
     rms_hz = math.sqrt(float(np.sum(frequency**2 * power)) / float(np.sum(power)))
     crossings = max(2.0 * rms_hz * 2.0 * lag / rate_hz, 0.1)
     return deviation * math.sqrt(2.0 * math.log(crossings / 0.05))

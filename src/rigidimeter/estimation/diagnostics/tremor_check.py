@@ -38,8 +38,7 @@ def tremor(voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings)
     low_hz, high_hz = settings.tremor_low_hz, settings.tremor_high_hz
     high_hz = min(high_hz, signals.band_hz[1] - WIDTH_HZ / 2)
     frequency, power = power_lines(voluntary_nm, signals.rate_hz, tapered=True)
-    spacing_hz = signals.rate_hz / voluntary_nm.size
-    width = max(round(WIDTH_HZ / spacing_hz), 1)
+    width = max(round(WIDTH_HZ / float(frequency[1])), 1)
     running = np.convolve(power, np.ones(width), "same")
     inside = np.flatnonzero((frequency >= low_hz) & (frequency <= high_hz))
     if inside.size < 3 * width:
