@@ -165,9 +165,16 @@ def whole_periods(perturbation: Channel, grid_rate_hz: float, samples: int) -> t
     period = period_s(perturbation)
     periods = 0 if period is None else int(samples / grid_rate_hz / period + 1e-6)
     if period is None or periods < 2:
+        long_s = samples / grid_rate_hz
+        shown = (
+            f"no period of the perturbation is twice in the {long_s:.3g} s in a row"
+            if period is None
+            else f"the perturbation repeats every {period:.3g} s, and of the {2 * period:.3g} s of "
+            f"two periods there are {long_s:.3g} s in a row"
+        )
         raise ValueError(
-            "the spectral method needs two whole periods of the perturbation in an epoch; "
-            "use --method iv"
+            f"{shown} that can be used; the spectral method needs two whole periods with nothing "
+            "left out between; use --method iv, which needs none and allows for what is left out"
         )
     return periods, round(periods * period * grid_rate_hz)
 

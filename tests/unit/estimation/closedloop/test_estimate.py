@@ -135,7 +135,9 @@ def test_spectral_needs_two_periods(simulated):
         k: Channel(k, c.time_s[:11000], c.values[:11000]) for k, c in epoch.channels.items()
     })  # fmt: skip
     (fit,), _ = fit_epochs([short], "spectral", settings)
+    assert "twice in the 11 s in a row" in fit.outcome.reason
     assert "two whole periods" in fit.outcome.reason
+    assert "--method iv" in fit.outcome.reason
 
 
 def test_auto_chooses_by_what_was_recorded(simulated):
