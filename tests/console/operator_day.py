@@ -14,6 +14,9 @@ from tests.console.opened import STARTS_S, Console, wait_for
 
 LONG_MS = 1e3 * STARTS_S
 RUNS = "document.getElementById('state').textContent === 'epoch runs'"
+SETTLES_MS = 1500
+"""So long after its end a session may unfold by itself."""
+
 MEMORY = Path("/dev/shm")
 
 
@@ -32,6 +35,7 @@ def rate(page: Page, place: int, score: str) -> None:
     page.locator("#examiner").fill("E1")
     page.locator("#score").fill(score)
     page.locator("#score").press("Enter")
+    expect(page.locator("#said")).to_contain_text(f"rating of epoch {place}: ")
 
 
 def over(page: Page, outcome: str) -> str:
@@ -45,6 +49,7 @@ def opened_session(page: Page, name: str):
     """Return a session under After, unfolded."""
     page.get_by_role("button", name="After", exact=True).click()
     session = page.locator(".session").filter(has_text=f"{name}:")
+    page.wait_for_timeout(SETTLES_MS)
     if not session.get_by_role("button", name="Estimate").is_visible():
         session.get_by_text(f"{name}:").click()
     expect(session.get_by_role("button", name="Estimate")).to_be_visible()

@@ -133,7 +133,7 @@ def _added(
     add_rows(ratings, "ratings", rating_rows(session, table_rows(ratings, "ratings")))
     add_rows(table, "sessions", session_rows(session, before))
     # Not in which condition: the operator may be blinded.
-    return [f"{path}: is in {table.name}, subject {session.subject}, day {session.day}", *said]
+    return [f"{path}: is in {table.name}, subject {session.subject}, day {session.day}.", *said]
 
 
 def _virtual(folder: Path) -> bool | None:

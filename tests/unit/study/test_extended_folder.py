@@ -44,8 +44,8 @@ def test_sessions_become_a_study(tmp_path):
     record(tmp_path / "b", "DBS", note="resumed")
     said = extend_study(tmp_path)
     assert said == [
-        "a: is in sessions.csv, subject S01, day 2026-03-01",
-        "b: is in sessions.csv, subject S01, day 2026-03-01",
+        "a: is in sessions.csv, subject S01, day 2026-03-01.",
+        "b: is in sessions.csv, subject S01, day 2026-03-01.",
     ]
     assert cells(tmp_path, "sessions") == [
         ["a", "S01", "2026-03-01", "OFF", "", "", ""],
@@ -77,7 +77,7 @@ def test_what_a_person_wrote_stays(tmp_path):
     record(tmp_path / "b", "DBS", stimulation=STIMULATION)
     record(tmp_path / "c", "DBS")
     said = extend_study(tmp_path)
-    assert said[0] == "b: is in sessions.csv, subject S01, day 2026-03-01"
+    assert said[0] == "b: is in sessions.csv, subject S01, day 2026-03-01."
     assert "frequency_hz = 130.0, amplitude_ma = 2.5; study.toml says otherwise" in said[1]
     assert len(said) == 2
     after = (tmp_path / "sessions.csv").read_bytes().decode()

@@ -55,6 +55,7 @@ class AfterView:
         self._shown = -1
         ui.label(f"Sessions in {self._root}").classes("text-lg")
         self._list()
+        self._dialogs = ui.element("div")  # not in the list, which is drawn anew meanwhile
         self._answer = ui.html("", sanitize=False).classes("answer")
         ui.element("div").props('id=epoch-panes aria-label="Epoch"')
         ui.timer(1.0, self._follow)
@@ -141,7 +142,7 @@ class AfterView:
         self._desk.ask(StartRequest(folder, resume=session, epoch=epoch, left=left))
 
     def _ask_reason(self, session: str, epoch: str) -> None:
-        with ui.dialog() as dialog, ui.card():
+        with self._dialogs, ui.dialog() as dialog, ui.card():
             ui.label(f"Leave epoch {epoch} of {session} out of results; nothing is deleted.")
             reason = ui.input("Reason").props("maxlength=200 data-field=reason")
             by = ui.input("Your name").props("maxlength=40 data-field=by")

@@ -51,7 +51,7 @@
       if (starting) { view("during"); clear(); }
       seen = key;
     }
-    banner(finished ? finished.sentences.join(" ") : "");
+    banner(finished ? finished.sentences.join("\n") : "");
   }
 
   function during(session) {
@@ -104,7 +104,7 @@
 
   function banner(text) { const at = $("banner"); at.hidden = !text; if (at.textContent !== text) at.textContent = text; }
   function remark(text) { const at = $("said"); at.prepend(node("div", "", text)); while (at.children.length > 4) at.lastChild.remove(); }
-  function clear() { traces.clear(); $("said").replaceChildren(); $("limits").replaceChildren(); }
+  function clear() { traces.clear(); rated = null; show("rated", "–"); $("said").replaceChildren(); $("limits").replaceChildren(); }
 
   function leave() { away = true; say({ kind: "leave" }); }
   function note(what, text) { say({ kind: "note", what, text, by: "" }); remark(`${what}: ${text}`); }
