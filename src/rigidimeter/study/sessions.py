@@ -6,13 +6,10 @@ twice, disagrees with the table about its condition, or was commanded otherwise 
 
 from __future__ import annotations
 
-import json
 import os
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
-from typing import Any
 
 from rigidimeter.documents import noted_digests, open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
@@ -25,16 +22,16 @@ from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES
 from rigidimeter.recording.study_folder import Row, StudyFolder
 from rigidimeter.recording.study_toml import is_outside
 from rigidimeter.records import Epoch, Notice
-from rigidimeter.settings import Settings, dump_settings
+from rigidimeter.settings import Settings
 from rigidimeter.study.analysis import task_of
 from rigidimeter.study.blinding import Naming
 from rigidimeter.study.results import LeftOut, SessionEntry
-
-_COMMANDED: Mapping[str, tuple[str, ...]] = {
-    "prbs": ("controller", "prbs"),
-    "sinusoid": ("controller", "sinusoid"),
-}
-"""By task, the tables of the settings that say what the rig was commanded."""
+from rigidimeter.study.session_checks import (
+    commanded_otherwise,
+    line_of,
+    other_settings,
+    twice,
+)
 
 
 @dataclass(frozen=True)
@@ -149,11 +146,11 @@ def gather(
             sessions.append(session)
             notices += said
         progress(1.0 / len(read.sessions))
-    for find in (_twice, _commanded_otherwise):
+    for find in (twice, commanded_otherwise):
         for row, reason in find(sessions):
             leave_out(row, reason)
             sessions = [session for session in sessions if session.row is not row]
-    notices += _other_settings(sessions)
+    notices += other_settings(sessions)
     if not sessions:
         raise UserError(
             f"{read.folder}: no session is left to analyse: "
@@ -197,7 +194,8 @@ def _read(
     first = samples.get(digest, row) if digest else row
     if first not in before:
         raise _Refused(
-            f"{path} holds the same samples as {first['path']} ({_line(first)}); take the copy out"
+            f"{path} holds the same samples as {first['path']} ({line_of(first)}); "
+            "take the copy out"
         )
     samples.setdefault(digest, row)
     condition = names.named(row["condition"])
@@ -249,7 +247,7 @@ def _options(
 def _differs(path: Path, row: Row, before: Sequence[Row], names: Naming) -> None:
     """Refuse a row of a recording that has one already, but for another of its conditions."""
     for other in before:
-        there = f"{path} is in the table already ({_line(other)})"
+        there = f"{path} is in the table already ({line_of(other)})"
         if names.named(other["condition"]) == names.named(row["condition"]):
             raise _Refused(there)
         if any(other[key] != row[key] for key in ("subject", "day")):
@@ -305,93 +303,3 @@ def _of_condition(
     if others and not kept:
         raise _Refused(f"{path} records no epoch of {condition}; take the row out")
     return kept, said
-
-
-def _twice(sessions: Sequence[Session]) -> list[tuple[Row, str]]:
-    """Find a day of a subject that is there twice with the same condition, task and part."""
-    seen: dict[tuple[str, ...], Row] = {}
-    found = []
-    for session in sessions:
-        row, entry = session.row, session.entry
-        for task in dict.fromkeys(epoch.task or "" for epoch in session.epochs):
-            key = (entry.subject, entry.day, entry.condition, task, row["part"])
-            if key in seen:
-                part = f", part {row['part']}" if row["part"] else ""
-                found.append(
-                    (
-                        row,
-                        f"subject {entry.subject}, day {entry.day}, {entry.condition}, {task}"
-                        f"{part} is in the table already ({_line(seen[key])}); if both are parts "
-                        "of one day, give each a name in the column part",
-                    )
-                )
-                break
-            seen[key] = row
-    return found
-
-
-def _commanded_otherwise(sessions: Sequence[Session]) -> list[tuple[Row, str]]:
-    """Return the sessions that were commanded otherwise than most of their task, and in what.
-
-    Epochs of two versions of a protocol are two measurements, and must not be pooled.
-    Where no version has more sessions than any other, the one that comes first in the table stays.
-    """
-    found: list[tuple[Row, str]] = []
-    for task, tables in _COMMANDED.items():
-        versions = [
-            (session, _values(session.settings, tables))
-            for session in sessions
-            if session.settings is not None
-            and any(epoch.task == task for epoch in session.epochs)
-            and not any(session.row is other for other, _ in found)
-        ]
-        counts = Counter(json.dumps(values, sort_keys=True) for _, values in versions)
-        if len(counts) < 2:
-            continue
-        most = counts.most_common(1)[0][0]
-        usual = json.loads(most)
-        example = next(s.entry for s, v in versions if json.dumps(v, sort_keys=True) == most)
-        for session, values in versions:
-            differing = [name for name in usual if usual[name] != values.get(name)]
-            if not differing:
-                continue
-            told = "; ".join(f"{name} = {values.get(name)}" for name in differing)
-            wanted = "; ".join(f"{name} = {usual[name]}" for name in differing)
-            found.append(
-                (
-                    session.row,
-                    f"{session.entry.path} is of another version of the protocol: it was recorded "
-                    f"with {told}, but {counts[most]} of {len(versions)} sessions, such as "
-                    f"{example.path}, with {wanted}",
-                )
-            )
-    return found
-
-
-def _values(settings: Settings, tables: Sequence[str]) -> dict[str, Any]:
-    dumped = dump_settings(settings)
-    return {f"{table}.{name}": value for table in tables for name, value in dumped[table].items()}
-
-
-def _other_settings(sessions: Sequence[Session]) -> list[Notice]:
-    """Say where sessions were recorded with other settings that the analysis uses or shows."""
-    with_settings = [(s.entry, s.settings) for s in sessions if s.settings is not None]
-    said = []
-    for entry, settings in with_settings[1:]:
-        first_entry, first = with_settings[0]
-        differing = [
-            name
-            for name in ("guard", "rig", "estimation", "scores", "diagnostics")
-            if getattr(settings, name) != getattr(first, name)
-        ]
-        if differing:
-            text = (
-                f"{entry.path}: was recorded with other settings than {first_entry.path} in "
-                f"{', '.join(differing)}; those of {first_entry.path} are used for all"
-            )
-            said.append(Notice("warning", text))
-    return said
-
-
-def _line(row: Row) -> str:
-    return f"line {row.line}"
