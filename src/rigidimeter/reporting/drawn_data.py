@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,17 +21,24 @@ def drawn_csv(figure: Figure) -> str:
     `series` counts the lines of a panel; an interval is a series of its two ends. What only marks a
     place across the whole of an axis is left out.
     """
-    return csv_text(COLUMNS, _rows(figure))
+    return csv_text(COLUMNS, []) + "".join(_lines(figure))
 
 
-def _rows(figure: Figure) -> Iterator[tuple[Any, ...]]:
+def _lines(figure: Figure) -> Iterator[str]:
+    """Yield a line for each point; what all points of a series share is made once."""
     for panel, axes in enumerate(figure.axes, start=1):
         title = axes.get_title("left") or axes.get_title()
         texts = (title, axes.get_xlabel(), axes.get_ylabel())
         about = (panel, *(" ".join(str(text).split()) for text in texts))
         for series, (label, points) in enumerate(_series(axes), start=1):
+            _, _, shared = csv_text(COLUMNS[:-2], [(*about, series, label)]).partition("\n")
+            start = shared.removesuffix("\n")
             for x, y in points.tolist():
-                yield (*about, series, label, x, y)
+                yield f"{start},{_cell(x)},{_cell(y)}\n"
+
+
+def _cell(number: float) -> str:
+    return "" if math.isnan(number) else repr(number)
 
 
 def _series(axes: Axes) -> Iterator[tuple[str, np.ndarray]]:
