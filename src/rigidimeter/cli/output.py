@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -15,11 +18,16 @@ def echo(text: str = "", *, err: bool = False) -> None:
 
     Control characters are shown as escapes, in a message also line feeds. Names of files,
     conditions and examiners come from other people's files: an ESC in one could clear the screen or
-    change what is read there, and a line feed would break a message in two.
+    change what is read there, and a line feed would break a message in two. On a terminal a message
+    is broken between words, elsewhere it stays one line.
     """
     from rigidimeter.documents.escaping import visible
 
-    typer.echo(visible(text, lines=not err), err=err)
+    shown = visible(text, lines=not err)
+    if err and sys.stderr.isatty():
+        width = shutil.get_terminal_size((80, 24)).columns
+        shown = textwrap.fill(shown, width, break_long_words=False, break_on_hyphens=False)
+    typer.echo(shown, err=err)
 
 
 class VisibleErrors(TyperGroup):

@@ -187,17 +187,20 @@ class Recordings:
         UserError
             If an option is wrong, or not one input can be read.
         """
+        from rigidimeter.cli.progress import Meter
         from rigidimeter.recording import read
 
-        recording = read(
-            self.paths,
-            condition=self.condition,
-            leave_out=self.leave_out or (),
-            settings=self.settings,
-            join=self.join,
-            clock_offset=self.asked_clock_offset,
-            **self.of_files(),
-        )
+        with Meter("read", 1.0) as meter:
+            recording = read(
+                self.paths,
+                condition=self.condition,
+                leave_out=self.leave_out or (),
+                settings=self.settings,
+                join=self.join,
+                clock_offset=self.asked_clock_offset,
+                progress=meter.advance,
+                **self.of_files(),
+            )
         return replace(recording, settings=self.adjust(recording.settings))
 
     @property

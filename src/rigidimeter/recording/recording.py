@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -80,6 +80,7 @@ def read(
     join: bool = False,
     clock_offset: float | str | None = None,
     settings: Settings | str | Path | Mapping[str, Any] | None = None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> Recording:
     """Read session folders and files into one recording.
 
@@ -129,6 +130,8 @@ def read(
     settings : Settings, path or mapping, optional
         Settings for the analysis, or a TOML file of them. Default: those with which the first
         session folder was recorded, else the built-in ones.
+    progress : callable
+        Called with the share of the bytes that was read since, 1 in all; not with `join`.
 
     Returns
     -------
@@ -160,7 +163,7 @@ def read(
         raise UserError("--clock-offset: is for recordings that are joined; say --join")
     if not join:
         named = dict(zip(asked, conditions, strict=True))
-        return read_as(named, options, chosen, leave_out)
+        return read_as(named, options, chosen, leave_out, progress)
     with noted_digests() as digests:
         tables = [read_table(path, options) for path in asked]
         joined, found_offset = join_tables(tables, options, clock_offset)
@@ -180,6 +183,7 @@ def read_as(
     options: ReadOptions,
     chosen: Settings | None,
     leave_out: Sequence[str] = (),
+    progress: Callable[[float], None] = lambda _: None,
 ) -> Recording:
     """Read paths, each with its condition, with options and settings that are made already.
 
@@ -193,7 +197,12 @@ def read_as(
     epochs: list[Epoch] = []
     notices: list[Notice] = []
     digests: dict[Path, str] = {}
+    sizes = {path: _size(path) for path in named}
+    total = sum(sizes.values()) or 1
+    begun = 0
     for path, name in named.items():
+        progress(begun / total)
+        begun = sizes[path]
         try:
             with noted_digests() as noted:
                 recorded = recorded_settings(path)
@@ -207,11 +216,21 @@ def read_as(
         digests |= noted
         epochs += found
         notices += remarks
+    progress(begun / total)
     settings = chosen or first or load_settings(None)
     recording = Recording(
         tuple(epochs), tuple(notices), settings, tuple(named), digests, first is not None
     )
     return _complete(recording, leave_out)
+
+
+def _size(path: Path) -> int:
+    """Return the bytes of a file or folder, as far as they can be looked at."""
+    try:
+        files = path.rglob("*") if path.is_dir() else [path]
+        return sum(file.stat().st_size for file in files if file.is_file())
+    except (OSError, ValueError):
+        return 0
 
 
 def _complete(found: Recording, leave_out: Sequence[str]) -> Recording:

@@ -47,11 +47,13 @@ def drawn_signals(
     perturbed = perturbed_epoch(result)
     named = {(epoch.source, epoch.label) for epoch in examples}
     other = perturbed is not None and (perturbed.source, perturbed.label) not in named
+    over_frequency = responses(result)
+    progress(len(result.analysis.fits) / total)
     return DrawnSignals(
         channel_facts(result),
         examples,
         (perturbed,) if perturbed is not None and other else (),
-        responses(result),
+        over_frequency,
         unexplained_spectra(result),
         tuple(traces),
     )

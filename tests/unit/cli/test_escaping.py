@@ -2,6 +2,7 @@
 
 import csv
 import json
+import sys
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigidimeter.cli.output import echo
 from rigidimeter.documents import as_read, as_written, csv_text, visible
 from rigidimeter.recording.formats import read_text_table
 from rigidimeter.reporting.page import shown_text
@@ -108,3 +110,17 @@ def test_pages_and_figures_hold_no_control_characters():
     text = svg_text(figure)
     plt.close(figure)
     assert "\x1b" not in text
+
+
+def test_a_message_is_broken_between_words_on_a_terminal_alone(monkeypatch, capsys):
+    text = (
+        "warning: " + "a long message of many words " * 8 + "/a/path/that-has-no-blank/" + 60 * "x"
+    )
+    echo(text, err=True)
+    assert capsys.readouterr().err == f"{text}\n"
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", "60")
+    echo(text, err=True)
+    lines = capsys.readouterr().err.splitlines()
+    assert " ".join(lines) == text
+    assert all(len(line) <= 60 for line in lines[:-1])

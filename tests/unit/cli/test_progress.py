@@ -9,6 +9,7 @@ import pytest
 
 from rigidimeter.cli.progress import LEAST_SHARE, Meter
 from rigidimeter.experiment import design
+from rigidimeter.recording import read
 from rigidimeter.records import Epoch
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.study import Preparation, compare
@@ -151,3 +152,18 @@ def test_the_time_left_of_an_analysis_is_never_off_by_more_than_three(delay_s: f
     assert np.all(left_s[inside] < 3 * truly_s[inside])
     assert np.all(left_s[inside] > truly_s[inside] / 3)
     assert np.all(np.abs(left_s - truly_s)[~inside] < 2 * least_s)
+
+
+def test_reading_advances_by_the_bytes_of_each_file(tmp_path) -> None:
+    rng = np.random.default_rng(1)
+    paths, sizes = [], []
+    for number, seconds in enumerate((5, 20, 10)):
+        time_s = np.arange(100 * seconds) / 100
+        columns = {"time_s": time_s, "torque_nm": rng.normal(size=time_s.size)}
+        columns["angle_rad"] = 0.1 * rng.normal(size=time_s.size)
+        paths.append(tmp_path / f"{number}.csv")
+        pd.DataFrame(columns).to_csv(paths[-1], index=False)
+        sizes.append(paths[-1].stat().st_size)
+    shares: list[float] = []
+    read(paths, progress=shares.append)
+    assert np.cumsum(shares) == pytest.approx(np.cumsum([0, *sizes]) / sum(sizes))
