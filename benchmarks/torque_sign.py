@@ -32,6 +32,9 @@ from rigidimeter.settings import Settings, parse_settings
 MOMENTS_S = (0.0, 1.0, 1.37, 2.05, 3.13)
 """When the sign turns; at 0 it was wrong from the start."""
 
+WANTED_S, WANTED_DEG = 0.5, 5.0
+"""The sign is to be found before so much time or so much wrong motion, whichever is later."""
+
 LONGEST_S = 4.0
 """So long after it the epoch ends."""
 
@@ -61,11 +64,12 @@ def row(settings: Settings, epochs: int) -> str:
                 others[turned.cause.name.lower().replace("_", " ")] += 1
     rest = ", ".join(f"{n} {name}" for name, n in sorted(others.items())) or "–"
     if not found_s:
-        return f"0 | – | – | {rest}"
+        return f"0 | – | – | 0 | {rest}"
     within_s, deg = np.array(found_s), np.array(wrong_deg)
+    early = np.count_nonzero((within_s <= WANTED_S) | (deg <= WANTED_DEG))
     return (
         f"{len(found_s)} | {np.median(within_s):.2f} ({within_s.min():.2f}–{within_s.max():.2f}) "
-        f"| {np.median(deg):.0f} ({deg.max():.0f}) | {rest}"
+        f"| {np.median(deg):.0f} ({deg.max():.0f}) | {early} | {rest}"
     )
 
 
@@ -118,8 +122,11 @@ def main() -> None:
         print("| size | ticks/s | subject | S/N, median (a tenth is below) |")
         print("| --- | --- | --- | --- |")
     else:
-        print("| size | ticks/s | subject | found | after s | wrong by deg (most) | else |")
-        print("| --- | --- | --- | --- | --- | --- | --- |")
+        early = f"before {WANTED_S:g} s or {WANTED_DEG:g} deg"
+        print(
+            f"| size | ticks/s | subject | found | after s | wrong by deg (most) | {early} | else |"
+        )
+        print("| --- " * 8 + "|")
     for size in given.sizes:
         values = SIZES[size]
         for tick_hz, torque_hz, guard, controller in RATES:

@@ -113,6 +113,8 @@ EQUIVALENT: dict[str, str] = {
     "tick.py run_tick: loop.limit_time_s <= due_s → loop.limit_time_s < due_s": "a later tick is "
     "due later",
     "stop_account.py : if TYPE_CHECKING: ... → if False: ...": "it is never true where it runs",
+    "stop_account.py _stalled: if math.isfinite(latched.measured): ... → if True: ...": "of a "
+    "number and NaN after it the number is the larger",
     "ramp.py ramp_to_rest: 0 → 1": RAMP,
     "ramp.py ramp_to_rest: 0 → -1": RAMP,
     "sink.py SharedSupervision.__init__: 3 → 4": "one look at both clocks more",

@@ -185,6 +185,7 @@ def test_each_cause_is_told_with_its_number(cause, expected):
     [
         (Cause.ENERGY_HIGH, {"guard": {"energy_j": 0.9}}, "value", 0.9),
         (Cause.OVERSPEED, {"sample": {"velocity_rad_s": 6.0}}, "value", math.degrees(6.0)),
+        (Cause.POWER_HIGH, {"sample": {"velocity_rad_s": 6.0}}, "value", 18.0),
         (Cause.TORQUE_STATUS, {"sample": {"torque_status": 0}}, "device", ""),
         (Cause.STALLED, {"measured": 0.02}, "value", 33.0),
         (Cause.STALLED, {"measured": 12.5}, "value", 12500.0),
@@ -204,11 +205,12 @@ def test_a_stamp_ahead_may_be_so_by_the_reaction_time_and_a_tick():
     assert found.setting == "guard.reaction_time_s and one tick"
 
 
-def test_a_small_disagreement_of_the_velocity_is_held_against_what_cannot_be_seen():
+def test_other_means_are_told_where_they_are_the_larger_ones():
     consistency = latched(Cause.VELOCITY_WRONG).consistency
-    means = consistency.means._replace(both_rad2=1e-12)
+    means = consistency.means._replace(both_rad2=1e-12, motion_old=0.4)
     limit = told(Cause.VELOCITY_WRONG, consistency={"means": means}).limit
     assert limit == pytest.approx(math.degrees(AGREEMENT.unseen_rad))
+    assert told(Cause.SELDOM_FRESH, consistency={"means": means}).value == pytest.approx(40.0)
 
 
 @pytest.mark.parametrize(
