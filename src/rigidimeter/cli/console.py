@@ -137,16 +137,14 @@ def lead_session(
     from rigidimeter.cli.sharing import require_packages, write_nwb_beside
     from rigidimeter.console.page.button_words import in_buttons, next_buttons
     from rigidimeter.console.page.kept_study import extended
-    from rigidimeter.console.page.session_form import codes
     from rigidimeter.recording.resume import count_epochs, rest_of
 
     folder, rig = desk.place.root / request.folder, desk.place.rig
     try:
         planned = checked_rig(_planned(desk, request, source), rig)
         require_packages(planned.settings)
-        names = [epoch.condition for epoch in planned.protocol.epochs]
-        hidden = codes(names, request.folder) if planned.about.get("blinded") else {}
-        look = desk.console(planned.shown(virtual=rig is None, codes=hidden), folder)
+        planned = planned.blinded() if planned.about.get("blinded") else planned
+        look = desk.console(planned.shown(virtual=rig is None), folder)
         ended = run_planned(planned, folder, rig, realtime, look, desk.operator_seen_ns)
         desk.told_to_end = bool(ended.signals)
         good, of = count_epochs(ended.folder)

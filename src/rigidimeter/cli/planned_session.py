@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -47,11 +48,23 @@ class PlannedSession:
     about: Mapping[str, Any] = field(default_factory=dict)
     source: Path | None = None
 
-    def shown(self, *, virtual: bool, codes: Mapping[str, str] | None = None) -> SessionPlan:
-        """Return the plan as consoles take it."""
+    def shown(self, *, virtual: bool) -> SessionPlan:
+        """Return the plan as consoles take it, with the codes of a blinded session."""
         from rigidimeter.console import SessionPlan
+        from rigidimeter.recording.blinded import codes_of
 
-        return SessionPlan(self.settings, self.protocol.epochs, self.done, codes or {}, virtual)
+        codes = codes_of(self.about)
+        return SessionPlan(self.settings, self.protocol.epochs, self.done, codes, virtual)
+
+    def blinded(self) -> PlannedSession:
+        """Return the session with codes for its conditions, which one that has them keeps."""
+        from rigidimeter.recording.blinded import drawn_codes
+
+        if self.about.get("codes"):
+            return self
+        names = [epoch.condition for epoch in self.protocol.epochs]
+        codes = drawn_codes(names, random.SystemRandom())
+        return replace(self, about={**self.about, "blinded": True, "codes": codes})
 
 
 def new_session(

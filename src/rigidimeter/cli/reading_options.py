@@ -157,6 +157,12 @@ class Recordings:
             '"12.3:14.0 cough"; NAME is a recording, where there are several. Repeat as needed.',
         ),
     ] = None
+    blinded: Annotated[
+        bool,
+        typer.Option(
+            "--blinded", help="Of sessions that were recorded blinded: codes for the conditions."
+        ),
+    ] = False
     band_hz: Annotated[
         tuple[float, float] | None,
         typer.Option(
@@ -189,6 +195,7 @@ class Recordings:
         """
         from rigidimeter.cli.progress import Meter
         from rigidimeter.recording import read
+        from rigidimeter.recording.blinded import with_codes
 
         with Meter("read", 1.0) as meter:
             recording = read(
@@ -201,7 +208,8 @@ class Recordings:
                 progress=meter.advance,
                 **self.of_files(),
             )
-        return replace(recording, settings=self.adjust(recording.settings))
+        recording = replace(recording, settings=self.adjust(recording.settings))
+        return with_codes(recording) if self.blinded else recording
 
     @property
     def asked_clock_offset(self) -> float | str | None:

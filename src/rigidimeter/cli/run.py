@@ -54,6 +54,14 @@ def run(
             help="Lead the session from a page in a browser, as `rigidimeter console` does.",
         ),
     ] = False,
+    blinded: Annotated[
+        bool,
+        typer.Option(
+            "--blinded",
+            help="Show codes in place of conditions, for an examiner who may see the screen; also "
+            "with `estimate --blinded`.",
+        ),
+    ] = False,
     host: HostOption = "127.0.0.1",
     port: PortOption = 8765,
     token: TokenOption = "",
@@ -81,6 +89,7 @@ def run(
     for line in complete_left():
         echo(line, err=True)
     planned = _planned(protocol, resume, seed, virtual=rig is None)
+    planned = planned.blinded() if blinded else planned
     require_packages(planned.settings)
     _offer(out)
     if page:
@@ -112,6 +121,8 @@ def _conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
     """Say how the session ended; a session that is not whole ends the program with status 1."""
     from rigidimeter.cli.sharing import write_nwb_beside
     from rigidimeter.console import new_folder, next_steps
+    from rigidimeter.recording import read_manifest
+    from rigidimeter.recording.blinded import codes_of
     from rigidimeter.recording.resume import count_epochs, require_all, rest_of
 
     folder = ended.folder if ended.folder != out.absolute() else out
@@ -121,7 +132,15 @@ def _conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
         echo(write_nwb_beside(folder))
     closed = bool(ended.outcome)
     left = len(rest_of(folder).epochs)
-    steps = next_steps(folder, closed=closed, good=good, left=left, rig=rig, out=new_folder(folder))
+    steps = next_steps(
+        folder,
+        closed=closed,
+        good=good,
+        left=left,
+        rig=rig,
+        out=new_folder(folder),
+        blinded=bool(codes_of(read_manifest(folder).get("about", {}))),
+    )
     echo("\n".join(["What to do next:", *(f"  {step}" for step in steps)]))
     if ended.outcome != "success":
         raise UserError(

@@ -15,7 +15,14 @@ def resume_command(folder: Path, rig: Path | str | None, out: Path | str) -> str
 
 
 def next_steps(
-    folder: Path, *, closed: bool, good: int, left: int, rig: Path | None, out: Path
+    folder: Path,
+    *,
+    closed: bool,
+    good: int,
+    left: int,
+    rig: Path | None,
+    out: Path,
+    blinded: bool = False,
 ) -> tuple[str, ...]:
     """Return what to do next, a command with its purpose on each line, the most pressing first.
 
@@ -31,6 +38,8 @@ def next_steps(
         The rig file; None for the virtual rig.
     out : Path
         A folder that does not exist yet, for what is left.
+    blinded : bool
+        Whether conditions stay hidden behind codes.
     """
     steps = []
     if not closed:
@@ -39,11 +48,15 @@ def next_steps(
         what = "the epoch that is left" if left == 1 else f"the {left} epochs that are left"
         steps.append((resume_command(folder, rig, out), f"run {what}"))
     if good:
+        hide = ["--blinded"] if blinded else []
         report = folder.with_name(f"{folder.name}-report")
         steps += [
-            (shlex.join(["rigidimeter", "estimate", str(folder)]), "J, B and K of each epoch"),
             (
-                shlex.join(["rigidimeter", "report", str(folder), "--out", str(report)]),
+                shlex.join(["rigidimeter", "estimate", str(folder), *hide]),
+                "J, B and K of each epoch",
+            ),
+            (
+                shlex.join(["rigidimeter", "report", str(folder), *hide, "--out", str(report)]),
                 "a page with tables and figures",
             ),
         ]

@@ -171,17 +171,34 @@ class AfterView:
         self._list.refresh()
 
     async def _estimate(self, session: FoundSession) -> None:
-        await self._command("estimate", session.name, *session.left_out)
+        await self._command("estimate", session.name, *session.options)
 
     async def _report(self, session: FoundSession) -> None:
         out = self._root / report_folder(session.name)
-        if await self._command("report", session.name, "--out", str(out), *session.left_out):
+        if await self._command("report", session.name, "--out", str(out), *session.options):
             self._chosen = session.name
             self._list.refresh()
 
     async def _study_report(self) -> None:
+        """Report the study; of blinded sessions only after a warning, since it names conditions."""
+        sessions, _ = found_sessions(self._root)
+        blinded = [session.name for session in sessions if session.blinded]
+        if blinded and not await self._unblinds(blinded):
+            return
         if await self._command("report", "", "--out", str(self._root / OF_STUDY)):
             self._list.refresh()
+
+    async def _unblinds(self, sessions: list[str]) -> bool:
+        """Warn that the report of the study names the conditions of blinded sessions."""
+        with ui.dialog() as dialog, ui.card():
+            ui.label(
+                f"This unblinds you: the report of the study names the conditions of "
+                f"{', '.join(sessions)}. Reports of single sessions show their codes."
+            )
+            with ui.row():
+                ui.button("Cancel", on_click=lambda: dialog.submit(False))
+                ui.button("Unblind and report", on_click=lambda: dialog.submit(True))
+        return bool(await dialog)
 
     async def _command(self, command: str, session: str, *options: str) -> bool:
         """Show what a command says of a session, or of the study; return whether it was run."""

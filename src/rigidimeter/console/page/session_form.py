@@ -6,7 +6,6 @@ for each field what is wrong, in the sentences of the settings.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -174,22 +173,6 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
     conditions = list(dict.fromkeys(block["condition"] for block in blocks))
     about["conditions"] = conditions
     return EnteredSession(None if errors else settings, about, about["subject"], errors)
-
-
-def codes(conditions: Sequence[str], secret: str) -> dict[str, str]:
-    """Return a code for each condition, in an order that the names do not tell.
-
-    Examples
-    --------
-    >>> sorted(codes(["OFF", "DBS"], "S01-1").values())
-    ['code A', 'code B']
-    """
-
-    def place(condition: str) -> bytes:
-        return hashlib.sha256(f"{secret}\0{condition}".encode()).digest()
-
-    drawn = sorted(dict.fromkeys(conditions), key=place)
-    return {condition: f"code {chr(ord('A') + k)}" for k, condition in enumerate(drawn)}
 
 
 def _with_subjects(base: Settings, blocks: Sequence[Mapping[str, Any]]) -> Settings:

@@ -7,7 +7,7 @@ reason, by. The samples stay as they are.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 from rigidimeter.console.page.entered import line, name
 from rigidimeter.errors import UserError
 from rigidimeter.recording import is_session, read_manifest
+from rigidimeter.recording.blinded import NO_CODE, codes_of
 from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.resume import rest_of
 from rigidimeter.recording.session_folder import EVENTS, locked
@@ -65,6 +66,7 @@ class FoundSession:
     continues: str = ""
     plan: tuple[int, ...] = ()
     left: tuple[int, ...] = ()
+    blinded: bool = False
 
     @property
     def unfinished(self) -> bool:
@@ -77,14 +79,16 @@ class FoundSession:
         return sum(epoch.outcome == "success" for epoch in self.epochs)
 
     @property
-    def left_out(self) -> tuple[str, ...]:
-        """Options of `estimate` and `report` that leave out the excluded epochs, and say why."""
-        return tuple(
-            word
-            for epoch in self.epochs
-            if epoch.excluded
-            for word in ("--leave-out", f"{epoch.begun_s}:{epoch.ended_s} {epoch.excluded}")
-        )
+    def options(self) -> tuple[str, ...]:
+        """Options of `estimate` and `report` that leave out the excluded epochs, and say why.
+
+        Those of a blinded session hide its conditions, too.
+        """
+        words = ["--blinded"] if self.blinded else []
+        for epoch in self.epochs:
+            if epoch.excluded:
+                words += ["--leave-out", f"{epoch.begun_s}:{epoch.ended_s} {epoch.excluded}"]
+        return tuple(words)
 
 
 def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
@@ -163,10 +167,11 @@ def _session(folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession
         end.get("reason", "still being recorded" if recording else "it was interrupted"),
         len(plan),
         recording,
-        tuple(_epochs(folder.name, events, excluded, blinded=about.get("blinded") is True)),
+        tuple(_epochs(folder.name, events, excluded, about)),
         manifest.get("session_id", ""),
         manifest.get("continues", {}).get("session_id", ""),
         tuple(entry["number"] for entry in plan),
+        blinded=about.get("blinded") is True,
     )
 
 
@@ -174,9 +179,9 @@ def _epochs(
     session: str,
     events: Sequence[dict[str, Any]],
     excluded: dict[tuple[str, str], str],
-    *,
-    blinded: bool,
+    about: Mapping[str, Any],
 ) -> list[FoundEpoch]:
+    codes = codes_of(about)
     ends = {event["epoch"]: event for event in events if event["event"] == "epoch_ended"}
     ratings: dict[int, list[str]] = {}
     for event in events:
@@ -187,7 +192,7 @@ def _epochs(
             begun["epoch"],
             begun["label"],
             begun["task"],
-            "condition hidden" if blinded else begun["condition"],
+            codes.get(begun["condition"], NO_CODE) if about.get("blinded") else begun["condition"],
             ends.get(begun["epoch"], {}).get("outcome", ""),
             ends.get(begun["epoch"], {}).get("reason", "not ended"),
             "; ".join(ratings.get(begun["epoch"], ())),

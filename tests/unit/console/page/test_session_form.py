@@ -2,7 +2,7 @@
 
 import pytest
 
-from rigidimeter.console.page.session_form import codes, empty_form, kept_form, read_form
+from rigidimeter.console.page.session_form import empty_form, kept_form, read_form
 from rigidimeter.documents import toml_text
 from rigidimeter.settings import Settings, dump_settings, load_settings, parse_settings
 
@@ -70,11 +70,6 @@ def test_a_kept_form_comes_back_and_a_damaged_one_does_not(form):
     assert kept_form(kept, BASE) == kept
     for damaged in (None, [], {"subject": 1}, {"task0": "prbs"}, {"more": "x"}):
         assert kept_form(damaged, BASE) == empty_form(BASE)
-
-
-def test_codes_do_not_tell_the_order_of_the_names():
-    drawn = {codes(["DBS", "OFF"], f"S01-{k}")["DBS"] for k in range(20)}
-    assert drawn == {"code A", "code B"}
 
 
 def test_settings_are_the_same_as_a_file(tmp_path):

@@ -33,7 +33,7 @@ def test_a_session_is_found_with_its_epochs(root):
 
 
 def test_an_interrupted_session_and_one_that_is_recorded_are_told_apart(tmp_path):
-    about = {"subject": "S02", "blinded": True}
+    about = {"subject": "S02", "blinded": True, "codes": {"DBS": "code-B"}}
     writer = SessionWriter(tmp_path / "s", Settings(), [], {}, virtual=True, about=about)
     begun = {"label": "1", "task": "prbs", "condition": "DBS", "time_s": 0.0}
     writer.event("epoch_started", epoch=1, **begun)
@@ -44,7 +44,8 @@ def test_an_interrupted_session_and_one_that_is_recorded_are_told_apart(tmp_path
     (found,), _ = found_sessions(tmp_path)
     assert (found.recording, found.outcome, found.reason) == (False, "", "it was interrupted")
     assert found.subject == "S02"
-    assert found.epochs[0].condition == "condition hidden"
+    assert found.epochs[0].condition == "code-B"
+    assert found.options == ("--blinded",)
     assert found.epochs[0].rating == "1.5 (E1)"
 
 
@@ -66,14 +67,14 @@ def test_an_epoch_is_left_out_with_a_reason_and_a_name_and_nothing_deleted(root)
 
 def test_what_is_estimated_from_the_page_is_without_the_epochs_left_out(root, rigidimeter):
     (found,), _ = found_sessions(root)
-    assert found.left_out == ()
+    assert found.options == ()
     exclude(root, "S01-1", "2", "cough", "Op")
     (found,), _ = found_sessions(root)
     out = root / "e.json"
-    assert rigidimeter("estimate", root / "S01-1", "--json", out, *found.left_out).status == 1
+    assert rigidimeter("estimate", root / "S01-1", "--json", out, *found.options).status == 1
     one, two = json.loads(out.read_text())["epochs"]
     assert (one["outcome"], two["outcome"]) == ("included", "failed")
-    ran = rigidimeter("report", root / "S01-1", "--out", root / "page", *found.left_out)
+    ran = rigidimeter("report", root / "S01-1", "--out", root / "page", *found.options)
     assert "left out: cough (Op)" in ran.err
 
 
