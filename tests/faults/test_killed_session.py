@@ -12,12 +12,23 @@ import pytest
 
 from rigidimeter.recording.sample_reading import read_samples
 
-RIGIDIMETER = [sys.executable, "-m", "rigidimeter"]
+QUICK = """
+[rig]
+tick_rate_hz = 250.0
+torque.rate_hz = 250.0
+motion.rate_hz = 250.0
+[sinusoid]
+duration_s = 600.0
+motion_s = 600.0
+[protocol]
+blocks = [{ task = "prbs", epochs = 2 }, { task = "sinusoid", epochs = 1 }]
+"""
+"""The third epoch is simulated for some seconds, in which it is killed."""
 
 
 def start(folder, *options):
     return subprocess.Popen(
-        [*RIGIDIMETER, "simulate", "--out", str(folder), "--task", "prbs", *options],
+        [sys.executable, "-m", "rigidimeter", "simulate", "--out", str(folder), *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -41,15 +52,15 @@ def wait_for_epoch(folder, number, timeout_s=60.0):
     pytest.fail(f"epoch {number} did not start within {timeout_s} s")
 
 
-def run(*arguments):
-    return subprocess.run(
-        [*RIGIDIMETER, *map(str, arguments)], capture_output=True, text=True, check=False
-    )
+def quick(tmp_path):
+    """Return the options of a session that is simulated, and its settings."""
+    (tmp_path / "quick.toml").write_text(QUICK)
+    return "--settings", str(tmp_path / "quick.toml")
 
 
-def test_a_killed_session_comes_back_and_is_analysed(tmp_path):
+def test_a_killed_session_comes_back_and_is_analysed(tmp_path, rigidimeter):
     folder = tmp_path / "session"
-    process = start(folder, "--epochs", "50")
+    process = start(folder, *quick(tmp_path))
     wait_for_epoch(folder, 3)
     while read_samples(folder / "samples.arrows")["epoch"][-1] != 3:
         time.sleep(0.01)
@@ -57,8 +68,8 @@ def test_a_killed_session_comes_back_and_is_analysed(tmp_path):
     process.communicate()
     last_written = read_samples(folder / "samples.arrows")["tick"][-1]
 
-    recovered = run("recover", folder, "--reason", "the plug was pulled")
-    assert recovered.returncode == 0, recovered.stderr
+    recovered = rigidimeter("recover", folder, "--reason", "the plug was pulled")
+    assert recovered.status == 0, recovered.err
     ticks = read_samples(folder / "samples.arrows")["tick"]
     np.testing.assert_array_equal(ticks, np.arange(last_written + 1))
     closing = [
@@ -70,12 +81,14 @@ def test_a_killed_session_comes_back_and_is_analysed(tmp_path):
     assert closing[-1]["reason"] == "the plug was pulled"
 
     out = tmp_path / "out.json"
-    analysed = run("estimate", folder, "--json", out)
-    assert analysed.returncode == 0, analysed.stderr
-    epochs = json.loads(out.read_text())["epochs"]
-    assert [e["outcome"] for e in epochs[:2]] == ["included", "included"]
-    assert epochs[0]["stiffness_nm_rad"] == pytest.approx(1.751, rel=0.01)
-    assert "the plug was pulled" in epochs[-1]["reason"]
+    analysed = rigidimeter("estimate", folder, "--json", out)
+    assert analysed.status == 0, analysed.err
+    document = json.loads(out.read_text())
+    assert [e["outcome"] for e in document["epochs"]] == ["included", "included"]
+    assert document["epochs"][0]["stiffness_nm_rad"] == pytest.approx(1.751, rel=0.01)
+    (interrupted,) = document["scores"]
+    assert interrupted["outcome"] == "excluded"
+    assert "the plug was pulled" in interrupted["reason"]
 
 
 @pytest.mark.realtime(resolves_s=0.1)
@@ -83,7 +96,9 @@ def test_in_real_time_at_most_a_tenth_of_a_second_is_lost(tmp_path, lateness):
     folder = tmp_path / "session"
     patient = tmp_path / "patient.toml"  # other programs may hold up this one
     patient.write_text("[loop]\nmissed_in_a_row = 1000\nstall_s = 1.0\n")
-    process = start(folder, "--epochs", "1", "--real-time", "--settings", str(patient))
+    process = start(
+        folder, "--task", "prbs", "--epochs", "1", "--real-time", "--settings", str(patient)
+    )
     wait_for_epoch(folder, 1)
     started = time.monotonic()
     time.sleep(1.5)
@@ -98,7 +113,7 @@ def test_in_real_time_at_most_a_tenth_of_a_second_is_lost(tmp_path, lateness):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT])
 def test_an_interrupted_session_closes_in_order(tmp_path, number):
     folder = tmp_path / "session"
-    process = start(folder, "--epochs", "50")
+    process = start(folder, *quick(tmp_path))
     wait_for_epoch(folder, 2)
     os.kill(process.pid, number)
     _, errors = process.communicate(timeout=30)

@@ -14,6 +14,7 @@ which also lets the cycles begin and end between samples.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy import optimize, signal
@@ -98,9 +99,7 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     rate_hz = grid_rate_hz(used, settings.band_high_hz)
     grid = uniform_grid(used, rate_hz)
     angle = angle_at(epoch, grid)
-    bandpass = signal.butter(
-        2, [settings.band_low_hz, settings.band_high_hz], "bandpass", fs=rate_hz, output="sos"
-    )
+    bandpass = _bandpass(settings.band_low_hz, settings.band_high_hz, rate_hz)
     gain = _gain(bandpass, motion.frequency_hz, rate_hz)
     if gain < LEAST_GAIN:
         raise ValueError(
@@ -131,6 +130,13 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     return Cycles(fine, band_passed(torque), band_passed(angle), motion.frequency_hz, n_cycles)
 
 
+@lru_cache(maxsize=16)
+def _bandpass(low_hz: float, high_hz: float, rate_hz: float) -> Array:
+    """Return the filter of the scores; to design it takes as long as to filter with it."""
+    sections = signal.butter(2, [low_hz, high_hz], "bandpass", fs=rate_hz, output="sos")
+    return np.asarray(sections)
+
+
 def _gain(sections: Array, frequency_hz: float, rate_hz: float) -> float:
     """Return the gain of the filter at a frequency, once forwards and once backwards."""
     _, response = signal.sosfreqz(sections, [frequency_hz], fs=rate_hz)
@@ -158,12 +164,11 @@ def _continued(
     steps = np.arange(1, n + 1) * interval_s
     cycle_s = 1.0 / frequency_hz
     back = (-steps) % cycle_s  # how far into the first cycle, for each time before it
-    early = CubicSpline(grid, values)(grid[0] + back)
-    late = CubicSpline(grid, values)(grid[-1] - back)
-    if not moving[0]:
-        early = np.full(n, values[0])
-    if not moving[1]:
-        late = np.full(n, values[-1])
+    early, late = np.full(n, values[0]), np.full(n, values[-1])
+    if any(moving):
+        motion = CubicSpline(grid, values)
+        early = motion(grid[0] + back) if moving[0] else early
+        late = motion(grid[-1] - back) if moving[1] else late
     return np.concatenate([early[::-1], values, late]), n
 
 

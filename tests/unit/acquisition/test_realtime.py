@@ -78,6 +78,7 @@ def test_what_is_refused_is_said_and_not_raised():
 
 def prepared_in_order(pipe) -> None:
     """Say in what order the slow steps and the priority come."""
+    gc.freeze()  # else all that the test run holds is copied into this process, to look at it
     steps = []
     collect = gc.collect
     gc.collect = lambda: (steps.append("collect"), collect())

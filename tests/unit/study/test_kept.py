@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -23,8 +24,21 @@ def state(folder: Path) -> dict[str, tuple[bytes, int]]:
     return {p.name: (p.read_bytes(), p.stat().st_mtime_ns) for p in (folder / "analysis").iterdir()}
 
 
+@pytest.fixture(scope="module")
+def analysed(scored_study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the study with what is kept of its analysis; it is not to be changed."""
+    folder = Path(shutil.copytree(scored_study, tmp_path_factory.mktemp("kept") / "study"))
+    assert kept(folder) == []
+    return folder
+
+
+@pytest.fixture
+def study(analysed: Path, tmp_path: Path) -> Path:
+    """Return a copy of it that a test may change."""
+    return Path(shutil.copytree(analysed, tmp_path / "study"))
+
+
 def test_the_second_time_nothing_is_written(study: Path) -> None:
-    assert kept(study) == []
     before = state(study)
     assert {"inputs.json", "estimates.json", "comparison.json", "days.csv"} <= set(before)
     assert kept(study) == [UNCHANGED]
@@ -32,7 +46,6 @@ def test_the_second_time_nothing_is_written(study: Path) -> None:
 
 
 def test_another_place_gives_the_same_bytes(study: Path, tmp_path: Path) -> None:
-    kept(study)
     moved = tmp_path / "elsewhere"
     one = {name: data for name, (data, _) in state(study).items()}
     study.rename(moved)
@@ -41,7 +54,6 @@ def test_another_place_gives_the_same_bytes(study: Path, tmp_path: Path) -> None
 
 
 def test_inputs_hold_a_digest_of_every_file(study: Path) -> None:
-    kept(study)
     inputs = json.loads((study / "analysis/inputs.json").read_text())
     assert inputs["schema"] == "rigidimeter.study-inputs/1"
     sessions = [p for p in (study / "sessions").rglob("*") if p.is_file()]
@@ -63,7 +75,6 @@ def test_digests_are_of_what_was_read_not_of_what_lies_there_now(study: Path) ->
 
 
 def test_a_new_exclusion_is_told_with_the_numbers_it_moved(study: Path) -> None:
-    kept(study)
     before = json.loads((study / "analysis/comparison.json").read_text())
     (study / "exclusions.csv").write_text("path,epoch,reason,by\nsessions/2-OFF,1,coughed,NB\n")
     said = kept(study)
@@ -80,14 +91,12 @@ def test_a_new_exclusion_is_told_with_the_numbers_it_moved(study: Path) -> None:
 
 
 def test_a_changed_input_without_effect_says_only_that(study: Path) -> None:
-    kept(study)
     with (study / "sessions.csv").open("a") as file:
         file.write("\n")
     assert kept(study) == ["inputs that are changed: sessions.csv"]
 
 
 def test_changed_settings_are_named(study: Path) -> None:
-    kept(study)
     from rigidimeter.settings import dump_settings, parse_settings
 
     read = read_study(study)
@@ -98,7 +107,6 @@ def test_changed_settings_are_named(study: Path) -> None:
 
 
 def test_a_result_that_was_edited_is_noticed_and_not_lost(study: Path) -> None:
-    kept(study)
     path = study / "analysis/comparison.json"
     written = path.read_text()
     path.write_text(written.replace("Small study", "Large study"))
@@ -111,7 +119,6 @@ def test_a_result_that_was_edited_is_noticed_and_not_lost(study: Path) -> None:
 
 
 def test_a_second_edit_does_not_replace_the_first(study: Path) -> None:
-    kept(study)
     path = study / "analysis/days.csv"
     written = path.read_text()
     for text in ("one", "two", "three"):
@@ -123,7 +130,6 @@ def test_a_second_edit_does_not_replace_the_first(study: Path) -> None:
 
 
 def test_an_edit_is_not_lost_where_the_record_is(study: Path) -> None:
-    kept(study)
     (study / "analysis/inputs.json").unlink()
     (study / "analysis/days.csv").write_text("mine")
     (said,) = kept(study)
@@ -135,7 +141,6 @@ def test_an_edit_is_not_lost_where_the_record_is(study: Path) -> None:
 def test_a_run_that_was_cut_off_is_made_up_for(
     study: Path, monkeypatch: pytest.MonkeyPatch, written: int
 ) -> None:
-    kept(study)
     (study / "ratings.csv").write_text(
         (study / "ratings.csv").read_text().replace("M1,1,OFF,A,2.0", "M1,1,OFF,A,2.5")
     )
@@ -172,7 +177,6 @@ def older(document: dict) -> dict:
 
 
 def test_an_archive_of_the_older_schema_is_read(study: Path) -> None:
-    kept(study)
     path, inputs = (study / "analysis" / name for name in ("comparison.json", "inputs.json"))
     document = older(json.loads(path.read_text()))
     document["day_tests"][0]["p"] = 0.125
@@ -192,7 +196,6 @@ def test_an_archive_of_the_older_schema_is_read(study: Path) -> None:
 
 
 def test_what_the_seed_moves_is_told(study: Path) -> None:
-    kept(study)
     read = read_study(study)
     found = analyse_study(read, seed=2, resamples=RESAMPLES)
     said = keep(read, found)
@@ -203,14 +206,12 @@ def test_what_the_seed_moves_is_told(study: Path) -> None:
 
 
 def test_a_result_that_is_gone_is_written_again(study: Path) -> None:
-    kept(study)
     (study / "analysis/days.csv").unlink()
     assert kept(study) == ["analysis/days.csv was taken away; it is written again"]
     assert (study / "analysis/days.csv").exists()
 
 
 def test_a_table_that_no_longer_exists_is_taken_away(study: Path) -> None:
-    kept(study)
     (study / "ratings.csv").unlink()
     said = kept(study)
     assert "ratings, contrast is no longer there" in said
@@ -219,6 +220,5 @@ def test_a_table_that_no_longer_exists_is_taken_away(study: Path) -> None:
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"schema": "other"}', _DAMAGED])
 def test_damaged_inputs_are_said(study: Path, text: str) -> None:
-    kept(study)
     (study / "analysis/inputs.json").write_text(text)
     assert kept(study) == ["analysis/inputs.json is damaged, so what has changed since is unknown"]
