@@ -10,7 +10,8 @@ freeze      from SIGSTOP to all renderers of the browser to the first recorded t
 behind      from the newest sample on the screen to now, looked at by the page
 server      share of one processor that the server's process took while the epoch ran
 
-gaps        ticks that are missing in the records of these sessions
+gaps        ticks that are missing in the records of these sessions: left out by a loop that was
+            late, or lost by the recorder
 
 The browser's clock is the wall clock; its difference to CLOCK_MONOTONIC is read beside each click.
 

@@ -22,10 +22,11 @@ def ring():
     ring.close()
 
 
-def push(ring, first, stop, torque=lambda k: float(k)):
+def push(ring, first, stop, torque=lambda k: float(k), epoch=None):
     for k in range(first, stop):
         ring.recorded = ring.written
-        values = (k, k / RATE_HZ, 0.0, k // 50, 0.0, torque(k), 0.0, 0.1, *[0.0] * 5, 0)
+        of = k // 50 if epoch is None else epoch
+        values = (k, k / RATE_HZ, 0.0, of, 0.0, torque(k), 0.0, 0.1, *[0.0] * 5, 0)
         assert ring.push(Sample(*values))
 
 
@@ -112,11 +113,15 @@ def test_what_is_drawn_one_over_the_other_is_of_one_sample(ring):
 
 
 def test_after_a_gap_the_filters_begin_anew(ring):
-    """Also where the first samples after it wait for the rest of their piece."""
+    """Also where the samples after it wait for the rest of their piece."""
     band = BandTorque(OnlineSettings(), RATE_HZ)
-    reader = TraceReader(ring, RATE_HZ, band=band)
-    push(ring, 0, 8)
-    reader.read()
-    push(ring, 8, 404)
+    reader = TraceReader(ring, RATE_HZ, points_per_s=5.0, band=band)
+    push(ring, 0, 200, epoch=1)
+    assert reader.read().time_s.size == 1
+    begun_s = band.since_s
+    push(ring, 200, 799, epoch=1)
     assert reader.read().missed > 0
-    assert band.since_s > 0.2
+    assert band.since_s == begun_s < 0.2  # nothing that came after it was complete
+    push(ring, 799, 800, epoch=1)
+    reader.read()
+    assert band.since_s == 0.6
