@@ -24,7 +24,7 @@ from rigidimeter.settings import parse_settings
 
 RATE_HZ = 500
 PR_SET_PDEATHSIG = 1  # of prctl(2)
-PATIENCE = Patience(look_s=0.05, loop_lost_s=1.0, hung_s=2.0, disk_s=3.0)
+PATIENCE = Patience(look_s=0.05, loop_lost_s=1.0, hung_s=2.0, disk_s=1.0)
 SETTINGS = parse_settings({"loop": {"console_lost_s": 1.0, "recorder_lost_s": 1.0}})
 
 
