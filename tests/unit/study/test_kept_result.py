@@ -201,15 +201,6 @@ def endless(document: dict) -> None:
     document["drawn"]["examples"][0]["channels"]["torque_nm"]["values"]["shape"] = [10**12]
 
 
-def all_zeros(document: dict) -> None:
-    # Each is within the bound of an array; all of them together are not.
-    channels = document["drawn"]["examples"][0]["channels"]
-    large = {"kind": "<f8", "shape": [2**22], "data": ""}
-    channels.update(
-        {f"c{n}": {"name": "emg_v", "time_s": large, "values": large} for n in range(9)}
-    )
-
-
 DAMAGE: list[Callable[[Path], object]] = [
     lambda study: (study / KEPT).write_bytes(b""),
     lambda study: (study / KEPT).write_bytes((study / KEPT).read_bytes()[:-1000]),
@@ -220,7 +211,6 @@ DAMAGE: list[Callable[[Path], object]] = [
     lambda study: (study / KEPT).write_bytes(b"\x80\x04\x95\x1a\x00\x00\x00\x00\x00\x00\x8c"),
     lambda study: reseal(study, class_name),
     lambda study: reseal(study, endless),
-    lambda study: reseal(study, all_zeros),
     lambda study: reseal(study, lambda d: d["epochs"][0].update(closed=[[[1]]])),
     lambda study: reseal(study, lambda d: d["result"].update(seed="1")),
     lambda study: reseal(study, lambda d: d["result"].update(analysis=None)),
