@@ -33,7 +33,9 @@ pytest.importorskip("can")
 pytest.importorskip("canopen")
 pytest.importorskip("serial")
 
-QUICK = CommissioningSettings(idle_s=0.6, swings=1, steps_s=1.2, known_torque_s=0.5)
+QUICK = CommissioningSettings(
+    idle_s=0.6, swings=1, swing_speed_deg_s=20.0, steps_s=1.2, known_torque_s=0.5
+)
 
 
 @pytest.fixture(scope="module")

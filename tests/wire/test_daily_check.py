@@ -37,7 +37,7 @@ def bench(request: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[An
 
 def checked(bench: Any) -> DailyRecord:
     rate_hz = RATES_HZ[bench.drive]
-    chosen = settings(rate_hz, commissioning={"daily_rest_s": 1.0})
+    chosen = settings(rate_hz, commissioning={"daily_rest_s": 1.0, "daily_motion_s": 3.0})
     rigfile, operator = load_rig(bench.rig), Operator(ask=lambda _: True, present=False)
     with rigfile.claim() as lock:
         return daily_check(
