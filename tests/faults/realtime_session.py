@@ -7,11 +7,13 @@ orders another folder as soon as the recorder is in trouble.
 
 import ctypes
 import json
+import os
 import signal
 import sys
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
@@ -54,10 +56,11 @@ def ticks(duration_s, side):
 def main() -> None:
     # A test that is killed ends nothing itself, and a full disk keeps a session for ever.
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    test = os.getppid()
     folder, duration_s = Path(sys.argv[1]), float(sys.argv[2])
     options = dict(option.partition("=")[::2] for option in sys.argv[3:])
     save_to = Path(options["save"]) if "save" in options else None
-    seen: dict[str, object] = {}
+    seen: dict[str, Any] = {}
 
     def console(shared) -> None:
         shared_status = shared.status
@@ -87,6 +90,9 @@ def main() -> None:
         patience=PATIENCE,
         console=console,
     )
+    if os.getppid() != test:  # nobody will bring in what is in memory
+        for path in Path("/dev/shm").glob(f"{seen['pids']['MEMORY']}-*"):
+            path.unlink()
     print(json.dumps({**asdict(ended), "folder": str(ended.folder), "seen": seen}))
 
 
