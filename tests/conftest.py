@@ -1,11 +1,12 @@
 from __future__ import annotations
 
 import functools
+import gc
 import json
 import os
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -131,6 +132,17 @@ REALTIME = {
     "tests/faults/test_session_ends": {"resolves_s": 0.5},  # its processes wait 1 s for each other
 }
 """What keeps real time, the first that fits: priority and what can be resolved, see `lateness`."""
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Nothing of what is imported and collected is garbage: the collector need not look for it."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
