@@ -149,7 +149,7 @@ def test_a_day_with_a_stop_a_repetition_and_a_restart(console, chromium):
 
     session = opened_session(page, fourth.name)
     session.get_by_role("button", name="Estimate").click()
-    page.get_by_text("N·m/rad").first.wait_for(timeout=60e3)
+    expect(page.locator("#view-after .answer")).to_contain_text("N·m/rad", timeout=60e3)
     verdict = sound_study(page, {"OFF": 3, "DBS": 3})
     ran = command("report", desk.sessions, "--out", desk.sessions / "report")
     assert ran.returncode == 0, ran.stderr

@@ -190,7 +190,7 @@ class AfterView:
 
     async def _unblinds(self, sessions: list[str]) -> bool:
         """Warn that the report of the study names the conditions of blinded sessions."""
-        with ui.dialog() as dialog, ui.card():
+        with self._dialogs, ui.dialog() as dialog, ui.card():
             ui.label(
                 f"This unblinds you: the report of the study names the conditions of "
                 f"{', '.join(sessions)}. Reports of single sessions show their codes."
