@@ -6,6 +6,7 @@ for each field what is wrong, in the sentences of the settings.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -55,6 +56,9 @@ STIMULATION = (
     Field("stim_wash_in", "Stimulation: since", "min", "wash_in_min"),
 )
 
+_OF_THE_SESSION = (*METADATA, NOTE, *STIMULATION)
+"""Fields that no protocol fills."""
+
 MOST_BLOCKS = 12
 LONGEST_VALUE = 400
 
@@ -76,7 +80,8 @@ class EnteredSession:
 def empty_form(settings: Settings) -> dict[str, str]:
     """Return the form that makes these settings."""
     values = dump_settings(settings)
-    form = {one.key: "" for one in (*METADATA, NOTE, *STIMULATION)}
+    form = {one.key: "" for one in _OF_THE_SESSION}
+    form["protocol"] = hashlib.sha256(repr(values).encode()).hexdigest()[:16]
     for one in SETTINGS:
         form[one.key] = f"{_at(values, one.path):.10g}"
     form["rests"] = "; ".join(f"{rest_s:g}" for rest_s in settings.protocol.rests_s)
@@ -96,7 +101,10 @@ def blocks_of(form: Mapping[str, str]) -> list[int]:
 
 
 def kept_form(stored: Any, settings: Settings) -> dict[str, str]:
-    """Return a form that was kept, so far as it is one; otherwise the form of the settings."""
+    """Return a form that was kept, so far as it is one; otherwise the form of the settings.
+
+    Of a form that was made from other settings, what these say is not kept.
+    """
     form = empty_form(settings)
     if not isinstance(stored, dict):
         return form
@@ -105,6 +113,9 @@ def kept_form(stored: Any, settings: Settings) -> dict[str, str]:
         for key, value in stored.items()
         if isinstance(value, str) and len(value) <= LONGEST_VALUE
     }
+    if found.get("protocol") != form["protocol"]:
+        kept = {one.key for one in _OF_THE_SESSION}
+        return form | {key: value for key, value in found.items() if key in kept}
     blocks = {f"{part}{k}" for k in blocks_of(found) for part in ("task", "condition", "epochs")}
     if blocks and blocks <= found.keys():
         form = {key: value for key, value in form.items() if key[:-1] not in _BLOCK_PARTS}

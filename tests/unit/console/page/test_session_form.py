@@ -72,6 +72,16 @@ def test_a_kept_form_comes_back_and_a_damaged_one_does_not(form):
         assert kept_form(damaged, BASE) == empty_form(BASE)
 
 
+def test_a_form_of_another_protocol_keeps_who_was_there_alone(form):
+    """The values of a protocol file that was edited since are those of the file."""
+    kept = form | {"stim_ma": "2", "prbs_amplitude": "1.7"}
+    edited = parse_settings({"prbs": {"duration_s": 33.0}})
+    assert kept_form(kept, BASE) == kept
+    again = kept_form(kept, edited)
+    assert again == empty_form(edited) | {"subject": "S01", "operator": "Op", "stim_ma": "2"}
+    assert again["prbs_duration"] == "33"
+
+
 def test_settings_are_the_same_as_a_file(tmp_path):
     settings = parse_settings({"protocol": {"blocks": [{"condition": "OFF"}]}, "seed": 7})
     path = tmp_path / "protocol.toml"
