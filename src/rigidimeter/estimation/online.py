@@ -277,7 +277,7 @@ def online_reading(
     J, B, K = (float(value) for value in state[_VALUES : _VALUES + 3])
     weight, weight2 = state[_WEIGHT], state[_WEIGHT2]
     sd = J_se = B_se = K_se = math.inf
-    if math.isfinite(J + B + K):
+    if weight2 > 0.0 and math.isfinite(J + B + K):
         independent = design.independent * weight * weight / weight2
         if independent > 3.0:
             variance = state[_RSS] / weight * independent / (independent - 3.0)

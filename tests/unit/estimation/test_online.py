@@ -208,6 +208,8 @@ def test_before_anything_was_seen_nothing_is_claimed():
     reading = online_reading(design, state, RATE_HZ)
     assert math.isnan(reading.inertia_kg_m2)
     assert math.isinf(reading.stiffness_nm_rad_se)
+    reading = online_reading(design, np.zeros(STATE_SIZE), RATE_HZ)
+    assert math.isnan(reading.inertia_kg_m2)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])

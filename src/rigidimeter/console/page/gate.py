@@ -108,6 +108,20 @@ def for_another_page(headers: Mapping[str, str]) -> bool:
     return headers.get("sec-fetch-dest") != "document"
 
 
+def cookie_name(host: str) -> str:
+    """Return the name of the cookie that holds the token; browsers do not tell ports apart.
+
+    Examples
+    --------
+    >>> cookie_name("192.168.0.7:8080")
+    'rigidimeter_token_8080'
+    """
+    try:
+        return f"{COOKIE}_{urlsplit(f'//{host}').port or 80}"
+    except ValueError:
+        return COOKIE
+
+
 def same_token(given: str, token: str) -> bool:
     """Whether two tokens are equal, in a time that does not tell where they differ."""
     return hmac.compare_digest(given.encode(), token.encode())
@@ -138,7 +152,7 @@ class Gate:
             name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]
         }
         if scope["type"] == "http" and self._token and _token_in_query(scope):
-            await self._admit(scope, send)
+            await self._admit(scope, headers.get("host", ""), send)
             return
         why = self._refusal(scope, headers)
         if why:
@@ -156,7 +170,7 @@ class Gate:
         acts = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
         if ((acts or origin) and not same_origin(origin, host)) or for_another_page(headers):
             return "requests of other pages are refused"
-        if self._token and not same_token(_cookie(headers.get("cookie", "")), self._token):
+        if self._token and not same_token(_cookie(headers), self._token):
             return "the token is missing or wrong; open the address that the server printed"
         length = headers.get("content-length", "0")
         long = not length.isdecimal() or len(length) > 9 or int(length) > LONGEST_BODY
@@ -164,11 +178,15 @@ class Gate:
             return f"a request may have {LONGEST_BODY} bytes"
         return ""
 
-    async def _admit(self, scope: Scope, send: Send) -> None:
-        """Take the token out of the address, and keep it in a cookie."""
+    async def _admit(self, scope: Scope, host: str, send: Send) -> None:
+        """Take the token out of the address, and keep it in a cookie.
+
+        Lax: a link to here may carry it, as those of a report do, whose page is of no origin; what
+        acts needs the origin beside it.
+        """
         headers: list[tuple[bytes, bytes]] = [(b"location", b"/"), (b"content-length", b"0")]
         if same_token(_token_in_query(scope), self._token):
-            cookie = f"{COOKIE}={self._token}; Path=/; HttpOnly; SameSite=Strict"
+            cookie = f"{cookie_name(host)}={self._token}; Path=/; HttpOnly; SameSite=Lax"
             headers.append((b"set-cookie", cookie.encode()))
         await send({"type": "http.response.start", "status": 303, "headers": headers})
         await send({"type": "http.response.body", "body": b""})
@@ -210,9 +228,9 @@ def _token_in_query(scope: Scope) -> str:
     return str(values[0])
 
 
-def _cookie(header: str) -> str:
+def _cookie(headers: Mapping[str, str]) -> str:
     try:
-        morsel = SimpleCookie(header).get(COOKIE)
+        morsel = SimpleCookie(headers.get("cookie", "")).get(cookie_name(headers.get("host", "")))
     except CookieError:
         return ""
     return str(morsel.value) if morsel is not None else ""

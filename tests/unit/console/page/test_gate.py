@@ -6,9 +6,9 @@ import itertools
 import pytest
 
 from rigidimeter.console.page.gate import (
-    COOKIE,
     LONGEST_BODY,
     Gate,
+    cookie_name,
     host_allowed,
     is_loopback,
     same_origin,
@@ -16,6 +16,7 @@ from rigidimeter.console.page.gate import (
 )
 
 OWN = {"host": "127.0.0.1:8765", "origin": "http://127.0.0.1:8765"}
+COOKIE = cookie_name(OWN["host"])
 
 
 def ask(token="", kind="http", method="GET", query="", **headers):
@@ -102,9 +103,24 @@ def test_without_the_token_nobody_looks_or_acts():
 def test_the_token_leaves_the_address_for_a_cookie():
     status, headers = ask("right", query="token=right", host=OWN["host"])
     assert (status, headers[b"location"]) == (303, b"/")
-    assert headers[b"set-cookie"] == f"{COOKIE}=right; Path=/; HttpOnly; SameSite=Strict".encode()
+    assert headers[b"set-cookie"] == f"{COOKIE}=right; Path=/; HttpOnly; SameSite=Lax".encode()
     status, headers = ask("right", query="token=wrong", host=OWN["host"])
     assert b"set-cookie" not in headers
+
+
+def test_a_report_s_links_carry_the_token_and_what_acts_needs_more():
+    """A sandboxed report has no origin, so its links come from another site, as a browser says."""
+    link = {"sec_fetch_site": "cross-site", "sec_fetch_dest": "document"}
+    assert ask("right", host=OWN["host"], **link, cookie=f"{COOKIE}=right")[0] == "passed"
+    elsewhere = {"host": OWN["host"], "origin": "null", "cookie": f"{COOKIE}=right"}
+    assert ask("right", method="POST", **elsewhere)[0] == 403
+    assert ask("right", kind="websocket", **elsewhere)[0] == "websocket.close"
+
+
+def test_two_programs_on_one_computer_keep_their_tokens_apart():
+    other = cookie_name("127.0.0.1:9000")
+    assert ask("right", **OWN, cookie=f"{other}=wrong; {COOKIE}=right")[0] == "passed"
+    assert ask("right", **OWN, cookie=f"{other}=right")[0] == 403
 
 
 def test_large_requests_are_refused():

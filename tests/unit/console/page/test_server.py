@@ -9,7 +9,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from rigidimeter.console.page.desk import Desk, Place
-from rigidimeter.console.page.gate import COOKIE, MOST_MESSAGES
+from rigidimeter.console.page.gate import MOST_MESSAGES, cookie_name
 from rigidimeter.console.page.server import PageServer
 from rigidimeter.console.page.work import Work
 from rigidimeter.errors import UserError
@@ -52,8 +52,12 @@ def ask(port, path="/", method="GET", body=None, **headers):
     return found
 
 
+def cookie(port, value=TOKEN):
+    return {"Cookie": f"{cookie_name(f'127.0.0.1:{port}')}={value}"}
+
+
 def own(port):
-    return {"Cookie": f"{COOKIE}={TOKEN}", "Origin": f"http://127.0.0.1:{port}"}
+    return {**cookie(port), "Origin": f"http://127.0.0.1:{port}"}
 
 
 def live(port, path="/live", **headers):
@@ -83,19 +87,19 @@ def alive(port):
 
 @pytest.mark.parametrize("path", PATHS)
 def test_without_the_token_nothing_is_seen(port, path):
-    for headers in ({}, {"Cookie": f"{COOKIE}="}, {"Cookie": f"{COOKIE}={TOKEN}x"}):
+    for headers in ({}, cookie(port, ""), cookie(port, f"{TOKEN}x")):
         status, given, text = ask(port, path, **headers)
         assert status in (303, 403)
         assert "set-cookie" not in given
         assert "rig-page" not in text
-    for headers in ({}, {"Cookie": f"{COOKIE}=x"}, {"Origin": f"http://127.0.0.1:{port}"}):
+    for headers in ({}, cookie(port, "x"), {"Origin": f"http://127.0.0.1:{port}"}):
         with pytest.raises(InvalidStatus, match="403"), live(port, path, **headers):
             pass
 
 
 @pytest.mark.parametrize("path", ["/", "/live", f"{SOCKET_IO}polling", f"{SOCKET_IO}websocket"])
 def test_a_page_of_others_does_not_get_in_with_the_cookie_of_the_browser(port, path):
-    cookie = {"Cookie": f"{COOKIE}={TOKEN}"}
+    known = cookie(port)
     for headers in (
         {"Origin": OTHERS},
         {"Origin": "null"},
@@ -103,11 +107,11 @@ def test_a_page_of_others_does_not_get_in_with_the_cookie_of_the_browser(port, p
         {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Dest": "iframe"},
         {"Host": f"evil.example:{port}", "Origin": f"http://evil.example:{port}"},
     ):
-        assert ask(port, path, **cookie, **headers)[0] == 403
-        assert ask(port, path, "POST", b"x", **cookie, **headers)[0] == 403
+        assert ask(port, path, **known, **headers)[0] == 403
+        assert ask(port, path, "POST", b"x", **known, **headers)[0] == 403
     for origin in (OTHERS, "null", f"http://127.0.0.1:{port + 1}", None):
         given = {"Origin": origin} if origin else {}
-        with pytest.raises(InvalidStatus, match="403"), live(port, path, **cookie, **given):
+        with pytest.raises(InvalidStatus, match="403"), live(port, path, **known, **given):
             pass
 
 
@@ -141,7 +145,7 @@ def test_a_path_leads_to_no_file_but_those_of_the_page(port, path):
 
 def test_requests_of_no_form_end_nothing(port):
     head = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"
-    cookie = f"Cookie: {COOKIE}={TOKEN}\r\n".encode()
+    cookie = f"Cookie: {cookie_name('127.0.0.1')}={TOKEN}\r\n".encode()
     for raw in (
         b"\x00" * 1000,
         b"GET " + b"/" * 100_000 + b" HTTP/1.1\r\n\r\n",

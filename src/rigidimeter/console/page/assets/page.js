@@ -51,7 +51,7 @@
       if (starting) { view("during"); clear(); }
       seen = key;
     }
-    banner(finished ? finished.sentences.join("\n") : "");
+    banner(finished ? finished.sentences.join("\n") : "", finished && finished.outcome === "success");
   }
 
   function during(session) {
@@ -102,7 +102,7 @@
     at.replaceChildren(...rows.map(([className, one]) => node("div", className, one)));
   }
 
-  function banner(text) { const at = $("banner"); at.hidden = !text; if (at.textContent !== text) at.textContent = text; }
+  function banner(text, good) { const at = $("banner"); at.hidden = !text; at.classList.toggle("good", !!good); if (at.textContent !== text) at.textContent = text; }
   function remark(text) { const at = $("said"); at.prepend(node("div", "", text)); while (at.children.length > 4) at.lastChild.remove(); }
   function clear() { traces.clear(); rated = null; show("rated", "–"); $("said").replaceChildren(); $("limits").replaceChildren(); }
 
