@@ -75,12 +75,13 @@ def console(
     require_page()
     out.mkdir(parents=True, exist_ok=True)
     name = protocol.name if protocol is not None else "the defaults"
-    desk = Desk(Place(out.absolute(), settings, name, rig))
+    place = Place(out.absolute(), settings, name, rig, settings_path=protocol)
+    desk = Desk(place)
     for line in extended(desk.place):
         echo(line)
     with serving(desk, host, port, token):
         while not desk.told_to_end:
-            lead_session(desk, desk.next_request(), Realtime(priority=priority, cpu=cpu), protocol)
+            lead_session(desk, desk.next_request(), Realtime(priority=priority, cpu=cpu))
 
 
 def run_on_page(
@@ -103,10 +104,11 @@ def run_on_page(
     out = out.absolute()
     out.parent.mkdir(parents=True, exist_ok=True)
     name = planned.source.name if planned.source is not None else "the defaults"
-    desk = Desk(Place(out.parent, planned.settings, name, rig, one_session=out.name))
+    source = planned.source
+    desk = Desk(Place(out.parent, planned.settings, name, rig, out.name, source))
     with serving(desk, *address):
         while not desk.told_to_end:
-            ended = lead_session(desk, desk.next_request(), realtime, planned.source)
+            ended = lead_session(desk, desk.next_request(), realtime)
             if ended is not None:
                 time.sleep(SHOWN_S)  # for the page to say how it ended
                 return ended
@@ -129,9 +131,7 @@ def serving(desk: Desk, host: str, port: int, token: str) -> Iterator[None]:
         server.stop()
 
 
-def lead_session(
-    desk: Desk, request: StartRequest, realtime: Realtime, source: Path | None
-) -> Ended | None:
+def lead_session(desk: Desk, request: StartRequest, realtime: Realtime) -> Ended | None:
     """Run what the page asked for, and say on the page how it ended; None if it did not begin."""
     from rigidimeter.cli.planned_session import checked_rig, run_planned
     from rigidimeter.cli.sharing import require_packages, write_nwb_beside
@@ -141,7 +141,7 @@ def lead_session(
 
     folder, rig = desk.place.root / request.folder, desk.place.rig
     try:
-        planned = checked_rig(_planned(desk, request, source), rig)
+        planned = checked_rig(_planned(desk, request), rig)
         require_packages(planned.settings)
         planned = planned.blinded() if planned.about.get("blinded") else planned
         look = desk.console(planned.shown(virtual=rig is None), folder)
@@ -166,7 +166,7 @@ def lead_session(
     return ended
 
 
-def _planned(desk: Desk, request: StartRequest, source: Path | None) -> PlannedSession:
+def _planned(desk: Desk, request: StartRequest) -> PlannedSession:
     """Return what is to be run, in which a silent page is lost sooner than a silent terminal."""
     from rigidimeter.cli.planned_session import new_session, rest_of_session
     from rigidimeter.console.page.presence import SILENT_S
@@ -177,7 +177,7 @@ def _planned(desk: Desk, request: StartRequest, source: Path | None) -> PlannedS
         folder = desk.place.root / request.resume
         planned = rest_of_session(folder, virtual=virtual, epoch=request.epoch, left=request.left)
     else:
-        planned = new_session(request.settings, request.about, source)
+        planned = new_session(request.settings, request.about, desk.place.settings_path)
     lost_s = min(SILENT_S, planned.settings.loop.console_lost_s)
     settings = changed_settings(planned.settings, {"loop": {"console_lost_s": lost_s}})
     return replace(planned, settings=settings)

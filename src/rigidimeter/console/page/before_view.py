@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from nicegui import ui
 
 from rigidimeter.console.page.desk import Desk, StartRequest
 from rigidimeter.console.page.prediction import dry_run_lines, prediction_lines
+from rigidimeter.console.page.protocols import protocol_names, read_protocol
 from rigidimeter.console.page.rig_steps import refusal
 from rigidimeter.console.page.rig_view import RigView
 from rigidimeter.console.page.session_form import (
@@ -58,7 +60,16 @@ class BeforeView:
         self._blinded = False
         place = desk.place
         rig = "the virtual rig" if place.rig is None else f"rig {place.rig.name}"
-        ui.label(f"Protocol: {place.settings_name}. Rig: {rig}.").classes("text-lg")
+        with ui.row().classes("w-full items-center"):
+            ui.label(f"Rig: {rig}. Protocol: {place.settings_name}.").classes("text-lg").mark(
+                "what"
+            )
+            names = [] if place.one_session else protocol_names(place.protocols)
+            if names:
+                chosen = ui.select(names, label=f"Another protocol of {place.protocols}")
+                chosen.classes("entry").mark("protocol")
+                chosen.on_value_change(lambda event: self._choose(str(event.value or "")))
+        self._wrong_file = ui.label("").classes("problem").props('role="alert"')
         self._rig = RigView(desk, work, self._may_act, in_control, self._settings)
         with ui.row().classes("w-full"):
             for one in (*METADATA, NOTE):
@@ -91,9 +102,25 @@ class BeforeView:
         self._check()
         ui.timer(5.0, self._show_steps)
 
+    def _choose(self, name: str) -> None:
+        """Begin the form anew with another protocol; of a wrong one the page says what is wrong."""
+        place = self._desk.place
+        if not name or not self._may_act():
+            return
+        try:
+            settings = read_protocol(place.protocols, name)
+        except UserError as error:
+            self._wrong_file.text = f"{error}. The form is still that of {place.settings_name}."
+            return
+        path = place.protocols / name
+        self._desk.place = replace(place, settings=settings, settings_name=name, settings_path=path)
+        write_json(place.root / DRAFT, kept_form(self._form, settings))
+        ui.navigate.reload()
+
     def _input(self, one: Field) -> None:
         label = f"{one.label} [{one.unit}]" if one.unit else one.label
-        made = ui.input(label, value=self._form.get(one.key, "")).classes("entry")
+        made = ui.input(label, value=self._form.get(one.key, ""))
+        made.classes("entry short" if one.key.startswith("epochs") else "entry")
         made.without_auto_validation()  # what is wrong is said by `_check`
         made.props(f"maxlength=400 data-field={one.key} debounce=150")
         made.on_value_change(lambda event, key=one.key: self._change(key, event.value))
@@ -167,7 +194,9 @@ class BeforeView:
         """Show the steps for what was entered, and why a session cannot start."""
         if self._desk.busy or self._entered is None:
             return
-        steps = self._work.rig_steps(self._entered.settings or self._base, None)
+        steps = self._work.rig_steps(
+            self._entered.settings or self._base, self._desk.place.settings_path
+        )
         self._rig.show(steps)
         why = refusal(steps)
         self._refused.text = f"No session can start: {why}." if why else ""

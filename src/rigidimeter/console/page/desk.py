@@ -78,6 +78,12 @@ class Place:
     settings_name: str
     rig: Path | None = None
     one_session: str = ""
+    settings_path: Path | None = None
+
+    @property
+    def protocols(self) -> Path:
+        """The folder whose protocol files can be chosen."""
+        return self.settings_path.parent if self.settings_path is not None else Path.cwd()
 
 
 class Desk:

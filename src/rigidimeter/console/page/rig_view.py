@@ -118,7 +118,7 @@ class RigView:
             self._said.set_content("")
         else:
             self._said.set_content(answer.html())
-        self.show(self._work.rig_steps(settings, None))
+        self.show(self._work.rig_steps(settings, self._desk.place.settings_path))
 
     def _say(self, text: str) -> None:
         self._said.set_content(Answer(True, text).html())

@@ -1,0 +1,48 @@
+"""The page before a session: the steps of the rig, what is predicted, and other protocols."""
+
+from __future__ import annotations
+
+from tests.console.opened import fill, open_page
+
+FOCUSED = "document.activeElement.textContent === 'No'"
+
+
+def test_before_a_session(console, chromium):
+    """By keyboard a check asks, consents to nothing by itself, and ends with Esc."""
+    desk = console()
+    protocol = (desk.place / "protocol.toml").read_text()
+    (desk.place / "long.toml").write_text(protocol.replace("duration_s = 2.0", "duration_s = 3.0"))
+    (desk.place / "wrong.toml").write_text("prbs.duration_s = -1.0\n")
+    page = open_page(chromium, desk)
+    page.set_viewport_size({"width": 820, "height": 1180})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 820
+    fill(page, "subject", "S01")
+    fill(page, "operator", "Op")
+    page.get_by_text("fields are not right yet").wait_for(state="hidden")
+    page.get_by_role("button", name="Check the rig").focus()
+    page.keyboard.press("Enter")
+    page.get_by_text("Nobody's arm may be in the rig").wait_for()
+    page.wait_for_function(FOCUSED)
+    assert page.locator("#emergency").is_enabled()
+    page.keyboard.press("Escape")
+    page.get_by_text("Nobody's arm may be in the rig").wait_for(state="hidden")
+    page.get_by_text("not good").wait_for()
+    page.wait_for_function("document.getElementById('emergency').disabled")
+
+    page.get_by_text("Perturbation, controller and limits").click()
+    fill(page, "prbs_duration", "6,5")
+    page.get_by_role("button", name="Predict").focus()
+    page.keyboard.press("Enter")
+    page.get_by_text("The loop is stable; smallest margins").wait_for()
+    page.get_by_text("OFF: 2 epochs give J ±").wait_for()
+
+    page.get_by_label("Another protocol of").click()
+    page.get_by_role("option", name="wrong.toml").click()
+    page.get_by_text("The form is still that of protocol.toml").wait_for()
+    page.get_by_label("Another protocol of").click()
+    page.get_by_role("option", name="long.toml").click()
+    page.get_by_text("Protocol: long.toml").wait_for()
+    page.wait_for_function("document.body.dataset.view !== undefined")
+    page.get_by_text("Perturbation, controller and limits").click()
+    assert page.locator("input[data-field=prbs_duration]").input_value() == "3"
+    assert page.locator("input[data-field=subject]").input_value() == "S01"
