@@ -123,15 +123,17 @@ def places_of(read: StudyFolder) -> dict[str, list[str]]:
             path = read.folder / name
             if name in found or is_outside(name):
                 continue
-            where = os.path.relpath(place_of(path), root)
-            if path.is_dir():
-                below = sorted(p.relative_to(path).as_posix() for p in path.rglob("*"))
-                found[name] = [where, *below]
-            else:
-                above = [p for p in path.parents if p.is_relative_to(read.folder)]
-                beside = (each for parent in above if parent.is_dir() for each in parent.iterdir())
-                files = sorted(
-                    each.relative_to(read.folder).as_posix() for each in beside if each.is_file()
-                )
-                found[name] = [where, *files]
+            try:
+                found[name] = [os.path.relpath(place_of(path), root), *_files_of(path, read.folder)]
+            except OSError as error:  # such as a name that is too long; its session is left out
+                found[name] = [str(error.strerror)]
     return found
+
+
+def _files_of(path: Path, study: Path) -> list[str]:
+    """Return what is below a folder, or beside a file and above it in the study."""
+    if path.is_dir():
+        return sorted(each.relative_to(path).as_posix() for each in path.rglob("*"))
+    above = [each for each in path.parents if each.is_relative_to(study) and each.is_dir()]
+    beside = (each for parent in above for each in parent.iterdir())
+    return sorted(each.relative_to(study).as_posix() for each in beside if each.is_file())
