@@ -182,7 +182,9 @@ def emps(work: Workspace) -> Numbers:
         "inertia,directional-damping,directional-coulomb",
     )
     settings = work.settings("emps", "[estimation]\ntrim_s = 0.25")
-    options = ("--rate-hz", 1000, "--band-hz", 0, 40, "--settings", settings)
+    # Newtons stand for newton-metres, more than a limb's; so the unit has to be said.
+    units = ("--unit", "torque=Nm")
+    options = ("--rate-hz", 1000, "--band-hz", 0, 40, "--settings", settings, *units)
     return models_numbers(work.document("emps", "model", path, *options, *_terms(*models)))
 
 
@@ -191,7 +193,8 @@ def silverbox(work: Workspace) -> Numbers:
     shared = _shared()
     found = {}
     settings = work.settings("silverbox", "[estimation]\ntrim_s = 0.5")
-    options = ("--rate-hz", 610.3516, "--band-hz", 0, 120, "--settings", settings)
+    units = ("--unit", "angle=rad")
+    options = ("--rate-hz", 610.3516, "--band-hz", 0, 120, "--settings", settings, *units)
     for name, part in (("noise", slice(0, 40_000)), ("multisine", slice(40_800, None))):
         path = work.silverbox(shared, part)
         models = _terms(OFFSET, f"{OFFSET},quadratic,cubic")
