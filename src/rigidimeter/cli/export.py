@@ -123,6 +123,7 @@ def _of_recordings(
         day=said["day"],
         joint=said["joint"],
         started_utc=said["started"],
+        blinded=recordings.blinded,
     )
     return sessions, status
 

@@ -34,14 +34,18 @@ def require_packages(settings: Settings) -> None:
 def write_nwb_beside(folder: Path) -> str:
     """Write `SESSION.nwb` beside a closed session, without estimates; return what came of it.
 
-    The session is recorded whatever becomes of this, so a failure is a sentence.
+    A blinded session is written with its codes. The session is recorded whatever becomes of this,
+    so a failure is a sentence.
     """
     from rigidimeter.exporting import export_sessions, sessions_of_recording
-    from rigidimeter.recording import read
+    from rigidimeter.recording import read, read_manifest
+    from rigidimeter.recording.blinded import codes_of, with_codes
 
     out = folder.with_name(f"{folder.name}.nwb")
     try:
-        export_sessions(sessions_of_recording(read(folder), None), "nwb", out)
+        blinded = bool(codes_of(read_manifest(folder).get("about", {})))
+        recording = with_codes(read(folder)) if blinded else read(folder)
+        export_sessions(sessions_of_recording(recording, None, blinded=blinded), "nwb", out)
     except UserError as error:
         return f"error: {out} was not written: {error}"
     return f"the same as NWB in {out}"

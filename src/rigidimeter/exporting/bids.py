@@ -148,7 +148,7 @@ def _write_top(sessions: Sequence[ExportedSession], folder: Path) -> None:
             "GeneratedBy": [made],
         },
     )
-    blinded = "Conditions are codes: the study was blinded.\n" if about.get("blinded") else ""
+    blinded = "Conditions are codes: the recording is blinded.\n" if about.get("blinded") else ""
     write_text(
         folder / "README.md",
         f"# {described['Name']}\n\n{_SIMULATED if virtual else _MEASURED}\n{blinded}\n"

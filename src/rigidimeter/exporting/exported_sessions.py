@@ -1,14 +1,15 @@
 """From recordings and studies to what is given away of each session.
 
 A session folder gives every sample that was recorded, rests included. A file of another program
-gives the channels of its epochs. In a blinded study nothing is given that tells the condition: not
-the path, the planned protocol, or the joint of a simulated subject.
+gives the channels of its epochs. In a blinded study, or of a recording whose conditions are codes,
+nothing is given that tells the condition: not the path, the planned protocol, or the joint of a
+simulated subject.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -16,7 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.documents import plain_values
-from rigidimeter.recording import Recording, estimates_document, is_session, session_settings
+from rigidimeter.recording import (
+    Recording,
+    estimates_document,
+    is_session,
+    read_manifest,
+    session_settings,
+)
+from rigidimeter.recording.blinded import NO_CODE, codes_of
 from rigidimeter.recording.exported_session import (
     EXPORT_SCHEMA,
     ExportedSession,
@@ -75,6 +83,8 @@ class Described:
         Of its study, as the document holds them.
     blinded : bool
         Whether the condition is a code that must stay one.
+    codes : mapping of str to str
+        The code of each condition that a blinded session names.
     """
 
     subject: str = ""
@@ -85,6 +95,7 @@ class Described:
     started_utc: str = ""
     facts: Mapping[str, Any] | None = None
     blinded: bool = False
+    codes: Mapping[str, str] = field(default_factory=dict)
 
 
 def sessions_of_recording(
@@ -95,6 +106,7 @@ def sessions_of_recording(
     day: str = "",
     joint: str = "",
     started_utc: str = "",
+    blinded: bool = False,
 ) -> list[ExportedSession]:
     """Return what is given away of each source of a recording.
 
@@ -107,6 +119,8 @@ def sessions_of_recording(
         What they are called; empty where unknown.
     started_utc : str
         When recordings began that do not say so themselves, ISO 8601.
+    blinded : bool
+        Whether the recording is of blinded sessions and has their codes (`with_codes`).
     """
     found = []
     for source, epochs in _by_source(recording.epochs).items():
@@ -115,6 +129,9 @@ def sessions_of_recording(
         conditions = {epoch.condition for epoch in epochs}
         condition = conditions.pop() if len(conditions) == 1 else ""
         described = Described(subject, day, condition, "", joint, started_utc)
+        if blinded:
+            codes = codes_of(read_manifest(path).get("about", {}))
+            described = replace(described, facts={"blinded": True}, blinded=True, codes=codes)
         found.append(_exported(path, source, epochs, settings, analysis, described))
     return found
 
@@ -240,7 +257,9 @@ def _event(event: Mapping[str, Any], described: Described) -> dict[str, Any]:
     kept = dict(event)
     if described.blinded:
         kept = {key: value for key, value in kept.items() if key not in _TELLS_CONDITION}
-    if "condition" in kept and described.condition:
+    if "condition" in kept and described.codes:
+        kept["condition"] = described.codes.get(kept["condition"], NO_CODE)
+    elif "condition" in kept and described.condition:
         kept["condition"] = described.condition
     return kept
 
@@ -273,8 +292,11 @@ def _estimates(analysis: Analysis, source: str, name: str) -> dict[str, Any]:
     scores: tuple[Score, ...] = own(analysis.scores)
     delays: tuple[Delay, ...] = own(analysis.delays)
     fixed: tuple[Fit, ...] = own(analysis.fixed_inertia)
+    pooled = tuple(replace(fit, source=name) for fit in analysis.pooled)
     return estimates_document(
-        replace(analysis, fits=fits, fixed_inertia=fixed, scores=scores, delays=delays)
+        replace(
+            analysis, fits=fits, fixed_inertia=fixed, scores=scores, delays=delays, pooled=pooled
+        )
     )
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import random
+import shutil
 import tomllib
 
 import pytest
 
 from rigidimeter.cli.planned_session import PlannedSession
+from rigidimeter.cli.sharing import write_nwb_beside
 from rigidimeter.documents import json_text, text_bytes
 from rigidimeter.experiment import plan
+from rigidimeter.recording import read
 from rigidimeter.recording.blinded import codes_of, drawn_codes
 from rigidimeter.recording.checksum import ZEROS, with_checksum
 from rigidimeter.settings import parse_settings
@@ -57,6 +60,32 @@ def test_no_file_of_a_report_names_a_condition(session, rigidimeter, tmp_path):
         content = path.read_bytes()
         assert not any(name.encode() in content for name in NAMES), path
     assert b"code-B" in (tmp_path / "report" / "report.html").read_bytes()
+
+
+@pytest.mark.parametrize("to", ["csv", "bids"])
+def test_no_file_of_an_export_names_a_condition(session, rigidimeter, tmp_path, to):
+    """The path may tell the condition too."""
+    session = shutil.copytree(session, tmp_path / "Zebra first")
+    out = tmp_path / "out"
+    ran = rigidimeter("export", session, "--blinded", "--to", to, "--out", out)
+    assert ran.status == 0
+    files = [path for path in out.rglob("*") if path.is_file()]
+    assert files
+    for path in files:
+        content = path.read_bytes()
+        assert not any(name.encode() in content for name in NAMES), path
+        assert not any(name in str(path.relative_to(out)) for name in NAMES)
+    again = [epoch.condition for epoch in read(out).epochs]
+    assert again == ["code-B", "code-B", "code-A", "code-A"]
+
+
+def test_nwb_at_the_close_of_a_blinded_session_has_codes(session, tmp_path):
+    pytest.importorskip("pynwb")
+    session = shutil.copytree(session, tmp_path / "session")
+    assert write_nwb_beside(session).startswith("the same as NWB")
+    assert read(tmp_path / "session.nwb").epochs[0].condition == "code-B"
+    content = (tmp_path / "session.nwb").read_bytes()
+    assert not any(name.encode() in content for name in NAMES)
 
 
 def test_a_session_that_was_not_blinded_has_no_codes(rigidimeter, session, tmp_path):
