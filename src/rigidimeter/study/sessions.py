@@ -17,7 +17,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording import ReadOptions, is_session, read_recording
 from rigidimeter.recording.channels.mapping_file import read_mapping
 from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.formats import recorded_settings
+from rigidimeter.recording.formats import reader_of, recorded_settings
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES
 from rigidimeter.recording.study_folder import Row, StudyFolder
 from rigidimeter.recording.study_toml import is_outside
@@ -183,14 +183,13 @@ def _read(
     if not path.exists():
         raise _Refused(f"{path}: there is no such session folder or recording")
     from_session = is_session(path)
-    if not from_session and path.is_dir():
-        raise _Refused(f"{path}: is not a session folder, it has no {MANIFEST}")
-    for name in (MANIFEST, SAMPLES, EVENTS) if from_session else ("",):
-        if (path / name).is_file():
-            open_regular(path / name, RECORDING_BYTES).close()
-            digests[str(PurePath(source) / name)] = noted[path / name]
+    reader_of(path)
+    files = _files_of_samples(path, from_session=from_session)
+    for file in files:
+        open_regular(file, RECORDING_BYTES).close()
+        digests[str(PurePath(source) / file.relative_to(path))] = noted[file]
     # Before the condition is looked at: a copy under another name is no less a copy.
-    digest = digests.get(str(PurePath(source) / (SAMPLES if from_session else "")), "")
+    digest = noted.get(path / SAMPLES if from_session else files[0], "") if files else ""
     first = samples.get(digest, row) if digest else row
     if first not in before:
         raise _Refused(
@@ -221,6 +220,17 @@ def _read(
         for epoch, task in zip(epochs, tasks, strict=True)
     )
     return Session(row, entry, kept, settings), said
+
+
+def _files_of_samples(path: Path, *, from_session: bool) -> list[Path]:
+    """Return the files of a session; of another recording the one that no two of them share.
+
+    Of a folder, such as a BIDS data set, that is its largest file.
+    """
+    if from_session:
+        return [path / name for name in (MANIFEST, SAMPLES, EVENTS) if (path / name).is_file()]
+    files = sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
+    return sorted(files, key=lambda file: file.stat().st_size)[-1:]
 
 
 def _note_others(folder: Path, noted: Mapping[Path, str], digests: dict[str, str]) -> list[Path]:
