@@ -145,12 +145,12 @@ def _write(
     found: StudyResult, json_out: Path | None, csv_out: Path | None, place: str = ""
 ) -> None:
     from rigidimeter.documents import write_json, write_text
-    from rigidimeter.study import comparison_document, result_tables, table_csv
+    from rigidimeter.study import comparison_document, result_table, table_csv
 
     if json_out is not None:
         write_json(json_out, comparison_document(found, place))
     if csv_out is not None:
-        write_text(csv_out, table_csv(result_tables(found)["comparisons"]))
+        write_text(csv_out, table_csv(result_table(found, "comparisons")))
 
 
 def _say_changes(found: StudyResult, folder: Path, *, kept: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 import hashlib
 import itertools
 import math
@@ -155,26 +156,14 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
     sources = [epoch.source for epoch in result.epochs]
     sources += [fit.source for fit in (*analysis.fits, *analysis.fixed_inertia)]
     names = short_names([*sources, *(score.source for score in analysis.scores)])
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(_text),
-        autoescape=True,
-        finalize=shown_text,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.tests["table"] = lambda block: isinstance(block, Table)
-    environment.tests["figure"] = lambda block: isinstance(block, Figure)
-    environment.globals["show"] = lambda value, column: _shown(value, column, names)
-    environment.globals["below"] = lambda row, column: _below(row, column, names)
-    environment.globals["shown_columns"] = lambda table: _shown_columns(table, len(names) > 1)
-    environment.globals["heads"] = _heads
-    environment.globals["file_stem"] = file_stem
     light = traffic_light(result)
     traces = page_traces(result)
     script = _script() if traces else ""
-    return environment.get_template("page.html").render(
+    return _template().render(
         result=result,
+        show=lambda value, column: _shown(value, column, names),
+        below=lambda row, column: _below(row, column, names),
+        shown_columns=lambda table: _shown_columns(table, len(names) > 1),
         # The style is this package's own file and needs no escaping.
         css=Markup("\n".join([_text("page.css"), *([_plot(".min.css")] if traces else [])])),
         parts=parts(made),
@@ -192,6 +181,24 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
         virtual=sum(epoch.virtual for epoch in result.epochs),
         version=__version__,
     )
+
+
+@functools.cache
+def _template() -> jinja2.Template:
+    """Return the template of the page, which takes longer to compile than to fill."""
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(_text),
+        autoescape=True,
+        finalize=shown_text,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.tests["table"] = lambda block: isinstance(block, Table)
+    environment.tests["figure"] = lambda block: isinstance(block, Figure)
+    environment.globals["heads"] = _heads
+    environment.globals["file_stem"] = file_stem
+    return environment.get_template("page.html")
 
 
 def _images(

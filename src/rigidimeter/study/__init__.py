@@ -39,7 +39,7 @@ from rigidimeter.study.results import (
     StudyResult,
 )
 from rigidimeter.study.study_analysis import analyse_study, estimate_study, read_study
-from rigidimeter.study.tables import comparison_document, result_tables, table_csv
+from rigidimeter.study.tables import comparison_document, result_table, result_tables, table_csv
 from rigidimeter.study.traffic_light import TrafficLight, traffic_light
 from rigidimeter.study.warnings import analysis_warnings
 
@@ -94,6 +94,7 @@ __all__ = [
     "read_study",
     "recording_result",
     "relations",
+    "result_table",
     "result_tables",
     "split_pooled",
     "table_csv",

@@ -6,16 +6,17 @@ inputs give the same bytes: neither time nor place is written down.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 from rigidimeter.documents import csv_text, plain_values
 from rigidimeter.recording import estimates_document
-from rigidimeter.study.compared import Comparison, comparison_rows, comparison_values, measure_names
+from rigidimeter.study.compared import comparison_rows, comparison_values, measure_names
 from rigidimeter.study.conclusions import conclusion_rows
 from rigidimeter.study.rating_relation import relations
 from rigidimeter.study.ratings_found import (
+    RatingsFound,
     rating_contrast,
     rating_offsets,
     rating_rows,
@@ -38,27 +39,26 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
     `place` is the study's folder as sentences name it; it is taken out of them.
     """
     analysis = result.analysis
-    tables = result_tables(result)
     light = traffic_light(result)
     of_result = ("title", "source", "by", "reference", "other", "seed", "resamples", "blinded",
                  "virtual")  # fmt: skip
     document = {
         "schema": COMPARISON_SCHEMA,
         **{name: getattr(result, name) for name in of_result},
-        **{name: tables[name] for name in ("conditions", "sessions", "left_out")},
+        **{name: result_table(result, name) for name in ("conditions", "sessions", "left_out")},
         "method": analysis.method,
         "method_reason": analysis.method_reason,
         "inertia_kg_m2": analysis.inertia_kg_m2,
         "inertia_by_subject": result.several_subjects,
-        "conclusion": tables["conclusion"],
+        "conclusion": result_table(result, "conclusion"),
         "quality": None if light is None else light.row(),
         "comparisons": [comparison_values(comparison) for comparison in result.comparisons],
-        "days": tables["days"],
-        "effect_differences": tables["effect_differences"],
+        "days": result_table(result, "days"),
+        "effect_differences": result_table(result, "effect_differences"),
         "ratings": None if result.ratings is None else ratings_document(result.ratings),
-        "rating_relation": tables["rating_relation"],
-        "sensitivity": tables["sensitivity"],
-        "exclusions": tables["excluded_epochs"],
+        "rating_relation": result_table(result, "rating_relation"),
+        "sensitivity": result_table(result, "sensitivity"),
+        "exclusions": result_table(result, "excluded_epochs"),
         "notices": [
             {"level": notice.level, "text": notice.text.replace(f"{place}/", "")}
             if place
@@ -71,51 +71,48 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
     return plain
 
 
+def result_table(result: StudyResult, name: str) -> Rows:
+    """Return one of the tables of conclusions; the others are not made."""
+    return TABLES[name](result)
+
+
 def result_tables(result: StudyResult) -> dict[str, Rows]:
     """Return every table of conclusions by name; some have no rows."""
-    ratings = result.ratings
+    return {name: make(result) for name, make in TABLES.items()}
+
+
+def _days(result: StudyResult) -> Iterator[dict[str, Any]]:
+    for c in result.comparisons:
+        for day in c.day_medians:
+            yield {"measure": c.measure.name} | asdict(day)
+
+
+def _effect_differences(result: StudyResult) -> Iterator[dict[str, Any]]:
     titles = {c.measure.name: c.measure.title for c in result.comparisons}
-    return {
-        "conclusion": conclusion_rows(result),
-        "precision": [one.row() for one in precisions(result)],
-        "comparisons": comparison_rows(result.comparisons),
-        "summaries": list(_summaries(result.comparisons)),
-        "days": [
-            {"measure": c.measure.name} | asdict(day)
-            for c in result.comparisons
-            for day in c.day_medians
-        ],
-        "effect_differences": [
-            {
-                "first": pair.first,
-                "second": pair.second,
-                "first_title": titles[pair.first],
-                "second_title": titles[pair.second],
-                **asdict(pair.difference),
-                "p_holm": pair.p_holm,
-            }
-            for pair in result.differences
-        ],
-        "ratings": [] if ratings is None else rating_rows(ratings),
-        "rating_offsets": [] if ratings is None else list(rating_offsets(ratings)),
-        "rating_contrast": [] if ratings is None else list(rating_contrast(ratings)),
-        "rating_relation": [one.row() for one in relations(result)],
-        "sensitivity": [
-            measure_names(row.measure) | vars(row) | {"measure": row.measure.name}
-            for row in result.sensitivity
-        ],
-        "conditions": list(_conditions(result)),
-        "sessions": [asdict(session) for session in result.sessions],
-        "excluded_epochs": [asdict(exclusion) for exclusion in result.exclusions],
-        "left_out": [asdict(out) for out in result.left_out],
-        "account": list(_account(result)),
-        "estimates": list(_estimates(result)),
-        "scores": list(_scores(result)),
-    }
+    for pair in result.differences:
+        yield {
+            "first": pair.first,
+            "second": pair.second,
+            "first_title": titles[pair.first],
+            "second_title": titles[pair.second],
+            **asdict(pair.difference),
+            "p_holm": pair.p_holm,
+        }
 
 
-def _summaries(comparisons: Iterable[Comparison]) -> Iterator[dict[str, Any]]:
-    for c in comparisons:
+def _of_ratings(
+    result: StudyResult, rows: Callable[[RatingsFound], Iterable[dict[str, Any]]]
+) -> list[dict[str, Any]]:
+    return [] if result.ratings is None else list(rows(result.ratings))
+
+
+def _sensitivity(result: StudyResult) -> Iterator[dict[str, Any]]:
+    for row in result.sensitivity:
+        yield measure_names(row.measure) | vars(row) | {"measure": row.measure.name}
+
+
+def _summaries(result: StudyResult) -> Iterator[dict[str, Any]]:
+    for c in result.comparisons:
         for name, summary in c.summaries.items():
             if summary.n or c.excluded[name]:
                 counts = {"condition": name, "n": summary.n, "excluded": c.excluded[name]}
@@ -209,6 +206,29 @@ def _whose(result: StudyResult) -> dict[str, dict[str, str]]:
 def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return the cells that fit into a table."""
     return {name: value for name, value in row.items() if not isinstance(value, (list, dict))}
+
+
+TABLES: Mapping[str, Callable[[StudyResult], Rows]] = {
+    "conclusion": conclusion_rows,
+    "precision": lambda result: [one.row() for one in precisions(result)],
+    "comparisons": lambda result: comparison_rows(result.comparisons),
+    "summaries": lambda result: list(_summaries(result)),
+    "days": lambda result: list(_days(result)),
+    "effect_differences": lambda result: list(_effect_differences(result)),
+    "ratings": lambda result: _of_ratings(result, rating_rows),
+    "rating_offsets": lambda result: _of_ratings(result, rating_offsets),
+    "rating_contrast": lambda result: _of_ratings(result, rating_contrast),
+    "rating_relation": lambda result: [one.row() for one in relations(result)],
+    "sensitivity": lambda result: list(_sensitivity(result)),
+    "conditions": lambda result: list(_conditions(result)),
+    "sessions": lambda result: [asdict(session) for session in result.sessions],
+    "excluded_epochs": lambda result: [asdict(exclusion) for exclusion in result.exclusions],
+    "left_out": lambda result: [asdict(out) for out in result.left_out],
+    "account": lambda result: list(_account(result)),
+    "estimates": lambda result: list(_estimates(result)),
+    "scores": lambda result: list(_scores(result)),
+}
+"""The tables of conclusions by name, each made alone."""
 
 
 def table_csv(rows: Rows) -> str:

@@ -18,7 +18,7 @@ from rigidimeter.reporting.method_words import interval_basis, pooled_basis
 from rigidimeter.reporting.numbers import condition_name, series
 from rigidimeter.reporting.prose_statistics import day_tests_in_words
 from rigidimeter.reporting.sections.estimate_tables import pooled_table
-from rigidimeter.study import StudyResult, result_tables
+from rigidimeter.study import StudyResult, result_table
 
 _EPOCHS_NOTE = Markup(
     "All differences are {pair}. Two-sided Wilcoxon rank-sum test, asymptotic (normal "
@@ -66,7 +66,7 @@ def _comparison(result: StudyResult) -> Iterator[Block]:
             Column("days_day_share", "Between days", "percent"),
             Column("days_remark", "Remark", "reason"),
         ),
-        result_tables(result)["comparisons"],
+        result_table(result, "comparisons"),
         note=_DAYS_NOTE.format(
             tests="; ".join(text[:1].upper() + text[1:] for text in used), ratings=ratings
         ),
@@ -100,7 +100,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
         "comparisons",
         f"{_pair(result)}: each epoch counted",
         tuple(columns),
-        result_tables(result)["comparisons"],
+        result_table(result, "comparisons"),
         note=_EPOCHS_NOTE.format(pair=f"{sides['reference']} − {sides['other']}"),
     )
     yield paragraph(
@@ -145,7 +145,7 @@ def _all_epochs(result: StudyResult) -> Iterator[Block]:
             Column("q1", "Lower quartile"),
             Column("q3", "Upper quartile"),
         )
-    rows = result_tables(result)["summaries"]
+    rows = result_table(result, "summaries")
     yield Table("summaries", "Medians and quartiles by condition", columns, rows)
     yield pooled_table(
         result,

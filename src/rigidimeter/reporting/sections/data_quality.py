@@ -19,7 +19,7 @@ from rigidimeter.reporting.contents import (
 )
 from rigidimeter.reporting.numbers import plural, short_names
 from rigidimeter.reporting.sections.estimate_tables import HOW, WHO
-from rigidimeter.study import StudyResult, result_tables
+from rigidimeter.study import StudyResult, result_table
 
 GRAVEST_FIRST = ("exclude", "doubt", "note")
 
@@ -170,7 +170,7 @@ def _exclusions(result: StudyResult) -> Iterator[Block]:
 
 
 def _study_exclusions(result: StudyResult) -> Iterator[Block]:
-    tables = result_tables(result)
+    account = result_table(result, "account")
     yield Table(
         "account",
         "All recorded epochs",
@@ -182,9 +182,9 @@ def _study_exclusions(result: StudyResult) -> Iterator[Block]:
             *(Column(f"by_{by}", f"Excluded by {by}", "count") for by in BY),
             Column("unlisted", "Not accounted for", "count"),
         ),
-        tables["account"],
+        account,
     )
-    unlisted = sum(row["unlisted"] for row in tables["account"])
+    unlisted = sum(row["unlisted"] for row in account)
     if unlisted:
         yield paragraph(
             Markup(
@@ -205,7 +205,7 @@ def _study_exclusions(result: StudyResult) -> Iterator[Block]:
             *([Column("who", "Name", "label")] if any(e.who for e in result.exclusions) else []),
             Column("reason", "Reason", "reason"),
         ),
-        tables["excluded_epochs"],
+        result_table(result, "excluded_epochs"),
         empty="No epoch was excluded.",
         folding=True,
     )
@@ -217,7 +217,7 @@ def _study_exclusions(result: StudyResult) -> Iterator[Block]:
             *SESSION,
             Column("reason", "Reason", "reason"),
         ),
-        tables["left_out"],
+        result_table(result, "left_out"),
     )
     yield _stages(result, on_page=False)
 

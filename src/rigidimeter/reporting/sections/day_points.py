@@ -31,7 +31,7 @@ from rigidimeter.reporting.style import (
     styled,
     wrapped,
 )
-from rigidimeter.study import Comparison, DayMedian, Observation, StudyResult, result_tables
+from rigidimeter.study import Comparison, DayMedian, Observation, StudyResult, result_table
 
 MOST_IN_A_ROW = 26
 """More days than this continue in another row of the same figure."""
@@ -64,7 +64,7 @@ class Day(NamedTuple):
 
 
 def _blocks(result: StudyResult) -> Iterator[Block]:
-    yield Table("days", "Medians of the days", (), result_tables(result)["days"])
+    yield Table("days", "Medians of the days", (), result_table(result, "days"))
     by_measure = [(c, found) for c in result.comparisons if (found := _days(c))]
     if not by_measure:
         return

@@ -13,7 +13,7 @@ from rigidimeter.reporting.contents import INTERVAL, Block, Column, Section, Tab
 from rigidimeter.reporting.method_words import interval_basis, method_title
 from rigidimeter.reporting.numbers import number
 from rigidimeter.reporting.sections.recordings import longest_s
-from rigidimeter.study import StudyResult, result_tables, split_pooled
+from rigidimeter.study import StudyResult, result_table, split_pooled
 from rigidimeter.study.drawing import channel_facts
 
 ALL_CONDITIONS = "(all)"
@@ -139,7 +139,6 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             "unbiased estimate from the same excitation and noise could have (Cramér–Rao)."
         ).format(interval_basis(analysis.method, result.settings.estimation))
     )
-    tables = result_tables(result)
     band, in_which = _band(analysis.fits)
     found: tuple[Column, ...] = ()
     doubts: tuple[Column, ...] = ()
@@ -147,11 +146,12 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
         found = (Column("n_findings", "Findings", "count"),)
     if any(fit.doubts for fit in analysis.fits):
         doubts = (Column("doubts", "Doubted by", "reason"),)
+    estimates = result_table(result, "estimates")
     yield Table(
         "estimates",
         f"Inertia, damping and stiffness, epoch by epoch{in_which}",
         (*WHO, *HOW, *_parameters(), *_quality(), *band, *found, *doubts),
-        tables["estimates"],
+        estimates,
         empty="No epoch was fitted.",
         folding=True,
     )
@@ -170,7 +170,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             *_quality(prefix),
             *doubts,
         ),
-        tables["estimates"],
+        estimates,
         empty="No epoch was fitted with the inertia fixed.",
         folding=True,
     )
@@ -185,7 +185,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             Column("n_cycles", "Cycles", "count"),
             Column("frequency_hz", "Frequency (Hz)"),
         ),
-        tables["scores"],
+        result_table(result, "scores"),
         empty="No epoch was scored.",
         folding=True,
     )

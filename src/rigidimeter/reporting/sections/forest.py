@@ -21,7 +21,7 @@ from rigidimeter.reporting.contents import (
 from rigidimeter.reporting.numbers import condition_name, interval, number
 from rigidimeter.reporting.style import GREY, INK, styled, wrapped
 from rigidimeter.statistics import Effects, largest_r
-from rigidimeter.study import Comparison, StudyResult, result_tables
+from rigidimeter.study import Comparison, StudyResult, result_table
 
 COHEN = (0.1, 0.3, 0.5)
 """What is called a small, a medium and a large r."""
@@ -68,7 +68,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             Column("p_holm", "p, Holm", "p"),
             Column("paired", "Same days", "label"),
         ),
-        result_tables(result)["effect_differences"],
+        result_table(result, "effect_differences"),
         folding=True,
     )
 

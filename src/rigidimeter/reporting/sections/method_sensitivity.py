@@ -26,7 +26,7 @@ from rigidimeter.reporting.contents import (
 from rigidimeter.reporting.numbers import axis_unit, condition_name, interval, number
 from rigidimeter.reporting.style import GREY, INK, drawable, styled, wrapped
 from rigidimeter.reporting.verdict_text import dependence_sentences
-from rigidimeter.study import Measure, SensitivityRow, StudyResult, result_tables
+from rigidimeter.study import Measure, SensitivityRow, StudyResult, result_table
 
 _OTHER = "#0072B2"
 MOST_BESIDE = 3
@@ -73,7 +73,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             Column("p_day", "p, days", "p"),
             Column("chosen", "Used here", "label"),
         ),
-        result_tables(result)["sensitivity"],
+        result_table(result, "sensitivity"),
     )
 
 

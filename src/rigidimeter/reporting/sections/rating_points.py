@@ -30,7 +30,7 @@ from rigidimeter.reporting.style import (
     styled,
     wrapped,
 )
-from rigidimeter.study import RatingMean, RatingsFound, StudyResult, result_tables
+from rigidimeter.study import RatingMean, RatingsFound, StudyResult, result_table
 
 _LANES = 0.66
 """The width of a condition that its examiners share."""
@@ -57,7 +57,6 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         partial(ratings, found, order),
     )
     yield paragraph(f"Means of the model with 95 % Kenward–Roger intervals: {words}.")
-    tables = result_tables(result)
     yield Table(
         "rating_contrast",
         f"Contrast of the ratings, {found.reference} − {found.other}",
@@ -69,7 +68,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             Column("df", "df"),
             Column("p", "p", "p"),
         ),
-        tables["rating_contrast"],
+        result_table(result, "rating_contrast"),
     )
     yield Table(
         "rating_offsets",
@@ -81,7 +80,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             Column("offset", "Offset"),
             Column("sd", "SD of such offsets"),
         ),
-        tables["rating_offsets"],
+        result_table(result, "rating_offsets"),
     )
     for text in (*found.notices, *found.model_notices):
         yield paragraph(f"{text}.", "remark")
@@ -94,7 +93,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             Column("score", "Score", "setting"),
             Column("corrected", "Score less offsets"),
         ),
-        tables["ratings"],
+        result_table(result, "ratings"),
         folding=True,
     )
 

@@ -21,7 +21,7 @@ from rigidimeter.reporting.contents import (
 )
 from rigidimeter.reporting.numbers import axis_unit, condition_name, interval, number, plural
 from rigidimeter.reporting.style import condition_colours, condition_markers, listed, note, styled
-from rigidimeter.study import Relation, StudyResult, agreement, relations, result_tables
+from rigidimeter.study import Relation, StudyResult, agreement, relations, result_table
 
 
 def _blocks(result: StudyResult) -> Iterator[Block]:
@@ -51,7 +51,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
                 digits=2,
             ),
         ),
-        result_tables(result)["rating_relation"],
+        result_table(result, "rating_relation"),
         note="Over all: ratings and measures may go together because the conditions change both. "
         "Within conditions: only what differs between days of one condition counts.",
     )

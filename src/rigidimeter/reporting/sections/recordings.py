@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from rigidimeter.reporting.contents import SESSION, Block, Column, Section, Table, paragraph
 from rigidimeter.reporting.numbers import number, plural
 from rigidimeter.settings import Settings
-from rigidimeter.study import StudyResult, result_tables
+from rigidimeter.study import StudyResult, result_table
 from rigidimeter.study.drawing import channel_facts
 from rigidimeter.study.drawn_signals import ChannelFacts
 from rigidimeter.units import rad_from_deg
@@ -69,7 +69,7 @@ def _design(result: StudyResult) -> Iterator[Block]:
                 ),
                 Column("path", "Path", "text"),
             ),
-            result_tables(result)["sessions"],
+            result_table(result, "sessions"),
             folding=True,
         )
     elif result.epochs:

@@ -16,7 +16,7 @@ from rigidimeter.reporting.contents import (
     from_study_folder,
 )
 from rigidimeter.reporting.numbers import condition_name, plural, series
-from rigidimeter.study import StudyResult, result_tables, traffic_light
+from rigidimeter.study import StudyResult, result_table, traffic_light
 
 _STIMULATION: tuple[tuple[str, str, Kind], ...] = (
     ("title", "Description", "text"),
@@ -34,7 +34,7 @@ def _overview(result: StudyResult) -> Iterator[Block]:
         Markup("<dt>{}</dt><dd>{}</dd>").format(name, value) for name, value in _facts(result)
     )
     yield Markup('<dl class="facts">\n{}\n</dl>').format(items)
-    rows = result_tables(result)["conditions"]
+    rows = result_table(result, "conditions")
     known = [row for row in _STIMULATION if any(cells[row[0]] not in (None, "") for cells in rows)]
     yield Table(
         "conditions",
@@ -87,13 +87,12 @@ def _changes(result: StudyResult) -> Iterator[Block]:
 
 def _numbers(result: StudyResult) -> Iterator[Block]:
     """Yield the numbers of the first screen as files."""
-    tables = result_tables(result)
     for name, title in (
         ("conclusion", "What is concluded of each measure"),
         ("precision", "Precision of each measure"),
     ):
-        if tables[name]:
-            yield Table(name, title, (), tables[name])
+        if rows := result_table(result, name):
+            yield Table(name, title, (), rows)
     light = traffic_light(result)
     if light is not None:
         yield Table("quality", "Quality of the data", (), [light.row()])
