@@ -24,7 +24,7 @@ from rigidimeter.cli.main import main
 from rigidimeter.settings import parse_settings
 from rigidimeter.virtual.virtual_session import run_virtual_session
 
-pytest_plugins = ["pytester"]
+pytest_plugins = ["pytester", "tests.small_study"]
 
 Simulate = Callable[..., Path]
 

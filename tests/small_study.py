@@ -1,7 +1,12 @@
-"""A small study on the virtual rig: three days in OFF, three in DBS, two short epochs each."""
+"""A small study on the virtual rig: three days in OFF, three in DBS, two short epochs each.
+
+A plugin of the tests, so that its studies are made once for all of them.
+"""
 
 from __future__ import annotations
 
+import fcntl
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -96,16 +101,28 @@ def build(folder: Path, task: str) -> Path:
     return folder
 
 
+def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], Path]) -> Path:
+    """Return a folder that one of the processes of this run made for all of them."""
+    place = factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        place = place.parent
+    with (place / f"{name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (place / name).exists():
+            make(place / f"{name}.part").rename(place / name)
+    return place / name
+
+
 @pytest.fixture(scope="session")
 def fitted_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Make the study of PRBS epochs once; it is not to be changed."""
-    return build(tmp_path_factory.mktemp("fitted") / "study", "prbs")
+    return made_once(tmp_path_factory, "fitted", lambda folder: build(folder, "prbs"))
 
 
 @pytest.fixture(scope="session")
 def scored_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Make the study of sinusoidal epochs once: scores cost nothing, so tests are fast."""
-    return build(tmp_path_factory.mktemp("scored") / "study", "sinusoid")
+    return made_once(tmp_path_factory, "scored", lambda folder: build(folder, "sinusoid"))
 
 
 @pytest.fixture

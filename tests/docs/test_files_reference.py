@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from tests.docs.markdown import ROOT, table
 from tests.known_joint import angle_rad, torque_nm
-from tests.small_study import scored_study, study
 from typer.testing import CliRunner
 
 from rigidimeter.archives.epoch_table import columns as batch_columns
@@ -28,8 +27,6 @@ from rigidimeter.recording.sample_log import SAMPLE_UNITS
 from rigidimeter.recording.study_toml import STUDY_SCHEMA
 from rigidimeter.records import Analysis, Delay, Finding, Fit, Outcome, Score
 from rigidimeter.settings import Settings
-
-__all__ = ["scored_study", "study"]
 
 FILES = ROOT / "docs" / "reference" / "files.md"
 RECORDING = ROOT / "docs" / "how-to" / "read-your-recording.md"

@@ -4,9 +4,9 @@ import shutil
 
 import pytest
 from tests.faults.compared_study import compared, errors, only_error
-from tests.small_study import edit, record, scored_study, study
+from tests.small_study import record
 
-__all__ = ["compared", "edit", "scored_study", "study"]
+__all__ = ["compared"]
 
 
 def test_a_sound_study_says_nothing(compared) -> None:

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 from tests.faults.compared_study import compared, errors, only_error
-from tests.small_study import edit, scored_study, study
 
-__all__ = ["compared", "edit", "scored_study", "study"]
+__all__ = ["compared"]
 
 
 @pytest.mark.parametrize(

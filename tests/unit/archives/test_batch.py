@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import errno
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.known_joint import TRUTH
-from tests.small_study import fitted_study
 from tests.unit.archives.conftest import write_recording
 
 import rigidimeter as rm
@@ -17,8 +17,6 @@ from rigidimeter.archives import epoch_rows as rows
 from rigidimeter.archives import epoch_table as table
 from rigidimeter.archives import parts
 from rigidimeter.errors import UserError
-
-__all__ = ["fitted_study"]
 
 NUMBERS = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 
@@ -130,17 +128,14 @@ def test_a_disk_that_is_full_at_the_end_keeps_what_is_done(
 
 
 def test_a_study_is_its_sessions(fitted_study: Path, tmp_path: Path) -> None:
-    exclusions = fitted_study / "exclusions.csv"
-    exclusions.write_text("path,epoch,reason\nsessions/2-DBS,1,cough\n")
-    try:
-        found = rm.batch(fitted_study, tmp_path / "out.parquet").table()
-    finally:
-        exclusions.unlink()
+    study = Path(shutil.copytree(fitted_study, tmp_path / "study"))
+    (study / "exclusions.csv").write_text("path,epoch,reason\nsessions/2-DBS,1,cough\n")
+    found = rm.batch(study, tmp_path / "out.parquet", method="bandlimited").table()
     assert len(found) == 12
     assert set(found["condition"]) == {"OFF", "DBS"}
     assert sorted(set(found["day"])) == ["1", "2", "3", "4"]
     (out,) = found[found["outcome"] == "excluded"].to_dict("records")
-    assert (out["input"], out["epoch"]) == (str(fitted_study / "sessions/2-DBS"), "1")
+    assert (out["input"], out["epoch"]) == (str(study / "sessions/2-DBS"), "1")
     assert out["reason"] == "cough"
 
 

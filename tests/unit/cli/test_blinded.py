@@ -21,6 +21,9 @@ from rigidimeter.virtual.virtual_session import run_virtual_session
 
 PROTOCOL = """
 prbs.duration_s = 12.0
+rig.tick_rate_hz = 250.0
+rig.torque.rate_hz = 250.0
+rig.motion.rate_hz = 250.0
 protocol.rests_s = [1.0]
 protocol.return_s = 1.0
 protocol.blocks = [{condition = "Zebra", epochs = 2}, {condition = "Quagga", epochs = 2}]

@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.small_study import record, scored_study
+from tests.small_study import record
 
 from rigidimeter.exporting import FORMATS, Format
-
-__all__ = ["scored_study"]
 
 
 @pytest.fixture(scope="module")

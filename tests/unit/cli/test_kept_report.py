@@ -6,11 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.small_study import TOML, record, scored_study, study
+from tests.small_study import TOML, record
 
 from rigidimeter.documents import replace_file
-
-__all__ = ["scored_study", "study"]
 
 AGAIN = "the study is analysed again: "
 KEPT = "analysis/kept.json"
@@ -62,6 +60,7 @@ def no_analysis(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     return forbid
 
 
+@pytest.mark.usefixtures("no_figures")  # what a figure draws is compared as its CSV
 def test_the_page_of_a_kept_result_is_that_of_a_new_one(
     of_both: Path, tmp_path: Path, rigidimeter, no_analysis
 ) -> None:
@@ -79,7 +78,7 @@ def test_the_page_of_a_kept_result_is_that_of_a_new_one(
     warnings = [line for line in ran.err.splitlines() if line.startswith("warning")]
     assert warnings == [line for line in compared.err.splitlines() if line.startswith("warning")]
     found = files(tmp_path / "report")
-    assert {"figures/impedance.svg", "figures/loops.svg", "figures/recorded.svg"} <= set(found)
+    assert {"figures/impedance.csv", "figures/loops.csv", "figures/recorded.csv"} <= set(found)
     one, two = timeless(found), timeless(expected)
     assert [name for name in {**one, **two} if one.get(name) != two.get(name)] == []
 

@@ -6,15 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.small_study import fitted_study, record, scored_study
+from tests.small_study import record
 
 from rigidimeter.exporting import sessions_of_recording
 from rigidimeter.recording import read
 from rigidimeter.recording.exported_session import ExportedSession
 from rigidimeter.records import Epoch
 from rigidimeter.study import estimate
-
-__all__ = ["fitted_study", "scored_study"]
 
 
 @pytest.fixture(scope="session")

@@ -27,8 +27,8 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Recording]
     jitter = {"rate_hz": 125.0, "jitter_s": 0.002}
     rig = {"tick_rate_hz": 250.0, "torque": {**jitter, "rate_hz": 250.0}, "motion": jitter}
     return {
-        "even": read(record(place / "even", "OFF", 1)),
-        "jittered": read(record(place / "jittered", "DBS", 2, rig=rig)),
+        "even": read(record(place / "even", "OFF", 1, epochs=1)),
+        "jittered": read(record(place / "jittered", "DBS", 2, epochs=1, rig=rig)),
         "sinusoid": read(record(place / "sinusoid", "OFF", 3, task="sinusoid", epochs=1)),
     }
 

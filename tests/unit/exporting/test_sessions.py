@@ -102,7 +102,7 @@ def study(fitted_study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_study_gives_stimulation_ratings_and_exclusions(study: Path) -> None:
-    read_one = read_study(study)
+    read_one = read_study(study, method="bandlimited")
     analysis, _ = estimate_study(read_one)
     sessions = sessions_of_study(read_one, analysis)
     assert len(sessions) == 6

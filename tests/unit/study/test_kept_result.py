@@ -58,6 +58,10 @@ def reason(folder: Path, **asked: object) -> str:
 
 def test_every_number_comes_back_as_it_was(fitted_study: Path, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(fitted_study, tmp_path / "study"))
+    for name in ("sessions.csv", "ratings.csv"):  # two days of each condition are enough
+        lines = (folder / name).read_text().splitlines()
+        left = [line for line in lines if ",3,OFF" not in line and ",4,DBS" not in line]
+        (folder / name).write_text("\n".join(left) + "\n")
     for condition in ("OFF", "DBS"):
         record(folder / f"sessions/2-{condition}-sine", condition, seed=41, task="sinusoid")
         with (folder / "sessions.csv").open("a") as table:
