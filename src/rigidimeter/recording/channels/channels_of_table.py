@@ -23,6 +23,7 @@ from rigidimeter.recording.channels.readings import (
     sign_fault,
 )
 from rigidimeter.recording.formats.columns import (
+    counts_samples,
     numbers,
     own_rate,
     own_rates,
@@ -83,6 +84,8 @@ def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
         except UserError as error:
             faults.append(str(error))
     time_s, rate_hz = np.empty(0), options.rate_hz
+    if rate_hz is not None and numbers_rows(choice.taken, raw):
+        del names["time_s"], raw["time_s"], choice.taken["time_s"]
     try:
         if "time_s" not in names and rate_hz is None:
             rate_hz = own_rate(table)
@@ -113,6 +116,18 @@ def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
         values["torque_nm"] = -values["torque_nm"]
     notices += [Notice("error", f"{text}; the entry was left out") for text in strays]
     return TableChannels(names, time_s, values, tuple(notices))
+
+
+def numbers_rows(taken: Mapping[str, Taken], raw: Mapping[str, Array]) -> bool:
+    """Whether the column of the time may be sample numbers: the user did not say its unit."""
+    time = taken.get("time_s")
+    return (
+        time is not None
+        and not time.of_user
+        and (time.to_si is None or time.unit == "s")
+        and "time_s" in raw
+        and counts_samples(raw["time_s"])
+    )
 
 
 def _about_emg(table: Table, values: Mapping[str, Array]) -> list[Notice]:
@@ -155,6 +170,8 @@ def _unstated(
         f"{table.source}: the unit of {columns} is stated nowhere, so nothing is estimated; say "
         f"{options_text(vary)}"
     )
+    if numbers_rows(choice.taken, raw):
+        text += f"; or --rate-hz, if {choice.taken['time_s'].column!r} numbers the samples"
     return [text, *(readings(choice.taken, raw, rate_hz, vary) if usable else [])]
 
 
@@ -195,5 +212,8 @@ def _doubtful(
             warnings.append(f"{text}; it is read as the unit that was given says")
             continue
         vary = {doubt.standard: doubt.units}
-        faults += [f"{text}; say {options_text(vary)}", *readings(taken, signed, rate_hz, vary)]
+        text += f"; say {options_text(vary)}"
+        if one.standard == "time_s" and numbers_rows(taken, raw):
+            text += ", or --rate-hz if it numbers the samples"
+        faults += [text, *readings(taken, signed, rate_hz, vary)]
     return faults, warnings

@@ -2,7 +2,7 @@
 
 The numbers decide a unit where every other usual one is impossible, the torque among several
 columns where one alone belongs to the motion, and its sign. The unit of a torque, a lever arm and a
-calibration they never decide.
+calibration they never decide, nor whether 0, 1, 2 are milliseconds or sample numbers.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.channels.channels_of_table import channels_of_table
+from rigidimeter.recording.channels.channels_of_table import channels_of_table, numbers_rows
 from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
 from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.channels.looks import Array, Look
@@ -130,6 +130,8 @@ def _units(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOption
         for name in vary
         if name != "torque_nm" and not _unknown_unit(choice.taken[name].column)
     ]
+    if "time_s" in vary and numbers_rows(choice.taken, raw):
+        return options
     if not vary:
         return options
     possible = []
@@ -176,6 +178,8 @@ def _raw(
             rate_hz = own_rate(table)
         except UserError:
             rate_hz = None
+    if rate_hz is not None and numbers_rows(choice.taken, raw):
+        del raw["time_s"]
     sizes = {values.size for values in raw.values()}
     if options.reaction and "torque_nm" in raw:
         raw["torque_nm"] = -raw["torque_nm"]

@@ -112,6 +112,11 @@ def restarts(values: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.flatnonzero(np.diff(values) < 0) + 1
 
 
+def counts_samples(values: NDArray[np.float64]) -> bool:
+    """Whether a column only numbers the rows, as 0, 1, 2: no clock, or one in ms at 1000 Hz."""
+    return values.size > 1 and bool(np.all(np.diff(values) == 1.0))
+
+
 def seconds(value: float) -> str:
     """Return a time or duration as sentences show it, with at most four decimals."""
     return f"{value:.4f}".rstrip("0").rstrip(".") + " s"

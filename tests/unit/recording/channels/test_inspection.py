@@ -100,3 +100,22 @@ def test_a_wrong_mapping_is_refused(tmp_path, text, told):
     with pytest.raises(UserError, match=r"^.*lab\.toml: ") as caught:
         read_mapping(path)
     assert told in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["t", "time_s"])
+def test_sample_numbers_are_not_taken_for_milliseconds(name):
+    """At 200 samples/s, J would be 25 times too small in ms, B 5 times; K would be right."""
+    columns = {name: np.arange(9000.0), "torque_nm": TORQUE_NM, "angle_rad": ANGLE_RAD}
+    found = inspected(**columns)
+    assert "--rate-hz" in found.proposal.unsaid[0]
+    assert "--unit time=s or --unit time=ms" in found.proposal.unsaid[0]
+    found = inspected(ReadOptions(rate_hz=200.0), **columns)
+    assert found.proposal.unsaid == ()
+    assert option_words(found)[:2] == ["--rate-hz", "200"]
+    read = channels_of_table(found.table, found.options)
+    np.testing.assert_allclose(read.time_s, TIME_S)
+    np.testing.assert_allclose(found.proposal.seen.fit.value[0], 0.0063, rtol=0.1)
+    said = inspected(ReadOptions(units={"time": "ms"}), **columns)
+    assert said.proposal.unsaid == ()
+    stated = inspected(**{"t [ms]": np.arange(9000.0)}, torque_nm=TORQUE_NM, angle_rad=ANGLE_RAD)
+    assert stated.proposal.unsaid == ()
