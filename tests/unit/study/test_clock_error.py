@@ -18,7 +18,7 @@ OMEGA = 2 * np.pi * np.array([1.0, 1.5, 2.0])
 TIME_S = np.arange(4000) / 200.0
 
 
-def epoch(clock_error_s: float = 0.0, label: str = "1", seed: int = 0) -> Epoch:
+def epoch(clock_error_s: float = 0.0, label: str = "1", seed: int = 0, source: str = "r") -> Epoch:
     """Return three lines of 0.1 rad, and the torque with a little noise."""
     angle, velocity, acceleration = (
         0.1 * np.sum(OMEGA[:, None] ** n * np.cos(np.outer(OMEGA, TIME_S) + n * np.pi / 2), axis=0)
@@ -31,7 +31,7 @@ def epoch(clock_error_s: float = 0.0, label: str = "1", seed: int = 0) -> Epoch:
         name: Channel(name, TIME_S, values)
         for name, values in (("torque_nm", torque), ("angle_rad", angle))
     }
-    return Epoch("r", label, channels, task="prbs", clock_error_s=clock_error_s)
+    return Epoch(source, label, channels, task="prbs", clock_error_s=clock_error_s)
 
 
 def fits(epochs, inertia_kg_m2=None, delays=()):
@@ -72,14 +72,25 @@ def test_it_does_not_become_smaller_by_pooling():
     np.testing.assert_allclose(added, alone, rtol=0.05)
 
 
+def test_independent_errors_of_two_sources_become_smaller_by_pooling():
+    """Of two equal ones by √2: their mean is pooled."""
+    (_, (plain, *_)), ((one, *_), (pooled, *_)) = fits(
+        [epoch(ERROR_S, "1", k, source) for k, source in enumerate("ab")]
+    )
+    added = np.sqrt(np.diag(pooled.covariance - plain.covariance))[:2]
+    np.testing.assert_allclose(added, one.se[:2] / np.sqrt(2), rtol=0.05)
+
+
 def test_without_an_error_nothing_is_fitted_again():
     found, wide = fits([epoch()])
     assert wide is found
 
 
-def test_of_a_corrected_delay_its_own_error_counts():
+@pytest.mark.parametrize("clock_error_s", [0.0, ERROR_S])
+def test_of_a_corrected_delay_its_own_error_counts(clock_error_s):
+    """Whether torque and motion had two clocks or one."""
     delay = Delay("r", 0.01, ERROR_S / 10, corrected=True)
-    ((plain,), _), ((wide,), _) = fits([epoch(ERROR_S)], delays=[delay])
+    ((plain,), _), ((wide,), _) = fits([epoch(clock_error_s)], delays=[delay])
     added = np.sqrt((wide.covariance - plain.covariance)[0, 0])
     assert added == pytest.approx(0.1 * ERROR_S * DAMPING_NM_S_RAD, rel=0.05)
 
