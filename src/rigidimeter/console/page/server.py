@@ -21,6 +21,7 @@ from nicegui import ui
 from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.staticfiles import StaticFiles
 
+from rigidimeter.console.page.connections import bound_connections
 from rigidimeter.console.page.desk import Desk
 from rigidimeter.console.page.gate import Gate, is_loopback
 from rigidimeter.console.page.live_socket import LiveSockets
@@ -75,6 +76,7 @@ class PageServer:
             timeout_graceful_shutdown=1,
             server_header=False,
         )
+        bound_connections(config)
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._serve, name="page", daemon=True)
 

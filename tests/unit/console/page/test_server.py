@@ -8,6 +8,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from rigidimeter.console.page import connections
 from rigidimeter.console.page.desk import Desk, Place
 from rigidimeter.console.page.gate import MOST_MESSAGES, cookie_name
 from rigidimeter.console.page.server import PageServer
@@ -212,6 +213,59 @@ def test_messages_of_the_framework_with_other_types_end_nothing(port):
             "451-",
         ):
             one.send(packet)
+    assert alive(port)
+
+
+@pytest.fixture
+def silent(port):
+    """Open connections that say nothing, or part of a head, before and after a page's socket."""
+    made = []
+
+    def open_some(count, said=b""):
+        for _ in range(count):
+            made.append(socket.create_connection(("127.0.0.1", port), timeout=20))
+            made[-1].sendall(said)
+        return made
+
+    yield open_some
+    for one in made:
+        one.close()
+
+
+def ended(one):
+    """Whether the server has closed a connection; waits for that."""
+    try:
+        return one.recv(1) == b""
+    except ConnectionError:
+        return True
+
+
+def test_500_connections_that_say_nothing_leave_room_for_the_operator(port, silent):
+    """The page that is open is heard, another is served; the oldest idle ones are closed."""
+    with live(port, **own(port)) as page:
+        page.send(json.dumps({"kind": "hello", "page": secret(port), "tab": "o" * 36}))
+        silent(250)
+        made = silent(250, b"GET / HTTP/1.1\r\nHost: ")
+        page.send(json.dumps({"kind": "order", "command": "nonsense"}))
+        while "say" not in json.loads(page.recv(timeout=20)):
+            pass
+        assert alive(port)
+    assert all(ended(one) for one in made[: len(made) - connections.MOST_CONNECTIONS])
+
+
+def test_a_connection_without_a_request_is_closed_in_time(port, silent, monkeypatch):
+    monkeypatch.setattr(connections, "HEAD_S", 0.05)
+    silent(2)
+    assert all(map(ended, silent(1, b"GET / HTTP/1.1\r\n")))
+    monkeypatch.undo()
+    assert alive(port)
+
+
+def test_a_head_without_an_end_is_cut_off(port, silent):
+    (one,) = silent(1, b"GET / HTTP/1.1\r\n")
+    with pytest.raises(ConnectionError):
+        while True:
+            one.sendall(b"X-Long: " + b"x" * 8000 + b"\r\n")
     assert alive(port)
 
 
