@@ -10,14 +10,14 @@ freeze      from SIGSTOP to all renderers of the browser to the first recorded t
 behind      from the newest sample on the screen to now, looked at by the page
 server      share of one processor that the server's process took while the epoch ran
 
-gaps        ticks that are missing in the records of these sessions: left out by a loop that was
-            late, or lost by the recorder
+left out    ticks that the loop left out of a session because it was late
+lost        samples that the loop made and the recorder lost, of a session
 
 The browser's clock is the wall clock; its difference to CLOCK_MONOTONIC is read beside each click.
 
-`python -m benchmarks.console lateness --runs 5` compares the loop's lateness with the page open and
-without it, and `python -m benchmarks.console memory --minutes 20` follows the memory of server and
-browser; see `benchmarks.console_running`.
+`python -m benchmarks.console lateness --pairs 20` compares the loop's lateness with the page and
+without it (`benchmarks.console_lateness`), and `python -m benchmarks.console memory --minutes 20`
+follows the memory of server and browser (`benchmarks.console_running`).
 """
 
 from __future__ import annotations
@@ -35,15 +35,20 @@ import psutil
 from playwright.sync_api import Browser, Page
 from tests.console.opened import Console, browser, open_page
 
-from benchmarks.console_running import lateness, memory, missing_ticks, renderers, renew
+from benchmarks.console_gaps import gaps
+from benchmarks.console_lateness import lateness
+from benchmarks.console_running import memory, renderers, renew
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_reading import read_samples
 
-PROTOCOL = """
+RATE_HZ = 1000.0
+
+PROTOCOL = f"""
+rig.tick_rate_hz = {RATE_HZ}
 prbs.duration_s = 60.0
 protocol.rests_s = [2.0]
 protocol.return_s = 1.0
-protocol.blocks = [{task = "prbs", condition = "OFF", epochs = 1}]
+protocol.blocks = [{{task = "prbs", condition = "OFF", epochs = 1}}]
 zeroing.duration_s = 0.2
 """
 NOTE_CLICK = """addEventListener("pointerdown", (event) => {
@@ -78,7 +83,9 @@ def stopped_s(
     reason = console.ended()["reason"]
     assert cause.sentence in reason, reason
     samples: dict[str, Any] = read_samples(console.folder() / "samples.arrows")
-    measured["gaps"].append(float(missing_ticks(samples["tick"])))
+    missing = gaps(samples["tick"], samples["lateness_s"], RATE_HZ)
+    measured["left out"].append(float(missing.left_out))
+    measured["lost"].append(float(missing.lost))
     latched = samples["cause"] == int(cause)
     at_rest = latched & (samples["velocity_command_rad_s"] == 0.0)
     return float(samples["time_s"][latched][0]), float(samples["time_s"][at_rest][0])
@@ -117,7 +124,7 @@ def row(name: str, values: list[float]) -> str:
     if not values:
         return f"| {name} | – | – | – | 0 |"
     shown = (np.median(values), np.percentile(values, 95), max(values))
-    if name == "gaps":
+    if name in ("left out", "lost"):
         cells = [f"{value:.0f}" for value in shown]
     elif name == "server":
         cells = [f"{100 * value:.0f} %" for value in shown]
@@ -128,7 +135,7 @@ def row(name: str, values: list[float]) -> str:
 
 def stops(clicks: int, freezes: int) -> None:
     """Measure how soon the page stops the arm, and print a table."""
-    names = ("click", "frozen, cause", "frozen, zero", "behind", "server", "gaps")
+    names = ("click", "frozen, cause", "frozen, zero", "behind", "server", "left out", "lost")
     measured: dict[str, list[float]] = {name: [] for name in names}
     with tempfile.TemporaryDirectory() as name:
         console = Console(Path(name), protocol=PROTOCOL)
@@ -152,14 +159,14 @@ def main() -> None:
     parser.add_argument("mode", nargs="?", choices=("stops", "lateness", "memory"), default="stops")
     parser.add_argument("--clicks", type=int, default=30)
     parser.add_argument("--freezes", type=int, default=5)
-    parser.add_argument("--runs", type=int, default=5, help="pairs of sessions of `lateness`")
-    parser.add_argument("--seconds", type=float, default=20.0, help="of each of them")
+    parser.add_argument("--pairs", type=int, default=20, help="of windows of `lateness`")
+    parser.add_argument("--seconds", type=float, default=4.0, help="of each window")
     parser.add_argument("--minutes", type=float, default=20.0, help="of `memory`")
     asked = parser.parse_args()
     if asked.mode == "stops":
         stops(asked.clicks, asked.freezes)
     elif asked.mode == "lateness":
-        lateness(asked.runs, asked.seconds)
+        lateness(asked.pairs, asked.seconds)
     else:
         memory(asked.minutes)
 

@@ -17,7 +17,7 @@ from typing import Any
 import uvicorn
 
 MOST_CONNECTIONS = 128
-"""At once, with the sockets of pages; a browser opens six connections and two sockets for a page."""
+"""At once, with the sockets of pages; a browser opens some eight for a page."""
 
 HEAD_S = 10.0
 """So long a connection may last without a whole head of a request."""
