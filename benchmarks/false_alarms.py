@@ -198,8 +198,8 @@ def compiled() -> Callable[..., tuple[int, int]]:
             ),
         ),
     )
-    answer = made(
-        torque_answer.answer_step,
+    one_step = made(
+        torque_answer.one_step,
         Cause=causes,
         lowpassed=made(torque_answer.lowpassed),
         keep_row=made(torque_answer.keep_row),
@@ -210,10 +210,11 @@ def compiled() -> Callable[..., tuple[int, int]]:
     means = made(
         agreement.means_step,
         Cause=causes,
-        answer_step=answer,
+        answer_step=made(torque_answer.answer_step, one_step=one_step),
         energy_after=made(watch.energy_after),
     )
-    step = made(consistency.consistency_step, Cause=causes, means_step=means)
+    ended = made(consistency.ended, means_step=means)
+    step = made(consistency.consistency_step, Cause=causes, ended=ended)
 
     return made(first_cause, consistency_step=step)
 

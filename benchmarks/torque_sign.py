@@ -5,10 +5,13 @@ the sensor's torque has the opposite sign. A twin with the same random numbers k
 where the two arms are apart, the motion is wrong. Each row is of `MOMENTS_S` and of some epochs.
 
     python -m benchmarks.torque_sign
+    python -m benchmarks.torque_sign --late
     python -m benchmarks.torque_sign --ratios
 
-The second prints what bounds all that: which ratio S/N of the perturbation's answer to all other
-torque a window needs (`commissioning.turned_sign`), and which one it has while the sign is right.
+The second is of a small joint on a computer that stands still now and then, at random moments: what
+becomes of a wrong sign, and whether a right one is called wrong. The third prints what bounds all
+that: which ratio S/N of the perturbation's answer to all other torque a window needs
+(`commissioning.turned_sign`), and which one it has while the sign is right.
 """
 
 from __future__ import annotations
@@ -47,6 +50,43 @@ SUBJECTS: dict[str, tuple[tuple[float, float, float], dict[str, float]]] = {
 }
 
 
+LATE_S = 12.0
+"""So long is an epoch in which the sign is right."""
+
+SHORTEST_S = 0.005
+GAPS = ((0.0, 0.0), (1.0, 0.039), (5.0, 0.039), (20.0, 0.039), (5.0, 0.2))
+"""How many times a second the computer stands still, and for how long at most."""
+
+LATE_SUBJECTS = ("relaxed, no torque of its own", "relaxed, 0.05 N·m (SD)", "1 N·m (SD)")
+
+
+def made(
+    size: str,
+    of: tuple[tuple[float, float, float], dict[str, float]],
+    tick_hz: float,
+    torque_hz: float,
+    guard: dict[str, Any],
+    controller: dict[str, Any],
+) -> Settings:
+    """Return the settings of one row."""
+    values, (factors, subject) = SIZES[size], of
+    names = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
+    joint = (v * f for v, f in zip(values["joint"], factors, strict=True))
+    return parse_settings(
+        {
+            "subject": {"OFF": {**dict(zip(names, joint, strict=True)), **subject}},
+            "controller": {**values["controller"], **controller},
+            "prbs": values["prbs"],
+            "guard": guard,
+            "rig": {
+                "tick_rate_hz": tick_hz,
+                "torque": {"rate_hz": torque_hz},
+                "motion": {"rate_hz": tick_hz},
+            },
+        }
+    )
+
+
 def row(settings: Settings, epochs: int) -> str:
     """Return what became of one subject, as columns of the table."""
     found_s: list[float] = []
@@ -71,6 +111,71 @@ def row(settings: Settings, epochs: int) -> str:
         f"{len(found_s)} | {np.median(within_s):.2f} ({within_s.min():.2f}–{within_s.max():.2f}) "
         f"| {np.median(deg):.0f} ({deg.max():.0f}) | {early} | {rest}"
     )
+
+
+class StandingStill:
+    """A clock of a computer that stands still at random moments, so often a second and so long."""
+
+    def __init__(self, per_s: float, longest_s: float, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        self._gaps: list[tuple[float, float]] = []
+        began_s = 0.0
+        while per_s > 0.0 and began_s < LATE_S:
+            began_s += rng.exponential(1.0 / per_s)
+            ended_s = began_s + rng.uniform(SHORTEST_S, longest_s)
+            self._gaps.append((began_s, ended_s))
+            began_s = ended_s
+        self._gaps.reverse()
+
+    def wait_until(self, deadline_s: float) -> float:
+        """Return the deadline, or the end of the gap in which it lies."""
+        while self._gaps and self._gaps[-1][1] <= deadline_s:
+            self._gaps.pop()
+        if self._gaps and self._gaps[-1][0] <= deadline_s:
+            return self._gaps[-1][1]
+        return deadline_s
+
+
+def late_row(settings: Settings, epochs: int, per_s: float, longest_s: float) -> str:
+    """Return how epochs end in which the sign turns at 0 and 1.37 s, and in which it is right."""
+    found_s: list[float] = []
+    others: Counter[str] = Counter()
+    falsely: Counter[str] = Counter()
+    for seed in range(epochs):
+        for moment_s in (0.0, 1.37, math.inf):
+            clock = StandingStill(per_s, longest_s, 1000 + seed)
+            until_s = min(moment_s + LONGEST_S, LATE_S)
+            ended = turned_epoch(settings, "OFF", seed, moment_s, until_s, clock)
+            if moment_s == math.inf:
+                falsely[ended.cause.name.lower().replace("_", " ")] += 1
+            elif ended.cause is Cause.TORQUE_SIGN:
+                found_s.append(ended.ended_s - moment_s)
+            else:
+                others[ended.cause.name.lower().replace("_", " ")] += 1
+    after = f"{np.median(found_s):.2f} (to {max(found_s):.2f})" if found_s else "–"
+    del falsely["none"]
+    rest, stopped = (
+        ", ".join(f"{n} {name}" for name, n in sorted(ends.items())) or "–"
+        for ends in (others, falsely)
+    )
+    return f"{len(found_s)} | {after} | {rest} | {stopped}"
+
+
+def print_late(epochs: int) -> None:
+    """Print what becomes of a small joint's sign while ticks are late."""
+    of = f"of {2 * epochs}"
+    print(
+        f"| ticks/s | subject | gaps/s | found {of} | after s | else | right: {epochs}, stopped |"
+    )
+    print("| --- " * 7 + "|")
+    for tick_hz, torque_hz, guard, controller in RATES:
+        if torque_hz == tick_hz:
+            for name in LATE_SUBJECTS:
+                settings = made("small", SUBJECTS[name], tick_hz, torque_hz, guard, controller)
+                for per_s, longest_s in GAPS:
+                    columns = late_row(settings, epochs, per_s, longest_s)
+                    gaps = f"{per_s:g} to {1e3 * longest_s:g} ms"
+                    print(f"| {tick_hz:g} | {name} | {gaps} | {columns} |", flush=True)
 
 
 def ratios_needed() -> list[str]:
@@ -116,7 +221,11 @@ def main() -> None:
     parser.add_argument("--epochs", type=int, default=4, help="for each moment")
     parser.add_argument("--sizes", nargs="*", choices=list(SIZES), default=list(SIZES))
     parser.add_argument("--ratios", action="store_true", help="what bounds the time: S/N")
+    parser.add_argument("--late", action="store_true", help="where ticks are late")
     given = parser.parse_args()
+    if given.late:
+        print_late(given.epochs)
+        return
     if given.ratios:
         print(*ratios_needed(), "", sep="\n")
         print("| size | ticks/s | subject | S/N, median (a tenth is below) |")
@@ -128,24 +237,11 @@ def main() -> None:
         )
         print("| --- " * 8 + "|")
     for size in given.sizes:
-        values = SIZES[size]
         for tick_hz, torque_hz, guard, controller in RATES:
-            for name, (factors, subject) in SUBJECTS.items():
-                names = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
-                joint = (v * f for v, f in zip(values["joint"], factors, strict=True))
-                tables: dict[str, Any] = {
-                    "subject": {"OFF": {**dict(zip(names, joint, strict=True)), **subject}},
-                    "controller": {**values["controller"], **controller},
-                    "prbs": values["prbs"],
-                    "guard": guard,
-                    "rig": {
-                        "tick_rate_hz": tick_hz,
-                        "torque": {"rate_hz": torque_hz},
-                        "motion": {"rate_hz": tick_hz},
-                    },
-                }
+            for name, subject in SUBJECTS.items():
+                settings = made(size, subject, tick_hz, torque_hz, guard, controller)
                 of = f"{tick_hz:g}" if torque_hz == tick_hz else f"{tick_hz:g}, {torque_hz:g}"
-                columns = (ratios if given.ratios else row)(parse_settings(tables), given.epochs)
+                columns = (ratios if given.ratios else row)(settings, given.epochs)
                 print(f"| {size} | {of} | {name} | {columns} |", flush=True)
 
 

@@ -13,7 +13,7 @@ AGREE_S = 0.5
 """How long a wrong motion may last, unless it is shorter than `AGREE_DEG`."""
 
 AGREE_DEG = 5.0
-LONG = {"prbs": {"duration_s": 2.5}, "protocol": {"rests_s": [2.5], "return_s": 0.5}}
+LONG = {"prbs": {"duration_s": 4.0}, "protocol": {"rests_s": [2.5], "return_s": 0.5}}
 
 
 def moved_deg(trial, until_s):

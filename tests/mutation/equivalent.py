@@ -37,17 +37,18 @@ EQUIVALENT: dict[str, str] = {
     STEP + "perturbation_nm + torque_nm + angle_rad → "
     "perturbation_nm + torque_nm - angle_rad": ANY_SIGN,
     STEP + "perturbation_nm + torque_nm → perturbation_nm - torque_nm": ANY_SIGN,
-    STEP + "ConsistencyState(means, still_s, held, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) → "
+    "consistency.py ended: "
+    "ConsistencyState(means, still_s, held, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) → "
     "ConsistencyState(means, still_s, held, 0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)": (
         "0 is 0.0"
     ),
-    ANSWER + "answer_step: elapsed_s > LONGEST_S → elapsed_s >= LONGEST_S": "it becomes what it is",
-    ANSWER + "answer_step: needed > limits.unshown_nm * limits.unshown_nm → "
+    ANSWER + "one_step: elapsed_s > LONGEST_S → elapsed_s >= LONGEST_S": "it becomes what it is",
+    ANSWER + "one_step: needed > limits.unshown_nm * limits.unshown_nm → "
     "needed >= limits.unshown_nm * limits.unshown_nm": MOMENT,
-    ANSWER + "answer_step: shown < part * needed → shown <= part * needed": MOMENT,
-    ANSWER + "answer_step: if steps > 0: ... → if True: ...": EMPTY,
-    ANSWER + "answer_step: steps > 0 → steps >= 0": EMPTY,
-    ANSWER + "answer_step: 0 → -1": EMPTY,
+    ANSWER + "one_step: shown < part * needed → shown <= part * needed": MOMENT,
+    ANSWER + "one_step: if steps > 0: ... → if True: ...": EMPTY,
+    ANSWER + "one_step: steps > 0 → steps >= 0": EMPTY,
+    ANSWER + "one_step: 0 → -1": EMPTY,
     ANSWER + "keep_row: rows % half + half → rows % half - half": "a place below zero counts from "
     "the end",
     SIGN + "table: 1.0 → 1.01": OF_NOTHING,

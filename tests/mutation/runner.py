@@ -41,7 +41,9 @@ TESTS = {
     "control/tracking.py": ("control/test_tracking.py",),
     "guard/causes.py": ("guard/test_causes.py",),
     "guard/agreement.py": ("guard/test_agreement_memories.py", "guard/test_consistency.py"),
-    "guard/consistency.py": ("guard/test_rest.py", "guard/test_consistency.py"),
+    "guard/consistency.py": (
+        *("guard/test_rest.py", "guard/test_late_means.py", "guard/test_consistency.py"),
+    ),
     "guard/limits.py": ("guard/test_limits.py",),
     "guard/recorded_guard.py": ("guard/test_recorded_guard.py",),
     "guard/step.py": _STEP,

@@ -15,7 +15,6 @@ from typing import Any
 
 from rigidimeter.acquisition.run_states import Order
 from rigidimeter.acquisition.tick import (
-    LONGEST_STEP,
     REST,
     ControlLoop,
     TickResult,
@@ -24,7 +23,7 @@ from rigidimeter.acquisition.tick import (
 )
 from rigidimeter.control import admittance_step, minimum_jerk, tracking_step
 from rigidimeter.devices.base import Reading
-from rigidimeter.settings import ControllerSettings
+from rigidimeter.settings import LONGEST_STEP, ControllerSettings
 
 LARGEST_FACTOR = 10.0
 """A parameter may grow to so many times the protocol's value."""

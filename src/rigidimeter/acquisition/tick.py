@@ -42,13 +42,10 @@ from rigidimeter.guard import (
     released,
 )
 from rigidimeter.recording.sample_log import Sample
-from rigidimeter.settings import Settings
+from rigidimeter.settings import LONGEST_STEP, Settings
 
 REST = -1
 """The epoch number of samples between epochs."""
-
-LONGEST_STEP = 5
-"""In ticks, however many were missed."""
 
 POSITION_LIMITED, CUT, STALLED = int(Limited.POSITION), int(Reaction.CUT), int(Cause.STALLED)
 

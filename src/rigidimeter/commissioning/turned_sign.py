@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.acquisition import ControlLoop, SimulatedClock, perturb
+from rigidimeter.acquisition import Clock, ControlLoop, SimulatedClock, perturb
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.devices.base import Reading
 from rigidimeter.experiment import prbs_nm
@@ -125,14 +125,23 @@ class Search(NamedTuple):
 
 
 def turned_epoch(
-    settings: Settings, condition: str, seed: int, turned_s: float, longest_s: float
+    settings: Settings,
+    condition: str,
+    seed: int,
+    turned_s: float,
+    longest_s: float,
+    clock: Clock | None = None,
 ) -> TurnedEpoch:
-    """Run one PRBS epoch from rest on the virtual rig, its torque turned from `turned_s` on."""
+    """Run one PRBS epoch from rest on the virtual rig, its torque turned from `turned_s` on.
+
+    No tick is late unless the clock is.
+    """
     rate_hz = settings.rig.tick_rate_hz
     rig = TurnedRig(settings.rig, settings.subject[condition], np.random.default_rng(seed))
     rig.turned_at = turned_s * rate_hz
     angles: list[float] = []
-    loop = ControlLoop(settings, rig, SimulatedClock(), lambda s: angles.append(s.angle_rad))
+    clock = clock or SimulatedClock()
+    loop = ControlLoop(settings, rig, clock, lambda s: angles.append(s.angle_rad))
     rig.enable()
     perturb(loop, 0, prbs_nm(settings.prbs, rate_hz)[: round(longest_s * rate_hz)].tolist())
     return TurnedEpoch(loop.cause, loop.tick / rate_hz, np.degrees(angles))

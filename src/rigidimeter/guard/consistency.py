@@ -89,6 +89,9 @@ def consistency_step(
     elapsed_ticks : int
         Ticks since the step before.
     """
+    unlike = _NO_CAUSE
+    if elapsed_ticks > limits.mean_of_ticks and state.readings > 0:
+        state, unlike = ended(limits, state)  # the gap is no part of a mean with what was before
     (
         means,
         still_s,
@@ -131,39 +134,45 @@ def consistency_step(
         velocity += velocity_rad_s
         stamp_s += ticks * limits.interval_s - age_s
         before_s += age_s - torque_age_s
-    if ticks < limits.mean_of_ticks or readings == 0:
-        return (
-            ConsistencyState(
-                means,
-                still_s,
-                held,
-                ticks,
-                torque_old,
-                motion_old,
-                readings,
-                perturbed,
-                perturbation,
-                torque,
-                angle,
-                velocity,
-                stamp_s,
-                before_s,
-            ),
-            found,
-        )
+    after = ConsistencyState(
+        means,
+        still_s,
+        held,
+        ticks,
+        torque_old,
+        motion_old,
+        readings,
+        perturbed,
+        perturbation,
+        torque,
+        angle,
+        velocity,
+        stamp_s,
+        before_s,
+    )
+    if ticks >= limits.mean_of_ticks and readings > 0:
+        after, of_this = ended(limits, after)
+        if unlike == _NO_CAUSE:
+            unlike = of_this
+    return after, found if found != _NO_CAUSE else unlike
+
+
+def ended(limits: ConsistencyLimits, state: ConsistencyState) -> tuple[ConsistencyState, int]:
+    """Look at the mean of the ticks since the last one; return the state and a `Cause`."""
+    means, still_s, held, ticks, torque_old, motion_old, readings, perturbed = state[:8]
     share = 1.0 / readings
-    means, unlike = means_step(
+    means, cause = means_step(
         limits,
         means,
-        perturbation * share if perturbed == readings else 0.0,
-        torque * share,
-        angle * share,
-        velocity * share,
-        stamp_s * share,
+        state.perturbation_nm * share if perturbed == readings else 0.0,
+        state.torque_nm * share,
+        state.angle_rad * share,
+        state.velocity_rad_s * share,
+        state.stamp_s * share,
         torque_old / ticks,
         motion_old / ticks,
         ticks * limits.interval_s,
-        before_s * share,
+        state.before_s * share,
     )
     after = ConsistencyState(means, still_s, held, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return after, found if found != _NO_CAUSE else unlike
+    return after, cause

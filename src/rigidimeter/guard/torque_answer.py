@@ -19,8 +19,12 @@ sign    While the perturbation runs, a row of the same signals, through one low-
         every 16 ms or so, and every tenth of a second `torque_sign` looks at the last ones.
 
 A step takes the mean of a few ticks: a mean leaves out what filters of 5 Hz would only alias, and
-costs a fraction of a step each tick. It only adds, multiplies, divides and compares. The window is
-written in place: a state is used once.
+costs a fraction of a step each tick. Where ticks are late the missing steps are filled in, on a
+line to the new mean, since the drive went on at its last velocity. Rows further apart would be
+larger than the others, all columns alike, and few of them look like an answer to M_p.
+
+It only adds, multiplies, divides and compares. The window is written in place: a state is used
+once.
 """
 
 from __future__ import annotations
@@ -34,7 +38,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.guard.causes import Cause
 from rigidimeter.guard.torque_sign import BEFORE, COLUMNS, Left, most_left, sign_is_wrong
-from rigidimeter.settings import Settings
+from rigidimeter.settings import LONGEST_STEP, Settings
 from rigidimeter.units import rad_from_deg
 
 FILTER_RAD_S = 2.0 * math.pi * 5.0
@@ -49,6 +53,9 @@ ROW_S = 0.016
 
 LONGEST_S = 0.06
 """However late a step comes, the filters go on by no more than this: they do not overshoot."""
+
+MOST_FILLED = 64
+"""Half a second and more, of which the filters know nothing afterwards."""
 
 ROWS = (24, 48, 96)
 """Of the windows. The shortest shows a relaxed joint, the longer ones a less plain answer."""
@@ -78,7 +85,8 @@ class AnswerLimits(NamedTuple):
     `rate_per_s` is B_c/J_c of the controller. `steps_a_row` steps make a row. `left` is what a
     joint may leave of each of the windows, `shows_inertia` whether torques read at the ticks do.
     `inertia_kg_m2` is J₀; at 0 the size is not looked at. `least_part` is the part of J₀ a that the
-    torque must show, `unshown_nm` the J₀ a below which the size is not looked at.
+    torque must show, `unshown_nm` the J₀ a below which the size is not looked at. `step_s` is the
+    time of a step, `controlled_s` the longest that the controller makes up for after a late tick.
     """
 
     rate_per_s: float = 0.0
@@ -88,6 +96,8 @@ class AnswerLimits(NamedTuple):
     inertia_kg_m2: float = 0.0
     least_part: float = 1.0
     unshown_nm: float = math.inf
+    step_s: float = math.inf
+    controlled_s: float = math.inf
 
 
 Filtered = tuple[float, float, float, float, float]
@@ -140,6 +150,8 @@ def answer_limits(settings: Settings) -> AnswerLimits:
         inertia_kg_m2=inertia,
         least_part=1.0 if shows_inertia else HARDLY_SHOWN,
         unshown_nm=UNSHOWN_NM + rig.torque.resolution_nm + inertia * steps_rad_s2,
+        step_s=step_s,
+        controlled_s=LONGEST_STEP / rig.tick_rate_hz,
     )
 
 
@@ -169,6 +181,38 @@ def answer_step(
     elapsed_s : float
         The time that the means are of.
     """
+    steps = int(min(elapsed_s / limits.step_s + 0.5, MOST_FILLED))
+    if steps < 2 or isnan(state.angle[0]):
+        return one_step(limits, state, perturbation_nm, torque_nm, angle_rad, elapsed_s, 1.0)
+    before_nm, before_rad = state.torque[0], state.angle[0]
+    controlled = min(limits.controlled_s / elapsed_s, 1.0)
+    cause = _NO_CAUSE
+    for k in range(1, steps + 1):
+        part = k / steps
+        state, found = one_step(
+            limits,
+            state,
+            perturbation_nm,
+            before_nm + part * (torque_nm - before_nm),
+            before_rad + part * (angle_rad - before_rad),
+            elapsed_s / steps,
+            controlled,
+        )
+        if cause == _NO_CAUSE:
+            cause = found
+    return state, cause
+
+
+def one_step(
+    limits: AnswerLimits,
+    state: AnswerState,
+    perturbation_nm: float,
+    torque_nm: float,
+    angle_rad: float,
+    elapsed_s: float,
+    controlled: float,
+) -> tuple[AnswerState, int]:
+    """Take one step, for a part of which the controller went on; see `answer_step`."""
     window, torque, angle, alone, alone_per_s, pushed_nm, shown, moved, steps = state
     if elapsed_s > LONGEST_S:
         elapsed_s = LONGEST_S
@@ -195,8 +239,9 @@ def answer_step(
         alone, alone_per_s, pushed_nm, steps = AT_REST, 0.0, 0.0, 0
     else:
         # The controller alone, trapezoidal as the filters are, so that both are late by the same.
-        drag = 0.5 * limits.rate_per_s * elapsed_s
-        push = 0.5 * (pushed_nm + perturbation_nm) * elapsed_s
+        controlled_s = controlled * elapsed_s
+        drag = 0.5 * limits.rate_per_s * controlled_s
+        push = 0.5 * (pushed_nm + perturbation_nm) * controlled_s
         before, pushed_nm = alone_per_s, perturbation_nm
         alone_per_s = (alone_per_s * (1.0 - drag) + push) / (1.0 + drag)
         alone = lowpassed(blend, alone, alone[0] + 0.5 * (before + alone_per_s) * elapsed_s)

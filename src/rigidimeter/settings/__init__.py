@@ -28,6 +28,7 @@ from rigidimeter.settings.load import (
 )
 from rigidimeter.settings.loop_settings import (
     GAP_S,
+    LONGEST_STEP,
     ControllerSettings,
     GuardSettings,
     LoopSettings,
@@ -44,6 +45,7 @@ from rigidimeter.settings.rig_settings import (
 __all__ = [
     "FEWEST_LINES",
     "GAP_S",
+    "LONGEST_STEP",
     "USABLE_FRACTION_OF_RATE",
     "BlockSettings",
     "ControllerSettings",

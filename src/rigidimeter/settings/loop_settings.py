@@ -19,6 +19,9 @@ A loop under a real-time schedule is late by at most this; against a program tha
 longer there are the drive's own watchdog and the mechanical stops.
 """
 
+LONGEST_STEP = 5
+"""In ticks: after a late one the controller steps over no more, however many were missed."""
+
 
 class ControllerSettings(Section):
     """The admittance M_PRBS − M_meas = J_c θ'' + B_c θ' (Eq. 5), per radian.

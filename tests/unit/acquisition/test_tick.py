@@ -14,11 +14,11 @@ from tests.unit.acquisition.exact_rig import (
 
 from rigidimeter.acquisition import hold
 from rigidimeter.acquisition.run_states import Command
-from rigidimeter.acquisition.tick import LONGEST_STEP, run_ticks, set_admittance
+from rigidimeter.acquisition.tick import run_ticks, set_admittance
 from rigidimeter.control import BiquadState, admittance, biquad_step
 from rigidimeter.devices import Reading
 from rigidimeter.guard import Cause, Limited, Reaction
-from rigidimeter.settings import parse_settings
+from rigidimeter.settings import LONGEST_STEP, parse_settings
 
 # What is written and recorded
 

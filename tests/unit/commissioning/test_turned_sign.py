@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pytest
+from tests.unit.acquisition.exact_rig import LateClock
 
 from rigidimeter.commissioning import turned_sign
 from rigidimeter.commissioning.turned_sign import (
@@ -138,3 +140,42 @@ def test_conditions_are_those_that_are_perturbed() -> None:
         {"protocol": {"blocks": blocks}, "subject": {name: {} for name in ("ON", "OFF", "DBS")}}
     )
     assert perturbed_conditions(settings) == ["DBS", "OFF"]
+
+
+def late_epoch(rate_hz: float, own_nm: float, seed: int, turned_s: float) -> tuple[Cause, float]:
+    """Return how 12 s ended in which about one tick a second is 20 to 39 ms late."""
+    rng = np.random.default_rng(seed)
+    ticks = np.flatnonzero(rng.random(round(12.0 * rate_hz)) < 1.0 / rate_hz).tolist()
+    late = dict(zip(ticks, rng.uniform(0.02, 0.039, len(ticks)).tolist(), strict=True))
+    settings = parse_settings(
+        {
+            "rig": {
+                "tick_rate_hz": rate_hz,
+                "torque": {"rate_hz": rate_hz},
+                "motion": {"rate_hz": rate_hz},
+            },
+            "controller": {"torque_cutoff_hz": 10.0},
+            "guard": {"reaction_time_s": 0.1},
+            "subject": {"OFF": {"voluntary_sd_nm": own_nm}},
+        }
+    )
+    epoch = turned_epoch(settings, "OFF", seed, turned_s, 12.0, LateClock(late, 1.0 / rate_hz))
+    return epoch.cause, epoch.ended_s
+
+
+def test_the_sign_of_a_rig_in_order_is_not_called_wrong_for_late_ticks() -> None:
+    """A missed tick of 20 ms makes a row that is larger than the others, in all columns alike."""
+    for seed in (1, 6, 8, 9, 10, 17):
+        assert late_epoch(50.0, 1.0, seed, math.inf)[0] is Cause.NONE
+
+
+@pytest.mark.parametrize("turned_s", [0.0, 1.3])
+def test_a_rig_of_the_wrong_sign_is_stopped_between_late_ticks(turned_s: float) -> None:
+    """The sign is found, or the arm has been at its limit for a second."""
+    found = 0
+    for seed in range(5):
+        cause, ended_s = late_epoch(50.0, 0.0, seed, turned_s)
+        found += cause is Cause.TORQUE_SIGN
+        assert cause in (Cause.TORQUE_SIGN, Cause.HELD_AT_LIMIT)
+        assert ended_s - turned_s < 3.0
+    assert found >= 4

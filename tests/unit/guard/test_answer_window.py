@@ -156,6 +156,62 @@ def test_a_late_step_is_one_of_the_longest():
         assert state.alone_per_s == pytest.approx(0.09 / 1.06)
 
 
+def test_a_late_step_is_filled_in_by_steps_on_a_line():
+    """It leaves what as many steps in time leave, if torque and angle changed steadily."""
+    limits = AnswerLimits(10.0, 2, step_s=0.008)
+    states = []
+    for elapsed_s, parts in ((0.008, (0.2, 0.4, 0.6, 0.8, 1.0)), (0.04, (1.0,))):
+        state = answer_state()
+        for _ in range(20):
+            state, _ = answer_step(limits, state, 1.5, 0.1, 0.2, 0.008)
+        for part in parts:
+            torque, angle = 0.1 + part * 0.6, 0.2 - part * 0.3
+            state, _ = answer_step(limits, state, 1.5, torque, angle, elapsed_s)
+        states.append(state)
+    in_time, late = states
+    assert (in_time.steps, late.steps) == (25, 25)
+    for name in ("window", "torque", "angle", "alone", "alone_per_s", "shown_nm2", "moved2"):
+        np.testing.assert_allclose(getattr(late, name), getattr(in_time, name), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("elapsed_s", "steps"),
+    [(0.0119, 1), (0.0121, 2), (0.0199, 2), (0.0201, 3), (0.501, 63), (9.0, 64)],
+)
+def test_so_many_steps_fill_in_a_late_one(elapsed_s, steps):
+    limits, state = AnswerLimits(10.0, 2, step_s=0.008), answer_state()
+    first, _ = answer_step(limits, state, 1.5, 0.1, 0.2, elapsed_s)
+    assert first.steps == 1  # nothing is known of before
+    state, _ = answer_step(limits, first, 1.5, 0.1, 0.2, elapsed_s)
+    assert state.steps == 1 + steps
+
+
+def test_the_controller_alone_makes_up_for_a_part_of_a_late_step_and_keeps_its_velocity():
+    """θ_p' grows by M times 5 ms, however late, and θ_p by its mean times 48 ms."""
+    limits, state = AnswerLimits(0.0, 2, step_s=0.008, controlled_s=0.005), answer_state()
+    for _ in range(10):
+        state, _ = answer_step(limits, state, 2.0, 0.1, 0.2, 0.008)
+    after, _ = answer_step(limits, state, 2.0, 0.1, 0.2, 0.048)
+    assert after.alone_per_s - state.alone_per_s == pytest.approx(2.0 * 0.005)
+    mean = 0.5 * (after.alone_per_s + state.alone_per_s)
+    assert after.alone[0] - state.alone[0] == pytest.approx(0.048 * mean)
+    # A step that is late by less is made up for.
+    late = state._replace(alone_per_s=0.0)
+    limits = limits._replace(controlled_s=0.1)
+    after, _ = answer_step(limits, late, 2.0, 0.1, 0.2, 0.048)
+    assert after.alone_per_s == pytest.approx(2.0 * 0.048)
+
+
+def test_the_first_cause_of_a_late_step_is_kept():
+    """The mean squares reach J₀² a² in its first steps, and fall below it in the last."""
+    limits = AnswerLimits(0.0, 2, inertia_kg_m2=1.0, unshown_nm=1.0, step_s=0.008)
+    state = answer_state()._replace(torque=AT_REST, angle=AT_REST, moved2=1.05)
+    once, cause = answer_step(limits, state, 0.0, 0.0, 0.0, 0.008)
+    assert (cause, once.moved2 > 1.0) == (Cause.TORQUE_SILENT, True)
+    late, cause = answer_step(limits, state, 0.0, 0.0, 0.0, 0.032)
+    assert (cause, late.moved2 < 1.0) == (Cause.TORQUE_SILENT, True)
+
+
 def test_the_size_is_looked_at_with_a_memory_of_a_quarter_of_a_second():
     """The mean squares fall by h/0.25 s a step: by (1 − 0.008/0.25)^n once all is at rest."""
     limits = AnswerLimits()

@@ -235,6 +235,8 @@ def test_each_limit_is_the_settings_in_si_units():
             "inertia_kg_m2": 0.002,
             "least_part": 1.0,
             "unshown_nm": 0.0003 + 0.003 + 0.002 * math.radians(0.02) * (10 * math.pi) ** 2,
+            "step_s": 0.008,
+            "controlled_s": 0.01,
         }
     )
     slow = {"tick_rate_hz": 50.0, "torque": {"rate_hz": 50.0}, "motion": {"rate_hz": 50.0}}
@@ -274,7 +276,7 @@ def test_the_figures_of_the_laws_and_what_they_begin_with():
     assert (SHOWN_MEMORY_S, MEAN_OF_S, ROW_S, LONGEST_S) == (0.25, 0.008, 0.016, 0.06)
     assert (ROWS, ROWS_A_LOOK, UNSHOWN_NM) == ((24, 48, 96), 6, 0.0003)
     assert pytest.approx((0.75 * math.pi, 0.3)) == (SETTLED, HARDLY_SHOWN)
-    assert AnswerLimits() == (0.0, 2, (Left(), Left(), Left()), True, 0.0, 1.0, math.inf)
+    assert AnswerLimits() == (0.0, 2, (Left(), Left(), Left()), True, 0.0, 1.0, *[math.inf] * 3)
     assert Left() == (1, 0.0, 0.0)
     state = answer_state()
     assert not state.window.any()
