@@ -6,6 +6,7 @@ a person would add for what no file says, and what must come of it.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -31,13 +32,17 @@ class Dialect:
     refused: str = ""
 
 
+@functools.cache
+def _written(column: bytes, decimal: str, digits: int) -> list[str]:
+    """Return the numbers of a column as text; many dialects share a column."""
+    values = np.frombuffer(column).tolist()
+    return [f"{value:.{digits}g}".replace(".", decimal) for value in values]
+
+
 def rows(*columns, mark=",", decimal=".", end="", digits=9) -> str:
-    lists = (np.asarray(column).tolist() for column in columns)
-    texts = (
-        mark.join(f"{value:.{digits}g}".replace(".", decimal) for value in row) + end
-        for row in zip(*lists, strict=True)
-    )
-    return "\n".join(texts) + "\n"
+    made = [np.asarray(column, dtype=np.float64).tobytes() for column in columns]
+    lists = [_written(column, decimal, digits) for column in made]
+    return "\n".join(mark.join(row) + end for row in zip(*lists, strict=True)) + "\n"
 
 
 def csv(head: str, *columns, **more) -> bytes:

@@ -7,6 +7,7 @@ it was recorded and how it was written.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +18,8 @@ from pyarrow import csv
 from tests.scenarios.limbs import LIMBS, setup_of
 from tests.scenarios.recordings import Setup, simulate
 from tests.scenarios.subject import Subject
+
+from rigidimeter.records import Epoch
 
 RATE_HZ = 250.0
 DURATION_S = 12.0
@@ -67,10 +70,9 @@ class Session:
 
 def write_session(path: Path, session: Session, seed: np.random.SeedSequence) -> Path:
     """Simulate the epochs of a session and write them as one table."""
-    rng = np.random.default_rng(seed.spawn(1)[0])
+    moved = replace(session, day="", condition="", columns=(), degrees=False)
     tables = []
-    for number, child in enumerate(seed.spawn(session.epochs)):
-        epoch = simulate(_setup(session, rng), 1, child).epochs[0]
+    for number, epoch in enumerate(_recorded(moved, seed.spawn_key, seed.entropy)):
         start_s = number * (DURATION_S + REST_S)
         values = {name: epoch.channels[name].values for name in session.columns}
         if session.degrees:
@@ -80,6 +82,15 @@ def write_session(path: Path, session: Session, seed: np.random.SeedSequence) ->
     columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
     csv.write_csv(pa.table(columns), path)
     return path
+
+
+@functools.cache
+def _recorded(session: Session, key: tuple[int, ...], entropy: int) -> list[Epoch]:
+    """Simulate the epochs of a session; studies share those in which nothing differs."""
+    seed = np.random.SeedSequence(entropy, spawn_key=key)
+    rng = np.random.default_rng(seed.spawn(1)[0])
+    children = seed.spawn(session.epochs)
+    return [simulate(_setup(session, rng), 1, child).epochs[0] for child in children]
 
 
 def write_study(folder: Path, sessions: Sequence[Session], seed: int, ratings: str = "") -> Path:

@@ -318,11 +318,12 @@ def test_files_are_written_even_when_nobody_reads_the_words(simulate, tmp_path):
     assert json.loads(out.read_text())["epochs"]
 
 
-def test_a_terminal_without_our_signs_or_space_is_no_traceback(tmp_path):
-    for redirect, encoding in (("/dev/full", "utf-8"), ("/dev/null", "cp1252")):
-        command = f"PYTHONIOENCODING={encoding} {sys.executable} -m rigidimeter design > {redirect}"
-        ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
-        assert "Traceback" not in ran.stderr
+def test_a_terminal_without_our_signs_or_space_is_no_traceback():
+    """A sign would fail when it is printed, the space when all is written at the end."""
+    command = f"PYTHONIOENCODING=cp1252 {sys.executable} -m rigidimeter design > /dev/full"
+    ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert "Traceback" not in ran.stderr
+    assert "No space left on device" in ran.stderr
 
 
 def test_microseconds_given_as_seconds_are_refused_in_words(rigidimeter, tmp_path):

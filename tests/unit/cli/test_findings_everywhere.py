@@ -73,7 +73,7 @@ def names_and_levels(epochs, method, settings):
 
 
 def test_a_tenth_of_a_millisecond_of_jitter_changes_no_finding(simulate):
-    recording = rm.read(simulate(epochs=2, subject={"OFF": {"voluntary_sd_nm": 0.35}}))
+    recording = rm.read(simulate(subject={"OFF": {"voluntary_sd_nm": 0.35}}))
     rng = np.random.default_rng(1)
     moved = []
     for epoch in recording.epochs:

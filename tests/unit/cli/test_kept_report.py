@@ -21,13 +21,11 @@ def of_both(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "sessions").mkdir(parents=True)
     rows = ["path,subject,day,condition"]
     repeating = {"duration_s": 8.0, "register_bits": 5}
-    for day, condition in (("1", "OFF"), ("2", "OFF"), ("1", "DBS"), ("2", "DBS")):
-        path = f"sessions/{day}-{condition}"
-        record(folder / path, condition, seed=10 * len(rows), epochs=1, prbs=repeating)
-        rows.append(f"{path},M1,{day},{condition}")
-        if day == "1":
-            record(folder / f"{path}-sine", condition, seed=40 + len(rows), task="sinusoid")
-            rows.append(f"{path}-sine,M1,{day},{condition}")
+    for condition in ("OFF", "DBS"):
+        path = f"sessions/{condition}"
+        record(folder / path, condition, seed=10 * len(rows), prbs=repeating)
+        record(folder / f"{path}-sine", condition, seed=40 + len(rows), task="sinusoid")
+        rows += [f"{path},M1,1,{condition}", f"{path}-sine,M1,1,{condition}"]
     (folder / "study.toml").write_text(TOML)
     (folder / "sessions.csv").write_text("\n".join(rows) + "\n")
     return folder

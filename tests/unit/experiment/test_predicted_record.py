@@ -131,7 +131,7 @@ def test_the_products_are_those_of_matrices(voluntary_sd_nm: float, trim_s: floa
     turn = np.exp(-2j * np.pi * np.outer(lines.line, np.arange(n)) / n)
     F = turn * lines.window
     C = toeplitz(noise_covariance(settings.rig, subject, n))
-    S = np.real(np.einsum("ij,jk,ik->i", F, C, F.conj()))
+    S = np.real(np.sum((F @ C) * F.conj(), axis=1))
     # Without the mean, as a projection: least squares of a constant under the window.
     centred = np.eye(n) - np.outer(np.ones(n), lines.window**2) / np.sum(lines.window**2)
     Z = F @ centred @ record.motion[:, :n].T

@@ -52,6 +52,14 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         }
 
 
+@pytest.fixture(scope="module")
+def on_a_desk(browser: Browser, reports: dict[str, Path]) -> Iterator[Page]:
+    """Return the page of the study, opened once; a test leaves it as it was."""
+    page = opened(browser, reports["study"], DESKTOP)
+    yield page
+    page.close()
+
+
 def opened(browser: Browser, path: Path, size: tuple[int, int]) -> Page:
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
     page.goto(path.as_uri())
@@ -77,23 +85,15 @@ def test_the_first_screen_holds_stiffness_and_the_traffic_light(
     assert re.search(r"\[[\d.]+ (\w+ )?to [\d.]+", row.inner_text())
     assert row.locator("svg.interval").is_visible()
     assert "Data quality: good" in page.locator(".light").inner_text()
+    # Nothing is cut at the side.
+    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    strip = page.locator(".scroll:has(> .strip)")
+    assert not strip.evaluate("one => one.scrollWidth > one.clientWidth")
     page.close()
 
 
-@pytest.mark.parametrize("size", [DESKTOP, PHONE])
-def test_nothing_is_cut_at_the_side(
-    browser: Browser, reports: dict[str, Path], size: tuple[int, int]
-) -> None:
-    for path in reports.values():
-        page = opened(browser, path, size)
-        assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-        strip = page.locator(".scroll:has(> .strip)")
-        assert not strip.evaluate("one => one.scrollWidth > one.clientWidth")
-        page.close()
-
-
-def test_every_link_leads_somewhere(browser: Browser, reports: dict[str, Path]) -> None:
-    page = opened(browser, reports["study"], DESKTOP)
+def test_every_link_leads_somewhere(on_a_desk: Page, reports: dict[str, Path]) -> None:
+    page = on_a_desk
     links = page.locator("a").evaluate_all("all => all.map(a => a.getAttribute('href'))")
     assert len(links) > 30
     for link in links:
@@ -105,13 +105,12 @@ def test_every_link_leads_somewhere(browser: Browser, reports: dict[str, Path]) 
         box = target.bounding_box()
         assert box is not None
         assert -1 <= box["y"] < DESKTOP[1], entry.inner_text()
-    page.close()
 
 
 def test_the_print_is_the_first_parts_with_page_numbers(
-    browser: Browser, reports: dict[str, Path]
+    on_a_desk: Page, reports: dict[str, Path]
 ) -> None:
-    page = opened(browser, reports["study"], DESKTOP)
+    page = on_a_desk
 
     def pages() -> int:
         return len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True)))
@@ -122,7 +121,8 @@ def test_the_print_is_the_first_parts_with_page_numbers(
     page.locator("details.long").evaluate_all("all => all.forEach(one => one.open = true)")
     assert pages() > first
     assert "counter(page)" in reports["study"].read_text(encoding="utf-8")
-    page.close()
+    page.locator("#everything").uncheck()
+    page.reload()
 
 
 def test_the_dark_scheme_is_dark_and_its_text_light(
@@ -142,10 +142,8 @@ def test_the_dark_scheme_is_dark_and_its_text_light(
     page.close()
 
 
-def test_a_point_names_its_epoch_and_opens_its_traces(
-    browser: Browser, reports: dict[str, Path]
-) -> None:
-    page = opened(browser, reports["study"], DESKTOP)
+def test_a_point_names_its_epoch_and_opens_its_traces(on_a_desk: Page) -> None:
+    page = on_a_desk
     wrong: list[str] = []
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("console", lambda said: wrong.append(said.text))
@@ -175,7 +173,6 @@ def test_a_point_names_its_epoch_and_opens_its_traces(
     page.keyboard.press("Escape")
     assert not dialog.is_visible()
     assert wrong == []
-    page.close()
 
 
 def test_without_scripts_the_figures_and_their_words_remain(

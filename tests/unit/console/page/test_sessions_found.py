@@ -65,6 +65,7 @@ def test_an_epoch_is_left_out_with_a_reason_and_a_name_and_nothing_deleted(root)
         exclude(root, "S01-1", "2", "again", "Op")
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_what_is_estimated_from_the_page_is_without_the_epochs_left_out(root, rigidimeter):
     (found,), _ = found_sessions(root)
     assert found.options == ()
