@@ -25,10 +25,8 @@ demo: install
 # Hundreds of processes are started, and without bytecode each would compile the package anew.
 test: export PYTHONDONTWRITEBYTECODE =
 
-# In the order of their names: by the number of tests, files of few long ones would come last, alone.
 test: install
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m 'not slow and not realtime'
-	$(BIN)/python -m pytest -n 2 -m 'not slow and realtime' tests/console tests/faults tests/wire tests/unit/acquisition
+	$(BIN)/python -m tests
 
 check: install
 	$(BIN)/ruff format --check .

@@ -73,6 +73,7 @@ def recorded(folder):
     return samples
 
 
+@pytest.mark.slow  # always: `test_page` kills the server, `tests/faults` the processes, by signals
 def test_all_processes_are_killed_and_a_new_page_runs_the_rest(console, chromium):
     """What was recorded is whole; the rest is run from a new page; the folder is a study."""
     desk = console(1, 1, 3.0)

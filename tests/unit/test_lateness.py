@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from tests import lateness
+from tests.__main__ import TIMED
 from tests.conftest import REALTIME
 from tests.lateness import ATTEMPTS, LatenessProbe
 
@@ -46,20 +47,8 @@ class Still(LatenessProbe):
         pass
 
 
-@pytest.mark.parametrize(
-    ("body", "still", "outcome", "runs"),
-    [
-        ("assert True", 9, "passed", 1),  # it did not ask how late the machine was
-        ("assert PRESENT[0].worst_s(0.0) < 9", 2, "passed", 3),
-        ("assert PRESENT[0].worst_s(0.0) < 9", 9, "skipped", ATTEMPTS),
-        ("assert False", 9, "skipped", ATTEMPTS),
-        ("assert False", 0, "failed", 1),
-    ],
-)
-def test_a_machine_that_stood_still_is_no_judge(pytester, monkeypatch, body, still, outcome, runs):
-    monkeypatch.setattr(lateness, "LatenessProbe", Still)
-    monkeypatch.setattr(Still, "left", still)
-    monkeypatch.setattr(lateness, "PAUSE_S", 0.0)
+def judged_once(pytester, body):
+    """Run a test of that body beside the probe; `ran` gets a letter for each attempt."""
     pytester.makeconftest(
         "from tests.lateness import run_beside_probe\n"
         "def pytest_runtest_protocol(item, nextitem):\n"
@@ -74,7 +63,24 @@ def test_a_machine_that_stood_still_is_no_judge(pytester, monkeypatch, body, sti
         "        file.write('x')\n"
         f"    {body}\n"
     )
-    ran = pytester.runpytest_inprocess("-rs", "-p", "no:cacheprovider", "-W", "ignore")
+    return pytester.runpytest_inprocess("-rs", "-p", "no:cacheprovider", "-W", "ignore")
+
+
+@pytest.mark.parametrize(
+    ("body", "still", "outcome", "runs"),
+    [
+        ("assert True", 9, "passed", 1),  # it did not ask how late the machine was
+        ("assert PRESENT[0].worst_s(0.0) < 9", 2, "passed", 3),
+        ("assert PRESENT[0].worst_s(0.0) < 9", 9, "skipped", ATTEMPTS),
+        ("assert False", 9, "skipped", ATTEMPTS),
+        ("assert False", 0, "failed", 1),
+    ],
+)
+def test_a_machine_that_stood_still_is_no_judge(pytester, monkeypatch, body, still, outcome, runs):
+    monkeypatch.setattr(lateness, "LatenessProbe", Still)
+    monkeypatch.setattr(Still, "left", still)
+    monkeypatch.setattr(lateness, "PAUSE_S", 0.0)
+    ran = judged_once(pytester, body)
     ran.assert_outcomes(**{outcome: 1})
     assert (pytester.path / "ran").read_text() == "x" * runs
     assert ("too busy to judge" in ran.stdout.str()) == (runs == ATTEMPTS)
@@ -82,13 +88,18 @@ def test_a_machine_that_stood_still_is_no_judge(pytester, monkeypatch, body, sti
 
 def test_make_test_looks_for_tests_in_real_time_wherever_there_are_some():
     root = Path(__file__).parents[2]
-    (folders,) = re.findall(r"'not slow and realtime' (.*)", (root / "Makefile").read_text("utf-8"))
     marked = [
         path.relative_to(root).as_posix()
         for path in (root / "tests").rglob("test_*.py")
         if re.search("^@pytest.mark.realtime", path.read_text("utf-8"), re.MULTILINE)
     ]
     assert marked
-    assert [
-        each for each in (*marked, *REALTIME) if not each.startswith(tuple(folders.split()))
-    ] == []
+    assert [each for each in (*marked, *REALTIME) if not each.startswith(tuple(TIMED))] == []
+
+
+def test_a_long_test_is_not_repeated_for_ever(pytester, monkeypatch):
+    monkeypatch.setattr(lateness, "LatenessProbe", Still)
+    monkeypatch.setattr(Still, "left", 9)
+    monkeypatch.setattr(lateness, "PATIENCE_S", -1.0)
+    judged_once(pytester, "assert False").assert_outcomes(skipped=1)
+    assert (pytester.path / "ran").read_text() == "x"

@@ -129,6 +129,7 @@ def _holds_for_this_rig_only(bench: Any, chosen: Settings, record: Commissioning
         check_record(rigfile, facts, settings(125.0), now_utc=today)
 
 
+@pytest.mark.slow  # always: the CAN rig above, and the serial drive in `test_conformance`
 def test_a_healthy_serial_rig_passes_at_a_low_tick_rate(tmp_path: Path) -> None:
     with RigProcess(tmp_path / "RIG.toml", "ascii") as bench:
         record, failed = tried(bench.rig, settings(60.0))

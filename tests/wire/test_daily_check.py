@@ -80,7 +80,7 @@ SIGN, SLOW = "sign of the torque", pytest.mark.slow
         pytest.param("torque", "gain", -1.0, {SIGN}, marks=SLOW),
         # The guard may be the first to say that so little torque is none.
         pytest.param("torque", "gain", 0.5, {"inertia", SIGN}, marks=SLOW),
-        ("torque", "gain", 0.0, {"different torque values"}),
+        pytest.param("torque", "gain", 0.0, {"different torque values"}, marks=SLOW),
         pytest.param("torque", "other_axis", None, {SIGN}, marks=SLOW),
         pytest.param("torque", "delay", 0.05, {"torque behind the angle"}, marks=SLOW),
         pytest.param("drive", ENCODER_SIGN, None, {"angle per command"}, marks=SLOW),
