@@ -110,7 +110,14 @@ def test_in_real_time_at_most_a_tenth_of_a_second_is_lost(tmp_path, lateness):
     assert samples["time_s"][-1] >= ran_s - 0.1 - 0.02 - lateness.worst_s(started)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT])
+@pytest.mark.parametrize(
+    "number",
+    [
+        signal.SIGINT,
+        pytest.param(signal.SIGTERM, marks=pytest.mark.slow),
+        pytest.param(signal.SIGQUIT, marks=pytest.mark.slow),
+    ],
+)
 def test_an_interrupted_session_closes_in_order(tmp_path, number):
     folder = tmp_path / "session"
     process = start(folder, *quick(tmp_path))

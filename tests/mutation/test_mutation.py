@@ -74,7 +74,11 @@ def test_what_is_made_by_hand_stands_once_in_the_source_and_changes_it(fault):
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--every", "160", "step.py"], ["--hand-made", "--every", "40"]]
+    "arguments",
+    [
+        pytest.param(["--every", "160", "step.py"], marks=pytest.mark.slow),
+        ["--hand-made", "--every", "40"],
+    ],
 )
 def test_a_sample_of_the_faults_is_seen(arguments):
     ran = run(*arguments)

@@ -1,13 +1,13 @@
 """A measured human ankle, from the file to J, B and K, by the command line."""
 
 import json
-import subprocess
 import sys
 
 import numpy as np
 import pytest
 import scipy.io
 
+from rigidimeter.cli.main import main
 from rigidimeter.errors import UserError
 from rigidimeter.recording import ReadOptions, read_recording
 
@@ -19,9 +19,12 @@ OPTIONS = ["--rate-hz", "1000", "--reaction", "--epoch-length-s", "20"]
 
 
 def estimate(path, out, *options):
-    command = [sys.executable, "-m", "rigidimeter", "estimate", path, *options, "--json", out]
-    ran = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
-    assert ran.returncode == 0, ran.stderr
+    arguments = ["rigidimeter", "estimate", path, *options, "--json", out]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", list(map(str, arguments)))
+        with pytest.raises(SystemExit) as ended:
+            main()
+    assert not ended.value.code
     return json.loads(out.read_text())
 
 
