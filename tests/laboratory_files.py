@@ -75,7 +75,17 @@ LABORATORY: Mapping[str, Dialect] = {
         "r.csv",
         csv("# torque gain: 0.001 Nm/count\ntime_ms,torque_counts,angle_deg", MILLI * T,
             (1e3 * M).round(), D),
-        refused="stated nowhere",
+        refused="--scale",
+    ),
+    "counts, the gain in the comment as it stands": Dialect(
+        "r.csv",
+        csv("# torque gain: 1e-6 Nm/count\ntime_ms,torque_counts,angle_deg", MILLI * T,
+            (1e6 * M).round(), D),
+        {"scale": {"torque": "1e-6 Nm/count"}},
+    ),
+    "encoder counts": Dialect(
+        "r.csv", csv("t_s,torque_Nm,angle [counts]", T, M, (1e5 * D).round()),
+        {"scale": {"angle": "1e-5 deg/count"}},
     ),
     "counts with their gain": Dialect(
         "r.csv", csv("time_ms,torque_counts,angle_deg", MILLI * T, (1e6 * M).round(), D),

@@ -107,3 +107,16 @@ def test_files_that_belong_together_are_inspected_together(tmp_path, rigidimeter
     assert words[-4:] == ["--reaction", "--join", "--clock-offset", "found"]
     assert rigidimeter(*words[1:], "--json", out).status == 0
     assert stiffness(out) == pytest.approx(STIFFNESS_NM_RAD, rel=0.01)
+
+
+def test_a_calibration_in_a_comment_is_shown(rigidimeter, tmp_path):
+    """And not used: only a person knows of which column it is, and whether it still holds."""
+    path = tmp_path / "r.csv"
+    rows = "".join(f"{k / 100},{k % 7},{k % 11 / 10}\n" for k in range(700))
+    head = "# recorded by A\n# gain 0.0024 Nm/count\n# elbow\ntime_s,torque_counts,angle_deg\n"
+    path.write_text(head + rows)
+    ran = rigidimeter("inspect", path)
+    assert ran.status == 1
+    said = " ".join(ran.out.split())
+    assert "the file says 'gain 0.0024 Nm/count'" in said
+    assert "is in counts, and torque is needed in Nm: say --scale 'torque=2.5 Nm/counts'" in said

@@ -170,6 +170,8 @@ def _unstated(
         f"{table.source}: the unit of {columns} is stated nowhere, so nothing is estimated; say "
         f"{options_text(vary)}"
     )
+    if "torque_nm" in vary:
+        text += "; or --scale 'torque=0.001 Nm', if its values are counts of that size"
     if numbers_rows(choice.taken, raw):
         text += f"; or --rate-hz, if {choice.taken['time_s'].column!r} numbers the samples"
     return [text, *(readings(choice.taken, raw, rate_hz, vary) if usable else [])]

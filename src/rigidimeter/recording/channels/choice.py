@@ -21,6 +21,7 @@ from rigidimeter.recording.formats.table import Table, alike, nearest
 LABELS = ("epoch", "condition", "task")
 MOTION = ("velocity_rad_s", "angle_rad")
 STANDARD = (*BY_STANDARD, *LABELS)
+_UNCALIBRATED = ("volt", "millivolt", "microvolt", "count")
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,8 @@ def _candidates(
     found = [column for column in free if headers[column].kind == name]
     if standard == "torque_nm" and not found:
         found = [column for column in free if headers[column].kind == "force"]
-    return [column for column in found if _may_be(standard, headers[column], said)]
+    possible = [column for column in found if _may_be(standard, headers[column], said)]
+    return possible or [one for one in found if expression(headers[one].unit) in _UNCALIBRATED]
 
 
 def _may_be(standard: str, header: Header, said: Said) -> bool:

@@ -85,8 +85,10 @@ def _kind(text: str) -> str:
 
 
 def fits(kind: str, unit: str) -> bool:
-    """Whether a unit is one of a quantity; of a force, one of force."""
+    """Whether a unit is one of a quantity, or counts; of a force, one of force."""
     if kind == "force":
         return ratio(expression(unit), "newton") is not None
     standard = _STORED.get(kind, "")
+    if expression(unit) == "count":  # of a converter, which a calibration makes a quantity
+        return standard in BY_STANDARD and kind != "time"
     return standard in BY_STANDARD and expression(unit) != "" and factor(unit, standard) is not None

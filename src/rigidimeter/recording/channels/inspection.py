@@ -20,7 +20,7 @@ from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.readings import look_text
 from rigidimeter.recording.formats.columns import numbers
 from rigidimeter.recording.formats.read_options import ReadOptions
-from rigidimeter.recording.formats.table import Table
+from rigidimeter.recording.formats.table import CALIBRATION, Table
 
 EPOCH_LENGTH_S = 20.0
 """Proposed where a recording without epochs is longer than two of them."""
@@ -111,6 +111,8 @@ def remarks(found: Inspection) -> list[str]:
             unable.append(f"{method.name} lacks {' and '.join(lacking)}")
     lines.append(f"methods: {', '.join(able) or 'none'}" + "".join(f"; {text}" for text in unable))
     lines += found.proposal.choice.unused
+    if stated := found.table.scalars.get(CALIBRATION):
+        lines.append(f"the file says {str(stated)[:80]!r}: if that is a calibration, say --scale")
     return [*lines, *(f"decided by the numbers: {text}" for text in found.proposal.reasons)]
 
 

@@ -45,6 +45,7 @@ _SPELLED: Mapping[str, str] = {
     "volt": "V Volt volt volts",
     "millivolt": "mV",
     "microvolt": "uV µV",
+    "count": "count counts cts digits LSB",
 }
 _UNIT: Mapping[str, str] = {one: unit for unit, text in _SPELLED.items() for one in text.split()}
 _NEWTON_METER = re.compile(r"([munkcdM]?)N(m|cm|mm)", re.ASCII)

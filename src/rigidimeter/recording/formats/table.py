@@ -19,6 +19,8 @@ from rigidimeter.recording.formats.stored_arrays import Columns, Stored
 MISSING = frozenset({"", "na", "n/a", "#n/a", "#na", "nan", "-nan", "null", "none", "<na>"})
 """Texts, in lower case, that mark a missing sample."""
 
+CALIBRATION = "calibration"
+"""The single value that holds a line of a head such as ``gain 0.5 Nm/V``: shown, and not used."""
 _SHOWN = 20
 _LONGEST_TEXT_BYTES = 4096
 

@@ -11,7 +11,7 @@ import csv
 import io
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.formats.spike2_text import FIRST as SPIKE2
 from rigidimeter.recording.formats.spike2_text import spike2_table
-from rigidimeter.recording.formats.table import Table, printable
+from rigidimeter.recording.formats.table import CALIBRATION, Table, printable
 from rigidimeter.recording.formats.text_head import (
     HEAD_LINES,
     Head,
@@ -43,6 +43,10 @@ from rigidimeter.recording.formats.text_lines import (
 from rigidimeter.recording.formats.text_preambles import known_head, without_later_heads
 
 _DECIMAL_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
+_CALIBRATION = re.compile(
+    r"(?i)\d\s*[\w·.*°]+\s*(?:/|per)\s*(?:m?V|counts?|digits?|LSB|bits?)\b"
+    r"|\d\s*(?:m?V|counts?|digits?|LSB|bits?)\s*(?:/|per)\s*[\w·.*°]+"
+)
 _STAMP = re.compile(r"(\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d([.,]\d+)?")
 
 
@@ -309,4 +313,8 @@ def _head(source: str, whole: bytes, data: bytes, example: str, layout: Layout |
         return known
     before, _, _ = whole.partition(data[: data.find(b"\n")] if b"\n" in data else data)
     comments = [line[1:].strip() for line in before.decode("utf-8").splitlines() if line[:1] == "#"]
-    return found_head(source, first, comments[-1] if comments else "", layout.names, example)
+    head = found_head(source, first, comments[-1] if comments else "", layout.names, example)
+    stated = [
+        line for line in (*comments, *first[: head.n_before - 1]) if _CALIBRATION.search(line)
+    ]
+    return replace(head, scalars={**head.scalars, CALIBRATION: stated[0]}) if stated else head
