@@ -17,8 +17,10 @@ that: which ratio S/N of the perturbation's answer to all other torque a window 
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 from unittest import mock
 
@@ -49,6 +51,12 @@ SUBJECTS: dict[str, tuple[tuple[float, float, float], dict[str, float]]] = {
     "hanging": ((1.0, 0.15, 0.03), {}),
 }
 
+
+RATIOS = (18.0, 8.0, 1.4, 0.7, 0.2)
+"""S/N of a small joint whose subject has a torque of 0.05, 0.2 and 1 N·m (SD) of its own."""
+
+LAG_S = 0.05
+"""By so much the filters of a row are late, at 8 Hz, and the joint."""
 
 LATE_S = 12.0
 """So long is an epoch in which the sign is right."""
@@ -192,6 +200,46 @@ def ratios_needed() -> list[str]:
     return lines
 
 
+def needed(rows: int, instruments: int, chance: float) -> float:
+    """Return the S/N times rows of a window whose noise is measured in it.
+
+    With one instrument, the answer's known form, only one sign of it counts.
+    """
+    free = rows - instruments - 2 * torque_answer.NOISE_ORDERS[0]
+    if free < 1:
+        return math.inf
+    sides = 2.0 if instruments == 1 else 1.0
+    left = scipy.special.betaincinv(0.5 * free, 0.5 * instruments, sides * chance)
+    return free * (1.0 / float(left) - 1.0)
+
+
+def least_times(chance: float = 1e-9) -> list[str]:
+    """Return when half of the wrong signs can be found, by S/N and by what a test knows.
+
+    The logarithm of the ratio of the likelihoods of the answers ±s in white noise of known variance
+    has the mean ±2 E and the variance 4 E, with E = n S/N over n rows. So half are found at
+    2 √E = z, the normal quantile of the chance of a false alarm; at √E = z if the answer may have
+    any size; and if it may be any combination of the instruments at E = their quantile of χ².
+    """
+    z = float(scipy.stats.norm.isf(chance))
+    combination = float(scipy.stats.chi2.isf(chance, INSTRUMENTS))
+    tests: dict[str, Callable[[int], float]] = {
+        "answer and noise known": lambda _: z * z / 4.0,
+        "answer's size unknown": lambda _: z * z,
+        "its form as well": lambda _: combination,
+        "size of answer and noise unknown": lambda rows: needed(rows, 1, chance),
+        "only the perturbation known": lambda rows: needed(rows, INSTRUMENTS, chance),
+    }
+    lines = [f"| S/N | {' | '.join(tests)} |", "| --- " * (1 + len(tests)) + "|"]
+    for ratio in RATIOS:
+        rows = [
+            next(n for n in itertools.count(1) if n * ratio >= test(n)) for test in tests.values()
+        ]
+        times = " | ".join(f"{LAG_S + n * torque_answer.ROW_S:.2f} s" for n in rows)
+        lines.append(f"| {ratio:g} | {times} |")
+    return lines
+
+
 def ratios(settings: Settings, epochs: int) -> str:
     """Return S/N of the shortest window: its median, and what a tenth of the windows is below."""
     rows, order = torque_answer.ROWS[0], torque_answer.NOISE_ORDERS[0]
@@ -227,7 +275,7 @@ def main() -> None:
         print_late(given.epochs)
         return
     if given.ratios:
-        print(*ratios_needed(), "", sep="\n")
+        print(*ratios_needed(), "", *least_times(), "", sep="\n")
         print("| size | ticks/s | subject | S/N, median (a tenth is below) |")
         print("| --- | --- | --- | --- |")
     else:
