@@ -22,7 +22,6 @@ from tests.lateness import PRESENT, LatenessProbe, run_beside_probe
 
 from rigidimeter.cli.main import main
 from rigidimeter.settings import parse_settings
-from rigidimeter.virtual.virtual_session import run_virtual_session
 
 pytest_plugins = ["pytester", "tests.small_study"]
 
@@ -53,6 +52,9 @@ def simulated_sessions(tmp_path_factory: pytest.TempPathFactory) -> Callable[...
 
     def run(values: dict[str, Any], name: str) -> Path:
         key = json.dumps([values, name])
+        # Not before: the process that starts the others would wait for it, and never use it.
+        from rigidimeter.virtual.virtual_session import run_virtual_session
+
         if key not in done:
             done[key] = folder / str(len(done))
             run_virtual_session(parse_settings(values), done[key])

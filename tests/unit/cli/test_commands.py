@@ -45,6 +45,7 @@ def test_a_session_goes_from_simulation_to_estimate_to_comparison(rigidimeter, t
     settings.write_text(
         """
         seed = 4
+        prbs.duration_s = 12.0
         [rig]
         tick_rate_hz = 250.0
         torque.rate_hz = 250.0

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 from tests.small_study import TOML, record
+from typer.testing import CliRunner
 
+from rigidimeter.cli.main import app
 from rigidimeter.documents import replace_file
 
 AGAIN = "the study is analysed again: "
@@ -81,12 +83,19 @@ def test_the_page_of_a_kept_result_is_that_of_a_new_one(
     assert [name for name in {**one, **two} if one.get(name) != two.get(name)] == []
 
 
+@pytest.fixture(scope="module")
+def kept_once(scored_study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make a study of scores whose analysis is kept; it is not to be changed."""
+    folder = Path(shutil.copytree(scored_study, tmp_path_factory.mktemp("kept") / "study"))
+    assert CliRunner().invoke(app, ["compare", str(folder)]).exit_code == 0
+    assert (folder / KEPT).is_file()
+    return folder
+
+
 @pytest.fixture
-def kept(study: Path, rigidimeter, no_figures) -> Path:
-    """Return a study of scores whose analysis is kept."""
-    assert rigidimeter("compare", study).status == 0
-    assert (study / KEPT).is_file()
-    return study
+def kept(kept_once: Path, tmp_path: Path, no_figures) -> Path:
+    """Return a copy of it that a test may change."""
+    return Path(shutil.copytree(kept_once, tmp_path / "study"))
 
 
 def test_a_damaged_file_is_said_and_made_anew(kept: Path, tmp_path: Path, rigidimeter) -> None:

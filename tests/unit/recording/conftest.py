@@ -22,7 +22,9 @@ def _kept(tmp_path_factory) -> Callable[[int, int], Path]:
                 "return_s": 1.0,
             }
             made[epochs, seed] = tmp_path_factory.mktemp("kept") / "session"
-            settings = parse_settings({"seed": seed, "protocol": protocol})
+            settings = parse_settings(
+                {"seed": seed, "protocol": protocol, "prbs": {"duration_s": 8.0}}
+            )
             run_virtual_session(settings, made[epochs, seed])
         return made[epochs, seed]
 

@@ -298,7 +298,7 @@ def test_a_foreign_recording_of_torque_and_angle(study, make_study, tmp_path: Pa
         ({"OFF": 1}, None),
         ({"OFF": 1, "DBS": 2}, None),
         ({"OFF": 3, "DBS": 3}, None),
-        ({"OFF": 200, "DBS": 100}, None),
+        ({"OFF": 60, "DBS": 40}, None),
         ({"OFF": 5, "DBS": 5, "levodopa": 4}, None),
     ],
 )

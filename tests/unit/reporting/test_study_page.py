@@ -152,7 +152,9 @@ def test_a_blinded_study_keeps_its_codes_and_shows_no_stimulation() -> None:
     assert not re.search(r"130 Hz|stimulation|0\.32 mA|\bOFF\b|\bDBS\b", text)
 
 
-def test_the_test_by_days_is_said_in_words() -> None:
+def test_the_test_by_days_is_said_in_words(page: ParsedPage) -> None:
+    assert "Welch's t-test of 4 days of OFF and 3 days of DBS" in page.words("comparison")
+    assert "Satterthwaite FE" in page.words("methods")
     study = made_study(dataclasses.replace(SMALL, both_on_a_day=True))
     page = shown(study)
     assert "Paired t-test of 4 days. In brackets" in page.words("comparison")
@@ -166,9 +168,6 @@ def test_the_test_by_days_is_said_in_words() -> None:
     )
     assert "T-test paired by 4 days, with 5 days of OFF alone" in page.words("comparison")
     assert f"{words}, with 95 % intervals. The weights follow from the" in page.words("methods")
-    page = shown(made_study(SMALL))
-    assert "Welch's t-test of 4 days of OFF and 3 days of DBS" in page.words("comparison")
-    assert "Satterthwaite FE" in page.words("methods")
 
 
 def test_several_subjects_are_distinguished() -> None:
