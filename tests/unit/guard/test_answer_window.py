@@ -162,10 +162,10 @@ def test_a_late_step_is_filled_in_by_steps_on_a_line():
     states = []
     for elapsed_s, parts in ((0.008, (0.2, 0.4, 0.6, 0.8, 1.0)), (0.04, (1.0,))):
         state = answer_state()
-        for _ in range(20):
-            state, _ = answer_step(limits, state, 1.5, 0.1, 0.2, 0.008)
+        for k in range(20):
+            state, _ = answer_step(limits, state, 1.5, 0.01 * k, 0.02 * k, 0.008)
         for part in parts:
-            torque, angle = 0.1 + part * 0.6, 0.2 - part * 0.3
+            torque, angle = 0.19 + part * 0.6, 0.38 - part * 0.3
             state, _ = answer_step(limits, state, 1.5, torque, angle, elapsed_s)
         states.append(state)
     in_time, late = states
@@ -176,7 +176,7 @@ def test_a_late_step_is_filled_in_by_steps_on_a_line():
 
 @pytest.mark.parametrize(
     ("elapsed_s", "steps"),
-    [(0.0119, 1), (0.0121, 2), (0.0199, 2), (0.0201, 3), (0.501, 63), (9.0, 64)],
+    [(0.01197, 1), (0.01203, 2), (0.0199, 2), (0.0201, 3), (0.501, 63), (9.0, 64)],
 )
 def test_so_many_steps_fill_in_a_late_one(elapsed_s, steps):
     limits, state = AnswerLimits(10.0, 2, step_s=0.008), answer_state()
