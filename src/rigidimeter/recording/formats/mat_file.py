@@ -52,7 +52,9 @@ def read_mat(path: Path) -> Table:
         raise UserError(
             f"{path}: {', '.join(objects)[:60]} is a table or another object, and those are not "
             f"read; in MATLAB say s = table2struct({name[:60]}, 'ToScalar', true); "
-            "save('r.mat', '-struct', 's')"
+            "save('r.mat', '-struct', 's'). Of a timetable TT with the row times Time: T = "
+            "timetable2table(TT); T.time_s = seconds(T.Time - T.Time(1)); T.Time = []; then the "
+            "same with T"
         )
     return table_of_arrays(str(path), entries)
 

@@ -38,9 +38,9 @@ def read_neurophysiology(path: Path) -> Table:
     Raises
     ------
     UserError
-        If it holds none, or several recordings.
+        If it holds none, or several recordings, or is a `.smrx` file and sonpy does not work.
     ImportError
-        If neo is not installed, or for `.smrx` sonpy.
+        If neo is not installed.
     Exception
         Whatever neo raises on a damaged file.
     """
@@ -50,7 +50,7 @@ def read_neurophysiology(path: Path) -> Table:
     with silent("neo"), ExitStack() as on_end:
         raw = _reader(path)
         on_end.callback(_close, raw)
-        raw.parse_header()
+        _parse_header(path, raw)
         if raw.block_count() != 1:
             raise UserError(f"{path} holds {raw.block_count()} recordings; save one a file")
         check_count(path, len(raw.header["signal_channels"]))
@@ -62,6 +62,17 @@ def read_neurophysiology(path: Path) -> Table:
     return table_of_streams(
         str(path), [stream for stream, _ in pairs], [units for _, units in pairs]
     )
+
+
+def _parse_header(path: Path, raw: Any) -> None:
+    try:
+        raw.parse_header()
+    except ImportError as error:  # sonpy has no wheel for Linux below Python 3.14
+        raise UserError(
+            f"{path} is a 64-bit file of Spike2, which neo reads only with CED's sonpy, and that "
+            f"does not work here ({str(error)[:80]}); in Spike2 export it as a 32-bit file (.smr), "
+            "or as a spreadsheet text (.txt) with names and units, which are read"
+        ) from error
 
 
 def _reader(path: Path) -> Any:

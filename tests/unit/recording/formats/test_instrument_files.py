@@ -69,6 +69,16 @@ def test_a_channel_keeps_its_clock(tmp_path, name, write, late) -> None:
     np.testing.assert_allclose(found.values, angle_rad(kept), atol=1e-7)
 
 
+def test_a_64_bit_file_of_spike2_has_a_way_on_without_sonpy(tmp_path: Path, monkeypatch) -> None:
+    """That package cannot be installed everywhere, so its name alone would not help."""
+    pytest.importorskip("neo")
+    monkeypatch.setitem(sys.modules, "sonpy", None)
+    path = tmp_path / "joint.smrx"
+    path.write_bytes(b"S64" + bytes(5000))
+    with pytest.raises(UserError, match=r"CED's sonpy.*export it as a 32-bit file \(\.smr\)"):
+        read(path)
+
+
 def test_analogue_channels_in_volts_ask_for_the_calibration(tmp_path: Path) -> None:
     """A Plexon file has 12-bit numbers of millivolts and no other unit."""
     path = tmp_path / "joint.plx"
