@@ -28,6 +28,20 @@ def _block(part: slice) -> bytes:
     return csv(_BLOCK_HEAD, T[part], M[part], D[part], mark="\t", end="\t")
 
 
+def _paired() -> bytes:
+    """Return a file with a column of the time for each channel, the second at half the rate."""
+    heads = (_FILE_HEAD + _BLOCK_HEAD).replace("X_Columns\tOne", "X_Columns\tMulti")
+    for twice in ("Newton_Meters", "0.005", "2024/05/06", "10:11:12.5", "0.0E+0", "2000"):
+        heads = heads.replace(f"\t{twice}\t", f"\t{twice}\t\t", 1)
+    heads = heads.replace("X_Value\tTorque\tAngle", "X_Value\tTorque\tX_Value\tAngle")
+    rows = [f"{t:.9g}\t{m:.9g}" for t, m in zip(T, M, strict=True)]
+    slow = [f"{t:.9g}\t{d:.9g}" for t, d in zip(T[::2], D[::2], strict=True)]
+    slow += ["\t"] * (len(rows) - len(slow))
+    return (
+        heads + "\n" + "".join(f"{a}\t{b}\t\n" for a, b in zip(rows, slow, strict=True))
+    ).encode()
+
+
 def _clock(mark: str, midnight_at_s: float = 5.0) -> list[str]:
     """Return times of day to the millisecond, past midnight."""
     start = datetime(2024, 5, 7) - timedelta(seconds=midnight_at_s)
@@ -53,6 +67,7 @@ LABORATORY: Mapping[str, Dialect] = {
     "LabVIEW, two blocks": Dialect(
         "r.lvm", _FILE_HEAD.encode() + _block(slice(HALF)) + b"\n" + _block(slice(HALF, None))
     ),
+    "LabVIEW, a time for each channel": Dialect("r.lvm", _paired()),
     "German, UTF-16, a footer with numbers": Dialect(
         "r.csv",
         (_GERMAN.decode() + "\nEnde der Messung\nMittelwert;0,123;0,456\n").encode("utf-16"),

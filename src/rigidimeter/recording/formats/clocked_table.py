@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.exported_session import Stream
+from rigidimeter.recording.formats.columns import numbers
 from rigidimeter.recording.formats.stored_arrays import Columns
 from rigidimeter.recording.formats.table import Table, printable
 
@@ -73,6 +74,24 @@ def table_of_streams(
             if stated.get(column):
                 known[name] = stated[column]
     return Table(source, Columns(columns), units=known)
+
+
+def table_of_pairs(table: Table) -> Table:
+    """Return a table whose every second column is a channel, with its time in s before it.
+
+    Raises
+    ------
+    UserError
+        If a time is not a number, or does not increase.
+    """
+    names = list(table.columns)
+    streams, units = [], []
+    for time, name in zip(names[::2], names[1::2], strict=True):
+        stamps, values = numbers(table, TIME, time), numbers(table, name, name, [])
+        here = np.isfinite(stamps)  # a shorter channel ends in empty cells
+        streams.append(Stream(name, stamps[here], {name: values[here]}))
+        units.append({name: table.units.get(name, "")})
+    return table_of_streams(table.source, streams, units)
 
 
 def unique(names: Iterable[str], but: Sequence[str] = (TIME,)) -> list[str]:

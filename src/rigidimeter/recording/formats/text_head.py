@@ -43,6 +43,8 @@ class Head:
         By name.
     scalars : mapping of str to float or str
         Such as a sampling rate.
+    in_pairs : bool
+        Whether every second column is a channel, with its own time in the column before it.
     """
 
     delimiter: str
@@ -50,6 +52,7 @@ class Head:
     n_before: int
     units: Mapping[str, str] = field(default_factory=dict)
     scalars: Mapping[str, float | str] = field(default_factory=dict)
+    in_pairs: bool = False
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.headers import read_header
@@ -46,10 +46,9 @@ def _labview(source: str, lines: Sequence[str]) -> Head:
     names = [cell.strip() for cell in cells_of(lines[ends[1] + 1], delimiter)]
     if names and names[-1] == "Comment":
         names = names[:-1]
-    if said.get("X_Columns", ["One"])[0].strip() == "Multi":
-        raise UserError(
-            f"{source}: has a time column for each channel; save it with one (X_Columns One)"
-        )
+    in_pairs = said.get("X_Columns", ["One"])[0].strip() == "Multi"
+    if in_pairs:
+        _one_start(source, names, said)
     units = dict(
         zip(names[1:], (unit.strip() for unit in said.get("Y_Unit_Label", [])), strict=False)
     )
@@ -60,7 +59,34 @@ def _labview(source: str, lines: Sequence[str]) -> Head:
             scalars["rate_hz"] = 1.0 / step
         names[0] = "X_Value (time)"
         units[names[0]] = "s" if said.get("X_Dimension", ["Time"])[0].strip() == "Time" else ""
-    return Head(delimiter, checked_names(source, names), ends[1] + 2, units, scalars)
+    shown = checked_names(source, names)
+    if in_pairs:
+        units = {
+            name: "s" if place % 2 == 0 else unit.strip()
+            for place, (name, unit) in enumerate(
+                zip(shown, ["", *said.get("Y_Unit_Label", [])], strict=False)
+            )
+        }
+    return Head(delimiter, shown, ends[1] + 2, units, scalars, in_pairs)
+
+
+def _one_start(source: str, names: Sequence[str], said: Mapping[str, Sequence[str]]) -> None:
+    """Refuse columns that are no pairs of time and channel, and channels that start apart."""
+    started = [
+        {cell.strip() for cell in said.get(key, ()) if cell.strip()} for key in ("Date", "Time")
+    ]
+    dimensions = {cell.strip() for cell in said.get("X_Dimension", ()) if cell.strip()}
+    if len(names) % 2 or set(names[::2]) != {"X_Value"} or dimensions - {"Time"}:
+        raise UserError(
+            f"{source}: says that each channel has a column of its time (X_Columns Multi), but its "
+            f"columns are {', '.join(names)[:120]}"
+        )
+    if any(len(each) > 1 for each in started):
+        raise UserError(
+            f"{source}: its channels have a time each, from different starts "
+            f"({' or '.join(sorted(started[1]))[:80]}); save them in one column of the time "
+            "(X_Columns One), or each in a file and join them with --clock-offset"
+        )
 
 
 def without_later_heads(text: bytes) -> bytes:

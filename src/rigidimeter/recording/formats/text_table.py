@@ -23,6 +23,7 @@ from rigidimeter.documents.bounds import RECORDING_BYTES, TABLE_BYTES, TABLE_CEL
 from rigidimeter.documents.escaping import NUMBER
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.headers import read_header
+from rigidimeter.recording.formats.clocked_table import table_of_pairs
 from rigidimeter.recording.formats.spike2_text import FIRST as SPIKE2
 from rigidimeter.recording.formats.spike2_text import spike2_table
 from rigidimeter.recording.formats.table import CALIBRATION, Table, printable
@@ -191,6 +192,8 @@ def read_text_recording(path: Path, layout: Layout | None = None) -> Table:
             texts = texts.map(as_read)
         columns[name] = texts.to_numpy(object)
     units = dict(text.head.units)
+    if text.head.in_pairs:
+        return table_of_pairs(Table(text.source, columns, lines=text.lines, units=units))
     for name in text.names:
         if read_header(name).kind == "time" and (stamps := _stamps(columns[name])) is not None:
             columns[name], units[name] = stamps, "s"

@@ -8,6 +8,7 @@ from rigidimeter.recording.formats import ReadOptions, read_table
 
 ROWS = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(60))
 LABVIEW = "LabVIEW Measurement\t\nX_Columns\t{}\n***End_of_Header***\t\nDelta_X\t0.004\t0.004\n"
+MULTI, STARTS = LABVIEW.format("Multi"), "Time\t10:11:12\t\t10:11:13\n"
 
 
 def table(path, text, **options):
@@ -45,7 +46,8 @@ def test_a_row_of_text_between_rows_is_not_a_footer(tmp_path):
         (ROWS, {"skip_rows": 99}, "has fewer lines than --skip-rows 99"),
         ("a\nb\nc\nd\ne\n" + ROWS, {}, "does not name as many; name them with --names"),
         ("LabVIEW Measurement\n" + ROWS, {}, "head of this LabVIEW file is not complete"),
-        (LABVIEW.format("Multi") + "***End_of_Header***\nX_Value\tA\n" + ROWS, {}, "X_Columns One"),
+        (MULTI + "***End_of_Header***\nX_Value\tA\tB\n" + ROWS, {}, "columns are X_Value, A, B"),
+        (MULTI + STARTS + "***End_of_Header***\nX_Value\tA\tX_Value\tB\n", {}, "different starts"),
         ("x\n5 msec/sample\n900 channels\na\nb\n", {}, "head of this AcqKnowledge file is not"),
         ("x\n0 msec/sample\n1 channels\nT\nNm\nsec\tCH1\n" + ROWS, {}, "no sampling interval"),
         ("x\n1.2.3 sec/sample\n1 channels\nT\nNm\nsec\tCH1\n" + ROWS, {}, "no sampling interval"),
