@@ -10,11 +10,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rigidimeter.errors import UserError
-from rigidimeter.records import Epoch, LeftOut, Notice
+from rigidimeter.records import Epoch, LeftOut, Notice, Outcome
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _SPAN = re.compile(rf"\s*({_NUMBER})\s*:\s*({_NUMBER})(?:\s+(.*?))?\s*", re.DOTALL)
 _EXAMPLE = 'write START:STOP in s and a reason, for example --leave-out "12.3:14.0 cough"'
+
+EDGE_S = 0.1
+"""An epoch of which no more is kept at either end is left out whole."""
 
 
 class Named(NamedTuple):
@@ -53,6 +56,9 @@ def with_left_out(
 ) -> tuple[list[Epoch], list[Notice]]:
     """Return epochs with the stretches that were named, and a sentence on each.
 
+    An epoch that is left out whole is excluded, as one in a study's list of exclusions: it may have
+    numbers, which do not count.
+
     Times are on the clock of the recording. A recording is named by its path, its file name, or its
     file name without the ending; with a single recording no name is needed.
 
@@ -71,8 +77,13 @@ def with_left_out(
             if epoch.source != source or stretch.start_s > last_s or stretch.stop_s < first_s:
                 continue
             hit = True
-            found[place] = replace(epoch, left_out=(*epoch.left_out, stretch))
             why = f": {stretch.reason}" if stretch.reason else ""
+            if stretch.start_s <= first_s + EDGE_S and last_s - EDGE_S <= stretch.stop_s:
+                reason = "; ".join(filter(None, (epoch.closed.reason, f"left out{why}")))
+                found[place] = replace(epoch, closed=Outcome("excluded", reason))
+                notices.append(Notice("warning", f"{epoch.name} is left out{why}"))
+                continue
+            found[place] = replace(epoch, left_out=(*epoch.left_out, stretch))
             text = f"{epoch.name}: {stretch.start_s:g} to {stretch.stop_s:g} s are left out{why}"
             notices.append(Notice("warning", text))
         if not hit:

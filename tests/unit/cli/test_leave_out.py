@@ -85,6 +85,19 @@ def test_an_estimate_without_the_push_is_the_joint_and_says_why(rigidimeter, tmp
     assert epoch["inertia_kg_m2"] == pytest.approx(0.005, rel=0.01)
 
 
+def test_an_epoch_that_is_left_out_whole_is_excluded_and_no_error(rigidimeter, tmp_path):
+    path, out = write(tmp_path / "one.csv"), tmp_path / "estimates.json"
+    halves = "--epoch-length-s", "20"
+    ran = rigidimeter(
+        "estimate", path, *halves, "--leave-out", "0.01:20 cough (Kim)", "--json", out
+    )
+    assert ran.status == 0, ran.err
+    assert "epoch 1 is left out: cough (Kim)" in ran.err
+    first, second = json.loads(out.read_text())["epochs"]
+    assert (first["outcome"], first["reason"]) == ("excluded", "left out: cough (Kim)")
+    assert second["outcome"] == "included"
+
+
 def test_a_study_folder_has_its_own_list(rigidimeter, tmp_path):
     (tmp_path / "study.toml").write_text("")
     ran = rigidimeter("compare", tmp_path, "--leave-out", "1:2")

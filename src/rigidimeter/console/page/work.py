@@ -47,9 +47,12 @@ class Answer:
         hidden : str
             The name of a folder that is gone by then; it is left out.
         lines : sequence of str
-            What it comes to; the whole text is folded up below.
+            What it comes to; the whole text is folded up below. Of one that did not end well, if
+            none are given, what it says was wrong.
         """
         text = self.text.replace(hidden, "…") if hidden else self.text
+        if not self.good:
+            lines = lines or [line for line in text.splitlines() if line.startswith("error: ")]
         sign = "" if self.good else "<p><b>✗ not good:</b></p>"
         whole = f'<pre tabindex="0">{escape(text)}</pre>'
         if not lines:
