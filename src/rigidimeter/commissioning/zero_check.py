@@ -33,18 +33,29 @@ class ZeroFound:
     objection: str
 
     def words(self, settings: Settings) -> str:
-        """Return each value beside its limit."""
+        """Return each value beside its limit, to a hundredth of that."""
         limits = settings.zeroing
         rows = (
             ("bias", self.bias_nm, limits.bias_limit_nm, "N·m"),
-            ("scatter (SD)", self.noise_sd_nm, limits.noise_limit_nm, "N·m"),
+            ("noise (SD)", self.noise_sd_nm, limits.noise_limit_nm, "N·m"),
             ("motion", self.range_deg, limits.motion_limit_deg, "deg"),
         )
         return ", ".join(
-            f"{name} {number(value if math.isfinite(value) else None, unit)} "
-            f"(at most {number(limit, unit)})"
+            f"{name} {_rounded(value, limit, unit)} (at most {number(limit, unit)})"
             for name, value, limit, unit in rows
         )
+
+
+def _rounded(value: float, limit: float, unit: str) -> str:
+    """Return a value to a hundredth of its limit.
+
+    >>> _rounded(0.000112, 1.0, "N·m"), _rounded(0.00478, 0.1, "N·m"), _rounded(-0.1, 250.0, "N·m")
+    ('0.00 N·m', '0.005 N·m', '0 N·m')
+    """
+    if not math.isfinite(value):
+        return number(None, unit)
+    places = max(0, 2 - math.floor(math.log10(limit)))
+    return f"{round(value, places) + 0.0:.{places}f} {unit}"  # no -0.00
 
 
 def zero_check(setup: Setup) -> ZeroFound:

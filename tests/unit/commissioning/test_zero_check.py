@@ -29,7 +29,7 @@ def test_a_quiet_sensor_is_within_the_limits(zeroed, settings):
     assert found.objection == ""
     assert abs(found.bias_nm) < 4 * 0.02 / 200**0.5
     assert found.noise_sd_nm == pytest.approx(0.02, rel=0.2)
-    assert "(at most 1 N·m), scatter (SD) 0.0" in found.words(settings)
+    assert "bias 0.00 N·m (at most 1 N·m), noise (SD) 0.0" in found.words(settings)
 
 
 @pytest.mark.parametrize(
