@@ -55,6 +55,8 @@ protocol.rests_s = [2.0]
 protocol.return_s = 1.0
 protocol.blocks = [{{task = "prbs", condition = "OFF", epochs = {epochs}}}]
 zeroing.duration_s = 0.2
+loop.console_lost_s = 2.0
+loop.stall_s = 0.25
 """
 
 
@@ -73,9 +75,10 @@ def lateness(pairs: int, seconds: float) -> None:
             turns.close()
         print(f"the session ended: {ended.outcome} {ended.reason} {' '.join(ended.remarks)}")
         samples: dict[str, Any] = read_samples(ended.folder / "samples.arrows")
-    if len(turns.begun) < 2 * pairs + 1:
-        raise SystemExit(f"only {len(turns.begun)} windows of {2 * pairs} began")
-    _print(samples, turns.begun, planned.settings.rig.tick_rate_hz)
+    whole = turns.begun[: 1 + (len(turns.begun) - 1) // 2 * 2]  # of a session that ended early
+    if len(whole) < 5:
+        raise SystemExit(f"{len(turns.begun)} windows began; two pairs are needed")
+    _print(samples, whole, planned.settings.rig.tick_rate_hz)
 
 
 class _Turns:

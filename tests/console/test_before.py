@@ -5,6 +5,27 @@ from __future__ import annotations
 from tests.console.opened import fill, open_page
 
 FOCUSED = "document.activeElement.textContent === 'No'"
+STOP = """() => {
+  const at = document.activeElement, shown = at.closest(".q-field__control") || at;
+  const top = document.querySelector(".bar").getBoundingClientRect().bottom;
+  const hidden = !at.closest(".bar") && shown.getBoundingClientRect().top < top;
+  const { outlineWidth, boxShadow } = getComputedStyle(shown);
+  const outlined = outlineWidth === "4px" || boxShadow.endsWith("6px");
+  return [at.ariaLabel || at.textContent, outlined, hidden];
+}"""
+
+
+def assert_reached_by_tab(page, last):
+    """Go by Tab from the top to what is called `last`; each stop must be seen to have the focus."""
+    page.locator(".tab").first.focus()
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        name, outlined, hidden = page.evaluate(STOP)
+        assert outlined, name
+        assert not hidden, name
+        if name == last:
+            return
+    raise AssertionError(f"Tab does not lead to {last}")
 
 
 def test_before_a_session(console, chromium):
@@ -19,6 +40,7 @@ def test_before_a_session(console, chromium):
     fill(page, "subject", "S01")
     fill(page, "operator", "Op")
     page.get_by_text("fields are not right yet").wait_for(state="hidden")
+    assert_reached_by_tab(page, "Start session")
     page.get_by_role("button", name="Check the rig").focus()
     page.keyboard.press("Enter")
     page.get_by_text("Nobody's arm may be in the rig").wait_for()

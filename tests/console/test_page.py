@@ -167,6 +167,7 @@ def test_the_emergency_stop_stops(console, chromium, lateness):
     assert stopped_s - clicked_s < 0.3 + lateness.worst_s(clicked_s)
     assert read_samples(desk.folder() / "samples.arrows")["velocity_command_rad_s"][-1] == 0.0
     page.wait_for_function("document.getElementById('state').textContent === 'ended: fail'")
+    page.wait_for_function("document.activeElement.matches('.tab')")  # for the next Tab
 
 
 def test_a_frozen_page_stops_the_arm(console, chromium, lateness):

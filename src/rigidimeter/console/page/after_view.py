@@ -13,6 +13,7 @@ from nicegui import ui
 
 from rigidimeter.console.page.button_words import in_buttons, unfinished_words
 from rigidimeter.console.page.desk import Desk, StartRequest
+from rigidimeter.console.page.entered import line
 from rigidimeter.console.page.kept_study import extended
 from rigidimeter.console.page.recorded_traces import epoch_traces
 from rigidimeter.console.page.report_files import (
@@ -54,6 +55,9 @@ class AfterView:
         self._chosen = ""
         self._shown = -1
         ui.label(f"Sessions in {self._root}").classes("text-lg")
+        self._title = ui.input("Title of the report of the study", value=self._root.name)
+        self._title.classes("entry").props("maxlength=120 data-field=title")
+        self._title.set_visibility(not desk.place.one_session)
         self._list()
         self._dialogs = ui.element("div")  # not in the list, which is drawn anew meanwhile
         self._answer = ui.html("", sanitize=False).classes("answer")
@@ -165,8 +169,8 @@ class AfterView:
     async def _recover(self, session: str) -> None:
         if not await self._command("recover", session):
             return
-        for line in extended(self._desk.place):
-            ui.notify(line)
+        for said in extended(self._desk.place):
+            ui.notify(said)
         self._chosen = session
         self._list.refresh()
 
@@ -181,11 +185,17 @@ class AfterView:
 
     async def _study_report(self) -> None:
         """Report the study; of blinded sessions only after a warning, since it names conditions."""
+        try:
+            title = line(str(self._title.value or ""), "title", 120)
+        except UserError as error:
+            ui.notify(str(error))
+            return
+        named = (f"--title={title}",) if title else ()
         sessions, _ = found_sessions(self._root)
         blinded = [session.name for session in sessions if session.blinded]
         if blinded and not await self._unblinds(blinded):
             return
-        if await self._command("report", "", "--out", str(self._root / OF_STUDY)):
+        if await self._command("report", "", "--out", str(self._root / OF_STUDY), *named):
             self._list.refresh()
 
     async def _unblinds(self, sessions: list[str]) -> bool:

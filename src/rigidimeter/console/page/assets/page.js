@@ -31,6 +31,13 @@
     traces.resize();
   }
 
+  // A view that comes by itself takes the keyboard's place with it, to where Enter does no harm.
+  function come(name) {
+    view(name);
+    const at = document.activeElement;
+    if (!at || at === document.body || at.offsetParent === null) document.querySelector(`.tab[data-view=${name}]`).focus({ preventScroll: true });
+  }
+
   function told(message) {
     heard = performance.now();
     if (message.say) return remark(message.say);
@@ -47,15 +54,15 @@
     show("state", starting ? `starting ${starting} …` : checking ? checking : finished ? `ended: ${finished.outcome}` : "no session runs");
     const key = finished ? `ended ${finished.number}` : starting ? `starting ${starting}` : "";
     if (seen !== key) {
-      if (finished && seen !== null) view("after");
-      if (starting) { view("during"); clear(); }
+      if (finished && seen !== null) come("after");
+      if (starting) { come("during"); clear(); }
       seen = key;
     }
     banner(finished ? finished.sentences.join("\n") : "", finished && finished.outcome === "success");
   }
 
   function during(session) {
-    if (seen !== `runs ${session.number}`) { seen = `runs ${session.number}`; clear(); view("during"); }
+    if (seen !== `runs ${session.number}`) { seen = `runs ${session.number}`; clear(); come("during"); }
     show("state", session.state);
     show("condition", session.condition);
     show("epoch", session.epoch);
@@ -108,7 +115,7 @@
 
   function leave() { away = true; say({ kind: "leave" }); }
   function note(what, text) { say({ kind: "note", what, text, by: "" }); remark(`${what}: ${text}`); }
-  function emergency() { say({ kind: "emergency" }); if (control) remark("emergency stop"); }
+  function emergency() { say({ kind: "emergency" }); if (!$("emergency").disabled) remark("emergency stop"); }
 
   function score(text) {
     const plain = text.trim().replace("−", "-");
