@@ -175,6 +175,9 @@ DIALECTS: Mapping[str, Dialect] = {
     "Spike2": Dialect("r.txt", _SPIKE2.encode()),
     "block of lines and units": Dialect("r.txt", (_MONITOR + rows(T, M, D, mark="\t")).encode()),
     "headerless": Dialect("r.csv", rows(T, M, D).encode(), refused="must name the columns"),
+    "headerless, blanks": Dialect(
+        "r.txt", rows(T, M, D, mark=" ").encode(), refused="name them with --names"
+    ),
     "headerless with names": Dialect(
         "r.csv", rows(T, M, D).encode(), {"names": ("t [s]", "M [Nm]", "phi [deg]")}
     ),

@@ -84,10 +84,11 @@ def first_line_head(source: str, text: str, example: str, *, once: bool = False)
     """
     delimiter = next((mark for mark in DELIMITERS[:3] if mark in text), ",")
     names = [name.strip().strip("\"'").strip() for name in cells_of(text, delimiter)]
-    if any(names) and all(NUMBER.fullmatch(name) for name in names if name):
+    cells = names if len(names) > 1 else text.split()
+    if any(cells) and all(NUMBER.fullmatch(cell) for cell in cells if cell):
         raise UserError(
-            f"{source}: its first line holds numbers ({', '.join(names[:3])}"
-            f"{', ...' if len(names) > 3 else ''}), but it must name the columns, as in {example}; "
+            f"{source}: its first line holds numbers ({', '.join(cells[:3])}"
+            f"{', ...' if len(cells) > 3 else ''}), but it must name the columns, as in {example}; "
             "or name them with --names"
         )
     return Head(delimiter, checked_names(source, names, once=once), 1)
