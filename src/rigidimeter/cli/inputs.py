@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rigidimeter.recording.study_folder import StudyFolder
     from rigidimeter.records import Analysis, Fit, Notice, Score
     from rigidimeter.study import StudyResult
+    from rigidimeter.study.kept_origin import Asked
 
 _OF_STUDIES_TOO = ("paths", "method", "band_hz", "controller", "settings")
 """Fields of `Recordings` that do not say how to read a single recording."""
@@ -232,7 +233,7 @@ def asked_of(
     pair: tuple[str | None, str | None] = (None, None),
     seed: int = 1,
     resamples: int = 9999,
-) -> dict[str, Any]:
+) -> Asked:
     """Return the options of an analysis of a study as JSON has them.
 
     Raises
@@ -240,21 +241,19 @@ def asked_of(
     UserError
         If the settings cannot be read.
     """
-    from rigidimeter.documents import plain_values
-    from rigidimeter.settings import dump_settings, load_settings
+    from rigidimeter.settings import load_settings
+    from rigidimeter.study.kept_origin import asked
 
     given = recordings.settings
-    values = {
-        "--method": recordings.method,
-        "--settings": None if given is None else dump_settings(load_settings(given)),
-        "--band-hz": recordings.band_hz,
-        "--controller": recordings.controller,
-        "--reference": pair[0],
-        "--other": pair[1],
-        "--seed": seed,
-        "--resamples": resamples,
-    }
-    return dict(plain_values(values))
+    return asked(
+        method=recordings.method,
+        settings=None if given is None else load_settings(given),
+        band_hz=recordings.band_hz,
+        controller=recordings.controller,
+        pair=pair,
+        seed=seed,
+        resamples=resamples,
+    )
 
 
 def _with_provenance(

@@ -12,11 +12,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.documents import open_regular
+from rigidimeter.documents import open_regular, plain_values
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.study_folder import StudyFolder
 from rigidimeter.recording.study_toml import is_outside
+from rigidimeter.settings import Settings, dump_settings
 from rigidimeter.study.archive import ANALYSIS, INPUTS, results_changed
 from rigidimeter.study.sessions import place_of
 from rigidimeter.version import __version__
@@ -32,6 +33,33 @@ _LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow")
 
 class Stale(Exception):
     """A kept result no longer holds, for the reason given."""
+
+
+def asked(
+    *,
+    method: str = "auto",
+    settings: Settings | None = None,
+    band_hz: tuple[float, float] | None = None,
+    controller: tuple[float, float] | None = None,
+    pair: tuple[str | None, str | None] = (None, None),
+    seed: int = 1,
+    resamples: int = 9999,
+) -> Asked:
+    """Return the options of an analysis of a study as JSON has them, named as on a command line.
+
+    The defaults are those of `compare`.
+    """
+    values = {
+        "--method": method,
+        "--settings": None if settings is None else dump_settings(settings),
+        "--band-hz": band_hz,
+        "--controller": controller,
+        "--reference": pair[0],
+        "--other": pair[1],
+        "--seed": seed,
+        "--resamples": resamples,
+    }
+    return dict(plain_values(values))
 
 
 def made_by() -> dict[str, str]:

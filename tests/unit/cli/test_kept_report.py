@@ -9,6 +9,7 @@ import pytest
 from tests.small_study import TOML, record
 from typer.testing import CliRunner
 
+import rigidimeter as rm
 from rigidimeter.cli.main import app
 from rigidimeter.documents import replace_file
 
@@ -145,3 +146,22 @@ def test_with_files_of_the_user_everything_is_computed(
     ran = rigidimeter("--load", tmp_path / "added.py", "report", kept, "--out", tmp_path / "r")
     assert f"{AGAIN}files are loaded with --load" in ran.err
     assert (kept / KEPT).read_bytes() == before
+
+
+def test_from_python_a_report_takes_the_kept_result_too(
+    kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Anew(Exception):
+        pass
+
+    def analysed(folder: Path) -> None:
+        raise Anew(folder)
+
+    monkeypatch.setattr("rigidimeter.reporting.make_report.compare", analysed)
+    page = rm.report(kept, tmp_path / "report").read_text(encoding="utf-8")
+    table = (tmp_path / "report/tables/comparisons.csv").read_bytes()
+    assert table == (kept / "analysis/comparisons.csv").read_bytes()
+    assert "Data quality" in page
+    (kept / "ratings.csv").write_bytes((kept / "ratings.csv").read_bytes() + b"M1,1,OFF,C,1.0\n")
+    with pytest.raises(Anew):
+        rm.report(kept, tmp_path / "report")
