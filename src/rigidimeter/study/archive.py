@@ -38,8 +38,8 @@ INPUTS, COMPARISON = "inputs.json", "comparison.json"
 OLD_SCHEMA = "rigidimeter.study-comparison/1"
 
 _SHOWN = 12
-_TABLES = ("conclusion", "comparisons", "days", "effect_differences", "ratings", "sensitivity",
-           "excluded_epochs", "left_out", "estimates", "scores")  # fmt: skip
+_TABLES = ("conclusion", "precision", "comparisons", "days", "effect_differences", "ratings",
+           "sensitivity", "excluded_epochs", "left_out", "estimates", "scores")  # fmt: skip
 _COMPARED = ("shift", "p", "r")
 _SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
 _BY_DAYS = ("estimate", "p", "p_days", "day_share")

@@ -104,6 +104,12 @@ def precisions_untested(result: StudyResult) -> dict[str, tuple[Precision, ...]]
     return {name: each for name, each in found.items() if each}
 
 
+def precision_rows(result: StudyResult) -> list[dict[str, Any]]:
+    """Return the measures of the only condition, or of each of two without a test, as a table."""
+    found = {result.reference: precisions(result)} | precisions_untested(result)
+    return [{"condition": name} | one.row() for name, each in found.items() for one in each]
+
+
 def _of_epochs(analysis: Analysis, condition: str) -> tuple[Precision, ...]:
     counting = [fit for fit in analysis.fits if fit.outcome.included]
     by_condition, overall = split_pooled(analysis)

@@ -22,7 +22,7 @@ from rigidimeter.study.ratings_found import (
     rating_rows,
     ratings_document,
 )
-from rigidimeter.study.reached_precision import precisions
+from rigidimeter.study.reached_precision import precision_rows
 from rigidimeter.study.results import StudyResult
 from rigidimeter.study.traffic_light import traffic_light
 
@@ -210,7 +210,7 @@ def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
 
 TABLES: Mapping[str, Callable[[StudyResult], Rows]] = {
     "conclusion": conclusion_rows,
-    "precision": lambda result: [one.row() for one in precisions(result)],
+    "precision": precision_rows,
     "comparisons": lambda result: comparison_rows(result.comparisons),
     "summaries": lambda result: list(_summaries(result)),
     "days": lambda result: list(_days(result)),

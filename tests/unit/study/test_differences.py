@@ -8,9 +8,10 @@ import pandas as pd
 import pytest
 from scipy.stats import t as t_distribution
 from scipy.stats import ttest_ind
-from tests.unit.reporting.cohorts import Design, made_study
+from tests.unit.reporting.cohorts import Design, altered, made_study
 
 from rigidimeter.records import Epoch, Finding, Outcome
+from rigidimeter.reporting.page import contents, render_page
 from rigidimeter.study import (
     Difference,
     LeftOut,
@@ -20,8 +21,10 @@ from rigidimeter.study import (
     conclude,
     precisions,
     precisions_untested,
+    result_table,
     traffic_light,
 )
+from rigidimeter.study.comparison import no_days
 
 SMALL = Design(days=(5, 4), epochs=(5, 5), scores=(4, 4))
 
@@ -206,10 +209,8 @@ class TestPrecision:
         """No test by days exists; what the epochs of the day give is shown, for each condition."""
         assert precisions_untested(study) == {}
         analysis = replace(study.analysis, pooled=())
-        no_test = tuple(
-            replace(c, days=c.days and replace(c.days, p=math.nan)) for c in study.comparisons
-        )
-        one_day = replace(study, analysis=analysis, comparisons=no_test)
+        no_test = altered(study, lambda c: replace(c, days=c.days and no_days(1, 1, "one day")))
+        one_day = replace(no_test, analysis=analysis)
         found = precisions_untested(one_day)
         for name in ("OFF", "DBS"):
             own = [
@@ -220,3 +221,9 @@ class TestPrecision:
             stiffness = found[name][0]
             assert (stiffness.n, stiffness.value) == (len(own), pytest.approx(np.mean(own)))
             assert stiffness.low < stiffness.value < stiffness.high
+        rows = result_table(one_day, "precision")
+        assert [(row["condition"], row["value"]) for row in rows] == [
+            (name, one.value) for name, each in found.items() for one in each
+        ]
+        page = render_page(one_day, contents(one_day), {})
+        assert 'href="tables/precision.csv">the intervals' in page
