@@ -253,14 +253,20 @@ def test_findings_are_told_once_a_kind(make_study, make_analysis, tmp_path: Path
         for fit in analysis.fits[:-1]
     ]
     last = dataclasses.replace(analysis.fits[-1], findings=(found("exclude", "frozen", "stood"),))
-    made = make_study([], analysis=dataclasses.replace(analysis, fits=(*fits, last)))
+    together = tuple(
+        dataclasses.replace(fit, epoch="pooled", findings=(found("note", "varying", "it varied"),))
+        for fit in fits[:2]
+    )
+    analysis = dataclasses.replace(analysis, fits=(*fits, last), pooled=together)
+    made = make_study([], analysis=analysis)
     text = " ".join(page_of(made, tmp_path).text.split())
     assert text.index("frozen exclude 1 32 1 stood") < text.index("voluntary_torque doubt 31 32")
     assert "22, 23 and 7 more pushed in 0 relax" in text
     assert "pushed in 1 " not in text
+    assert "varying note 0 32 all epochs together it varied" in text
     with (tmp_path / "tables" / "findings.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 32
+    assert len(rows) == 34
     assert rows[1]["text"] == "pushed in 1"
 
 

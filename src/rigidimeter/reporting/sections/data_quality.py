@@ -100,7 +100,7 @@ def _kinds(result: StudyResult, found: list[tuple[Fit, Finding]]) -> Iterator[di
         yield {
             "check": name,
             "level": level,
-            "epochs": len(members),
+            "epochs": sum(fit.epoch != "pooled" for fit, _ in members),
             "fitted": len(result.analysis.fits),
             "where": _where(result, [fit for fit, _ in members]),
             "first": first.text,
