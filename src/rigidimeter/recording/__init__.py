@@ -1,17 +1,25 @@
-"""Files, and nothing but files: sessions, other people's recordings, and estimates."""
+"""Files, and nothing but files: sessions, other people's recordings, and estimates.
 
-from rigidimeter.recording.estimate_files import (
-    ESTIMATES_SCHEMA,
-    estimates_document,
-    read_estimates,
-    write_estimates_csv,
-    write_estimates_json,
-)
-from rigidimeter.recording.formats import ReadOptions, Table, read_recording, read_table
-from rigidimeter.recording.recording import Recording, read
-from rigidimeter.recording.recovery import Recovery, recover
-from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
-from rigidimeter.recording.session_folder import SessionWriter, read_manifest
+Each name is imported when it is first used: the processes of a session write files, and would
+otherwise load the readers of every format before the arm may move.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rigidimeter.recording.estimate_files import (
+        ESTIMATES_SCHEMA,
+        estimates_document,
+        read_estimates,
+        write_estimates_csv,
+        write_estimates_json,
+    )
+    from rigidimeter.recording.formats import ReadOptions, Table, read_recording, read_table
+    from rigidimeter.recording.recording import Recording, read
+    from rigidimeter.recording.recovery import Recovery, recover
+    from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
+    from rigidimeter.recording.session_folder import SessionWriter, read_manifest
 
 __all__ = [
     "ESTIMATES_SCHEMA",
@@ -33,3 +41,26 @@ __all__ = [
     "write_estimates_csv",
     "write_estimates_json",
 ]
+
+_MODULES = {
+    "estimate_files": (
+        "ESTIMATES_SCHEMA",
+        "estimates_document",
+        "read_estimates",
+        "write_estimates_csv",
+        "write_estimates_json",
+    ),
+    "formats": ("ReadOptions", "Table", "read_recording", "read_table"),
+    "recording": ("Recording", "read"),
+    "recovery": ("Recovery", "recover"),
+    "session_epochs": ("is_session", "read_session", "session_settings"),
+    "session_folder": ("SessionWriter", "read_manifest"),
+}
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = globals()[name] = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+    return found

@@ -13,15 +13,16 @@ from rigidimeter.acquisition.processes import (
 )
 
 HEAVY = ("scipy.signal", "scipy.stats", "scipy.optimize", "pandas", "pint", "matplotlib")
+READING = ("pyarrow.parquet", "rigidimeter.recording.formats", "rigidimeter.recording.channels")
 
 
 def test_the_processes_of_a_session_load_nothing_heavy():
-    """A subpackage of SciPy that is imported by name costs each process a second."""
+    """A subpackage of SciPy costs each process a second, the readers of formats a tenth of one."""
     modules = "rigidimeter.acquisition.processes"
     code = (
         f"import sys, {modules}.loop_process, {modules}.recorder, {modules}.supervise, "
         f"{modules}.live_estimate; "
-        f"print([name for name in {HEAVY} if name in sys.modules])"
+        f"print([name for name in {HEAVY + READING} if name in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"
