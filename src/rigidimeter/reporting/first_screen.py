@@ -84,7 +84,10 @@ def tested_words(result: StudyResult) -> str:
         return ""
     centres = {one.difference.centre for one in concluded.each}
     what = "medians" if centres == {"median"} else f"means of {concluded.basis}"
-    return f"{what}; p and intervals by the test of {concluded.basis}"
+    text = f"{what}; p and intervals by the test of {concluded.basis}"
+    if concluded.tested > 1:
+        text += " for each measure alone; the conclusion follows p in brackets, adjusted for all"
+    return text
 
 
 def _strip_row(one: Conclusion, to: float, other: str) -> StripRow:

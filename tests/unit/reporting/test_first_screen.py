@@ -15,6 +15,7 @@ from rigidimeter.cli.comparison_text import comparison_blocks
 from rigidimeter.cli.estimate import estimate_blocks
 from rigidimeter.cli.terminal_tables import Table, text_lines
 from rigidimeter.documents import read_json, write_json
+from rigidimeter.reporting import first_screen
 from rigidimeter.reporting import page as page_module
 from rigidimeter.reporting.first_screen import (
     difference_words,
@@ -42,6 +43,14 @@ SMALL = Design(days=(4, 3), epochs=(4, 4), scores=(3, 3))
 @pytest.fixture(scope="module")
 def study() -> StudyResult:
     return made_study(SMALL)
+
+
+def test_it_is_said_which_p_the_conclusion_follows(study: StudyResult) -> None:
+    """An interval can exclude zero where p adjusted for all measures shows no difference."""
+    says = "the conclusion follows p in brackets, adjusted for all"
+    assert says in first_screen.tested_words(study)
+    alone = replace(study, comparisons=study.comparisons[:1])
+    assert "in brackets" not in first_screen.tested_words(alone)
 
 
 @pytest.mark.parametrize(
