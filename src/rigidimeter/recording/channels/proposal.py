@@ -20,7 +20,12 @@ from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
 from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.channels.looks import Array, Look
 from rigidimeter.recording.channels.quantities import BY_STANDARD
-from rigidimeter.recording.channels.readings import doubts, look_at, usual_units
+from rigidimeter.recording.channels.readings import (
+    BELIEVED_SPEED_RAD_S,
+    doubts,
+    look_at,
+    usual_units,
+)
 from rigidimeter.recording.formats.columns import numbers, own_rate, own_rates, restarts
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
@@ -134,13 +139,17 @@ def _units(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOption
         return options
     if not vary:
         return options
-    possible = []
+    possible, speeds_rad_s = [], []
     usual = {name: usual_units(name, choice.taken, raw) for name in vary}
     for units in itertools.product(*usual.values()):
         as_units = dict(zip(vary, units, strict=True))
         looked = _seen(choice.taken, raw, rate_hz, as_units)
         if looked is not None and not doubts(looked):
             possible.append(as_units)
+            speeds_rad_s.append(looked.speed_rad_s)
+    low, high = BELIEVED_SPEED_RAD_S
+    if not all(low <= speed <= high for speed in speeds_rad_s):
+        return options  # the unit may be none of the usual ones: ticks, mrad, tenths of a degree
     for name in vary:
         units_left = {as_units[name] for as_units in possible}
         if len(units_left) == 1:

@@ -21,13 +21,13 @@ def inspected(options=None, **columns):
 
 
 def test_what_the_numbers_decide_is_proposed_and_reads_the_file():
-    found = inspected(time=1e3 * TIME_S, torque_nm=-TORQUE_NM, angle=ANGLE_DEG * 3)
+    found = inspected(time=1e3 * TIME_S, torque_nm=-TORQUE_NM, angle=ANGLE_DEG * 2)
     assert found.proposal.unsaid == ()
     assert option_words(found) == [
         "--unit", "time=ms", "--unit", "angle=deg", "--reaction", "--epoch-length-s", "20",
     ]  # fmt: skip
     read = channels_of_table(found.table, found.options)
-    np.testing.assert_allclose(read.values["angle_rad"], 3 * ANGLE_RAD, rtol=1e-12)
+    np.testing.assert_allclose(read.values["angle_rad"], 2 * ANGLE_RAD, rtol=1e-12)
 
 
 def test_a_table_without_a_torque_is_told_so():
@@ -119,3 +119,20 @@ def test_sample_numbers_are_not_taken_for_milliseconds(name):
     assert said.proposal.unsaid == ()
     stated = inspected(**{"t [ms]": np.arange(9000.0)}, torque_nm=TORQUE_NM, angle_rad=ANGLE_RAD)
     assert stated.proposal.unsaid == ()
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"time": 1e4 * TIME_S, "torque_nm": TORQUE_NM, "angle_rad": ANGLE_RAD},
+        {"timestamp": 3e4 * TIME_S, "torque_nm": TORQUE_NM, "angle_rad": ANGLE_RAD},
+        {"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle": 1e3 * ANGLE_RAD},
+        {"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle": 10 * ANGLE_DEG},
+    ],
+    ids=["0.1 ms", "ticks of 30 kHz", "mrad", "0.1 deg"],
+)
+def test_a_unit_that_is_not_usual_is_not_taken_for_the_only_usual_one_left(columns):
+    """ms of 10 kHz, or degrees that are mrad, are possible, but too slow or fast to be believed."""
+    found = inspected(**columns)
+    assert "--unit" in found.proposal.unsaid[0]
+    assert found.options.units == {}
