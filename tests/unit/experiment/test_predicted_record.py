@@ -120,7 +120,7 @@ def test_the_products_are_those_of_matrices(voluntary_sd_nm: float, trim_s: floa
     settings = parse_settings(
         {
             "rig": {**COARSE, "drive_bandwidth_hz": 40.0},
-            "prbs": {"duration_s": 8.0},
+            "prbs": {"duration_s": 4.0},
             "estimation": {"trim_s": trim_s},
             "subject": {"OFF": {"voluntary_sd_nm": voluntary_sd_nm}},
         }
