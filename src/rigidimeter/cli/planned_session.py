@@ -122,11 +122,11 @@ def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
     UserError
         If the rig was not commissioned or not checked, or another program has it.
     """
+    if rig is None:
+        return planned
     from rigidimeter.commissioning import check_record, require_daily_check, with_measured_floor
     from rigidimeter.devices.rigfile import load_rig
 
-    if rig is None:
-        return planned
     rigfile, settings = load_rig(rig), planned.settings
     commissioned = check_record(rigfile, None, settings)
     today = require_daily_check(rigfile, commissioned, settings, settings_path=planned.source)

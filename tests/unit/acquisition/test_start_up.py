@@ -16,12 +16,14 @@ HEAVY = ("scipy.signal", "scipy.stats", "scipy.optimize", "pandas", "pint", "mat
 READING = ("pyarrow.parquet", "rigidimeter.recording.formats", "rigidimeter.recording.channels")
 
 
-def test_the_processes_of_a_session_load_nothing_heavy():
+def test_the_processes_of_a_session_load_nothing_heavy(tmp_path):
     """A subpackage of SciPy costs each process a second, the readers of formats a tenth of one."""
     modules = "rigidimeter.acquisition.processes"
     code = (
-        f"import sys, {modules}.loop_process, {modules}.recorder, {modules}.supervise, "
-        f"{modules}.live_estimate; "
+        f"import pathlib, sys, {modules}.loop_process, {modules}.recorder, {modules}.supervise, "
+        f"{modules}.live_estimate; from rigidimeter.recording import sample_log; "
+        f"log = sample_log.SampleLog(pathlib.Path({str(tmp_path / 's.arrows')!r}), 10.0); "
+        "log.append_columns({name: [0] for name in sample_log.Sample._fields}); log.close(); "
         f"print([name for name in {HEAVY + READING} if name in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
