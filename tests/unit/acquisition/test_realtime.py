@@ -3,6 +3,7 @@ import multiprocessing
 import os
 import signal
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -78,11 +79,11 @@ def test_what_is_refused_is_said_and_not_raised():
 
 def prepared_in_order(pipe) -> None:
     """Say in what order the slow steps and the priority come."""
-    gc.freeze()  # else all that the test run holds is copied into this process, to look at it
     steps = []
-    collect = gc.collect
-    gc.collect = lambda: (steps.append("collect"), collect())
-    realtime._checked = lambda _: steps.append("lock")
+    # Truly done, both would copy all that the test run holds into this process.
+    gc.collect = lambda: steps.append("collect")
+    libc = SimpleNamespace(mlockall=lambda _: steps.append("lock") or 0, prctl=lambda *_: 0)
+    realtime.ctypes.CDLL = lambda *_, **__: libc
     realtime._beside = lambda *_: steps.append("look") or []
     os.sched_setscheduler = lambda *_: steps.append("priority")
     prepare_loop_process()
