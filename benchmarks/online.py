@@ -14,7 +14,6 @@ import numpy as np
 from benchmarks.paired import Row
 from rigidimeter.estimation.online import (
     STATE_SIZE,
-    compiled_online_step,
     online_design,
     online_step,
 )
@@ -59,19 +58,12 @@ def rows() -> list[Row]:
     torque = 0.14 * velocity + 1.7 * angle + 0.01 * rng.standard_normal(SAMPLES)
     samples = np.column_stack([torque, angle, velocity]).tolist()
     design = online_design(OnlineSettings(), RATE_HZ)
-    found = []
-    for name, step, kind in (
-        ("interpreted", online_step, list),
-        ("compiled", compiled_online_step(), np.array),
-    ):
-        times = []
-        for _ in range(REPEATS + 1):
-            ours = run(step, kind(design), kind([0.0] * STATE_SIZE), samples)
-            times.append((ours, run(nothing, kind(design), kind([0.0] * STATE_SIZE), samples)))
-        ours, bare = (statistics.median(column) for column in zip(*times[1:], strict=True))
-        what = f"a sample of the live estimate, {name} / an empty call"
-        found.append(Row(what, 1e6 * ours, 1e6 * bare, "µs"))
-    return found
+    times = []
+    for _ in range(REPEATS + 1):
+        ours = run(online_step, design, [0.0] * STATE_SIZE, samples)
+        times.append((ours, run(nothing, design, [0.0] * STATE_SIZE, samples)))
+    ours, bare = (statistics.median(column) for column in zip(*times[1:], strict=True))
+    return [Row("a sample of the live estimate / an empty call", 1e6 * ours, 1e6 * bare, "µs")]
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from rigidimeter.settings import OnlineSettings
 
 
 class BandTorque:
-    """Follows the samples of a session; it does not compile, which would hold up its process.
+    """Follows the samples of a session.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class BandTorque:
     """
 
     def __init__(self, settings: OnlineSettings, rate_hz: float) -> None:
-        self._estimator = Estimator(settings, rate_hz, compiled=False)
+        self._estimator = Estimator(settings, rate_hz)
 
     @property
     def since_s(self) -> float:

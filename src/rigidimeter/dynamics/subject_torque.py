@@ -125,11 +125,13 @@ class SubjectTorque:
         self._subject = subject
         self._rate_hz = rate_hz
         self._rng = rng
-        self._sos, energy = _band(subject, rate_hz)
-        self._memory = np.zeros((self._sos.shape[0], 2))
+        # A relaxed subject needs no filter, and loading `scipy.signal` for it takes a second.
+        if subject.voluntary_sd_nm > 0.0:
+            self._sos, energy = _band(subject, rate_hz)
+            self._memory = np.zeros((self._sos.shape[0], 2))
+            # White noise of unit variance leaves it with the energy of its impulse response.
+            self._gain = subject.voluntary_sd_nm / math.sqrt(energy)
         self._phase_rad = rng.uniform(0.0, 2.0 * math.pi)
-        # White noise of unit variance leaves the filter with the energy of its impulse response.
-        self._gain = subject.voluntary_sd_nm / math.sqrt(energy)
         self.block(round(3.0 * rate_hz / subject.voluntary_low_hz))  # let the filter settle
 
     def block(self, n: int) -> NDArray[np.float64]:

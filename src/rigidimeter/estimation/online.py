@@ -23,9 +23,8 @@ It is least squares: a subject who pushes biases it as it does the batch fit.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, MutableSequence, Sequence
-from functools import cache
-from typing import Any, NamedTuple
+from collections.abc import MutableSequence, Sequence
+from typing import NamedTuple
 
 from rigidimeter.settings import OnlineSettings
 
@@ -44,7 +43,7 @@ _POWER = 36  # of the velocity, lately
 _RESTING = 37
 _BAND_TORQUE = 38
 STATE_SIZE = 39
-"""A state is this many numbers, zero at first: a list, or an array for the compiled step."""
+"""A state is this many numbers, zero at first."""
 
 UNDETERMINED = 1e-9
 """With a diagonal of R below this part of its column, the motion so far cannot distinguish them."""
@@ -147,7 +146,7 @@ def _section(corner_hz: float, damping: float, rate_hz: float) -> tuple[float, f
 
 
 def online_step(
-    design: Sequence[float],
+    design: OnlineDesign,
     state: MutableSequence[float],
     torque_nm: float,
     angle_rad: float,
@@ -160,9 +159,8 @@ def online_step(
     Parameters
     ----------
     design : OnlineDesign
-        Or an array of it, for the compiled step.
     state : list of float, length STATE_SIZE
-        Zeros at first; an array for the compiled step.
+        Zeros at first.
     torque_nm, angle_rad, velocity_rad_s : float
         As measured.
 
@@ -171,11 +169,9 @@ def online_step(
     float
         The innovation in N·m; NaN before the parameters are determined.
     """
-    # By place, so that the compiled step can have an array: it unpacks a tuple value by value.
-    high_k, high_1, high_2, high_3 = design[0], design[1], design[2], design[3]
-    low1_1, low1_2, low1_3, low2_1 = design[4], design[5], design[6], design[7]
-    low2_2, low2_3, per_s, forgetting = design[8], design[9], design[10], design[11]
-    root, power_forgetting, rest_share, rest_after = design[12], design[13], design[14], design[15]
+    high_k, high_1, high_2, high_3, low1_1, low1_2, low1_3 = design[:7]
+    low2_1, low2_2, low2_3, per_s, forgetting, root = design[7:13]
+    power_forgetting, rest_share, rest_after = design[13:16]
     if not math.isfinite(torque_nm + angle_rad + velocity_rad_s):
         return math.nan
     if state[_STARTED] == 0.0:
@@ -316,20 +312,3 @@ def _root_inverse(state: MutableSequence[float]) -> tuple[float, float, float]:
         math.hypot(1.0 / r11, i12),
         1.0 / r22,
     )
-
-
-@cache
-def compiled_online_step() -> Callable[..., float]:
-    """Return `online_step` compiled from the same source: design and state are float64 arrays.
-
-    Without numba, the interpreter's step, which takes arrays too.
-    """
-    try:
-        import numba
-    except ImportError:
-        return online_step
-    try:  # kept for the next session, which need not wait for the compiler
-        compiled: Any = numba.njit(online_step, cache=True)
-    except RuntimeError:  # there is no folder to keep it in
-        compiled = numba.njit(online_step)
-    return compiled  # type: ignore[no-any-return]

@@ -23,7 +23,8 @@ across a whole number.
 References
 ----------
 S. W. Golomb, "Shift Register Sequences", Holden-Day, 1967: the run, balance and correlation
-properties. The register itself is `scipy.signal.max_len_seq`.
+properties, and primitive polynomials. `scipy.signal.max_len_seq` gives the same sequences; it is
+not called, since loading it takes the loop's process a second.
 """
 
 from __future__ import annotations
@@ -32,7 +33,6 @@ import math
 from fractions import Fraction
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
@@ -82,6 +82,14 @@ def period_s(settings: PrbsSettings) -> float:
     return chip_count(settings) / settings.clock_hz
 
 
+_TAPS = {
+    **{2: (1,), 3: (2,), 4: (3,), 5: (3,), 6: (5,), 7: (6,), 8: (7, 6, 1), 9: (5,), 10: (7,)},
+    **{11: (9,), 12: (11, 10, 4), 13: (12, 11, 8), 14: (13, 12, 2), 15: (14,), 16: (15, 13, 4)},
+    **{17: (14,), 18: (11,), 19: (18, 17, 14), 20: (17,)},
+}
+"""For n bits the powers t of the primitive polynomial xⁿ + Σ xᵗ + 1."""
+
+
 def prbs_levels(register_bits: int) -> NDArray[np.float64]:
     """Return one period of the sequence as levels of ±1, one a chip.
 
@@ -91,20 +99,21 @@ def prbs_levels(register_bits: int) -> NDArray[np.float64]:
     Parameters
     ----------
     register_bits : int
-        n, from 2 to 32.
+        n, from 2 to 20.
 
     Returns
     -------
     array, shape (2**n - 1,)
         With one more +1 than −1.
-
-    Raises
-    ------
-    ValueError
-        If scipy knows no primitive polynomial of that degree.
     """
-    bits, _ = scipy.signal.max_len_seq(register_bits, state=np.ones(register_bits, dtype=np.int8))
-    return 2.0 * bits.astype(np.float64) - 1.0
+    taps = _TAPS[register_bits]
+    bits = [1] * register_bits
+    for k in range(2**register_bits - 1 - register_bits):
+        bit = bits[k]
+        for tap in taps:
+            bit ^= bits[k + tap]
+        bits.append(bit)
+    return 2.0 * np.array(bits, dtype=np.float64) - 1.0
 
 
 def prbs_nm(settings: PrbsSettings, rate_hz: float) -> NDArray[np.float64]:

@@ -1,11 +1,9 @@
 """Measured and modelled torque in the band of the live estimate."""
 
 import numpy as np
-import pytest
 from scipy import signal
 from tests.unit.acquisition.test_live_estimate import RATE_HZ, rows
 
-from rigidimeter.acquisition.processes.live_estimate import Estimator
 from rigidimeter.acquisition.processes.ring import ROW
 from rigidimeter.console.band_torque import BandTorque
 from rigidimeter.settings import OnlineSettings
@@ -59,10 +57,3 @@ def test_in_parts_it_is_the_same_and_a_rest_has_none():
     assert np.isfinite(at_once[0, 3_200:]).all()
     assert once.since_s == 3.2
     assert parts.take(np.empty(0, ROW), 0)[0].size == 0
-
-
-def test_the_step_that_is_not_compiled_is_the_same():
-    whole = rows(1, 0, 4_000, 1.7)
-    compiled = Estimator(SETTINGS, RATE_HZ).take(whole, 0)
-    plain = Estimator(SETTINGS, RATE_HZ, compiled=False).take(whole, 0)
-    assert plain == pytest.approx(compiled, rel=1e-6)

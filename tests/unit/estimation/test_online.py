@@ -8,7 +8,6 @@ from scipy import signal
 
 from rigidimeter.estimation.online import (
     STATE_SIZE,
-    compiled_online_step,
     online_design,
     online_reading,
     online_step,
@@ -42,14 +41,13 @@ def faded(ago_s, pace, x, v, a):
     return x * fade, v * fade + x * slope, a * fade + 2 * v * slope + x * bend
 
 
-def run(torque, angle, velocity, settings=SETTINGS, rate_hz=RATE_HZ, step=online_step):
+def run(torque, angle, velocity, settings=SETTINGS, rate_hz=RATE_HZ):
     """Return the final state, and J, B, K and whether at rest after each sample."""
     design = online_design(settings, rate_hz)
-    state = [0.0] * STATE_SIZE if step is online_step else np.zeros(STATE_SIZE)
-    numbers = design if step is online_step else np.array(design)
+    state = [0.0] * STATE_SIZE
     found = np.empty((len(torque), 4))
     for k, (m, x, v) in enumerate(zip(torque, angle, velocity, strict=True)):
-        step(numbers, state, float(m), float(x), float(v))
+        online_step(design, state, float(m), float(x), float(v))
         found[k] = *state[31:34], state[37]
     return design, state, found
 
@@ -164,15 +162,14 @@ def test_standard_errors_are_the_scatter():
     settings = OnlineSettings(forgetting_s=2.0, band_low_hz=0.02)
     _, x, v, a = sines(8.0, rate_hz=200.0)
     exact = TRUTH @ np.array([a, v, x])
-    step, design = compiled_online_step(), online_design(settings, 200.0)
-    numbers = np.array(design)
+    design = online_design(settings, 200.0)
     found, claimed = [], []
     for seed in range(150):
         noise = 0.1 * np.random.default_rng([5, seed]).standard_normal(exact.size)
         noise[0] = 0.0  # the first value is taken for the offset
-        state = np.zeros(STATE_SIZE)
+        state = [0.0] * STATE_SIZE
         for m, angle, speed in zip((exact + noise).tolist(), x.tolist(), v.tolist(), strict=True):
-            step(numbers, state, m, angle, speed)
+            online_step(design, state, m, angle, speed)
         reading = online_reading(design, state, 200.0)
         found.append(reading[:6:2])
         claimed.append(reading[1:6:2])
@@ -222,14 +219,6 @@ def test_a_sample_that_is_not_a_number_is_passed_over(bad):
     assert math.isnan(online_step(design, state, 0.0, bad, 0.0))
     assert math.isnan(online_step(design, state, 0.0, 0.0, -bad))
     assert state == before
-
-
-def test_the_compiled_step_is_the_same():
-    _, x, v, a = sines(2.0)
-    torque = TRUTH @ np.array([a, v, x])
-    plain = run(torque, x, v)[2]
-    compiled = run(torque, x, v, step=compiled_online_step())[2]
-    np.testing.assert_allclose(compiled, plain, rtol=1e-9)
 
 
 def test_a_band_beyond_half_the_rate_is_refused():

@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+import scipy
 from scipy.integrate import cumulative_simpson
 
 from rigidimeter.errors import UserError
@@ -74,6 +75,12 @@ def test_a_rate_of_nothing_is_refused() -> None:
 def test_three_bits_give_the_sequence_of_the_register_by_hand() -> None:
     # from 111, each chip is the sum modulo 2 of the one before it and the one three before it
     np.testing.assert_array_equal(prbs_levels(3), [1, 1, 1, -1, 1, -1, -1])
+
+
+@pytest.mark.parametrize("bits", range(2, 21))
+def test_the_register_is_that_of_scipy(bits):
+    expected, _ = scipy.signal.max_len_seq(bits, state=np.ones(bits, dtype=np.int8))
+    np.testing.assert_array_equal(prbs_levels(bits) > 0, expected == 1)
 
 
 def test_one_whole_period_has_the_levels_of_the_closed_form() -> None:

@@ -10,8 +10,7 @@ from __future__ import annotations
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,6 @@ from rigidimeter.acquisition.processes.status_values import Condition, LiveEstim
 from rigidimeter.acquisition.tick import REST
 from rigidimeter.estimation.online import (
     STATE_SIZE,
-    compiled_online_step,
     online_design,
     online_reading,
     online_step,
@@ -44,20 +42,12 @@ class Estimator:
     ----------
     settings : OnlineSettings
     rate_hz : float
-    compiled : bool
-        Whether to compile the step; the compiler holds up its process for a second.
     """
 
-    def __init__(self, settings: OnlineSettings, rate_hz: float, *, compiled: bool = True) -> None:
+    def __init__(self, settings: OnlineSettings, rate_hz: float) -> None:
         self._rate_hz = rate_hz
         self._design = online_design(settings, rate_hz)
-        self._compiled = compiled
-        self._values: Any = self._design
-        self._step: Callable[..., float] = online_step
-        if compiled:
-            self._values, self._step = np.array(self._design), compiled_online_step()
-            self._step(self._values, self._at_rest(), 0.0, 0.0, 0.0)  # compile now, not later
-        self._state = self._at_rest()
+        self._state = [0.0] * STATE_SIZE
         self._missed = 0
         self._tick, self._epoch = -1, REST
         self.since_s = self._time_s = 0.0
@@ -91,23 +81,18 @@ class Estimator:
                 continue
             if gap or epoch != self._epoch:
                 self._epoch, self.since_s = epoch, float(part["time_s"][0])
-                self._state, self._last = self._at_rest(), part[:0]
+                self._state, self._last = [0.0] * STATE_SIZE, part[:0]
             yield from self._take(part)
 
     def torque(self) -> tuple[float, float]:
         """Return the torque of the last sample in the band in N·m: measured, and modelled."""
         return online_torque(self._state)
 
-    def _at_rest(self) -> Any:
-        state = [0.0] * STATE_SIZE
-        return np.array(state) if self._compiled else state
-
     def _take(self, rows: NDArray[np.void]) -> Iterator[int]:
         """Take samples of one epoch; ticks that the loop left out lie on straight lines.
 
         Passed over they would make the motion shorter, and so faster, than it was.
         """
-        step, values, state = self._step, self._values, self._state
         ticks = rows["tick"]
         if self._last.size:  # of the epoch, and already taken: the first of the lines begins there
             rows, ticks = np.concatenate((self._last, rows)), np.append(self._last["tick"], ticks)
@@ -116,7 +101,7 @@ class Estimator:
         self._last = rows[-1:].copy()
         self._tick, self._time_s = int(ticks[-1]), float(rows["time_s"][-1])
         for tick, *sample in zip(every.tolist(), *columns, strict=True):
-            step(values, state, *sample)
+            online_step(self._design, self._state, *sample)
             yield tick
 
 
