@@ -149,7 +149,9 @@ def test_after_a_pause_the_arm_waits_to_be_enabled_again(wire, sleeps):
     assert "t 1" not in [request for _, request, _ in list(wire.emulator.log)[asked:]]
     assert wire.arm.motion()[0] == pytest.approx(stood_rad, abs=1e-3 if sleeps else 0.05)
     assert abs(wire.arm.motion()[1]) < 0.02
+    assert drive.powered
     drive.disable()
+    assert not drive.powered
     drive.enable()
     assert wire.run(drive, SPEED_RAD_S, 0.3)[0].cause == 0
     assert wire.arm.motion()[1] == pytest.approx(SPEED_RAD_S, rel=0.1)

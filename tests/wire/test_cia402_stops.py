@@ -36,10 +36,13 @@ def test_a_quick_stop_that_keeps_the_power_holds_until_it_is_taken_away(wire):
     drive.stop()
     assert run_loop(drive, 1.0, for_s=0.3).cause == Cause.NONE
     assert wire.emulator.state()["state"] == "QUICK_STOP_ACTIVE"
+    assert drive.powered
     drive.disable()
+    assert drive.powered  # it has not said otherwise
     drive.stop()  # does not give the power back
     assert wait_until(lambda: wire.emulator.state()["state"] == "SWITCH_ON_DISABLED")
     assert run_loop(drive, 1.0, for_s=0.2).cause == Cause.NONE
+    assert not drive.powered
 
 
 def test_a_drive_that_ignores_its_quick_stop_is_named_and_loses_its_power(wire):

@@ -12,7 +12,15 @@ import math
 import numpy as np
 
 from rigidimeter.commissioning.checks import Check, impossible, untried, within, yes
-from rigidimeter.commissioning.trial import Operator, Setup, drop_old_samples, hold, listen, trial
+from rigidimeter.commissioning.trial import (
+    Operator,
+    Setup,
+    drop_old_samples,
+    hold,
+    listen,
+    require_no_power,
+    trial,
+)
 
 SETTLE_S = 0.5
 KNOWN_ANGLE_S = 1.0
@@ -54,6 +62,7 @@ def known_torque(setup: Setup) -> Check:
     if not operator.present:
         return untried(TORQUE, limit)
     before = trial(setup, hold(SETTLE_S)).readings.torque_nm
+    require_no_power(setup)
     held_s = limits.known_torque_s
     if not operator.ask(
         f"Put a torque of {known_nm:g} N·m on the joint, toward positive angles, and keep it for "
@@ -61,6 +70,7 @@ def known_torque(setup: Setup) -> Check:
     ):
         return impossible(TORQUE, limit, "the operator did not agree to it")
     readings = trial(setup, hold(SETTLE_S + held_s)).readings
+    require_no_power(setup)
     late = readings.torque_nm[readings.time_s > SETTLE_S]
     value = -float(np.nanmedian(late) - np.nanmedian(before)) if len(late) else math.nan
     operator.ask("Take the torque off again. Done?")

@@ -2,7 +2,9 @@
 
 The loop that commissions a rig is the one that moves a person in it. A trial enables the drive at
 zero velocity, runs its stretches on end, stops and takes the power away again, whatever happens;
-nothing stays energised while an operator is asked or numbers are looked at.
+nothing stays energised while an operator is asked or numbers are looked at. A command that takes
+the power away may be lost, so the drive's own word is waited for, and required before hands are
+asked for.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.acquisition import ControlLoop, control_modes, ramp_to_rest
-from rigidimeter.devices.base import Now, Reading, Rig
+from rigidimeter.devices.base import DeviceError, Now, Reading, Rig
 from rigidimeter.guard import Cause, Reaction
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import Settings
@@ -33,6 +35,9 @@ MOST_READS = 400
 
 PILED_UP = {int(Cause.TORQUE_STALE), int(Cause.TORQUE_PACKETS), int(Cause.TORQUE_FROZEN)}
 """What a sensor says when nobody has listened for a while."""
+
+POWER_OFF_S = 1.0
+"""For so long a drive may take to say that it has no power."""
 
 DURING_TRIAL = -1
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
@@ -206,6 +211,8 @@ def trial(setup: Setup, *stretches: Stretch, spread: float = 0.0) -> TrialResult
                 rig.stop()
     finally:
         rig.disable()
+    if rig.powered:
+        listen(setup, POWER_OFF_S, until=lambda _: not rig.powered)
     return TrialResult(_readings([_OF_SAMPLE(sample) for sample in samples]), cause)
 
 
@@ -245,6 +252,22 @@ def listen(
         if until(reading):
             break
     return _readings(rows)
+
+
+def require_no_power(setup: Setup) -> None:
+    """Refuse to go on after a trial unless the drive said that it has no power.
+
+    Raises
+    ------
+    DeviceError
+        If its last word is another one.
+    """
+    if setup.rig.powered:
+        raise DeviceError(
+            f"drive: {POWER_OFF_S:g} s after it was told to take the power away it has not said "
+            "that it has none; keep hands off the joint, press the emergency stop, and look at the "
+            "wiring to the drive"
+        )
 
 
 def drop_old_samples(setup: Setup) -> None:

@@ -207,6 +207,13 @@ class Rig(Protocol):
     def counts(self) -> Mapping[str, int]:
         """Message counts since the connections were opened."""
 
+    @property
+    def powered(self) -> bool:
+        """Whether the drive, by what it said last, may turn the joint by its own power.
+
+        False where the driver has no property `powered`: such a drive is believed.
+        """
+
     def stop(self) -> None:
         """Let the drive brake along its own ramp, for example when commands no longer reach it."""
 

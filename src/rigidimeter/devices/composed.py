@@ -217,6 +217,11 @@ class ComposedRig:
             **{f"drive_{name}": count for name, count in self._drive.counts.items()},
         }
 
+    @property
+    def powered(self) -> bool:
+        """Whether the drive has not said that it has no power; False if its driver cannot tell."""
+        return bool(getattr(self._drive, "powered", False))
+
     def stop(self) -> None:
         """Let the drive brake along its own ramp."""
         self._drive.stop()

@@ -131,6 +131,11 @@ class SimulatedRig:
         """No messages, no counts."""
         return {}
 
+    @property
+    def powered(self) -> bool:
+        """Whether it takes commands."""
+        return self._enabled
+
     def stop(self) -> None:
         """Stop the drive."""
         self._command = 0.0

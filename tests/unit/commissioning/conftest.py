@@ -149,8 +149,13 @@ class FakeDrive:
     def stop(self) -> None:
         self._halt()
 
+    @property
+    def powered(self) -> bool:
+        return self._on
+
     def disable(self) -> None:
-        self._halt()
+        if "keeps_power" not in self._faults:
+            self._halt()
 
     def close(self) -> None: ...
 

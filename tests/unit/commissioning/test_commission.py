@@ -240,3 +240,18 @@ def test_what_the_operator_knows_is_compared(
 
     record = commissioned(ask=ask, known_torque_nm=2.0, known_angle_deg=10.0, **faults)
     assert failed(record) == wrong
+
+
+def test_hands_are_asked_for_only_after_the_drive_said_that_it_has_no_power(
+    commissioned: Any,
+) -> None:
+    asked: list[str] = []
+
+    def ask(question: str, world: Any) -> bool:
+        asked.append(question)
+        return at_hand(question, world)
+
+    record = commissioned(ask=ask, known_torque_nm=2.0, keeps_power=True)
+    assert failed(record) == ["devices answer"]
+    assert "keep hands off the joint" in record.failed[0].sentence
+    assert not any("torque of" in question for question in asked)

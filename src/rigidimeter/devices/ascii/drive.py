@@ -72,6 +72,7 @@ class AsciiDrive:
         self._line: AsciiLine | None = None
         self._speaking = self._configured = False
         self._powered = self._commanding = False
+        self._said_off = True
         self._cycle_s = 0.0
         self._sent = 0  # in 0.1 counts/s, on the drive's side of the sign
         self._commanded_s = -math.inf
@@ -160,7 +161,7 @@ class AsciiDrive:
             raise
 
     def _enable(self) -> None:
-        self._powered = True
+        self._powered, self._said_off = True, False
         self._talking().energise(self._state_on, self._jump)
         self._sent = 0
         self._start_sampling()
@@ -232,6 +233,11 @@ class AsciiDrive:
 
     # -- the end ------------------------------------------------------------------------------
 
+    @property
+    def powered(self) -> bool:
+        """Whether it was given power and has not confirmed that it is gone."""
+        return not self._said_off
+
     def stop(self) -> None:
         """Abort the move: the drive brakes with its own deceleration and stays at rest."""
         self._commanding = False
@@ -243,7 +249,7 @@ class AsciiDrive:
         """Remove the power at once; a drive that does not confirm it is reported as lost."""
         self._commanding = False
         self._powered = False
-        self._try(set_(0x24, OFF))
+        self._said_off = self._try(set_(0x24, OFF)) or self._said_off
 
     def close(self) -> None:
         """Remove the power and close the port."""
@@ -301,10 +307,12 @@ class AsciiDrive:
             raise DeviceError("drive: not connected; call connect first")
         return AsciiTalk(self._line, self._settings)
 
-    def _try(self, request: str) -> None:
+    def _try(self, request: str) -> bool:
         """Send a request that ends the motion; without an ok the drive is lost, but no error."""
-        if self._line is not None and self._speaking:
-            self._feedback.forget_requests()
-            text = self._line.ask(request, PATIENCE * self._settings.lost_s)
-            if text != "ok":
-                self._feedback.latch(Cause.DRIVE_LOST)
+        if self._line is None or not self._speaking:
+            return False
+        self._feedback.forget_requests()
+        text = self._line.ask(request, PATIENCE * self._settings.lost_s)
+        if text != "ok":
+            self._feedback.latch(Cause.DRIVE_LOST)
+        return text == "ok"

@@ -32,6 +32,7 @@ from rigidimeter.devices.cia402.setup import (
 )
 from rigidimeter.devices.cia402.state_words import (
     OPERATIONAL,
+    POWERED,
     Control,
     Nmt,
     State,
@@ -81,6 +82,14 @@ class Cia402Drive:
     def counts(self) -> Mapping[str, int]:
         """Measurements received or lost, frames damaged or unsent, reads that hit their limit."""
         return self._wire.counts
+
+    @property
+    def powered(self) -> bool:
+        """Whether its last statusword is of a state in which it may turn the motor.
+
+        Between `enable` and `disable` it is, so after `disable` any other is news.
+        """
+        return self._wire.is_open and self._wire.state in POWERED
 
     def connect(self) -> None:
         """Open the bus and make the drive pre-operational; nothing is energised."""

@@ -86,6 +86,9 @@ class Nmt(IntEnum):
     PRE_OPERATIONAL = 0x80
 
 
+POWERED = (State.UNKNOWN, State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
+"""States in which the drive may turn the motor; in all others its torque is off."""
+
 NEXT_CONTROL = {
     State.SWITCH_ON_DISABLED: Control.SHUTDOWN,
     State.READY: Control.SWITCH_ON,
