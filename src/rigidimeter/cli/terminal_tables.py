@@ -13,7 +13,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Iterable, Sequence
-from itertools import groupby
+from itertools import compress, groupby
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import typer
@@ -92,7 +92,7 @@ def _rendered(blocks: Iterable[Block], width: int, *, terminal: bool = False) ->
     )
     for block in blocks:
         if isinstance(block, Table):
-            _print_table(console, block, width)
+            _print_table(console, _filled(block), width)
         else:
             _print_text(console, block, width, "bold" if isinstance(block, Heading) else "")
     return "\n".join(line.rstrip() for line in shown.getvalue().split("\n"))
@@ -124,6 +124,21 @@ def paragraph(text: str, width: int) -> list[str]:
         break_long_words=False,
         break_on_hyphens=False,
     ) or [""]
+
+
+def _filled(table: Table) -> Table:
+    """Return a table without the columns in which no row has an entry, such as the condition."""
+    rows = [row for row in table.rows if not isinstance(row, str)]
+    filled = [any(cells) or not rows for _, *cells in zip(table.headings, *rows, strict=True)]
+
+    def cut(cells: Iterable[str]) -> tuple[str, ...]:
+        return tuple(compress(cells, filled))
+
+    return table._replace(
+        headings=cut(table.headings),
+        rows=[row if isinstance(row, str) else cut(row) for row in table.rows],
+        align="".join(cut(table.align)),
+    )
 
 
 def _print_table(console: Console, table: Table, width: int) -> None:

@@ -35,6 +35,11 @@ def test_numbers_stand_below_each_other_and_texts_across_the_columns() -> None:
     ]
 
 
+def test_a_column_without_an_entry_is_left_out() -> None:
+    table = Table(("epoch", "condition", "R²"), [("1", "", "0.9"), ("2", "", "1.0")], "<<>")
+    assert text_lines([table]) == ["  epoch   R²", "  1      0.9", "  2      1.0"]
+
+
 cells = st.text(st.characters(min_codepoint=33, max_codepoint=0x2FF), min_size=1, max_size=60)
 
 
