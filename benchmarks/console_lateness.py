@@ -30,6 +30,7 @@ from playwright.sync_api import sync_playwright
 from scipy import stats
 from tests.console.opened import CHROMIUM
 
+from benchmarks import console_running
 from benchmarks.console_gaps import gaps
 from rigidimeter.acquisition.processes.loop_process import Realtime
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
@@ -49,15 +50,7 @@ QUANTILES = (50.0, 95.0, 99.0)
 STARTS_S = 60.0
 EPOCH_S = 60.0
 
-PROTOCOL = """
-prbs.duration_s = {seconds}
-protocol.rests_s = [2.0]
-protocol.return_s = 1.0
-protocol.blocks = [{{task = "prbs", condition = "OFF", epochs = {epochs}}}]
-zeroing.duration_s = 0.2
-loop.console_lost_s = 2.0
-loop.stall_s = 0.25
-"""
+PROTOCOL = f"{console_running.PROTOCOL}loop.console_lost_s = 2.0\nloop.stall_s = 0.25\n"
 
 
 def lateness(pairs: int, seconds: float) -> None:

@@ -4,8 +4,9 @@ Each name is imported when it is first used: the estimator that runs beside a se
 module, and would otherwise load scipy while the arm is about to move.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rigidimeter.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from rigidimeter.estimation.alignment import aligned, estimate_delays
@@ -55,36 +56,31 @@ __all__ = [
     "single_frequency_share",
 ]
 
-_MODULES = {
-    "alignment": ("aligned", "estimate_delays"),
-    "bandlimited": ("band_hz",),
-    "from_arrays": ("identify",),
-    "least_squares": ("fit_inertia_damping_stiffness",),
-    "method_record": ("Method",),
-    "methods": (
-        "METHODS",
-        "choose_method",
-        "epoch_signals",
-        "fit_epoch",
-        "fit_epochs",
-        "method_named",
-        "method_names",
-        "no_such_method",
-    ),
-    "scores": (
-        "Cycles",
-        "find_motion",
-        "score_epoch",
-        "scoring_cycles",
-        "single_frequency_share",
-    ),
-    "signals": ("Signals",),
-}
-_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _MODULE_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = globals()[name] = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
-    return found
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "alignment": ("aligned", "estimate_delays"),
+        "bandlimited": ("band_hz",),
+        "from_arrays": ("identify",),
+        "least_squares": ("fit_inertia_damping_stiffness",),
+        "method_record": ("Method",),
+        "methods": (
+            "METHODS",
+            "choose_method",
+            "epoch_signals",
+            "fit_epoch",
+            "fit_epochs",
+            "method_named",
+            "method_names",
+            "no_such_method",
+        ),
+        "scores": (
+            "Cycles",
+            "find_motion",
+            "score_epoch",
+            "scoring_cycles",
+            "single_frequency_share",
+        ),
+        "signals": ("Signals",),
+    },
+)

@@ -4,8 +4,9 @@ Each name is imported when it is first used: the processes of a session write fi
 otherwise load the readers of every format before the arm may move.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rigidimeter.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from rigidimeter.recording.estimate_files import (
@@ -42,25 +43,20 @@ __all__ = [
     "write_estimates_json",
 ]
 
-_MODULES = {
-    "estimate_files": (
-        "ESTIMATES_SCHEMA",
-        "estimates_document",
-        "read_estimates",
-        "write_estimates_csv",
-        "write_estimates_json",
-    ),
-    "formats": ("ReadOptions", "Table", "read_recording", "read_table"),
-    "recording": ("Recording", "read"),
-    "recovery": ("Recovery", "recover"),
-    "session_epochs": ("is_session", "read_session", "session_settings"),
-    "session_folder": ("SessionWriter", "read_manifest"),
-}
-_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _MODULE_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = globals()[name] = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
-    return found
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "estimate_files": (
+            "ESTIMATES_SCHEMA",
+            "estimates_document",
+            "read_estimates",
+            "write_estimates_csv",
+            "write_estimates_json",
+        ),
+        "formats": ("ReadOptions", "Table", "read_recording", "read_table"),
+        "recording": ("Recording", "read"),
+        "recovery": ("Recovery", "recover"),
+        "session_epochs": ("is_session", "read_session", "session_settings"),
+        "session_folder": ("SessionWriter", "read_manifest"),
+    },
+)

@@ -3,8 +3,9 @@
 Loaded when it is asked for: matplotlib, which only figures need, takes as long as an epoch.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rigidimeter.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from rigidimeter.reporting.contents import Column, Figure, Section, Table, bullets, paragraph
@@ -13,9 +14,11 @@ if TYPE_CHECKING:
 
 __all__ = ["SECTIONS", "Column", "Figure", "Section", "Table", "bullets", "paragraph", "report"]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    modules = {"SECTIONS": "sections", "report": "make_report"}
-    return getattr(import_module(f"{__name__}.{modules.get(name, 'contents')}"), name)
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "contents": ("Column", "Figure", "Section", "Table", "bullets", "paragraph"),
+        "make_report": ("report",),
+        "sections": ("SECTIONS",),
+    },
+)

@@ -3,8 +3,9 @@
 Each name is imported when it is first used, as those of `rigidimeter.recording` are.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rigidimeter.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from rigidimeter.recording.formats.read_options import ReadOptions
@@ -36,26 +37,21 @@ __all__ = [
     "recorded_settings",
 ]
 
-_MODULES = {
-    "read_options": ("ReadOptions",),
-    "readers": (
-        "READERS",
-        "Reader",
-        "formats_text",
-        "read_content",
-        "read_recording",
-        "read_table",
-        "reader_of",
-        "recorded_settings",
-    ),
-    "table": ("Table",),
-    "text_table": ("TextTable", "read_text_table"),
-}
-_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _MODULE_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = globals()[name] = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
-    return found
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "read_options": ("ReadOptions",),
+        "readers": (
+            "READERS",
+            "Reader",
+            "formats_text",
+            "read_content",
+            "read_recording",
+            "read_table",
+            "reader_of",
+            "recorded_settings",
+        ),
+        "table": ("Table",),
+        "text_table": ("TextTable", "read_text_table"),
+    },
+)
