@@ -9,7 +9,9 @@ velocity   The reported velocity v is the change of the angle θ between the sta
            p², with its sign turned four times that, with a gain g (1 − g)² times; with v late by τ
            at ω it is 4 sin²(ωτ/2) times. It may be 0.375 of the mean of p² + q², which are alike
            where all is well: a velocity of 0 gives 1, a turned sign 2, a velocity late by 10 ms
-           at 10 Hz 0.18. No ratio is looked at while d is below what resolution explains.
+           at 10 Hz 0.18. No ratio is looked at while d is below what resolution explains. Where the
+           loop was late, v had the value before for an unknown part of the time and the value after
+           for the rest: what agrees best with θ is taken.
 
 energy     As `watch` counts it, with the velocity from the angle, smoothed over 20 ms: a velocity
            of 0 hides nothing that goes to and fro.
@@ -66,6 +68,9 @@ OLD_SHARE = 0.2
 
 OLD_MEMORY_S, OLD_MEMORY_STALES = 0.5, 5.0
 """Of the share: one pause of `stale_s` then is at most 1 − e^(−1/5) = 0.18 of it."""
+
+LATE = 1.5
+"""Of the time of a mean: it holds a gap in which the velocity changed nobody knows when."""
 
 _SAME_STAMP_S = 1e-6
 
@@ -185,7 +190,11 @@ def means_step(
         kept = max(1.0 - passed_s / limits.summed_s, 0.0)
         change = angle_rad - before
         moved = moved * kept + change
-        reported = reported * kept + 0.5 * (speed_before + velocity_rad_s) * passed_s
+        said = 0.5 * (speed_before + velocity_rad_s) * passed_s
+        if elapsed_s > LATE * limits.mean_of_ticks * limits.interval_s:
+            one, other = speed_before * passed_s, velocity_rad_s * passed_s
+            said = min(max(change, min(one, other)), max(one, other))
+        reported = reported * kept + said
         weight = min(passed_s / SQUARED_S, 1.0)
         difference = moved - reported
         apart += (difference * difference - apart) * weight

@@ -115,7 +115,7 @@ def guard_step(
     oldest, passed = ring.size - 1, max(elapsed_ticks, 1)
     was_latched = cause != _NO_CAUSE
     elapsed_s = passed * dt
-    sum_rad = ring[newest]
+    sum_rad = ring[newest] + max(passed - oldest, 0) * sent_before * dt  # before the ring's memory
     for _ in range(min(passed, oldest)):
         newest = newest + 1 if newest < oldest else 0
         sum_rad += sent_before * dt
@@ -158,11 +158,7 @@ def guard_step(
         energy,
         limited_s,
     )
-    if REACTIONS[disagreement] > REACTIONS[found]:
-        found = disagreement
-    # A device knows better why than what was found; most ticks name nothing.
-    if reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found]:
-        found = reported
+    found = _gravest(found, disagreement, reported)
     if found != _NO_CAUSE:
         if cause == _NO_CAUSE:
             cause = found
@@ -183,22 +179,9 @@ def guard_step(
     if abs(sent) > limits.speed_rad_s:
         sent, limited = math.copysign(limits.speed_rad_s, sent), max(limited, int(Limited.SPEED))
 
-    # Toward the nearer limit, no faster than can still be stopped in the distance left when the
-    # next step comes late.
-    toward = math.copysign(1.0, sent)
-    left = limits.position_rad - toward * angle
-    reach_s = old_s + reaction_time_s
-    held_s = dt + limits.gap_s
-    # Far from the limit the search is spared: at full speed, after all that can be in flight and
-    # one command more, the joint could still stop.
-    speed = limits.speed_rad_s
-    stopping = speed * speed / (2.0 * limits.acceleration_rad_s2)
-    if left < speed * (reach_s + dt + held_s) + stopping:
-        back = math.ceil(min(reach_s * ticks_per_s, oldest))
-        left -= _farthest_in_flight(ring, newest, back, toward)
-        fastest = _stoppable_speed(limits.acceleration_rad_s2, held_s, left)
-        if abs(sent) > fastest:
-            sent, limited = math.copysign(fastest, sent), max(limited, int(Limited.POSITION))
+    fastest = _fastest_toward(limits, ring, newest, math.copysign(1.0, sent), angle, old_s)
+    if abs(sent) > fastest:
+        sent, limited = math.copysign(fastest, sent), max(limited, int(Limited.POSITION))
     limited_s = limited_s + elapsed_s if limited == _AT_LIMIT else 0.0
     after = GuardState(ring, newest, sent, angle, age, origin, energy, cause, reaction, limited_s)
     return after, sent, limited
@@ -206,6 +189,41 @@ def guard_step(
 
 LONGEST_BRAKING = 5
 """A late step brakes for at most so many ticks at once: a loop that is later has stalled."""
+
+
+def _gravest(found: int, disagreement: int, reported: int) -> int:
+    """Return which of the causes is named: a device knows better why than what was found here."""
+    if REACTIONS[disagreement] > REACTIONS[found]:
+        found = disagreement
+    if reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found]:  # most ticks: neither
+        found = reported
+    return found
+
+
+def _fastest_toward(
+    limits: GuardLimits,
+    ring: NDArray[np.float64],
+    newest: int,
+    toward: float,
+    angle: float,
+    old_s: float,
+) -> float:
+    """Return how fast the joint may be told to move toward a limit, +1 or -1.
+
+    It can then still stop in the distance left when the next step comes late.
+    """
+    left = limits.position_rad - toward * angle
+    reach_s = old_s + limits.reaction_time_s
+    held_s = limits.interval_s + limits.gap_s
+    # Far from the limit the search is spared: at full speed, after all that can be in flight and
+    # one command more, the joint could still stop.
+    speed = limits.speed_rad_s
+    stopping = speed * speed / (2.0 * limits.acceleration_rad_s2)
+    if left >= speed * (reach_s + limits.interval_s + held_s) + stopping:
+        return speed
+    back = math.ceil(min(reach_s * (1.0 / limits.interval_s), ring.size - 1))
+    left -= _farthest_in_flight(ring, newest, back, toward)
+    return _stoppable_speed(limits.acceleration_rad_s2, held_s, left)
 
 
 def _farthest_in_flight(ring: NDArray[np.float64], newest: int, back: int, toward: float) -> float:

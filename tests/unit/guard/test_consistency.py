@@ -93,7 +93,8 @@ def test_a_drive_at_rest_and_a_reading_that_is_no_number_show_nothing():
 def test_one_mean_after_another_is_what_the_equations_say(passed_s):
     answer = answer_state()
     before = MeansState(answer, 0.2, 1.0, 0.0, 0.3, 0.1, 0.05, 0.06, 0.5)
-    after, cause = means_step(NOTHING, before, 0, 0, 0.3, 2.0, passed_s, 0, 0, passed_s + 0.001, 0)
+    limits = NOTHING._replace(mean_of_ticks=40)
+    after, cause = means_step(limits, before, 0, 0, 0.3, 2.0, passed_s, 0, 0, passed_s + 0.001, 0)
     kept = 1.0 - passed_s / 0.05
     moved, reported = 0.3 * kept + 0.1, 0.1 * kept + 1.5 * passed_s
     weight = passed_s / 0.3
@@ -109,8 +110,36 @@ def test_one_mean_after_another_is_what_the_equations_say(passed_s):
     )
     same, _ = means_step(NOTHING, after, 0, 0, 9.0, 9.0, -0.001, 0, 0, 0.008, 0)
     assert same[1:9] == (*after[1:3], pytest.approx(0.009), *after[4:9])
-    long, _ = means_step(NOTHING, before, 0, 0, 0.3, 2.0, 5.0, 0, 0, 5.0, 0)
-    assert long[4:8] == pytest.approx((0.1, 7.5, 7.4**2, 0.1**2 + 7.5**2))
+
+
+@pytest.mark.parametrize(
+    ("angle", "said"), [(0.3, 1.0), (1.4, 1.2), (9.0, 2.0), (1.2, 1.0), (2.2, 2.0)]
+)
+@pytest.mark.parametrize("turned", [False, True])
+def test_over_a_gap_the_velocity_was_any_of_those_before_and_after(angle, said, turned):
+    """From 0.2 rad on, for 1 s, at 1 rad/s and then at 2, or the other way round."""
+    first, then = (2.0, 1.0) if turned else (1.0, 2.0)
+    before = MeansState(answer_state(), 0.2, first, 0.0, 0.3, 0.1, 0.05, 0.06, 0.5)
+    after, _ = means_step(NOTHING, before, 0, 0, angle, then, 1.0, 0, 0, 1.0, 0)
+    assert after[4:6] == pytest.approx((angle - 0.2, said))
+    for elapsed_s, late in ((0.0118, False), (0.0121, True)):  # means are of 8 ms
+        after, _ = means_step(
+            NOTHING._replace(mean_of_ticks=8), before, 0, 0, 0.2, then, 0.01, 0, 0, elapsed_s, 0
+        )
+        assert after.reported_rad == pytest.approx(0.08 + (0.01 if late else 0.015))
+
+
+def test_a_command_that_changes_before_a_gap_is_no_wrong_velocity():
+    """Told 0.5 rad/s, then 0 at the tick before the loop stood still for 200 ms."""
+    limits = VELOCITY._replace(mean_of_ticks=1)
+    state = consistency_state(limits)
+    angle = 0.0
+    for velocity, elapsed in (*[(0.5, 1)] * 300, (0.0, 200)):
+        angle += velocity * elapsed * DT
+        state, cause = consistency_step(
+            limits, state, velocity, 0.0, 0.0, angle, velocity, 0.0, 0.0, elapsed
+        )
+        assert cause == Cause.NONE
 
 
 # --- energy

@@ -156,3 +156,11 @@ def test_the_stretch_is_the_reaction_time_before_and_after_the_stamp(age_ticks, 
         state, _, _ = step(state, 2.0, limits=free, **values)
         state = state._replace(velocity_rad_s=2.0, origin_rad=0.0)
     assert (state.cause == Cause.NONE) is follows
+
+
+@pytest.mark.parametrize(("moved", "cause"), [(25.0, Cause.NONE), (5.25, Cause.NOT_FOLLOWING)])
+def test_a_gap_longer_than_what_is_remembered_is_counted_whole(moved, cause):
+    # 100 ticks late, of which the ring holds 21
+    state = moving([5.0, 5.25, 5.5])
+    after, _, _ = step(state, 2.0, angle=5.5 + moved, limits=BINARY, elapsed=100)
+    assert after.cause == cause

@@ -64,7 +64,11 @@ def test_what_was_in_force_fills_the_ticks_that_were_missed(missed):
     state, _, _ = step(at(2.0, BINARY), 2.0, limits=BINARY, elapsed=missed)
     filled = min(missed, 21)
     assert state.newest == filled
-    assert state.sent_rad[: filled + 1].tolist() == [0.25 * k for k in range(filled + 1)]
+    longer = missed - filled  # than the ring's memory
+    assert state.sent_rad[0] == 0.0
+    assert state.sent_rad[1 : filled + 1].tolist() == [
+        0.25 * (longer + k) for k in range(1, filled + 1)
+    ]
 
 
 @pytest.mark.parametrize("elapsed", [0, -5])
