@@ -242,7 +242,8 @@ def _live(
         tasks[number] = (progress.current.task, progress.places.get(number, number))
     task, place = tasks.get(now.epoch, ("", now.epoch))
     words = f"epoch {place}" if now.epoch >= 0 else ""
-    return live_values(history, task, plan.settings.online), words
+    runs = progress.current.number if progress.running and progress.current else None
+    return live_values(history, task, plan.settings.online, running=runs == now.epoch), words
 
 
 def _stop_words(progress: Progress, loop: LoopStatus) -> str:

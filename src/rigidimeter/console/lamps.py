@@ -117,10 +117,7 @@ def _limits(recent: RecentSamples, distances: Sequence[LimitDistance]) -> Lamp:
     if not known:
         return Lamp("limits", Level.UNKNOWN, "nothing measured yet")
     nearest = max(known, key=lambda distance: distance.part)
-    words = (
-        f"{nearest.name} {nearest.value:.3g} of {nearest.limit:g} {nearest.unit} "
-        f"({100 * nearest.part:.0f} %)"
-    )
+    words = f"{nearest.name} {nearest.text} ({100 * nearest.part:.0f} %)"
     if recent.held_back:
         return Lamp("limits", Level.WATCH, f"the arm is braked before its angle limit; {words}")
     return Lamp("limits", Level.WATCH if nearest.near else Level.GOOD, words)

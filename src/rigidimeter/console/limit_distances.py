@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from rigidimeter.console.recent_samples import RecentSamples
@@ -40,6 +41,21 @@ class LimitDistance:
     def part(self) -> float:
         """The value as a part of the limit: 1 at the limit."""
         return self.value / self.limit
+
+    @property
+    def text(self) -> str:
+        """The value and the limit, as ``14.6 of 40 deg``."""
+        return f"{self._rounded(self.value)} of {self.limit:g} {self.unit}"
+
+    @property
+    def left_text(self) -> str:
+        """What is left, as ``25.4 deg left``; empty where that is not known."""
+        return f"{self._rounded(self.left)} {self.unit} left" if math.isfinite(self.left) else ""
+
+    def _rounded(self, value: float) -> str:
+        """Return a value with the digits that tell a hundredth of the limit."""
+        digits = max(0, 2 - math.floor(math.log10(self.limit)))
+        return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 
     @property
     def near(self) -> bool:

@@ -75,7 +75,7 @@ def settling_s(settings: OnlineSettings) -> float:
 
 
 def live_values(
-    history: Sequence[LiveEstimate], task: str, settings: OnlineSettings
+    history: Sequence[LiveEstimate], task: str, settings: OnlineSettings, *, running: bool = True
 ) -> tuple[LiveValue, ...]:
     """Return J, B and K of the last estimate.
 
@@ -86,6 +86,8 @@ def live_values(
     task : str
         Of the epoch that was estimated.
     settings : OnlineSettings
+    running : bool
+        Whether that epoch still runs.
     """
     now = history[-1] if history else LiveEstimate()
     elapsed_s = now.time_s - now.since_s
@@ -94,8 +96,10 @@ def live_values(
         common = "no epoch yet"
     elif task != "prbs":
         common = "not from a sinusoid"
+    elif elapsed_s < settling_s(settings) and not running:
+        common = "not known: the epoch was too short"
     elif elapsed_s < settling_s(settings):
-        common = f"in {settling_s(settings) - elapsed_s:.0f} s"
+        common = f"in {math.ceil(settling_s(settings) - elapsed_s)} s"
     # As much was remembered when half of it had been seen.
     middle_s = now.time_s - min(elapsed_s, now.memory_s) / 2.0
     same = [one for one in history if (one.epoch, one.since_s) == (now.epoch, now.since_s)]

@@ -148,14 +148,11 @@ def _limits(facts: Facts) -> list[Text]:
         known = math.isfinite(distance.part)
         part = min(max(distance.part, 0.0), 1.0) if known else 0.0
         bar = "█" * round(_BAR * part) + "░" * (_BAR - round(_BAR * part))
-        value = f"{distance.value:.3g}" if known else "-"
-        words = f"{value} of {distance.limit:g} {distance.unit}"
         sign = (Level.WATCH if distance.near else Level.GOOD).sign if known else Level.UNKNOWN.sign
-        left = f"  {distance.left:.3g} {distance.unit} left" if known else ""
         colour = COLOURS[Level.WATCH] if known and distance.near else ""
         percent = f"{100 * distance.part:4.0f} %" if known else "     -"
-        line = f"{sign} {distance.name:8}{bar}{percent}  {words}{left}"
-        lines.append(Text(line, style=colour))
+        line = f"{sign} {distance.name:8}{bar}{percent}  {distance.text}"
+        lines.append(Text(f"{line:55}  {distance.left_text}".rstrip(), style=colour))
     return lines
 
 

@@ -120,6 +120,10 @@ def test_live_values_are_of_the_epoch_that_was_estimated():
     found = shown(told(started(1, "1"), ended(1)), history=[live])
     assert found.live_words == "epoch 1"
     assert found.live[2].why_not == "not known yet"
+    short = [live._replace(time_s=2.0)]
+    assert shown(told(started(1, "1")), history=short).live[2].why_not == "in 3 s"
+    over = shown(told(started(1, "1"), ended(1)), history=short)
+    assert over.live[2].why_not == "not known: the epoch was too short"
 
 
 def test_how_it_ended_is_said():
@@ -136,6 +140,9 @@ def test_distances_are_in_the_units_of_the_limits():
     assert (torque.left, power.left) == pytest.approx((9.0, 19.2))
     assert (energy.near, torque.near) == (True, False)
     assert energy.part == pytest.approx(0.9)
+    assert (angle.text, angle.left_text) == ("10.0 of 40 deg", "30.0 deg left")
+    assert (energy.text, energy.left_text) == ("4.50 of 5 J", "0.50 J left")
+    assert limit_distances(SETTINGS.guard, QUIET, 2e-6)[-1].text == "0.00 of 5 J"
 
 
 def lit(loop=RUNNING, recent=QUIET, recorder=WELL, energy_j=0.5, left_s=60.0):
@@ -148,7 +155,7 @@ def test_all_lamps_are_good_and_say_what_they_know():
     found = lit()
     assert list(found) == ["limits", "sensor", "drive", "lateness", "recorder", "disk"]
     assert {lamp.level for lamp in found.values()} == {Level.GOOD}
-    assert found["limits"].words == "angle 10 of 40 deg (25 %)"
+    assert found["limits"].words == "angle 10.0 of 40 deg (25 %)"
     assert found["sensor"].words == "torque 1 ms old, limit 100 ms"
     assert found["lateness"].words == (
         "at most 0.1 ms late, limit 40 ms; 0 of 30001 deadlines missed"

@@ -56,8 +56,10 @@ def test_a_value_is_shown_with_its_interval_once_it_means_something():
 
 def test_nothing_is_shown_before_the_filters_have_settled():
     K = live_values(steady(4.4), "prbs", SETTINGS)[2]
-    assert (K.settled, K.text) == (False, "K in 0 s")
+    assert (K.settled, K.text) == (False, "K in 1 s")
     assert live_values(steady(1.0), "prbs", SETTINGS)[2].text == "K in 4 s"
+    over = live_values(steady(1.0), "prbs", SETTINGS, running=False)
+    assert over[2].text == "K not known: the epoch was too short"
     assert live_values(steady(4.6), "prbs", SETTINGS)[2].settled
 
 

@@ -118,7 +118,7 @@ def _limit(one: LimitDistance) -> dict[str, Any]:
     return {
         "name": one.name,
         "sign": (Level.WATCH if one.near else Level.GOOD).sign,
-        "text": f"{one.value:.1f} of {one.limit:g} {one.unit}",
+        "text": one.text,
         "part": round(one.part, 3),
         "near": one.near,
     }
