@@ -40,7 +40,7 @@ def test_before_a_session(console, chromium):
     assert page.evaluate("document.documentElement.scrollWidth") <= 820
     fill(page, "subject", "S01")
     fill(page, "operator", "Op")
-    page.get_by_text("fields are not right yet").wait_for(state="hidden")
+    page.get_by_text("not right yet").wait_for(state="hidden")
     assert_reached_by_tab(page, "Start session")
     page.get_by_role("button", name="Check the rig").focus()
     page.keyboard.press("Enter")

@@ -186,7 +186,8 @@ class BeforeView:
         for key, made in self._inputs.items():
             made.error = errors.get(key)
         general = [text for key, text in errors.items() if key not in self._inputs]
-        wrong = f"{len(errors)} fields are not right yet" if errors else ""
+        count = "1 field is" if len(errors) == 1 else f"{len(errors)} fields are"
+        wrong = f"{count} not right yet" if errors else ""
         self._problem.text = " ".join([*general, wrong]) if general or wrong else ""
         self._show_steps()
 

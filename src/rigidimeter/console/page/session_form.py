@@ -82,12 +82,18 @@ def empty_form(settings: Settings) -> dict[str, str]:
     values = dump_settings(settings)
     form = {one.key: "" for one in _OF_THE_SESSION}
     form["protocol"] = hashlib.sha256(repr(values).encode()).hexdigest()[:16]
-    for one in SETTINGS:
-        form[one.key] = f"{_at(values, one.path):.10g}"
-    form["rests"] = "; ".join(f"{rest_s:g}" for rest_s in settings.protocol.rests_s)
+    form |= _shown(values)
     for k, block in enumerate(settings.protocol.blocks[:MOST_BLOCKS]):
         form |= block_form(k, block.task, block.condition, str(block.epochs))
     return form
+
+
+def _shown(values: Mapping[str, Any]) -> dict[str, str]:
+    """Return the settings as the form shows them: with fewer digits than they may have."""
+    shown = {one.key: f"{_at(values, one.path):.10g}" for one in SETTINGS}
+    return shown | {
+        "rests": "; ".join(f"{rest_s:.10g}" for rest_s in values["protocol"]["rests_s"])
+    }
 
 
 def block_form(k: int, task: str, condition: str, epochs: str) -> dict[str, str]:
@@ -143,8 +149,12 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
             errors[key] = str(error)
             return None
 
+    shown = _shown(dump_settings(base))
     changes: dict[str, Any] = {}
     for one in SETTINGS:
+        # What is as it was shown is the protocol's own value, which may have more digits.
+        if form.get(one.key, "").strip() == shown[one.key]:
+            continue
         value = read(one.key, number, one.label)
         if value is not None:
             table, _, key = one.path.partition(".")
@@ -154,8 +164,9 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
         condition = read(f"condition{k}", name, "condition")
         epochs = read(f"epochs{k}", whole_number, "epochs")
         blocks.append({"task": form[f"task{k}"], "condition": condition, "epochs": epochs})
-    rests_s = read("rests", _numbers, "rests")
-    changes.setdefault("protocol", {}).update(blocks=blocks, rests_s=rests_s)
+    changes.setdefault("protocol", {})["blocks"] = blocks
+    if form.get("rests", "").strip() != shown["rests"]:
+        changes["protocol"]["rests_s"] = read("rests", _numbers, "rests")
     about: dict[str, Any] = {
         "subject": read("subject", name, "subject"),
         "operator": read("operator", _needed, "operator"),

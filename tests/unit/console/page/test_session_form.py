@@ -14,14 +14,17 @@ def form():
     return empty_form(BASE) | {"subject": "S01", "operator": "Op"}
 
 
-def test_an_untouched_form_is_the_protocol(form):
+def test_an_untouched_form_is_the_protocol_to_the_last_digit(form):
+    """A commissioning record holds for these numbers and no others."""
     entered = read_form(form, BASE)
     assert entered.errors == {}
-    assert entered.settings is not None
-    assert entered.settings.protocol == BASE.protocol
-    assert entered.settings.controller.inertia_kg_m2 == pytest.approx(
-        BASE.controller.inertia_kg_m2, rel=1e-9
-    )
+    assert entered.settings == BASE
+    third = parse_settings({"protocol": {"rests_s": [10.0 + 1 / 3]}})
+    said = empty_form(third) | {"subject": "S01", "operator": "Op", "prbs_amplitude": "1,5"}
+    entered = read_form(said, third)
+    assert entered.settings.prbs.amplitude_nm == 1.5
+    assert entered.settings.protocol == third.protocol
+    assert entered.settings.controller == third.controller
 
 
 def test_subject_and_operator_must_be_given():
