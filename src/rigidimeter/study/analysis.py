@@ -31,7 +31,7 @@ from rigidimeter.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.stretches import longest_part
 from rigidimeter.recording import Recording
-from rigidimeter.records import Analysis, Delay, Epoch, Fit, Task
+from rigidimeter.records import Analysis, BandEstimate, Delay, Epoch, Fit, Task
 from rigidimeter.settings import Settings, settings_from
 
 
@@ -43,7 +43,6 @@ class StepCosts(NamedTuple):
 
     delay: float
     score: float
-    first_check: float
     check: float
     fit: float
 
@@ -54,8 +53,7 @@ def step_costs(samples: float) -> StepCosts:
     return StepCosts(
         delay=25 + 5 * thousands,
         score=4 + 0.75 * thousands,
-        first_check=8 + 4.3 * thousands,
-        check=1.3 * thousands,
+        check=8 + 4.3 * thousands,
         fit=1.3 * thousands,
     )
 
@@ -117,15 +115,14 @@ class Preparation:
         return step_costs(float(np.mean(samples)) if samples else 1000.0)
 
     def work(self, methods: Sequence[str]) -> float:
-        """Return what analyses by these methods cost, the first with scores and pooled fits."""
+        """Return what analyses by these methods cost, the first with checks and scores."""
         n, costs = len(self._perturbed), self.costs
         searched = 0
         if any(name == "auto" or not method_named(name).as_recorded for name in methods):
             sources = Counter(prepared.epoch.source for prepared in self._perturbed)
             searched = sum(min(count, MOST_EPOCHS) for count in sources.values())
-        first = n * (2 * costs.fit + costs.first_check) + len(self._imposed) * costs.score
-        later = (len(methods) - 1) * n * (2 * costs.fit + costs.check)
-        return searched * costs.delay + first + later
+        fits = len(methods) * 2 * n * costs.fit
+        return searched * costs.delay + fits + n * costs.check + len(self._imposed) * costs.score
 
     def perturbed(self, *, as_recorded: bool = False) -> list[PreparedEpoch]:
         """Return the perturbation epochs, on one clock or as they were recorded."""
@@ -163,7 +160,8 @@ def analyse_prepared(
     method : str
         The name of one of `estimation.METHODS`; ``auto`` chooses by what was recorded.
     fits_alone : bool
-        Leave out the pooled fits and the scores of the sinusoids.
+        Leave out the pooled fits, the scores of the sinusoids, and what does not decide whether an
+        epoch counts.
     progress : callable
         Called with the work that was done, `Preparation.work` in all.
     """
@@ -195,13 +193,13 @@ def analyse_prepared(
     found, pooled = fitted_by(fitted, None, not fits_alone)
     fits = []
     for prepared, fit in zip(fitted, found, strict=True):
-        found_fit = checked(prepared, fit)
-        if closed_loop_obstacle(prepared.epoch):
+        found_fit = checked(prepared, fit, exclusions_alone=fits_alone)
+        if not fits_alone and closed_loop_obstacle(prepared.epoch):
             diagnostics, of_drive_s = prepared.settings.diagnostics, delay_of_drive_s(prepared)
             late = torque_delay(found_fit, delays, of_drive_s, diagnostics)
             found_fit = replace(found_fit, findings=(*found_fit.findings, *late))
         fits.append(found_fit)
-        progress(costs.check if fits_alone else costs.first_check)
+        progress(0.0 if fits_alone else costs.check)
     counted = [
         prepared.closed_as(fit.outcome)
         if not fit.outcome.included and prepared.epoch.closed.included and fit.n_samples > 0
@@ -213,8 +211,9 @@ def analyse_prepared(
         _, pooled = with_clock_error(estimator.fit, counted, None, made, delays)
     by_perturbation = estimator.uses_perturbation
     pooled = [_with_differences(fit, fits, by_perturbation, preparation.settings) for fit in pooled]
-    together = checked_together(fitted, fits, pooled, estimator)
-    fits, pooled = together.fits, together.pooled
+    sensitivity: Sequence[BandEstimate] = ()
+    if not fits_alone:
+        fits, pooled, sensitivity = checked_together(fitted, fits, pooled, estimator)
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
     if included:
@@ -235,7 +234,7 @@ def analyse_prepared(
         tuple(pooled),
         delays,
         reason,
-        tuple(together.sensitivity),
+        tuple(sensitivity),
     )
 
 

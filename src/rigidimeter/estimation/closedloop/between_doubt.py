@@ -39,22 +39,23 @@ def moved_elsewhere(problems: Sequence[Problem], powers: Sequence[Array], values
     values : array, shape (p,)
         The solution of the problems.
     """
-    changes = []
-    for other in range(max(len(problem.otherwise) for problem in problems)):
-        gram, moment = np.zeros((values.size, values.size)), np.zeros(values.size)
-        for problem, power in zip(problems, powers, strict=True):
-            weighted = (problem.instruments / power[:, None]).conj().T
-            regressors, target = problem.regressors, problem.target
-            if other < len(problem.otherwise):
-                regressors, target = problem.otherwise[other]
-            gram += (weighted @ regressors).real
-            moment += (weighted @ target).real
-        size = np.sqrt(np.abs(np.diag(gram)))
-        found = np.linalg.lstsq(gram / np.outer(size, size), moment / size)[0] / size
-        changes.append(np.abs(found - values))
-    if not changes:
-        return np.zeros(values.size)
-    without, *others = changes
+    moved = [one.observation.otherwise if one.observation else () for one in problems]
+    p, count = values.size, max(map(len, moved))
+    if not count:
+        return np.zeros(p)
+    grams, moments = np.zeros((count, p, p)), np.zeros((count, p))
+    for problem, power, more in zip(problems, powers, moved, strict=True):
+        weighted, held = (problem.instruments / power[:, None]).conj().T, len(problem.held)
+        grams += (weighted @ problem.regressors).real
+        moments += (weighted @ problem.target).real
+        if len(more):
+            added = (weighted @ more).real
+            grams[: len(more)] += added[:, :, held:]
+            moments[: len(more)] -= added[:, :, :held] @ np.array(problem.held)
+    size = np.sqrt(np.abs(np.diagonal(grams, axis1=1, axis2=2)))
+    scaled = np.linalg.pinv(grams / (size[:, :, None] * size[:, None, :]))
+    found = (scaled @ (moments / size)[:, :, None])[:, :, 0] / size
+    without, *others = np.abs(found - values)
     most = np.max(others, axis=0)
     return np.asarray(
         np.where(most > UNSETTLED * np.abs(values), np.maximum(most, 2 * without), most)

@@ -70,10 +70,9 @@ def filtered(torque_filter: TorqueFilter | None, omega_rad_s: Array) -> Complex:
 def seen_beyond_samples(
     drive: DriveModel,
     torque_filter: TorqueFilter | None,
-    command: Channel,
     omega_rad_s: Array,
-    time_s: Array,
-    after_s: float | None = None,
+    interval_s: float,
+    after_s: float,
 ) -> Complex:
     """Return what stands before C above, shape (m, 3).
 
@@ -81,20 +80,17 @@ def seen_beyond_samples(
     ----------
     drive : DriveModel
     torque_filter : TorqueFilter or None
-    command : Channel
     omega_rad_s : array, shape (m,)
-    time_s : array, shape (n,)
-        When torque and motion were sampled, as long after each tick.
-    after_s : float, optional
-        How long, instead of the mean by the stamps.
+    interval_s : float
+        Of the ticks.
+    after_s : float
+        How long after each tick torque and motion were sampled.
     """
-    interval_s = 1.0 / command.mean_rate_hz
-    if after_s is None:
-        after_s = float(np.mean(since_ticks(command, time_s, 0.0)[1]))
     z = np.exp(1j * omega_rad_s * interval_s)
-    seen = behind(drive, torque_filter).transfer(z, interval_s, after_s)
-    _, velocity, angle = drive.transfer(z, interval_s, after_s)
-    sampled = np.stack([1j * omega_rad_s * velocity, velocity, angle])
+    seen = motion = drive.transfer(z, interval_s, after_s)
+    if torque_filter is not None:
+        seen = behind(drive, torque_filter).transfer(z, interval_s, after_s)
+    sampled = np.stack([1j * omega_rad_s * motion[1], motion[1], motion[2]])
     return np.asarray(seen.T - filtered(torque_filter, omega_rad_s) * sampled.T)
 
 
@@ -198,15 +194,6 @@ def step_kept_s(command: Channel, time_s: Array) -> float | None:
     return float(np.angle(mean) / (2 * np.pi) % 1.0) * interval_s
 
 
-def command_at(command: Channel, time_s: Array) -> Array:
-    """Return the command of the last tick at each time."""
-    tick, _ = since_ticks(command, time_s, 0.0)
-    return command.values[tick]
-
-
-def in_step(command: Channel, time_s: Array) -> bool:
-    """Return whether samples were taken once a tick, as long after each."""
-    tick, after_s = since_ticks(command, time_s, 0.0)
-    return bool(np.all(np.diff(tick) == 1)) and (
-        float(np.ptp(after_s)) * command.mean_rate_hz < 2 * EVEN
-    )
+def in_step(tick: NDArray[np.intp], after_s: Array, interval_s: float) -> bool:
+    """Return whether samples (`since_ticks`) were taken once a tick, as long after each."""
+    return bool(np.all(np.diff(tick) == 1)) and float(np.ptp(after_s)) < 2 * EVEN * interval_s

@@ -42,15 +42,15 @@ T = TypeVar("T")
 class Problem(NamedTuple):
     """The linear problem of one epoch at given parameters.
 
-    `instruments` and `regressors` have shape (m, p), `target` (m,). `otherwise` holds regressors
-    and target as they would be without what the drive tells of the motion between the samples, and
-    then with other drives that explain the velocity as well.
+    `instruments` and `regressors` have shape (m, p), `target` (m,). `observation` says how the
+    motion might be otherwise, and `held` are the values of the first parameters, which are held.
     """
 
     instruments: Complex
     regressors: Complex
     target: Complex
-    otherwise: tuple[tuple[Complex, Complex], ...] = ()
+    observation: Observation | None = None
+    held: tuple[float, ...] = ()
 
 
 Linearise = Callable[[Sequence[Observation], Array], list[Problem]]
@@ -59,7 +59,8 @@ Linearise = Callable[[Sequence[Observation], Array], list[Problem]]
 def direct(observations: Sequence[Observation], values: Array) -> list[Problem]:
     """Return the problems of least squares: the measured motion is its own instrument."""
     del values  # they do not depend on the parameters
-    return [Problem(lines.motion, lines.motion, lines.torque_nm) for lines, *_ in observations]
+    everything = [observation.lines for observation in observations]
+    return [Problem(lines.motion, lines.motion, lines.torque_nm) for lines in everything]
 
 
 def instrumental(observations: Sequence[Observation], values: Array) -> list[Problem]:
@@ -67,15 +68,7 @@ def instrumental(observations: Sequence[Observation], values: Array) -> list[Pro
     J, B, K = np.maximum(values, LEAST).tolist()
     made = _of_each(observations, lambda excitation: excitation.motion_lines((J, B, K)))
     return [
-        Problem(
-            instruments,
-            observation.lines.motion,
-            observation.lines.torque_nm,
-            tuple(
-                (observation.lines.motion + more, observation.lines.torque_nm)
-                for more in observation.otherwise
-            ),
-        )
+        Problem(instruments, observation.lines.motion, observation.lines.torque_nm, observation)
         for observation, instruments in zip(observations, made, strict=True)
     ]
 
@@ -100,10 +93,8 @@ def holding(linearise: Linearise, inertia_kg_m2: float) -> Linearise:
                 problem.instruments[:, 1:],
                 problem.regressors[:, 1:],
                 problem.target - inertia_kg_m2 * problem.regressors[:, 0],
-                tuple(
-                    (motion[:, 1:], torque - inertia_kg_m2 * motion[:, 0])
-                    for motion, torque in problem.otherwise
-                ),
+                problem.observation,
+                (inertia_kg_m2,),
             )
             for problem in full
         ]

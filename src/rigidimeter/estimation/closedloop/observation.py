@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
-from dataclasses import replace
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,13 @@ from rigidimeter.estimation.bandlimited import band_hz
 from rigidimeter.estimation.closedloop.between_samples import (
     INEXACT,
     acceleration_by_settings,
-    command_at,
     phases_s,
     seen_beyond_samples,
     step_kept_s,
     torque_filter_of,
 )
+from rigidimeter.estimation.closedloop.drive_fit import FoundDrive
+from rigidimeter.estimation.closedloop.drive_motion import since_ticks
 from rigidimeter.estimation.closedloop.excitation import Excitation, excitation
 from rigidimeter.estimation.closedloop.spectral_lines import Grid, Lines, epoch_grid, epoch_lines
 from rigidimeter.estimation.prepared import PreparedEpoch
@@ -39,7 +40,8 @@ REPEATS = 0.999
 """The correlation of a perturbation with itself one period later, at least."""
 
 
-class Observation(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Observation:
     """One epoch, ready.
 
     Attributes
@@ -51,22 +53,30 @@ class Observation(NamedTuple):
         The loop that the epoch ran in; None where the perturbation is not known.
     excited : array of bool, shape (m,)
         The lines at which a periodic perturbation has power; all where it is not periodic.
-    otherwise : tuple of complex array, shape (m, 3)
-        What would add to the motion if the samples were taken as they are, and what other drives
-        would add that explain the velocity as well; where the drive is unknown, that of the
-        settings.
     drive_known : bool
     wider : Lines or None
         Those of a wider band, for `band_sensitivity`.
+    make_otherwise : callable
+        Returns `otherwise`.
     """
 
     lines: Lines
     perturbation: Channel
     excitation: Excitation | None
     excited: NDArray[np.bool_]
-    otherwise: tuple[Complex, ...] = ()
     drive_known: bool = False
     wider: Lines | None = None
+    make_otherwise: Callable[[], Sequence[Complex]] = tuple
+
+    @cached_property
+    def otherwise(self) -> Complex:
+        """What would add to the motion at the lines, shape (k, m, 3).
+
+        If the samples were taken as they are, and then with other drives that explain the velocity
+        as well; where the drive is unknown, with that of the settings.
+        """
+        changes = self.make_otherwise()
+        return np.stack(changes) if changes else np.empty((0, *self.lines.motion.shape))
 
 
 def closed_loop_obstacle(epoch: Epoch) -> str:
@@ -250,39 +260,41 @@ def _observed(
         perturbation,
         made,
         excited,
-        _otherwise(prepared, lines),
         drive is not None,
         everything if wider is not None else None,
+        partial(_otherwise, epoch, prepared.settings, found, lines),
     )
 
 
-def _otherwise(prepared: PreparedEpoch, lines: Lines) -> tuple[Complex, ...]:
+def _otherwise(
+    epoch: Epoch, settings: Settings, found: FoundDrive | None, lines: Lines
+) -> list[Complex]:
     """Return what would add to the motion without a drive, and with others.
 
     One that tells a little less, the rivals, and samples that kept step with the ticks where it may
     be the stamps that did not.
     """
-    found, grid = prepared.source.drive, lines.grid
-    command = prepared.epoch.channels.get("velocity_command_rad_s")
-    torque_filter = torque_filter_of(prepared.settings.estimation)
+    grid, command = lines.grid, epoch.channels.get("velocity_command_rad_s")
+    torque_filter = torque_filter_of(settings.estimation)
     if found is None or command is None:
-        seen_share = acceleration_by_settings(prepared.settings.rig, torque_filter)
+        seen_share = acceleration_by_settings(settings.rig, torque_filter)
         change = lines.motion * np.array([seen_share - 1.0, 0.0, 0.0])
-        return np.zeros_like(change), change
-    omega, time_s = grid.omega_rad_s, grid.time_s
-    stamps_s = prepared.epoch.channels["torque_nm"].time_s
+        return [np.zeros_like(change), change]
+    stamps_s, interval_s = epoch.channels["torque_nm"].time_s, 1.0 / command.mean_rate_hz
+    tick, after = since_ticks(command, grid.time_s, 0.0)
+    mean_s = float(np.mean(after))
 
-    def seen(drive: DriveModel, after_s: float | None = None) -> Complex:
-        return seen_beyond_samples(drive, torque_filter, command, omega, time_s, after_s)
+    def seen(drive: DriveModel, after_s: float = mean_s) -> Complex:
+        return seen_beyond_samples(drive, torque_filter, grid.omega_rad_s, interval_s, after_s)
 
     ours = seen(found.model)
     changes = [-ours, -INEXACT * ours, *(seen(drive) - ours for drive in found.rivals)]
     kept_s = step_kept_s(command, stamps_s)
     if kept_s is not None:
-        there = [seen(found.model, after) for after in phases_s(command, stamps_s).tolist()]
+        there = [seen(found.model, after_s) for after_s in phases_s(command, stamps_s).tolist()]
         changes.append(seen(found.model, kept_s) - np.mean(there, axis=0))
-    sent = grid.transform(command_at(command, time_s))[:, None]
-    return tuple(np.asarray(change * sent) for change in changes)
+    sent = grid.transform(command.values[tick])[:, None]
+    return [np.asarray(change * sent) for change in changes]
 
 
 def loop_of(settings: Settings, torque_rate_hz: float, drive: DriveModel | None) -> Loop:

@@ -29,14 +29,13 @@ from scipy import fft
 from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.closedloop.between_samples import (
     TorqueFilter,
-    command_at,
     driven_behind,
     filtered,
     in_step,
     seen_beyond_samples,
     without_driven,
 )
-from rigidimeter.estimation.closedloop.drive_motion import DrivenAt
+from rigidimeter.estimation.closedloop.drive_motion import DrivenAt, since_ticks
 from rigidimeter.estimation.signals import (
     Array,
     angle_at,
@@ -252,10 +251,12 @@ def _between_samples(
     angle, velocity = (
         _sampled(epoch.channels.get(name), grid.time_s) for name in ("angle_rad", "velocity_rad_s")
     )
-    if angle is not None and velocity is not None and in_step(command, grid.time_s):
-        omega, time_s = grid.omega_rad_s, grid.time_s
-        beyond = seen_beyond_samples(drive, torque_filter, command, omega, time_s)
-        sent = grid.transform(command_at(command, time_s))
+    tick, after_s = since_ticks(command, grid.time_s, 0.0)
+    interval_s = 1.0 / command.mean_rate_hz
+    if angle is not None and velocity is not None and in_step(tick, after_s, interval_s):
+        omega, mean_s = grid.omega_rad_s, float(np.mean(after_s))
+        beyond = seen_beyond_samples(drive, torque_filter, omega, interval_s, mean_s)
+        sent = grid.transform(command.values[tick])
         sampled = _spectra(grid, angle, velocity) * filtered(torque_filter, omega)
         return np.asarray(sampled + beyond * sent[:, None])
     driven_at = DrivenAt(drive, command)

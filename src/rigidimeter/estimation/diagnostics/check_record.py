@@ -191,6 +191,11 @@ class Check:
     of_fit: bool = True
     harmless: Callable[[Case, Look], str] = never
 
+    def level(self, settings: DiagnosticsSettings) -> Level:
+        """Return what a failure does."""
+        level: Level = getattr(settings.levels, self.name, "doubt")
+        return level
+
     def looks(self, case: Case) -> Look | None:
         """Return what the check sees, or None where it lacks what it needs."""
         return self.function(case) if all(case.has(name) for name in self.needs) else None
@@ -207,7 +212,7 @@ class Check:
         """
         if not look.failed:
             return Finding(self.name, "note", look.value, look.threshold, look.fact, "")
-        level: Level = getattr(settings.levels, self.name, "doubt")
+        level = self.level(settings)
         if harmless and level == getattr(DEFAULT_LEVELS, self.name, "doubt"):
             level = "note"
         return Finding(

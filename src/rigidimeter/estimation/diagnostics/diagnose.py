@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -44,8 +44,12 @@ CHECKS: list[Check] = [
 """Every check of an epoch. Code from outside the package may append its own."""
 
 
-def diagnose(case: Case, seen: Mapping[str, Look | None] | None = None) -> tuple[Finding, ...]:
-    """Run every check for which there is something to look at; passed ones are among the findings.
+def diagnose(
+    case: Case,
+    seen: Mapping[str, Look | None] | None = None,
+    checks: Sequence[Check] = CHECKS,
+) -> tuple[Finding, ...]:
+    """Run the checks for which there is something to look at; passed ones are among the findings.
 
     What several epochs show together is found by `together.checked_together` and, for
     `varying_between_epochs`, where they are fitted together.
@@ -55,10 +59,11 @@ def diagnose(case: Case, seen: Mapping[str, Look | None] | None = None) -> tuple
     case : Case
     seen : mapping of str to Look, optional
         What the checks of the epoch alone have seen already, by name.
+    checks : sequence of Check
     """
     seen = seen or {}
     found = []
-    for check in CHECKS:
+    for check in checks:
         look = seen[check.name] if check.name in seen else check.looks(case)
         if look is not None:
             reason = check.harmless(case, look) if look.failed else ""
@@ -66,14 +71,23 @@ def diagnose(case: Case, seen: Mapping[str, Look | None] | None = None) -> tuple
     return tuple(found)
 
 
-def checked(prepared: PreparedEpoch, fit: Fit) -> Fit:
-    """Return the fit with what the checks found, excluded if one of them says so."""
+def checked(prepared: PreparedEpoch, fit: Fit, *, exclusions_alone: bool = False) -> Fit:
+    """Return the fit with what the checks found, excluded if one of them says so.
+
+    Parameters
+    ----------
+    prepared : PreparedEpoch
+    fit : Fit
+    exclusions_alone : bool
+        Run those checks alone that may exclude the epoch.
+    """
     if fit.n_samples == 0 or prepared.obstacle:
         return fit  # the fit has said why
     method = method_named(fit.method)
     by_loop = None if method.uses_perturbation else prepared.once(unbiased)
     case = replace(_case(prepared, fit.value), fit=fit, method=method, unbiased=by_loop)
-    findings = diagnose(case, prepared.once(_seen_without_fit))
+    checks = [c for c in CHECKS if not exclusions_alone or c.level(case.settings) == "exclude"]
+    findings = diagnose(case, prepared.once(_seen_without_fit), checks)
     failed = [finding for finding in findings if finding.remedy]
     grave = [finding for finding in failed if finding.level == "exclude"]
     outcome = fit.outcome

@@ -48,7 +48,7 @@ def test_a_window_with_a_hole_widens_the_intervals(simulated):
     (prepared,) = prepare([epoch], settings)
     plain = observe(prepared)
     spread = replace(plain.lines.grid, spread=4.0)
-    wider = plain._replace(lines=replace(plain.lines, grid=spread))
+    wider = replace(plain, lines=replace(plain.lines, grid=spread))
     start = np.array([0.004, 0.1, 1.5])
     one, two = (fit_single(each, instrumental, start) for each in (plain, wider))
     assert two.covariance == pytest.approx(4 * one.covariance)
