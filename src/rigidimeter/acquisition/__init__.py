@@ -8,15 +8,3 @@ from rigidimeter.acquisition.clock import Clock, DeadlineClock, SimulatedClock
 from rigidimeter.acquisition.control_modes import follow, hold, perturb, rest
 from rigidimeter.acquisition.ramp import ramp_to_rest
 from rigidimeter.acquisition.tick import ControlLoop
-
-__all__ = [
-    "Clock",
-    "ControlLoop",
-    "DeadlineClock",
-    "SimulatedClock",
-    "follow",
-    "hold",
-    "perturb",
-    "ramp_to_rest",
-    "rest",
-]

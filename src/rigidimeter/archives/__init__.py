@@ -1,5 +1,3 @@
 """Many recordings at once, to one table: resumable, on one machine or a cluster."""
 
-from rigidimeter.archives.archive_run import BatchResult, batch
-
-__all__ = ["BatchResult", "batch"]
+from rigidimeter.archives.archive_run import batch

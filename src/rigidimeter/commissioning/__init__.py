@@ -1,6 +1,6 @@
 """Whether a rig is fit for a person's arm: checks on the devices, and a record of them."""
 
-from rigidimeter.commissioning.checks import Check, Outcome
+from rigidimeter.commissioning.checks import Check
 from rigidimeter.commissioning.commissioning_record import (
     CommissioningRecord,
     read_record,
@@ -27,32 +27,3 @@ from rigidimeter.commissioning.turned_sign import (
     search_for_turned_sign,
 )
 from rigidimeter.commissioning.zero_check import ZeroFound, zero_check
-
-__all__ = [
-    "Check",
-    "CommissioningRecord",
-    "Compared",
-    "DailyRecord",
-    "Operator",
-    "Outcome",
-    "Search",
-    "Setup",
-    "Timebase",
-    "TurnedEpochs",
-    "ZeroFound",
-    "check_record",
-    "commission",
-    "daily_check",
-    "daily_path",
-    "measured_noise_nm",
-    "perturbed_conditions",
-    "read_daily",
-    "read_record",
-    "record_path",
-    "require_daily_check",
-    "search_for_turned_sign",
-    "with_measured_floor",
-    "write_daily",
-    "write_record",
-    "zero_check",
-]

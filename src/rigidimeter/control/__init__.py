@@ -8,15 +8,3 @@ in the interpreter and compiled, with the same bits.
 from rigidimeter.control.admittance import Admittance, admittance, admittance_step
 from rigidimeter.control.filters import Biquad, BiquadState, biquad_step, butterworth_lowpass
 from rigidimeter.control.tracking import minimum_jerk, tracking_step
-
-__all__ = [
-    "Admittance",
-    "Biquad",
-    "BiquadState",
-    "admittance",
-    "admittance_step",
-    "biquad_step",
-    "butterworth_lowpass",
-    "minimum_jerk",
-    "tracking_step",
-]

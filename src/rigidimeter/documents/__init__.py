@@ -22,26 +22,3 @@ from rigidimeter.documents.writing import (
     write_json,
     write_text,
 )
-
-__all__ = [
-    "as_read",
-    "as_written",
-    "csv_text",
-    "in_place",
-    "json_line",
-    "json_text",
-    "noted_digests",
-    "open_regular",
-    "parse_json",
-    "parse_toml",
-    "plain_values",
-    "read_bytes",
-    "read_json",
-    "read_toml",
-    "replace_file",
-    "text_bytes",
-    "toml_text",
-    "visible",
-    "write_json",
-    "write_text",
-]

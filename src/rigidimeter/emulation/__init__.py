@@ -1,5 +1,3 @@
 """Emulated sensors and drives that use real communication and can be made to misbehave."""
 
 from rigidimeter.emulation.emulated_arm import EmulatedArm
-
-__all__ = ["EmulatedArm"]

@@ -8,30 +8,6 @@ from rigidimeter.guard.consistency import (
     consistency_step,
 )
 from rigidimeter.guard.limits import GuardLimits, GuardState, guard_limits, guard_state, released
-from rigidimeter.guard.recorded_guard import Replayed, replay
+from rigidimeter.guard.recorded_guard import replay
 from rigidimeter.guard.step import Limited, guard_step, why_ended
-from rigidimeter.guard.torque_answer import AnswerLimits, AnswerState, answer_limits
-
-__all__ = [
-    "REACTIONS",
-    "AnswerLimits",
-    "AnswerState",
-    "Cause",
-    "ConsistencyLimits",
-    "ConsistencyState",
-    "GuardLimits",
-    "GuardState",
-    "Limited",
-    "Reaction",
-    "Replayed",
-    "answer_limits",
-    "consistency_limits",
-    "consistency_state",
-    "consistency_step",
-    "guard_limits",
-    "guard_state",
-    "guard_step",
-    "released",
-    "replay",
-    "why_ended",
-]
+from rigidimeter.guard.torque_answer import AnswerLimits, answer_limits

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
         write_estimates_csv,
         write_estimates_json,
     )
-    from rigidimeter.recording.formats import ReadOptions, Table, read_recording, read_table
+    from rigidimeter.recording.formats import ReadOptions, read_recording
     from rigidimeter.recording.recording import Recording, read
-    from rigidimeter.recording.recovery import Recovery, recover
+    from rigidimeter.recording.recovery import recover
     from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
     from rigidimeter.recording.session_folder import SessionWriter, read_manifest
 
@@ -26,9 +26,7 @@ __all__ = [
     "ESTIMATES_SCHEMA",
     "ReadOptions",
     "Recording",
-    "Recovery",
     "SessionWriter",
-    "Table",
     "estimates_document",
     "is_session",
     "read",
@@ -36,7 +34,6 @@ __all__ = [
     "read_manifest",
     "read_recording",
     "read_session",
-    "read_table",
     "recover",
     "session_settings",
     "write_estimates_csv",
@@ -47,15 +44,14 @@ __getattr__ = lazy_names(
     __name__,
     {
         "estimate_files": (
-            "ESTIMATES_SCHEMA",
             "estimates_document",
             "read_estimates",
             "write_estimates_csv",
             "write_estimates_json",
         ),
-        "formats": ("ReadOptions", "Table", "read_recording", "read_table"),
+        "formats": ("ReadOptions", "read_recording"),
         "recording": ("Recording", "read"),
-        "recovery": ("Recovery", "recover"),
+        "recovery": ("recover",),
         "session_epochs": ("is_session", "read_session", "session_settings"),
         "session_folder": ("SessionWriter", "read_manifest"),
     },

@@ -3,7 +3,7 @@
 Every name ends in its unit. Arrays are float64 and read-only once inside a record.
 """
 
-from rigidimeter.records.analysis_record import Analysis, Findings
+from rigidimeter.records.analysis_record import Analysis
 from rigidimeter.records.band_estimate import BandEstimate
 from rigidimeter.records.epochs import (
     CHANNEL_UNITS,
@@ -14,12 +14,11 @@ from rigidimeter.records.epochs import (
     Motion,
     Notice,
     Outcome,
-    OutcomeKind,
     Task,
     readonly,
 )
 from rigidimeter.records.estimates import FIT_NUMBERS, STATISTICS, Delay, Finding, Fit, Score
-from rigidimeter.records.parameters import PARAMETER_VECTORS, PARAMETERS, Parameter
+from rigidimeter.records.parameters import PARAMETER_VECTORS, PARAMETERS
 
 __all__ = [
     "CHANNEL_UNITS",
@@ -34,14 +33,11 @@ __all__ = [
     "Delay",
     "Epoch",
     "Finding",
-    "Findings",
     "Fit",
     "LeftOut",
     "Motion",
     "Notice",
     "Outcome",
-    "OutcomeKind",
-    "Parameter",
     "Score",
     "Task",
     "readonly",

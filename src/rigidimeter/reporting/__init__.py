@@ -8,16 +8,24 @@ from typing import TYPE_CHECKING
 from rigidimeter.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from rigidimeter.reporting.contents import Column, Figure, Section, Table, bullets, paragraph
+    from rigidimeter.reporting.contents import Column, Figure, Section, Table, paragraph
     from rigidimeter.reporting.make_report import report
     from rigidimeter.reporting.sections import SECTIONS
 
-__all__ = ["SECTIONS", "Column", "Figure", "Section", "Table", "bullets", "paragraph", "report"]
+__all__ = [
+    "SECTIONS",
+    "Column",
+    "Figure",
+    "Section",
+    "Table",
+    "paragraph",
+    "report",
+]
 
 __getattr__ = lazy_names(
     __name__,
     {
-        "contents": ("Column", "Figure", "Section", "Table", "bullets", "paragraph"),
+        "contents": ("Column", "Figure", "Section", "Table", "paragraph"),
         "make_report": ("report",),
         "sections": ("SECTIONS",),
     },

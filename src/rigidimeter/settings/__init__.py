@@ -13,8 +13,6 @@ from rigidimeter.settings.estimation_settings import (
 from rigidimeter.settings.experiment_settings import (
     BlockSettings,
     MarginsSettings,
-    MultisineSettings,
-    OptimiseSettings,
     PrbsSettings,
     ProtocolSettings,
     SinusoidSettings,
@@ -31,7 +29,6 @@ from rigidimeter.settings.loop_settings import (
     LONGEST_STEP,
     ControllerSettings,
     GuardSettings,
-    LoopSettings,
     ZeroingSettings,
 )
 from rigidimeter.settings.models import Settings
@@ -54,12 +51,9 @@ __all__ = [
     "EstimationSettings",
     "GuardSettings",
     "Level",
-    "LoopSettings",
     "MarginsSettings",
     "MotionSensorSettings",
-    "MultisineSettings",
     "OnlineSettings",
-    "OptimiseSettings",
     "PrbsSettings",
     "ProtocolSettings",
     "RigSettings",

@@ -15,8 +15,6 @@ from rigidimeter.statistics.day_model import (
     day_medians,
 )
 from rigidimeter.statistics.effect_from_p import (
-    PublishedDifference,
-    PublishedEffect,
     compare_published,
     effect_from_p,
     largest_r,
@@ -38,42 +36,3 @@ from rigidimeter.statistics.partially_paired import PartiallyPaired, partially_p
 from rigidimeter.statistics.rank_correlation import RankCorrelation, rank_correlation
 from rigidimeter.statistics.ranksum import RankSum, ranksum
 from rigidimeter.statistics.summary import Summary, summarise
-
-__all__ = [
-    "Contrast",
-    "DayDifference",
-    "EffectDifference",
-    "Effects",
-    "JointTest",
-    "Mixed",
-    "PartiallyPaired",
-    "PublishedDifference",
-    "PublishedEffect",
-    "RankCorrelation",
-    "RankSum",
-    "Summary",
-    "TwoGroups",
-    "compare_effects",
-    "compare_published",
-    "contrast",
-    "day_difference",
-    "day_medians",
-    "difference",
-    "effect_from_p",
-    "effect_sizes",
-    "exact_ranksum",
-    "fit_mixed",
-    "holm",
-    "interval_of",
-    "joint_test",
-    "largest_r",
-    "nested",
-    "pairwise",
-    "partially_paired",
-    "rank_biserial",
-    "rank_biserial_interval",
-    "rank_correlation",
-    "ranksum",
-    "summarise",
-    "two_groups",
-]

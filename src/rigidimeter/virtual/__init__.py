@@ -1,5 +1,3 @@
 """Recordings and whole studies of a subject that does not exist, made on the virtual rig."""
 
-from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s, simulate
-
-__all__ = ["run_virtual_session", "session_length_s", "simulate"]
+from rigidimeter.virtual.virtual_session import run_virtual_session, simulate

@@ -14,7 +14,6 @@ move it, at up to `DriveFixture.speed_rad_s`: never run them with a person at th
 
 from rigidimeter.devices.conformance.drive_checks import DRIVE_CHECKS
 from rigidimeter.devices.conformance.fixture import (
-    ConformanceError,
     DriveFixture,
     OtherEnd,
     SensorFixture,
@@ -24,7 +23,6 @@ from rigidimeter.devices.conformance.sensor_checks import SENSOR_CHECKS
 __all__ = [
     "DRIVE_CHECKS",
     "SENSOR_CHECKS",
-    "ConformanceError",
     "DriveFixture",
     "OtherEnd",
     "SensorFixture",

@@ -3,8 +3,6 @@
 from rigidimeter.estimation.diagnostics.check_record import (
     Case,
     Check,
-    Look,
-    at_least,
     at_most,
     reconstructed_torque_nm,
 )
@@ -15,8 +13,6 @@ __all__ = [
     "CHECKS",
     "Case",
     "Check",
-    "Look",
-    "at_least",
     "at_most",
     "checked",
     "checked_together",

@@ -10,7 +10,6 @@ from rigidimeter.estimation.terms.model_comparison import (
     fit_models,
 )
 from rigidimeter.estimation.terms.term_fit import TermsFit, fit_terms
-from rigidimeter.estimation.terms.term_gains import TermGain
 from rigidimeter.estimation.terms.wideband import wideband_from_angle, wideband_signals
 
 __all__ = [
@@ -18,7 +17,6 @@ __all__ = [
     "Comparison",
     "ModelRow",
     "Term",
-    "TermGain",
     "TermsFit",
     "candidates",
     "compare_models",

@@ -25,8 +25,6 @@ from rigidimeter.reporting.sections import (
     unexplained_torque,
 )
 
-__all__ = ["SECTIONS"]
-
 
 def _part(title: str, *sections: Section, printed: int = 0) -> list[Section]:
     """Return the sections of a part; the first ones are printed."""

@@ -1,6 +1,6 @@
 """Many virtual epochs at once, compiled from the steps that the loop itself takes."""
 
-from rigidimeter.virtual.batch.batch_rig import Bench, EpochInputs, bench, draw_inputs
+from rigidimeter.virtual.batch.batch_rig import Bench, bench, draw_inputs
 from rigidimeter.virtual.batch.batch_run import Batch, simulate_inputs
 from rigidimeter.virtual.batch.batch_simulate import (
     epoch_generator,
@@ -11,7 +11,6 @@ from rigidimeter.virtual.batch.batch_simulate import (
 __all__ = [
     "Batch",
     "Bench",
-    "EpochInputs",
     "bench",
     "draw_inputs",
     "epoch_generator",
