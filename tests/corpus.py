@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from tests import archive_files as archives
 from tests import instrument_files as instruments
+from tests import matlab_files as matlab
 from tests.dialects import ANGLE_DEG, ANGLE_RAD, DIALECTS, MILLI, SEED, TIME_S, TORQUE_NM, csv
 from tests.instrument_files import Signal
 from tests.known_joint import angle_rad
@@ -55,6 +56,10 @@ def _one(file: str, writer: Callable, *arguments: object, **more: object) -> Ent
 def _save(path: Path, **values: object) -> None:
     (np.savez if path.suffix == ".npz" else scipy.io.savemat)(path, *([values] if path.suffix ==
      ".mat" else []), **(values if path.suffix == ".npz" else {}))  # fmt: skip
+
+
+def _date(time_s: np.ndarray) -> np.ndarray:
+    return np.datetime64("2024-05-01", "ns") + np.round(1e9 * time_s).astype("timedelta64[ns]")
 
 
 def _text(name: str, content: bytes) -> Callable[[Path], object]:
@@ -156,6 +161,19 @@ FILES: Mapping[str, Entry] = {
         said={"column": {"angle": "w_deg"}, "unit": {"angle": "deg"}},
     ),
     "MATLAB 7.3": _one("r.mat", archives.write_mat73, {"t_s": T, "M_Nm": M, "phi_deg": D}),
+    "MATLAB table": _one(
+        "r.mat", lambda path: matlab.save(path, T=matlab.table(
+            {"t": MILLI * T, "M": M, "phi": D}, ["ms", "N*m", "deg"])),
+    ),
+    "MATLAB timetable": _one(
+        "r.mat", lambda path: matlab.save(
+            path, "v7.3", TT=matlab.timetable({"M": M, "phi": D}, ["N*m", "deg"], 200.0)),
+    ),
+    "MATLAB timetables, two clocks": _one(
+        "r.mat", lambda path: matlab.save(
+            path, M=matlab.timetable({"M": M}, ["N*m"], _date(T)),
+            phi=matlab.timetable({"phi": SLOW.values}, ["deg"], _date(_SLOW_S))),
+    ),
     "NWB, two clocks": _one("r.nwb", archives.write_nwb, [TORQUE, SLOW]),
     "NWB without a unit": _one(
         "r.nwb", archives.write_nwb, [TORQUE, Signal("Angle", "a.u.", D / 8)], refused="stated no"

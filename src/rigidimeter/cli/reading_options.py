@@ -82,7 +82,10 @@ class Recordings:
     table: Annotated[
         str | None,
         typer.Option(
-            "--table", metavar="NAME", help="The sheet that is read, of a file with several."
+            "--table",
+            metavar="NAME",
+            help="The sheet, or the variable of a MATLAB "
+            "file, that is read, of a file with several.",
         ),
     ] = None
     mapping: Annotated[

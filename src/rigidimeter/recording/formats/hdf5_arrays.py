@@ -16,6 +16,9 @@ from rigidimeter.documents.bounds import CELLS, NESTING
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.stored_arrays import Expansion, Stored, check_count
 
+_OPAQUE = 3
+"""MATLAB's mark of an object of a class."""
+
 
 def hdf5_arrays(path: Path) -> dict[str, Stored]:
     """Return the arrays of a file by name; fields of structures have dotted names.
@@ -52,13 +55,50 @@ def hdf5_arrays(path: Path) -> dict[str, Stored]:
     return entries
 
 
+def hdf5_objects(path: Path, expansion: Expansion) -> list[str]:
+    """Return the variables that are objects of a class, such as a table, or hold some.
+
+    Their values lie in the groups of a leading ``#``, which are then checked as a whole.
+
+    Raises
+    ------
+    ValueError
+        If a part of such a file lies in another file.
+    """
+    h5py = _h5py(path)
+    found: dict[str, None] = {}
+    links: list[str] = []
+
+    def look(name: str, value: Any) -> None:
+        if isinstance(value, h5py.Group):
+            links.extend(
+                key for key in value if not isinstance(value.get(key, getlink=True), h5py.HardLink)
+            )
+        elif value.is_virtual or value.external:
+            links.append(name)
+        else:
+            sizes.append((name, value.size or 0))
+        if value.attrs.get("MATLAB_object_decode") == _OPAQUE and not name.startswith("#"):
+            found[name.partition("/")[0]] = None
+
+    sizes: list[tuple[str, int]] = []
+    with h5py.File(path, "r") as file:
+        look("", file)
+        file.visititems(look)
+    if found and links:
+        raise ValueError(f"{links[0]} lies in another file or place")
+    for name, size in sizes if found else ():
+        expansion.take(name, 8 * size)
+    return list(found)
+
+
 def _h5py(path: Path) -> Any:
     try:
         import h5py
     except ImportError:
         raise UserError(
             f"{path} is a MATLAB file of version 7.3, which needs one more package: "
-            "pip install 'rigidimeter[matlab73]' (or save it in MATLAB with -v7)"
+            "pip install 'rigidimeter[matlab]' (or save it in MATLAB with -v7)"
         ) from None
     return h5py
 

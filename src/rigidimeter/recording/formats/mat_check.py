@@ -12,7 +12,7 @@ import math
 import struct
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 from rigidimeter.documents.bounds import CELLS, NESTING
@@ -42,16 +42,20 @@ class Variable:
     ----------
     name : str
     content : str
-        ``numbers``, ``complex``, ``text or parts`` (text, cells and structures) or ``other``.
+        ``numbers``, ``complex``, ``text or parts`` (text, cells and structures), ``objects`` (of a
+        class, such as a table, or a structure with such) or ``other``.
     shape : tuple of int
     n_values : int
         Numbers and letters, those of its parts included.
+    start : int
+        Where its tag begins in the file.
     """
 
     name: str
     content: str
     shape: tuple[int, ...]
     n_values: int
+    start: int = 0
 
 
 def check_mat5(
@@ -87,6 +91,7 @@ def check_mat5(
     walk = _Walk(order)
     found = []
     while tag := file.read(8):
+        start = file.tell() - len(tag)
         if len(tag) < 8:
             raise ValueError("it ends within the tag of an element")
         kind, size = struct.unpack(order + "II", tag)
@@ -98,11 +103,12 @@ def check_mat5(
             elements = walk.elements(data, 0, len(data))
             if len(elements) != 1 or elements[0].kind != _MATRIX:
                 raise ValueError("a compressed variable is not a single matrix")
-            found.append(walk.matrix(data, elements[0], 1))
+            variable = walk.matrix(data, elements[0], 1)
         elif kind == _MATRIX:
-            found.append(walk.matrix(data, _Element(kind, 0, size), 1))
+            variable = walk.matrix(data, _Element(kind, 0, size), 1)
         else:
             raise ValueError(f"a variable has the unknown type {kind}")
+        found.append(replace(variable, start=start))
     return found
 
 
@@ -127,6 +133,7 @@ class _Walk:
         self._order = order
         self._n_elements = 0
         self._n_values = 0
+        self._n_objects = 0
 
     def elements(self, data: bytes, start: int, stop: int) -> list[_Element]:
         """Split a range of bytes into its elements, which must fill it."""
@@ -160,17 +167,14 @@ class _Walk:
         parts = self.elements(data, matrix.start, matrix.stop)
         if len(parts) < 3 or parts[0].kind != _UINT32 or parts[0].stop - parts[0].start != 8:
             raise ValueError("a variable has no flags")
-        before = self._n_values
+        before, objects_before = self._n_values, self._n_objects
         (flags,) = struct.unpack_from(self._order + "I", data, parts[0].start)
         kind = flags & 0xFF
         for part in parts[1:]:
             if part.kind == _MATRIX:
                 self.matrix(data, part, depth + 1)
         if not _CELL <= kind <= _LAST_PLAIN:
-            # Classes and functions: never a column, and read without their parts.
-            named = kind == _CLASS and len(parts) > 1 and parts[1].kind == _INT8
-            text = data[parts[1].start : parts[1].stop].decode("latin-1") if named else ""
-            return Variable(text, "other", (0,), 0)
+            return self._object(data, kind, parts)
         _, dims, name, *rest = parts
         shape = self._shape(data, dims, name)
         count = math.prod(shape)
@@ -192,8 +196,21 @@ class _Walk:
             content = "other"
         elif kind in (_CELL, _STRUCT, _CHAR):
             content = "text or parts"
+        if self._n_objects > objects_before:
+            content = "objects"
         text = data[name.start : name.stop].decode("latin-1")  # as scipy does
         return Variable(text, content, shape, self._n_values - before)
+
+    def _object(self, data: bytes, kind: int, parts: list[_Element]) -> Variable:
+        """Check an object of a class; a function is never a column, and read without its parts."""
+        if kind != _CLASS:
+            return Variable("", "other", (0,), 0)
+        self._n_objects += 1
+        _, name, *rest = parts
+        if name.kind != _INT8 or [part.kind for part in rest] != [_INT8, _INT8, _MATRIX]:
+            raise ValueError("an object does not have the parts of its class")
+        text = data[name.start : name.stop].decode("latin-1")
+        return Variable(text, "objects", (0,), 0)
 
     def _shape(self, data: bytes, dims: _Element, name: _Element) -> tuple[int, ...]:
         n_dims = (dims.stop - dims.start) // 4

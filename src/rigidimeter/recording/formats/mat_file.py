@@ -1,4 +1,4 @@
-"""MATLAB files: version 4 to 7 by scipy, version 7.3 (which is HDF5) by h5py.
+"""MATLAB files: version 4 to 7 by scipy, 7.3 (which is HDF5) by h5py, objects by mat-io.
 
 Fields of structures get dotted names: `data.torque`.
 """
@@ -10,7 +10,7 @@ import os
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any, BinaryIO, Literal, cast
 
 import numpy as np
 import scipy
@@ -19,53 +19,67 @@ from numpy.typing import NDArray
 from rigidimeter.documents import open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
-from rigidimeter.recording.formats.hdf5_arrays import hdf5_arrays
+from rigidimeter.recording.formats.hdf5_arrays import hdf5_arrays, hdf5_objects
 from rigidimeter.recording.formats.mat4_check import check_mat4
 from rigidimeter.recording.formats.mat_check import Variable, check_mat5
+from rigidimeter.recording.formats.mat_objects import check_subsystem, table_with_objects
 from rigidimeter.recording.formats.stored_arrays import Expansion, Stored, check_count
 from rigidimeter.recording.formats.table import Table, table_of_arrays
+from rigidimeter.recording.formats.text_head import Layout
 
 _VALUE_BYTES = 8
+_VALUES = "__function_workspace__"
+"""scipy's name of the variable without a name, which holds the values of objects."""
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
-def read_mat(path: Path) -> Table:
-    """Read a MATLAB file.
+def read_mat(path: Path, layout: Layout | None = None) -> Table:
+    """Read a MATLAB file, or the one of its variables that `layout` names as the table.
 
     Raises
     ------
     UserError
-        If it has no column, or needs h5py and that is not installed.
+        If it has no column, or needs h5py or mat-io and that is not installed.
     Exception
-        Whatever scipy and h5py raise on a damaged file.
+        Whatever scipy, h5py and mat-io raise on a damaged file.
     """
     with open_regular(path, RECORDING_BYTES) as file:
         start = file.read(520)
         if _HDF5 in (start[:8], start[512:520]):
             entries = hdf5_arrays(path)
+            objects = hdf5_objects(path, Expansion(path, path.stat().st_size))
         else:
             file.seek(0)
-            entries = _entries(path, file)
-    objects = [name for name, entry in entries.items() if entry.dtype.kind == "V"]
-    if objects and len(objects) == len(entries):
-        name = objects[0]
-        raise UserError(
-            f"{path}: {', '.join(objects)[:60]} is a table or another object, and those are not "
-            f"read; in MATLAB say s = table2struct({name[:60]}, 'ToScalar', true); "
-            "save('r.mat', '-struct', 's'). Of a timetable TT with the row times Time: T = "
-            "timetable2table(TT); T.time_s = seconds(T.Time - T.Time(1)); T.Time = []; then the "
-            "same with T"
-        )
-    return table_of_arrays(str(path), entries)
+            entries, objects = _entries(path, file)
+    if layout is not None and layout.table:
+        chosen = layout.table
+        mine = {name for name in [*entries, *objects] if name.partition(".")[0] == chosen}
+        if not mine:
+            names = dict.fromkeys(name.partition(".")[0] for name in [*entries, *objects])
+            raise UserError(f"{path}: there is no variable {chosen!r}; it has {', '.join(names)}")
+        entries = {name: entry for name, entry in entries.items() if name in mine}
+        objects = [name for name in objects if name in mine]
+    if not objects:
+        return table_of_arrays(str(path), entries)
+    plain = {
+        name: entry for name, entry in entries.items() if name.partition(".")[0] not in objects
+    }
+    try:
+        return table_with_objects(path, objects, plain, Expansion(path, path.stat().st_size))
+    except Exception:
+        if all(entry.dtype.kind == "V" or entry.size < 2 for entry in plain.values()):
+            raise
+        return table_of_arrays(str(path), entries)  # the columns beside objects that are not read
 
 
-def _entries(path: Path, file: BinaryIO) -> dict[str, Stored]:
+def _entries(path: Path, file: BinaryIO) -> tuple[dict[str, Stored], list[str]]:
+    """Return the variables, and the names of those that are objects or hold some."""
     file_bytes = os.fstat(file.fileno()).st_size
     checked, used = Expansion(path, file_bytes), Expansion(path, file_bytes)
     variables = check_mat5(file, file_bytes, lambda n_bytes: checked.take("a variable", n_bytes))
     if variables is None:  # version 4, which is never compressed
         check_count(path, check_mat4(file, file_bytes))
-        return _flat(_loaded(file, None))
+        return _flat(_loaded(file, None)), []
     check_count(path, len(variables))
     names = [variable.name for variable in variables if variable.name]
     if len(set(names)) < len(names):
@@ -88,7 +102,22 @@ def _entries(path: Path, file: BinaryIO) -> dict[str, Stored]:
         else:
             dtype = np.dtype(np.complex128 if variable.content == "complex" else "V1")
             entries[name] = Stored(dtype, variable.shape, lambda: np.empty(0))
-    return entries
+    objects = [each.name for each in variables if each.content == "objects" and each.name]
+    if objects:
+        _check_subsystem(file, variables, checked)
+    return entries, objects
+
+
+def _check_subsystem(file: BinaryIO, variables: list[Variable], expansion: Expansion) -> None:
+    """Check the last variable, in which the values of objects are."""
+    file.seek(116)
+    header = file.read(12)
+    order: Literal["little", "big"] = "little" if header[10:] == b"IM" else "big"
+    starts = [variable.start for variable in variables if not variable.name]
+    if starts != [int.from_bytes(header[:8], order)]:
+        raise ValueError("it does not hold the values of its objects where its header says")
+    data = _loaded(file, [_VALUES])[_VALUES]
+    check_subsystem(np.ascontiguousarray(data, np.uint8).tobytes(), expansion)
 
 
 def _read(path: Path, variable: Variable, used: Expansion) -> NDArray[Any]:
@@ -105,7 +134,7 @@ def _loaded(file: BinaryIO, names: list[str] | None) -> dict[str, Any]:
         warnings.simplefilter("error", scipy.io.matlab.MatReadWarning)
         # A file too, say scipy's documents.
         loaded = scipy.io.loadmat(cast("Any", file), simplify_cells=True, variable_names=names)
-    return {name: value for name, value in loaded.items() if not name.startswith("__")}
+    return {name: value for name, value in loaded.items() if name == _VALUES or name[:2] != "__"}
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Stored]:

@@ -66,7 +66,8 @@ class Reader:
         Turns a path into a `Table`, or into epochs and notices. It raises `UserError` with a
         sentence that begins with the path.
     of_text : bool
-        `read` takes a `Layout` too: what the user says of the lines of a text or a sheet.
+        `read` takes a `Layout` too: what the user says of the lines of a text or a sheet, and
+        which of several tables is read.
     sniff : callable, optional
         Whether a path holds this format. It decides between readers of one suffix, and finds the
         reader of a path with an unknown suffix. A reader without it takes every file with one of
@@ -76,7 +77,7 @@ class Reader:
     made_by : str
         What makes such files. Where it is given, any exception of `read` means a damaged file.
     extra : str
-        The extra of this package that `read` needs for some files, as in ``rigidimeter[matlab73]``.
+        The extra of this package that `read` needs for some files, as in ``rigidimeter[matlab]``.
     """
 
     name: str
@@ -129,7 +130,14 @@ READERS: list[Reader] = [
         settings=mat_export_settings,
         made_by="rigidimeter export",
     ),
-    Reader("MATLAB file", (".mat",), read_mat, made_by="save in MATLAB", extra="matlab73"),
+    Reader(
+        "MATLAB file",
+        (".mat",),
+        read_mat,
+        made_by="save in MATLAB",
+        extra="matlab",
+        of_text=True,
+    ),
     Reader(
         "NWB file",
         (".nwb",),

@@ -66,7 +66,7 @@ class Layout:
     names : tuple of str
         Of the columns, where the file has none.
     table : str
-        The sheet that is read, of a file with several.
+        The sheet, or the variable of a MATLAB file, that is read, of a file with several.
     """
 
     skip_rows: int = 0

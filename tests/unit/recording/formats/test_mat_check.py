@@ -111,33 +111,3 @@ def test_version_4_of_many_variables_is_refused_before_they_are_read(tmp_path):
 def test_no_whole_file_of_version_4_is_refused(path):
     data = path.read_bytes()
     assert check_mat4(io.BytesIO(data), len(data)) == len(scipy.io.whosmat(path))
-
-
-def element(kind, data):
-    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
-
-
-def table_of_version_7(path):
-    """A table: an opaque matrix with its name, type system, class and a reference."""
-    reference = element(6, struct.pack("<II", 13, 0)) + element(5, struct.pack("<ii", 1, 1))
-    reference += element(1, b"") + element(6, struct.pack("<I", 0xDD000000))
-    parts = element(6, struct.pack("<II", 17, 0)) + element(1, b"T") + element(1, b"MCOS")
-    matrix = element(14, parts + element(1, b"table") + element(14, reference))
-    path.write_bytes(
-        b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<HH", 0x0100, 0x4D49) + matrix
-    )
-
-
-def table_of_version_73(path):
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w", userblock_size=512) as file:
-        file["T"] = np.array([[0xDD000000, 2, 1, 1, 1, 1]], np.uint32)
-        file["T"].attrs["MATLAB_class"] = np.bytes_(b"table")
-        file["T"].attrs["MATLAB_object_decode"] = np.int32(3)
-
-
-@pytest.mark.parametrize("write", [table_of_version_7, table_of_version_73])
-def test_a_table_is_refused_with_the_lines_that_save_its_columns(tmp_path, write):
-    write(tmp_path / "r.mat")
-    with pytest.raises(UserError, match=r"T is a table or another object.*table2struct\(T, "):
-        read_table(tmp_path / "r.mat")

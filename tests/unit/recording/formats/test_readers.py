@@ -193,7 +193,7 @@ def test_matlab_73_text_cells_and_structures(tmp_path, columns):
 def test_matlab_73_without_h5py_says_what_to_install(tmp_path, columns, monkeypatch):
     path = write_mat73(tmp_path / "r.mat", columns)
     monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(UserError, match=r"pip install 'rigidimeter\[matlab73\]'"):
+    with pytest.raises(UserError, match=r"pip install 'rigidimeter\[matlab\]'"):
         read_table(path)
 
 
