@@ -12,7 +12,6 @@ LOOP = "tick.py ControlLoop.__init__: "
 SET = "each tick sets it before it is read"
 ANEW = "each stretch sets it; a ramp before the first has no velocity to take off"
 GIVEN = "a default that is never used: every result is made with all its fields"
-BEGUN = "a default that is never used: a state begins within its first mean"
 ANY_SIGN = "infinite or no number in a sum makes the sum so, whatever the signs"
 OF_NOTHING = "divides a column of nothing, or solves for what is 0"
 BOTH_SIDES = "a scale of both sides, next to which what is added is a thousand-millionth"
@@ -22,9 +21,6 @@ RAMP = "only a ramp uses it, and its controller does not ask for the tick's numb
 
 EQUIVALENT: dict[str, str] = {
     "agreement.py means_step: passed_s > _SAME_STAMP_S → passed_s >= _SAME_STAMP_S": MOMENT,
-    "consistency.py ConsistencyState: ticks: int = 0 → ticks: int = -1": BEGUN,
-    "consistency.py ConsistencyState: 0 → 1": BEGUN,
-    "consistency.py ConsistencyState: 0 → -1": BEGUN,
     STEP + "1 → 0": "elapsed_ticks if not given: none counts as one",
     STEP + "elapsed_ticks < 1 → elapsed_ticks <= 1": "one counts as one",
     STEP + "1 → 2 #2": "one counts as one",
@@ -37,11 +33,6 @@ EQUIVALENT: dict[str, str] = {
     STEP + "perturbation_nm + torque_nm + angle_rad → "
     "perturbation_nm + torque_nm - angle_rad": ANY_SIGN,
     STEP + "perturbation_nm + torque_nm → perturbation_nm - torque_nm": ANY_SIGN,
-    "consistency.py ended: "
-    "ConsistencyState(means, still_s, held, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) → "
-    "ConsistencyState(means, still_s, held, 0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)": (
-        "0 is 0.0"
-    ),
     ANSWER + "one_step: elapsed_s > LONGEST_S → elapsed_s >= LONGEST_S": "it becomes what it is",
     ANSWER + "one_step: needed > limits.unshown_nm * limits.unshown_nm → "
     "needed >= limits.unshown_nm * limits.unshown_nm": MOMENT,
@@ -75,7 +66,6 @@ EQUIVALENT: dict[str, str] = {
     "self._speaking": "nothing is spoken to without a port",
     "tracking.py minimum_jerk: elapsed_s >= duration_s → elapsed_s > duration_s": "at its end the "
     "polynomial and its derivative are 0, too",
-    "recorded_guard.py replay: Cause.NONE → Cause.SOFTWARE": "a guard at the start holds nothing",
     "step.py guard_step: 1 → 0": "elapsed_ticks if not given: none counts as one",
     NEAR + "speed * speed / (2.0 * limits.acceleration_rad_s2) → "
     "speed * speed * (2.0 * limits.acceleration_rad_s2)": SLOWER,

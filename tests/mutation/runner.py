@@ -45,7 +45,6 @@ TESTS = {
         *("guard/test_rest.py", "guard/test_late_means.py", "guard/test_consistency.py"),
     ),
     "guard/limits.py": ("guard/test_limits.py",),
-    "guard/recorded_guard.py": ("guard/test_recorded_guard.py",),
     "guard/step.py": _STEP,
     "guard/torque_answer.py": (
         *("guard/test_answer_window.py", "guard/test_torque_answer.py"),

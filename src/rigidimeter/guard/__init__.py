@@ -8,6 +8,5 @@ from rigidimeter.guard.consistency import (
     consistency_step,
 )
 from rigidimeter.guard.limits import GuardLimits, GuardState, guard_limits, guard_state, released
-from rigidimeter.guard.recorded_guard import replay
 from rigidimeter.guard.step import Limited, guard_step, why_ended
 from rigidimeter.guard.torque_answer import AnswerLimits, answer_limits

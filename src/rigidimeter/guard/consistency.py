@@ -92,22 +92,8 @@ def consistency_step(
     unlike = _NO_CAUSE
     if elapsed_ticks > limits.mean_of_ticks and state.readings > 0:
         state, unlike = ended(limits, state)  # the gap is no part of a mean with what was before
-    (
-        means,
-        still_s,
-        held,
-        ticks,
-        torque_old,
-        motion_old,
-        readings,
-        perturbed,
-        perturbation,
-        torque,
-        angle,
-        velocity,
-        stamp_s,
-        before_s,
-    ) = state
+    means, still_s, held, ticks, torque_old, motion_old, readings, perturbed = state[:8]
+    perturbation, torque, angle, velocity, stamp_s, before_s = state[8:]
     if elapsed_ticks < 1:
         elapsed_ticks = 1
     ticks += elapsed_ticks
@@ -174,5 +160,4 @@ def ended(limits: ConsistencyLimits, state: ConsistencyState) -> tuple[Consisten
         ticks * limits.interval_s,
         state.before_s * share,
     )
-    after = ConsistencyState(means, still_s, held, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return after, cause
+    return ConsistencyState(means, still_s, held), cause

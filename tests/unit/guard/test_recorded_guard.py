@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.unit.guard.recorded_guard import replay
 
 from rigidimeter.acquisition import (
     ControlLoop,
@@ -25,7 +26,6 @@ from rigidimeter.guard import (
     guard_state,
     guard_step,
     released,
-    replay,
 )
 from rigidimeter.settings import parse_settings
 
@@ -121,18 +121,6 @@ def test_other_limits_find_other_things():
     assert not replay(limits._replace(torque_nm=12.0), 1000.0, columns).cause.any()
     narrow = replay(limits._replace(speed_rad_s=0.1), 1000.0, columns)
     assert np.abs(narrow.velocity_command_rad_s).max() == 0.1
-
-
-def test_nothing_recorded_gives_nothing():
-    names = (
-        *("tick", "cause", "velocity_request_rad_s", "torque_nm", "angle_rad", "velocity_rad_s"),
-        *("motion_time_s", "torque_time_s", "perturbation_nm"),
-    )
-    again = replay(
-        GuardLimits(0.7, 3.0, 100.0, 0.02, 0.001), 1000.0, {name: np.array([]) for name in names}
-    )
-    assert [column.size for column in again] == [0, 0, 0, 0]
-    assert [column.dtype.name for column in again] == ["float64", "int8", "int8", "int8"]
 
 
 def by_hand(torques, releases=(), requests=None, step_of=lambda k: 1):
@@ -234,14 +222,3 @@ def test_each_sensor_has_its_own_age(column, cause):
     limits, columns = by_hand([0.0] * 3)
     columns[column][1] -= 0.6
     assert replay(limits, 1000.0, columns).cause.tolist() == [0, cause, cause]
-
-
-@pytest.mark.parametrize("column", ["tick", "torque_nm"])
-def test_columns_of_different_lengths_are_refused(column):
-    limits, columns = by_hand([0.0] * 3)
-    columns[column] = columns[column][:-1]
-    with pytest.raises(ValueError, match=r"shorter|longer"):
-        replay(limits, 1000.0, columns)
-    columns[column] = np.zeros(4)
-    with pytest.raises(ValueError, match=r"shorter|longer"):
-        replay(limits, 1000.0, columns)

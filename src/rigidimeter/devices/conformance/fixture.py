@@ -16,6 +16,7 @@ from rigidimeter.devices.base import (
     TorqueSensor,
     VelocityDrive,
 )
+from rigidimeter.guard import Cause
 
 MANY_READS = 100
 
@@ -161,8 +162,10 @@ def wait_for(
         time.sleep(fixture.tick_s)
 
 
-def check_stamp(sample: TorqueSample | MotionSample, now: Now | None) -> None:
-    """Check that a time stamp is on the clock."""
+def check_sample(sample: TorqueSample | MotionSample, value: float, now: Now | None) -> None:
+    """Check that a sample with this value, or sum of values, is good and stamped on the clock."""
+    require(sample.cause == Cause.NONE, f"a good sample has no cause; {Cause(sample.cause).name}")
+    require(math.isfinite(value), "a good sample is finite")
     if now is not None:
         age_s = now() - sample.time_s
         require(-1e-3 <= age_s < 1.0, f"a stamp is on the loop's clock; it is {age_s:.3f} s old")

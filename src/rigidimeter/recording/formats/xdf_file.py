@@ -7,10 +7,7 @@ nominal rate are straightened, as pyxdf does.
 
 from __future__ import annotations
 
-import logging
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -35,6 +32,7 @@ from rigidimeter.recording.formats.lsl_recording import (
     epochs_of_samples,
     settings_of_samples,
 )
+from rigidimeter.recording.formats.stored_arrays import silent
 from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.xdf_check import check_xdf
 from rigidimeter.records import Epoch, Notice
@@ -120,27 +118,14 @@ def _streams(path: Path) -> list[XdfStream]:
 
     with open_regular(path, RECORDING_BYTES) as file:
         check_xdf(file, path.stat().st_size)
-    with _quiet():
+    # Of damage `check_xdf` has said what is to be said; a stream of one stamp brings a warning.
+    with silent("pyxdf.pyxdf"):
         ours = any(each["name"] == _DOCUMENT for each in pyxdf.resolve_streams(str(path)))
         # Stamps of an exported session are those of its devices, on one clock.
         found, _ = pyxdf.load_xdf(
             str(path), synchronize_clocks=not ours, dejitter_timestamps=not ours
         )
     return [_stream(each) for each in found]
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep pyxdf from printing tracebacks: of damage `check_xdf` has said what is to be said."""
-    log = logging.getLogger("pyxdf.pyxdf")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # of a stream of one stamp
-            yield
-    finally:
-        log.setLevel(level)
 
 
 def _stream(found: Mapping[str, Any]) -> XdfStream:
