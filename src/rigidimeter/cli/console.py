@@ -133,8 +133,12 @@ def serving(desk: Desk, host: str, port: int, token: str) -> Iterator[None]:
 
 def lead_session(desk: Desk, request: StartRequest, realtime: Realtime) -> Ended | None:
     """Run what the page asked for, and say on the page how it ended; None if it did not begin."""
-    from rigidimeter.cli.planned_session import checked_rig, run_planned
-    from rigidimeter.cli.sharing import require_packages, write_nwb_beside
+    from rigidimeter.cli.planned_session import (
+        checked_rig,
+        require_packages,
+        run_planned,
+        write_nwb_beside,
+    )
     from rigidimeter.console.page.button_words import in_buttons, next_buttons
     from rigidimeter.console.page.kept_study import extended
     from rigidimeter.recording.resume import count_epochs, rest_of

@@ -82,8 +82,7 @@ def run(
     """
     from rigidimeter.acquisition.processes.left_memory import complete_left
     from rigidimeter.acquisition.processes.loop_process import Realtime
-    from rigidimeter.cli.planned_session import checked_rig, run_planned
-    from rigidimeter.cli.sharing import require_packages
+    from rigidimeter.cli.planned_session import checked_rig, require_packages, run_planned
     from rigidimeter.console import discard_typed, terminal_view
 
     for line in complete_left():
@@ -119,7 +118,7 @@ def run(
 
 def _conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
     """Say how the session ended; a session that is not whole ends the program with status 1."""
-    from rigidimeter.cli.sharing import write_nwb_beside
+    from rigidimeter.cli.planned_session import write_nwb_beside
     from rigidimeter.console import new_folder, next_steps
     from rigidimeter.recording import read_manifest
     from rigidimeter.recording.blinded import codes_of

@@ -10,7 +10,6 @@ Nobody's arm is in the rig. The drive has power only while a trial runs.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +17,7 @@ from typing import Any
 from rigidimeter.commissioning.checks import yes
 from rigidimeter.commissioning.commissioning_record import CommissioningRecord
 from rigidimeter.commissioning.daily_record import DailyRecord, Reference, objection
-from rigidimeter.commissioning.first_steps import Findings, at_rest, move, small_move
+from rigidimeter.commissioning.first_steps import Findings, at_rest, move, power_allowed, small_move
 from rigidimeter.commissioning.inertia_fit import TorqueAnswer, quick_motion, torque_answer
 from rigidimeter.commissioning.motion_tests import COMPLETED, swing, swing_checks
 from rigidimeter.commissioning.static_tests import facts_checks
@@ -145,7 +144,7 @@ def daily_check(
         rig_digest=rigfile.digest,
         commissioning_digest=digest,
         checks=checks,
-        numbers={name: value for name, value in found.numbers.items() if math.isfinite(value)},
+        numbers=found.finite_numbers,
         reference=reference,
         known_inertia_kg_m2=compared.known_inertia_kg_m2,
         validity_h=setup.limits.daily_validity_h,
@@ -160,15 +159,13 @@ def _try(
     """Try rest, a small move and the quick motion; return what the torque answered."""
     settings, limits = setup.settings, setup.limits
     at_rest(setup, found, limits.daily_rest_s)
-    if not found.none_failed():
-        found.refrain("a check without power failed; put that right first")
-        return None
-    if not setup.operator.ask(
-        "Nobody's arm may be in the rig; cuff and handle are mounted as for a session. The drive "
-        f"will get power and move them by a few degrees, at up to {limits.daily_speed_deg_s:g} "
-        "deg/s. The emergency stop is at hand. Go on?"
+    if not power_allowed(
+        setup,
+        found,
+        "cuff and handle are mounted as for a session. The drive will get power and move them by a "
+        f"few degrees, at up to {limits.daily_speed_deg_s:g} deg/s. The emergency stop is at hand. "
+        "Go on?",
     ):
-        found.refrain("the operator did not agree to it")
         return None
     if not small_move(setup, found, limits.daily_rest_s):
         found.refrain("the small move went wrong; put that right first")

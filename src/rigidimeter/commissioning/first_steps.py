@@ -5,6 +5,7 @@ Nothing larger is tried after one of them went wrong.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -51,6 +52,22 @@ class Findings:
     def refrain(self, why: str) -> None:
         """Say of the rest that it was not tried."""
         self.checks.append(impossible("everything after this", "tried", why))
+
+    @property
+    def finite_numbers(self) -> dict[str, float]:
+        """The numbers that could be measured."""
+        return {name: value for name, value in self.numbers.items() if math.isfinite(value)}
+
+
+def power_allowed(setup: Setup, found: Findings, question: str) -> bool:
+    """Whether nothing failed without power and the operator agrees; else the rest is not tried."""
+    if not found.none_failed():
+        found.refrain("a check without power failed; put that right first")
+        return False
+    if not setup.operator.ask(f"Nobody's arm may be in the rig; {question}"):
+        found.refrain("the operator did not agree to it")
+        return False
+    return True
 
 
 def at_rest(setup: Setup, found: Findings, duration_s: float) -> None:

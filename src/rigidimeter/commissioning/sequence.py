@@ -14,14 +14,20 @@ question waits for its answer.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from rigidimeter.commissioning.checks import yes
 from rigidimeter.commissioning.commissioning_record import CommissioningRecord
 from rigidimeter.commissioning.coverage import covered, kept_facts
-from rigidimeter.commissioning.first_steps import SETTLE_S, Findings, at_rest, move, small_move
+from rigidimeter.commissioning.first_steps import (
+    SETTLE_S,
+    Findings,
+    at_rest,
+    move,
+    power_allowed,
+    small_move,
+)
 from rigidimeter.commissioning.manual_checks import ask_operator, known_angle, known_torque
 from rigidimeter.commissioning.margins import margin_checks
 from rigidimeter.commissioning.motion_tests import (
@@ -81,7 +87,7 @@ def commission(
         facts=kept_facts(facts),
         covered=covered(setup.settings),
         checks=tuple(found.checks),
-        numbers={name: value for name, value in found.numbers.items() if math.isfinite(value)},
+        numbers=found.finite_numbers,
         software=software,
         made_utc=made_utc,
         signed_by=signed_by,
@@ -93,15 +99,13 @@ def _try_all(setup: Setup, found: Findings, facts: Mapping[str, Any]) -> None:
     found.checks += facts_checks(facts, setup.settings)
     at_rest(setup, found, limits.idle_s)
     _by_hand(setup, found)
-    if not found.none_failed():
-        found.refrain("a check without power failed; put that right first")
-        return
-    if not operator.ask(
-        "Nobody's arm may be in the rig; a spring, or a weight like a relaxed arm's, is fastened "
-        f"to the joint. The drive will get power and move it by up to {limits.swing_deg:g} deg at "
-        f"{limits.swing_speed_deg_s:g} deg/s. The emergency stop is at hand. Go on?"
+    if not power_allowed(
+        setup,
+        found,
+        "a spring, or a weight like a relaxed arm's, is fastened to the joint. The drive will get "
+        f"power and move it by up to {limits.swing_deg:g} deg at {limits.swing_speed_deg_s:g} "
+        "deg/s. The emergency stop is at hand. Go on?",
     ):
-        found.refrain("the operator did not agree to it")
         return
     if not (small_move(setup, found, SETTLE_S) and _swing(setup, found) and _steps(setup, found)):
         found.refrain("the motions went wrong; put that right first")

@@ -9,8 +9,7 @@ import tomllib
 
 import pytest
 
-from rigidimeter.cli.planned_session import PlannedSession
-from rigidimeter.cli.sharing import write_nwb_beside
+from rigidimeter.cli.planned_session import PlannedSession, write_nwb_beside
 from rigidimeter.documents import json_text, text_bytes
 from rigidimeter.experiment import plan
 from rigidimeter.recording import read

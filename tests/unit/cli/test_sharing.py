@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from tests.small_study import record
 
-from rigidimeter.cli.sharing import require_packages, write_nwb_beside
+from rigidimeter.cli.planned_session import require_packages, write_nwb_beside
 from rigidimeter.errors import UserError
 from rigidimeter.settings import parse_settings
 
