@@ -20,7 +20,7 @@ import numpy as np
 from scipy import signal
 
 from rigidimeter.dynamics import DriveModel
-from rigidimeter.estimation.closedloop.as_sampled import inertia_doubt
+from rigidimeter.estimation.closedloop.as_sampled import InertiaDoubt, inertia_doubt
 from rigidimeter.estimation.closedloop.between_samples import (
     driven_behind,
     torque_filter_of,
@@ -29,6 +29,7 @@ from rigidimeter.estimation.closedloop.between_samples import (
 from rigidimeter.estimation.closedloop.drive_motion import DrivenAt
 from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares, intervals_text
 from rigidimeter.estimation.method_record import Method
+from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import (
     Array,
     Signals,
@@ -38,8 +39,9 @@ from rigidimeter.estimation.signals import (
     uniform_grid,
     values_at,
 )
+from rigidimeter.estimation.steps import moved_by_steps
 from rigidimeter.estimation.stretches import sound
-from rigidimeter.records import Epoch
+from rigidimeter.records import Channel, Epoch
 from rigidimeter.settings import USABLE_FRACTION_OF_RATE, EstimationSettings
 
 EDGE_SAMPLES = 10
@@ -173,12 +175,26 @@ def _motion(
     return angle, velocity, acceleration
 
 
+def _doubt(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
+    """Return how far a fit hangs on the drive between the samples and on steps of the motion."""
+    doubt, settings = inertia_doubt(prepared, signals), prepared.settings.estimation
+
+    def smooth(channel: Channel) -> Array:
+        lowpass, _ = _filters(*signals.band_hz, float(f"{channel.mean_rate_hz:.12g}"))
+        return _both_ways(lowpass, channel.values, SHORT_MEMORY)
+
+    moved = moved_by_steps(
+        prepared.epoch, signals, lambda epoch: bandlimited_signals(epoch, settings), smooth
+    )
+    return doubt._replace(away=doubt.away + moved / abs(signals.solution.values[0]))
+
+
 BANDLIMITED = Method(
     name="bandlimited",
     title="least squares, all signals through one zero-phase band",
     needs=(),
     methods_text="by least squares of signals that passed one zero-phase filter",
-    fit=partial(fit_least_squares, "bandlimited", bandlimited_signals, inertia_doubt),
+    fit=partial(fit_least_squares, "bandlimited", bandlimited_signals, _doubt),
     signals=bandlimited_signals,
     intervals_text=intervals_text,
     pooled_text=POOLED_TEXT,
