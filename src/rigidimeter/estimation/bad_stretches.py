@@ -129,6 +129,8 @@ def _in_use(
     epoch: Epoch, channel: Channel, starts: NDArray[np.int64], stops: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
     """Return which runs do not lie in what is left out already."""
+    if not epoch.left_out:
+        return np.ones(starts.size, dtype=np.bool_)
     kept = np.asarray(sound(epoch, channel.time_s), dtype=np.int64)
     before = np.concatenate(([0], np.cumsum(kept)))
     return np.asarray(before[stops + 1] > before[starts])

@@ -98,7 +98,7 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
         )
     rate_hz = grid_rate_hz(used, settings.band_high_hz)
     grid = uniform_grid(used, rate_hz)
-    angle = angle_at(epoch, grid)
+    both = np.stack([values_at(used[0], grid), angle_at(epoch, grid)])
     bandpass = _bandpass(settings.band_low_hz, settings.band_high_hz, rate_hz)
     gain = _gain(bandpass, motion.frequency_hz, rate_hz)
     if gain < LEAST_GAIN:
@@ -106,9 +106,8 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
             f"the {motion.frequency_hz:.3g} Hz motion lies outside the band of the scores, "
             f"{settings.band_low_hz:g} to {settings.band_high_hz:g} Hz ([scores] sets it)"
         )
-    moving = _moving_at_ends(angle, round(rate_hz / motion.frequency_hz))
+    moving = _moving_at_ends(both[1], round(rate_hz / motion.frequency_hz))
     padding_s = 3 / settings.band_low_hz  # the slowest part of the filter settles in that time
-    torque = values_at(used[0], grid)
     start = max(motion.start_s + settings.discard_s, float(grid[0]))
     stop = min(motion.start_s + motion.duration_s - settings.discard_s, float(grid[-1]))
     available = int(np.floor((stop - start) * motion.frequency_hz + 1e-6))
@@ -120,14 +119,11 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
         )
     points = n_cycles * POINTS_PER_CYCLE
     fine = start + np.arange(points + 1) / (POINTS_PER_CYCLE * motion.frequency_hz)
-
-    def band_passed(values: Array) -> Array:
-        centred = values - np.mean(values)
-        padded, before = _continued(grid, centred, motion.frequency_hz, moving, padding_s)
-        filtered = signal.sosfiltfilt(bandpass, padded)[before : before + grid.size]
-        return np.asarray(CubicSpline(grid, filtered / gain)(fine), dtype=np.float64)
-
-    return Cycles(fine, band_passed(torque), band_passed(angle), motion.frequency_hz, n_cycles)
+    centred = both - np.mean(both, axis=1, keepdims=True)
+    padded, before = _continued(grid, centred, motion.frequency_hz, moving, padding_s)
+    filtered = signal.sosfiltfilt(bandpass, padded)[:, before : before + grid.size]
+    torque, angle = CubicSpline(grid, filtered / gain, axis=1)(fine)
+    return Cycles(fine, torque, angle, motion.frequency_hz, n_cycles)
 
 
 @lru_cache(maxsize=16)
@@ -153,7 +149,7 @@ def _moving_at_ends(angle: Array, points_per_cycle: int) -> tuple[bool, bool]:
 def _continued(
     grid: Array, values: Array, frequency_hz: float, moving: tuple[bool, bool], padding_s: float
 ) -> tuple[Array, int]:
-    """Return the values continued at both ends, and how many were put before them.
+    """Return signals, shape (k, n), continued at both ends, and how many values were put before.
 
     A recording that begins in the middle of the motion is continued with the cycles next to its
     end, one at rest with its last value; a filter that started from a mirror image instead would
@@ -164,12 +160,12 @@ def _continued(
     steps = np.arange(1, n + 1) * interval_s
     cycle_s = 1.0 / frequency_hz
     back = (-steps) % cycle_s  # how far into the first cycle, for each time before it
-    early, late = np.full(n, values[0]), np.full(n, values[-1])
+    early, late = np.repeat(values[:, :1], n, axis=1), np.repeat(values[:, -1:], n, axis=1)
     if any(moving):
-        motion = CubicSpline(grid, values)
+        motion = CubicSpline(grid, values, axis=1)
         early = motion(grid[0] + back) if moving[0] else early
         late = motion(grid[-1] - back) if moving[1] else late
-    return np.concatenate([early[::-1], values, late]), n
+    return np.concatenate([early[:, ::-1], values, late], axis=1), n
 
 
 def score_epoch(epoch: Epoch, settings: ScoreSettings, screening: EstimationSettings) -> Score:

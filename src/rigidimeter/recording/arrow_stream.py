@@ -129,7 +129,8 @@ def _message(content: bytes, at: int, kind: int, checked: bool, context: bytes) 
         metadata = at + 8
         if not 0 < size <= min(_MOST_METADATA, len(content) - metadata):
             return None
-        stop = metadata + size + _body_length(content[metadata : metadata + size], kind)
+        head = content[metadata : metadata + size]
+        stop = metadata + size + _body_length(head, kind)
     except (struct.error, ValueError):
         return None
     if stop > len(content):
@@ -137,12 +138,11 @@ def _message(content: bytes, at: int, kind: int, checked: bool, context: bytes) 
     if not checked:
         return Message(at, stop)
     # A checksum is looked for in the metadata alone: the body may hold anything.
-    if FIELD not in content[metadata : metadata + size]:
+    if FIELD not in head:
         return None
-    message = content[at:stop]
-    if not checksum_holds(message, context):
+    if not checksum_holds(content[at:stop], context):
         return None
-    return Message(at, stop, covered_values(message))
+    return Message(at, stop, covered_values(head))
 
 
 def _body_length(metadata: bytes, kind: int) -> int:

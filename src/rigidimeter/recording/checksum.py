@@ -17,6 +17,8 @@ FIELD = b'"checksum": "'
 ZEROS = "0" * 32
 """In place of the digits before they are known."""
 
+_DECODER = json.JSONDecoder()
+
 
 def digest_hex(*contents: bytes | memoryview) -> str:
     """Return the digest of bytes one after another, as hexadecimal digits."""
@@ -65,6 +67,7 @@ def covered_values(content: bytes) -> dict[str, Any]:
 
     Call it for bytes whose checksum holds.
     """
-    text = content[content.index(FIELD) - 1 :].decode(errors="replace")
-    values: dict[str, Any] = json.JSONDecoder().raw_decode(text)[0]
+    # JSON has no zero byte; behind it in a message there may be megabytes that are no text.
+    text = content[content.index(FIELD) - 1 :].partition(b"\0")[0].decode(errors="replace")
+    values: dict[str, Any] = _DECODER.raw_decode(text)[0]
     return values

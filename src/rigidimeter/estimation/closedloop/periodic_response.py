@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from rigidimeter.estimation.closedloop.lack_of_fit import Answer, proportional
@@ -55,10 +56,9 @@ def impedance(observations: Sequence[Observation]) -> Impedance:
         turn = _toward_zero_phase(observation)[mask]
         torque += turn * lines.torque_nm[mask]
         angle += turn * lines.motion[mask, 2]
-        between = np.abs(lines.torque_nm) ** 2
-        between[mask] = np.nan
-        beside = [between[max(i - 2, 0) : i + 3] for i in np.flatnonzero(mask)]
-        noise += np.array([np.nanmean(part) for part in beside])
+        between = np.where(mask, np.nan, np.abs(lines.torque_nm) ** 2)
+        beside = sliding_window_view(np.pad(between, 2, constant_values=np.nan), 5)
+        noise += np.nanmean(beside[mask], axis=1)
     power = np.abs(torque) ** 2
     grid = observations[0].lines.grid
     frequency_hz = grid.omega_rad_s[observations[0].excited] / (2 * np.pi)

@@ -64,7 +64,7 @@ class Shape:
 
     def at(self, lines: Lines) -> Array:
         """Return the power at the lines of an epoch."""
-        return np.interp(lines.grid.omega_rad_s, self.omega_rad_s, self.density)
+        return _on(lines.grid.omega_rad_s, self.omega_rad_s, self.density)
 
 
 @dataclass(frozen=True)
@@ -297,12 +297,18 @@ def _density(
     total = np.zeros(omega.size)
     for lines, problem in zip(everything, problems, strict=True):
         residual = problem.target - problem.regressors @ values
-        power = np.abs(residual) ** 2
-        total += np.interp(omega, lines.grid.omega_rad_s, power)
+        total += _on(omega, lines.grid.omega_rad_s, np.abs(residual) ** 2)
     density = smoother(total / len(everything))
     if not np.all(density > 0):
         raise ValueError("the fit leaves nothing at some frequencies: are the channels simulated?")
     return Shape(omega, density)
+
+
+def _on(wanted_rad_s: Array, omega_rad_s: Array, power: Array) -> Array:
+    """Return power on other lines; epochs of one layout have the same."""
+    if wanted_rad_s is omega_rad_s:
+        return power
+    return np.interp(wanted_rad_s, omega_rad_s, power)
 
 
 def _bound(problems: Sequence[Problem], everything: Sequence[Lines], shape: Shape) -> Array:

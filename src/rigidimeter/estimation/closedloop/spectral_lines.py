@@ -71,8 +71,8 @@ class Grid:
     omega_rad_s : array, shape (m,)
     energy : float
         Σ w²: white noise of unit variance puts this much power into every line.
-    window_lines : complex array, shape (m,)
-        Σ w e^(−iωt): what a constant would leave at the lines.
+    window_spectrum : complex array
+        Σ w e^(−iωt) at every line of the FFT up to the last that is used.
     spread : float
         What is left out makes neighbouring lines alike. By this factor the variance of an estimate
         is then larger than independent lines would have it (`window.repetition`).
@@ -85,8 +85,13 @@ class Grid:
     line: NDArray[np.intp]
     omega_rad_s: Array
     energy: float
-    window_lines: Complex
+    window_spectrum: Complex
     spread: float = 1.0
+
+    @property
+    def window_lines(self) -> Complex:
+        """What a constant would leave at the lines, shape (m,)."""
+        return self.window_spectrum[int(self.line[0]) :]
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -203,7 +208,7 @@ def _layout(
     window = whole
     for hole_s in holes_s:
         window, slope = with_hole(window, slope, rate_hz, taper_s, hole_s)
-    spectrum = np.asarray(fft.rfft(window)[line], dtype=np.complex128)
+    spectrum = np.asarray(fft.rfft(window)[: line[-1] + 1], dtype=np.complex128)
     energy = float(np.sum(window * window))
     omega = np.asarray(2 * np.pi * line / duration_s, dtype=np.float64)
     for part in (window, slope, line, omega, spectrum):

@@ -23,6 +23,7 @@ from rigidimeter.estimation.diagnostics.check_record import (
 from rigidimeter.estimation.diagnostics.excitation_checks import perturbation_nm
 from rigidimeter.estimation.power_lines import lines_inside, power_lines
 from rigidimeter.estimation.signals import Array, Signals
+from rigidimeter.estimation.terms.explained import explained
 from rigidimeter.records import Epoch
 from rigidimeter.settings import DiagnosticsSettings
 from rigidimeter.units import rad_from_deg
@@ -114,15 +115,10 @@ def _chance_correlation(a: Array, b: Array, rate_hz: float, lag: int) -> float:
 
 def held_out_vaf(signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return how much of the second half's torque the parameters of the first half explain."""
-    half = signals.time_s.size // 2
-    regressors = np.column_stack(
-        [signals.acceleration_rad_s2, signals.velocity_rad_s, signals.angle_rad]
-    )
-    squares = np.einsum("ij,ij->j", regressors[:half], regressors[:half])
-    lengths = np.maximum(np.sqrt(squares), 1e-300)
-    scaled, torque = regressors / lengths, signals.torque_nm
-    parameters = np.linalg.lstsq(scaled[:half], torque[:half], rcond=None)[0]
-    left = torque[half:] - scaled[half:] @ parameters
+    half, torque = signals.time_s.size // 2, signals.torque_nm
+    rows = np.column_stack([signals.motion, torque])[:half]
+    upper = np.asarray(np.linalg.qr(rows, mode="r"))
+    left = torque[half:] - signals.motion[half:] @ explained(upper[:, :-1], upper[:, -1]).values
     variance, least = float(np.var(torque[half:])), settings.held_out_vaf_least_percent
     value = 100.0 * (1.0 - float(np.var(left)) / variance) if variance > 0 else math.nan
     return at_least(

@@ -148,13 +148,11 @@ def varying_lines(prepared: PreparedEpoch, parameters: Array) -> VaryingLines:
 
 def _from_first_line(grid: Grid) -> Grid:
     line = np.arange(1, int(grid.line[-1]) + 1, dtype=np.intp)
-    spectrum = np.asarray(fft.rfft(grid.window)[line], dtype=np.complex128)
     step_rad_s = float(grid.omega_rad_s[0]) / int(grid.line[0])
     return replace(
         grid,
         line=line,
         omega_rad_s=np.asarray(step_rad_s * line, dtype=np.float64),
-        window_lines=spectrum,
     )
 
 

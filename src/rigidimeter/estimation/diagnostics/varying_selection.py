@@ -128,14 +128,18 @@ def variation(lines: VaryingLines, chance: float) -> Variation:
 
 
 def _terms(lines: VaryingLines, shapes: Shapes) -> _Terms:
-    moving, caused = lines.in_time(lines.motion), lines.in_time(lines.instruments)
+    # Without a perturbation the motion is its own instrument.
+    parts = [lines.in_time(lines.motion)]
+    if lines.by_perturbation:
+        parts.append(lines.in_time(lines.instruments))
     beside = lines.window[:, None] * shapes.beside
     if beside.shape[1]:
         basis = np.linalg.qr(beside)[0]
-        moving, caused = (part - basis @ (basis.T @ part) for part in (moving, caused))
+        parts = [part - basis @ (basis.T @ part) for part in parts]
 
     def columns(functions: Array, j: int) -> Columns:
-        return Columns(*(_whitened(lines, part[:, [j]] * functions) for part in (caused, moving)))
+        moving, *caused = (_whitened(lines, part[:, [j]] * functions) for part in parts)
+        return Columns(caused[0] if caused else moving, moving)
 
     of = tuple(
         columns(shapes.functions * (shapes.elastic if j == STIFFNESS else 1.0), j) for j in range(3)
