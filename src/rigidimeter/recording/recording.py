@@ -244,19 +244,16 @@ def _complete(found: Recording, leave_out: Sequence[str]) -> Recording:
 def read_options(
     *,
     column: Mapping[str, str] | None = None,
-    rate_hz: float | None = None,
-    reaction: bool = False,
-    epoch_length_s: float | None = None,
-    task: Task | None = None,
     unit: Mapping[str, str] | None = None,
     scale: Mapping[str, str] | None = None,
     offset: Mapping[str, str] | None = None,
-    skip_rows: int = 0,
     names: Sequence[str] = (),
-    table: str = "",
     mapping: str | Path | None = None,
+    **others: Any,
 ) -> ReadOptions:
     """Return arguments of `read` as options, with those of the mapping file behind them.
+
+    `others` are named alike in `ReadOptions`.
 
     Raises
     ------
@@ -264,17 +261,12 @@ def read_options(
         If one is wrong.
     """
     options = ReadOptions(
-        _by_name("column", column, "'torque': 'Fz'"),
-        rate_hz,
-        reaction,
-        epoch_length_s,
-        task=task,
+        columns=_by_name("column", column, "'torque': 'Fz'"),
         units=_by_name("unit", unit, "'angle': 'deg'"),
         scales=_by_name("scale", scale, "'torque': '2.5 Nm/V'"),
         offsets=_by_name("offset", offset, "'torque': '0.1 V'"),
-        skip_rows=skip_rows,
         names=tuple(names),
-        table=table,
+        **others,
     )
     return options if mapping is None else merged(read_mapping(Path(mapping)), options)
 

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from rigidimeter.acquisition.processes.end_signals import leave_to_the_others
 from rigidimeter.acquisition.processes.ring import ROW, SampleReader
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.acquisition.processes.status_values import Condition, LiveEstimate, Role
 from rigidimeter.acquisition.tick import REST
 from rigidimeter.estimation.online import (
@@ -133,7 +132,7 @@ def estimator_main(
         estimator = Estimator(settings, rate_hz)
         reader = SampleReader(shared.samples)
         status.set_condition(Role.ESTIMATOR, Condition.RUNNING)
-        while os.getppid() == console_pid and _session_runs(status, lost_s):
+        while os.getppid() == console_pid and not status.ended(Role.LOOP, lost_s):
             status.beat(Role.ESTIMATOR)
             rows, missed = reader.read()
             if rows.size:
@@ -142,9 +141,3 @@ def estimator_main(
         status.set_condition(Role.ESTIMATOR, Condition.DONE)
     finally:
         shared.leave()
-
-
-def _session_runs(status: SharedStatus, lost_s: float) -> bool:
-    if status.condition(Role.LOOP) in (Condition.DONE, Condition.FAILED):
-        return False
-    return min(status.age_s(Role.LOOP), status.age_s(Role.RECORDER)) < lost_s

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from rigidimeter.acquisition.processes.end_signals import leave_to_the_others
 from rigidimeter.acquisition.processes.ring import ROW, SampleReader
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.shared_status import SharedStatus
-from rigidimeter.acquisition.processes.status_values import Condition, Role
+from rigidimeter.acquisition.processes.status_values import Role
 from rigidimeter.documents import json_text
 from rigidimeter.guard import Cause
 from rigidimeter.recording.markers import marker_of, sample_markers
@@ -163,7 +162,7 @@ def _send(streams: Streams, shared: SessionMemory, lost_s: float, console_pid: i
     reader = SampleReader(shared.samples)
     sent_events = 0
     while True:
-        over = os.getppid() != console_pid or _is_over(shared.status, lost_s)
+        over = os.getppid() != console_pid or shared.status.ended(Role.RECORDER, lost_s)
         recorded_events = shared.events.recorded
         rows, _ = reader.read(recorded=True)
         for facts in _events(shared, sent_events, recorded_events):
@@ -179,10 +178,3 @@ def _events(shared: SessionMemory, first: int, stop: int) -> Sequence[Mapping[st
     """Return recorded events that are still in their ring."""
     first = max(first, stop - shared.events.capacity // 2)
     return [shared.events.get(number).facts for number in range(first, stop)]
-
-
-def _is_over(status: SharedStatus, lost_s: float) -> bool:
-    """Whether nothing more will be recorded."""
-    if status.condition(Role.RECORDER) in (Condition.DONE, Condition.FAILED):
-        return True
-    return min(status.age_s(Role.LOOP), status.age_s(Role.RECORDER)) > lost_s

@@ -186,6 +186,12 @@ class SharedStatus:
         """Return how a process last said it is."""
         return Condition(self._words[_CONDITIONS + role])
 
+    def ended(self, role: Role, lost_s: float) -> bool:
+        """Whether a process is done, or loop and recorder were both silent for `lost_s`."""
+        if self.condition(role) in (Condition.DONE, Condition.FAILED):
+            return True
+        return min(self.age_s(Role.LOOP), self.age_s(Role.RECORDER)) > lost_s
+
     def note(self, role: Role) -> str:
         """Return the last sentence of a process."""
         return _text(self._notes[role]).decode(errors="replace")
