@@ -5,20 +5,4 @@ from rigidimeter.paper.context import Context
 from rigidimeter.paper.paper_page import ledger_text, render_page, tally, write_ledger
 from rigidimeter.paper.rows import MAKERS, SECTIONS, chosen, make_rows
 
-__all__ = [
-    "AGREES",
-    "DIFFERS",
-    "MAKERS",
-    "SECTIONS",
-    "UNPUBLISHED",
-    "VERDICTS",
-    "Check",
-    "Context",
-    "Row",
-    "chosen",
-    "ledger_text",
-    "make_rows",
-    "render_page",
-    "tally",
-    "write_ledger",
-]
+__all__ = ["Context", "make_rows"]
