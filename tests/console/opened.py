@@ -139,3 +139,27 @@ def start(page: Page, subject: str = "S01", operator: str = "Op") -> None:
     page.evaluate("window.rigDrawnS = 0")
     page.get_by_role("button", name="Start session").click()
     page.wait_for_function("window.rigDrawnS > 0", timeout=1e3 * STARTS_S)
+
+
+_OUTLINED = """() => {
+  const at = document.activeElement, shown = at.closest(".q-field__control") || at;
+  const bar = document.querySelector(".bar").getBoundingClientRect();
+  const under = !at.closest(".bar") && shown.getBoundingClientRect().top < bar.bottom;
+  const { outlineWidth, boxShadow } = getComputedStyle(shown);
+  const outlined = outlineWidth === "4px" || boxShadow.endsWith("6px");
+  return [at.ariaLabel || at.textContent, outlined, under || bar.top < 0];
+}"""
+
+
+def assert_reached_by_tab(page: Page, last: str) -> None:
+    """Go by Tab to what is called `last`; each stop, and the emergency stop, must be seen."""
+    page.set_viewport_size({"width": 820, "height": 420})
+    page.locator(".tab").first.focus()
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        name, outlined, hidden = page.evaluate(_OUTLINED)
+        assert outlined, name
+        assert not hidden, name
+        if name == last:
+            return
+    raise AssertionError(f"Tab does not lead to {last}")

@@ -124,9 +124,10 @@ def leave_out(page: Page, session, epoch: str, reason: str, by: str) -> None:
 def study_report(page: Page) -> Page:
     """Make the report of the study by its button, and open it by its link."""
     page.get_by_role("button", name="After", exact=True).click()
+    page.wait_for_timeout(SETTLES_MS)  # the list is drawn anew after a session
     page.get_by_role("button", name="Report of the study").click()
     link = page.get_by_role("link", name="Open the report of the study")
-    link.wait_for(timeout=LONG_MS)
+    link.wait_for(timeout=3 * LONG_MS)
     with page.context.expect_page() as opened:
         link.click()
     opened.value.wait_for_load_state()

@@ -2,31 +2,9 @@
 
 from __future__ import annotations
 
-from tests.console.opened import fill, open_page
+from tests.console.opened import assert_reached_by_tab, fill, open_page
 
 FOCUSED = "document.activeElement.textContent === 'No'"
-STOP = """() => {
-  const at = document.activeElement, shown = at.closest(".q-field__control") || at;
-  const bar = document.querySelector(".bar").getBoundingClientRect();
-  const under = !at.closest(".bar") && shown.getBoundingClientRect().top < bar.bottom;
-  const { outlineWidth, boxShadow } = getComputedStyle(shown);
-  const outlined = outlineWidth === "4px" || boxShadow.endsWith("6px");
-  return [at.ariaLabel || at.textContent, outlined, under || bar.top < 0];
-}"""
-
-
-def assert_reached_by_tab(page, last):
-    """Go by Tab to what is called `last`; each stop, and the emergency stop, must be seen."""
-    page.set_viewport_size({"width": 820, "height": 420})
-    page.locator(".tab").first.focus()
-    for _ in range(40):
-        page.keyboard.press("Tab")
-        name, outlined, hidden = page.evaluate(STOP)
-        assert outlined, name
-        assert not hidden, name
-        if name == last:
-            return
-    raise AssertionError(f"Tab does not lead to {last}")
 
 
 def test_before_a_session(console, chromium):

@@ -11,7 +11,7 @@ from threading import Thread
 
 import numpy as np
 import pytest
-from tests.console.opened import fill, open_page, start, wait_for
+from tests.console.opened import assert_reached_by_tab, fill, open_page, start, wait_for
 
 from rigidimeter.recording import SessionWriter
 from rigidimeter.recording.sample_reading import read_samples
@@ -130,6 +130,7 @@ def test_a_session_from_the_form_to_its_end(console, chromium):
     assert other.locator("#emergency").is_disabled()
     other.close()
     page.wait_for_function(RUNS)
+    assert_reached_by_tab(page, "Save")  # the last control of a session that runs
     page.locator("#note").fill("<b>coughs</b>")
     page.keyboard.press("Enter")
     page.reload()
@@ -160,6 +161,9 @@ def test_the_emergency_stop_stops(console, chromium, lateness):
     page = open_page(chromium, desk)
     start(page)
     page.wait_for_function(RUNS)
+    page.locator("#note").focus()
+    page.keyboard.type("e stop, a n h ")  # the keys of a terminal are text here
+    assert not text(page, "state").startswith("ended")
     clicked_s = time.monotonic()
     page.keyboard.press("Escape")
     assert "emergency stop" in desk.ended()["reason"]

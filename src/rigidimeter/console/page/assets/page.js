@@ -73,7 +73,7 @@
     lines("live", session.live.map((text) => ["", text]));
     show("live-of", session.live_of && `of ${session.live_of}`);
     traces.task(session.task);
-    show("band-model", session.modelled ? ", thin modelled" : ", modelled not known yet");
+    show("band-model", session.modelled ? "thick measured, thin modelled" : "measured, no model yet");
     banner(session.alert);
     const lamps = $("lamps");
     while (lamps.children.length > session.lamps.length) lamps.lastChild.remove();

@@ -67,7 +67,7 @@ window.rigTraces = (() => {
     titles.forEach((title, at) => add(pane($("panes"), title), () => [data[0], data[at + 1]], [{}], cyclic && at === 2));
     if (cyclic) plots.push(loopPlot(pane($("panes"), "torque [N·m] over angle [deg], last 10 s", "pane loop")));
     else {
-      const at = pane($("panes"), "band torque [N·m]: thick measured"), said = document.createElement("span");
+      const at = pane($("panes"), "band torque [N·m]: "), said = document.createElement("span");
       said.id = "band-model";
       at.firstChild.append(said);
       add(at, () => band, [{ width: 5, stroke: colour("--measured") }, { width: 1.5, stroke: colour("--ink") }], true);
