@@ -162,13 +162,14 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=20, help="of windows of `lateness`")
     parser.add_argument("--seconds", type=float, default=4.0, help="of each window")
     parser.add_argument("--minutes", type=float, default=20.0, help="of `memory`")
+    parser.add_argument("--rows", default="", help="CSV file for what `memory` reads")
     asked = parser.parse_args()
     if asked.mode == "stops":
         stops(asked.clicks, asked.freezes)
     elif asked.mode == "lateness":
         lateness(asked.pairs, asked.seconds)
     else:
-        memory(asked.minutes)
+        memory(asked.minutes, asked.rows)
 
 
 if __name__ == "__main__":
