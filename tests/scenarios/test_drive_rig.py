@@ -11,7 +11,8 @@ from tests.scenarios.drive_rig import TRUTH, DriveRig, run
 
 from rigidimeter.records import Epoch
 from rigidimeter.settings import parse_settings
-from rigidimeter.study import estimate
+from rigidimeter.study import Preparation, estimate
+from rigidimeter.study.analysis import analyse_prepared
 
 MOST = np.array([0.02, 0.01, 0.005])
 
@@ -77,12 +78,13 @@ def test_without_the_command_the_interval_holds_what_the_drive_of_the_settings_t
 @pytest.fixture(scope="module")
 def scattered():
     scenario = SCENARIOS["5 % lost, stamps ±0.3 ms"]
-    return *scenario.simulated(0, 2), scenario.analysed_with()
+    epochs, truth = scenario.simulated(0, 2)
+    return Preparation(epochs, scenario.analysed_with()), truth
 
 
 @pytest.mark.parametrize("method", ["iv", "bandlimited"])
 def test_stamps_that_scatter_about_the_ticks_leave_it_open_when_samples_came(scattered, method):
-    epochs, truth, settings = scattered
-    for fit in estimate(epochs, method, settings=settings).fits:
+    preparation, truth = scattered
+    for fit in analyse_prepared(preparation, method).fits:
         assert fit.low[0] <= truth[0, 0] <= fit.high[0]
         assert fit.high[0] - fit.low[0] < 0.04 * truth[0, 0]

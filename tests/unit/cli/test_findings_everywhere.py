@@ -10,7 +10,8 @@ import pytest
 
 import rigidimeter as rm
 from rigidimeter.records import Channel
-from rigidimeter.study import estimate
+from rigidimeter.study import Preparation
+from rigidimeter.study.analysis import analyse_prepared
 
 PUSHING = {"OFF": {"voluntary_sd_nm": 0.2}}
 
@@ -67,8 +68,8 @@ def test_every_output_has_every_finding(shown, method):
         assert said == 2 * [f"doubt: {doubts}" if doubts else ""]
 
 
-def names_and_levels(epochs, method, settings):
-    fits = estimate(epochs, method, settings=settings).fits
+def names_and_levels(preparation, method):
+    fits = analyse_prepared(preparation, method).fits
     return [sorted((f.name, f.level) for f in fit.findings) for fit in fits]
 
 
@@ -82,7 +83,8 @@ def test_a_tenth_of_a_millisecond_of_jitter_changes_no_finding(simulate):
             stamps = c.time_s + rng.uniform(-5e-5, 5e-5, len(c))
             channels[name] = Channel(name, stamps, c.values)
         moved.append(replace(epoch, channels=channels))
+    one, two = (Preparation(each, recording.settings) for each in (recording.epochs, moved))
     for method in ("auto", "bandlimited"):
-        before = names_and_levels(recording.epochs, method, recording.settings)
-        assert before == names_and_levels(moved, method, recording.settings)
+        before = names_and_levels(one, method)
+        assert before == names_and_levels(two, method)
         assert any(before)

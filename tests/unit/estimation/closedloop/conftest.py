@@ -19,7 +19,7 @@ def truth() -> np.ndarray:
     return np.array([JOINT.inertia_kg_m2, JOINT.damping_nm_s_rad, JOINT.stiffness_nm_rad])
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def simulated() -> Callable[..., tuple[Settings, list[Epoch]]]:
     """Simulate epochs of a subject with a known joint; a voluntary torque and a rig may be set."""
 

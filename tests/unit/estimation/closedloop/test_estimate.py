@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.estimation import choose_method, fit_epochs
+from rigidimeter.estimation.methods import method_named
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Channel, Outcome
 from rigidimeter.settings import ControllerSettings
@@ -38,21 +39,32 @@ def test_a_quiet_subject_is_found_to_the_noise(simulated, truth, method):
     np.testing.assert_allclose(ratio, 0.5, atol=0.1)
 
 
-@pytest.mark.parametrize("method", ["iv", "spectral"])
-def test_a_subject_who_pushes_does_not_bias_the_pooled_estimate(simulated, truth, method):
+@pytest.fixture(scope="module")
+def pushed(simulated):
+    """Return epochs of a subject who pushes, and what is found in them whatever the method."""
     settings, epochs = simulated(24, voluntary_sd_nm=0.2, seed=5)
-    fits, (pooled,) = fit_epochs(epochs, method, settings)
+    return settings, epochs, prepare(epochs, settings)
+
+
+def fitted(prepared, method):
+    return method_named(method).fit(prepared, None, lambda _: None, True)
+
+
+@pytest.mark.parametrize("method", ["iv", "spectral"])
+def test_a_subject_who_pushes_does_not_bias_the_pooled_estimate(pushed, truth, method):
+    *_, prepared = pushed
+    fits, (pooled,) = fitted(prepared, method)
     error = values(pooled) / truth - 1
     assert np.all(np.abs(values(pooled) - truth) < 4 * values(pooled, "_se"))
     assert np.all(np.abs(error) < [0.01, 0.05, 0.05])
-    squares = np.mean([values(f) for f in fit_epochs(epochs, "bandlimited", settings)[0]], axis=0)
+    squares = np.mean([values(f) for f in fitted(prepared, "bandlimited")[0]], axis=0)
     assert squares[1] / truth[1] < 0.7
     assert all(fit.outcome.included for fit in fits)
 
 
-def test_a_wrong_controller_costs_precision_and_not_truth(simulated, truth):
-    settings, epochs = simulated(24, voluntary_sd_nm=0.2, seed=5)
-    right = fit_epochs(epochs, "iv", settings)[1][0]
+def test_a_wrong_controller_costs_precision_and_not_truth(pushed, truth):
+    settings, epochs, prepared = pushed
+    right = fitted(prepared, "iv")[1][0]
     wrong_controller = ControllerSettings(inertia_kg_m2=0.01, damping_nm_s_rad=0.5)
     wrong = fit_epochs(epochs, "iv", settings.model_copy(update={"controller": wrong_controller}))[
         1

@@ -100,8 +100,7 @@ def jittered(epoch, number):
     return replace(epoch, channels=channels)
 
 
-def found(epochs, settings, method):
-    prepared = prepare(epochs, settings)
+def found(prepared, method):
     estimator = method_named(method)
     fits, pooled = estimator.fit(prepared, None, lambda _: None, True)
     return checked_together(prepared, fits, pooled, estimator)[:2]
@@ -111,14 +110,20 @@ def found(epochs, settings, method):
 @pytest.mark.parametrize("voluntary_sd_nm", [0.0, 0.2])
 def test_a_joint_of_three_parameters_leaves_noise(simulated, voluntary_sd_nm, method):
     settings, epochs = simulated(3, voluntary_sd_nm=voluntary_sd_nm, seed=4)
-    for fits in found(epochs, settings, method):
+    for fits in found(prepare(epochs, settings), method):
         assert {f.name for fit in fits for f in fit.findings} <= {"loop_bias"}
 
 
-@pytest.mark.parametrize("method", ["iv", "spectral", "bandlimited"])
-def test_what_is_not_the_joint_is_told_in_each_epoch_and_of_all(simulated, method):
+@pytest.fixture(scope="module")
+def softened_epochs(simulated):
+    """Return epochs whose drive and delay the methods find once for all of them."""
     settings, epochs = simulated(3, voluntary_sd_nm=0.1, seed=4)
-    fits, pooled = found([softened(epoch) for epoch in epochs], settings, method)
+    return prepare([softened(epoch) for epoch in epochs], settings)
+
+
+@pytest.mark.parametrize("method", ["iv", "spectral", "bandlimited"])
+def test_what_is_not_the_joint_is_told_in_each_epoch_and_of_all(softened_epochs, method):
+    fits, pooled = found(softened_epochs, method)
     for fit in (*fits, *pooled):
         (finding,) = (f for f in fit.findings if f.name == "lack_of_fit")
         assert finding.level == "doubt"
@@ -134,7 +139,7 @@ def test_stamps_of_real_time_change_nothing(simulated, count):
     soft = [softened(epoch) for epoch in epochs]
     values = []
     for kind in (soft, [jittered(epoch, k) for k, epoch in enumerate(soft)]):
-        fits, _ = found(kind, settings, "iv")
+        fits, _ = found(prepare(kind, settings), "iv")
         found_in = [f for fit in fits for f in fit.findings if f.name == "lack_of_fit"]
         values.append([f.value for f in found_in])
         assert len(values[-1]) == count
