@@ -43,6 +43,7 @@ from tests.faults.session import VIRTUAL, settings_for
 from tests.faults.written_ring import Ring
 from tests.wire.rig_process import RigProcess
 
+from rigidimeter.guard import Cause
 from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.sample_reading import read_samples
 
@@ -52,6 +53,8 @@ SINGLE = ("CONSOLE", "LOOP", "RECORDER")
 TARGETS = (*((one,) for one in SINGLE), *itertools.combinations(SINGLE, 2), SINGLE)
 CASES = tuple(itertools.product(SIGNALS, TARGETS))
 MOVES_RAD_S = 0.02
+TRIES = 50
+"""A session that ended before the signal is replaced by so many others."""
 STOPPED_S = 4.0
 """What was stopped is continued after that time, if it has not been ended."""
 ALL_OVER_S = 30.0
@@ -107,7 +110,7 @@ def start(rig: Path, folder: Path) -> tuple[subprocess.Popen[bytes], dict[str, i
     if "MEMORY" not in first:  # it is how the session ended
         process.wait()
         process.stdout.close()
-        raise EndedItselfError
+        raise EndedItselfError(line.decode())
     stem = first.pop("MEMORY")
     return process, {role: pid for role, pid in first.items() if pid}, Ring(stem)
 
@@ -137,7 +140,7 @@ def one_kill(
         at_s, newest = time.monotonic(), ring.newest()
         session_s = float(newest["time_s"])
         if newest["cause"]:
-            raise EndedItselfError
+            raise EndedItselfError(Cause(int(newest["cause"])).sentence)
         for role in roles:
             with suppress(ProcessLookupError):
                 os.kill(pids[role], number)
@@ -297,17 +300,16 @@ def run(kills: int, seed: int, rigs: tuple[str, ...] = ("virtual", "canopen")) -
 
 def tried(rig: str, number: int, roles: tuple[str, ...], wait_s: float) -> Killed:
     """Run one session; another in its place if it ended before the signal."""
-    for _ in range(10):
-        with (
-            tempfile.TemporaryDirectory() as made,
-            ExitStack() as stack,
-            suppress(EndedItselfError),
-        ):
+    for _ in range(TRIES):
+        with tempfile.TemporaryDirectory() as made, ExitStack() as stack:
             bench: Any = None
             if rig == "canopen":
                 bench = stack.enter_context(RigProcess(Path(made) / "RIG.toml"))
-            return one_kill(bench, number, roles, wait_s, Path(made) / "s")
-    raise AssertionError("ten sessions ended before the signal: the machine is too busy")
+            try:
+                return one_kill(bench, number, roles, wait_s, Path(made) / "s")
+            except EndedItselfError as ended:
+                print(f"     ended before the signal: {ended}", file=sys.stderr, flush=True)
+    raise AssertionError(f"{TRIES} sessions ended before the signal: the machine is too busy")
 
 
 def main() -> None:
