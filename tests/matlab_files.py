@@ -11,8 +11,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from rigidimeter.recording.formats.mat_objects import mat_io
+
 
 def table(columns: Mapping[str, np.ndarray], units: Sequence[str]) -> object:
+    mat_io(Path(), "")  # without its warnings
     from matio.utils.converters.mattables import table_to_mat
     from matio.utils.matclass import MatlabOpaque
 
@@ -25,6 +28,7 @@ def timetable(
     columns: Mapping[str, np.ndarray], units: Sequence[str], times: np.ndarray | float
 ) -> object:
     """`times` are durations or dates, or the rate in samples/s."""
+    mat_io(Path(), "")
     from matio.utils.converters.mattables import timetable_to_mat
     from matio.utils.matclass import MatlabOpaque
 

@@ -20,7 +20,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.exported_session import Stream
 from rigidimeter.recording.formats.clocked_table import TIME, table_of_streams, unique
 from rigidimeter.recording.formats.mat_check import check_mat5
-from rigidimeter.recording.formats.stored_arrays import Expansion, Stored
+from rigidimeter.recording.formats.stored_arrays import Expansion, Stored, silent
 from rigidimeter.recording.formats.table import Table, table_of_arrays
 
 _OBJECTS = "V1"
@@ -37,7 +37,8 @@ def mat_io(path: Path, name: str) -> Any:
         If it is not installed; the message names an object of the file.
     """
     try:
-        import matio
+        with silent("matio"):  # it sets an option that pandas calls deprecated
+            import matio
     except ImportError:
         raise UserError(
             f"{path}: {name[:60]} is a table or another object of a MATLAB class, which needs one "
