@@ -61,6 +61,9 @@ def find_offset(
     sos = scipy.signal.butter(2, [BAND_HZ[0], high_hz], "bandpass", fs=rate_hz, output="sos")
     target = scipy.signal.sosfiltfilt(sos, target - target.mean())
     regressors = scipy.signal.sosfiltfilt(sos, regressors - regressors.mean(axis=1, keepdims=True))
+    # At the ends the filter was starting: those of the motion are then no torque of the joint.
+    edge = min(int(_EDGE_S * rate_hz), target.size // 8, regressors.shape[1] // 8)
+    target, regressors = target[edge:-edge], regressors[:, edge:-edge]
     lags, explained = _explained(target, regressors)
     best = int(np.argmax(explained))
     near = np.abs(lags - lags[best]) <= _APART_S * rate_hz
@@ -75,26 +78,38 @@ def find_offset(
             "that repeats; give the offset in seconds"
         )
     starts_s = torque[0][0] - motion[0][0]
+    at = np.arange(target.size) - lags[best]
+    inside = (at >= 3) & (at <= regressors.shape[1] - 4)
+    part, at = target[inside], at[inside]
+    index = np.arange(regressors.shape[1])
+    curves = [scipy.interpolate.CubicSpline(index, row) for row in regressors]
 
-    edge = min(int(_EDGE_S * rate_hz), target.size // 8, regressors.shape[1] // 8)
-
-    def left(shift: float) -> float:
-        return _left(target, regressors, shift, edge)
+    def left(shift: float) -> Array:
+        return _left(part, np.column_stack([curve(at - shift) for curve in curves]))
 
     found = scipy.optimize.minimize_scalar(
-        left, bounds=(lags[best] - 1.5, lags[best] + 1.5), method="bounded",
+        lambda shift: float(np.sum(left(shift) ** 2)), bounds=(-1.5, 1.5), method="bounded",
         options={"xatol": 1e-4},
     )  # fmt: skip
-    shift, step = float(found.x), 0.5
-    curvature = (left(shift + step) - 2 * found.fun + left(shift - step)) / step**2
-    # In a band only so many samples are independent.
-    free = max(2 * (high_hz - BAND_HZ[0]) / rate_hz * target.size - 4, 1.0)
-    variance = 2.0 * float(found.fun) / free * (1.0 if curvature > 0 else np.inf) / abs(curvature)
+    shift = float(found.x)
+    residual, slope = left(shift), left(shift + 0.5) - left(shift - 0.5)
+    free = max(2 * (high_hz - BAND_HZ[0]) / rate_hz * part.size - 4, 1.0)
     return Offset(
-        float(starts_s + shift / rate_hz),
-        float(np.sqrt(variance)) / rate_hz,
-        1.0 - float(found.fun),
+        float(starts_s + (lags[best] + shift) / rate_hz),
+        _error(residual, slope) * np.sqrt((free + 4) / free) / rate_hz,
+        1.0 - float(found.fun) / float(part @ part),
     )
+
+
+def _error(residual: Array, slope: Array) -> float:
+    """Return the standard error of a shift from what is left, and its slope over the shift.
+
+    To first order the shift is wrong by Σ z e / Σ z², with z the slope and e the noise, of which
+    the filter and the joint's own torque leave an uneven spectrum S. So the variance is
+    Σ |Z|² S / (Σ z²)² over the frequencies, with the periodogram of what is left for S.
+    """
+    spectra = np.abs(scipy.fft.fft(slope) * scipy.fft.fft(residual)) ** 2
+    return float(np.sqrt(np.sum(spectra)) / (slope @ slope)) / residual.size
 
 
 def _grid(stamps: Array, values: Array, rate_hz: float) -> Array:
@@ -125,26 +140,15 @@ def _explained(target: Array, regressors: Array) -> tuple[NDArray[np.int_], Arra
     lags = np.arange(-m + 1, n)
     crossed = crossed[:, lags]  # negative lags from the end
     gram = np.linalg.inv(regressors @ regressors.T)
-    explained = np.einsum("ik,ij,jk->k", crossed, gram, crossed) / float(target @ target)
-    overlap = np.minimum(lags + m, n) - np.maximum(lags, 0)
-    return lags, np.where(overlap >= _LEAST_OVERLAP * min(n, m), explained, 0.0)
+    start, stop = np.maximum(lags, 0), np.minimum(lags + m, n)
+    power = np.concatenate([[0.0], np.cumsum(target**2)])
+    shares = np.einsum("ik,ij,jk->k", crossed, gram, crossed)
+    explained = shares / np.maximum(power[stop] - power[start], np.finfo(float).tiny)
+    return lags, np.where(stop - start >= _LEAST_OVERLAP * min(n, m), explained, 0.0)
 
 
-def _left(target: Array, regressors: Array, shift: float, edge: int) -> float:
-    """Return the share of the torque that is left where the motion is shifted by samples.
-
-    `edge` samples at each end, where the filter was starting, do not count: they are those of the
-    filter and move the offset by several of its standard errors.
-    """
-    at = np.arange(target.size) - shift
-    inside = (at >= edge + 1) & (at <= regressors.shape[1] - 2 - edge)
-    inside[:edge] = inside[inside.size - edge :] = False
-    index = np.arange(regressors.shape[1])
-    moved = np.column_stack(
-        [scipy.interpolate.CubicSpline(index, row)(at[inside]) for row in regressors]
-    )
-    moved /= np.linalg.norm(moved, axis=0)
-    part = target[inside]
+def _left(part: Array, moved: Array) -> Array:
+    """Return the torque that the moved motion leaves."""
+    moved = moved / np.linalg.norm(moved, axis=0)
     solution, *_ = np.linalg.lstsq(moved, part, rcond=None)
-    residual = part - moved @ solution
-    return float(residual @ residual) / float(part @ part)
+    return np.asarray(part - moved @ solution, dtype=np.float64)
