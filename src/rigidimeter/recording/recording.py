@@ -165,17 +165,32 @@ def read(
         named = dict(zip(asked, conditions, strict=True))
         return read_as(named, options, chosen, leave_out, progress)
     with noted_digests() as digests:
-        tables = [read_table(path, options) for path in asked]
-        joined, found_offset = join_tables(tables, options, clock_offset)
-        of_joined = replace(joined_options(options), condition=conditions[0])
-        epochs, notices = epochs_from_table(joined, of_joined)
+        epochs, notices = read_joined(
+            asked, replace(options, condition=conditions[0]), clock_offset
+        )
     used = chosen or load_settings(None)
-    if found_offset is not None and epochs:
-        notices.insert(0, offset_notice(found_offset, tables[1].source))
-        epochs = [replace(epoch, clock_error_s=found_offset.error_s) for epoch in epochs]
     paths_read = tuple(dict.fromkeys(asked))
     joined_recording = Recording(tuple(epochs), tuple(notices), used, paths_read, digests)
     return _complete(joined_recording, leave_out)
+
+
+def read_joined(
+    paths: Sequence[Path], options: ReadOptions, clock_offset: float | str | None
+) -> tuple[list[Epoch], list[Notice]]:
+    """Return the epochs of paths that are parts of one recording.
+
+    Raises
+    ------
+    UserError
+        If they cannot be read, or do not belong together.
+    """
+    tables = [read_table(path, options) for path in paths]
+    joined, found = join_tables(tables, options, clock_offset)
+    epochs, notices = epochs_from_table(joined, joined_options(options))
+    if found is not None and epochs:
+        notices.insert(0, offset_notice(found, tables[1].source))
+        epochs = [replace(epoch, clock_error_s=found.error_s) for epoch in epochs]
+    return epochs, notices
 
 
 def read_as(

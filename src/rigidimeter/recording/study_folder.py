@@ -27,14 +27,17 @@ from rigidimeter.recording.study_toml import STUDY_FILE, StudyToml, read_study_t
 from rigidimeter.records import Notice
 
 TABLE_COLUMNS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "sessions": (("path", "subject", "day", "condition"), ("part", "mapping", "note")),
+    "sessions": (
+        ("path", "subject", "day", "condition"),
+        ("part", "mapping", "join", "clock_offset", "note"),
+    ),
     "ratings": (("subject", "day", "condition", "examiner", "score"), ("note",)),
     "exclusions": (("path", "epoch", "reason"), ("by", "note")),
     "key": (("code", "condition"), ("note",)),
 }
 """The columns of each table: those that it must have, and those that it may have."""
 
-_MAY_BE_EMPTY = ("note", "part", "by", "mapping")
+_MAY_BE_EMPTY = ("note", "part", "by", "mapping", "join", "clock_offset")
 
 
 @dataclass(frozen=True)

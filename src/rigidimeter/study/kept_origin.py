@@ -147,7 +147,7 @@ def places_of(read: StudyFolder) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     root = place_of(read.folder)
     for row in read.sessions:
-        for name in filter(None, (row["path"], row["mapping"] or read.about.mapping)):
+        for name in filter(None, (row["path"], row["join"], row["mapping"] or read.about.mapping)):
             path = read.folder / name
             if name in found or is_outside(name):
                 continue

@@ -15,9 +15,11 @@ from rigidimeter.documents import noted_digests, open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording import ReadOptions, is_session, read_recording
+from rigidimeter.recording.channels.joining import FOUND
 from rigidimeter.recording.channels.mapping_file import read_mapping
 from rigidimeter.recording.event_log import read_events
 from rigidimeter.recording.formats import reader_of, recorded_settings
+from rigidimeter.recording.recording import read_joined
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES
 from rigidimeter.recording.study_folder import Row, StudyFolder
 from rigidimeter.recording.study_toml import is_outside
@@ -208,7 +210,11 @@ def _read(
                 f"{path}: the session was interrupted and never closed; close it with "
                 f"`rigidimeter recover {path}`"
             )
-    epochs, said = read_recording(path, _options(read, row, noted, digests))
+    options = _options(read, row, noted, digests)
+    if row["join"]:
+        epochs, said = _joined(read.folder, row, options, noted, digests)
+    else:
+        epochs, said = read_recording(path, options)
     epochs, differing = _of_condition(path, row, condition, beside, epochs, names)
     said = [*said, *differing]
     tasks = [task_of(epoch, settings or Settings()) for epoch in epochs]
@@ -252,6 +258,26 @@ def _options(
     options = read_mapping(read.folder / named)
     digests[source_of(named)] = noted[read.folder / named]
     return options
+
+
+def _joined(
+    folder: Path,
+    row: Row,
+    options: ReadOptions,
+    noted: Mapping[Path, str],
+    digests: dict[str, str],
+) -> tuple[list[Epoch], list[Notice]]:
+    """Read a recording whose torque and motion are in two files, each with its clock."""
+    other, offset = row["join"], row["clock_offset"]
+    if is_outside(other):
+        raise _Refused(f"join is {other}, outside the study folder; copy the file into it")
+    found = read_joined(
+        [folder / row["path"], folder / other],
+        options,
+        row.number("clock_offset") if offset not in ("", FOUND) else offset or None,
+    )
+    digests[source_of(other)] = noted[folder / other]
+    return found
 
 
 def _differs(path: Path, row: Row, before: Sequence[Row], names: Naming) -> None:

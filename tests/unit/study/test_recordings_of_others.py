@@ -11,6 +11,7 @@ from tests.archive_files import write_bids_motion, write_nwb
 from tests.instrument_files import Signal
 from tests.known_joint import angle_rad, torque_nm
 
+from rigidimeter.errors import UserError
 from rigidimeter.exporting import export_sessions, sessions_of_recording
 from rigidimeter.recording import read
 from rigidimeter.study import read_study
@@ -95,3 +96,37 @@ def test_mappings_of_the_study_and_of_single_sessions(tmp_path: Path) -> None:
         np.testing.assert_allclose(
             channels["angle_rad"].values, angle_rad(TIME_S, seed), atol=1e-11
         )
+
+
+@pytest.mark.parametrize("offset", ["0.375", "found"])
+def test_torque_and_motion_in_two_files_each_with_its_clock(tmp_path: Path, offset: str) -> None:
+    (tmp_path / "study.toml").write_text(TOML.replace('mapping = "lab.toml"\n', ""))
+    rows = ["path,subject,day,condition,join,clock_offset"]
+    for day, condition in enumerate(("OFF", "DBS")):
+        torque, motion = f"m{day}.csv", f"a{day}.csv"
+        for name, head, values, late_s in (
+            (torque, "t [s],M [Nm]", torque_nm(TIME_S, day), 0.0),
+            (motion, "t [s],phi [rad]", angle_rad(TIME_S, day), 0.375),
+        ):
+            columns = np.column_stack([TIME_S - late_s, values])
+            np.savetxt(tmp_path / name, columns, "%.17g", ",", header=head, comments="")
+        rows.append(f"{torque},S1,{day + 1},{condition},{motion},{offset}")
+    (tmp_path / "sessions.csv").write_text("\n".join(rows) + "\n")
+    found = read_study(tmp_path)
+    assert [epoch.condition for epoch in found.epochs] == ["OFF", "DBS"]
+    assert {"m0.csv", "a0.csv"} <= set(found.gathered.digests)
+    for day, epoch in enumerate(found.epochs):
+        angle = epoch.channels["angle_rad"]
+        wanted = angle_rad(angle.time_s, day)
+        assert np.abs(angle.values - wanted).max() < (1e-9 if offset != "found" else 1e-4)
+        assert (epoch.clock_error_s > 0) == (offset == "found")
+
+
+def test_a_file_to_join_that_lies_elsewhere_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(TOML.replace('mapping = "lab.toml"\n', ""))
+    (tmp_path / "sessions.csv").write_text(
+        "path,subject,day,condition,join\nm.csv,S1,1,OFF,../a.csv\n"
+    )
+    np.savetxt(tmp_path / "m.csv", [[0, 0], [1, 1]], header="t_s,M_Nm", delimiter=",", comments="")
+    with pytest.raises(UserError, match=r"join is \.\./a\.csv, outside the study folder"):
+        read_study(tmp_path)
