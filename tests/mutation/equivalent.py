@@ -1,7 +1,7 @@
 """Mutants that do the same as the module, by name, each with the reason."""
 
 SLOWER = "looks closer where it need not; what it finds there does not limit"
-NEAR = "step.py guard_step: "
+NEAR = "step.py _fastest_toward: "
 ANSWER = "torque_answer.py "
 SIGN = "torque_sign.py "
 STEP = "consistency.py consistency_step: "
@@ -62,8 +62,8 @@ EQUIVALENT: dict[str, str] = {
     "self._control is not Control.DISABLE_VOLTAGE": "a bus that was closed was told to disable",
     "ascii/drive.py AsciiDrive._check_horizon: now_s - self._commanded_s > "
     "self._settings.horizon_s → now_s - self._commanded_s >= self._settings.horizon_s": MOMENT,
-    "ascii/drive.py AsciiDrive._try: self._line is not None and self._speaking → "
-    "self._speaking": "nothing is spoken to without a port",
+    "ascii/drive.py AsciiDrive._try: self._line is None or not self._speaking → "
+    "not self._speaking": "nothing is spoken to without a port",
     "tracking.py minimum_jerk: elapsed_s >= duration_s → elapsed_s > duration_s": "at its end the "
     "polynomial and its derivative are 0, too",
     "step.py guard_step: 1 → 0": "elapsed_ticks if not given: none counts as one",
@@ -71,13 +71,15 @@ EQUIVALENT: dict[str, str] = {
     "speed * speed * (2.0 * limits.acceleration_rad_s2)": SLOWER,
     NEAR + "2.0 * limits.acceleration_rad_s2 → 2.0 / limits.acceleration_rad_s2": SLOWER,
     NEAR + "2.0 → 1.9801980198019802": SLOWER,
-    NEAR + "if left < speed * (reach_s + dt + held_s) + stopping: ... → if True: ...": SLOWER,
-    NEAR + "left < speed * (reach_s + dt + held_s) + stopping → "
-    "left <= speed * (reach_s + dt + held_s) + stopping": SLOWER,
-    NEAR + "reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found] → "
+    NEAR + "if left >= speed * (reach_s + limits.interval_s + held_s) + stopping: ... → "
+    "if False: ...": SLOWER,
+    NEAR + "left >= speed * (reach_s + limits.interval_s + held_s) + stopping → "
+    "left > speed * (reach_s + limits.interval_s + held_s) + stopping": SLOWER,
+    NEAR + "1 → 0": "a whole round of the ring is where it began",
+    "step.py _gravest: reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found] → "
     "REACTIONS[reported] >= REACTIONS[found]": "no cause has the least reaction: both are none",
-    NEAR
-    + "if found != _NO_CAUSE: ... → if True: ...": "no cause changes neither cause nor reaction",
+    "step.py guard_step: if found != _NO_CAUSE: ... → if True: ...": "no cause changes neither it "
+    "nor the reaction",
     "step.py _farthest_in_flight: 1 → 0": "none back gives 0, which is where it starts",
     "step.py _stoppable_speed: distance_rad <= 0.0 → distance_rad < 0.0": "the root gives 0, too",
     "session_run.py run_session: 0 → 1": "the next number where no epoch is planned: none repeats",

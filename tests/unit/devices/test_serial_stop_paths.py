@@ -58,6 +58,7 @@ class Serial:
         drive._line = AsciiLine(self.port, self.clock)
         # As `enable` leaves it.
         drive._speaking = drive._configured = drive._powered = drive._commanding = True
+        drive._said_off = False
         drive._cycle_s, drive._commanded_s = 0.01, self.clock.time_s
         drive._feedback.begin(0, 0, 0, self.clock.time_s)
 
@@ -147,6 +148,20 @@ def test_an_end_that_is_not_confirmed_is_a_drive_that_is_lost(serial, reply, end
     serial.port.replies |= {"t 0": reply, "s r0x24 0": reply}
     getattr(serial.drive, end)()
     assert serial.drive._feedback.cause is Cause.DRIVE_LOST
+
+
+def test_the_power_is_gone_when_the_drive_has_said_so(serial):
+    assert serial.drive.powered
+    for reply, powered in ((None, True), ("e 1", True), ("ok", False), (None, False)):
+        serial.port.replies["s r0x24 0"] = reply
+        serial.drive.disable()
+        assert serial.drive.powered is powered
+
+
+def test_the_power_of_a_drive_that_cannot_be_asked_is_not_known_to_be_gone(serial):
+    serial.drive._speaking = False
+    serial.drive.disable()
+    assert serial.drive.powered
 
 
 def test_serial_close_takes_the_power_and_closes_the_port(serial):

@@ -37,7 +37,7 @@ def step(
     torque_age_s=0.0,
     reported=Cause.NONE,
     elapsed=1,
+    disagreement=Cause.NONE,
 ):
-    return guard_step(
-        limits, state, request, torque, angle, velocity, age_s, torque_age_s, reported, elapsed
-    )
+    readings = (torque, angle, velocity, age_s, torque_age_s)
+    return guard_step(limits, state, request, *readings, reported, elapsed, disagreement)

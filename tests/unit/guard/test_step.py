@@ -231,6 +231,32 @@ def test_of_two_causes_at_once_the_graver_is_named():
     assert (found.cause, found.reaction) == (Cause.TORQUE_NOT_FINITE, Reaction.RAMP)
 
 
+@pytest.mark.parametrize(
+    ("readings", "named"),
+    [
+        ({}, Cause.MOVED_AT_REST),
+        ({"torque": 11.0}, Cause.MOVED_AT_REST),  # a hold is weaker
+        ({"torque": math.nan}, Cause.TORQUE_NOT_FINITE),  # as grave: what the tick itself shows
+        ({"reported": Cause.OPERATOR_HALT}, Cause.OPERATOR_HALT),
+    ],
+)
+def test_a_disagreement_is_named_where_it_is_the_gravest(readings, named):
+    limits = LIMITS._replace(torque_nm=10.0)
+    state, _, _ = step(at(), limits=limits, disagreement=Cause.MOVED_AT_REST, **readings)
+    assert state.cause == named
+
+
+def test_what_may_be_in_flight_is_all_that_the_ring_holds():
+    """Of 21 ticks at 2 rad/s, where nobody knows how old the angle is: 5.25 rad."""
+    state = at(2.0, BINARY)
+    for k in range(1, 22):
+        state, _, _ = step(state, 2.0, limits=BINARY, angle=53.375 + 0.25 * k)
+    assert state.velocity_rad_s == 2.0
+    _, sent, _ = step(state, 2.0, limits=BINARY, angle=58.625, age_s=1e300)
+    held_s, left_rad = BINARY.interval_s + BINARY.gap_s, 64.0 - 58.625 - 5.25
+    assert sent * held_s + sent**2 / (2.0 * 8.0) == pytest.approx(left_rad)
+
+
 def test_of_two_as_grave_the_one_that_was_reported_is_named():
     state, _, _ = step(at(), torque=math.nan, reported=Cause.TORQUE_STATUS)
     assert (state.cause, state.reaction) == (Cause.TORQUE_STATUS, Reaction.RAMP)

@@ -86,7 +86,7 @@ def test_only_epochs_with_the_same_lines_are_added(observations) -> None:
     assert len(same_lines([two, *observations])) == 4  # two periods have the lines of three
     grid = two.lines.grid
     other = dataclasses.replace(grid, omega_rad_s=1.01 * grid.omega_rad_s)
-    moved = two._replace(lines=dataclasses.replace(two.lines, grid=other))
+    moved = dataclasses.replace(two, lines=dataclasses.replace(two.lines, grid=other))
     assert same_lines([moved, *observations]) == observations
     assert same_lines([]) == []
 
