@@ -138,7 +138,12 @@ DIALECTS: Mapping[str, Dialect] = {
     "degrees about 40 stated as rad": Dialect(
         "r.csv", csv("time_s,torque_nm,Angle [rad]", T, M, D + 40)
     ),
-    "2 kHz in ms stated as s": Dialect("r.csv", csv("time_s,torque_nm,angle_rad", MILLI * T, M, A)),
+    "ms stated as s": Dialect(
+        "r.csv", csv("time_s,torque_nm,angle_rad", MILLI * T, M, A), refused="--unit time=ms"
+    ),
+    "ticks of half a millisecond": Dialect(
+        "r.csv", csv("time,torque_nm,angle_rad", 2 * MILLI * T, M, A), refused="if it counts ticks"
+    ),
     "exchanged": Dialect("r.csv", csv("time_s,torque_nm,angle_rad", T, A, M), refused="exchanged"),
     "reaction": Dialect("r.csv", csv("time_s,torque_nm,angle_rad", T, -M, A)),
     "angle reversed": Dialect("r.csv", csv("time_s,torque_nm,angle_rad", T, M, -A)),

@@ -39,6 +39,10 @@ Array = NDArray[np.float64]
 LARGEST_EMG_V = 20.0
 """Amplifiers of EMG give at most ±10 V or so."""
 
+_WHOLE = 1e-6
+_MS_IN_2001 = 1e12
+"""Milliseconds since 1970, in September 2001."""
+
 
 @dataclass(frozen=True)
 class TableChannels:
@@ -130,6 +134,18 @@ def numbers_rows(taken: Mapping[str, Taken], raw: Mapping[str, Array]) -> bool:
     )
 
 
+def may_be_ticks(raw: Mapping[str, Array]) -> bool:
+    """Whether the times are whole numbers, as those of a clock of any rate are.
+
+    Milliseconds since 1970 are told from them: a clock with some ticks a millisecond, which could
+    be taken for them, would have run for years.
+    """
+    time = raw.get("time_s", np.empty(0))
+    time = time[np.isfinite(time)]
+    whole = bool(np.all(np.abs(time - np.round(time)) < _WHOLE))
+    return bool(time.size) and whole and float(np.min(time)) < _MS_IN_2001
+
+
 def _about_emg(table: Table, values: Mapping[str, Array]) -> list[Notice]:
     emg = np.abs(values.get("emg_v", np.empty(0)))
     largest = float(np.max(emg, initial=0.0, where=np.isfinite(emg)))
@@ -174,6 +190,8 @@ def _unstated(
         text += "; or --scale 'torque=0.001 Nm', if its values are counts of that size"
     if numbers_rows(choice.taken, raw):
         text += f"; or --rate-hz, if {choice.taken['time_s'].column!r} numbers the samples"
+    elif "time_s" in vary and may_be_ticks(raw):
+        text += "; or --scale 'time=0.0001 s', if it counts ticks of that length"
     return [text, *(readings(choice.taken, raw, rate_hz, vary) if usable else [])]
 
 
@@ -217,5 +235,7 @@ def _doubtful(
         text += f"; say {options_text(vary)}"
         if one.standard == "time_s" and numbers_rows(taken, raw):
             text += ", or --rate-hz if it numbers the samples"
+        elif one.standard == "time_s" and may_be_ticks(raw):
+            text += ", or --scale 'time=0.0001 s' if it counts ticks of that length"
         faults += [text, *readings(taken, signed, rate_hz, vary)]
     return faults, warnings

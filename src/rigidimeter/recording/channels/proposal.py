@@ -2,7 +2,8 @@
 
 The numbers decide a unit where every other usual one is impossible, the torque among several
 columns where one alone belongs to the motion, and its sign. The unit of a torque, a lever arm and a
-calibration they never decide, nor whether 0, 1, 2 are milliseconds or sample numbers.
+calibration they never decide, nor whether 0, 1, 2 are milliseconds or sample numbers, and 0, 5, 10
+milliseconds or ticks of another clock: each has a rate and a joint that are possible.
 """
 
 from __future__ import annotations
@@ -15,7 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.channels.channels_of_table import channels_of_table, numbers_rows
+from rigidimeter.recording.channels.channels_of_table import (
+    channels_of_table,
+    may_be_ticks,
+    numbers_rows,
+)
 from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
 from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.channels.looks import Array, Look
@@ -135,7 +140,7 @@ def _units(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOption
         for name in vary
         if name != "torque_nm" and not _unknown_unit(choice.taken[name].column)
     ]
-    if "time_s" in vary and numbers_rows(choice.taken, raw):
+    if "time_s" in vary and may_be_ticks(raw):
         return options
     if not vary:
         return options

@@ -21,13 +21,17 @@ def inspected(options=None, **columns):
 
 
 def test_what_the_numbers_decide_is_proposed_and_reads_the_file():
-    found = inspected(time=1e3 * TIME_S, torque_nm=-TORQUE_NM, angle=ANGLE_DEG * 2)
+    # 400 samples/s: milliseconds that are not whole, so no ticks
+    time_s = np.arange(18000) / 400.0
+    found = inspected(
+        time=1e3 * time_s, torque_nm=-torque_nm(time_s), angle=np.degrees(angle_rad(time_s)) * 2
+    )
     assert found.proposal.unsaid == ()
     assert option_words(found) == [
         "--unit", "time=ms", "--unit", "angle=deg", "--reaction", "--epoch-length-s", "20",
     ]  # fmt: skip
     read = channels_of_table(found.table, found.options)
-    np.testing.assert_allclose(read.values["angle_rad"], 2 * ANGLE_RAD, rtol=1e-12)
+    np.testing.assert_allclose(read.values["angle_rad"], 2 * angle_rad(time_s), rtol=1e-12)
 
 
 def test_a_table_without_a_torque_is_told_so():
@@ -100,6 +104,20 @@ def test_a_wrong_mapping_is_refused(tmp_path, text, told):
     with pytest.raises(UserError, match=r"^.*lab\.toml: ") as caught:
         read_mapping(path)
     assert told in str(caught.value)
+
+
+@pytest.mark.parametrize("per_s", [300.0, 1000.0, 2000.0, 1e4])
+def test_ticks_of_a_clock_are_not_taken_for_milliseconds(per_s):
+    """2,000 ticks/s at 200 samples/s look like ms at 100: J would be 4 times too large."""
+    time_s = np.arange(9000) / 100.0
+    columns = {"torque_nm": torque_nm(time_s), "angle_rad": angle_rad(time_s)}
+    found = inspected(time=per_s * time_s, **columns)
+    assert "--scale 'time=0.0001 s'" in found.proposal.unsaid[0]
+    said = inspected(
+        ReadOptions(scales={"time": f"{1 / per_s!r} s"}), time=per_s * time_s, **columns
+    )
+    assert said.proposal.unsaid == ()
+    np.testing.assert_allclose(said.proposal.seen.fit.value[0], 0.0063, rtol=0.1)
 
 
 @pytest.mark.parametrize("name", ["t", "time_s"])
