@@ -225,6 +225,9 @@ def _missing(table: Table, choice: Choice, what: str, standards: tuple[str, ...]
     taken = {one.column for one in choice.taken.values()}
     free = [name for name in table.columns if name not in taken]
     text = f"{table.source} {what}; its columns are {table.listed}"
+    if table.others:
+        name, why = next(iter(table.others.items()))
+        text += f" ({name} is no column but {why})"
     if not free:
         return [f"{text}, and none is left to be it"]
     ranked = [(alike(standard, name), standard, name) for standard in standards for name in free]

@@ -9,6 +9,7 @@ import functools
 import os
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, cast
 
@@ -66,10 +67,15 @@ def read_mat(path: Path, layout: Layout | None = None) -> Table:
     }
     try:
         return table_with_objects(path, objects, plain, Expansion(path, path.stat().st_size))
-    except Exception:
+    except MemoryError:
+        raise
+    except Exception as error:  # mat-io raises what comes up in a class that it does not know
         if all(entry.dtype.kind == "V" or entry.size < 2 for entry in plain.values()):
             raise
-        return table_of_arrays(str(path), entries)  # the columns beside objects that are not read
+        rest = table_of_arrays(str(path), entries)  # the columns beside them
+        reason = str(error).removeprefix(f"{path}: ") or type(error).__name__
+        unread = dict.fromkeys(objects, f"an object that is not read ({reason})")
+        return replace(rest, others={**rest.others, **unread})
 
 
 def _entries(path: Path, file: BinaryIO) -> tuple[dict[str, Stored], list[str]]:

@@ -10,6 +10,8 @@ import pytest
 from tests.matlab_files import save, table, timetable
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.channels.channels_of_table import channels_of_table
+from rigidimeter.recording.formats import ReadOptions, mat_file
 from rigidimeter.recording.formats.mat_file import read_mat
 from rigidimeter.recording.formats.text_head import Layout
 
@@ -136,4 +138,25 @@ def test_without_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     with pytest.raises(UserError, match=r"'rigidimeter\[matlab\]'.*table2struct\(T1, 'ToScalar"):
         read_mat(MATLAB / "table.mat")
     found = read_mat(tmp_path / "r.mat")
-    assert (list(found.columns), list(found.others)) == (["more"], ["T"])
+    assert list(found.columns) == ["more"]
+    assert "'rigidimeter[matlab]'" in found.others["T"]
+    with pytest.raises(UserError, match=r"no column torque_nm.*T is no column but an object that"):
+        channels_of_table(found, ReadOptions())
+
+
+@pytest.mark.parametrize("error", [MemoryError, TypeError])
+def test_columns_beside_an_object_that_fails(tmp_path: Path, monkeypatch, error: type) -> None:
+    """They are read and the reason is kept; but the lack of memory is no fault of the object."""
+    save(tmp_path / "r.mat", T=table(COLUMNS, UNITS), more=np.arange(3.0))
+
+    def fails(*_: object) -> None:
+        raise error("of its own")
+
+    monkeypatch.setattr(mat_file, "table_with_objects", fails)
+    if error is MemoryError:
+        with pytest.raises(MemoryError):
+            read_mat(tmp_path / "r.mat")
+    else:
+        assert read_mat(tmp_path / "r.mat").others == {
+            "T": "an object that is not read (of its own)"
+        }
