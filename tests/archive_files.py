@@ -84,7 +84,8 @@ def write_nwb(path: Path, signals: Sequence[Signal]) -> None:
 def write_xlsx(path: Path, head: Sequence[str], columns: Sequence[np.ndarray]) -> None:
     import xlsxwriter
 
-    with xlsxwriter.Workbook(path) as book:
+    dates = {"default_date_format": "dd.mm.yyyy hh:mm:ss.000"}
+    with xlsxwriter.Workbook(path, dates) as book:
         sheet = book.add_worksheet("Trial 1")
         sheet.write_row(0, 0, head)
         for row, values in enumerate(zip(*columns, strict=True), start=1):
@@ -133,11 +134,12 @@ def write_arrow(path: Path, names: Sequence[str], columns: Sequence[np.ndarray],
     import pyarrow as pa
     import pyarrow.parquet
 
+    arrays = list(map(pa.array, columns))
     fields = [
-        pa.field(name, pa.float64(), metadata={"unit": unit} if unit else None)
-        for name, unit in zip(names, units, strict=True)
+        pa.field(name, column.type, metadata={"unit": unit} if unit else None)
+        for name, column, unit in zip(names, arrays, units, strict=True)
     ]
-    table = pa.Table.from_arrays(list(map(pa.array, columns)), schema=pa.schema(fields))
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields))
     if path.suffix == ".parquet":
         pa.parquet.write_table(table, path)
         return

@@ -146,6 +146,10 @@ FILES: Mapping[str, Entry] = {
         "r.xlsx", archives.write_xlsx, ["Zeit [ms]", "Drehmoment [Nm]", "Winkel [°]"],
         [MILLI * T, M, D],
     ),
+    "Excel, dates": _one(
+        "r.xlsx", archives.write_xlsx, ["Zeitstempel", "Drehmoment [Nm]", "Winkel [°]"],
+        [_date(T).astype("datetime64[us]").tolist(), M, D],
+    ),
     "OpenDocument": _one(
         "r.ods", archives.write_ods, ["temps (s)", "couple (N.m)", "angle (°)"], [T, M, D]
     ),
@@ -184,6 +188,10 @@ FILES: Mapping[str, Entry] = {
         "set", archives.write_bids_motion, [TORQUE, SLOW], latency=True
     ),
     "Parquet": _one("r.parquet", archives.write_arrow, _COLUMNS, [T, M, D], ["s", "Nm", "deg"]),
+    "Parquet, dates": _one(
+        "r.parquet", archives.write_arrow, ["Zeitstempel", "M [Nm]", "phi [deg]"],
+        [_date(T), M, D], [""] * 3,
+    ),
     "Feather": _one(
         "r.feather", archives.write_arrow, ["t_ms", "M_Nm", "phi_deg"], [MILLI * T, M, D], [""] * 3
     ),

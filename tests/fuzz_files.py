@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from tests import archive_files as archives
 from tests import instrument_files as instruments
+from tests import matlab_files as matlab
 from tests.instrument_files import Signal
 
 _TIME_S = np.arange(1200) / 100.0
@@ -34,6 +35,16 @@ def _biopac(path: Path) -> None:
     instruments.write_acq(path, _SIGNALS, compressed=True)
 
 
+def _matlab_table(path: Path) -> None:
+    columns = dict(zip("tMp", _COLUMNS, strict=True))
+    matlab.save(path, T=matlab.table(columns, ["s", "N*m", "deg"]))
+
+
+def _matlab_timetable(path: Path) -> None:
+    columns = dict(zip("Mp", _COLUMNS[1:], strict=True))
+    matlab.save(path, "v7.3", T=matlab.timetable(columns, ["N*m", "deg"], 100.0))
+
+
 def _in_set(folder: Path) -> None:
     archives.write_bids_motion(folder, _SIGNALS, latency=True)
 
@@ -52,6 +63,8 @@ FILES: tuple[Made, ...] = (
     ),
     _file("compressed .acq", "r.acq", _biopac),
     _file("LabVIEW text", "r.lvm", _labview),
+    _file("MATLAB table", "r.mat", _matlab_table),
+    _file("MATLAB timetable", "r.mat", _matlab_timetable),
     _file("XDF", "r.xdf", archives.write_xdf, _SIGNALS),
     _file("NWB", "r.nwb", archives.write_nwb, _SIGNALS),
     _file("Excel", "r.xlsx", archives.write_xlsx, _HEAD, _COLUMNS),

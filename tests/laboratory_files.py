@@ -58,6 +58,14 @@ def _lines(head: str, *columns, mark: str = ";", decimal: str = ",") -> bytes:
     return "\n".join([head, *rows]).encode()
 
 
+def _each_its_time() -> bytes:
+    """Return a torque and an angle of half the rate as Delsys writes them."""
+    slow = [f"{t:.6f},{d:.9g}" for t, d in zip(T[::2], D[::2], strict=True)]
+    slow += [","] * (T.size - len(slow))
+    rows = (f"{t:.6f},{m:.9g},{late}" for t, m, late in zip(T, M, slow, strict=True))
+    return "\n".join(["X[s],Torque [Nm],X[s],Elbow angle [deg]", *rows]).encode()
+
+
 _RESTART_S = np.concatenate([T[:HALF], T[:HALF]])
 _NOISE = np.random.default_rng(4).normal(size=T.size)
 _GERMAN = csv("Messung;Ellbogen rechts\nDatum;06.05.2024\n\nZeit [s];Drehmoment [Nm];Winkel [Grad]",
@@ -116,6 +124,22 @@ LABORATORY: Mapping[str, Dialect] = {
     ),
     "milliseconds since 1970": Dialect(
         "r.csv", csv("timestamp,torque (Nm),angle (deg)", 1.714e12 + MILLI * T, M, D, digits=16)
+    ),
+    "LabChart": Dialect(
+        "r.txt",
+        csv("Interval=\t5 ms\nExcelDateTime=\t4.5418E+04\t06/05/2024 10:19:12\nTimeFormat=\tStart "
+            "of block\nChannelTitle=\tTorque\tAngle\nRange=\t10 V\t10 V\nUnitName=\tNm\tdeg",
+            T, M, D, mark="\t"),
+    ),
+    "a time for each channel, two rates": Dialect("r.csv", _each_its_time()),
+    "decimal commas in quotes": Dialect(
+        "r.csv", _lines('"temps (s)","couple (Nm)","angle (degré)"', *(
+            [f'"{value:.6f}"'.replace(".", ",") for value in column] for column in (T, M, D)
+        ), mark=","),
+    ),
+    "names behind a per cent sign, small units": Dialect(
+        "r.txt", csv("% rate 200 Hz\n% t_us torque_mNm angle_mdeg", 1e6 * T, MILLI * M, MILLI * D,
+                     mark="  ", digits=10),
     ),
     "velocity alone, reaction": Dialect(
         "r.csv",

@@ -1,6 +1,7 @@
 """A part of the cases of the fuzzer, in one process: no traceback, only the output is changed."""
 
 import pytest
+from tests import fuzz
 from tests.fuzz import run_apart, run_case, run_here, warm
 from tests.fuzz_inputs import TARGETS
 
@@ -17,11 +18,27 @@ def test_damaged_inputs_are_read_or_refused(share):
     assert failed == []
 
 
-@pytest.mark.parametrize("case", [244, 258])
-def test_lengths_that_are_stated_take_no_memory(case):
-    """A name of 4 GB in a TDMS file, a first message of 2 GB in an Arrow stream."""
-    ((_, result),) = run_apart([case], 5)
+@pytest.mark.parametrize(
+    ("name", "sound", "damaged"),
+    [(".tdms file", b"\x0f\0\0\0wf_start_off", b"\xff\xff\xff\xffwf_start_off"),
+     ("Feather", b"ARROW1\0\0", b"ARRO\x98\0\0\0")],
+)  # fmt: skip
+def test_lengths_that_are_stated_take_no_memory(name, sound, damaged, monkeypatch):
+    """A name of 4 GB in a TDMS file, a first message of 1.3 GB in an Arrow stream."""
+    target = next(target for target in TARGETS if target.name == name)
+
+    def prepare(case, seed, folder):
+        target.make(folder)
+        path = folder / target.damaged
+        whole = path.read_bytes()
+        assert sound in whole
+        path.write_bytes(whole.replace(sound, damaged, 1))
+        return name, [*target.command]
+
+    monkeypatch.setattr(fuzz, "prepare", prepare)
+    ((_, result),) = run_apart([0], 5)
     assert result.failed == ""
+    assert result.refused
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.conversion import Conversion, conversion
 from rigidimeter.recording.channels.headers import Header, read_header
 from rigidimeter.recording.channels.quantities import BY_STANDARD, QUANTITIES
-from rigidimeter.recording.channels.unit_text import expression
+from rigidimeter.recording.channels.unit_text import expression, ratio
 from rigidimeter.recording.formats.table import Table, alike, nearest
 
 LABELS = ("epoch", "condition", "task")
@@ -140,7 +140,8 @@ def _may_be(standard: str, header: Header, said: Said) -> bool:
     try:
         conversion(standard, "", header.unit, "", "")
     except UserError:
-        return standard == "torque_nm"  # in V or N: a scale is what lacks
+        # In V or N: a scale is what lacks.
+        return standard == "torque_nm" and ratio(expression(header.unit), "second") is None
     return True
 
 
@@ -223,7 +224,10 @@ def _missing(table: Table, choice: Choice, what: str, standards: tuple[str, ...]
     if choice.faults:  # what was named and is not there, or does not fit
         return []
     taken = {one.column for one in choice.taken.values()}
-    free = [name for name in table.columns if name not in taken]
+    free = [
+        name for name, values in table.columns.items()
+        if name not in taken and any(letter.isdigit() for letter in str(values[:1]))
+    ]  # fmt: skip
     text = f"{table.source} {what}; its columns are {table.listed}"
     if table.others:
         name, why = next(iter(table.others.items()))

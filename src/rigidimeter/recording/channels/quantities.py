@@ -49,7 +49,8 @@ QUANTITIES = (
 BY_STANDARD: Mapping[str, Quantity] = {one.standard: one for one in QUANTITIES}
 
 _WORDS: Mapping[str, str] = {
-    "time": "time t zeit temps tempo tiempo timestamp timestamps secs uhrzeit heure ora hora clock",
+    "time": "time t zeit temps tempo tiempo timestamp timestamps secs uhrzeit "
+    "zeitstempel heure horodatage ora hora clock",
     "torque": "torque moment drehmoment couple coppia momento par trq tau mx my mz m",
     "force": "force kraft forza fuerza fx fy fz f",
     "angle": "angle ang winkel position pos angolo posizione angulo posicion theta phi alpha q "

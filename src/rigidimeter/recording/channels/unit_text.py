@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _SPELLED: Mapping[str, str] = {
     "degree": "deg degs degree degrees Grad grados gradi degre degres degré degrés °",
+    "millidegree": "mdeg",
     "radian": "rad rads radian radians Radiant radianti radianes radiani",
     "milliradian": "mrad",
     "turn": "rev revs revolution revolutions turn turns U tr giri giro",

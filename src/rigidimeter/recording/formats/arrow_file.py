@@ -56,6 +56,8 @@ def read_arrow(path: Path) -> Table:
         kind = table.schema.field(name).type
         if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
             columns[printable(name)] = _numbers(table[name])
+        elif pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
+            columns[printable(name)], units[printable(name)] = _seconds(table[name]), "s"
         elif pa.types.is_string(kind) or pa.types.is_large_string(kind) or _is_labels(kind):
             columns[printable(name)] = _texts(table[name])
         else:
@@ -79,6 +81,12 @@ def _is_labels(kind: Any) -> bool:
 
 def _numbers(column: Any) -> NDArray[np.float64]:
     return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
+
+
+def _seconds(column: Any) -> NDArray[np.float64]:
+    """Return dates or durations as seconds since the first."""
+    stamps = column.to_numpy()
+    return np.asarray((stamps - stamps[:1]) / np.timedelta64(1, "s"), dtype=np.float64)
 
 
 def _texts(column: Any) -> NDArray[Any]:

@@ -136,9 +136,11 @@ def _text(cell: object) -> str:
 def _column(cells: Sequence[Any]) -> tuple[NDArray[Any], bool]:
     """Return a column as numbers or texts, and whether it was dates or times, now in seconds."""
     filled = [cell for cell in cells if cell not in ("", None)]
-    if filled and all(isinstance(cell, dt.datetime) for cell in filled):
-        first = filled[0]
-        return _numbers(cells, lambda cell: (cell - first).total_seconds()), True
+    if any(isinstance(cell, dt.datetime) for cell in filled) and all(
+        isinstance(cell, dt.date) for cell in filled
+    ):
+        first = _when(filled[0])
+        return _numbers(cells, lambda cell: (_when(cell) - first).total_seconds()), True
     if filled and all(isinstance(cell, dt.timedelta) for cell in filled):
         return _numbers(cells, lambda cell: cell.total_seconds()), True
     if filled and all(isinstance(cell, dt.time) for cell in filled):
@@ -149,6 +151,11 @@ def _column(cells: Sequence[Any]) -> tuple[NDArray[Any], bool]:
     if all(isinstance(cell, int | float) and not isinstance(cell, bool) for cell in filled):
         return _numbers(cells, float), False
     return np.array([_text(cell) for cell in cells], dtype=object), False
+
+
+def _when(cell: dt.date) -> dt.datetime:
+    """Return a date as the midnight at which calamine gives it without a time of day."""
+    return cell if isinstance(cell, dt.datetime) else dt.datetime.combine(cell, dt.time())
 
 
 def _numbers(cells: Sequence[Any], number: Any) -> NDArray[np.float64]:

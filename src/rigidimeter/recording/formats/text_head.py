@@ -187,7 +187,7 @@ def _named(
         at -= 1
     else:
         units = None
-    for text in (lines[at] if at >= 0 else "", comment):
+    for text in (lines[at].lstrip("% ") if at >= 0 else "", comment):
         for mark in dict.fromkeys((delimiter, *DELIMITERS)):
             found = cells_of(text, mark)
             while len(found) > count and not found[-1].strip():

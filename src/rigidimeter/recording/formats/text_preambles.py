@@ -1,4 +1,4 @@
-"""The heads of text files that programs write: LabVIEW, BIOPAC AcqKnowledge and OpenSim."""
+"""The heads of text files of programs: LabVIEW, BIOPAC AcqKnowledge, LabChart and OpenSim."""
 
 from __future__ import annotations
 
@@ -29,6 +29,8 @@ def known_head(source: str, lines: Sequence[str]) -> Head | None:
     ends = [index for index, line in enumerate(lines) if line.strip().lower() == "endheader"]
     if ends and ends[0] + 1 < len(lines):
         return _opensim(source, lines, ends[0])
+    if lines[0].startswith("Interval="):
+        return _labchart(source, lines)
     if len(lines) > 3 and _PER_SAMPLE.fullmatch(lines[1].strip().rstrip(",;\t")):
         return _biopac(source, lines)
     return None
@@ -124,6 +126,27 @@ def _opensim(source: str, lines: Sequence[str], end: int) -> Head:
         if not header.unit and header.kind in by_kind
     }
     return Head(delimiter, names, end + 2, units)
+
+
+def _labchart(source: str, lines: Sequence[str]) -> Head:
+    """Read the head of LabChart's text: a key and a cell for each channel, the time before them."""
+    said: dict[str, list[str]] = {}
+    for line in lines:
+        key, equals, rest = line.partition("=")
+        if not equals:
+            break
+        said[key] = [cell.strip() for cell in rest.strip().split("\t")]
+    interval = re.fullmatch(r"([\d.,]+) (m?s)", said["Interval"][0])
+    if interval is None or not _number(interval[1]) or "ChannelTitle" not in said:
+        raise UserError(f"{source}: the head of this LabChart file is not complete")
+    names = checked_names(source, ["x axis", *said["ChannelTitle"]])
+    units = {
+        name: unit
+        for name, unit in zip(names[1:], said.get("UnitName", ()), strict=False)
+        if unit and unit != "*"
+    }
+    rate_hz = 1.0 / (_number(interval[1]) * _SECONDS[interval[2]])
+    return Head("\t", names, len(said), units, {"rate_hz": rate_hz})
 
 
 def _biopac(source: str, lines: Sequence[str]) -> Head:

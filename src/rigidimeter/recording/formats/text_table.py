@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -48,6 +48,7 @@ _CALIBRATION = re.compile(
     r"(?i)\d\s*[\w·.*°]+\s*(?:/|per)\s*(?:m?V|counts?|digits?|LSB|bits?)\b"
     r"|\d\s*(?:m?V|counts?|digits?|LSB|bits?)\s*(?:/|per)\s*[\w·.*°]+"
 )
+_SECONDS = re.compile(r"(?i)[^\[(]*[\[(]\s*s(?:ec)?\s*[\])](?: \(\d+\))?")
 _STAMP = re.compile(r"(\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d([.,]\d+)?")
 
 
@@ -175,7 +176,7 @@ def read_text_recording(path: Path, layout: Layout | None = None) -> Table:
         )
     if not text.lines.size:
         raise text.without_rows()
-    comma = text.delimiter != "," and re.search(rb"\d,\d", text.body) is not None
+    comma = _has_decimal_comma(text.delimiter, text.body)
     frame = text.parsed(decimal="," if comma else ".", low_memory=False)
     columns: dict[str, NDArray[Any]] = {}
     for name in text.names:
@@ -192,12 +193,25 @@ def read_text_recording(path: Path, layout: Layout | None = None) -> Table:
             texts = texts.map(as_read)
         columns[name] = texts.to_numpy(object)
     units = dict(text.head.units)
-    if text.head.in_pairs:
+    if text.head.in_pairs or _is_pairs(text.names):
         return table_of_pairs(Table(text.source, columns, lines=text.lines, units=units))
     for name in text.names:
         if read_header(name).kind == "time" and (stamps := _stamps(columns[name])) is not None:
             columns[name], units[name] = stamps, "s"
     return Table(text.source, columns, text.head.scalars, lines=text.lines, units=units)
+
+
+def _has_decimal_comma(delimiter: str, body: bytes) -> bool:
+    """Whether numbers have one: between commas, in quotes and not with three digits after it."""
+    if delimiter != ",":
+        return re.search(rb"\d,\d", body) is not None
+    return re.search(rb'"[+-]?\d*,(?:\d{1,2}|\d{4,})(?:[eE][+-]?\d+)?"', body) is not None
+
+
+def _is_pairs(names: Sequence[str]) -> bool:
+    """Whether every second column is a channel, and the one before it a time in s by its name."""
+    in_s = [_SECONDS.fullmatch(name) is not None for name in names]
+    return len(names) > 2 and in_s == [True, False] * (len(names) // 2)
 
 
 def _stamps(column: NDArray[Any]) -> NDArray[np.float64] | None:
