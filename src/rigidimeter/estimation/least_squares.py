@@ -17,7 +17,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal
+from scipy import fft
 
 from rigidimeter.estimation.closedloop.as_sampled import NONE, InertiaDoubt
 from rigidimeter.estimation.closedloop.line_noise import Smoother
@@ -242,12 +242,16 @@ def _interval(
 
 def _bound(signals: Signals, regressors: Array, residual: Array) -> Array:
     """Return the Cramér–Rao bound on the standard errors, for the power of the residual."""
-    frequency, power = signal.periodogram(residual, signals.rate_hz, detrend=False)
+    n, rate_hz = residual.size, signals.rate_hz
+    frequency = fft.rfftfreq(n, 1.0 / rate_hz)
+    power = 2.0 / (n * rate_hz) * np.abs(fft.rfft(residual)) ** 2
+    if n % 2 == 0:
+        power[-1] /= 2.0  # half the rate has no other side
     low, high = signals.band_hz
     inside = np.flatnonzero((frequency >= low) & (frequency <= high) & (frequency > 0))
     density = np.full(power.size, np.inf)
     density[inside] = Smoother.over(inside, 4, 0.1)(power[inside])
     if not np.all(density > 0):
         return np.zeros(regressors.shape[1])  # nothing was left: the channels are exact
-    bound = cramer_rao_coloured(regressors, density, signals.rate_hz)
+    bound = cramer_rao_coloured(regressors, density, rate_hz)
     return np.asarray(np.sqrt(np.diag(bound)), dtype=np.float64)

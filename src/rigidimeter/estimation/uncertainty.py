@@ -98,10 +98,10 @@ def correlation_samples(scores: Array) -> Array:
     """
     n = len(scores)
     length = fft.next_fast_len(2 * n, real=True)
-    power = np.abs(np.fft.rfft(scores, length, axis=0)) ** 2
-    autocovariance = np.fft.irfft(power, length, axis=0)[:n]
+    lines = fft.rfft(np.ascontiguousarray(scores.T), length)
+    autocovariance = fft.irfft(lines.real**2 + lines.imag**2, length)[:, :n]
     times = []
-    for column in autocovariance.T:
+    for column in autocovariance:
         if column[0] <= 0:
             times.append(1.0)
             continue

@@ -20,6 +20,7 @@ import numpy as np
 
 from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.closedloop.drive_search import (
+    explainable,
     explained,
     mean_sign,
     power_left,
@@ -72,7 +73,8 @@ OTHERS = 1.1
 """Of samples it was not fitted to, a structure may leave this much more."""
 
 BETTER = 0.98
-"""A pole more is worth a try where the last one brought the power down to this share."""
+"""A pole more is worth a try where the last one brought the power down to this share, and where the
+next one, of whatever drive, might do so again."""
 
 QUIET = 3e-4
 """What is left below this share of the velocity's SD needs no friction."""
@@ -207,7 +209,10 @@ def _climbed(samples: Samples, start: DriveModel, friction: bool) -> list[Fitted
             wanted = structure._replace(friction=friction)
             found = [search(samples, wanted, begin) for begin in starts]
             fitted.append(min(found, key=_by_power))
-        if min(one.power for one in fitted) > BETTER * before:
+        best = min(fitted, key=_by_power)
+        if best.power > BETTER * before:
+            break
+        if not best.too_fast and explainable(samples, best) < 1.0 - BETTER:
             break
     return fitted
 

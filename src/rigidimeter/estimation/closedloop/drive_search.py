@@ -6,6 +6,7 @@ searched (variable projection, Golub and Pereyra 1973).
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import deque
 from collections.abc import Callable
@@ -14,9 +15,11 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rigidimeter.dynamics import DriveModel
+from rigidimeter.estimation.closedloop.drive_motion import since_ticks
 from rigidimeter.estimation.closedloop.drive_terms import (
     FASTEST,
     SLOWEST,
+    TINY,
     Acting,
     Fitted,
     Samples,
@@ -46,6 +49,9 @@ STEP = float(np.sqrt(np.finfo(np.float64).eps))
 """Of a coordinate, for its slope: rounding and curvature disturb it alike."""
 
 EVERYTHING = slice(None)
+
+LAGS_TICKS = (0, *sorted(step << octave for octave in range(13) for step in (2, 3)))
+"""Edges of stretches of an input, ever longer the longer ago."""
 
 
 def search(
@@ -149,6 +155,26 @@ def explained(samples: Samples, fitted: Fitted, time_s: Array) -> Array:
         for acting, (row, late_s) in zip(inputs, answers, strict=False)
     ]
     return np.asarray(np.sum(columns, axis=0))
+
+
+def explainable(samples: Samples, fitted: Fitted) -> float:
+    """Return how much of what is left any linear drive might explain, as a share of its power.
+
+    Whatever its poles, it adds up the past of its inputs: so do their means over `LAGS_TICKS`. What
+    chance gives so many of them is taken off.
+    """
+    left = samples.measured - explained(samples, fitted, samples.time_s)
+    columns = []
+    for channel in samples.inputs(fitted.structure.friction):
+        sums = np.concatenate(([0.0], np.cumsum(channel.values)))
+        tick, _ = since_ticks(channel, samples.time_s, 0.0)
+        edges = [sums[np.maximum(tick + 1 - lag, 0)] for lag in LAGS_TICKS if lag <= tick[-1]]
+        columns += [late - early for late, early in itertools.pairwise(edges)]
+    table = np.column_stack(columns)
+    basis, _ = np.linalg.qr(table / (np.linalg.norm(table, axis=0) + TINY))
+    along = basis.T @ left
+    free = max(left.size - along.size, 1)
+    return 1.0 - float(left @ left - along @ along) / float(left @ left) * left.size / free
 
 
 def power_left(samples: Samples, fitted: Fitted, part: slice) -> float:

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from rigidimeter.dynamics import DriveModel, DriveState, drive, drive_step
-from rigidimeter.estimation.closedloop.drive_fit import fit_drive
+from rigidimeter.estimation.closedloop.drive_fit import STRUCTURES, fit_drive
 from rigidimeter.estimation.closedloop.drive_motion import driven, since_ticks
-from rigidimeter.estimation.closedloop.drive_search import _slopes
+from rigidimeter.estimation.closedloop.drive_search import _slopes, explainable
+from rigidimeter.estimation.closedloop.drive_terms import Fitted, Samples
 from rigidimeter.records import Channel, Epoch
 
 
@@ -174,6 +175,24 @@ def test_what_leaves_more_than_noise_is_no_rival():
     found = fit_drive(recorded(commands, velocity, 0.001), DriveModel.second_order(20.0, 0.7071))
     assert found.misfit == pytest.approx(3e-3, rel=0.05)
     assert max(drive.delay_s for drive in found.rivals) < 3e-4
+
+
+def share_explained(share, seed, n=1000):
+    """Return what past commands explain of their mean of 8 to 11 ticks ago beside white noise."""
+    rng = np.random.default_rng(seed)
+    commands = rng.standard_normal(n)
+    past = np.convolve(commands, [0.0] * 8 + [0.25] * 4)[:n]  # of variance 1/4
+    velocity = past * math.sqrt(4 * share) + math.sqrt(1 - share) * rng.standard_normal(n)
+    command = Channel("velocity_command_rad_s", np.arange(n) / 1000.0, commands)
+    samples = Samples(command, command, 1e-3, command.time_s[300:], velocity[300:], 1.0)
+    still = Fitted(STRUCTURES[0], DriveModel((-100 + 100j,), (0j,)), (), 1.0, 1e-3)
+    return explainable(samples, still)
+
+
+@pytest.mark.parametrize(("share", "about"), [(0.0, 0.01), (0.5, 0.02)])
+def test_what_past_commands_explain_of_the_rest_is_its_share(share, about):
+    found = np.mean([share_explained(share, seed) for seed in range(20)])
+    assert found == pytest.approx(share, abs=about)  # chance alone explains 0.03
 
 
 @pytest.mark.parametrize("jitter_s", [0.0, 0.0004, 0.02])
