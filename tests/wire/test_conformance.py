@@ -22,7 +22,6 @@ from rigidimeter.devices.conformance import (
     OtherEnd,
     SensorFixture,
 )
-from rigidimeter.devices.replay_device import ReplayDrive, ReplaySensor
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.emulation.ascii_emulator import AsciiEmulator
 from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
@@ -83,23 +82,6 @@ def rdt() -> Iterator[SensorFixture]:
         )
 
 
-def record(ticks: int = 5000) -> dict[str, np.ndarray]:
-    time_s = np.arange(ticks) / 1000.0
-    angle_rad = 0.1 * np.sin(time_s)
-    return {
-        "torque_nm": 2.0 * angle_rad,
-        "torque_time_s": time_s,
-        "angle_rad": angle_rad,
-        "velocity_rad_s": 0.1 * np.cos(time_s),
-        "motion_time_s": time_s,
-    }
-
-
-@contextmanager
-def replayed_sensor() -> Iterator[SensorFixture]:
-    yield SensorFixture(lambda: ReplaySensor(record()))
-
-
 @contextmanager
 def ascii_fixture(mode: str) -> Iterator[DriveFixture]:
     arm = EmulatedArm(JOINT)
@@ -152,17 +134,11 @@ def cia402() -> Iterator[DriveFixture]:
         emulator.close()
 
 
-@contextmanager
-def replayed_drive() -> Iterator[DriveFixture]:
-    yield DriveFixture(lambda: ReplayDrive(record()), tick_s=0.001, settle_s=0.1)
-
-
-SENSORS = {"ati-analogue": analogue, "ati-rdt": rdt, "replay": replayed_sensor}
+SENSORS = {"ati-analogue": analogue, "ati-rdt": rdt}
 DRIVES = {
     "ascii-moves": lambda: ascii_fixture("moves"),
     "ascii-velocity": lambda: ascii_fixture("velocity"),
     "cia402": cia402,
-    "replay": replayed_drive,
 }
 
 

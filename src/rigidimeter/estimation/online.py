@@ -81,10 +81,9 @@ class OnlineEstimate(NamedTuple):
 
     Attributes
     ----------
-    innovation_nm : float
-        Torque of the last sample less what the parameters before it foresaw.
     gain : float
-        What part of the innovation the fit took up, 0 to 1.
+        What part of the innovation, by which the last torque missed what the parameters before it
+        foresaw, the fit took up, 0 to 1.
     residual_sd_nm : float
         Of the torque about the fit, weighted as the samples are.
     memory_s : float
@@ -99,7 +98,6 @@ class OnlineEstimate(NamedTuple):
     damping_nm_s_rad_se: float
     stiffness_nm_rad: float
     stiffness_nm_rad_se: float
-    innovation_nm: float
     gain: float
     residual_sd_nm: float
     memory_s: float
@@ -284,7 +282,6 @@ def online_reading(
         J = B = K = math.nan
     return OnlineEstimate(
         J, J_se, B, B_se, K, K_se,
-        innovation_nm=float(state[_INNOVATION]),
         gain=float(state[_GAIN]),
         residual_sd_nm=sd,
         memory_s=float(weight) / rate_hz,
