@@ -24,6 +24,7 @@ from rigidimeter.estimation.closedloop.observation import (
     observe,
     observe_motion,
 )
+from rigidimeter.estimation.closedloop.refine import LineFit
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, torque_earlier
 from rigidimeter.estimation.signals import Array
@@ -144,35 +145,61 @@ def _settled(epochs: Sequence[PreparedEpoch], *, perturbed: bool) -> tuple[float
 
     The zero of what is left is sought by secants: between coarse samples moving the torque by what
     is left takes only part of it away. Where the perturbation is not known, least squares gives a
-    delay without moving anything.
+    delay without moving anything. The error of the zero is that of what is left over its slope,
+    by how much a move of the torque changes it.
     """
     longest_s = epochs[0].settings.estimation.longest_delay_s
-    before: tuple[float, float] | None = None
-    total_s, error_s = 0.0, float("nan")
-    for _ in range(ROUNDS if perturbed else 1):
-        moved = [epoch.moved(total_s) if total_s else epoch for epoch in epochs]
+
+    def left_after(move_s: float) -> LineFit:
+        moved = [epoch.moved(move_s) if move_s else epoch for epoch in epochs]
         observations = [epoch.once(observe if perturbed else observe_motion) for epoch in moved]
-        fit = estimate_delay(
+        return estimate_delay(
             observations,
             least_squares_start(observations),
             longest_s,
             instrumental if perturbed else direct,
         )
+
+    tried: list[tuple[float, float]] = []
+    total_s = 0.0
+    for _ in range(ROUNDS if perturbed else 1):
+        fit = left_after(total_s)
         left_s, error_s = float(fit.values[-1]), float(fit.standard_errors[-1])
-        step_s = left_s
-        if before is not None and abs(left_s) < abs(before[1]) and left_s != before[1]:
-            step_s = -left_s * (total_s - before[0]) / (left_s - before[1])
-            step_s = float(np.clip(step_s, -MOST_STRETCH * abs(left_s), MOST_STRETCH * abs(left_s)))
-        before = total_s, left_s
-        total_s += step_s
+        stretch = 1.0
+        if tried and abs(left_s) < abs(tried[-1][1]):
+            stretch = _stretch((total_s, left_s), tried[-1])
+        tried.append((total_s, left_s))
+        total_s += stretch * left_s
         if abs(left_s) < SETTLED_S or abs(total_s) > longest_s:
             break
-    if perturbed and abs(total_s) <= longest_s and abs(left_s) > max(error_s, LEAST_S):
+    if not perturbed or abs(total_s) > longest_s:
+        return total_s, error_s, fit.values[:-1]
+    if abs(left_s) > max(error_s, LEAST_S):
         raise ValueError(
             f"it did not settle in {ROUNDS} rounds: {1e3 * left_s:.2g} ms are left at "
             f"{1e3 * total_s:.3g} ms"
         )
+    # Between coarse samples what is left bends, so that its slope is that on the side where it is
+    # less steep, over what an interval of 95 % takes.
+    root, apart_s = tried[-1], 2.0 * error_s * abs(stretch)
+    stretches = []
+    for move_s in (root[0] - apart_s, root[0] + apart_s):
+        near = min(tried, key=lambda one: abs(one[0] - move_s))
+        if abs(near[0] - move_s) > 0.5 * apart_s:
+            near = move_s, float(left_after(move_s).values[-1])
+        stretches.append(abs(_stretch(root, near)))
+    error_s *= max(stretches)
     return total_s, error_s, fit.values[:-1]
+
+
+def _stretch(one: tuple[float, float], other: tuple[float, float]) -> float:
+    """Return how far the torque must move for each second that is left: 1 between dense samples.
+
+    Each argument is a move and what it left, in s.
+    """
+    gone_s = other[1] - one[1]
+    stretch = (one[0] - other[0]) / gone_s if gone_s else 1.0
+    return float(np.clip(stretch, -MOST_STRETCH, MOST_STRETCH))
 
 
 def _in_half_the_band(prepared: PreparedEpoch) -> PreparedEpoch:

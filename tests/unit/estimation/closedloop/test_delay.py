@@ -83,3 +83,12 @@ def test_the_period_is_that_of_the_sequence(simulated):
     assert period_s(epoch.channels["perturbation_nm"]) == pytest.approx(127 / 20, abs=1e-3)
     noise = np.random.default_rng(0).standard_normal(5000)
     assert period_s(Channel("perturbation_nm", np.arange(5000) / 1e3, noise)) is None
+
+
+def test_the_error_holds_between_coarse_samples(simulated):
+    """There a move of the torque takes away about a third of itself: three times too small."""
+    settings, epochs = simulated(5, voluntary_sd_nm=0.1, **PAPER_RATES)
+    found = estimate_delays({str(i): prepare([one], settings) for i, one in enumerate(epochs)})
+    scores = [one.delay_s / one.delay_s_se for one in found]
+    assert np.mean(np.square(scores)) < 2.0
+    assert not any(one.corrected for one in found)
