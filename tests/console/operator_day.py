@@ -14,9 +14,6 @@ from tests.console.opened import STARTS_S, Console, wait_for
 
 LONG_MS = 1e3 * STARTS_S
 RUNS = "document.getElementById('state').textContent === 'epoch runs'"
-SETTLES_MS = 1500
-"""So long after its end a session may unfold by itself."""
-
 MEMORY = Path("/dev/shm")
 
 
@@ -49,9 +46,10 @@ def opened_session(page: Page, name: str):
     """Return a session under After, unfolded."""
     page.get_by_role("button", name="After", exact=True).click()
     session = page.locator(".session").filter(has_text=f"{name}:")
-    page.wait_for_timeout(SETTLES_MS)
+    header = session.get_by_text(f"{name}:")
+    header.wait_for()
     if not session.get_by_role("button", name="Estimate").is_visible():
-        session.get_by_text(f"{name}:").click()
+        header.click()
     expect(session.get_by_role("button", name="Estimate")).to_be_visible()
     return session
 
@@ -124,7 +122,6 @@ def leave_out(page: Page, session, epoch: str, reason: str, by: str) -> None:
 def study_report(page: Page) -> Page:
     """Make the report of the study by its button, and open it by its link."""
     page.get_by_role("button", name="After", exact=True).click()
-    page.wait_for_timeout(SETTLES_MS)  # the list is drawn anew after a session
     page.get_by_role("button", name="Report of the study").click()
     link = page.get_by_role("link", name="Open the report of the study")
     link.wait_for(timeout=3 * LONG_MS)

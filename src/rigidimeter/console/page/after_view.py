@@ -23,6 +23,7 @@ from rigidimeter.console.page.report_files import (
     report_folder,
     report_link,
 )
+from rigidimeter.console.page.session_rows import Acts, SessionRow
 from rigidimeter.console.page.sessions_found import (
     FoundEpoch,
     FoundSession,
@@ -31,6 +32,9 @@ from rigidimeter.console.page.sessions_found import (
 )
 from rigidimeter.console.page.work import Work
 from rigidimeter.errors import UserError
+
+FOLLOW_S = 0.2
+"""How often it is looked whether a session has ended."""
 
 
 class AfterView:
@@ -52,102 +56,108 @@ class AfterView:
         self._desk, self._work, self._in_control = desk, work, in_control
         self._notice = notice
         self._root = desk.place.root
-        self._chosen = ""
         self._shown = -1
+        self._ran = False
+        self._rows: dict[str, SessionRow] = {}
+        self._acts = Acts(
+            recover=self._recover,
+            run_rest=self._run_rest,
+            estimate=self._estimate,
+            report=self._report,
+            show=self._show,
+            repeat=self._repeat,
+            leave_out=self._ask_reason,
+        )
+        several = not desk.place.one_session
         ui.label(f"Sessions in {self._root}").classes("text-lg")
         self._title = ui.input("Title of the report of the study", value=self._root.name)
         self._title.classes("entry").props("maxlength=120 data-field=title")
-        self._title.set_visibility(not desk.place.one_session)
-        self._list()
-        self._dialogs = ui.element("div")  # not in the list, which is drawn anew meanwhile
+        self._title.set_visibility(several)
+        self._problems = ui.element("div")
+        self._none = ui.label("There is no session yet.")
+        with ui.row().classes("items-center") as self._study:
+            if several:
+                ui.button("Report of the study", on_click=self._study_report)
+                text = "Open the report of the study"
+                self._study_link = ui.link(text, report_link(OF_STUDY), new_tab=True)
+        self._list = ui.element("div").classes("w-full")
+        self._dialogs = ui.element("div")
         self._answer = ui.html("", sanitize=False).classes("answer")
         ui.element("div").props('id=epoch-panes aria-label="Epoch"')
-        ui.timer(1.0, self._follow)
+        self._update()
+        self._follow()
+        ui.timer(FOLLOW_S, self._follow)
 
     def _follow(self) -> None:
-        """Show the list anew when a session has ended."""
+        """Fold the list when a session begins; when it has ended, list it and unfold it."""
+        began, self._ran = self._desk.in_session and not self._ran, self._desk.in_session
+        if began:
+            for row in self._rows.values():
+                row.frame.close()
         finished = self._desk.finished
         if finished is not None and finished.number != self._shown and not self._desk.busy:
-            self._shown, self._chosen = finished.number, finished.folder.name
-            self._list.refresh()
+            self._shown = finished.number
+            self._update()
+            if finished.folder.name in self._rows:
+                self._rows[finished.folder.name].frame.open()
 
-    @ui.refreshable_method
-    def _list(self) -> None:
+    def _update(self) -> None:
+        """Bring the list up to date; the rows that are in it stay, with what is unfolded."""
         sessions, problems = found_sessions(self._root)
         self._notice.text = unfinished_words(sessions)
-        for problem in problems:
-            ui.label(in_buttons(problem)).classes("problem")
-        if not sessions:
-            ui.label("There is no session yet.")
-        elif not self._desk.place.one_session:
-            with ui.row().classes("items-center"):
-                ui.button("Report of the study", on_click=self._study_report)
-                self._link(OF_STUDY, "Open the report of the study")
-        for session in sessions:
-            self._session(session)
+        self._problems.clear()
+        with self._problems:
+            for problem in problems:
+                ui.label(in_buttons(problem)).classes("problem")
+        self._none.set_visibility(not sessions)
+        self._study.set_visibility(bool(sessions))
+        if not self._desk.place.one_session:
+            self._study_link.set_visibility(self._reported(OF_STUDY))
+        for gone in self._rows.keys() - {session.name for session in sessions}:
+            self._rows.pop(gone).frame.delete()
+        for at, session in enumerate(sessions):
+            if session.name not in self._rows:
+                with self._list:
+                    self._rows[session.name] = SessionRow(self._acts, session)
+            row = self._rows[session.name]
+            row.show(session, reported=self._reported(report_folder(session.name)))
+            if self._list.default_slot.children[at] is not row.frame:
+                row.frame.move(self._list, at)
 
-    def _session(self, session: FoundSession) -> None:
-        how = session.outcome or session.reason
-        with ui.expansion(
-            f"{session.name}: {session.good} of {session.planned} epochs good, {how}",
-            value=session.name == self._chosen,
-        ).classes("w-full session"):
-            if session.reason:
-                ui.label(in_buttons(session.reason))
-            with ui.row():
-                if not session.outcome and not session.recording:
-                    ui.button("Recover", on_click=lambda: self._recover(session.name))
-                if session.left:
-                    ui.button(
-                        f"Run what is left: {len(session.left)}",
-                        on_click=lambda: self._run(session.name, left=session.left),
-                    )
-                ui.button("Estimate", on_click=lambda: self._estimate(session))
-                ui.button("Report", on_click=lambda: self._report(session))
-                self._link(report_folder(session.name), "Open its report")
-            for epoch in session.epochs:
-                self._epoch(session, epoch)
-
-    def _epoch(self, session: FoundSession, epoch: FoundEpoch) -> None:
-        said = [f"epoch {epoch.label}", epoch.condition, epoch.task, epoch.outcome, epoch.reason]
-        if epoch.rating:
-            said.append(f"rated {epoch.rating}")
-        if epoch.excluded:
-            said.append(f"left out: {epoch.excluded}")
-        with ui.row().classes("items-center w-full"):
-            ui.label(" · ".join(filter(None, said))).classes("grow")
-            ui.button("Show", on_click=lambda: self._show(session.name, epoch.label))
-            if session.outcome:
-                ui.button("Repeat", on_click=lambda: self._repeat(session.name, epoch))
-            if not epoch.excluded:
-                ui.button("Leave out", on_click=lambda: self._ask_reason(session.name, epoch.label))
+    def _reported(self, folder: str) -> bool:
+        """Whether a report was made; a page of one session links to none of other folders."""
+        return report_file(self._root, folder, PAGE) is not None
 
     def _may_act(self) -> bool:
+        self._follow()  # what is left of a session is what is left now
         if self._in_control() and not self._desk.busy:
             return True
         ui.notify("not while a session runs, and only on the page in control")
         return False
 
-    def _link(self, folder: str, text: str) -> None:
-        """Link to a report if it was made; a page of one session shows none of other folders."""
-        if report_file(self._root, folder, PAGE) is not None:
-            ui.link(text, report_link(folder), new_tab=True)
-
-    def _repeat(self, session: str, epoch: FoundEpoch) -> None:
-        if epoch.outcome == "success" and not epoch.excluded:
-            ui.notify("both runs of this epoch count, until you leave one out")
-        self._run(session, epoch.number)
-
-    def _run(self, session: str, epoch: int | None = None, left: tuple[int, ...] = ()) -> None:
-        """Run what is left of a session, or one epoch of it again, in a new folder."""
+    def _repeat(self, session: FoundSession, epoch: FoundEpoch) -> None:
+        """Run an epoch once more, in a new folder."""
         if not self._may_act():
             return
-        folder = f"{session.rpartition('-')[0] or session}-{time.strftime('%H%M%S')}"
-        self._desk.ask(StartRequest(folder, resume=session, epoch=epoch, left=left))
+        if epoch.outcome == "success" and not epoch.excluded:
+            ui.notify("both runs of this epoch count, until you leave one out")
+        self._run(session.name, epoch=epoch.number)
 
-    def _ask_reason(self, session: str, epoch: str) -> None:
+    def _run_rest(self, session: FoundSession) -> None:
+        """Run what is left of a session, in a new folder."""
+        if self._may_act() and (left := self._rows[session.name].session.left):
+            self._run(session.name, left=left)
+
+    def _run(self, session: str, **what: Any) -> None:
+        folder = f"{session.rpartition('-')[0] or session}-{time.strftime('%H%M%S')}"
+        self._desk.ask(StartRequest(folder, resume=session, **what))
+
+    def _ask_reason(self, session: FoundSession, epoch: FoundEpoch) -> None:
+        """Leave an epoch out, after asking for a reason and a name."""
         with self._dialogs, ui.dialog() as dialog, ui.card():
-            ui.label(f"Leave epoch {epoch} of {session} out of results; nothing is deleted.")
+            ui.label(
+                f"Leave epoch {epoch.label} of {session.name} out of results; nothing is deleted."
+            )
             reason = ui.input("Reason").props("maxlength=200 data-field=reason")
             by = ui.input("Your name").props("maxlength=40 data-field=by")
 
@@ -155,33 +165,33 @@ class AfterView:
                 if not self._may_act():
                     return
                 try:
-                    exclude(self._root, session, epoch, reason.value, by.value)
+                    exclude(self._root, session.name, epoch.label, reason.value, by.value)
                 except UserError as error:
                     ui.notify(str(error))
                     return
                 dialog.close()
-                self._chosen = session
-                self._list.refresh()
+                self._update()
 
             ui.button("Leave out", on_click=leave_out)
         dialog.open()
 
-    async def _recover(self, session: str) -> None:
-        if not await self._command("recover", session):
+    async def _recover(self, session: FoundSession) -> None:
+        """Close the record of an interrupted session."""
+        if not await self._command("recover", session.name):
             return
         for said in extended(self._desk.place):
             ui.notify(said)
-        self._chosen = session
-        self._list.refresh()
+        self._update()
 
     async def _estimate(self, session: FoundSession) -> None:
+        """Estimate J, B and K of each epoch."""
         await self._command("estimate", session.name, *session.options)
 
     async def _report(self, session: FoundSession) -> None:
+        """Make the report of a session."""
         out = self._root / report_folder(session.name)
         if await self._command("report", session.name, "--out", str(out), *session.options):
-            self._chosen = session.name
-            self._list.refresh()
+            self._update()
 
     async def _study_report(self) -> None:
         """Report the study; of blinded sessions only after a warning, since it names conditions."""
@@ -196,7 +206,7 @@ class AfterView:
         if blinded and not await self._unblinds(blinded):
             return
         if await self._command("report", "", "--out", str(self._root / OF_STUDY), *named):
-            self._list.refresh()
+            self._update()
 
     async def _unblinds(self, sessions: list[str]) -> bool:
         """Warn that the report of the study names the conditions of blinded sessions."""
@@ -219,23 +229,22 @@ class AfterView:
         self._answer.set_content(answer.html())
         return True
 
-    async def _show(self, session: str, epoch: str) -> None:
+    async def _show(self, session: FoundSession, epoch: FoundEpoch) -> None:
         """Draw an epoch: raw signals, and measured and modelled torque with their difference."""
         if self._desk.busy:
             ui.notify("not while a session runs")
             return
+        folder = self._root / session.name
         self._answer.set_content("<p>reading …</p>")
         with tempfile.TemporaryDirectory(prefix="rigidimeter-epoch-") as name:
             fitted = Path(name) / "torque.csv"
-            await self._work.command(
-                "estimate", str(self._root / session), "--subject-torque", str(fitted)
-            )
+            await self._work.command("estimate", str(folder), "--subject-torque", str(fitted))
             try:
-                panes: list[dict[str, Any]] = epoch_traces(self._root / session, epoch, fitted)
+                panes: list[dict[str, Any]] = epoch_traces(folder, epoch.label, fitted)
             except UserError as error:
                 self._answer.set_content("")
                 ui.notify(str(error))
                 return
         self._answer.set_content("")
-        title = json.dumps(f"{session}, epoch {epoch}")
+        title = json.dumps(f"{session.name}, epoch {epoch.label}")
         ui.run_javascript(f"rigEpoch({title}, {json.dumps(panes)})")
