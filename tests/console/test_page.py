@@ -113,6 +113,15 @@ def test_names_in_the_files_of_others_are_text(console, chromium):
     shutil.rmtree(writer.folder)
 
 
+WATCH = """() => {
+  window.replaced = window.written = 0;
+  new MutationObserver((records) => records.forEach(({ type }) => {
+    if (type === "childList") window.replaced += 1; else window.written += 1;
+  })).observe(document.getElementById("view-during"),
+    { childList: true, characterData: true, subtree: true });
+}"""
+
+
 def test_a_session_from_the_form_to_its_end(console, chromium):
     """Bad fields are said and nothing starts; a second page only looks; a reload pauses."""
     desk = console()
@@ -130,6 +139,9 @@ def test_a_session_from_the_form_to_its_end(console, chromium):
     assert other.locator("#emergency").is_disabled()
     other.close()
     page.wait_for_function(RUNS)
+    page.evaluate(WATCH)
+    page.wait_for_function("window.written + window.replaced > 20")
+    assert page.evaluate("window.replaced") == 0  # or the memory of the browser rises
     assert_reached_by_tab(page, "Save")  # the last control of a session that runs
     page.locator("#note").fill("<b>coughs</b>")
     page.keyboard.press("Enter")

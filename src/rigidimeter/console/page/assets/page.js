@@ -10,8 +10,15 @@
   let page = "", socket = null, control = false, away = false, heard = 0, rated = null, seen = null;
 
   const say = (message) => { if (socket && socket.readyState === 1) socket.send(JSON.stringify(message)); };
-  const show = (id, text) => { const at = $(id); if (at && at.textContent !== text) at.textContent = text; };
   const node = (name, className, text) => { const made = document.createElement(name); made.className = className; if (text) made.textContent = text; return made; };
+  // What changes ten times a second is written into nodes that stay: Chromium's memory rises with each one that is replaced.
+  const write = (at, text) => { if (!at.firstChild) at.append(text); else if (at.firstChild.data !== text) at.firstChild.data = text; };
+  const named = (at, className) => { if (at.className !== className) at.className = className; };
+  const show = (id, text) => { const at = $(id); if (at) write(at, text); };
+  const fill = (at, rows, make, tell) => {
+    while (at.children.length > rows.length) at.lastChild.remove();
+    rows.forEach((one, k) => tell(at.children[k] || at.appendChild(make(one)), one));
+  };
   const connected = () => socket && socket.readyState === 1 && performance.now() - heard < STATE_OLD_MS;
 
   function connect() {
@@ -69,47 +76,33 @@
     show("epoch-label", session.epoch_of);
     show("countdown", session.countdown);
     show("countdown-label", session.countdown_of);
-    lines("counts", session.counts.map((text) => ["", text]));
-    lines("live", session.live.map((text) => ["", text]));
-    show("live-of", session.live_of && `of ${session.live_of}`);
+    for (const id of ["counts", "live"]) fill($(id), session[id], () => node("div", ""), write);
+    show("live-of", session.live_of ? `of ${session.live_of}` : "");
     traces.task(session.task);
     show("band-model", session.modelled ? "thick measured, thin modelled" : "measured, no model yet");
     banner(session.alert);
-    const lamps = $("lamps");
-    while (lamps.children.length > session.lamps.length) lamps.lastChild.remove();
-    session.lamps.forEach(({ level, sign, text }, at) => {
-      let lamp = lamps.children[at];
-      if (!lamp) { lamp = node("div", "lamp"); lamp.append(node("b", ""), node("span", "")); lamps.append(lamp); }
-      lamp.className = `lamp ${level}`;
-      lamp.firstChild.textContent = sign;
-      lamp.lastChild.textContent = text;
+    const lamp = () => { const made = node("div", "lamp"); made.append(node("b", ""), node("span", "")); return made; };
+    fill($("lamps"), session.lamps, lamp, (row, { level, sign, text }) => {
+      named(row, `lamp ${level}`);
+      write(row.firstChild, sign);
+      write(row.lastChild, text);
     });
-    const limits = $("limits");
-    session.limits.forEach(({ name, sign, text, part, near }, at) => {
-      let row = limits.children[at];
-      if (!row) {
-        row = node("div", "limit");
-        const track = node("div", "track");
-        track.append(document.createElement("i"));
-        row.append(node("span", "", name), track, node("span", ""));
-        limits.append(row);
-      }
-      row.className = near ? "limit near" : "limit";
+    const limit = ({ name }) => {
+      const row = node("div", "limit"), track = node("div", "track");
+      track.append(document.createElement("i"));
+      row.append(node("span", "", name), track, node("span", ""));
+      return row;
+    };
+    fill($("limits"), session.limits, limit, (row, { sign, text, part, near }) => {
+      named(row, near ? "limit near" : "limit");
       row.children[1].firstChild.style.width = `${Math.min(100, 100 * part)}%`;
-      row.lastChild.textContent = `${sign} ${text}`;
+      write(row.lastChild, `${sign} ${text}`);
     });
     rated = session.rate;
     show("rated", rated === null ? "after the first epoch" : `epoch ${rated.place}`);
   }
 
-  function lines(id, rows) {
-    const at = $(id), text = JSON.stringify(rows);
-    if (at.dataset.text === text) return;
-    at.dataset.text = text;
-    at.replaceChildren(...rows.map(([className, one]) => node("div", className, one)));
-  }
-
-  function banner(text, good) { const at = $("banner"); at.hidden = !text; at.classList.toggle("good", !!good); if (at.textContent !== text) at.textContent = text; }
+  function banner(text, good) { const at = $("banner"); at.hidden = !text; at.classList.toggle("good", !!good); write(at, text); }
   function remark(text) { const at = $("said"); at.prepend(node("div", "", text)); while (at.children.length > 4) at.lastChild.remove(); }
   function clear() { traces.clear(); rated = null; show("rated", "–"); $("said").replaceChildren(); $("limits").replaceChildren(); }
 
