@@ -36,12 +36,12 @@ def _biopac(path: Path) -> None:
 
 
 def _matlab_table(path: Path) -> None:
-    columns = dict(zip("tMp", _COLUMNS, strict=True))
+    columns = dict(zip(("t", "M", "phi"), _COLUMNS, strict=True))
     matlab.save(path, T=matlab.table(columns, ["s", "N*m", "deg"]))
 
 
 def _matlab_timetable(path: Path) -> None:
-    columns = dict(zip("Mp", _COLUMNS[1:], strict=True))
+    columns = dict(zip(("M", "phi"), _COLUMNS[1:], strict=True))
     matlab.save(path, "v7.3", T=matlab.timetable(columns, ["N*m", "deg"], 100.0))
 
 

@@ -45,6 +45,11 @@ EXPLANATIONS = (
         Explanation(group, "*delays/delay_s_se", 0.8, DELAY)
         for group in ("estimate", "methods", "study", "full")
     ),
+    *(
+        Explanation("study", f"estimates/{fits}/*_{end}", 5e-5, DELAY)
+        for fits in ("fits", "fixed")
+        for end in ("low", "high")
+    ),
     Explanation("ledger", "checks/ours eq-6 00", 1.0, ZERO),
     Explanation("ledger", "checks/ours sec-1-voluntary-iv 0[01]", 1e-8, FFT),
 )

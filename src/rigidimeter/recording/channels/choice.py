@@ -233,7 +233,9 @@ def _missing(table: Table, choice: Choice, what: str, standards: tuple[str, ...]
         name, why = next(iter(table.others.items()))
         text += f" ({name} is no column but {why})"
     if not free:
-        return [f"{text}, and none is left to be it"]
+        matrices = [name for name, why in table.others.items() if "×" in why]
+        remedy = f"; save each column of {matrices[0]} under a name of its own" if matrices else ""
+        return [f"{text}, and none is left to be it{remedy}"]
     ranked = [(alike(standard, name), standard, name) for standard in standards for name in free]
     _, standard, name = max(ranked, key=lambda entry: entry[0])
     short = BY_STANDARD[standard].name

@@ -176,3 +176,17 @@ def test_an_axis_that_turns_on_is_no_limb():
 def test_the_rough_fit_is_the_joint():
     fit = look((TIME_S, TORQUE_NM), (TIME_S, ANGLE_RAD), is_angle=True).fit
     np.testing.assert_allclose(fit.value, TRUTH, rtol=0.05)
+
+
+def test_a_matrix_with_its_labels_is_refused_with_a_way_on():
+    """The words of the labels are not offered as the torque."""
+    labels = np.array(["Torque", "Angle"], dtype=object)
+    found = Table("r.mat", {"labels": labels}, others={"data": "an array of 4000 × 2"})
+    (missing,) = refusal(found)[:1]
+    assert "save each column of data under a name of its own" in missing
+    assert "--column" not in missing
+
+
+def test_a_time_is_no_candidate_for_the_torque():
+    columns = {"time_s": TIME_S, "t_torque [s]": TIME_S, "torque [Nm]": TORQUE_NM}
+    assert_si(channels_of_table(table(**columns, angle_rad=ANGLE_RAD), ReadOptions()))
