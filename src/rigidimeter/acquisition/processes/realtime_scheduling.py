@@ -24,6 +24,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rigidimeter.acquisition.processes.shared_memory import ORDERED
 
 MCL_CURRENT, MCL_FUTURE = 1, 2
@@ -105,6 +107,7 @@ def prepare_loop_process(
     ):
         wanted = set()
     libc = ctypes.CDLL(None, use_errno=True)
+    _take_working_memory()
     locked = lock_memory and _tried(
         lambda: _checked(libc.mlockall(MCL_CURRENT | MCL_FUTURE)),
         "The memory was not locked ({}), so a page that was swapped out can delay the loop; allow "
@@ -144,6 +147,16 @@ def prepare_loop_process(
         collector_off=not gc.isenabled(),
         refused=tuple(refused),
     )
+
+
+def _take_working_memory() -> None:
+    """Let NumPy's linear algebra take its working memory, 32 MB, before memory is locked.
+
+    OpenBLAS takes it at the first product of large matrices or the first solution. Where memory is
+    locked the system fills all of it at once, and the loop stands still for that time.
+    """
+    square = np.eye(256)
+    np.linalg.solve(square @ square.T, square)
 
 
 def _tried(step: Callable[[], object], sentence: str, refused: list[str]) -> bool:

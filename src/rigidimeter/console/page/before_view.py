@@ -59,7 +59,7 @@ class BeforeView:
         self._entered: EnteredSession | None = None
         self._blinded = False
         place = desk.place
-        rig = "the virtual rig" if place.rig is None else f"rig {place.rig.name}"
+        rig = "the virtual rig" if place.rig is None else place.rig.name
         with ui.row().classes("w-full items-center"):
             ui.label(f"Rig: {rig}. Protocol: {place.settings_name}.").classes("text-lg").mark(
                 "what"
@@ -70,7 +70,7 @@ class BeforeView:
                 chosen.classes("entry").mark("protocol")
                 chosen.on_value_change(lambda event: self._choose(str(event.value or "")))
         self._wrong_file = ui.label("").classes("problem").props('role="alert"')
-        self._rig = RigView(desk, work, self._may_act, in_control, self._settings)
+        self._rig = RigView(desk, work, self._may_act, in_control, self._settings, self._show_steps)
         with ui.row().classes("w-full"):
             for one in (*METADATA, NOTE):
                 self._input(one)

@@ -34,6 +34,8 @@ class RigView:
         Whether the page still has control; a check is stopped when it has lost it.
     settings : callable
         What was entered; None if something is wrong with it.
+    checked : callable
+        Called after each check, to show the steps anew.
     """
 
     def __init__(
@@ -43,9 +45,11 @@ class RigView:
         may_act: Callable[[], bool],
         in_control: Callable[[], bool],
         settings: Callable[[], Settings | None],
+        checked: Callable[[], None],
     ) -> None:
         self._desk, self._work = desk, work
         self._may_act, self._in_control, self._settings = may_act, in_control, settings
+        self._checked = checked
         self._steps: tuple[RigStep, ...] = ()
         self._rows()
         self._question = ui.element("div").props('role="alertdialog" aria-label="Question"')
@@ -118,7 +122,7 @@ class RigView:
             self._said.set_content("")
         else:
             self._said.set_content(answer.html())
-        self.show(self._work.rig_steps(settings, self._desk.place.settings_path))
+        self._checked()
 
     def _say(self, text: str) -> None:
         self._said.set_content(Answer(True, text).html())
