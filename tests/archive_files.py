@@ -124,6 +124,11 @@ def write_mat73(path: Path, values: dict[str, np.ndarray]) -> None:
         for name, array in values.items():
             file[name] = np.atleast_2d(array)
             file[name].attrs["MATLAB_class"] = np.bytes_(b"double")
+    mark_mat73(path)
+
+
+def mark_mat73(path: Path) -> None:
+    """Write the first bytes of a MATLAB file before those of HDF5."""
     with path.open("r+b") as raw:
         raw.write(b"MATLAB 7.3 MAT-file".ljust(124) + struct.pack("<HH", 0x0200, 0x4D49))
 

@@ -20,6 +20,7 @@ from tests.dialects import ANGLE_DEG, ANGLE_RAD, DIALECTS, MILLI, SEED, TIME_S, 
 from tests.instrument_files import Signal
 from tests.known_joint import angle_rad
 from tests.laboratory_files import LABORATORY
+from tests.matlab_exports import EXPORTS
 
 
 @dataclass(frozen=True)
@@ -221,6 +222,7 @@ CORPUS: Mapping[str, Entry] = {
         for name, one in {**DIALECTS, **LABORATORY}.items()
     },
     **{name if name not in DIALECTS else f"{name}, binary": one for name, one in FILES.items()},
+    **{name: _one("r.mat", made, refused="".join(more)) for name, (made, *more) in EXPORTS.items()},
 }
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 from tests import archive_files as archives
 from tests import instrument_files as instruments
+from tests import matlab_exports as exports
 from tests import matlab_files as matlab
 from tests.instrument_files import Signal
 
@@ -45,6 +46,10 @@ def _matlab_timetable(path: Path) -> None:
     matlab.save(path, "v7.3", T=matlab.timetable(columns, ["N*m", "deg"], 100.0))
 
 
+def _matlab_export(path: Path, made: Mapping[str, object]) -> None:
+    exports.save(path, **made)
+
+
 def _in_set(folder: Path) -> None:
     archives.write_bids_motion(folder, _SIGNALS, latency=True)
 
@@ -65,6 +70,10 @@ FILES: tuple[Made, ...] = (
     _file("LabVIEW text", "r.lvm", _labview),
     _file("MATLAB table", "r.mat", _matlab_table),
     _file("MATLAB timetable", "r.mat", _matlab_timetable),
+    _file("MATLAB of LabChart", "r.mat", _matlab_export, exports.labchart(blocks=2)),
+    _file("MATLAB of dSPACE", "r.mat", _matlab_export, exports.dspace()),
+    _file("MATLAB 7.3 of Spike2", "r.mat", exports.write_mat73, exports.spike2()),
+    _file("MATLAB 7.3, structures", "r.mat", exports.write_mat73, exports.by_hand()),
     _file("XDF", "r.xdf", archives.write_xdf, _SIGNALS),
     _file("NWB", "r.nwb", archives.write_nwb, _SIGNALS),
     _file("Excel", "r.xlsx", archives.write_xlsx, _HEAD, _COLUMNS),

@@ -286,6 +286,7 @@ def table(path: Path, time_s=None, scale_torque=1.0, scale_angle=1.0, **more) ->
         ({"time_s": np.arange(50) * 1e-310}, {}, "samples that are 1e-310 s apart"),
         ({"time_s": np.arange(50) * 1e300}, {}, "samples that are 1e+300 s apart"),
         ({}, {"epoch_length_s": 1e-300}, "more than 10000 epochs of --epoch-length-s 1e-300"),
+        ({}, {"epoch_length_s": 5e-324}, "more than 10000 epochs of --epoch-length-s 4.94066e-324"),
     ],
 )
 def test_numbers_beyond_arithmetic(tmp_path, changed, options, told):

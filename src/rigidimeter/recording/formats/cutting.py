@@ -76,7 +76,7 @@ def by_length(source: str, clock: Rows, length_s: float) -> tuple[list[Stretch],
     """
     time_s, step_s = clock.time_s, clock.step_s
     elapsed = time_s - time_s[0]
-    if not (elapsed[-1] + step_s) / length_s <= EPOCHS:
+    if not elapsed[-1] + step_s <= EPOCHS * length_s:
         raise UserError(
             f"{source} lasts {seconds(float(elapsed[-1]))}, which is more than {EPOCHS} epochs of "
             f"--epoch-length-s {length_s:g}; give a longer one"

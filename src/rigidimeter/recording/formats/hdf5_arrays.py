@@ -6,13 +6,14 @@ Only what lies in the file itself is read: no link to another file, no data kept
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.documents.bounds import CELLS, NESTING
+from rigidimeter.documents.bounds import CELLS, COLUMNS, NESTING
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.stored_arrays import Expansion, Stored, check_count
 
@@ -47,7 +48,8 @@ def hdf5_arrays(path: Path) -> dict[str, Stored]:
             if isinstance(value, h5py.Group):
                 visit(value, f"{prefix}{key}.", depth + 1)
             elif isinstance(value, h5py.Dataset):
-                entries[f"{prefix}{key}"] = _stored(path, h5py, value, f"{prefix}{key}", expansion)
+                for name, part in _elements(h5py, value, prefix, key):
+                    entries[name] = _stored(path, h5py, part, name, expansion)
                 check_count(path, len(entries))
 
     with h5py.File(path, "r") as file:
@@ -112,7 +114,7 @@ def _stored(path: Path, h5py: Any, dataset: Any, name: str, expansion: Expansion
         return Stored(np.dtype("V1"), dataset.shape, lambda: np.empty(0))
     if kind == "char":
         expansion.take(name, 4 * dataset.size)
-        return Stored.of(np.asarray(_text(dataset), dtype=object))
+        return Stored.of(np.asarray(_letters(dataset), dtype=object))
     if kind == "cell":
         if dataset.size > CELLS:
             raise UserError(
@@ -128,19 +130,41 @@ def _stored(path: Path, h5py: Any, dataset: Any, name: str, expansion: Expansion
         return Stored.of(np.array(texts, dtype=object))
     if h5py.check_ref_dtype(dataset.dtype) is not None or dataset.dtype.hasobject:
         return Stored(np.dtype("V1"), dataset.shape or (), lambda: np.empty(0))
-    read = functools.partial(_read, path, name, expansion)
-    return Stored(dataset.dtype, dataset.shape or (0,), read)
+    read = functools.partial(_read, path, name, dataset.name, expansion)
+    return Stored(dataset.dtype, (dataset.shape or (0,))[::-1], read)
 
 
-def _read(path: Path, name: str, expansion: Expansion) -> NDArray[Any]:
+def _elements(h5py: Any, dataset: Any, prefix: str, key: str) -> Iterator[tuple[str, Any]]:
+    """Yield a field of a structure, or of each element of an array of structures."""
+    references = h5py.check_ref_dtype(dataset.dtype) is not None and not _kind(dataset)
+    if not (references and prefix and 0 < dataset.size <= COLUMNS):
+        yield f"{prefix}{key}", dataset
+        return
+    parts = [dataset.file[reference] for reference in np.asarray(dataset[()]).reshape(-1)]
+    if not all(isinstance(part, h5py.Dataset) for part in parts):
+        yield f"{prefix}{key}", dataset
+        return
+    for index, part in enumerate(parts, start=1):
+        yield f"{prefix[:-1]}({index}).{key}", part
+
+
+def _read(path: Path, name: str, place: str, expansion: Expansion) -> NDArray[Any]:
+    """Return an array in MATLAB's order of dimensions, which HDF5 has reversed."""
     with _h5py(path).File(path, "r") as file:
-        dataset = file[name.replace(".", "/")]
+        dataset = file[place]
         expansion.take(name, dataset.size * max(dataset.dtype.itemsize, 8))
-        return np.asarray(dataset[()])
+        return np.asarray(dataset[()]).T
 
 
 def _kind(dataset: Any) -> str:
     return str(dataset.attrs.get("MATLAB_class", b"").decode("ascii", "replace"))
+
+
+def _letters(dataset: Any) -> str | list[str]:
+    """Return a text, or the rows of a matrix of letters."""
+    if len(dataset.shape) == 2 and min(dataset.shape) > 1:
+        return ["".join(map(chr, row)) for row in np.asarray(dataset[()]).T]
+    return _text(dataset)
 
 
 def _text(dataset: Any) -> str:

@@ -1,6 +1,6 @@
 """MATLAB files: version 4 to 7 by scipy, 7.3 (which is HDF5) by h5py, objects by mat-io.
 
-Fields of structures get dotted names: `data.torque`.
+Fields of structures get dotted names: `data.torque`; of arrays of structures `data(2).torque`.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.documents import open_regular
-from rigidimeter.documents.bounds import RECORDING_BYTES
+from rigidimeter.documents.bounds import COLUMNS, RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.hdf5_arrays import hdf5_arrays, hdf5_objects
 from rigidimeter.recording.formats.mat4_check import check_mat4
+from rigidimeter.recording.formats.mat_channels import table_of_variables
 from rigidimeter.recording.formats.mat_check import Variable, check_mat5
 from rigidimeter.recording.formats.mat_objects import check_subsystem, table_with_objects
 from rigidimeter.recording.formats.stored_arrays import Expansion, Stored, check_count
-from rigidimeter.recording.formats.table import Table, table_of_arrays
+from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.text_head import Layout
 
 _VALUE_BYTES = 8
@@ -61,7 +62,7 @@ def read_mat(path: Path, layout: Layout | None = None) -> Table:
         entries = {name: entry for name, entry in entries.items() if name in mine}
         objects = [name for name in objects if name in mine]
     if not objects:
-        return table_of_arrays(str(path), entries)
+        return table_of_variables(str(path), entries)
     plain = {
         name: entry for name, entry in entries.items() if name.partition(".")[0] not in objects
     }
@@ -72,7 +73,7 @@ def read_mat(path: Path, layout: Layout | None = None) -> Table:
     except Exception as error:  # mat-io raises what comes up in a class that it does not know
         if all(entry.dtype.kind == "V" or entry.size < 2 for entry in plain.values()):
             raise
-        rest = table_of_arrays(str(path), entries)  # the columns beside them
+        rest = table_of_variables(str(path), entries)  # the columns beside them
         reason = str(error).removeprefix(f"{path}: ") or type(error).__name__
         unread = dict.fromkeys(objects, f"an object that is not read ({reason})")
         return replace(rest, others={**rest.others, **unread})
@@ -150,9 +151,23 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Stored]:
         name = f"{prefix}{key}"
         if isinstance(value, Mapping):
             flat |= _flat(value, f"{name}.")
+        elif _is_signals(value):
+            for index, one in enumerate(value, start=1):
+                flat |= _flat(one, f"{name}({index}).")
         else:
             flat[name] = Stored.of(_array(value))
     return flat
+
+
+def _is_signals(value: object) -> bool:
+    """Whether a list is one of structures of which some hold samples; not one of many events."""
+    if not isinstance(value, list) or not all(isinstance(one, Mapping) for one in value):
+        return False
+    fields = [field for one in value for field in one.values()]
+    return 0 < len(fields) <= COLUMNS and any(
+        isinstance(field, np.ndarray) and field.dtype.kind in "fiu" and field.size > 1
+        for field in fields
+    )
 
 
 def _array(value: object) -> NDArray[Any]:

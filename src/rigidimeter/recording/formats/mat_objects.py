@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from rigidimeter.errors import UserError
 from rigidimeter.recording.exported_session import Stream
 from rigidimeter.recording.formats.clocked_table import TIME, table_of_streams, unique
+from rigidimeter.recording.formats.mat_channels import table_of_variables
 from rigidimeter.recording.formats.mat_check import check_mat5
 from rigidimeter.recording.formats.stored_arrays import Expansion, Stored, silent
-from rigidimeter.recording.formats.table import Table, table_of_arrays
+from rigidimeter.recording.formats.table import Table
 
 _OBJECTS = "V1"
 """The type of what cannot be a column."""
@@ -107,7 +108,8 @@ def table_with_objects(
         columns = _columns(frame, origin) if name in clocked else _columns(frame, None)
         arrays |= {f"{prefix}{column}": Stored.of(values) for column, values in columns.items()}
         units |= {f"{prefix}{column}": unit for column, unit in _units(frame, columns).items()}
-    return replace(table_of_arrays(str(path), arrays), units=units)
+    table = table_of_variables(str(path), arrays)
+    return replace(table, units={**table.units, **units})
 
 
 def _of_timetables(

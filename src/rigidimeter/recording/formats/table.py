@@ -67,14 +67,29 @@ class Table:
 
 
 def table_of_arrays(source: str, entries: Mapping[str, Stored]) -> Table:
-    """Sort named arrays, as NumPy and MATLAB files hold them, into columns, scalars and others.
-
-    An array with one value is a scalar; one with a single dimension longer than 1 is a column.
+    """Return named arrays, as NumPy and MATLAB files hold them, as a table.
 
     Raises
     ------
     UserError
         If there is no column at all.
+    """
+    columns, scalars, others = sorted_arrays(entries)
+    if not columns:
+        held = ", ".join([*scalars, *others][:_SHOWN]) or "nothing"
+        raise UserError(
+            f"{source} has no column of samples, that is, no array with one dimension and at least "
+            f"2 values (it holds {held})"
+        )
+    return Table(source, Columns(columns), scalars, others)
+
+
+def sorted_arrays(
+    entries: Mapping[str, Stored],
+) -> tuple[dict[str, Callable[[], NDArray[Any]]], dict[str, float | str], dict[str, str]]:
+    """Sort named arrays into columns, single values and what is neither, with the reason.
+
+    An array with one value is a single value; one with one dimension longer than 1 is a column.
     """
     columns: dict[str, Callable[[], NDArray[Any]]] = {}
     scalars: dict[str, float | str] = {}
@@ -96,13 +111,7 @@ def table_of_arrays(source: str, entries: Mapping[str, Stored]) -> Table:
             columns[name] = functools.partial(_column, array, object if text else np.float64)
         else:
             others[name] = f"an array of {' × '.join(map(str, array.shape))}"
-    if not columns:
-        held = ", ".join([*scalars, *others][:_SHOWN]) or "nothing"
-        raise UserError(
-            f"{source} has no column of samples, that is, no array with one dimension and at least "
-            f"2 values (it holds {held})"
-        )
-    return Table(source, Columns(columns), scalars, others)
+    return columns, scalars, others
 
 
 def _column(array: Stored, dtype: type) -> NDArray[Any]:

@@ -1,0 +1,91 @@
+"""Channels of MATLAB structures: their clocks, and what is no channel."""
+
+import numpy as np
+import pytest
+from tests.matlab_exports import (
+    D,
+    M,
+    T,
+    acqknowledge,
+    by_hand,
+    labchart,
+    save,
+    spike2,
+    structures,
+    write_mat73,
+)
+
+from rigidimeter.errors import UserError
+from rigidimeter.recording.formats import ReadOptions, read_table
+
+
+def table(path, values, **options):
+    save(path, **values)
+    return read_table(path, ReadOptions(**options))
+
+
+def stamps(found, name):
+    return found.columns["time_s"][np.isfinite(found.columns[name])]
+
+
+def test_blocks_of_labchart_begin_when_they_were_recorded(tmp_path):
+    found = table(tmp_path / "r.mat", labchart(blocks=2))
+    torque_s = stamps(found, "Torque")
+    np.testing.assert_allclose(torque_s[[0, 1999, 2000]], [0.0, 9.995, 40.0], atol=2e-5)
+    np.testing.assert_allclose(np.diff(stamps(found, "Elbow angle"))[:9], 0.01, atol=1e-12)
+    here = np.isfinite(found.columns["Torque"])
+    np.testing.assert_array_equal(found.columns["Torque"][here], M)
+    late = labchart()
+    late["firstsampleoffset"] = np.array([[0.0], [3.0]])  # ticks of 5 ms
+    assert stamps(table(tmp_path / "l.mat", late), "Elbow angle")[0] == pytest.approx(0.015)
+
+
+def test_a_unit_that_changes_between_blocks_is_refused(tmp_path):
+    values = labchart(blocks=2)
+    values["unittextmap"] = np.array([[1, 2], [2, 2]])
+    with pytest.raises(UserError, match="Torque is in Nm and in deg in different blocks"):
+        table(tmp_path / "r.mat", values)
+
+
+def test_the_times_of_a_channel_come_before_its_interval(tmp_path):
+    values = spike2()
+    values["elbow_Ch2"]["times"] = values["elbow_Ch2"]["times"] + 1.0
+    assert stamps(table(tmp_path / "r.mat", values), "Angle")[0] == pytest.approx(1.25)
+    values["elbow_Ch1"]["interval"] = 0.0
+    with pytest.raises(UserError, match="a clock from 0 s at 0 samples/s"):
+        table(tmp_path / "r.mat", values)
+
+
+def test_an_interval_in_another_unit(tmp_path):
+    found = table(tmp_path / "r.mat", acqknowledge() | {"isi": 5000.0, "isi_units": "us"})
+    np.testing.assert_allclose(found.columns["time_s"], T, atol=1e-9)
+    assert found.units["Elbow torque"] == "N-m"
+
+
+def test_columns_that_name_torque_and_motion_come_before_structures(tmp_path):
+    values = {"torque_nm": M, "angle_deg": D, "fs": 200.0}
+    found = table(tmp_path / "r.mat", {**values, "emg": {"data": M, "fs": 2000.0}})
+    assert {"torque_nm", "angle_deg", "emg.data"} == set(found.columns)
+
+
+def test_what_has_no_clock_is_said(tmp_path):
+    found = table(tmp_path / "r.mat", {**by_hand(), "calibration": M[:9], "condition": "OFF"})
+    assert found.others["calibration"] == "without a clock, beside channels that have one"
+    assert found.scalars == {"condition": "OFF"}
+
+
+def test_many_structures_without_samples_are_no_columns(tmp_path):
+    events = structures(*({"kind": "a", "at": float(k)} for k in range(3000)))
+    found = table(tmp_path / "r.mat", {"torque_nm": M, "angle_deg": D, "events": events})
+    assert found.others["events"] == "an array of objects"
+
+
+@pytest.mark.parametrize("made", [labchart(blocks=2), acqknowledge(), by_hand(), spike2()])
+def test_version_7_3_gives_the_same_table(tmp_path, made):
+    old = table(tmp_path / "old.mat", made)
+    write_mat73(tmp_path / "new.mat", made)
+    new = read_table(tmp_path / "new.mat")
+    assert list(new.columns) == list(old.columns)
+    assert new.units == old.units
+    for name in old.columns:
+        np.testing.assert_array_equal(new.columns[name], old.columns[name])
