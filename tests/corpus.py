@@ -19,6 +19,7 @@ from tests import matlab_files as matlab
 from tests.dialects import ANGLE_DEG, ANGLE_RAD, DIALECTS, MILLI, SEED, TIME_S, TORQUE_NM, csv
 from tests.instrument_files import Signal
 from tests.known_joint import angle_rad
+from tests.laboratory_exports import EXPORTED_TEXT
 from tests.laboratory_files import LABORATORY
 from tests.matlab_exports import EXPORTS
 
@@ -219,7 +220,7 @@ FILES: Mapping[str, Entry] = {
 CORPUS: Mapping[str, Entry] = {
     **{
         name: Entry((one.file,), _text(one.file, one.content), one.said, one.refused)
-        for name, one in {**DIALECTS, **LABORATORY}.items()
+        for name, one in {**DIALECTS, **LABORATORY, **EXPORTED_TEXT}.items()
     },
     **{name if name not in DIALECTS else f"{name}, binary": one for name, one in FILES.items()},
     **{name: _one("r.mat", made, refused="".join(more)) for name, (made, *more) in EXPORTS.items()},

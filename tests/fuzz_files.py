@@ -11,6 +11,7 @@ from tests import instrument_files as instruments
 from tests import matlab_exports as exports
 from tests import matlab_files as matlab
 from tests.instrument_files import Signal
+from tests.laboratory_exports import qualisys, vicon
 
 _TIME_S = np.arange(1200) / 100.0
 _RNG = np.random.default_rng(1)
@@ -70,6 +71,8 @@ FILES: tuple[Made, ...] = (
     _file("LabVIEW text", "r.lvm", _labview),
     _file("MATLAB table", "r.mat", _matlab_table),
     _file("MATLAB timetable", "r.mat", _matlab_timetable),
+    _file("Vicon text", "r.csv", Path.write_text, vicon()),
+    _file("Qualisys text", "r.tsv", Path.write_text, qualisys(_HEAD[1:], heading=True)),
     _file("MATLAB of LabChart", "r.mat", _matlab_export, exports.labchart(blocks=2)),
     _file("MATLAB of dSPACE", "r.mat", _matlab_export, exports.dspace()),
     _file("MATLAB 7.3 of Spike2", "r.mat", exports.write_mat73, exports.spike2()),

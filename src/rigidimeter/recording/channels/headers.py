@@ -13,6 +13,8 @@ from rigidimeter.recording.channels.quantities import BY_STANDARD, QUANTITIES, k
 from rigidimeter.recording.channels.unit_text import expression, factor, ratio
 
 _STORED = {one.name: one.standard for one in QUANTITIES}
+_TIMES = ("second", "millisecond", "microsecond")
+"""A column with only such a name, such as ``mSec``, is the time."""
 _BRACKETS = re.compile(r"(.*?)[\s_]*[\[({<]([^\[\](){}<>]*)[\])}>]\s*", re.DOTALL)
 _SEPARATED = re.compile(r"(.*\S)\s*(?:\s/\s|/|,|;|:|\sin\s|\s-\s)\s*(\S.*)", re.DOTALL)
 
@@ -75,6 +77,8 @@ def _own(name: str) -> Header:
             kind, unit = _kind(" ".join(parts[:-count])), "_".join(parts[-count:])
             if fits(kind, unit):
                 return Header(kind, unit)
+    if len(name.strip()) > 1 and expression(name) in _TIMES:
+        return Header("time", name.strip())
     return Header(_kind(name), "")
 
 

@@ -1,7 +1,8 @@
-"""The quantities that a recording may hold, and the words for them in five languages.
+"""The quantities that a recording may hold, and the words for them in six languages.
 
 A quantity is found in the name of a column by its words, as in `Torque`, `Drehmoment [Nm]` or
-`vitesse angulaire (deg/s)`: English, German, French, Italian and Spanish.
+`vitesse angulaire (deg/s)`: English, German, French, Italian, Spanish and
+Dutch.
 """
 
 from __future__ import annotations
@@ -50,24 +51,28 @@ BY_STANDARD: Mapping[str, Quantity] = {one.standard: one for one in QUANTITIES}
 
 _WORDS: Mapping[str, str] = {
     "time": "time t zeit temps tempo tiempo timestamp timestamps secs uhrzeit "
-    "zeitstempel heure horodatage ora hora clock",
-    "torque": "torque moment drehmoment couple coppia momento par trq tau mx my mz m",
-    "force": "force kraft forza fuerza fx fy fz f",
+    "zeitstempel heure horodatage ora hora clock tijd tijdstip",
+    "torque": "torque moment drehmoment couple coppia momento par trq tau mx my mz m "
+    "torques moments koppel",
+    "force": "force kraft forza fuerza kracht fx fy fz f",
     "angle": "angle ang winkel position pos angolo posizione angulo posicion theta phi alpha q "
-    "stellung auslenkung flexion flessione",
-    "velocity": "velocity vel speed omega geschwindigkeit drehzahl vitesse velocita velocidad w",
+    "stellung auslenkung flexion flessione "
+    "angles hoek positie",
+    "velocity": "velocity vel speed omega geschwindigkeit drehzahl vitesse velocita velocidad "
+    "snelheid w",
     "perturbation": "perturbation perturb disturbance prbs storung stoerung stormoment "
-    "stoermoment perturbazione disturbo perturbacion",
+    "stoermoment perturbazione disturbo perturbacion verstoring",
     "emg": "emg semg elektromyogramm",
     "command": "command commanded cmd setpoint target soll sollwert consigne comando mando "
-    "reference desired demand demanded",
+    "reference desired demand demanded gewenst gewenste",
     "no sample": "error err std sd sem quality status flag limit acceleration beschleunigung",
 }
 _WORD: Mapping[str, str] = {word: kind for kind, text in _WORDS.items() for word in text.split()}
 _GREEK = str.maketrans({"θ": " theta ", "φ": " phi ", "ϕ": " phi ", "α": " alpha ",
                         "ω": " omega ", "τ": " tau "})  # fmt: skip
 _ENDS = (("stormoment", "perturbation"), ("geschwindigkeit", "velocity"), ("moment", "torque"),
-         ("winkel", "angle"), ("kraft", "force"))  # fmt: skip
+         ("winkel", "angle"), ("kraft", "force"), ("snelheid", "velocity"),
+         ("koppel", "torque"), ("hoek", "angle"), ("kracht", "force"))  # fmt: skip
 
 
 def words_of(text: str) -> list[str]:

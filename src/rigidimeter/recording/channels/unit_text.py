@@ -18,15 +18,16 @@ if TYPE_CHECKING:
     import pint
 
 _SPELLED: Mapping[str, str] = {
-    "degree": "deg degs degree degrees Grad grados gradi degre degres degré degrés °",
+    "degree": "deg degs degree degrees Grad grados gradi degre degres degré degrés graden °",
     "millidegree": "mdeg",
     "radian": "rad rads radian radians Radiant radianti radianes radiani",
     "milliradian": "mrad",
     "turn": "rev revs revolution revolutions turn turns U tr giri giro",
     "gon": "gon",
     "second": "s sec secs second seconds Sek sek Sekunde Sekunden seconde secondes secondi "
-    "segundo segundos seg",
-    "millisecond": "ms msec msecs millisecond milliseconds Millisekunde Millisekunden",
+    "segundo segundos seg seconden",
+    "millisecond": "ms msec msecs millisecond milliseconds Millisekunde Millisekunden "
+    "milliseconde milliseconden",
     "microsecond": "us µs usec microsecond microseconds Mikrosekunden",
     "nanosecond": "ns nanoseconds",
     "minute": "min mins minute minutes Minuten",
@@ -58,6 +59,9 @@ _WHOLE: Mapping[str, str] = {
     "rpm": "turn/minute",
     "nm": "newton*meter",  # nothing that is read here is measured in nanometres
     "NM": "newton*meter",
+    "N-M": "newton*meter",
+    "FT-LBS": "foot*force_pound",
+    "FT-LB": "foot*force_pound",
 }
 _LONGEST = 40
 _ANGLES = ("radian", "degree", "turn", "grade", "revolutions_per_minute")

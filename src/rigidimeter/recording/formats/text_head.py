@@ -16,6 +16,7 @@ from rigidimeter.documents.escaping import NUMBER
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.unit_text import expression
 from rigidimeter.recording.formats.clocked_table import unique
+from rigidimeter.recording.formats.grouped_numbers import GROUPED
 from rigidimeter.recording.formats.table import MISSING, printable
 
 DELIMITERS = ("\t", ";", ",", "|", "")
@@ -254,4 +255,4 @@ def cells_of(line: str, delimiter: str) -> list[str]:
 
 
 def _is_number(cell: str) -> bool:
-    return NUMBER.fullmatch(cell.strip()) is not None
+    return any(form.fullmatch(cell.strip()) for form in (NUMBER, GROUPED))

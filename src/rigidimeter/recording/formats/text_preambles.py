@@ -1,4 +1,7 @@
-"""The heads of text files of programs: LabVIEW, BIOPAC AcqKnowledge, LabChart and OpenSim."""
+"""The heads of text files of programs.
+
+LabVIEW, BIOPAC AcqKnowledge, LabChart, OpenSim and Qualisys Track Manager.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from rigidimeter.recording.formats.text_head import DELIMITERS, Head, cells_of, 
 
 _PER_SAMPLE = re.compile(r"([\d.,]+)\s*(msec|sec|usec|µsec|min|s|ms)/sample[s]?", re.IGNORECASE)
 _SECONDS = {"msec": 1e-3, "ms": 1e-3, "sec": 1.0, "s": 1.0, "usec": 1e-6, "µsec": 1e-6, "min": 60.0}
+_QUALISYS = re.compile(r"(TOT_)?NO_OF_(FRAMES|SAMPLES)\t")
 _END = "***End_of_Header***"
 
 
@@ -29,6 +33,8 @@ def known_head(source: str, lines: Sequence[str]) -> Head | None:
     ends = [index for index, line in enumerate(lines) if line.strip().lower() == "endheader"]
     if ends and ends[0] + 1 < len(lines):
         return _opensim(source, lines, ends[0])
+    if _QUALISYS.match(lines[0]):
+        return _qualisys(source, lines)
     if lines[0].startswith("Interval="):
         return _labchart(source, lines)
     if len(lines) > 3 and _PER_SAMPLE.fullmatch(lines[1].strip().rstrip(",;\t")):
@@ -126,6 +132,34 @@ def _opensim(source: str, lines: Sequence[str], end: int) -> Head:
         if not header.unit and header.kind in by_kind
     }
     return Head(delimiter, names, end + 2, units)
+
+
+def _qualisys(source: str, lines: Sequence[str]) -> Head:
+    """Read keys and their values, then mostly a line of names; times are in s."""
+    said: dict[str, list[str]] = {}
+    for line in lines:
+        key, *values = (cell.strip() for cell in line.split("\t"))
+        if key.casefold() in ("frame", "sample") or not re.fullmatch(r"[A-Z][A-Z_]+", key):
+            break
+        said[key] = values
+    below = cells_of(lines[len(said)], "\t") if len(said) < len(lines) else []
+    rate_hz = _number(said.get("FREQUENCY", [""])[0])
+    if not below or not rate_hz > 0:
+        raise UserError(f"{source}: the head of this Qualisys file is not complete")
+    named = below[0].strip().casefold() in ("frame", "sample")
+    names = below if named else _qualisys_names(said)
+    while names and not names[-1].strip():
+        names = names[:-1]
+    shown = checked_names(source, names)
+    units = {name: "s" for name in shown if name.casefold() == "time"}
+    return Head("\t", shown, len(said) + named, units, {"rate_hz": rate_hz})
+
+
+def _qualisys_names(said: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return the names of the columns from the keys: of a marker there are three."""
+    if "CHANNEL_NAMES" in said:
+        return [*said["CHANNEL_NAMES"]]
+    return [f"{name} {axis}" for name in said.get("MARKER_NAMES", ()) if name for axis in "XYZ"]
 
 
 def _labchart(source: str, lines: Sequence[str]) -> Head:

@@ -24,6 +24,7 @@ from rigidimeter.documents.escaping import NUMBER
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.formats.clocked_table import table_of_pairs
+from rigidimeter.recording.formats.grouped_numbers import ungrouped
 from rigidimeter.recording.formats.spike2_text import FIRST as SPIKE2
 from rigidimeter.recording.formats.spike2_text import spike2_table
 from rigidimeter.recording.formats.table import CALIBRATION, Table, printable
@@ -42,6 +43,7 @@ from rigidimeter.recording.formats.text_lines import (
     trimmed,
 )
 from rigidimeter.recording.formats.text_preambles import known_head, without_later_heads
+from rigidimeter.recording.formats.vicon_text import is_vicon, vicon_table
 
 _DECIMAL_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
 _CALIBRATION = re.compile(
@@ -168,6 +170,8 @@ def read_text_recording(path: Path, layout: Layout | None = None) -> Table:
     whole = without_later_heads(read_utf8(path, RECORDING_BYTES))
     if whole.startswith(SPIKE2):
         return spike2_table(str(path), whole)
+    if is_vicon(whole):
+        return vicon_table(str(path), whole)
     text = _open(str(path), whole, "samples", example, layout or Layout())
     if len(text.names) < 2:
         raise UserError(
@@ -176,6 +180,7 @@ def read_text_recording(path: Path, layout: Layout | None = None) -> Table:
         )
     if not text.lines.size:
         raise text.without_rows()
+    text = replace(text, body=ungrouped(text.body, text.delimiter))
     comma = _has_decimal_comma(text.delimiter, text.body)
     frame = text.parsed(decimal="," if comma else ".", low_memory=False)
     columns: dict[str, NDArray[Any]] = {}
