@@ -95,8 +95,7 @@ class FoundDrive(NamedTuple):
 
     Attributes
     ----------
-    model : DriveModel
-    structure : str
+    fitted : Fitted
     misfit : float
         What the drive leaves of velocity that it was not fitted to, as a share of its SD.
     rivals : tuple of DriveModel
@@ -104,10 +103,19 @@ class FoundDrive(NamedTuple):
         and other structures.
     """
 
-    model: DriveModel
-    structure: str
+    fitted: Fitted
     misfit: float
     rivals: tuple[DriveModel, ...]
+
+    @property
+    def model(self) -> DriveModel:
+        """From command to velocity."""
+        return self.fitted.model
+
+    @property
+    def structure(self) -> str:
+        """The name of its structure."""
+        return self.fitted.structure.name
 
 
 def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
@@ -152,13 +160,17 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
     if misfit > LARGEST_MISFIT or not 0.5 < chosen.model.gain < 2.0:
         return None
     rival = AS_GOOD if _noise(samples, min(fitted, key=_by_power)) else RIVAL
-    near = (one for one in fitted if one.power <= rival * least + UNSEEN**2)
+    near = (
+        one
+        for one in fitted
+        if one.power <= rival * least + UNSEEN**2 and (chosen.unseen_pair or not one.unseen_pair)
+    )
     rivals = (
         *best.halves,
         *as_likely(samples, chosen),
         *(one.model for one in near if one is not chosen),
     )
-    return FoundDrive(chosen.model, chosen.structure.name, misfit, rivals)
+    return FoundDrive(chosen, misfit, rivals)
 
 
 class _Tried(NamedTuple):
@@ -261,6 +273,24 @@ def _power_between_lines(samples: Samples, start: DriveModel) -> float:
         command=Channel(sent.name, time_s, middle), interval_s=samples.interval_s / FINER
     )
     return min(search(finer, one, start).power for one in STRUCTURES if one.poles == 2)
+
+
+def velocity_sign(epoch: Epoch, fitted: Fitted) -> Channel | None:
+    """Return the sign of an epoch's velocity between its samples, by a drive with friction.
+
+    None for a drive without friction, or where command or velocity was not recorded.
+    """
+    command = epoch.channels.get("velocity_command_rad_s")
+    velocity = epoch.channels.get("velocity_rad_s")
+    if not fitted.structure.friction or command is None or velocity is None:
+        return None
+    time_s = _finer(command.time_s)
+    sign = mean_sign(time_s, np.interp(time_s, velocity.time_s, velocity.values))
+    scale = float(np.std(velocity.values))
+    samples = Samples(command, sign, fitted.interval_s, velocity.time_s, velocity.values, scale)
+    for _ in range(SIGNS):
+        samples = with_sign_of(samples, fitted)
+    return samples.sign
 
 
 def _finer(ticks_s: Array) -> Array:

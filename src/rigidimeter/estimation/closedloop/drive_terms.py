@@ -126,6 +126,16 @@ class Fitted(NamedTuple):
         fastest = max(-pole.real for pole in self.model.poles_rad_s)
         return math.exp(-fastest * self.interval_s) < FORGOTTEN
 
+    @property
+    def unseen_pair(self) -> bool:
+        """Whether a conjugate pair ended where the samples do not show that it is one.
+
+        At the ticks a pair is 1 − 2 Re(e^(λT)) z⁻¹ + |e^(λT)|² z⁻². With the last term gone it is
+        one pole. As two real poles the same pair would be `too_fast`.
+        """
+        pairs = [-2 * pole.real for pole in self.model.poles_rad_s if pole.imag]
+        return math.exp(-max(pairs, default=0.0) * self.interval_s) < FORGOTTEN
+
 
 class Terms(NamedTuple):
     """What the terms of a numerator would make of the inputs, for given poles and delay.

@@ -22,6 +22,7 @@ from rigidimeter.estimation.closedloop.between_samples import (
     torque_filter_of,
 )
 from rigidimeter.estimation.closedloop.drive_fit import FoundDrive
+from rigidimeter.estimation.closedloop.drive_friction import half_of_friction
 from rigidimeter.estimation.closedloop.drive_motion import since_ticks
 from rigidimeter.estimation.closedloop.excitation import Excitation, excitation
 from rigidimeter.estimation.closedloop.spectral_lines import Grid, Lines, epoch_grid, epoch_lines
@@ -254,6 +255,9 @@ def _observed(
     made = prepared.source.once(key, lambda: excitation(perturbation, loop, grid))
     torque_filter = torque_filter_of(prepared.settings.estimation)
     everything = epoch_lines(epoch, wider or grid, drive, torque_filter)
+    rubbing = half_of_friction(epoch, everything.grid, found, torque_filter)
+    by_friction = replace(everything, motion=rubbing).on(grid).motion
+    everything = replace(everything, motion=everything.motion + rubbing)
     lines = everything.on(grid)
     return Observation(
         lines,
@@ -262,17 +266,21 @@ def _observed(
         excited,
         drive is not None,
         everything if wider is not None else None,
-        partial(_otherwise, epoch, prepared.settings, found, lines),
+        partial(_otherwise, epoch, prepared.settings, found, lines, by_friction),
     )
 
 
 def _otherwise(
-    epoch: Epoch, settings: Settings, found: FoundDrive | None, lines: Lines
+    epoch: Epoch,
+    settings: Settings,
+    found: FoundDrive | None,
+    lines: Lines,
+    by_friction: Complex,
 ) -> list[Complex]:
     """Return what would add to the motion without a drive, and with others.
 
-    One that tells a little less, the rivals, and samples that kept step with the ticks where it may
-    be the stamps that did not.
+    One that tells a little less, the rivals, samples that kept step with the ticks where it may be
+    the stamps that did not, and half of what friction in the drive does between the samples.
     """
     grid, command = lines.grid, epoch.channels.get("velocity_command_rad_s")
     torque_filter = torque_filter_of(settings.estimation)
@@ -294,7 +302,8 @@ def _otherwise(
         there = [seen(found.model, after_s) for after_s in phases_s(command, stamps_s).tolist()]
         changes.append(seen(found.model, kept_s) - np.mean(there, axis=0))
     sent = grid.transform(command.values[tick])[:, None]
-    return [np.asarray(change * sent) for change in changes]
+    moved = [np.asarray(change * sent) for change in changes]
+    return [*moved, by_friction] if found.fitted.rubbing else moved
 
 
 def loop_of(settings: Settings, torque_rate_hz: float, drive: DriveModel | None) -> Loop:

@@ -240,7 +240,7 @@ def epoch_lines(
     if drive is not None and command is not None:
         motion = _between_samples(epoch, grid, drive, command, torque_filter)
     else:
-        motion = _spectra(grid, *_motion(epoch, grid.time_s))
+        motion = spectra(grid, *_motion(epoch, grid.time_s))
         motion *= filtered(torque_filter, grid.omega_rad_s)
     return Lines(grid, torque, motion)
 
@@ -262,11 +262,11 @@ def _between_samples(
         omega, mean_s = grid.omega_rad_s, float(np.mean(after_s))
         beyond = seen_beyond_samples(drive, torque_filter, omega, interval_s, mean_s)
         sent = grid.transform(command.values[tick])
-        sampled = _spectra(grid, angle, velocity) * filtered(torque_filter, omega)
+        sampled = spectra(grid, angle, velocity) * filtered(torque_filter, omega)
         return np.asarray(sampled + beyond * sent[:, None])
     driven_at = DrivenAt(drive, command)
     rest = without_driven(epoch, driven_at)
-    motion = _spectra(grid, *_motion(rest, grid.time_s))
+    motion = spectra(grid, *_motion(rest, grid.time_s))
     motion *= filtered(torque_filter, grid.omega_rad_s)
     # At the stamps of the torque, and from there like the torque.
     torque = epoch.channels["torque_nm"]
@@ -276,7 +276,7 @@ def _between_samples(
     return motion
 
 
-def _spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array) -> Complex:
+def spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array) -> Complex:
     """Return acceleration, velocity and angle at the lines; nothing is differentiated."""
     velocity = grid.transform(velocity_rad_s)
     acceleration = 1j * grid.omega_rad_s * velocity - grid.transform_slope(velocity_rad_s)
