@@ -6,7 +6,16 @@ from collections.abc import Mapping
 from datetime import datetime, timedelta
 
 import numpy as np
-from tests.dialects import ANGLE_DEG, MILLI, TIME_S, TORQUE_NM, VELOCITY_RAD_S, Dialect, csv
+from tests.dialects import (
+    ANGLE_DEG,
+    ANGLE_RAD,
+    MILLI,
+    TIME_S,
+    TORQUE_NM,
+    VELOCITY_RAD_S,
+    Dialect,
+    csv,
+)
 
 T, M, D = TIME_S, TORQUE_NM, ANGLE_DEG
 HALF = T.size // 2
@@ -140,6 +149,29 @@ LABORATORY: Mapping[str, Dialect] = {
     "names behind a per cent sign, small units": Dialect(
         "r.txt", csv("% rate 200 Hz\n% t_us torque_mNm angle_mdeg", 1e6 * T, MILLI * M, MILLI * D,
                      mark="  ", digits=10),
+    ),
+    "the lever arm in the head": Dialect(
+        "r.csv", b"Lever arm: 0.2 m\nSubject: 3\n" + csv("t (s),F (N),angle (deg)", T, M / 0.2, D)
+    ),
+    "the lever arm in a German comment": Dialect(
+        "r.csv", b"# Hebelarm [cm]: 20,0\n" + csv("t [s];Kraft [N];Winkel [°]", T, M / 0.2, D,
+                                                          mark=";"),
+    ),
+    "two lever arms": Dialect(
+        "r.csv",
+        b"Lever arm: 0.2 m\nLever arm: 0.3 m\n" + csv("t (s),F (N),angle (deg)", T, M / 0.2, D),
+        refused="lever arm",
+    ),
+    "an angle from 0 to 360 degrees": Dialect(
+        "r.csv", csv("t [s],M [Nm],phi [deg]", T, M, (D + 2.0) % 360)
+    ),
+    "an angle from -pi to pi": Dialect(
+        "r.csv", csv("t [s],M [Nm],phi [rad]", T, M, (ANGLE_RAD + 2 * np.pi) % (2 * np.pi) - np.pi)
+    ),
+    "an angle that drops to 0": Dialect(
+        "r.csv",
+        csv("t [s],M [Nm],phi [deg]", T, M, np.where(np.arange(T.size) % 50, D + 340.0, 0.0)),
+        refused="is too fast for a limb",
     ),
     "velocity alone, reaction": Dialect(
         "r.csv",

@@ -22,6 +22,7 @@ from rigidimeter.recording.channels.readings import (
     readings,
     sign_fault,
 )
+from rigidimeter.recording.channels.wrapping import unwrapped, wrapping_text
 from rigidimeter.recording.formats.columns import (
     counts_samples,
     numbers,
@@ -116,9 +117,14 @@ def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
         if standard in raw and standard != "time_s" and (to_si := taken.to_si) is not None
     }
     notices += _about_emg(table, values)
+    if "angle_rad" in values:
+        values["angle_rad"], n_turns = unwrapped(values["angle_rad"])
+        if n_turns:
+            text = f"{table.source}: column {names['angle_rad']!r} {wrapping_text(n_turns)}"
+            notices.append(Notice("warning", text))
     if options.reaction:
         values["torque_nm"] = -values["torque_nm"]
-    notices += [Notice("error", f"{text}; the entry was left out") for text in strays]
+    notices += [Notice("error", text) for text in strays]
     return TableChannels(names, time_s, values, tuple(notices))
 
 

@@ -12,8 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.channels.conversion import Conversion, conversion
+from rigidimeter.recording.channels.conversion import EXAMPLE_ARM, Conversion, conversion
 from rigidimeter.recording.channels.headers import Header, read_header
+from rigidimeter.recording.channels.lever_arm import lever_arm
 from rigidimeter.recording.channels.quantities import BY_STANDARD, QUANTITIES
 from rigidimeter.recording.channels.unit_text import expression, ratio
 from rigidimeter.recording.formats.table import Table, alike, nearest
@@ -170,7 +171,10 @@ def _take(
     try:
         to_si = conversion(standard, column, unit, scale, said.offsets.get(standard, ""))
     except UserError as error:
-        choice.faults.append(f"{table.source}: {error}")
+        text = f"{table.source}: {error}"
+        if not scale and (arm := lever_arm(table.scalars)):
+            text = text.replace(EXAMPLE_ARM, arm) + " (as the file states)"
+        choice.faults.append(text)
         return
     choice.taken[standard] = Taken(standard, column, unit, to_si, of_user)
 

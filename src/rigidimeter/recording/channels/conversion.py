@@ -11,6 +11,8 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.unit_text import expression, factor, ratio, split_number
 
+EXAMPLE_ARM = "0.25 m"
+
 
 @dataclass(frozen=True)
 class Conversion:
@@ -81,7 +83,7 @@ def _no_factor(standard: str, column: str, unit: str, scale: str) -> str:
     usual = " or ".join(quantity.usual)
     example = f"--scale '{quantity.name}=2.5 {quantity.usual[0]}/{unit or 'V'}'"
     if expression(unit) and ratio(expression(unit), "newton") is not None:
-        example = f"the lever arm, as in --scale '{quantity.name}=0.25 m'"
+        example = f"the lever arm, as in --scale '{quantity.name}={EXAMPLE_ARM}'"
     if scale:
         return (
             f"--scale '{quantity.name}={scale}': times the unit of column {column!r} "

@@ -15,6 +15,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.estimation import METHODS
 from rigidimeter.recording.channels.choice import MOTION
 from rigidimeter.recording.channels.column_facts import ColumnFacts, column_facts
+from rigidimeter.recording.channels.lever_arm import lever_arm
 from rigidimeter.recording.channels.proposal import Proposal, propose
 from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.readings import look_text
@@ -110,8 +111,11 @@ def remarks(found: Inspection) -> list[str]:
             lacking = lacking or ["torque and motion"]
             unable.append(f"{method.name} lacks {' and '.join(lacking)}")
     lines.append(f"methods: {', '.join(able) or 'none'}" + "".join(f"; {text}" for text in unable))
-    lines += found.proposal.choice.unused
-    if stated := found.table.scalars.get(CALIBRATION):
+    lines += found.proposal.notices
+    arm = lever_arm(found.table.scalars)
+    if arm and arm in found.options.scales.values():
+        lines.append(f"the file states a lever arm of {arm}: the torque is the force times it")
+    elif stated := found.table.scalars.get(CALIBRATION):
         lines.append(f"the file says {str(stated)[:80]!r}: if that is a calibration, say --scale")
     return [*lines, *(f"decided by the numbers: {text}" for text in found.proposal.reasons)]
 

@@ -23,6 +23,7 @@ from rigidimeter.recording.channels.channels_of_table import (
 )
 from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
 from rigidimeter.recording.channels.headers import read_header
+from rigidimeter.recording.channels.lever_arm import lever_arm
 from rigidimeter.recording.channels.looks import Array, Look
 from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.readings import (
@@ -54,6 +55,8 @@ class Proposal:
         The columns that are taken then.
     seen : Look or None
         How the recording looks then.
+    notices : tuple of str
+        What is not used or was changed then.
     """
 
     options: ReadOptions
@@ -61,6 +64,7 @@ class Proposal:
     unsaid: tuple[str, ...]
     choice: Choice
     seen: Look | None
+    notices: tuple[str, ...]
 
 
 def propose(table: Table, options: ReadOptions) -> Proposal:
@@ -68,6 +72,7 @@ def propose(table: Table, options: ReadOptions) -> Proposal:
     reasons: list[str] = []
     for standard in ("torque_nm", *MOTION):
         options = _one_of_several(table, standard, options, reasons)
+    options = _of_lever_arm(table, options)
     options = _trials(table, options, reasons)
     options = _units(table, options, reasons)
     choice = _chosen(table, options)
@@ -80,10 +85,10 @@ def propose(table: Table, options: ReadOptions) -> Proposal:
         seen = _seen(choice.taken, raw | {"torque_nm": -raw["torque_nm"]}, rate_hz, {})
     unsaid: tuple[str, ...] = ()
     try:
-        channels_of_table(table, options)
+        notices = tuple(notice.text for notice in channels_of_table(table, options).notices)
     except UserError as error:
-        unsaid = error.lines
-    return Proposal(options, tuple(reasons), unsaid, choice, seen)
+        unsaid, notices = error.lines, tuple(choice.unused)
+    return Proposal(options, tuple(reasons), unsaid, choice, seen, notices)
 
 
 def _one_of_several(
@@ -105,6 +110,15 @@ def _one_of_several(
     shown = ", ".join(f"{explained[column]:.2f} with {column!r}" for column in ranked[:4])
     reasons.append(f"the share of the torque that the motion explains is {shown} as the {name}")
     return replace(options, columns={**options.columns, name: ranked[0]})
+
+
+def _of_lever_arm(table: Table, options: ReadOptions) -> ReadOptions:
+    """Multiply a force by the lever arm that the file states."""
+    arm = lever_arm(table.scalars)
+    if not arm or "torque_nm" in _chosen(table, options).taken:
+        return options
+    tried = replace(options, scales={**options.scales, "torque": arm})
+    return tried if "torque_nm" in _chosen(table, tried).taken else options
 
 
 def _trials(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOptions:

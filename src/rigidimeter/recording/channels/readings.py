@@ -19,6 +19,7 @@ from rigidimeter.recording.channels.conversion import Conversion
 from rigidimeter.recording.channels.looks import Array, Look, RoughFit, look
 from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.unit_text import factor
+from rigidimeter.recording.channels.wrapping import unwrapped
 
 LARGEST_RAD = 2 * math.pi
 LARGEST_SPEED_RAD_S = 20.0
@@ -217,10 +218,11 @@ def look_at(
 
     def si(name: str) -> Array:
         values = raw[name].astype(np.float64)
-        if name in as_units:
-            return Conversion(factor(as_units[name], name) or 1.0)(values)
         to_si = taken[name].to_si
-        return values if to_si is None else to_si(values)
+        if name in as_units:
+            to_si = Conversion(factor(as_units[name], name) or 1.0)
+        values = values if to_si is None else to_si(values)
+        return unwrapped(values)[0] if name == "angle_rad" else values
 
     time_s = si("time_s") if "time_s" in raw else np.arange(raw[motion].size) / (rate_hz or 1.0)
     signals = []

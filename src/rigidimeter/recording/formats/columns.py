@@ -33,7 +33,7 @@ def numbers(
     standard, name : str
         What we and what the file call the column.
     strays : list of str, optional
-        Where given, a few entries that are not numbers are missing too, and a sentence about each
+        Where given, a few entries that are not numbers are missing too, and a sentence about them
         is added here.
 
     Raises
@@ -57,8 +57,10 @@ def numbers(
             # The first row is more often a row of units than a slip.
             if strays is None or row == 0 or len(found) > STRAY_SHARE * column.size:
                 raise UserError(found[0]) from None
-    if strays is not None:
-        strays += found
+    if strays is not None and found:
+        more = f", nor are {len(found) - 1} other entries of the column" if found[1:] else ""
+        left = "they were" if more else "the entry was"
+        strays.append(f"{found[0]}{more}; {left} left out")
     return values
 
 

@@ -23,6 +23,7 @@ from rigidimeter.documents.bounds import RECORDING_BYTES, TABLE_BYTES, TABLE_CEL
 from rigidimeter.documents.escaping import NUMBER
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.headers import read_header
+from rigidimeter.recording.channels.lever_arm import states_lever_arm
 from rigidimeter.recording.formats.clocked_table import table_of_pairs
 from rigidimeter.recording.formats.grouped_numbers import ungrouped
 from rigidimeter.recording.formats.spike2_text import FIRST as SPIKE2
@@ -336,7 +337,8 @@ def _head(source: str, whole: bytes, data: bytes, example: str, layout: Layout |
     before, _, _ = whole.partition(data[: data.find(b"\n")] if b"\n" in data else data)
     comments = [line[1:].strip() for line in before.decode("utf-8").splitlines() if line[:1] == "#"]
     head = found_head(source, first, comments[-1] if comments else "", layout.names, example)
-    stated = [
-        line for line in (*comments, *first[: head.n_before - 1]) if _CALIBRATION.search(line)
-    ]
-    return replace(head, scalars={**head.scalars, CALIBRATION: stated[0]}) if stated else head
+    above = (*comments, *first[: head.n_before - 1])
+    stated = [line for line in above if _CALIBRATION.search(line) or states_lever_arm(line)]
+    if not stated:
+        return head
+    return replace(head, scalars={**head.scalars, CALIBRATION: "; ".join(stated)})
