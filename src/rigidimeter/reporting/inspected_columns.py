@@ -6,13 +6,18 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from rigidimeter.documents import visible
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.inspection import Inspection
 from rigidimeter.recording.formats.columns import numbers
+from rigidimeter.recording.formats.gaps import longest_s
+
+Array = NDArray[np.float64]
 
 _MOST_PANES = 16
+_LONGEST = 70
 
 
 def draw_columns(found: Inspection, path: Path) -> None:
@@ -37,21 +42,30 @@ def columns_figure(found: Inspection) -> Figure:
         for one in found.facts
         if not one.text and (one.name not in taken or taken[one.name].standard != "time_s")
     ][:_MOST_PANES]
-    figure = Figure(figsize=(8, 1.2 + 1.3 * len(drawn)), layout="constrained")
+    figure = Figure(figsize=(8, 1.0 + 1.5 * len(drawn)), layout="constrained")
     panes = figure.subplots(max(len(drawn), 1), 1, sharex=True, squeeze=False)[:, 0]
     for pane, one in zip(panes, drawn, strict=False):
         values = numbers(found.table, one.name, one.name, [])
         known = found.time_s is not None and found.time_s.size == values.size
-        time = found.time_s if known and found.time_s is not None else np.arange(values.size)
+        time = found.time_s if known and found.time_s is not None else np.arange(float(values.size))
         there = np.isfinite(values)  # rows of other clocks are empty
-        pane.plot(time[there], values[there], linewidth=0.7, rasterized=True)
-        unit = (taken[one.name].unit if one.name in taken else "") or one.unit
-        pane.set_ylabel(_label(one.name, unit), parse_math=False)
+        x, y = time[there], values[there]
+        if known:
+            x, y = _with_gaps(x, y)
+        pane.plot(x, y, linewidth=0.7, rasterized=True)
+        role = taken.get(one.name)
+        unit = (role.unit if role is not None else "") or one.unit
+        title = one.name[:_LONGEST] + (f", read as {role.standard}" if role is not None else "")
+        pane.set_title(visible(title), loc="left", fontsize="small", parse_math=False)
+        pane.set_ylabel(visible(unit or "unit unknown"), parse_math=False)
     panes[-1].set_xlabel("time (s)" if found.time_s is not None else "row")
     return figure
 
 
-def _label(name: str, unit: str) -> str:
-    """Return name and unit, the unit once where the name ends with it."""
-    stated = bool(unit) and name.endswith((f"[{unit}]", f"({unit})"))
-    return visible(name[:32] if stated else f"{name[:24]}\n({unit or 'unit unknown'})", lines=True)
+def _with_gaps(time: Array, values: Array) -> tuple[Array, Array]:
+    """Return a signal with a point that is not drawn in every gap."""
+    steps = np.diff(time)
+    if not steps.size or not (typical := float(np.median(steps))) > 0:
+        return time, values
+    gaps = np.flatnonzero(steps > longest_s(typical)) + 1
+    return np.insert(time, gaps, time[gaps - 1]), np.insert(values, gaps, np.nan)

@@ -22,8 +22,19 @@ def test_each_column_but_the_time_with_every_value_and_its_unit():
     }
     options = ReadOptions({"angle_rad": "phi"}, units={"angle_rad": "deg"})
     panes = columns_figure(inspect_table(Table("r.csv", columns), options)).axes
-    assert [pane.get_ylabel() for pane in panes] == ["M [Nm]", "phi\n(deg)"]
+    titles = [pane.get_title(loc="left") for pane in panes]
+    assert titles == ["M [Nm], read as torque_nm", "phi, read as angle_rad"]
+    assert [pane.get_ylabel() for pane in panes] == ["Nm", "deg"]
     assert panes[-1].get_xlabel() == "time (s)"
     time, drawn = panes[1].lines[0].get_data()
     np.testing.assert_array_equal(time, TIME_S[::2])
     np.testing.assert_array_equal(drawn, angle[::2])
+
+
+def test_no_line_crosses_a_gap():
+    time_s = TIME_S + np.where(np.arange(TIME_S.size) < 500, 0.0, 30.0)
+    columns = {"t_s": time_s, "torque_nm": torque_nm(TIME_S), "angle_rad": angle_rad(TIME_S)}
+    (pane, _) = columns_figure(inspect_table(Table("r.csv", columns), ReadOptions())).axes
+    _, drawn = pane.lines[0].get_data()
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(drawn)), [500])
+    np.testing.assert_array_equal(drawn[np.isfinite(drawn)], columns["torque_nm"])
