@@ -50,7 +50,7 @@ QUANTITIES = (
 BY_STANDARD: Mapping[str, Quantity] = {one.standard: one for one in QUANTITIES}
 
 _WORDS: Mapping[str, str] = {
-    "time": "time t zeit temps tempo tiempo timestamp timestamps secs uhrzeit "
+    "time": "time times t zeit temps tempo tiempo timestamp timestamps secs uhrzeit "
     "zeitstempel heure horodatage ora hora clock tijd tijdstip",
     "torque": "torque moment drehmoment couple coppia momento par trq tau mx my mz m "
     "torques moments koppel",

@@ -76,12 +76,35 @@ def texts(entry: Stored) -> list[str]:
     """Return one text, a cell of texts or the rows of a matrix of letters."""
     if entry.dtype.kind not in "OU":
         return []
-    return [str(text).replace("\0", "").strip() for text in entry.read().reshape(-1)]
+    return [str(one).replace("\0", "").strip() for one in entry.read().reshape(-1)]
+
+
+def text(entry: Stored) -> str:
+    """Return the first text of a field.
+
+    Raises
+    ------
+    ValueError
+        If it has none.
+    """
+    found = texts(entry)
+    if not found:
+        raise ValueError("a field that must hold text does not")
+    return found[0]
 
 
 def number(entry: Stored) -> float:
-    """Return the first number of a field."""
-    return float(numbers(entry).reshape(-1)[0])
+    """Return the first number of a field.
+
+    Raises
+    ------
+    ValueError
+        If it has none.
+    """
+    found = numbers(entry).reshape(-1)
+    if not found.size:
+        raise ValueError("a field that must hold a number is empty")
+    return float(found[0])
 
 
 def numbers(entry: Stored) -> Array:

@@ -52,7 +52,7 @@ def test_the_times_of_a_channel_come_before_its_interval(tmp_path):
     values["elbow_Ch2"]["times"] = values["elbow_Ch2"]["times"] + 1.0
     assert stamps(table(tmp_path / "r.mat", values), "Angle")[0] == pytest.approx(1.25)
     values["elbow_Ch1"]["interval"] = 0.0
-    with pytest.raises(UserError, match="a clock from 0 s at 0 samples/s"):
+    with pytest.raises(UserError, match="export of Spike2 that cannot be read"):
         table(tmp_path / "r.mat", values)
 
 
@@ -89,3 +89,47 @@ def test_version_7_3_gives_the_same_table(tmp_path, made):
     assert new.units == old.units
     for name in old.columns:
         np.testing.assert_array_equal(new.columns[name], old.columns[name])
+
+
+def two(torque, angle):
+    """Return a structure for each channel, with these fields besides its own."""
+    return {"torque": {"data": M, "unit": "Nm", **torque},
+            "angle": {"data": D, "unit": "deg", **angle}}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("torque", "angle"),
+    [
+        ({"fs": 200.0, "time": T}, {"fs": 200.0, "time": T + 0.25}),
+        ({"fs": 200.0, "t": 1e3 * T}, {"fs": 200.0, "t": 1e3 * (T + 0.25)}),
+        ({"time_s": T}, {"t_ms": 1e3 * (T + 0.25)}),
+        ({"fs": 200.0}, {"fs": 200.0, "time_s": T + 0.25}),
+    ],
+)
+def test_the_times_of_a_structure_come_before_its_rate(tmp_path, torque, angle):
+    found = table(tmp_path / "r.mat", two(torque, angle))
+    assert found.units == {"time_s": "s", "torque": "Nm", "angle": "deg"}
+    np.testing.assert_allclose(stamps(found, "torque"), T, atol=1e-9)
+    np.testing.assert_allclose(stamps(found, "angle"), T + 0.25, atol=1e-9)
+
+
+def test_times_that_the_rate_contradicts_are_no_clock(tmp_path):
+    found = table(tmp_path / "r.mat", two({"fs": 100.0, "t": T}, {"fs": 100.0, "t": T}))
+    assert {"torque.t", "angle.t"} < set(found.columns)
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        (two({"fs": 200.0}, {"fs": 200.0, "start": 0.25}),
+         "angle has samples and a rate, but cannot be read (angle.start is 0.25, and no unit is"),
+        (two({"fs": -5.0}, {"fs": 200.0}), "torque has samples and a rate, but cannot be read (a"),
+        ({**acqknowledge(), "isi_units": 5.0}, "an export of AcqKnowledge that cannot be read (a"),
+        ({**labchart(), "samplerate": np.ones((3, 1))},
+         "LabChart that cannot be read (samplerate has 3 values for 2 channels)"),
+    ],
+)  # fmt: skip
+def test_clocks_that_cannot_be_are_refused(tmp_path, values, told):
+    with pytest.raises(UserError) as caught:
+        table(tmp_path / "r.mat", values)
+    assert told in str(caught.value)
