@@ -131,7 +131,8 @@ def _fits(analysis: Analysis) -> list[Block]:
     bands = sorted({fit.band_hz for fit in analysis.fits if fit.n_samples})
     band = "".join(f", {low:.4g} to {high:.4g} Hz" for low, high in bands[:1])
     heading = f"J, B, K of each epoch ± one standard error, {analysis.method}{band}"
-    return [Heading(heading), _fit_table(analysis.fits, analysis.fits)]
+    table = _fit_table(analysis.fits, analysis.fits)
+    return [Heading(heading), table, f"{analysis.weight_in_stiffness}."]
 
 
 def _fixed_inertia(analysis: Analysis) -> list[Block]:

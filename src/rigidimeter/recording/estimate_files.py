@@ -35,6 +35,7 @@ def estimates_document(analysis: Analysis) -> dict[str, Any]:
         "schema": ESTIMATES_SCHEMA,
         "method": analysis.method,
         "method_reason": analysis.method_reason,
+        "weight_in_stiffness": analysis.weight_in_stiffness,
         "delays": [vars(delay) for delay in analysis.delays],
         "pooled": _pooled(analysis.pooled),
         "epochs": [_fit_row(fit) for fit in analysis.fits],

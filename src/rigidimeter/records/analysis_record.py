@@ -19,6 +19,12 @@ MOST_EPOCHS = 20
 """Epochs shown one by one; of more only the first are."""
 
 
+WEIGHT_IN_STIFFNESS = (
+    "K is the slope of all torque against the angle. Unless the axis is vertical it includes that "
+    "of the limb's weight, m g l cos θ with θ from hanging straight down"
+)
+
+
 class Findings(NamedTuple):
     """What one check found, in one or more epochs: the first finding, and the fits of all."""
 
@@ -57,6 +63,15 @@ class Analysis:
                 _, fits = groups.setdefault((finding.name, finding.level), (finding, []))
                 fits.append(fit)
         return tuple(Findings(first, tuple(fits)) for first, fits in groups.values())
+
+    @property
+    def weight_in_stiffness(self) -> str:
+        """What K holds of the limb's weight, as a sentence without its stop; empty without fits."""
+        if not self.fits:
+            return ""
+        if any(group.first.name == "gravity" for group in self.findings):
+            return f"{WEIGHT_IN_STIFFNESS}; the note `gravity` of each epoch gives K without it"
+        return f"{WEIGHT_IN_STIFFNESS}; set diagnostics.gravity_nm to have K without it too"
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one row for each fitted epoch: the fit, and B and K at fixed inertia beside it.

@@ -14,6 +14,7 @@ import numpy as np
 from markupsafe import Markup
 
 from rigidimeter.records import Epoch, Fit
+from rigidimeter.records.analysis_record import WEIGHT_IN_STIFFNESS
 from rigidimeter.reporting.contents import Block, Section, from_study_folder, paragraph
 from rigidimeter.reporting.method_words import method_of
 from rigidimeter.reporting.numbers import condition_name, number, plural, series
@@ -178,8 +179,7 @@ def _estimation(result: StudyResult, cite: Cited) -> list[str]:
     sentences = [
         f"Inertia J, viscous damping B and stiffness K of J θ″ + B θ′ + K θ = M were estimated "
         f"epoch by epoch {_how(analysis.method, cite)}{band}.",
-        "K is the slope of all torque against the angle. Unless the axis is vertical it includes "
-        "that of the limb's weight, m g l cos θ with θ from hanging straight down.",
+        f"{WEIGHT_IN_STIFFNESS}.",
     ]
     corrected = [delay for delay in analysis.delays if delay.corrected]
     if corrected:
