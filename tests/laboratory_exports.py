@@ -41,6 +41,23 @@ def vicon(moment: str = "N.mm", angle: str = "deg") -> str:
     )
 
 
+def vicon_plate() -> str:
+    """Return a plate of three forces and three moments, of which one, and one angle, belong."""
+    count, still = np.arange(T.size), np.zeros(T.size)
+    forces = (M / 0.2, still + 1, 700 + np.sin(T))
+    plate = rows(count // 2 + 1, count % 2, *forces, still + 3, np.cos(T), MILLI * M)
+    return (
+        "Devices\n200\n,,Plate #1 - Force,,,Plate #1 - Moment,,\n"
+        f"Frame,Sub Frame,Fx,Fy,Fz,Mx,My,Mz\n,,N,N,N,N.mm,N.mm,N.mm\n{plate}\n"
+        + vicon()[vicon().index("Model") :]
+    )
+
+
+def european(text: str) -> str:
+    """Return text with semicolons and decimal commas."""
+    return text.replace(",", ";").replace(".", ",")
+
+
 def qualisys(names: Sequence[str], *, heading: bool) -> str:
     """Return analogue channels as Qualisys Track Manager exports them."""
     head = (
@@ -88,6 +105,20 @@ EXPORTED_TEXT: Mapping[str, Dialect] = {
         vicon().replace("Devices\n200\n", "Devices,,,\n200,,,\n")
         .replace("\n\nModel", "\n,,,\nModel").encode(),
     ),
+    "Vicon Nexus, three axes of each": Dialect("r.csv", vicon_plate().encode()),
+    "Vicon Nexus, decimal commas and N.mm": Dialect(
+        "r.csv", european(vicon()).replace("N,mm", "N.mm").encode()
+    ),
+    "a rate in a comment": Dialect("r.csv", csv("# fs = 0.2 kHz\nTorque (Nm),Angle (deg)", M, D)),
+    "a rate with its unit before it": Dialect(
+        "r.csv",
+        csv("Abtastrate [Hz];200\nDauer [s];20\nDrehmoment [Nm];Winkel [Grad]", M, D, mark=";",
+            decimal=","),
+    ),
+    "an interval in the head": Dialect(
+        "r.csv", csv("Sampling interval: 5 ms\nTorque (Nm),Angle (deg)", M, D)
+    ),
+    "units above the names": Dialect("r.csv", csv("s;Nm;deg\nt;M;phi", T, M, D, mark=";")),
     "Qualisys": Dialect(
         "r.tsv", qualisys(("Torque (Nm)", "Angle (deg)"), heading=True).encode()
     ),

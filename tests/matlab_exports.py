@@ -123,6 +123,16 @@ def of_one_clock(time: str, stamps: object) -> Values:
     return {"rec": {time: stamps, "channels": channels, "date": "1 May"}}
 
 
+def matrix(**more: object) -> Values:
+    """Return a matrix with the names and units of its columns beside it."""
+    return {"labels": _cells("Torque", "Angle"), "units": _cells("Nm", "deg"),
+            "data": np.stack([M, D], axis=1), **more}  # fmt: skip
+
+
+def _cells(*texts: str) -> np.ndarray:
+    return np.array([texts], dtype=object)
+
+
 def write_timeseries(path: Path, *, implicit: bool) -> None:
     """Write two objects of the class `timeseries` as mat-io writes objects.
 
@@ -202,11 +212,19 @@ EXPORTS: Mapping[str, tuple] = {
     "MATLAB array of structures, a rate": (_entry(of_one_clock("fs", RATE_HZ)),),
     "MATLAB array of structures, a time": (_entry(of_one_clock("t_ms", MILLI * T)),),
     "MATLAB structures, two rates": (_entry(two_rates()),),
+    "MATLAB matrix with labels": (_entry(matrix(fs=RATE_HZ)),),
+    "MATLAB matrix with headings": (
+        _entry({"rec": {"data": np.stack([T, M, D], axis=1),
+                        "colheaders": _cells("t [s]", "M [Nm]", "phi [deg]")}}),
+    ),
+    "MATLAB matrix beside its time": (_entry(matrix(t_ms=MILLI * T)),),
+    "MATLAB, a force and its lever arm": (_entry({"t_s": T, "F_N": M / 0.2, "phi_deg": D,
+                                                  "lever_arm_m": 0.2}),),
     "MATLAB timeseries": (lambda path: write_timeseries(path, implicit=False),),
     "MATLAB timeseries, even stamps": (lambda path: write_timeseries(path, implicit=True),),
     "MATLAB 7.3 of LabChart": (lambda path: write_mat73(path, labchart(blocks=2)),),
     "MATLAB 7.3 of AcqKnowledge": (lambda path: write_mat73(path, acqknowledge()),),
     "MATLAB 7.3 of dSPACE": (lambda path: write_mat73(path, dspace()),),
     "MATLAB 7.3, array of structures": (lambda path: write_mat73(path, by_hand()),),
-}
+}  # fmt: skip
 """What writes each, and a part of the refusal where there must be one."""

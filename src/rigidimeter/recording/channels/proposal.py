@@ -36,6 +36,7 @@ from rigidimeter.recording.formats.columns import numbers, own_rate, own_rates, 
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
 
+_MOST_PAIRS = 36
 _BELONGS, _DOES_NOT = 0.8, 0.5
 """Of the share of a torque that the motion explains."""
 
@@ -70,6 +71,7 @@ class Proposal:
 def propose(table: Table, options: ReadOptions) -> Proposal:
     """Return how a table should be read, with the options that are given already."""
     reasons: list[str] = []
+    options = _pair_of_several(table, options, reasons)
     for standard in ("torque_nm", *MOTION):
         options = _one_of_several(table, standard, options, reasons)
     options = _of_lever_arm(table, options)
@@ -91,6 +93,38 @@ def propose(table: Table, options: ReadOptions) -> Proposal:
     return Proposal(options, tuple(reasons), unsaid, choice, seen, notices)
 
 
+def _pair_of_several(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOptions:
+    """Choose the torque and the motion that alone belong together, of several of each."""
+    choice = _chosen(table, options)
+    motions = [name for name in MOTION if name in choice.several]
+    taken = any(name in choice.taken for name in MOTION)
+    if "torque_nm" not in choice.several or len(motions) != 1 or taken:
+        return options
+    torques, moved = choice.several["torque_nm"], choice.several[motions[0]]
+    name = BY_STANDARD[motions[0]].name
+    if len(torques) * len(moved) > _MOST_PAIRS:
+        return options
+    explained = {}
+    for torque, motion in itertools.product(torques, moved):
+        columns = {**options.columns, "torque": torque, name: motion}
+        explained[torque, motion] = _explained(table, replace(options, columns=columns))
+    best, second = sorted(explained, key=lambda pair: -explained[pair])[:2]
+    if explained[best] < _BELONGS or explained[second] > _DOES_NOT:
+        return options
+    reasons.append(
+        f"the share of the torque that the motion explains is {explained[best]:.2f} with "
+        f"{best[0]!r} and {best[1]!r}, and at most {explained[second]:.2f} with any other two"
+    )
+    return replace(options, columns={**options.columns, "torque": best[0], name: best[1]})
+
+
+def _explained(table: Table, options: ReadOptions) -> float:
+    """Return the share of the torque that the motion explains, 0 where that is not known."""
+    choice = _chosen(table, options)
+    seen = _seen(choice.taken, *_raw(table, choice, options), {})
+    return 0.0 if seen is None or seen.fit is None else seen.fit.r_squared
+
+
 def _one_of_several(
     table: Table, standard: str, options: ReadOptions, reasons: list[str]
 ) -> ReadOptions:
@@ -100,10 +134,8 @@ def _one_of_several(
     explained: dict[str, float] = {}
     for column in candidates:
         tried = replace(options, columns={**options.columns, name: column})
-        choice = _chosen(table, tried)
-        seen = _seen(choice.taken, *_raw(table, choice, tried), {})
-        if seen is not None and seen.fit is not None:
-            explained[column] = seen.fit.r_squared
+        if share := _explained(table, tried):
+            explained[column] = share
     ranked = sorted(explained, key=lambda column: -explained[column])
     if len(ranked) < 2 or explained[ranked[0]] < _BELONGS or explained[ranked[1]] > _DOES_NOT:
         return options

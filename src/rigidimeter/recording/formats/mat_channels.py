@@ -6,14 +6,14 @@ All channels keep their own clocks.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.channels.choice import LABELS
 from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.channels.unit_text import factor
 from rigidimeter.recording.exported_session import Stream
@@ -31,12 +31,14 @@ from rigidimeter.recording.formats.mat_fields import (
     stated_name,
     stated_rate,
     stated_unit,
+    texts,
 )
 from rigidimeter.recording.formats.mat_programs import PROGRAMS, Channel
 from rigidimeter.recording.formats.stored_arrays import Stored
 from rigidimeter.recording.formats.table import Table, sorted_arrays, table_of_arrays
 
-_VALUES = ("values", "data", "wave", "signal", "samples")
+_VALUES = ("values", "data", "wave", "signal", "signals", "samples")
+_LABELS = ("labels", "names", "colheaders", "channels", "titles", "channelnames", *NAMES)
 _STARTS = ("start", "t0", "starttime", "start_time")
 _SAME = 0.01
 
@@ -60,13 +62,18 @@ def table_of_variables(source: str, entries: Mapping[str, Stored]) -> Table:
     for place in groups:
         if channels := _channels(source, groups, place):
             found[place] = channels
-    rest = {name: entry for name, entry in entries.items() if name.rpartition(".")[0] not in found}
     channels = [channel for each in found.values() for channel in each]
-    if not channels or (_is_recording(sorted_arrays(rest)[0]) and not _is_recording(
-        channel.name for channel in channels
-    )):  # fmt: skip
+    if not channels or _is_recording(sorted_arrays(entries)[0]):
         return table_of_arrays(source, entries)
-    if all(channel.time_s is None for channel in channels):
+    bare = all(channel.time_s is None for channel in channels)
+    rest = {
+        name: entry
+        for name, entry in entries.items()
+        if (parts := name.rpartition("."))[0] not in found
+        or parts[2] in LABELS
+        or (bare and read_header(parts[2]).kind == "time")
+    }
+    if bare:
         return _without_clock(source, channels, rest)
     streams, units = [], []
     for channel in channels:
@@ -112,9 +119,9 @@ def _without_clock(source: str, channels: Sequence[Channel], rest: Mapping[str, 
     return replace(table_of_arrays(source, {**rest, **arrays}), units=units)
 
 
-def _is_recording(names: Any) -> bool:
-    """Whether columns are a torque and a motion by their names."""
-    kinds = {read_header(name).kind for name in names}
+def _is_recording(names: Iterable[str]) -> bool:
+    """Whether arrays are a torque and a motion by their own names."""
+    kinds = {read_header(name.rpartition(".")[2]).kind for name in names}
     return bool(kinds & {"torque", "force"}) and bool(kinds & {"angle", "velocity"})
 
 
@@ -122,18 +129,41 @@ def _by_hand(groups: Mapping[str, Fields], place: str) -> list[Channel]:
     """Read values with a name or a unit beside them, and a rate there or in a structure above."""
     fields = groups[place]
     key = next((key for key in _VALUES if key in fields), "")
+    rates = (stated_rate(each) for each in fields_above(groups, place))
+    rate_hz = next(filter(None, rates), 0.0)
+    if key and (names := _labels(fields, fields[key])):
+        return _of_matrix(fields, place, fields[key], names, rate_hz)
     columns = matrix_columns(fields[key], 1) if key else None
-    rate_hz = next(
-        (rate for each in fields_above(groups, place) if (rate := stated_rate(each))), 0.0
-    )
-    own = stated_rate(fields) or (bool(place) and any(key in fields for key in (*NAMES, *UNITS)))
-    if columns is None or not own:
+    own = stated_rate(fields) or any(key in fields for key in (*NAMES, *UNITS))
+    if columns is None or not (place and own):  # a vector beside others is a column
         return []
     (values,) = columns
     time_s = _clock(fields, place, values.size, rate_hz)
     if time_s is None and (rate_hz or not place.endswith(")")):
         return []
     return [Channel(stated_name(fields, place), stated_unit(fields), values, time_s)]
+
+
+def _labels(fields: Fields, matrix: Stored) -> list[str]:
+    """Return the texts beside a matrix of which there are as many as it has columns."""
+    found = (texts(fields[key]) for key in _LABELS if key in fields)
+    many = matrix.dtype.kind in "fiu" and len(matrix.shape) == 2 and min(matrix.shape) > 1
+    return next((each for each in found if many and len(each) in matrix.shape), [])
+
+
+def _of_matrix(
+    fields: Fields, place: str, matrix: Stored, names: list[str], rate_hz: float
+) -> list[Channel]:
+    """Read the columns of a matrix, of which one may be the time."""
+    columns = matrix_columns(matrix, len(names)) or []
+    stated = (texts(fields[key]) for key in UNITS if key in fields)
+    units = next((each for each in stated if len(each) == len(names)), [""] * len(names))
+    timed = any(read_header(name).kind == "time" for name in names)
+    time_s = None if timed or not columns else _clock(fields, place, columns[0].size, rate_hz)
+    return [
+        Channel(name, unit, column, time_s)
+        for name, unit, column in zip(names, units, columns, strict=False)
+    ]
 
 
 def _clock(fields: Fields, place: str, count: int, rate_hz: float) -> Array | None:

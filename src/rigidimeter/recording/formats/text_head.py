@@ -9,12 +9,12 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rigidimeter.documents.bounds import COLUMNS
 from rigidimeter.documents.escaping import NUMBER
 from rigidimeter.errors import UserError
-from rigidimeter.recording.channels.unit_text import expression
+from rigidimeter.recording.channels.unit_text import expression, factor
 from rigidimeter.recording.formats.clocked_table import unique
 from rigidimeter.recording.formats.grouped_numbers import GROUPED
 from rigidimeter.recording.formats.table import MISSING, printable
@@ -26,7 +26,16 @@ _RUN = 5
 _FEW = 2
 _LABEL = re.compile(r"[^\W\d_][\w .-]*")
 _STAMP = re.compile(r"[\d:./T -]*:[\d:.,]+Z?")
-_RATE = re.compile(r"(?i)\b(?:sampl|abtast|[ée]chant|campion|muestr)\D*?(\d+(?:[.,]\d+)?)\s*(k?)Hz")
+_SAMPLING = (
+    r"(?i)(?<![^\W_])(?:sampl|abtast|[ée]chant|campion|muestr|bemonster|measurement rate|fs\b)"
+)
+_AMOUNT = r"(\d+(?:[.,]\d+)?)"
+_RATE = re.compile(_SAMPLING + rf"\D*?{_AMOUNT}\s*(k?)Hz")
+_RATE_BEHIND = re.compile(_SAMPLING + rf"[^\d\n]*?[\[(_](k?)Hz\b[^\d\n]*{_AMOUNT}")
+_INTERVAL = re.compile(
+    r"(?i)(?<![^\W_])(?:dt|abtastzeit|(?:sampl|abtast|bemonster)\w*[\s_-]*(?:interval|period)\w*"
+    rf"|abtastintervall)(?![^\W_])\D*?{_AMOUNT}\s*(ms|msec|s|sec|us|µs)(?![^\W_/])(?!\s*/)"
+)
 
 
 @dataclass(frozen=True)
@@ -138,7 +147,7 @@ def found_head(
         If no row or no names are found.
     """
     if not names and (head := _standard(source, lines, example)) is not None:
-        return head
+        return replace(head, scalars=stated_rate([comment]))
     for start in range(len(lines)):
         for delimiter in DELIMITERS:
             count = _run_of_rows(lines[start : start + _RUN], delimiter)
@@ -187,7 +196,8 @@ def _named(
     if units is not None and len(units) == count and at > 0:
         at -= 1
     else:
-        units = None
+        above = units_row(lines[at - 1], delimiter) if at > 0 else None
+        units = above if above is not None and len(above) == count else None
     for text in (lines[at].lstrip("% ") if at >= 0 else "", comment):
         for mark in dict.fromkeys((delimiter, *DELIMITERS)):
             found = cells_of(text, mark)
@@ -197,7 +207,7 @@ def _named(
                 shown = checked_names(source, found)
                 stated = dict(zip(shown, units or [""] * count, strict=True))
                 stated = {name: unit for name, unit in stated.items() if unit}
-                return Head(delimiter, shown, start, stated, _rate([*lines[:start], comment]))
+                return Head(delimiter, shown, start, stated, stated_rate([*lines[:start], comment]))
     if start <= _FEW:
         return first_line_head(source, lines[0], example)
     raise UserError(
@@ -206,14 +216,22 @@ def _named(
     )
 
 
-def _rate(lines: Sequence[str]) -> dict[str, float | str]:
-    """Return the sampling rate that lines before the rows state in Hz, if they state one."""
-    found = {
-        float(number.replace(",", ".")) * (1000.0 if kilo else 1.0)
-        for line in lines
-        for number, kilo in _RATE.findall(line)
-    }
+def stated_rate(lines: Sequence[str]) -> dict[str, float | str]:
+    """Return the sampling rate that lines before the rows state, if they state one."""
+    found = set()
+    for line in lines:
+        pairs = [*_RATE.findall(line), *((n, kilo) for kilo, n in _RATE_BEHIND.findall(line))]
+        found |= {_amount(number) * (1000.0 if kilo else 1.0) for number, kilo in pairs}
+        found |= {
+            1.0 / (_amount(number) * (factor(unit, "time_s") or 1.0))
+            for number, unit in _INTERVAL.findall(line)
+            if _amount(number)
+        }
     return {"rate_hz": found.pop()} if len(found) == 1 else {}
+
+
+def _amount(text: str) -> float:
+    return float(text.replace(",", "."))
 
 
 def _run_of_rows(lines: Sequence[str], delimiter: str) -> int:

@@ -35,6 +35,7 @@ from rigidimeter.recording.formats.text_head import (
     Layout,
     first_line_head,
     found_head,
+    stated_rate,
 )
 from rigidimeter.recording.formats.text_lines import (
     content,
@@ -337,6 +338,7 @@ def _head(source: str, whole: bytes, data: bytes, example: str, layout: Layout |
     before, _, _ = whole.partition(data[: data.find(b"\n")] if b"\n" in data else data)
     comments = [line[1:].strip() for line in before.decode("utf-8").splitlines() if line[:1] == "#"]
     head = found_head(source, first, comments[-1] if comments else "", layout.names, example)
+    head = replace(head, scalars={**stated_rate(comments), **head.scalars})
     above = (*comments, *first[: head.n_before - 1])
     stated = [line for line in above if _CALIBRATION.search(line) or states_lever_arm(line)]
     if not stated:

@@ -20,7 +20,7 @@ from rigidimeter.recording.formats.table import Table, printable
 from rigidimeter.recording.formats.text_head import cells_of
 
 _HEAD = re.compile(
-    rb"[^\n,;\t]*[^\W\d][^\n,;\t]*[,;\t]*\n\s*[\d.]+[,;\t]*\n[^\n]*\nFrame([,;\t])Sub Frame"
+    rb"[^\n,;\t]*[^\W\d][^\n,;\t]*[,;\t]*\n\s*[\d.,]+[,;\t]*\n[^\n]*\nFrame([,;\t])Sub Frame"
 )
 _LINES_OF_HEAD = 5
 _SAME = 1e-6
@@ -82,7 +82,7 @@ def _section(
     """Return a section as a stream, the units of its columns, and its frames/s."""
     import pandas as pd
 
-    rate_hz = float(lines[1].strip(delimiter + " "))
+    rate_hz = float(lines[1].strip(delimiter + " ").replace(",", "."))
     above, below, stated = ([cell.strip() for cell in cells_of(line, delimiter)]
                             for line in lines[2:_LINES_OF_HEAD])  # fmt: skip
     while below and not below[-1]:
@@ -95,8 +95,10 @@ def _section(
         columns.append(f"{owner} {own}".strip())
     names = unique(columns, but=())
     rows = "\n".join(lines[_LINES_OF_HEAD:])
+    comma = delimiter != "," and re.search(r"\d,\d", rows) is not None
     frame = pd.read_csv(io.StringIO(rows), sep=delimiter, header=None, usecols=range(len(below)),
-                        dtype=np.float64, skipinitialspace=True)  # fmt: skip
+                        dtype=np.float64, skipinitialspace=True,
+                        decimal="," if comma else ".")  # fmt: skip
     values = frame.to_numpy()
     samples = float(np.max(values[:, 1])) + 1.0  # in a frame
     if not (0 < rate_hz < np.inf and np.all(np.isfinite(values[:, :2]))):

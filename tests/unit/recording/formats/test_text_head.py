@@ -5,6 +5,7 @@ import pytest
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats import ReadOptions, read_table
+from rigidimeter.recording.formats.text_head import stated_rate
 
 ROWS = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(60))
 LABVIEW = "LabVIEW Measurement\t\nX_Columns\t{}\n***End_of_Header***\t\nDelta_X\t0.004\t0.004\n"
@@ -31,6 +32,20 @@ def test_labview_without_a_column_of_time_has_a_rate(tmp_path):
     found = table(tmp_path / "r.lvm", text + "\t1.5\t2\n" * 30)
     assert found.scalars["rate_hz"] == pytest.approx(250.0)
     np.testing.assert_array_equal(found.columns["Torque"], np.full(30, 1.5))
+
+
+@pytest.mark.parametrize(
+    ("line", "rate_hz"),
+    [
+        ("Sampling rate: 1 kHz", 1000.0), ("fs = 200 Hz", 200.0), ("Abtastzeit: 2,5 ms", 400.0),
+        ("Sampling frequency (Hz): 250", 250.0), ("Bemonsteringsfrequentie;200 Hz", 200.0),
+        ("sampling_interval = 0.01 s", 100.0), ("dt 500 us", 2000.0), ("Sampling time: 20 s", 0.0),
+        ("Sampled for 20 s by A", 0.0), ("Sampling rate: 200 Hz, of EMG sampled at 2000 Hz", 0.0),
+        ("offs 20 Hz", 0.0), ("sample 5 s/division", 0.0), ("dt 0 s", 0.0), ("width 3 s", 0.0),
+    ],
+)  # fmt: skip
+def test_a_rate_that_a_line_states(line, rate_hz):
+    assert stated_rate([line]).get("rate_hz", 0.0) == pytest.approx(rate_hz)
 
 
 def test_a_row_of_text_between_rows_is_not_a_footer(tmp_path):
