@@ -32,7 +32,8 @@ def ungrouped(body: bytes, delimiter: str) -> bytes:
     (b'995;0,5\n1005;-1234,5', b'0.005;0,5')
     """
     commas = b"," in body if delimiter != "," else b'"' in body
-    if not (commas and b"." in body) and not re.search(rb"\d[ '\xc2\xe2]", body):
+    blanks = any(mark in body for mark in (b" ", b"'", b"\xc2\xa0", b"\xe2\x80"))
+    if not (commas and b"." in body) and not (blanks and re.search(rb"\d[ '\xc2\xe2]\S", body)):
         return body
     text = body.decode("utf-8")
     edge = re.escape(delimiter) + '\n"'
