@@ -50,14 +50,10 @@ def _different_inertia(analysis: Analysis) -> tuple[Notice, ...]:
 def _wrong_sign(analysis: Analysis) -> tuple[Notice, ...]:
     included = [fit for fit in analysis.fits if fit.outcome.included]
     of_all = f"of {len(included)} included epochs"
-    turned = [
-        fit
-        for fit in included
-        if max(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad) < 0
-    ]
+    turned = [fit for fit in included if np.all(fit.value < 0) and not np.any(fit.high > 0)]
     if turned:
         text = (
-            f"J, B and K are all negative in {len(turned)} {of_all}: the torque has the wrong "
+            f"J, B and K are all below zero in {len(turned)} {of_all}: the torque has the wrong "
             "sign; a sensor that reports the joint's reaction needs --reaction"
         )
         return (Notice("warning", text),)

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -158,6 +159,9 @@ def test_what_no_joint_can_be_is_doubted():
     assert "J is not greater than zero in 1 of 2" in notice.text
     (notice,) = analysis_warnings(analysis([fit("OFF", J=-0.1, B=-0.1, K=-1.0)]))
     assert "--reaction" in notice.text
+    by_noise = replace(fit("OFF", J=-0.1, B=-0.1, K=-1.0), high=np.array([0.1, 0.1, 1.0]))
+    (notice,) = analysis_warnings(analysis([by_noise]))
+    assert "--reaction" not in notice.text
     bad = fit("OFF", J=-0.1, outcome=Outcome("excluded", "limit"))
     assert analysis_warnings(analysis([bad])) == ()
 

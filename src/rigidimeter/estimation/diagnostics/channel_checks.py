@@ -15,7 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimeter.estimation.bad_stretches import FITTED, longest_repetition, share_at_extremes
-from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_most
+from rigidimeter.estimation.diagnostics.check_record import (
+    Case,
+    Check,
+    Look,
+    at_most,
+    in_full,
+)
 from rigidimeter.estimation.stretches import left_out_s
 from rigidimeter.records import LOST_SAMPLES, Channel, Epoch, LeftOut
 from rigidimeter.settings import DiagnosticsSettings
@@ -29,7 +35,7 @@ def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     left_out = _left_out(epoch, "saturation")
     if left_out:
         value = 100.0 * _seconds(left_out) / _length_s(epoch)
-        fact = f"{_channels(left_out)} in {value:.2g} % of the time (at most {most:g} %)"
+        fact = f"{_channels(left_out)} in {in_full(value)} % of the time (at most {most:g} %)"
         return Look(value, most, True, fact)
     shares = {c.name: 100.0 * share_at_extremes(epoch, c, settings) for c in _fitted(epoch)}
     worst = max(shares, key=lambda name: shares[name])
@@ -37,7 +43,7 @@ def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     return at_most(
         value,
         most,
-        f"{worst} repeats its extreme values in {value:.2g} % of samples (at most {most:g} %)",
+        f"{worst} repeats its extreme values in {in_full(value)} % of samples (at most {most:g} %)",
     )
 
 
@@ -78,8 +84,8 @@ def lost_samples(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     stop_s = max(float(torque_s[-1]), *(stretch.stop_s for stretch in found))
     value = 100.0 * lost_s / (stop_s - start_s)
     reasons = "; ".join(stretch.reason for stretch in found[:MOST_SHOWN])
-    fact = f"samples of {lost_s:.3g} s are lost, {value:.2g} % of the epoch (at most {most:g} %): "
-    return Look(value, most, True, fact + reasons)
+    share = f"{in_full(value)} % of the epoch (at most {most:g} %)"
+    return Look(value, most, True, f"samples of {lost_s:.3g} s are lost, {share}: {reasons}")
 
 
 def _said_lost(case: Case, look: Look) -> str:
@@ -139,7 +145,7 @@ def guard_limited(limited: ArrayLike, settings: DiagnosticsSettings) -> Look:
     value = 100.0 * float(np.mean(np.asarray(limited) > 0))
     most = settings.limited_most_percent
     return at_most(
-        value, most, f"the guard changed {value:.2g} % of the commands (at most {most:g} %)"
+        value, most, f"the guard changed {in_full(value)} % of the commands (at most {most:g} %)"
     )
 
 

@@ -18,6 +18,7 @@ from rigidimeter.estimation.diagnostics.check_record import (
     Check,
     Look,
     at_most,
+    in_full,
     push_harmless,
 )
 from rigidimeter.estimation.signals import Array
@@ -61,7 +62,7 @@ def controller_misfit(epoch: Epoch, loop: Loop, settings: DiagnosticsSettings) -
         most,
         (
             f"from perturbation and torque the controller of the settings makes a velocity command "
-            f"that differs from the recorded one by {value:.2g} % (at most {most:g} %) and is "
+            f"that differs from the recorded one by {in_full(value)} % (at most {most:g} %) and is "
             f"{factor:.2g} times as large"
         ),
     )

@@ -15,9 +15,11 @@ from scipy.special import digamma
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
 from rigidimeter.estimation.diagnostics.check_record import (
+    Case,
     Check,
     Look,
     at_least,
+    in_full,
     push_harmless,
 )
 from rigidimeter.estimation.diagnostics.excitation_checks import perturbation_nm
@@ -85,9 +87,9 @@ def residual_perturbation(
         most,
         not (value <= most or r <= chance),
         (
-            f"what is left over follows the perturbation by {value:.2g} % of the torque's SD (at "
-            f"most {most:g} %; correlation {r:.2f} at a lag of {delay_s:.2g} s, by chance up to "
-            f"{chance:.2f})"
+            f"what is left over follows the perturbation by {in_full(value)} % of the torque's SD "
+            f"(at most {most:g} %; correlation {r:.2f} at a lag of {delay_s:.2g} s, by chance "
+            f"up to {chance:.2f})"
         ),
     )
 
@@ -137,8 +139,11 @@ def r_squared(value: float, settings: DiagnosticsSettings) -> Look:
     return at_least(value, least, f"R² is {value:.2g} (at least {least:g})")
 
 
-def negative_parameters(parameters: Array) -> Look:
-    """Return how many of J, B and K are not above zero (none may be)."""
+def negative_parameters(parameters: Array, high: Array | None = None) -> Look:
+    """Return how many of J, B and K are not above zero (none may be).
+
+    `high` are the upper ends of their intervals: a sign that noise may have made says nothing.
+    """
     wrong = [name for name, value in zip("JBK", parameters, strict=True) if not value > 0]
     if not wrong:
         return Look(0.0, 0.0, False, "J, B and K are above zero")
@@ -146,6 +151,9 @@ def negative_parameters(parameters: Array) -> Look:
     fact = f"{' and '.join(wrong)} {verb} not above zero (0 of 3 may be)"
     if len(wrong) < len(parameters):
         return Look(float(len(wrong)), 0.0, True, fact)
+    if high is not None and np.any(np.asarray(high) > 0):
+        meaning = "not all of their intervals lie below zero, so the torque says little of a joint"
+        return Look(float(len(wrong)), 0.0, True, fact, meaning, "check which column is the torque")
     meaning = "the torque has the sign of the joint's reaction"
     return Look(float(len(wrong)), 0.0, True, fact, meaning, "say --reaction")
 
@@ -155,12 +163,13 @@ def implausible_parameters(parameters: Array, settings: DiagnosticsSettings) -> 
 
     Only sizes are looked at; signs are another check's business.
     """
-    J, B, K = (abs(value) for value in parameters)
+    J, B, K = parameters
+    least = settings.inertia_least_kg_m2
     factors = {
-        f"J = {J:.3g} kg·m² is large": J / settings.inertia_most_kg_m2,
-        f"J = {J:.3g} kg·m² is small": settings.inertia_least_kg_m2 / J if J > 0 else math.inf,
-        f"B = {B:.3g} N·m·s/rad is large": B / settings.damping_most_nm_s_rad,
-        f"K = {K:.3g} N·m/rad is large": K / settings.stiffness_most_nm_rad,
+        f"J = {J:.3g} kg·m² is large": abs(J) / settings.inertia_most_kg_m2,
+        f"J = {J:.3g} kg·m² is small": least / abs(J) if J != 0 else math.inf,
+        f"B = {B:.3g} N·m·s/rad is large": abs(B) / settings.damping_most_nm_s_rad,
+        f"K = {K:.3g} N·m/rad is large": abs(K) / settings.stiffness_most_nm_rad,
     }
     worst = max(factors, key=lambda text: factors[text])
     value = factors[worst]
@@ -197,6 +206,11 @@ def gravity(
         f"K of {stiffness_nm_rad:.4g} N·m/rad includes {slope:.4g} of the limb's weight (m g l "
         f"cos θ); without it K is {without:.4g}",
     )
+
+
+def _of_least_squares(case: Case, look: Look) -> str:
+    """Return why little of the torque does not bias an instrument; least squares it may."""
+    return push_harmless(case, look) if case.uses_perturbation else ""
 
 
 RESIDUAL_CHECKS = (
@@ -247,12 +261,12 @@ PARAMETER_CHECKS = (
         lambda c: r_squared(c.fit.r_squared, c.settings) if c.fit is not None else None,
         "most of the torque is not J, B and K, and least squares puts a part of it into them",
         "look for torque from elsewhere than the robot; record the perturbation and use iv",
-        harmless=push_harmless,
+        harmless=_of_least_squares,
     ),
     Check(
         "negative_parameters",
         (),
-        lambda c: negative_parameters(c.parameters),
+        lambda c: negative_parameters(c.parameters, None if c.fit is None else c.fit.high),
         "a subject may have pushed, or the channels are delayed relative to each other",
         "check the stamps of torque and motion, and see the voluntary torque",
     ),

@@ -14,7 +14,12 @@ from dataclasses import replace
 import numpy as np
 from scipy import fft
 
-from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
+from rigidimeter.estimation.diagnostics.check_record import (
+    Case,
+    Check,
+    Look,
+    in_full,
+)
 from rigidimeter.estimation.diagnostics.omitted_bias import moved, moved_by_linear
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array, motion_channels
@@ -96,7 +101,7 @@ def missing_term(case: Case) -> Look | None:
         value,
         100.0,
         True,
-        f"{named}{together}, {value:.3g} % of half their intervals (at most 100 %)",
+        f"{named}{together}, {in_full(value, '.3g')} % of half their intervals (at most 100 %)",
         meaning=_of_drive(case, found.terms),
         remedy=f"include it: rigidimeter model --terms {asked}",
     )
@@ -131,7 +136,8 @@ def _linear(case: Case, beyond: BeyondLinear, term: LinearTerm) -> Look:
         True,
         f"{what} (it explains {100 * term.share:.0f} % of what J, B and K leave to a linear "
         f"filter; p = {term.p:.1g}, below {CHANCE:g}); included, it changes "
-        f"{_changes(case, added)}, {value:.3g} % of half their intervals (at most 100 %)",
+        f"{_changes(case, added)}, {in_full(value, '.3g')} % of half their intervals (at most "
+        "100 %)",
         remedy=remedy,
     )
 
@@ -157,7 +163,10 @@ def _changes(case: Case, moved: Array) -> str:
     found = []
     for row in moved:
         shares = -100 * row / np.abs(case.parameters)
-        each = (f"{name} by {share:+.2g} %" for name, share in zip("JBK", shares, strict=True))
+        each = (
+            f"{name} by {in_full(share, '+.2g')} %"
+            for name, share in zip("JBK", shares, strict=True)
+        )
         found.append(", ".join(each))
     if len(found) == 1:
         return found[0]

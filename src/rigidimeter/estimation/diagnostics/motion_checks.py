@@ -22,7 +22,13 @@ from dataclasses import replace
 import numpy as np
 
 from rigidimeter.estimation.bandlimited import bandlimited_signals, zero_phase_band
-from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_most
+from rigidimeter.estimation.diagnostics.check_record import (
+    Case,
+    Check,
+    Look,
+    at_most,
+    in_full,
+)
 from rigidimeter.estimation.least_squares import fit_inertia_damping_stiffness
 from rigidimeter.estimation.signals import (
     Array,
@@ -134,7 +140,7 @@ def velocity_shape(
     most = settings.velocity_shape_most_percent
     fact = (
         f"from {band[0]:g} to {band[1]:.3g} Hz velocity_rad_s and the derivative of angle_rad "
-        f"differ in shape by {value:.2g} % of its rms (at most {most:g} %)"
+        f"differ in shape by {in_full(value)} % of its rms (at most {most:g} %)"
     )
     if value <= most:
         return Look(value, most, False, fact)

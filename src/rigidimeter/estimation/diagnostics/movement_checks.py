@@ -20,6 +20,7 @@ from rigidimeter.estimation.diagnostics.check_record import (
     Look,
     at_most,
     half_widths,
+    in_full,
     push_harmless,
 )
 from rigidimeter.estimation.power_lines import lines_inside, power_lines
@@ -47,7 +48,7 @@ def voluntary_torque(voluntary_nm: Array, signals: Signals, settings: Diagnostic
         most,
         (
             f"the torque beyond J, B and K has an SD of {np.std(voluntary_nm):.3g} N·m; its power "
-            f"from {low:g} to {high:g} Hz, {power:.2g} N²m², is {value:.2g} % of the torque's "
+            f"from {low:g} to {high:g} Hz, {power:.2g} N²m², is {in_full(value)} % of the torque's "
             f"variance (at most {most:g} %)"
         ),
     )
@@ -107,14 +108,14 @@ def loop_bias(fit: Fit, unbiased: Array, settings: DiagnosticsSettings) -> Look:
         return at_most(value, most, "no J, B and K go with this torque in this loop")
     shares = 100.0 * bias / np.abs(fit.value)
     of_each = ", ".join(
-        f"{name} by {share:+.2g} %" for name, share in zip("JBK", shares, strict=True)
+        f"{name} by {in_full(share, '+.2g')} %" for name, share in zip("JBK", shares, strict=True)
     )
     return at_most(
         value,
         most,
         (
             f"torque beyond J, B and K, which the loop turns into motion, moves {of_each}, at most "
-            f"{value:.2g} % of half their intervals (at most {most:g} %)"
+            f"{in_full(value)} % of half their intervals (at most {most:g} %)"
         ),
     )
 

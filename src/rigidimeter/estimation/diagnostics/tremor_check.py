@@ -18,6 +18,7 @@ from rigidimeter.estimation.diagnostics.check_record import (
     Case,
     Check,
     Look,
+    in_full,
     push_harmless,
     reconstructed_torque_nm,
 )
@@ -58,7 +59,7 @@ def tremor(voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings)
         most,
         not (value <= most or stands_out < STANDS_OUT),
         f"the subject's own torque has a line at {centre_hz:.2g} Hz of "
-        f"{math.sqrt(2.0 * running[at]):.2g} N·m (amplitude), {value:.2g} % of the torque's "
+        f"{math.sqrt(2.0 * running[at]):.2g} N·m (amplitude), {in_full(value)} % of the torque's "
         f"variance (at most {most:g} %) and {stands_out:.2g} times what lies beside it",
     )
 

@@ -179,6 +179,9 @@ def test_negative_parameters_are_named_with_what_is_likely():
     assert_failed(turned, "J and B and K", "sign of the joint's reaction")
     assert "--reaction" in turned.remedy
     assert negative_parameters((math.nan, 1.0, 1.0)).value == 1.0
+    by_noise = negative_parameters((-4e-4, -0.007, -0.12), np.array([8e-4, 0.03, 0.14]))
+    assert_failed(by_noise, "J and B and K", "the torque says little of a joint")
+    assert "--reaction" not in by_noise.remedy
 
 
 @pytest.mark.parametrize(
@@ -186,6 +189,7 @@ def test_negative_parameters_are_named_with_what_is_likely():
     [
         ((5.0, 0.1, 1.0), "J = 5 kg·m² is large", 5.0),
         ((1e-6, 0.1, 1.0), "J = 1e-06 kg·m² is small", 10.0),
+        ((-1e-6, 0.1, 1.0), "J = -1e-06 kg·m² is small", 10.0),
         ((0.01, 100.0, 1.0), "B = 100 N·m·s/rad is large", 2.0),
         ((0.01, 0.1, 6000.0), "K = 6e+03 N·m/rad is large", 3.0),
     ],

@@ -56,9 +56,11 @@ def test_a_level_that_was_set_is_used_in_any_case(level):
     assert by_iv["voluntary_torque"].level == level
 
 
-@pytest.mark.parametrize(("r_squared", "doubted"), [(0.29, True), (0.31, False)])
-def test_a_small_r_squared_is_a_doubt_for_least_squares(r_squared, doubted):
-    settings = parse_settings({"subject": {"OFF": {"voluntary_sd_nm": 0.5}}})
+@pytest.mark.parametrize(
+    ("push_nm", "r_squared", "doubted"), [(0.5, 0.29, True), (0.5, 0.31, False), (0.0, 0.29, True)]
+)
+def test_a_small_r_squared_is_a_doubt_for_least_squares(push_nm, r_squared, doubted):
+    settings = parse_settings({"subject": {"OFF": {"voluntary_sd_nm": push_nm}}})
     epochs = [simulate_epochs(settings, 1, joints=[JOINT], conditions="OFF", seed=3).epoch(0)]
     (prepared,) = prepare(epochs, settings)
     for method, level in (("bandlimited", "doubt"), ("iv", "note")):
