@@ -2,12 +2,12 @@
 
 A sensor at the end of its range repeats its extreme value; one that hangs repeats whatever it had.
 A living signal does neither for long: it has noise. But a joint that is told to rest is at rest:
-where command and perturbation are zero, a repeated value is what Eq. 3 gives, M = K θ.
+where command and perturbation are zero, a repeated value is what Eq. 3 gives, M = K θ. And a joint
+that is told to go on at one velocity has that velocity.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +24,9 @@ FEWEST_AT_EXTREME = 3
 
 ZERO = 1e-6
 """A command below this share of its largest value is none."""
+
+NEAR = 0.1
+"""A velocity no further than this share of the largest command from what it is told obeys it."""
 
 
 def without_bad_stretches(epoch: Epoch, settings: Settings) -> Epoch:
@@ -59,7 +62,7 @@ def frozen_stretches(epoch: Epoch, settings: DiagnosticsSettings) -> list[LeftOu
     return [
         LeftOut(start_s, stop_s, f"{channel.name} repeats one value", "frozen")
         for channel in _fitted(epoch)
-        for start_s, stop_s in _repetitions(epoch, channel, settings)
+        for start_s, stop_s in zip(*_repetitions(epoch, channel, settings), strict=True)
         if stop_s - start_s > settings.frozen_most_s
     ]
 
@@ -68,10 +71,11 @@ def longest_repetition(
     epoch: Epoch, channel: Channel, settings: DiagnosticsSettings
 ) -> tuple[float, float]:
     """Return how long the longest repetition of one value lasts, and when it begins, in s."""
-    spans = [(stop_s - start_s, -start_s) for start_s, stop_s in
-             _repetitions(epoch, channel, settings)]  # fmt: skip
-    length_s, start_s = max(spans, default=(0.0, -float(channel.time_s[0])))
-    return length_s, -start_s
+    starts_s, stops_s = _repetitions(epoch, channel, settings)
+    if starts_s.size == 0:
+        return 0.0, float(channel.time_s[0])
+    longest = int(np.argmax(stops_s - starts_s))
+    return float(stops_s[longest] - starts_s[longest]), float(starts_s[longest])
 
 
 def saturated_stretches(epoch: Epoch, settings: DiagnosticsSettings) -> list[LeftOut]:
@@ -101,22 +105,21 @@ def _at_extremes(
     kept = (stops - starts >= FEWEST_AT_EXTREME - 1) & _in_use(epoch, channel, starts, stops)
     kept &= (level == np.max(level)) | (level == np.min(level))
     for run in np.flatnonzero(kept):
-        span = float(channel.time_s[starts[run]]), float(channel.time_s[stops[run]])
-        kept[run] = not _told_to_rest(epoch, *span, settings.frozen_most_s)
+        kept[run] = not _as_told(epoch, channel, starts[run], stops[run], settings.frozen_most_s)
     return int(np.sum((stops - starts + 1)[kept])), starts[kept], stops[kept]
 
 
 def _repetitions(
     epoch: Epoch, channel: Channel, settings: DiagnosticsSettings
-) -> Iterator[tuple[float, float]]:
-    """Yield from when to when a channel repeats a value that nobody told it to keep."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return from when to when, in s, a channel repeats a value that nobody told it to keep."""
     starts, stops = _runs(channel.values)
+    most_s = settings.frozen_most_s
     kept = (stops > starts) & _in_use(epoch, channel, starts, stops)
-    for start, stop in zip(starts[kept], stops[kept], strict=True):
-        span = float(channel.time_s[start]), float(channel.time_s[stop])
-        longest = span[1] - span[0] > settings.frozen_most_s
-        if not (longest and _told_to_rest(epoch, *span, settings.frozen_most_s)):
-            yield span
+    long = kept & (channel.time_s[stops] - channel.time_s[starts] > most_s)
+    for run in np.flatnonzero(long):
+        kept[run] = not _as_told(epoch, channel, starts[run], stops[run], most_s)
+    return channel.time_s[starts[kept]], channel.time_s[stops[kept]]
 
 
 def _runs(values: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -136,23 +139,36 @@ def _in_use(
     return np.asarray(before[stops + 1] > before[starts])
 
 
-def _told_to_rest(epoch: Epoch, start_s: float, stop_s: float, within_s: float) -> bool:
-    """Return whether the joint was told to rest in a stretch, except for `within_s` of it.
+def _as_told(epoch: Epoch, channel: Channel, start: int, stop: int, within_s: float) -> bool:
+    """Return whether the command is why a channel repeats a value, except for `within_s` of it.
 
     The motion begins and ends later than its command, by the delay of the drive.
     """
     if CAUSES[0] not in epoch.channels:
         return False
+    start_s, stop_s = float(channel.time_s[start]), float(channel.time_s[stop])
+    moving_most_s = min(within_s, 0.5 * (stop_s - start_s))
+    command = epoch.channels[CAUSES[0]]
     causes = [epoch.channels[name] for name in CAUSES if name in epoch.channels]
-    for cause in causes:
-        inside = (cause.time_s >= start_s) & (cause.time_s <= stop_s)
-        if not np.any(inside):
-            return False
-        zero = np.abs(cause.values[inside]) <= ZERO * float(np.max(np.abs(cause.values)))
-        moving_s = float(np.count_nonzero(~zero)) / cause.mean_rate_hz
-        if moving_s > min(within_s, 0.5 * (stop_s - start_s)):
-            return False
-    return True
+    if all(_keeps(cause, start_s, stop_s, 0.0, moving_most_s) for cause in causes):
+        return True
+    inside = command.values[(command.time_s >= start_s) & (command.time_s <= stop_s)]
+    if channel.name != "velocity_rad_s" or inside.size == 0:
+        return False
+    told, largest = float(np.median(inside)), float(np.max(np.abs(command.values)))
+    obeyed = abs(channel.values[start] - told) <= NEAR * largest and abs(told) > NEAR * largest
+    return obeyed and _keeps(command, start_s, stop_s, told, moving_most_s)
+
+
+def _keeps(
+    cause: Channel, start_s: float, stop_s: float, level: float, other_most_s: float
+) -> bool:
+    """Return whether a cause has a level in a stretch, except for a time."""
+    inside = (cause.time_s >= start_s) & (cause.time_s <= stop_s)
+    if not np.any(inside):
+        return False
+    other = np.abs(cause.values[inside] - level) > ZERO * float(np.max(np.abs(cause.values)))
+    return float(np.count_nonzero(other)) / cause.mean_rate_hz <= other_most_s
 
 
 def _fitted(epoch: Epoch) -> list[Channel]:

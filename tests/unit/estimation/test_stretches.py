@@ -152,6 +152,26 @@ def test_a_joint_that_was_told_to_rest_is_no_broken_sensor():
     assert found_in(held(perturbation_nm=np.zeros(4000))) == (set(), set())
 
 
+def ramps(**changed):
+    """Positions that are reached at one speed, which the velocity repeats, with rests between."""
+    time_s = np.arange(0.0, 20.0, 1 / RATE_HZ)
+    going = (time_s % 2 > 0.5) & (time_s % 2 < 0.8)
+    command = np.where(going, np.where(time_s % 4 < 2, 0.3, -0.3), 0.0)
+    velocity = np.roll(command, 2)  # by the delay of the drive
+    moved = {"velocity_rad_s": velocity, "angle_rad": np.cumsum(velocity) / RATE_HZ, **changed}
+    return an_epoch(velocity_command_rad_s=command, **moved)
+
+
+def test_a_joint_that_was_told_to_go_on_at_one_velocity_is_no_broken_sensor():
+    assert found_in(ramps()) == (set(), set())
+
+
+def test_a_velocity_that_is_not_the_one_told_is_one():
+    stuck = ramps().channels["velocity_rad_s"].values.copy()
+    stuck[stuck != 0] *= 0.5
+    assert found_in(ramps(velocity_rad_s=stuck)) == ({"velocity_rad_s"}, {"velocity_rad_s"})
+
+
 def test_a_joint_that_rests_though_something_moves_it_is_one():
     both = {"angle_rad", "velocity_rad_s"}
     assert found_in(held(perturbation_nm=np.full(4000, 0.3))) == (both, {"angle_rad"})
