@@ -124,7 +124,7 @@ def _static_torque(case: Case) -> Look:
     return static_torque(case.epoch, case.signals, case.settings)
 
 
-TORQUE_CHECKS = (
+COMPUTED_TORQUE_CHECKS = (
     Check(
         "computed_torque",
         (),
@@ -134,6 +134,10 @@ TORQUE_CHECKS = (
         '[diagnostics.levels] computed_torque = "note"',
         of_fit=False,
     ),
+)
+"""Before those of the channels: a binary torque that was computed repeats its extremes too."""
+
+STATIC_TORQUE_CHECKS = (
     Check(
         "static_torque",
         ("angle_rad",),

@@ -12,7 +12,10 @@ from rigidimeter.estimation.bandlimited import bandlimited_signals
 from rigidimeter.estimation.closedloop.observation import loop_of
 from rigidimeter.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
-from rigidimeter.estimation.diagnostics.computed_torque_checks import TORQUE_CHECKS
+from rigidimeter.estimation.diagnostics.computed_torque_checks import (
+    COMPUTED_TORQUE_CHECKS,
+    STATIC_TORQUE_CHECKS,
+)
 from rigidimeter.estimation.diagnostics.controller_checks import CONTROLLER_CHECKS
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
@@ -29,10 +32,11 @@ from rigidimeter.records import Finding, Fit, Outcome
 from rigidimeter.units import rad_from_deg
 
 CHECKS: list[Check] = [
+    *COMPUTED_TORQUE_CHECKS,
     *CHANNEL_CHECKS,
     *MOTION_CHECKS,
     *EXCITATION_CHECKS,
-    *TORQUE_CHECKS,
+    *STATIC_TORQUE_CHECKS,
     *RESIDUAL_CHECKS,
     *MISSING_TERM_CHECKS,
     *MOVEMENT_CHECKS,

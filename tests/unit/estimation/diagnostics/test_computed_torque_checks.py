@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from rigidimeter.estimation import epoch_signals
+from rigidimeter.estimation.diagnostics import checked
 from rigidimeter.estimation.diagnostics.computed_torque_checks import computed_torque, static_torque
+from rigidimeter.estimation.methods import method_named
+from rigidimeter.estimation.prepared import prepare
 from rigidimeter.records import Channel, Epoch
-from rigidimeter.settings import DiagnosticsSettings, EstimationSettings
+from rigidimeter.settings import DiagnosticsSettings, EstimationSettings, Settings
 
 SETTINGS = DiagnosticsSettings()
 TIME_S = np.arange(10_000) / 500.0
@@ -81,6 +84,14 @@ def test_a_torque_that_was_computed_is_excluded(torque, origin):
     assert f"computed from {origin}" in look.meaning
     assert SETTINGS.levels.computed_torque == "exclude"
     assert computed_torque(recorded(torque, virtual=True), SETTINGS) is None
+
+
+def test_a_binary_torque_that_was_computed_is_not_called_a_sensor_at_its_limit():
+    (prepared,) = prepare([recorded(lambda x, v, p: 0.5 * p, task="prbs")], Settings())
+    (fit,), _ = method_named("bandlimited").fit([prepared], None, lambda _: None, False)
+    found = checked(prepared, fit)
+    assert "saturation" in {finding.name for finding in found.findings}
+    assert "the torque was computed from the perturbation" in found.outcome.reason
 
 
 def test_a_torque_with_the_noise_of_a_good_sensor_was_measured():
