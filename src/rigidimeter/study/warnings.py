@@ -68,8 +68,9 @@ def _wrong_sign(analysis: Analysis) -> tuple[Notice, ...]:
     negative = [fit for fit in included if min(fit.damping_nm_s_rad, fit.stiffness_nm_rad) < 0]
     if negative:
         text = (
-            f"B or K is negative in {len(negative)} {of_all}: the subject may have pushed, or the "
-            "channels are delayed relative to each other; look at R² before using them"
+            f"B or K is negative in {len(negative)} {of_all}: something but the robot may have "
+            "pushed, or the channels are delayed relative to each other; look at R² "
+            "before using them"
         )
         return (Notice("warning", text),)
     return ()

@@ -202,7 +202,7 @@ EXCITATION_CHECKS = (
         ("perturbation_nm",),
         lambda c: coherence(c.epoch, c.signals, c.settings),
         "the rest is torque from a subject, noise, or a joint that is not linear",
-        "perturb more strongly, pool epochs by iv, or repeat with a subject who relaxes",
+        "perturb more strongly, pool epochs by iv, or repeat while the robot alone moves it",
         of_fit=False,
         harmless=push_harmless,
     ),

@@ -267,7 +267,10 @@ PARAMETER_CHECKS = (
         "negative_parameters",
         (),
         lambda c: negative_parameters(c.parameters, None if c.fit is None else c.fit.high),
-        "a subject may have pushed, or the channels are delayed relative to each other",
+        (
+            "something but the robot may have pushed, or the channels are delayed relative to each "
+            "other"
+        ),
         "check the stamps of torque and motion, and see the voluntary torque",
     ),
     Check(

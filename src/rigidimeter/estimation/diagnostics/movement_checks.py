@@ -158,7 +158,7 @@ MOVEMENT_CHECKS = (
         (),
         _loop_bias,
         "least squares takes it for the joint, and the intervals do not include that",
-        "record the perturbation and use iv; or repeat with a subject who relaxes",
+        "record the perturbation and use iv; or repeat while the robot alone moves it",
     ),
     Check(
         "voluntary_torque",
@@ -176,7 +176,7 @@ MOVEMENT_CHECKS = (
         (),
         lambda c: active_movement(c.voluntary_nm, c.signals, c.settings),
         "something other than the robot moved it, and what was measured was not at rest",
-        "repeat with a subject who relaxes, or leave these seconds out",
+        "repeat while the robot alone moves it, or leave these seconds out",
         harmless=push_harmless,
     ),
     Check(

@@ -174,7 +174,7 @@ def test_the_guard_and_the_position_limit_are_counted(sound):
 def test_negative_parameters_are_named_with_what_is_likely():
     assert passed(negative_parameters(TRUTH))
     one = negative_parameters((0.0045, -0.1, 1.7))
-    assert_failed(one, "B is not above zero")
+    assert_failed(one, "B is not above zero", "something but the robot may have pushed")
     turned = negative_parameters((-0.0045, -0.1, -1.7))
     assert_failed(turned, "J and B and K", "sign of the joint's reaction")
     assert "--reaction" in turned.remedy
