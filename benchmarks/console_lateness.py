@@ -50,7 +50,7 @@ QUANTILES = (50.0, 95.0, 99.0)
 STARTS_S = 60.0
 EPOCH_S = 60.0
 
-PROTOCOL = f"{console_running.PROTOCOL}loop.console_lost_s = 2.0\nloop.stall_s = 0.25\n"
+PROTOCOL = f"{console_running.PROTOCOL}loop.console_lost_s = 2.0\n"
 
 
 def lateness(pairs: int, seconds: float) -> None:
