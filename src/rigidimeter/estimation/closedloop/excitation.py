@@ -10,6 +10,10 @@ through the ticks. Where ticks and grid are both uniform that spline is a filter
     H(z) = Σ_k β(k + f) z^(−k) ÷ Σ_k β(k) z^(−k)      f the part of a tick, β the cubic B-spline
 
 and one more factor of the transfer functions.
+
+A loop that would be unstable with the joint was not the one that moved it: its controller has other
+values. The motion is then made without feedback, by admittance and drive alone. That too follows
+from the perturbation alone, so it is an instrument.
 """
 
 from __future__ import annotations
@@ -69,15 +73,18 @@ class Excitation:
 
     def motion_lines(self, parameters: Parameters) -> Complex:
         """Return acceleration, velocity and angle that the perturbation causes, shape (m, 3)."""
-        return self._lines(self.motion * (self.command / self._around(parameters)))
-
-    def _around(self, parameters: Parameters) -> Complex:
-        J, B, K = parameters
-        return np.asarray(1 + (J * self.gain[0] + B * self.gain[1] + K * self.gain[2]))
+        return self._lines(self._motion(parameters))
 
     def windowed_motion(self, parameters: Parameters) -> Array:
         """Return the motion that the perturbation causes, times the window, shape (3, n)."""
-        return self._windowed(self.motion * (self.command / self._around(parameters)))
+        return self._windowed(self._motion(parameters))
+
+    def _motion(self, parameters: Parameters) -> Complex:
+        J, B, K = parameters
+        around = np.asarray(1 + (J * self.gain[0] + B * self.gain[1] + K * self.gain[2]))
+        if _unstable(around):
+            return self.motion * self.command
+        return np.asarray(self.motion * (self.command / around))
 
     def _lines(self, spectra: Complex) -> Complex:
         """Return the lines of signals whose spectra on the damped circle are given."""
@@ -148,6 +155,15 @@ def _steps(ticks: Channel, grid: Grid) -> tuple[int, float, int] | None:
     if stride < 1 or np.any(np.diff(index) != stride):
         return None
     return int(index[0]), part, stride
+
+
+def _unstable(around: Complex) -> bool:
+    """Return whether 1 + L, on the upper half of the circle, has zeros outside (Nyquist).
+
+    L has no poles there, so each zero turns the phase by −2π around the circle.
+    """
+    turned = np.sum(np.angle(around[1:] * around[:-1].conj()))
+    return bool(turned < -0.5 * np.pi)
 
 
 def _folded(spectra: Complex, times: int) -> Complex:

@@ -10,10 +10,11 @@ Instrumental variables (``iv``). A subject who pushes moves the joint through th
 motion carries the push that is also in the torque, and least squares takes it for the joint's own:
 it drifts toward −(J_c, B_c, 0). The perturbation carries nothing of the subject. Z is the motion
 that the perturbation *alone* causes, simulated through controller and joint (`excitation`), so the
-estimate is consistent whatever the subject did; a wrong controller makes Z weaker, not wrong. Z
-depends on the parameters and S on the residual: both are iterated (refined instrumental variables,
-Young and Jakeman 1979; for joints Westwick and Perreault 2011). With Z and S right the estimate is
-as precise as maximum likelihood from the same response to the perturbation.
+estimate is consistent whatever the subject did; a wrong controller makes Z weaker, not wrong, and
+where its loop would be unstable Z is made without feedback. Z depends on the parameters and S on
+the residual: both are iterated (refined instrumental variables, Young and Jakeman 1979; for joints
+Westwick and Perreault 2011). With Z and S right the estimate is as precise as maximum likelihood
+from the same response to the perturbation.
 
 The lines of a periodic perturbation (``spectral``). The same at the excited lines alone; the lines
 between them hold nothing but noise and set S.

@@ -1,17 +1,20 @@
 """Whether the controller of the settings can be the one that moved the joint.
 
-Perturbation and measured torque make the velocity command, c = A (p − F M'), with the admittance A
-and the low-pass F of the settings (`rigidimeter.dynamics.linear_loop`). Where the command was
-recorded it is held against that; and a loop that would be unstable with the joint that was
-estimated cannot have moved it.
+Where the command was recorded it is held against what that controller makes of perturbation and
+torque (`controller_used`); and a loop that would be unstable with the joint that was estimated
+cannot have moved it.
+
+Neither biases a method whose instruments are made from the perturbation: whatever the controller,
+they follow from the perturbation alone. Least squares is biased by the loop that really was, so the
+bias that `loop_bias` tells is computed with the controller that the recording shows.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from scipy import signal
+from dataclasses import replace
 
-from rigidimeter.control import admittance, butterworth_lowpass
+import numpy as np
+
 from rigidimeter.dynamics import JointDynamics, Loop, spectral_radius
 from rigidimeter.estimation.diagnostics.check_record import (
     Case,
@@ -21,43 +24,31 @@ from rigidimeter.estimation.diagnostics.check_record import (
     in_full,
     push_harmless,
 )
+from rigidimeter.estimation.diagnostics.controller_used import command_made
 from rigidimeter.estimation.signals import Array
-from rigidimeter.estimation.window import with_hole
 from rigidimeter.records import Epoch
-from rigidimeter.settings import DiagnosticsSettings, Settings
+from rigidimeter.settings import ControllerSettings, DiagnosticsSettings, Settings
+from rigidimeter.units import per_rad_from_per_deg
 
-COMPARED_HZ = (0.5, 10.0)
-"""Below, the start of the epoch still counts; above, how the torque is held between its samples."""
+REMEDY = (
+    "give the values that were used, per radian: --controller J_C B_C, or in the settings "
+    "[controller] inertia_kg_m2 and damping_nm_s_rad"
+)
 
-FORGOTTEN_S = 1.0
-"""So long after a stretch that is left out the comparison counts in full again."""
-
-REMEDY = "give the values that were used, per radian: --controller, or [controller] in the settings"
+PER_DEGREE_WITHIN = 1.5
+"""Values that are wrong by 57.3, within this factor, were given per degree."""
 
 
 def controller_misfit(epoch: Epoch, loop: Loop, settings: DiagnosticsSettings) -> Look | None:
     """Return how far the command is from what the controller makes of perturbation and torque."""
-    command = epoch.channels["velocity_command_rad_s"]
-    rate_hz = command.mean_rate_hz
-    if float(np.ptp(np.diff(command.time_s))) > 0.5 / rate_hz:
-        return None  # ticks are missing
-    expected = _command_rad_s(epoch, loop, command.time_s, rate_hz)
-    n = command.time_s.size
-    window, steep = np.hanning(n), np.zeros(n)
-    for stretch in epoch.left_out:  # there neither torque nor, where samples are lost, command is
-        hole_s = (stretch.start_s - command.time_s[0], stretch.stop_s - command.time_s[0])
-        window, steep = with_hole(window, steep, rate_hz, FORGOTTEN_S, hole_s)
-    both = np.fft.rfft(np.stack([command.values, expected]) * window, axis=1)
-    first, last = (int(frequency * n / rate_hz) for frequency in COMPARED_HZ)
-    sent, made = both[:, first : last + 1]
-    power = float(np.sum(np.abs(sent) ** 2))
-    if power == 0.0:
+    made = command_made(epoch, loop)
+    if made is None:
         return None
-    value = 100.0 * float(np.sqrt(np.sum(np.abs(sent - made) ** 2) / power))
-    # What would have been sent, per what was.
-    factor = float(np.sum((sent.conj() * made).real) / power)
+    value, factor = made.misfit(loop.controller)
+    if np.isnan(value):
+        return None
     most = settings.controller_misfit_most_percent
-    return at_most(
+    look = at_most(
         value,
         most,
         (
@@ -66,6 +57,27 @@ def controller_misfit(epoch: Epoch, loop: Loop, settings: DiagnosticsSettings) -
             f"{factor:.2g} times as large"
         ),
     )
+    shown = made.shown(loop.controller) if look.failed else None
+    if shown is None or made.misfit(shown)[0] > most:
+        return look
+    return look._replace(remedy=_remedy(loop.controller, shown))
+
+
+def controller_used(epoch: Epoch, loop: Loop, settings: DiagnosticsSettings) -> Loop:
+    """Return the loop with the controller that the recording shows.
+
+    That is the one of the settings unless another makes the recorded command and it does not.
+    """
+    if not all(name in epoch.channels for name in ("velocity_command_rad_s", "perturbation_nm")):
+        return loop
+    made = command_made(epoch, loop)
+    most = settings.controller_misfit_most_percent
+    if made is None or not made.misfit(loop.controller)[0] > most:
+        return loop
+    shown = made.shown(loop.controller)
+    if shown is None or made.misfit(shown)[0] > most:
+        return loop
+    return replace(loop, controller=shown)
 
 
 def unstable_loop(parameters: Array, loop: Loop) -> Look | None:
@@ -83,27 +95,35 @@ def unstable_loop(parameters: Array, loop: Loop) -> Look | None:
     )
 
 
-def _command_rad_s(epoch: Epoch, loop: Loop, ticks_s: Array, rate_hz: float) -> Array:
-    perturbation, torque = epoch.channels["perturbation_nm"], epoch.channels["torque_nm"]
-    held = np.searchsorted(perturbation.time_s, ticks_s + 0.01 / rate_hz, side="right") - 1
-    # The newest sample at a tick is half an interval old on average, beside the latency.
-    late_s = loop.rig.torque.latency_s + max(0.5 / torque.rate_hz - 0.5 / rate_hz, 0.0)
-    read = np.interp(ticks_s - late_s, torque.time_s, torque.values)
-    cutoff_hz = loop.controller.torque_cutoff_hz
-    if cutoff_hz < rate_hz / 2:
-        b0, b1, b2, a1, a2 = butterworth_lowpass(cutoff_hz, rate_hz)
-        read = signal.lfilter([b0, b1, b2], [1.0, a1, a2], read)
-    decay, gain = admittance(
-        loop.controller.inertia_kg_m2, loop.controller.damping_nm_s_rad, 1.0 / rate_hz
-    )
-    asked = perturbation.values[np.maximum(held, 0)] - read
-    return np.asarray(signal.lfilter([gain], [1.0, -decay], asked), dtype=np.float64)
+def _remedy(given: ControllerSettings, shown: ControllerSettings) -> str:
+    """Return what to give in place of the controller of the settings."""
+    J, B = shown.inertia_kg_m2, shown.damping_nm_s_rad
+    per_deg = per_rad_from_per_deg(1.0)
+    factors = np.array([J / given.inertia_kg_m2, B / max(given.damping_nm_s_rad, 1e-12)])
+    why = ""
+    for wrong, text in (
+        (per_deg, "; those of the settings are per degree, as it seems"),
+        (1.0 / per_deg, "; those of the settings were multiplied by 57.3, as it seems"),
+    ):
+        if np.all(np.abs(np.log(factors / wrong)) < np.log(PER_DEGREE_WITHIN)):
+            why = text
+    return f"{REMEDY}; the recording shows {J:.3g} kg·m² and {B:.3g} N·m·s/rad{why}"
 
 
 def _harmless(case: Case, look: Look) -> str:
     """Return why a wrong controller does not bias the estimate; empty where it does."""
     if case.uses_perturbation and case.method is not None:
         return f"{case.method.name} is less precise with it, not biased"
+    # Of a loop that is not known the bias cannot be told.
+    return push_harmless(case, look) if look.remedy else ""
+
+
+def _loop_harmless(case: Case, look: Look) -> str:
+    if case.uses_perturbation and case.method is not None:
+        return (
+            f"{case.method.name} takes the motion that the perturbation would cause without "
+            "feedback, so it is less precise, not biased"
+        )
     return push_harmless(case, look)
 
 
@@ -123,6 +143,6 @@ CONTROLLER_CHECKS = (
         lambda c: unstable_loop(c.parameters, c.loop) if c.loop is not None else None,
         "the joint or the controller was another one",
         REMEDY,
-        harmless=_harmless,
+        harmless=_loop_harmless,
     ),
 )

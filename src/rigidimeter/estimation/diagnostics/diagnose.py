@@ -16,7 +16,10 @@ from rigidimeter.estimation.diagnostics.computed_torque_checks import (
     COMPUTED_TORQUE_CHECKS,
     STATIC_TORQUE_CHECKS,
 )
-from rigidimeter.estimation.diagnostics.controller_checks import CONTROLLER_CHECKS
+from rigidimeter.estimation.diagnostics.controller_checks import (
+    CONTROLLER_CHECKS,
+    controller_used,
+)
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.estimation.diagnostics.missing_term import MISSING_TERM_CHECKS
@@ -119,9 +122,11 @@ def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
 def unbiased(prepared: PreparedEpoch) -> Array:
     """Return J, B and K by least squares without the bias of the loop; NaN where it is too large.
 
-    The loop is the one that the settings describe, with the drive that the recording shows.
+    The loop is the one that the settings describe, with drive and controller that the recording
+    shows.
     """
-    found = compensated(prepared.signals(bandlimited_signals), _loop(prepared))
+    loop = controller_used(prepared.epoch, _loop(prepared), prepared.settings.diagnostics)
+    found = compensated(prepared.signals(bandlimited_signals), loop)
     return np.full(3, np.nan) if found is None else found
 
 

@@ -14,14 +14,20 @@ from rigidimeter.virtual.batch import simulate_epochs
 
 JOINT = JointDynamics(0.0045, 0.1368, 1.751)
 WRONG = {"controller": {"inertia_kg_m2": 0.0917, "damping_nm_s_rad": 3.21}}
+PER_DEGREE = {"controller": {"inertia_kg_m2": 0.0008, "damping_nm_s_rad": 0.028}}
 SLOW = {"rig": {"torque": {"rate_hz": 100.0}, "motion": {"rate_hz": 50.0}}}
 
 
-def found(method, given, rig=None, push_nm=0.0, value=None):
+def fitted(method, given, rig=None, push_nm=0.0):
     true = parse_settings({"subject": {"OFF": {"voluntary_sd_nm": push_nm}}, **(rig or {})})
     epoch = simulate_epochs(true, 1, joints=[JOINT], conditions="OFF", seed=3).epoch(0)
     settings = changed_settings(true, given)
     (fit,), _ = fit_epochs([epoch], method, settings)
+    return epoch, settings, fit
+
+
+def found(method, given, rig=None, push_nm=0.0, value=None):
+    epoch, settings, fit = fitted(method, given, rig, push_nm)
     if value is not None:
         fit = replace(fit, value=np.array(value))
     (prepared,) = prepare([epoch], settings)
@@ -44,6 +50,48 @@ def test_another_controller_is_told_by_the_command_and_does_not_bias_iv():
 def test_for_least_squares_it_matters_where_the_subject_pushes():
     assert found("bandlimited", WRONG)["controller_misfit"].level == "note"
     assert found("bandlimited", WRONG, push_nm=0.3)["controller_misfit"].level == "doubt"
+
+
+@pytest.mark.parametrize("push_nm", [0.0, 0.3])
+@pytest.mark.parametrize("times", [1 / 300, 1 / 57.3, 1 / 5, 1 / 2, 2, 57.3])
+def test_iv_is_as_good_whatever_the_controller(times, push_nm):
+    used = parse_settings({}).controller
+    inertia, damping = used.inertia_kg_m2 * times, used.damping_nm_s_rad * times
+    given = {"controller": {"inertia_kg_m2": inertia, "damping_nm_s_rad": damping}}
+    _, _, right = fitted("iv", {}, push_nm=push_nm)
+    _, _, wrong = fitted("iv", given, push_nm=push_nm)
+    assert wrong.outcome.included
+    half = (right.high - right.low) / 2
+    assert np.all(np.abs(wrong.value - right.value) < 0.5 * half)
+    assert np.all((wrong.high - wrong.low) / 2 < 2.0 * half)
+
+
+def test_a_controller_given_per_degree_is_named_with_the_one_that_the_recording_shows():
+    both = found("iv", PER_DEGREE)
+    assert both["unstable_loop"].level == both["controller_misfit"].level == "note"
+    assert "cause without feedback" in both["unstable_loop"].text
+    assert "57 times as large" in both["controller_misfit"].text
+    for part in ("[controller] inertia_kg_m2 and damping_nm_s_rad", "per degree"):
+        assert part in both["controller_misfit"].remedy
+    assert "the recording shows 0.0458 kg·m² and 1.6 N·m·s/rad" in both["controller_misfit"].remedy
+
+
+@pytest.mark.parametrize("times", [10.0, 57.3])
+def test_a_loop_that_was_another_does_not_say_that_least_squares_is_unbiased(times):
+    given = {"controller": {"inertia_kg_m2": 0.0458 * times, "damping_nm_s_rad": 1.604 * times}}
+    pushed = found("bandlimited", given, push_nm=0.1)
+    assert pushed["controller_misfit"].level == pushed["loop_bias"].level == "doubt"
+
+
+def test_a_command_that_no_controller_makes_leaves_the_bias_of_least_squares_unknown():
+    epoch, settings, fit = fitted("bandlimited", {})
+    command = epoch.channels["velocity_command_rad_s"]
+    other = replace(command, values=command.values[::-1].copy())
+    epoch = replace(epoch, channels={**epoch.channels, command.name: other})
+    (prepared,) = prepare([epoch], settings)
+    (misfit,) = (f for f in checked(prepared, fit).findings if f.name == "controller_misfit")
+    assert misfit.level == "doubt"
+    assert "the recording shows" not in misfit.remedy
 
 
 @pytest.mark.parametrize(

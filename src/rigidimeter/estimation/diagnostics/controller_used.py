@@ -1,0 +1,121 @@
+"""The controller that a recording shows, and how far it is from another.
+
+Perturbation and measured torque make the velocity command, c = A (p − F M'), with the admittance A
+and the low-pass F of the settings (`rigidimeter.dynamics.linear_loop`). From one tick to the next
+
+    p − F M' = B_c c(k) + β (c(k) − c(k − 1)),    β = B_c d / (1 − d),    d = e^(−B_c T/J_c)
+
+so inertia and damping follow from a recorded command by least squares.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from rigidimeter.control import admittance, butterworth_lowpass
+from rigidimeter.dynamics import Loop
+from rigidimeter.estimation.signals import Array
+from rigidimeter.estimation.window import with_hole
+from rigidimeter.records import Epoch
+from rigidimeter.settings import ControllerSettings
+
+COMPARED_HZ = (0.5, 10.0)
+"""Below, the start of the epoch still counts; above, how the torque is held between its samples."""
+
+FORGOTTEN_S = 1.0
+"""So long after a stretch that is left out the comparison counts in full again."""
+
+
+@dataclass(frozen=True, eq=False)
+class CommandMade:
+    """A recorded command, and what was asked of the admittance that made it.
+
+    Attributes
+    ----------
+    command_rad_s, asked_nm : array, shape (n,)
+        Velocity command, and perturbation less the torque as the loop read and filtered it.
+    window : array, shape (n,)
+    rate_hz : float
+    """
+
+    command_rad_s: Array
+    asked_nm: Array
+    window: Array
+    rate_hz: float
+
+    def misfit(self, controller: ControllerSettings) -> tuple[float, float]:
+        """Return the difference of what a controller makes from the command, and its size.
+
+        In % of the command, and as a factor of it; NaN where nothing was commanded.
+        """
+        decay, gain = admittance(
+            controller.inertia_kg_m2, controller.damping_nm_s_rad, 1.0 / self.rate_hz
+        )
+        expected = signal.lfilter([gain], [1.0, -decay], self.asked_nm)
+        sent, made = self._lines(self.command_rad_s, expected)
+        power = float(np.sum(np.abs(sent) ** 2))
+        if power == 0.0:
+            return np.nan, np.nan
+        off = float(np.sqrt(np.sum(np.abs(sent - made) ** 2) / power))
+        return 100.0 * off, float(np.sum((sent.conj() * made).real) / power)
+
+    def shown(self, controller: ControllerSettings) -> ControllerSettings | None:
+        """Return the controller with the inertia and damping that fit best, if there are such."""
+        command = self.command_rad_s
+        sent, step, asked = self._lines(
+            command, np.diff(command, prepend=command[0]), self.asked_nm
+        )
+        columns = np.stack([sent, step], axis=1)
+        stacked = np.concatenate([columns.real, columns.imag])
+        wanted = np.concatenate([asked.real, asked.imag])
+        damping, beta = np.linalg.lstsq(stacked, wanted)[0].tolist()
+        if not beta > 0:
+            return None
+        inertia = beta / self.rate_hz
+        if damping > 0:
+            inertia *= damping / beta / np.log1p(damping / beta)
+        values = {"inertia_kg_m2": float(inertia), "damping_nm_s_rad": max(damping, 0.0)}
+        return controller.model_copy(update=values)
+
+    def _lines(self, *signals: Array) -> NDArray[np.complex128]:
+        first, last = (int(edge * self.window.size / self.rate_hz) for edge in COMPARED_HZ)
+        return np.fft.rfft(np.stack(signals) * self.window, axis=1)[:, first : last + 1]
+
+
+def command_made(epoch: Epoch, loop: Loop) -> CommandMade | None:
+    """Return the command of an epoch and what made it; None where ticks are missing.
+
+    Parameters
+    ----------
+    epoch : Epoch
+        With perturbation and velocity command.
+    loop : Loop
+        Of the settings.
+    """
+    command = epoch.channels["velocity_command_rad_s"]
+    rate_hz, n = command.mean_rate_hz, command.time_s.size
+    if float(np.ptp(np.diff(command.time_s))) > 0.5 / rate_hz:
+        return None
+    window, steep = np.hanning(n), np.zeros(n)
+    for stretch in epoch.left_out:  # there neither torque nor, where samples are lost, command is
+        hole_s = (stretch.start_s - command.time_s[0], stretch.stop_s - command.time_s[0])
+        window, steep = with_hole(window, steep, rate_hz, FORGOTTEN_S, hole_s)
+    asked = _asked_nm(epoch, loop, command.time_s, rate_hz)
+    return CommandMade(command.values, asked, window, rate_hz)
+
+
+def _asked_nm(epoch: Epoch, loop: Loop, ticks_s: Array, rate_hz: float) -> Array:
+    perturbation, torque = epoch.channels["perturbation_nm"], epoch.channels["torque_nm"]
+    held = np.searchsorted(perturbation.time_s, ticks_s + 0.01 / rate_hz, side="right") - 1
+    # The newest sample at a tick is half an interval old on average, beside the latency.
+    late_s = loop.rig.torque.latency_s + max(0.5 / torque.rate_hz - 0.5 / rate_hz, 0.0)
+    read = np.interp(ticks_s - late_s, torque.time_s, torque.values)
+    cutoff_hz = loop.controller.torque_cutoff_hz
+    if cutoff_hz < rate_hz / 2:
+        b0, b1, b2, a1, a2 = butterworth_lowpass(cutoff_hz, rate_hz)
+        read = signal.lfilter([b0, b1, b2], [1.0, a1, a2], read)
+    return np.asarray(perturbation.values[np.maximum(held, 0)] - read, dtype=np.float64)
