@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from rigidimeter.recording.sample_log import SCHEMA, Sample, columns_text, sampl
 
 _FIRST = len(Sample._fields) - len(Sample._field_defaults)
 """Columns that every recording has; later versions added the others."""
-_READING = pa.ipc.IpcReadOptions(use_threads=False)
+_OTHER_COLUMNS = "{source}: holds other columns than a recording of this version"
 _REFUSALS = (pa.ArrowException, MemoryError, OSError, UnicodeDecodeError)
 """What Arrow raises for bytes that are no stream; a damaged length is one that asks for memory."""
 
@@ -70,7 +70,7 @@ class Samples:
     Attributes
     ----------
     columns : dict of str to array
-        All samples of whole batches.
+        All samples of whole batches; of the columns that were asked for.
     lost : tuple of Lost
     session_ids : tuple of str
         That the messages name; an empty text where they name none, as in version 1.
@@ -97,8 +97,16 @@ def read_samples(path: Path) -> dict[str, NDArray[Any]]:
     return scan_samples(read_bytes(path, RECORDING_BYTES), path).columns
 
 
-def scan_samples(content: bytes, source: Path) -> Samples:
+def scan_samples(content: bytes, source: Path, wanted: Collection[str] = Sample._fields) -> Samples:
     """Return what a file of samples holds, and what is damaged in it.
+
+    Parameters
+    ----------
+    content : bytes
+    source : Path
+        For messages.
+    wanted : collection of str
+        The columns to decode, `tick` always. Half the columns take half the time.
 
     Raises
     ------
@@ -107,10 +115,13 @@ def scan_samples(content: bytes, source: Path) -> Samples:
     """
     header, schema, first = _read_schema(content)
     stream = scan_stream(content, first, columns_text(schema))
-    batches = _decode(content, header, stream.batches)
+    names = _recorded(schema, {"tick", *wanted}, source)
+    fields = [schema.get_field_index(name) for name in names]
+    batches = _decode(content, header, stream.batches, fields)
     if batches is None:  # without checksums only Arrow can say which
-        stream, batches = _each_by_itself(content, header, stream)
-    columns = _to_columns(pa.Table.from_batches(batches, schema), source)
+        stream, batches = _each_by_itself(content, header, stream, fields)
+    table = pa.Table.from_batches(batches, pa.schema([schema.field(k) for k in fields]))
+    columns = _to_columns(table, names, wanted, source)
     rows = np.concatenate(([0], np.cumsum([batch.num_rows for batch in batches], dtype=int)))
     facts = [message.facts for message in (stream.schema, *stream.batches) if message]
     ids = dict.fromkeys(str(said.get("session_id", "")) for said in facts)
@@ -133,14 +144,28 @@ def _read_schema(content: bytes) -> tuple[bytes, pa.Schema, Message | None]:
     return SCHEMA.serialize().to_pybytes(), SCHEMA, None
 
 
+def _recorded(schema: pa.Schema, wanted: Collection[str], source: Path) -> list[str]:
+    """Return which wanted columns a file has, in its order."""
+    names = [name for name in schema.names if name in Sample._fields]
+    types = {name: SCHEMA.field(name).type for name in names}
+    if (
+        not set(Sample._fields[:_FIRST]) <= set(names)
+        or len(types) < len(names)
+        or any(schema.field(name).type != types[name] for name in names)
+    ):
+        raise UserError(_OTHER_COLUMNS.format(source=source))
+    return [name for name in names if name in wanted]
+
+
 def _decode(
-    content: bytes, header: bytes, messages: Sequence[Message]
+    content: bytes, header: bytes, messages: Sequence[Message], fields: list[int]
 ) -> list[pa.RecordBatch] | None:
-    """Return the batches of messages, None if Arrow refuses one."""
+    """Return these fields of the batches of messages, None if Arrow refuses one."""
     runs = [content[message.start : message.stop] for message in messages]
+    options = pa.ipc.IpcReadOptions(use_threads=False, included_fields=fields)
     try:
         data = pa.py_buffer(b"".join([header, *runs, END_OF_STREAM]))
-        batches = list(pa.ipc.open_stream(data, options=_READING))
+        batches = list(pa.ipc.open_stream(data, options=options))
         for batch in batches:
             batch.validate()
     except _REFUSALS:
@@ -149,12 +174,12 @@ def _decode(
 
 
 def _each_by_itself(
-    content: bytes, header: bytes, stream: Stream
+    content: bytes, header: bytes, stream: Stream, fields: list[int]
 ) -> tuple[Stream, list[pa.RecordBatch]]:
     """Decode batches one by one; those that Arrow refuses become gaps."""
     messages, batches, gaps = [], [], list(stream.gaps)
     for message in stream.batches:
-        decoded = _decode(content, header, [message])
+        decoded = _decode(content, header, [message], fields)
         if decoded:
             messages.append(message)
             batches += decoded
@@ -193,21 +218,19 @@ def _lost(
     return found
 
 
-def _to_columns(table: pa.Table, source: Path) -> dict[str, NDArray[Any]]:
+def _to_columns(
+    table: pa.Table, names: Sequence[str], wanted: Collection[str], source: Path
+) -> dict[str, NDArray[Any]]:
     """Return the columns of a table by name, those that were not recorded yet with a default."""
-    names = [name for name in Sample._fields if name in table.column_names]
-    if not set(Sample._fields[:_FIRST]) <= set(names):
-        raise UserError(f"{source}: holds other columns than a recording of this version")
-    table = table.select(names).combine_chunks()
-    if any(table.schema.field(name).type != SCHEMA.field(name).type for name in names) or any(
-        column.null_count for column in table.columns
-    ):
-        raise UserError(f"{source}: holds other columns than a recording of this version")
+    table = table.combine_chunks()
+    if any(column.null_count for column in table.columns):
+        raise UserError(_OTHER_COLUMNS.format(source=source))
     columns = {
         # Not to_numpy, which imports pandas.
         name: np.from_dlpack(column.chunk(0)) if len(table) else np.empty(0, sample_dtypes()[name])
         for name, column in zip(names, table.columns, strict=True)
     }
     for name, default in Sample._field_defaults.items():  # recorded before there was this column
-        columns.setdefault(name, np.full(len(table), default, sample_dtypes()[name]))
+        if name in wanted:
+            columns.setdefault(name, np.full(len(table), default, sample_dtypes()[name]))
     return columns

@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.lost_samples import lost_stretches
+from rigidimeter.recording.lost_samples import STAMPS, lost_stretches
 from rigidimeter.recording.session_files import SessionFiles, read_session_files
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES, read_manifest
 from rigidimeter.records import Channel, Epoch, Motion, Notice, Outcome
 from rigidimeter.settings import Settings, parse_settings
+
+CHANNELS = ("torque_nm", "angle_rad", "velocity_rad_s", "velocity_command_rad_s", "perturbation_nm")
+"""The columns of samples that an epoch has."""
 
 MUCH_LIMITED = 0.01
 """Above this share of limited ticks there is a warning."""
@@ -46,7 +49,7 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
     UserError
         If a file of the folder is missing or unreadable.
     """
-    files = read_session_files(folder)
+    files = read_session_files(folder, (*CHANNELS, *STAMPS, "epoch", "limited"))
     manifest, samples, events = files.manifest, files.samples.columns, files.log.events
     settings = _settings(folder, manifest)
     notices = _damage(folder, files)

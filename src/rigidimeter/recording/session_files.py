@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from rigidimeter.documents import read_bytes
 from rigidimeter.documents.bounds import DOCUMENT_BYTES, RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.event_log import EventLog, scan_events
+from rigidimeter.recording.sample_log import Sample
 from rigidimeter.recording.sample_reading import Samples, scan_samples
 from rigidimeter.recording.session_folder import EVENTS, SAMPLES, check_session, read_manifest
 
@@ -30,8 +31,14 @@ class SessionFiles:
         return next(found, None)
 
 
-def read_session_files(folder: Path) -> SessionFiles:
+def read_session_files(folder: Path, wanted: Collection[str] = Sample._fields) -> SessionFiles:
     """Read manifest, samples and events of a session.
+
+    Parameters
+    ----------
+    folder : Path
+    wanted : collection of str
+        The columns of the samples to decode.
 
     Raises
     ------
@@ -43,7 +50,7 @@ def read_session_files(folder: Path) -> SessionFiles:
         if not (folder / name).exists():
             raise UserError(f"{folder}: the session has no {name}")
     samples_path, events_path = folder / SAMPLES, folder / EVENTS
-    samples = scan_samples(read_bytes(samples_path, RECORDING_BYTES), samples_path)
+    samples = scan_samples(read_bytes(samples_path, RECORDING_BYTES), samples_path, wanted)
     log = scan_events(read_bytes(events_path, DOCUMENT_BYTES), events_path)
     check_session(folder, manifest, {SAMPLES: samples.session_ids, EVENTS: log.session_ids})
     return SessionFiles(manifest, samples, log)
