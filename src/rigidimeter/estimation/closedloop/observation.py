@@ -138,7 +138,10 @@ def observe_motion(prepared: PreparedEpoch) -> Observation:
     epoch, estimation = prepared.epoch, prepared.settings.estimation
     grid = epoch_grid(epoch, band_hz(epoch, estimation), estimation.trim_s)
     everywhere = np.ones(grid.line.size, dtype=np.bool_)
-    lines = epoch_lines(epoch, grid, None, torque_filter_of(prepared.settings.estimation))
+    # The drive is followed as least squares follows it, or what it does looks like a delay.
+    found = prepared.source.drive if "velocity_command_rad_s" in epoch.channels else None
+    drive = found.model if found is not None else None
+    lines = epoch_lines(epoch, grid, drive, torque_filter_of(estimation))
     return Observation(lines, epoch.channels["torque_nm"], None, everywhere)
 
 

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.scenarios.catalogue import SCENARIOS
@@ -39,3 +41,16 @@ def test_a_delay_that_is_not_corrected_is_said_where_it_matters(name, late_ms, r
     # B τ off J is less than half its interval below that delay.
     J = analysis.fits[0]
     assert finding.threshold <= 1e3 * 0.5 * (J.high[0] - J.low[0]) / J.value[1] * 1.001
+
+
+@pytest.mark.parametrize("name", ["drive PI 20 Hz with load", "drive PI 30 Hz, 500/s"])
+def test_with_the_command_recorded_what_the_drive_does_is_no_delay(name):
+    """The drive is followed, and what is left between torque and motion is no delay."""
+    (epoch,), truth = SCENARIOS[name].simulated(0, 1)
+    channels = {k: v for k, v in epoch.channels.items() if k != "perturbation_nm"}
+    known = replace(epoch, channels=channels, excitation_hz=None)
+    analysis = estimate([known], "bandlimited", settings=SCENARIOS[name].analysed_with())
+    (fit,) = analysis.fits
+    assert not {finding.name for finding in fit.findings if finding.level != "note"}
+    assert abs(analysis.delays[0].delay_s) < 4.0 * analysis.delays[0].delay_s_se
+    np.testing.assert_allclose(fit.value, truth[0], rtol=0.004)
