@@ -110,8 +110,8 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
         if not known:
             return replace(
                 found,
-                remark="not corrected: without the recorded perturbation a reflex, or a subject "
-                "who pushes, looks like a delay",
+                remark="not corrected: without the recorded perturbation a reflex, or torque that "
+                "something but the robot adds, looks like a delay",
             )
         if abs(total_s) < max(SIGNIFICANT * error_s, LEAST_S):
             return replace(found, remark="not corrected: not significantly different from zero")

@@ -56,8 +56,9 @@ POOLED_TEXT = (
 def intervals_text(settings: EstimationSettings) -> str:
     """Return what the intervals of least squares hold for."""
     return (
-        f"Intervals hold for {_RESIDUALS[settings.intervals]}, and do not include bias: a "
-        "subject who pushes in a closed loop pulls least squares away from the joint"
+        f"Intervals hold for {_RESIDUALS[settings.intervals]}, and do not include bias: "
+        "torque that something but the robot adds in a closed loop pulls least squares away from "
+        "the joint"
     )
 
 

@@ -74,7 +74,8 @@ def choose_method(epochs: Sequence[PreparedEpoch]) -> tuple[str, str]:
         obstacle for prepared in epochs if (obstacle := closed_loop_obstacle(prepared.epoch))
     ]
     least_squares = (
-        "so least squares is used: torque that a subject adds biases it in a closed loop"
+        "so least squares is used: torque that something but the robot adds biases it in a closed "
+        "loop"
     )
     if 2 * len(obstacles) > len(epochs):
         found = f"{obstacles[0]} (in {len(obstacles)} of {len(epochs)} epochs)"
@@ -93,7 +94,7 @@ def choose_method(epochs: Sequence[PreparedEpoch]) -> tuple[str, str]:
     return (
         "iv",
         f"the perturbation was recorded{where}, so the motion that it causes is the instrument: "
-        "torque that a subject adds does not bias the estimate",
+        "torque that something but the robot adds does not bias the estimate",
     )
 
 

@@ -21,7 +21,7 @@ MOST_EPOCHS = 20
 
 WEIGHT_IN_STIFFNESS = (
     "K is the slope of all torque against the angle. Unless the axis is vertical it includes that "
-    "of the limb's weight, m g l cos θ with θ from hanging straight down"
+    "of the weight, m g l cos θ with θ from hanging straight down"
 )
 
 

@@ -254,8 +254,8 @@ def advice(result: StudyResult, light: TrafficLight | None) -> list[str]:
     ]
     if perturbed and not any("perturbation_nm" in names for names in perturbed):
         found.append(
-            "Record the perturbation (perturbation_nm): without it the subject’s own torque biases "
-            "J, B and K, whatever the number of epochs."
+            "Record the perturbation (perturbation_nm): without it torque that something but the "
+            "robot adds biases J, B and K, whatever the number of epochs."
         )
     measured = precisions(result)
     more = [

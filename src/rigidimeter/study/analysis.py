@@ -257,7 +257,7 @@ def _without_drive(epochs: Sequence[PreparedEpoch], after: bool) -> str:
         f"{'. ' if after else ''}In {', '.join(unknown)} command and velocity do not show the "
         "drive, so the motion between samples is interpolated: J comes out low, by about 1 % with "
         "a drive of second order and 50 Hz at 1000 ticks/s, by 14 % with a PI drive, and by far "
-        "more at lower rates; where the subject pushes, B may be some percent high"
+        "more at lower rates; where something but the robot pushes, B may be some percent high"
     )
 
 

@@ -25,12 +25,12 @@ CLOSED_LOOP: Mapping[str, LineMethod] = {
 def _intervals_text(settings: EstimationSettings) -> str:
     if settings.intervals == "bootstrap":
         return (
-            "Intervals are made by giving each spectral line of the residual a new phase, the "
-            "subject’s own torque included"
+            "Intervals are made by giving each spectral line of the residual a new phase, torque "
+            "that something but the robot adds included"
         )
     return (
-        "Intervals are made from the power of the residual at each frequency, the subject’s own "
-        "torque included"
+        "Intervals are made from the power of the residual at each frequency, torque that "
+        "something but the robot adds included"
     )
 
 

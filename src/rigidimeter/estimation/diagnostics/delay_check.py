@@ -53,7 +53,8 @@ def torque_delay(
     text = (
         f"the torque is {late_ms:.3g} ms late against the motion (at most {most_ms:.2g} ms either "
         f"way), which was not corrected: if it is a delay, J is about {moved[0]:.2g} kg·m² off and "
-        f"B {moved[1]:.2g} N·m·s/rad; if not, a reflex or the subject's own torque is in them"
+        f"B {moved[1]:.2g} N·m·s/rad; if not, a reflex is in them, or torque that "
+        "something but the robot adds"
     )
     remedy = (
         "record the perturbation, which tells the two apart; or take the delay out of the "

@@ -86,7 +86,7 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
         ),
         meaning=(
             f"only {100 * value:.0f} % of the {weaker}'s power follows the perturbation; the rest "
-            "is torque from a subject, noise, or a joint that is not linear"
+            "is torque that something but the robot adds, noise, or a joint that is not linear"
         ),
     )
 
@@ -201,7 +201,10 @@ EXCITATION_CHECKS = (
         "coherence",
         ("perturbation_nm",),
         lambda c: coherence(c.epoch, c.signals, c.settings),
-        "the rest is torque from a subject, noise, or a joint that is not linear",
+        (
+            "the rest is torque that something but the robot adds, noise, or a joint that is not "
+            "linear"
+        ),
         "perturb more strongly, pool epochs by iv, or repeat while the robot alone moves it",
         of_fit=False,
         harmless=push_harmless,

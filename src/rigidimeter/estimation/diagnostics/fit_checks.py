@@ -181,7 +181,7 @@ def implausible_parameters(parameters: Array, settings: DiagnosticsSettings) -> 
         (
             f"{worst}, {value:.3g} times the end of its range (at most 1)"
             if failed
-            else "J, B and K are of a size that joints have"
+            else "J, B and K are within the ranges of joints"
         ),
     )
 
@@ -203,7 +203,7 @@ def gravity(
         without,
         stiffness_nm_rad,
         True,
-        f"K of {stiffness_nm_rad:.4g} N·m/rad includes {slope:.4g} of the limb's weight (m g l "
+        f"K of {stiffness_nm_rad:.4g} N·m/rad includes {slope:.4g} of the weight (m g l "
         f"cos θ); without it K is {without:.4g}",
     )
 
@@ -219,8 +219,8 @@ RESIDUAL_CHECKS = (
         (),
         lambda c: residual_whiteness(-c.voluntary_nm, c.signals, c.settings),
         (
-            "the residual is coloured, by torque from a subject or by what the model lacks, and "
-            "standard errors for white noise are too small"
+            "the residual is coloured, by torque that something but the robot adds or by what the "
+            "model lacks, and standard errors for white noise are too small"
         ),
         "use the intervals for coloured residuals; see the residual's spectrum",
         harmless=push_harmless,
@@ -232,7 +232,8 @@ RESIDUAL_CHECKS = (
         "the model lacks something that the perturbation causes",
         (
             "look for a delay between torque and motion, for a reflex, for stiffness that changes "
-            "with the angle; torque that a subject adds biases least squares in this way too"
+            "with the angle; torque that something but the robot adds biases least squares in this "
+            "way too"
         ),
         harmless=push_harmless,
     ),
@@ -252,7 +253,7 @@ PARAMETER_CHECKS = (
         "gravity",
         ("angle_rad",),
         lambda c: gravity(c.epoch.channels["angle_rad"].values, c.parameters[2], c.settings),
-        "the weight is no property of muscle",
+        "the weight is no stiffness of the joint itself",
         "state which of the two is given",
     ),
     Check(
@@ -271,13 +272,17 @@ PARAMETER_CHECKS = (
             "something but the robot may have pushed, or the channels are delayed relative to each "
             "other"
         ),
-        "check the stamps of torque and motion, and see the voluntary torque",
+        "check the stamps of torque and motion, and see the torque beyond J, B and K",
     ),
     Check(
         "implausible_parameters",
         (),
         lambda c: implausible_parameters(c.parameters, c.settings),
-        "no joint of a person or an animal is like that",
-        "check the units of torque (N·m) and angle (rad, not degrees) and the time (s)",
+        "a joint of a person or an animal is not like that; a machine's axis may be",
+        (
+            "check the units of torque (N·m) and angle (rad, not degrees) and the time (s); for an "
+            "axis that is so, set the ends of the ranges: inertia_least_kg_m2, inertia_most_kg_m2, "
+            "damping_most_nm_s_rad and stiffness_most_nm_rad in [diagnostics]"
+        ),
     ),
 )

@@ -58,7 +58,7 @@ def tremor(voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings)
         value,
         most,
         not (value <= most or stands_out < STANDS_OUT),
-        f"the subject's own torque has a line at {centre_hz:.2g} Hz of "
+        f"the torque beyond J, B and K has a line at {centre_hz:.2g} Hz of "
         f"{math.sqrt(2.0 * running[at]):.2g} N·m (amplitude), {in_full(value)} % of the torque's "
         f"variance (at most {most:g} %) and {stands_out:.2g} times what lies beside it",
     )
@@ -76,8 +76,10 @@ TREMOR_CHECKS = (
         "tremor",
         (),
         lambda c: tremor(_own_torque(c), c.signals, c.settings),
-        "a tremor; least squares takes part of it for the joint, and J and B come out low in a "
-        "closed loop",
+        (
+            "a tremor or another oscillation; least squares takes part of it for the joint, and J "
+            "and B come out low in a closed loop"
+        ),
         "record the perturbation and use iv, or leave the epoch out",
         harmless=push_harmless,
     ),

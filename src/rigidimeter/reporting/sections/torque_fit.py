@@ -43,8 +43,8 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     if not is_least_squares(result.analysis.method):
         text += (
             " The estimate ignores torque that does not follow the perturbation. What the model "
-            "leaves here is the subject’s own torque and noise, so a low VAF does not mean a poor "
-            "fit."
+            "leaves here is noise and torque that something but the robot adds, so a low VAF does "
+            "not mean a poor fit."
         )
     yield paragraph(text)
     limit_nm = max(torque_limit_nm(signals, fit, WINDOW_S) for fit, _, signals in found)

@@ -37,8 +37,9 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         return
     text = Markup(
         "The torque of each epoch that J, B and K do not explain, "
-        '<span class="formula">J θ″ + B θ′ + K θ − M</span>: the subject’s own torque, sensor '
-        "noise, and whatever the model lacks. Voluntary movement is below 4 Hz; a tremor is a peak."
+        '<span class="formula">J θ″ + B θ′ + K θ − M</span>: what something but the robot adds, '
+        "sensor noise, and whatever the model lacks. Voluntary movement is below 4 Hz; a tremor is "
+        "a peak."
     )
     if is_least_squares(result.analysis.method):
         text += " Least squares makes this torque as small as it can, and so hides part of it."

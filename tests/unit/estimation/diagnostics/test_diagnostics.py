@@ -228,3 +228,10 @@ def test_a_check_from_outside_is_one_entry(sound):
     assert (found["loud"].level, found["loud"].remedy) == ("doubt", "push less")
     assert found["loud"].text.endswith("N·m: that is much")
     assert "never" not in found
+
+
+def test_sentences_of_findings_hold_for_an_axis_on_a_bench_too():
+    """Only an EMG says that there is a person."""
+    for check in CHECKS:
+        if check.name != "emg_activity":
+            assert "subject" not in f"{check.meaning} {check.remedy}"
