@@ -32,27 +32,7 @@ class Explanation(NamedTuple):
     reason: str
 
 
-FFT = "rounding in the FFT of the loop, which holds to 2e-8 of the largest value"
-"""The transfer functions are evaluated in another order. Bounds change by up to 1e-7 if the damping
-of that FFT is 18.3 instead of 18."""
-DELAY = "the error of a delay is over the slope of what a move of the torque leaves"
-"""Between coarse samples a move takes a third of itself away, so the error is three times larger;
-on dense ones it is 0.8 to 1.3 times what it was."""
-ZERO = "a number that is zero but for rounding"
-
-EXPLANATIONS = (
-    *(
-        Explanation(group, "*delays/delay_s_se", 0.8, DELAY)
-        for group in ("estimate", "methods", "study", "full")
-    ),
-    *(
-        Explanation("study", f"estimates/{fits}/*_{end}", 5e-5, DELAY)
-        for fits in ("fits", "fixed")
-        for end in ("low", "high")
-    ),
-    Explanation("ledger", "checks/ours eq-6 00", 1.0, ZERO),
-    Explanation("ledger", "checks/ours sec-1-voluntary-iv 0[01]", 1e-8, FFT),
-)
+EXPLANATIONS: tuple[Explanation, ...] = ()
 
 
 def explanation(group: str, difference: Difference) -> Explanation | None:
