@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from scipy import optimize, signal
@@ -49,6 +50,9 @@ SAME_AMPLITUDE = 0.9
 
 LOWEST_HZ, HIGHEST_HZ = 0.25, 10.0
 """Where the frequency of an imposed sinusoid is looked for: slower motion is drift."""
+
+LEAST_VELOCITY_SHARE = 0.5
+"""In the line of a sinusoid there is at least this share of the velocity's variance too."""
 
 
 @dataclass(frozen=True)
@@ -229,15 +233,35 @@ def find_motion(epoch: Epoch) -> Motion:
     return Motion(float(best.x), float(t[0]), float(t[-1] - t[0]))
 
 
+class LineShares(NamedTuple):
+    """The share of the variance of angle and velocity near the angle's strongest line."""
+
+    angle: float
+    velocity: float
+
+    def single(self, most: float) -> bool:
+        """Return whether the motion is a sinusoid: more than `most` of the angle is in the line.
+
+        Steps to and fro are not: the line of their period holds 0.8 to 0.95 of the angle, but not
+        half of the velocity, and the rest tells J from K.
+        """
+        return self.angle > most and self.velocity > LEAST_VELOCITY_SHARE
+
+
 def single_frequency_share(epoch: Epoch) -> float:
     """Return the share of the angle's variance within a quarter octave of its strongest line.
 
     Close to 1 for an imposed sinusoid, well below for a perturbation with many frequencies.
     """
+    return line_shares(epoch).angle
+
+
+def line_shares(epoch: Epoch) -> LineShares:
+    """Return the shares within a quarter octave of the angle's strongest line."""
     motion = {c.name: thinned(c, HIGHEST_HZ) for c in motion_channels(epoch)}
     time_s, angle = _angle(replace(epoch, channels=motion))
     if time_s.size < 16 or not np.any(angle):
-        return 0.0
+        return LineShares(0.0, 0.0)
     return _spectral_peak(time_s, angle)[1]
 
 
@@ -248,7 +272,7 @@ def _angle(epoch: Epoch) -> tuple[Array, Array]:
     return time_s, np.asarray(signal.detrend(angle), dtype=np.float64)
 
 
-def _spectral_peak(time_s: Array, angle: Array) -> tuple[float, float]:
+def _spectral_peak(time_s: Array, angle: Array) -> tuple[float, LineShares]:
     """Return the frequency of the strongest line and its share of the power."""
     rate_hz = 1.0 / float(time_s[1] - time_s[0])
     frequency_hz, power = power_lines(angle, rate_hz, tapered=True, longer=4)
@@ -258,4 +282,6 @@ def _spectral_peak(time_s: Array, angle: Array) -> tuple[float, float]:
     peak_hz = float(frequency_hz[inside][np.argmax(power[inside])])
     resolution_hz = 2.0 / float(time_s[-1] - time_s[0])
     near = np.abs(frequency_hz - peak_hz) <= max(0.19 * peak_hz, resolution_hz)
-    return peak_hz, float(power[near].sum() / power.sum())
+    of_velocity = power * frequency_hz**2 * (frequency_hz <= HIGHEST_HZ)
+    shares = (float(one[near].sum() / one.sum()) for one in (power, of_velocity))
+    return peak_hz, LineShares(*shares)

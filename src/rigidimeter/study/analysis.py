@@ -17,7 +17,6 @@ from rigidimeter.estimation import (
     estimate_delays,
     method_named,
     score_epoch,
-    single_frequency_share,
 )
 from rigidimeter.estimation.alignment import MOST_EPOCHS, aligned_prepared
 from rigidimeter.estimation.between_epochs import between_epochs
@@ -28,6 +27,7 @@ from rigidimeter.estimation.diagnostics import checked, checked_together
 from rigidimeter.estimation.diagnostics.delay_check import torque_delay
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, prepare
+from rigidimeter.estimation.scores import line_shares
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.stretches import longest_part
 from rigidimeter.recording import Recording
@@ -59,19 +59,20 @@ def step_costs(samples: float) -> StepCosts:
 
 
 SINGLE_FREQUENCY_SHARE = 0.85
-"""Above this share of the angle's variance in one line, the epoch is an imposed sinusoid.
+"""Above this share of the angle's variance in one line, the epoch is an imposed sinusoid, unless
+the velocity shows that it is steps to and fro (`LineShares`).
 
 A sinusoid whose motion fills half the epoch reaches 0.95, a PRBS in the closed loop 0.5.
 """
 
 
 def task_of(epoch: Epoch, settings: Settings) -> Task:
-    """Return the epoch's task: as recorded, else a sinusoid if the angle holds a single line."""
+    """Return the epoch's task: as recorded, else a sinusoid if the motion holds a single line."""
     if epoch.task is not None:
         return epoch.task
     if before_fit(epoch, settings.estimation):
         return "prbs"  # it will fail with its reason among the fits
-    return "sinusoid" if single_frequency_share(epoch) > SINGLE_FREQUENCY_SHARE else "prbs"
+    return "sinusoid" if line_shares(epoch).single(SINGLE_FREQUENCY_SHARE) else "prbs"
 
 
 class Preparation:

@@ -8,7 +8,7 @@ import pytest
 
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import find_motion, score_epoch, scoring_cycles, single_frequency_share
-from rigidimeter.estimation.scores import loop_area_j
+from rigidimeter.estimation.scores import line_shares, loop_area_j
 from rigidimeter.estimation.stretches import longest_part
 from rigidimeter.records import Channel, Epoch, LeftOut, Motion, Outcome
 from rigidimeter.settings import EstimationSettings, ScoreSettings
@@ -86,6 +86,26 @@ def test_the_motion_is_found_where_it_is_not_said():
     assert found.start_s == pytest.approx(3.0, abs=0.3)
     assert found.start_s + found.duration_s == pytest.approx(13.0, abs=0.3)
     assert single_frequency_share(epoch) > 0.9
+
+
+@pytest.mark.parametrize("ramp", [0.05, 0.08, 0.12])
+def test_steps_to_and_fro_are_no_sinusoid(ramp):
+    """The first line of a trapezoid whose ramps take r of the period, and of its two pulses."""
+    t = np.arange(20_000) / 1000.0
+    there = np.clip((t % 2.0) / 2.0 / ramp, 0, 1) - np.clip(((t % 2.0) / 2.0 - 0.5) / ramp, 0, 1)
+    shares = line_shares(Epoch("file", "1", {"angle_rad": Channel("angle_rad", t, there)}))
+    power = 8 / np.pi**2 * np.sinc(ramp) ** 2 / (1 - 4 * ramp / 3)
+    assert shares.angle == pytest.approx(power, abs=0.005)
+    assert shares.velocity == pytest.approx(4 * ramp * np.sinc(ramp) ** 2, abs=0.05)
+    assert not shares.single(0.7)
+
+
+def test_a_sinusoid_with_a_tremor_upon_it_is_one():
+    t = np.arange(20_000) / 1000.0
+    angle = 0.1 * np.sin(2 * np.pi * 1.1 * t) + 0.01 * np.sin(2 * np.pi * 5.0 * t)
+    shares = line_shares(Epoch("file", "1", {"angle_rad": Channel("angle_rad", t, angle)}))
+    assert shares.velocity == pytest.approx(1 / (1 + (0.1 * 5.0 / 1.1) ** 2), abs=0.01)
+    assert shares.single(0.85)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -24,7 +24,7 @@ from rigidimeter.estimation.diagnostics.check_record import (
     push_harmless,
 )
 from rigidimeter.estimation.power_lines import lines_inside, power_lines
-from rigidimeter.estimation.scores import single_frequency_share
+from rigidimeter.estimation.scores import line_shares
 from rigidimeter.estimation.signals import Array, Signals, values_at, velocity_at
 from rigidimeter.records import PARAMETERS, Channel, Epoch
 from rigidimeter.settings import DiagnosticsSettings
@@ -131,11 +131,14 @@ def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) ->
 
 def imposed_sinusoid(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return whether the motion is a single sinusoid, which no fit of three parameters can use."""
-    value, most = 100.0 * single_frequency_share(epoch), settings.single_frequency_most_percent
-    return at_most(
+    shares, most = line_shares(epoch), settings.single_frequency_most_percent
+    value = 100.0 * shares.angle
+    return Look(
         value,
         most,
-        f"the strongest line holds {value:.0f} % of the angle's variance (at most {most:g} %)",
+        shares.single(most / 100.0),
+        f"the strongest line holds {value:.0f} % of the angle's variance (at most {most:g} %) and "
+        f"{100 * shares.velocity:.0f} % of the velocity's",
     )
 
 
