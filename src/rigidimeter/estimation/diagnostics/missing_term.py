@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import fft
 
+from rigidimeter.estimation.closedloop.between_finding import REMEDY
 from rigidimeter.estimation.diagnostics.check_record import (
     Case,
     Check,
@@ -109,12 +110,39 @@ def missing_term(case: Case) -> Look | None:
 
 def _of_drive(case: Case, terms: Sequence[OmittedTerm]) -> str:
     """Say that a friction is so small that it may be the drive's; else return an empty text."""
-    (first, *more), most = terms, LITTLE * float(np.std(case.signals.torque_nm))
-    if more or first.name != "coulomb" or first.value > most:
+    if not _little_friction(case, terms):
         return ""
     return (
         f"J, B and K take it for their own; or, since it is below {100 * LITTLE:g} % of the "
         "torque's SD, it is friction of the drive, and including it does not make them better"
+    )
+
+
+def _little_friction(case: Case, terms: Sequence[OmittedTerm]) -> bool:
+    most = LITTLE * float(np.std(case.signals.torque_nm))
+    return [term.name for term in terms] == ["coulomb"] and terms[0].value <= most
+
+
+def friction_of_drive(case: Case) -> Look | None:
+    """Return that J hangs on a drive that is not known, where its friction may be in the torque.
+
+    A drive shows in the torque only by what it does between the samples of the velocity.
+    """
+    known = case.uses_perturbation or "velocity_command_rad_s" in case.epoch.channels
+    said = case.fit is not None and any(f.name == "between_samples" for f in case.fit.findings)
+    look = None if known or said else case.once(missing_term)
+    if look is None or case.prepared is None or not look.value > look.threshold:
+        return None
+    if not _little_friction(case, case.prepared.once(_Found).terms):
+        return None
+    most = case.settings.between_samples_most_percent
+    return Look(
+        np.nan,
+        most,
+        True,
+        f"the torque holds a friction below {100 * LITTLE:g} % of its SD, as friction of the drive "
+        "leaves there, and without the command it is not known how the drive moved between the "
+        "samples",
     )
 
 
@@ -184,9 +212,16 @@ MISSING_TERM_CHECKS = (
     Check(
         "missing_term",
         (),
-        missing_term,
+        lambda c: c.once(missing_term),
         "J, B and K take it for their own",
         "include it: rigidimeter model",
         harmless=_harmless,
+    ),
+    Check(
+        "between_samples",
+        (),
+        friction_of_drive,
+        "J may be some percent too small",
+        f"record the command; or {REMEDY}",
     ),
 )

@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.recordings import measured_alone
 from tests.scenarios.scenario import scenario
 
 from rigidimeter.estimation.diagnostics import checked
 from rigidimeter.estimation.methods import method_named
 from rigidimeter.estimation.prepared import prepare
+from rigidimeter.study import estimate
 
 JOINTS = {
     "coulomb": {"coulomb_nm": 0.1},
@@ -105,6 +107,20 @@ def test_so_little_friction_may_be_the_drives(coulomb_nm, said):
     finding = found["missing_term"]
     assert finding.text.startswith("coulomb")
     assert ("it is friction of the drive" in finding.text) == said
+
+
+@pytest.mark.parametrize(
+    ("name", "doubted"),
+    [("friction in the drive 3 N·m", True), ("friction in the joint 0.02 N·m", False)],
+)
+def test_without_the_command_friction_of_the_drive_leaves_the_inertia_in_doubt(name, doubted):
+    """J is 6 % too small with that drive, and its interval does not say so."""
+    (epoch,), _ = SCENARIOS[name].simulated(0, 1)
+    settings = SCENARIOS[name].analysed_with()
+    (fit,) = estimate([measured_alone(epoch)], "bandlimited", settings=settings).fits
+    doubts = {finding.name for finding in fit.findings if finding.level == "doubt"}
+    assert "missing_term" in doubts
+    assert ("between_samples" in doubts) == doubted
 
 
 def test_what_goes_with_the_angle_and_misses_a_term_may_have_one_cause():
