@@ -147,8 +147,10 @@ def _age(latched: Latched, stamp_s: float) -> Found:
 
 
 def _motion_age(latched: Latched) -> Found:
-    age_s = latched.guard.age_s
-    return Found(1e3 * age_s, 1e3 * latched.limits.stale_s, "ms", age_s, "guard.stale_s")
+    age_s, stale_s = latched.guard.age_s, latched.limits.stale_s
+    if latched.guard.cause == Cause.MOTION_STALE and age_s <= stale_s:  # a reading that is repeated
+        age_s = latched.consistency.same_s
+    return Found(1e3 * age_s, 1e3 * stale_s, "ms", age_s, "guard.stale_s")
 
 
 def _ahead(latched: Latched) -> Found:

@@ -11,13 +11,17 @@ velocity   The reported velocity v is the change of the angle θ between the sta
            where all is well: a velocity of 0 gives 1, a turned sign 2, a velocity late by 10 ms
            at 10 Hz 0.18. No ratio is looked at while d is below what resolution explains. Where the
            loop was late, v had the value before for an unknown part of the time and the value after
-           for the rest: what agrees best with θ is taken.
+           for the rest: what agrees best with θ is taken. So it is where readings were old.
 
 energy     As `watch` counts it, with the velocity from the angle, smoothed over 20 ms: a velocity
            of 0 hides nothing that goes to and fro.
 
 freshness  The share of the time in which a reading was older than a sensor that keeps its rate
            lets it be, with a memory that one gap of `stale_s` does not fill.
+
+answer     `torque_answer` is not asked about a mean with more old motion than that: at the torque's
+           time the angle would be wrong by θ'' age²/2, and the torque would seem to answer another
+           motion. The gap is filled in as one of the loop is. It cannot last: `freshness` ends it.
 
 These laws need a tenth of a second and more to show, so `consistency` takes the mean of some ticks'
 readings and stamps, and the means are looked at here: a mean of velocities over that of the stamps
@@ -80,8 +84,9 @@ class ConsistencyLimits(NamedTuple):
 
     `settle_s` is how long after the last command the joint may still move, `hold_rad` how far
     after that. The means are of `mean_of_ticks`. `unseen_rad` is how far velocity and angle may
-    disagree within `SUMMED_S`. `torque_old_s` and `motion_old_s` are the ages above which a reading
-    is old, `old_memory_s` the memory of their share.
+    disagree within `SUMMED_S`; a reading that repeats itself while the joint goes farther at its
+    velocity is old, and stale after `stale_s`. `torque_old_s` and `motion_old_s` are the ages above
+    which a reading is old, `old_memory_s` the memory of their share.
     """
 
     interval_s: float
@@ -89,6 +94,7 @@ class ConsistencyLimits(NamedTuple):
     mean_of_ticks: int = 8
     settle_s: float = 0.0
     hold_rad: float = math.inf
+    stale_s: float = math.inf
     summed_s: float = SUMMED_S
     unseen_rad: float = math.inf
     energy_j: float = math.inf
@@ -103,7 +109,8 @@ class MeansState(NamedTuple):
     `angle_rad` and `velocity_rad_s` are the last means (NaN before the first), `since_s` the time
     from their stamps to the end of their ticks. `moved_rad` and `reported_rad` are p and q,
     `apart_rad2` and `both_rad2` the means of d² and p² + q². `pace_rad_s` is the velocity from the
-    angle, `energy_j` what goes to and fro at it. `torque_old` and `motion_old` are shares of time.
+    angle, `energy_j` what goes to and fro at it. `torque_old` and `motion_old` are shares of time,
+    `unanswered_s` is the time since `torque_answer` was asked.
     """
 
     answer: AnswerState
@@ -118,6 +125,7 @@ class MeansState(NamedTuple):
     energy_j: float = 0.0
     torque_old: float = 0.0
     motion_old: float = 0.0
+    unanswered_s: float = 0.0
 
 
 def consistency_limits(settings: Settings) -> ConsistencyLimits:
@@ -138,6 +146,7 @@ def consistency_limits(settings: Settings) -> ConsistencyLimits:
         mean_of_ticks=mean_of_ticks(rig.tick_rate_hz),
         settle_s=2.0 * guard.reaction_time_s,
         hold_rad=rad_from_deg(guard.hold_limit_deg + rig.motion.angle_resolution_deg),
+        stale_s=guard.stale_s,
         summed_s=summed_s,
         unseen_rad=rad_from_deg(unseen_deg),
         energy_j=guard.energy_limit_j,
@@ -178,7 +187,7 @@ def means_step(
         How long before the torque the motion was taken. The joint has gone on since.
     """
     answer, before, speed_before, since_s, moved, reported, apart, both = state[:8]
-    pace, energy, torque_old, motion_old = state[8:]
+    pace, energy, torque_old, motion_old, unanswered_s = state[8:]
     forgotten = min(elapsed_s / limits.old_memory_s, 1.0)
     torque_old += (torque_old_share - torque_old) * forgotten
     motion_old += (motion_old_share - motion_old) * forgotten
@@ -191,7 +200,7 @@ def means_step(
         change = angle_rad - before
         moved = moved * kept + change
         said = 0.5 * (speed_before + velocity_rad_s) * passed_s
-        if elapsed_s > LATE * limits.mean_of_ticks * limits.interval_s:
+        if elapsed_s > LATE * limits.mean_of_ticks * limits.interval_s or unanswered_s > 0.0:
             one, other = speed_before * passed_s, velocity_rad_s * passed_s
             said = min(max(change, min(one, other)), max(one, other))
         reported = reported * kept + said
@@ -204,10 +213,14 @@ def means_step(
     else:
         since_s += elapsed_s
     energy = energy_after(energy, torque_nm * pace, elapsed_s)
-    angle_then_rad = angle_rad + velocity_rad_s * before_s
-    answer, cause = answer_step(
-        limits.answer, answer, perturbation_nm, torque_nm, angle_then_rad, elapsed_s
-    )
+    unanswered_s += elapsed_s
+    cause = int(Cause.NONE)
+    if motion_old_share <= OLD_SHARE:
+        angle_then_rad = angle_rad + velocity_rad_s * before_s
+        answer, cause = answer_step(
+            limits.answer, answer, perturbation_nm, torque_nm, angle_then_rad, unanswered_s
+        )
+        unanswered_s = 0.0
 
     # The first law that is broken is named; a number that is none breaks no law.
     if torque_old > OLD_SHARE or motion_old > OLD_SHARE:
@@ -229,5 +242,6 @@ def means_step(
         energy,
         torque_old,
         motion_old,
+        unanswered_s,
     )
     return after, cause

@@ -48,6 +48,14 @@ def test_every_cause_has_a_remedy_and_a_sentence(cause):
     assert (facts["value"], facts["limit"], facts["duration_s"]) == (None, None, None)
 
 
+def test_a_motion_that_repeats_itself_is_stale_since_its_first_repetition():
+    kept = {"angle_rad": 0.001, "velocity_rad_s": 0.1}
+    stop = stopped(lambda r: r._replace(**kept), speed_rad_s=0.1)
+    assert stop.cause is Cause.MOTION_STALE
+    assert "ms, limit 100 ms (guard.stale_s)" in stop.sentence
+    assert stop.found.value == pytest.approx(101.0, abs=1.1)
+
+
 def test_the_settings_that_are_named_exist():
     named = " ".join([*REMEDIES.values(), *settings_named()])
     for table, key in re.findall(r"(guard|loop|rig|prbs|controller)\.(\w+)", named):

@@ -202,6 +202,59 @@ def test_the_share_is_of_the_time_not_of_the_steps_and_of_the_sensor_that_is_old
     assert shares[1 - sensor] == 0.0
 
 
+# --- a reading that repeats itself
+
+
+REPEATED = NOTHING._replace(unseen_rad=0.0021, stale_s=0.0995, motion_old_s=0.0125)
+
+
+def repeating(speed_rad_s):
+    """Return angle and velocity of a motion that speeds up; from 50 ms on they repeat."""
+    return (
+        lambda t: speed_rad_s * min(t, 0.05),
+        lambda t: speed_rad_s * (1.0 + 1e-3 * min(t, 0.05)),
+    )
+
+
+def test_a_reading_that_repeats_itself_is_as_old_as_its_first_repetition():
+    limits = REPEATED._replace(mean_of_ticks=1000)
+    _, cause, state = run(limits, 71, *repeating(1.0))
+    assert (cause, state.ticks) == (Cause.NONE, 70)
+    assert state.same_s == pytest.approx(0.020)
+    assert state.motion_old_ticks == 8  # from 13 to 20 ms
+    # Within 2.1 mrad the angle may be right, so that its stamp counts: 1 and 2 ms of the 20.
+    assert state.stamp_s == pytest.approx(1e-3 * (sum(range(1, 71)) - sum(range(3, 21))))
+
+
+def test_what_its_stamp_says_is_older_stays_older():
+    state = run(REPEATED._replace(mean_of_ticks=1000), 71, *repeating(1.0), ages=(0.05, 0.0))[2]
+    assert state.motion_old_ticks == 70
+    assert state.before_s == pytest.approx(70 * 0.05)
+
+
+@pytest.mark.parametrize(
+    ("speed_rad_s", "sent", "tick", "cause"),
+    [
+        (1.0, 1.0, 150, Cause.MOTION_STALE),
+        (0.018, 1.0, 155, Cause.NONE),  # 1.8 mrad in 100 ms: no more than they may disagree
+        (1.0, 0.0, 144, Cause.VELOCITY_WRONG),  # the joint may be at rest
+    ],
+)
+def test_a_reading_that_repeats_itself_for_too_long_is_stale(speed_rad_s, sent, tick, cause):
+    found = run(REPEATED, 155, *repeating(speed_rad_s), sent=sent)
+    assert found[:2] == (tick, cause)
+
+
+def test_the_torque_is_not_asked_to_answer_a_motion_that_is_old():
+    asked = []
+    for old_s in (0.0125, 0.013):
+        ages = (lambda t, old_s=old_s: old_s if 0.0995 < t < 0.1135 else 0.0, 0.0)
+        states = [run(REPEATED, n, *swing(), ages=ages)[2].means for n in (105, 113, 121)]
+        asked.append([means.unanswered_s for means in states])
+    assert asked[0] == [0.0] * 3
+    assert asked[1] == pytest.approx([0.008, 0.016, 0.0])
+
+
 # --- the ticks between two means
 
 
@@ -234,7 +287,7 @@ def test_a_mean_is_of_the_ticks_with_readings_over_the_time_of_all():
     assert (state.means.angle_rad, state.means.velocity_rad_s) == pytest.approx((0.5 / 3, 1.0))
     # Read 1, 7 and 8 ms after the last mean, so 5.33 ms after it, 2.67 ms before its own end.
     assert state.means.since_s == pytest.approx(0.008 / 3)
-    assert state[3:] == (0,) * 5 + (0.0,) * 6
+    assert state[6:] == (0,) * 5 + (0.0,) * 6
 
 
 def test_no_reading_in_all_the_ticks_makes_no_mean():
@@ -283,6 +336,7 @@ def test_each_limit_is_the_settings_in_si_units():
         {
             "interval_s": 0.002,
             "settle_s": 0.1,
+            "stale_s": 0.2,
             "hold_rad": math.radians(2.25),
             "summed_s": 0.05,
             "unseen_rad": math.radians(0.1 + 2 * 0.25 + 0.05 * 2.0),
@@ -310,7 +364,7 @@ def test_whatever_comes_the_state_stays_finite():
         drawn = rng.choice(values[:-1], 7).tolist()
         state, cause = consistency_step(limits, state, *drawn, int(rng.integers(-3, 200)))
         assert cause in set(Cause)
-        assert all(math.isfinite(value) for value in (state.still_s, *state[3:], *state.means[2:]))
+        assert all(math.isfinite(value) for value in (state.still_s, *state[5:], *state.means[2:]))
 
 
 def test_the_figures_of_the_laws_and_what_they_begin_with():
@@ -328,13 +382,23 @@ def test_the_figures_of_the_laws_and_what_they_begin_with():
     )
     # Nothing is found where nothing is given.
     assert NOTHING[1:3] == (AnswerLimits(), 8)
-    assert NOTHING[3:] == (0.0, math.inf, 0.05, math.inf, math.inf, math.inf, math.inf, 0.5)
+    assert NOTHING[3:] == (
+        0.0,
+        math.inf,
+        math.inf,
+        0.05,
+        math.inf,
+        math.inf,
+        math.inf,
+        math.inf,
+        0.5,
+    )
     state = consistency_state(NOTHING)
     assert state.still_s == 0.0
     assert math.isnan(state.held_rad)
-    assert state[3:] == (7, 0, 0, 0, 0) + (0.0,) * 6
+    assert state[5:] == (0.0, 7, 0, 0, 0, 0) + (0.0,) * 6
     assert math.isnan(state.means.angle_rad)
-    assert state.means[2:] == (0.0,) * 10
+    assert state.means[2:] == (0.0,) * 11
 
 
 def test_what_is_summed_of_the_ticks_is_how_long_before_the_torque_the_motion_was_taken():
