@@ -27,6 +27,9 @@ from rigidimeter.recording.sample_log import SCHEMA, Sample, columns_text, sampl
 _FIRST = len(Sample._fields) - len(Sample._field_defaults)
 """Columns that every recording has; later versions added the others."""
 _OTHER_COLUMNS = "{source}: holds other columns than a recording of this version"
+TOGETHER = 64
+"""So many batches are decoded at a time. What Arrow takes for them is used again for the next: room
+for the whole of a long recording takes longer to get than to fill."""
 _REFUSALS = (pa.ArrowException, MemoryError, OSError, UnicodeDecodeError)
 """What Arrow raises for bytes that are no stream; a damaged length is one that asks for memory."""
 
@@ -117,12 +120,9 @@ def scan_samples(content: bytes, source: Path, wanted: Collection[str] = Sample.
     stream = scan_stream(content, first, columns_text(schema))
     names = _recorded(schema, {"tick", *wanted}, source)
     fields = [schema.get_field_index(name) for name in names]
-    batches = _decode(content, header, stream.batches, fields)
-    if batches is None:  # without checksums only Arrow can say which
-        stream, batches = _each_by_itself(content, header, stream, fields)
-    table = pa.Table.from_batches(batches, pa.schema([schema.field(k) for k in fields]))
-    columns = _to_columns(table, names, wanted, source)
-    rows = np.concatenate(([0], np.cumsum([batch.num_rows for batch in batches], dtype=int)))
+    stream, lengths, tables = _decode(content, header, stream, fields)
+    columns = _to_columns(tables, names, wanted, source)
+    rows = np.concatenate(([0], np.cumsum(lengths, dtype=int)))
     facts = [message.facts for message in (stream.schema, *stream.batches) if message]
     ids = dict.fromkeys(str(said.get("session_id", "")) for said in facts)
     numbers = [_number(stream, k) for k in range(len(stream.batches))]
@@ -158,35 +158,43 @@ def _recorded(schema: pa.Schema, wanted: Collection[str], source: Path) -> list[
 
 
 def _decode(
+    content: bytes, header: bytes, stream: Stream, fields: list[int]
+) -> tuple[Stream, list[int], list[pa.Table]]:
+    """Return these fields of the batches, and how long each is; those Arrow refuses become gaps."""
+    messages: list[Message] = []
+    lengths: list[int] = []
+    tables: list[pa.Table] = []
+    gaps = list(stream.gaps)
+    waiting = [stream.batches[k : k + TOGETHER] for k in range(0, len(stream.batches), TOGETHER)]
+    waiting.reverse()
+    while waiting:
+        some = waiting.pop()
+        table = _decode_together(content, header, some, fields)
+        if table is not None:
+            messages += some
+            lengths += [len(chunk) for chunk in table.column(0).chunks]
+            tables.append(table.combine_chunks())
+        elif len(some) > 1:  # without checksums only Arrow can say which
+            waiting += [(message,) for message in reversed(some)]
+        else:
+            gaps.append(Gap(some[0].start, some[0].stop))
+    gaps.sort(key=lambda gap: gap.start)
+    return replace(stream, batches=tuple(messages), gaps=tuple(gaps)), lengths, tables
+
+
+def _decode_together(
     content: bytes, header: bytes, messages: Sequence[Message], fields: list[int]
-) -> list[pa.RecordBatch] | None:
-    """Return these fields of the batches of messages, None if Arrow refuses one."""
+) -> pa.Table | None:
+    """Return these fields of some batches, a chunk of each; None if Arrow refuses one."""
     runs = [content[message.start : message.stop] for message in messages]
     options = pa.ipc.IpcReadOptions(use_threads=False, included_fields=fields)
     try:
         data = pa.py_buffer(b"".join([header, *runs, END_OF_STREAM]))
-        batches = list(pa.ipc.open_stream(data, options=options))
-        for batch in batches:
-            batch.validate()
+        table = pa.ipc.open_stream(data, options=options).read_all()
+        table.validate()
     except _REFUSALS:
         return None
-    return batches if len(batches) == len(messages) else None
-
-
-def _each_by_itself(
-    content: bytes, header: bytes, stream: Stream, fields: list[int]
-) -> tuple[Stream, list[pa.RecordBatch]]:
-    """Decode batches one by one; those that Arrow refuses become gaps."""
-    messages, batches, gaps = [], [], list(stream.gaps)
-    for message in stream.batches:
-        decoded = _decode(content, header, [message], fields)
-        if decoded:
-            messages.append(message)
-            batches += decoded
-        else:
-            gaps.append(Gap(message.start, message.stop))
-    gaps.sort(key=lambda gap: gap.start)
-    return replace(stream, batches=tuple(messages), gaps=tuple(gaps)), batches
+    return table if table.column(0).num_chunks == len(messages) else None
 
 
 def _number(stream: Stream, k: int) -> int:
@@ -219,18 +227,22 @@ def _lost(
 
 
 def _to_columns(
-    table: pa.Table, names: Sequence[str], wanted: Collection[str], source: Path
+    tables: Sequence[pa.Table], names: Sequence[str], wanted: Collection[str], source: Path
 ) -> dict[str, NDArray[Any]]:
-    """Return the columns of a table by name, those that were not recorded yet with a default."""
-    table = table.combine_chunks()
-    if any(column.null_count for column in table.columns):
+    """Return the columns of tables by name, those that were not recorded yet with a default."""
+    if any(column.null_count for table in tables for column in table.columns):
         raise UserError(_OTHER_COLUMNS.format(source=source))
+    whole = [table for table in tables if len(table)]
+    dtypes = sample_dtypes()
     columns = {
         # Not to_numpy, which imports pandas.
-        name: np.from_dlpack(column.chunk(0)) if len(table) else np.empty(0, sample_dtypes()[name])
-        for name, column in zip(names, table.columns, strict=True)
+        name: np.concatenate([np.from_dlpack(table.column(k).chunk(0)) for table in whole])
+        if whole
+        else np.empty(0, dtypes[name])
+        for k, name in enumerate(names)
     }
+    count = sum(map(len, whole))
     for name, default in Sample._field_defaults.items():  # recorded before there was this column
         if name in wanted:
-            columns.setdefault(name, np.full(len(table), default, sample_dtypes()[name]))
+            columns.setdefault(name, np.full(count, default, dtypes[name]))
     return columns

@@ -11,10 +11,11 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording import read_session, session_settings
 from rigidimeter.recording.checksum import FIELD, ZEROS, checksum_holds, with_checksum
 from rigidimeter.recording.event_log import read_events, scan_events
-from rigidimeter.recording.sample_log import SampleLog, sample_dtypes
-from rigidimeter.recording.sample_reading import read_samples, scan_samples
+from rigidimeter.recording.sample_log import SCHEMA, SampleLog, sample_dtypes
+from rigidimeter.recording.sample_reading import TOGETHER, read_samples, scan_samples
 
 BATCH = 100
+LZ4 = pa.ipc.IpcWriteOptions(compression="lz4")
 
 
 def flip(path, bit):
@@ -254,6 +255,29 @@ def test_version_1_passes_over_a_batch_that_cannot_be_decoded(recorded):
     found = scan_samples(path.read_bytes(), path)
     assert found.columns["tick"].size == n - BATCH
     assert [str(lost) for lost in found.lost] == ["batch 7 (ticks 700 to 799)"]
+
+
+@pytest.mark.parametrize("checked", [True, False])
+@pytest.mark.parametrize("batch", [TOGETHER - 1, TOGETHER, 2 * TOGETHER + 1])
+def test_a_damaged_batch_of_a_long_stream_costs_no_other(tmp_path, batch, checked):
+    path = tmp_path / "samples.arrows"
+    count = 2 * TOGETHER + 3
+    whole = stream(path, count)
+    if not checked:
+        with pa.ipc.new_stream(str(path), SCHEMA, options=LZ4) as plain:
+            plain.write_table(pa.table(whole.columns, SCHEMA), max_chunksize=BATCH)
+        whole = scan_samples(path.read_bytes(), path)
+    assert (whole.columns["tick"].size, whole.lost) == (count * BATCH, ())
+    message = whole.stream.batches[batch]
+    frame = path.read_bytes().index(b"\x04\x22\x4d\x18", message.start)
+    assert frame < message.stop
+    flip(path, 8 * frame)  # what begins the compressed bytes of a column
+    found = scan_samples(path.read_bytes(), path)
+    ticks = np.arange(count * BATCH)
+    np.testing.assert_array_equal(found.columns["tick"], ticks[ticks // BATCH != batch])
+    first = batch * BATCH
+    text = f"batch {batch} (ticks {first} to {first + BATCH - 1})"
+    assert [str(lost) for lost in found.lost] == [text]
 
 
 def test_a_stream_that_is_continued_goes_on_counting(tmp_path):
