@@ -2,10 +2,21 @@
 
 import math
 import time
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
-from tests.faults.rigs import ASCII, CANOPEN, CANOPEN_DRIVE, RIGS, WIRES, Wrong, bench
+from tests.faults.rigs import (
+    ASCII,
+    CANOPEN,
+    CANOPEN_DRIVE,
+    JOINT,
+    RIGS,
+    WIRES,
+    WatchedArm,
+    Wrong,
+    bench,
+)
 from tests.faults.trials import (
     AT_REST_RAD_S,
     Desk,
@@ -16,6 +27,7 @@ from tests.faults.trials import (
 
 from rigidimeter.acquisition.run_states import Command
 from rigidimeter.devices.base import DeviceError
+from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
 from rigidimeter.guard import Cause, guard_limits
 
 HORIZON_S = 0.1
@@ -53,6 +65,35 @@ def test_fault_07_drive_fault(rig, case, cause, ticks, tmp_path, measured):
         elif (rig, case) == (ASCII, "fault"):
             assert trial.samples["motion_status"].any()
         measured(7, rig, f"{case}, {cause.name}", trial, bound_s)
+
+
+def test_fault_07_a_second_node_of_the_same_id(tmp_path, measured):
+    """Switched on in a run, it says that it has booted, and answers for the drive from then on."""
+    with bench(CANOPEN) as made, ExitStack() as ended:
+
+        def switched_on():
+            channel = made.drive._settings.channel
+            other = Cia402Emulator(WatchedArm(JOINT), interface="virtual", channel=channel)
+            ended.callback(other.close)
+
+        trial = run(made, tmp_path / "s", switched_on)
+        bound_s = 2 / made.rate_hz
+        assert_stopped(trial, (Cause.DRIVE_FAULT, Cause.DRIVE_STATE), bound_s)
+        measured(7, CANOPEN, f"second node, {trial.result.cause.name}", trial, bound_s)
+
+
+def test_fault_07_no_drive_is_configured_where_two_answer():
+    with bench(CANOPEN, connected=False) as made:
+        channel = made.drive._settings.channel
+        other = Cia402Emulator(WatchedArm(JOINT), interface="virtual", channel=channel)
+        try:
+            made.rig.connect()
+            with pytest.raises(DeviceError, match="another node"):
+                made.rig.configure()
+            assert not made.powered
+            assert not other.state()["power"]
+        finally:
+            other.close()
 
 
 LOST = [
@@ -239,8 +280,8 @@ def test_fault_15_not_as_commanded(rig, case, tmp_path, measured):
         bound_s = limits.following_rad / speed_rad_s + limits.reaction_time_s + 2 / made.rate_hz
         more_s = 0.01 if case == "runs away" else 0.0  # it stops from three times the speed
         causes = (Cause.NOT_FOLLOWING, Cause.OVERSPEED)
-        if case == "encoder frozen":  # the velocity goes on
-            causes += (Cause.VELOCITY_WRONG,)
+        if case == "encoder frozen":  # the velocity goes on, or repeats itself as well
+            causes += (Cause.VELOCITY_WRONG, Cause.MOTION_STALE)
         assert_stopped(trial, causes, bound_s, more_s=more_s)
         if case == "runs away":
             # A drive that does not obey is not waited for: the power goes once zero was sent.

@@ -170,6 +170,15 @@ def test_fault_05_bad_packets(rig, case, tmp_path, measured):
         measured(5, rig, case, trial, bound_s)
 
 
+def test_fault_05_counters_that_start_again(tmp_path, measured):
+    """The sensor restarts in a run: all that it sends is old by its counters."""
+    with bench(CANOPEN) as made:
+        trial = run(made, tmp_path / "s", Wrong("sensor", "restart"))
+        bound_s = 6 * 0.001 + 0.002 + 1.0 / made.rate_hz  # the sixth in a second is one too many
+        assert_stopped(trial, Cause.TORQUE_PACKETS, bound_s)
+        measured(5, CANOPEN, "counters start again", trial, bound_s)
+
+
 @pytest.mark.parametrize("rig", WIRES)
 @pytest.mark.parametrize("case", ["changed_units", "changed_calibration", "changed_bias"])
 def test_fault_06_sensor_changed_on_reconnect(rig, case):

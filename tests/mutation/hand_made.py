@@ -162,6 +162,7 @@ HAND_MADE = tuple(
             "pass",
             "a velocity with no sense passes",
         ),
+        (AGREEMENT, "> WRONG_GAIN *", "> 100 *", "a velocity of twice its size passes"),
         (AGREEMENT, "cause = int(Cause.SELDOM_FRESH)", "pass", "a sensor that pauses passes"),
         # Commands
         (TICK, "loop.rig.write(allowed)", "loop.rig.write(request)", "no limit reaches the wire"),

@@ -20,7 +20,14 @@ from rigidimeter.guard import (
     GuardLimits,
     GuardState,
 )
-from rigidimeter.guard.agreement import OLD_SHARE, SUMMED_S, WRONG_SHARE
+from rigidimeter.guard.agreement import (
+    OLD_SHARE,
+    SQUARED_S,
+    SUMMED_S,
+    WRONG_GAIN,
+    WRONG_SHARE,
+    larger_gain,
+)
 from rigidimeter.guard.torque_answer import SHOWN_MEMORY_S
 from rigidimeter.guard.watch import outside
 from rigidimeter.recording.sample_log import Sample
@@ -237,7 +244,13 @@ def _moved(latched: Latched) -> Found:
 
 def _velocity(latched: Latched) -> Found:
     means = latched.consistency.means
-    limit_rad = max(latched.agreement.unseen_rad, math.sqrt(WRONG_SHARE * means.both_rad2))
+    both_rad2 = means.moved_rad2 + means.reported_rad2
+    limit_rad = max(latched.agreement.unseen_rad, math.sqrt(WRONG_SHARE * both_rad2))
+    gain = larger_gain(means)
+    if means.apart_rad2 <= limit_rad * limit_rad and gain > WRONG_GAIN:
+        larger = means.reported_rad2 > means.moved_rad2
+        of = "times the change of the angle" if larger else "times the velocity"
+        return Found(gain, WRONG_GAIN, of, SQUARED_S)
     value_rad = math.sqrt(means.apart_rad2)
     return Found(deg_from_rad(value_rad), deg_from_rad(limit_rad), "deg", SUMMED_S)
 

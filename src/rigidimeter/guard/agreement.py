@@ -9,9 +9,12 @@ velocity   The reported velocity v is the change of the angle θ between the sta
            p², with its sign turned four times that, with a gain g (1 − g)² times; with v late by τ
            at ω it is 4 sin²(ωτ/2) times. It may be 0.375 of the mean of p² + q², which are alike
            where all is well: a velocity of 0 gives 1, a turned sign 2, a velocity late by 10 ms
-           at 10 Hz 0.18. No ratio is looked at while d is below what resolution explains. Where the
-           loop was late, v had the value before for an unknown part of the time and the value after
-           for the rest: what agrees best with θ is taken. So it is where readings were old.
+           at 10 Hz 0.18. A gain of 2 gives 0.2, so that gains are asked for as well: that of v on
+           θ, <p q>/<p²>, and that of θ on v, <p q>/<q²>, may be 1.5. A delay makes both smaller, by
+           cos ωτ; a filter of v of first order makes the second 1, whatever the frequency. Neither
+           ratio nor gain is looked at while d is below what resolution explains. Where the loop was
+           late, v had the value before for an unknown part of the time and the value after for the
+           rest: what agrees best with θ is taken. So it is where readings were old.
 
 energy     As `watch` counts it, with the velocity from the angle, smoothed over 20 ms: a velocity
            of 0 hides nothing that goes to and fro.
@@ -54,6 +57,9 @@ SQUARED_S = 0.3
 
 WRONG_SHARE = 0.375
 """Of the mean of p² + q²; p² and q² are alike where all is well."""
+
+WRONG_GAIN = 1.5
+"""Of the velocity on the change of the angle, or the other way round."""
 
 UNSEEN_DEG = 0.1
 """Velocity and angle may disagree by so much within `SUMMED_S`, and by what resolution adds."""
@@ -108,9 +114,9 @@ class MeansState(NamedTuple):
 
     `angle_rad` and `velocity_rad_s` are the last means (NaN before the first), `since_s` the time
     from their stamps to the end of their ticks. `moved_rad` and `reported_rad` are p and q,
-    `apart_rad2` and `both_rad2` the means of d² and p² + q². `pace_rad_s` is the velocity from the
-    angle, `energy_j` what goes to and fro at it. `torque_old` and `motion_old` are shares of time,
-    `unanswered_s` is the time since `torque_answer` was asked.
+    `apart_rad2`, `moved_rad2` and `reported_rad2` the means of d², p² and q². `pace_rad_s` is the
+    velocity from the angle, `energy_j` what goes to and fro at it. `torque_old` and `motion_old`
+    are shares of time, `unanswered_s` is the time since `torque_answer` was asked.
     """
 
     answer: AnswerState
@@ -120,7 +126,8 @@ class MeansState(NamedTuple):
     moved_rad: float = 0.0
     reported_rad: float = 0.0
     apart_rad2: float = 0.0
-    both_rad2: float = 0.0
+    moved_rad2: float = 0.0
+    reported_rad2: float = 0.0
     pace_rad_s: float = 0.0
     energy_j: float = 0.0
     torque_old: float = 0.0
@@ -186,8 +193,8 @@ def means_step(
     before_s : float
         How long before the torque the motion was taken. The joint has gone on since.
     """
-    answer, before, speed_before, since_s, moved, reported, apart, both = state[:8]
-    pace, energy, torque_old, motion_old, unanswered_s = state[8:]
+    answer, before, speed_before, since_s, moved, reported = state[:6]
+    apart, moved2, reported2, pace, energy, torque_old, motion_old, unanswered_s = state[6:]
     forgotten = min(elapsed_s / limits.old_memory_s, 1.0)
     torque_old += (torque_old_share - torque_old) * forgotten
     motion_old += (motion_old_share - motion_old) * forgotten
@@ -207,7 +214,8 @@ def means_step(
         weight = min(passed_s / SQUARED_S, 1.0)
         difference = moved - reported
         apart += (difference * difference - apart) * weight
-        both += (moved * moved + reported * reported - both) * weight
+        moved2 += (moved * moved - moved2) * weight
+        reported2 += (reported * reported - reported2) * weight
         pace += (change - pace * passed_s) / max(passed_s, SMOOTHED_S)
         before, speed_before, since_s = angle_rad, velocity_rad_s, elapsed_s - stamp_s
     else:
@@ -227,8 +235,11 @@ def means_step(
         cause = int(Cause.SELDOM_FRESH)
     if energy > limits.energy_j:
         cause = int(Cause.ENERGY_HIGH)
-    if apart > limits.unseen_rad * limits.unseen_rad and apart > WRONG_SHARE * both:
-        cause = int(Cause.VELOCITY_WRONG)
+    if apart > limits.unseen_rad * limits.unseen_rad:
+        both = moved2 + reported2
+        in_common = 0.5 * (both - apart)  # the mean of p q
+        if apart > WRONG_SHARE * both or in_common > WRONG_GAIN * min(moved2, reported2):
+            cause = int(Cause.VELOCITY_WRONG)
     after = MeansState(
         answer,
         before,
@@ -237,7 +248,8 @@ def means_step(
         moved,
         reported,
         apart,
-        both,
+        moved2,
+        reported2,
         pace,
         energy,
         torque_old,
@@ -245,3 +257,13 @@ def means_step(
         unanswered_s,
     )
     return after, cause
+
+
+def larger_gain(means: MeansState) -> float:
+    """Return the gain of velocity and change of the angle, the larger on the smaller.
+
+    Infinite where one of them is 0.
+    """
+    in_common = 0.5 * (means.moved_rad2 + means.reported_rad2 - means.apart_rad2)
+    least = min(means.moved_rad2, means.reported_rad2)
+    return in_common / least if least > 0.0 else math.inf

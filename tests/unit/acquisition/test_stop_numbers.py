@@ -50,7 +50,8 @@ def latched(cause, **changed):
     means = means._replace(
         answer=answer,
         apart_rad2=0.0009,
-        both_rad2=0.01,
+        moved_rad2=0.005,
+        reported_rad2=0.005,
         energy_j=0.7,
         torque_old=0.3,
         motion_old=0.2,
@@ -207,7 +208,7 @@ def test_a_stamp_ahead_may_be_so_by_the_reaction_time_and_a_tick():
 
 def test_other_means_are_told_where_they_are_the_larger_ones():
     consistency = latched(Cause.VELOCITY_WRONG).consistency
-    means = consistency.means._replace(both_rad2=1e-12, motion_old=0.4)
+    means = consistency.means._replace(moved_rad2=5e-13, reported_rad2=5e-13, motion_old=0.4)
     limit = told(Cause.VELOCITY_WRONG, consistency={"means": means}).limit
     assert limit == pytest.approx(math.degrees(AGREEMENT.unseen_rad))
     assert told(Cause.SELDOM_FRESH, consistency={"means": means}).value == pytest.approx(40.0)

@@ -27,6 +27,7 @@ from rigidimeter.devices.cia402.setup import (
     objects,
     put,
     read_back,
+    refuse_two_nodes,
     scale,
     text,
 )
@@ -112,6 +113,7 @@ class Cia402Drive:
         self._wire.network(Nmt.PRE_OPERATIONAL)
         with self._wire.sdo_client() as sdo:
             self._wire.booted = False
+            refuse_two_nodes(sdo, who)
             identity = {entry.name: get(sdo, entry, who) for entry in IDENTITY}
             firmware, name = text(sdo, 0x100A, who), text(sdo, 0x1008, who)
             absent = [entry for entry in self._objects if not put(sdo, entry, who)]

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, Self
@@ -29,6 +30,9 @@ NO_REMOTE_REQUEST = 1 << 30
 
 NOT_THERE = (0x06020000, 0x06090011)
 """The abort codes of an index and of a subindex that do not exist."""
+
+SECOND_ANSWER_S = 0.05
+"""A node answers within some ms; the second of two has the bus as soon as the first has sent."""
 
 
 class Cia402Settings(Section):
@@ -298,6 +302,25 @@ def get(sdo: Any, entry: Object, who: str) -> int | None:
     except _silence() as error:
         raise _no_answer(entry, who, error) from None
     return int.from_bytes(data[: entry.size], "little", signed=entry.signed)
+
+
+def refuse_two_nodes(sdo: Any, who: str) -> None:
+    """Ask one question and wait a moment for a second answer.
+
+    Two nodes of one number would both move at each command, and answer for each other.
+
+    Raises
+    ------
+    DeviceError
+        If nobody answers, or two do.
+    """
+    get(sdo, IDENTITY[0], who)
+    time.sleep(SECOND_ANSWER_S)
+    if not sdo.responses.empty():
+        raise DeviceError(
+            f"{who}: two answers came to one question, so another node on the bus has this node_id "
+            "too; give each node its own, or take the other off the bus"
+        )
 
 
 def text(sdo: Any, index: int, who: str) -> str:
