@@ -138,6 +138,20 @@ def test_the_code_of_an_emergency_is_kept(wire):
     assert drive.counts["emergencies"] == 1
 
 
+@pytest.mark.parametrize("code", [0x8130, 0x8250])
+def test_a_node_that_missed_our_frames_before_it_was_enabled_has_no_fault(wire, code):
+    """A watchdog that ends with one session speaks while the next is being configured."""
+    drive = wire.drive()
+    drive.configure()
+    wire.emulator.misbehave("emergency", code)
+    assert run_loop(drive, for_s=0.1, until=lambda _: False).cause == Cause.NONE
+    assert drive.counts["emergencies"] == 1
+    drive.enable()
+    assert run_loop(drive, for_s=0.1).cause == Cause.NONE
+    wire.emulator.misbehave("emergency", code)
+    assert run_loop(drive).cause == Cause.DRIVE_FAULT
+
+
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_drive_that_is_not_as_it_should_be_is_not_enabled(wire, name):
     drive = wire.drive(sdo_timeout_s=0.1, enable_timeout_s=0.3)

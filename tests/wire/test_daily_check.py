@@ -95,6 +95,6 @@ def test_a_fault_fails_its_check(
         found = checked(bench)
     finally:
         bench.behave()
-    assert failed(found)[0] in names
+    assert failed(found)[0] in names, [c for c in found.checks if c.outcome == "failed"]
     assert not found.passed
     assert bench.state()["power"] is False

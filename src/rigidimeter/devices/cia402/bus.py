@@ -31,6 +31,9 @@ from rigidimeter.devices.cia402.state_words import (
     velocity_of,
 )
 
+COMMUNICATION = (0x81, 0x82)
+"""The upper bytes of the error codes of a node that misses frames (CiA 301)."""
+
 QUIET_S = 0.01
 LONGEST_DRAIN_S = 0.5
 
@@ -79,6 +82,11 @@ class NodeBus:
         """
         self.alarmed = False
         """Whether an emergency message arrived; reset by `enable` and `reset_fault`."""
+        self.unheard = False
+        """Whether one said that the node misses our frames; reset by `enable`.
+
+        It also says so some time after a session's end, while the next is being configured.
+        """
         self.emergency = 0
         self.counts = dict.fromkeys(
             ("received", "lost", "damaged", "unsent", "backlog", "emergencies"), 0
@@ -261,6 +269,9 @@ class NodeBus:
             return False
         if report.code:  # 0 revokes earlier ones, which are kept all the same
             self.emergency = report.code
-            self.alarmed = True
+            if report.code >> 8 in COMMUNICATION:
+                self.unheard = True
+            else:
+                self.alarmed = True
             self.counts["emergencies"] += 1
         return True

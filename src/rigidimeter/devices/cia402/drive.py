@@ -171,7 +171,7 @@ class Cia402Drive:
             wire.network(Nmt.START)
             wire.drain()
             self._require_configured()
-            wire.alarmed = False
+            wire.alarmed = wire.unheard = False
             self._cause = Cause.NONE
             power_up(wire, self._now, self._settings.enable_timeout_s, self._who)
         except BaseException:  # also when interrupted: the drive may have power by now
@@ -225,7 +225,8 @@ class Cia402Drive:
         wire, settings = self._wire, self._settings
         if wire.booted:
             self._halt(Control.DISABLE_VOLTAGE)
-        if wire.booted or wire.alarmed or wire.state in FAULTS:
+        unheard = wire.unheard and self._control is Control.ENABLE_OPERATION
+        if wire.booted or wire.alarmed or unheard or wire.state in FAULTS:
             return Cause.DRIVE_FAULT
         if self._control is Control.ENABLE_OPERATION:
             if wire.left_operation or wire.network_state != OPERATIONAL:
