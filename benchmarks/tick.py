@@ -5,21 +5,45 @@ it goes, and records nothing. Without the laws, a step that finds nothing stands
 least of some runs is taken: whatever else the machine does only adds.
 
     python -m benchmarks.tick
+    python -m benchmarks.tick --lateness 120
+
+With `--lateness` one loop of so many seconds runs in real time, as `benchmarks.loop` runs it, with
+the laws in every other window of 2 s and without them in those between: the ratios of lateness of
+neighbouring windows, as their geometric mean and its 95 % interval (Student's t of the logarithms).
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
+import tempfile
 import time
+from functools import partial
+from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from scipy import stats
 
+from benchmarks.loop import PRIORITY, patient, virtual_session
 from rigidimeter.acquisition import SimulatedClock, perturb, rest, tick
+from rigidimeter.acquisition.processes.loop_process import LoopSide, Realtime
+from rigidimeter.acquisition.processes.recorder import Recording
+from rigidimeter.acquisition.processes.supervise import supervise
 from rigidimeter.devices import SimulatedRig
 from rigidimeter.experiment import prbs_nm
-from rigidimeter.settings import parse_settings
+from rigidimeter.guard.agreement import consistency_limits
+from rigidimeter.guard.consistency import consistency_state
+from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.settings import Settings, parse_settings
+
+RATE_HZ = 1000.0
+WINDOW_TICKS = 2000
+SKIPPED_TICKS = 4000
+"""Processes start in the first of these windows."""
+
+PERCENTILES = (50.0, 95.0, 99.0)
 
 
 def _agrees(_: Any, state: Any, *__: Any) -> tuple[Any, int]:
@@ -40,11 +64,58 @@ def tick_us() -> float:
     return 1e6 * (time.process_time() - began_s) / loop.tick
 
 
+def in_turn(settings: Settings, duration_s: float, side: LoopSide) -> None:
+    """Run a session whose laws are left out in every other window."""
+    laws, ticks = tick.consistency_step, itertools.count()
+    new = consistency_state(consistency_limits(settings))
+
+    def step(*arguments: Any) -> Any:
+        # Those who have looked away begin anew.
+        return laws(*arguments) if next(ticks) // WINDOW_TICKS % 2 == 0 else (new, 0)
+
+    with patch.object(tick, "consistency_step", step):
+        virtual_session(settings, duration_s, side)
+
+
+def lateness(seconds: float, cpu: int) -> None:
+    """Print how late the ticks with the laws are, over how late those without are."""
+    settings = patient(RATE_HZ)
+    with tempfile.TemporaryDirectory() as folder:
+        session = Path(folder) / "session"
+        ended = supervise(
+            partial(in_turn, settings, seconds),
+            Recording(session, settings, virtual=True),
+            realtime=Realtime(priority=PRIORITY, cpu=cpu, attended=False),
+        )
+        samples = read_samples(session / "samples.arrows")
+    late_us = 1e6 * samples["lateness_s"]
+    windows = len(late_us) // (2 * WINDOW_TICKS) * 2
+    pairs = late_us[: windows * WINDOW_TICKS].reshape(-1, 2, WINDOW_TICKS)
+    pairs = pairs[SKIPPED_TICKS // (2 * WINDOW_TICKS) :]
+    for percentile in PERCENTILES:
+        found = np.percentile(pairs, percentile, axis=2)
+        logs = np.log(found[:, 0] / found[:, 1])
+        half = stats.t.ppf(0.975, len(logs) - 1) * stats.sem(logs)
+        ours, without = np.exp(np.log(found).mean(axis=0))
+        print(
+            f"p{percentile:g} of lateness: {ours:.1f} µs with the laws, {without:.1f} µs without: "
+            f"{np.exp(logs.mean()):.2f} ({np.exp(logs.mean() - half):.2f} to "
+            f"{np.exp(logs.mean() + half):.2f}), {len(logs)} pairs"
+        )
+    print(f"samples made and not recorded: {ended.samples - len(late_us)}")
+
+
 def main() -> None:
     """Print the two costs and their ratio."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--repeats", type=int, default=7)
-    repeats = parser.parse_args().repeats
+    parser.add_argument("--lateness", type=float, metavar="SECONDS", help="in real time instead")
+    parser.add_argument("--cpu", type=int, default=1)
+    asked = parser.parse_args()
+    if asked.lateness:
+        lateness(asked.lateness, asked.cpu)
+        return
+    repeats = asked.repeats
     found: tuple[list[float], list[float]] = ([], [])
     for _ in range(repeats):
         found[0].append(tick_us())
