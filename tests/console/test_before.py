@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tests.console.opened import assert_reached_by_tab, fill, open_page
+from playwright.sync_api import expect
+from tests.console.opened import assert_reached_by_tab, fill, open_page, wait_for
 
 FOCUSED = "document.activeElement.textContent === 'No'"
 
@@ -47,3 +48,17 @@ def test_before_a_session(console, chromium):
     page.get_by_text("Perturbation, controller and limits").click()
     assert page.locator("input[data-field=prbs_duration]").input_value() == "3"
     assert page.locator("input[data-field=subject]").input_value() == "S01"
+
+    draft = desk.sessions / "draft.json"
+    page.get_by_role("checkbox", name="Blinded").click()
+    wait_for(lambda: '"yes"' in draft.read_text())
+    page.reload()
+    page.wait_for_function("document.body.dataset.view !== undefined")
+    expect(page.get_by_role("checkbox", name="Blinded")).to_be_checked()
+    draft.unlink()
+    draft.mkdir()
+    fill(page, "note", "of today")
+    page.get_by_text("A reload would empty this form").wait_for()
+    draft.rmdir()
+    page.get_by_role("checkbox", name="Blinded").click()
+    page.get_by_text("A reload would empty this form").wait_for(state="hidden")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,13 @@ from rigidimeter.console.page.protocols import protocol_names, read_protocol
 from rigidimeter.console.page.rig_steps import refusal
 from rigidimeter.console.page.rig_view import RigView
 from rigidimeter.console.page.session_form import (
+    BLINDED,
     METADATA,
     MOST_BLOCKS,
     NOTE,
     SETTINGS,
     STIMULATION,
+    YES,
     EnteredSession,
     Field,
     block_form,
@@ -57,7 +59,6 @@ class BeforeView:
         self._form = kept_form(_stored(desk.place.root / DRAFT), self._base)
         self._inputs: dict[str, Any] = {}
         self._entered: EnteredSession | None = None
-        self._blinded = False
         place = desk.place
         rig = "the virtual rig" if place.rig is None else place.rig.name
         with ui.row().classes("w-full items-center"):
@@ -70,6 +71,7 @@ class BeforeView:
                 chosen.classes("entry").mark("protocol")
                 chosen.on_value_change(lambda event: self._choose(str(event.value or "")))
         self._wrong_file = ui.label("").classes("problem").props('role="alert"')
+        self._not_kept = ui.label("").classes("problem").props('role="alert"')
         self._rig = RigView(desk, work, self._may_act, in_control, self._settings, self._show_steps)
         with ui.row().classes("w-full"):
             for one in (*METADATA, NOTE):
@@ -77,7 +79,9 @@ class BeforeView:
         self._blocks()
         with ui.row().classes("w-full items-start"):
             self._input(Field("rests", "Rests, drawn from (several by ;)", "s"))
-            ui.checkbox("Blinded: show codes for conditions", on_change=self._blind).mark("blinded")
+            blinded = ui.checkbox("Blinded: show codes for conditions").mark("blinded")
+            blinded.value = self._form[BLINDED] == YES
+            blinded.on_value_change(lambda event: self._change(BLINDED, YES if event.value else ""))
         with ui.expansion("Perturbation, controller and limits").classes("w-full").props("dense"):
             with ui.row().classes("w-full"):
                 for one in SETTINGS:
@@ -114,7 +118,7 @@ class BeforeView:
             return
         path = place.protocols / name
         self._desk.place = replace(place, settings=settings, settings_name=name, settings_path=path)
-        write_json(place.root / DRAFT, kept_form(self._form, settings))
+        self._keep(kept_form(self._form, settings))
         ui.navigate.reload()
 
     def _input(self, one: Field) -> None:
@@ -170,14 +174,19 @@ class BeforeView:
         self._blocks.refresh()
         self._check()
 
-    def _blind(self, event: Any) -> None:
-        self._blinded = bool(event.value)
-
     def _change(self, key: str, value: Any) -> None:
         self._form[key] = str(value or "")[:400]
         self._check()
         if self._in_control():
-            write_json(self._desk.place.root / DRAFT, self._form)
+            self._keep(self._form)
+
+    def _keep(self, form: Mapping[str, str]) -> None:
+        """Keep the form for a reload; say why where that is not possible."""
+        try:
+            write_json(self._desk.place.root / DRAFT, form)
+            self._not_kept.text = ""
+        except UserError as error:
+            self._not_kept.text = f"A reload would empty this form: {error}"
 
     def _check(self) -> None:
         """Say under each field what is wrong with it."""
@@ -224,9 +233,7 @@ class BeforeView:
         now = time.localtime()
         folder = f"{entered.subject}-{time.strftime('%Y%m%d-%H%M%S', now)}"
         request = StartRequest(
-            self._desk.place.one_session or folder,
-            entered.settings,
-            {**entered.about, "blinded": self._blinded},
+            self._desk.place.one_session or folder, entered.settings, entered.about
         )
         self._desk.ask(request)
 

@@ -7,6 +7,8 @@ for each field what is wrong, in the sentences of the settings.
 from __future__ import annotations
 
 import hashlib
+import itertools
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -56,11 +58,18 @@ STIMULATION = (
     Field("stim_wash_in", "Stimulation: since", "min", "wash_in_min"),
 )
 
-_OF_THE_SESSION = (*METADATA, NOTE, *STIMULATION)
+BLINDED, YES = "blinded", "yes"
+"""The box that hides conditions behind codes, and what it holds where it is ticked."""
+
+_OF_THE_SESSION = (*(one.key for one in (*METADATA, NOTE, *STIMULATION)), BLINDED)
 """Fields that no protocol fills."""
 
 MOST_BLOCKS = 12
+"""To which blocks can be added; a protocol may have more."""
+
 LONGEST_VALUE = 400
+
+_OF_A_BLOCK = re.compile(r"(task|condition|epochs)\d+")
 
 
 @dataclass(frozen=True)
@@ -80,10 +89,10 @@ class EnteredSession:
 def empty_form(settings: Settings) -> dict[str, str]:
     """Return the form that makes these settings."""
     values = dump_settings(settings)
-    form = {one.key: "" for one in _OF_THE_SESSION}
+    form = dict.fromkeys(_OF_THE_SESSION, "")
     form["protocol"] = hashlib.sha256(repr(values).encode()).hexdigest()[:16]
     form |= _shown(values)
-    for k, block in enumerate(settings.protocol.blocks[:MOST_BLOCKS]):
+    for k, block in enumerate(settings.protocol.blocks):
         form |= block_form(k, block.task, block.condition, str(block.epochs))
     return form
 
@@ -103,7 +112,7 @@ def block_form(k: int, task: str, condition: str, epochs: str) -> dict[str, str]
 
 def blocks_of(form: Mapping[str, str]) -> list[int]:
     """Return the numbers of the blocks of a form."""
-    return [k for k in range(MOST_BLOCKS) if f"task{k}" in form]
+    return list(itertools.takewhile(lambda k: f"task{k}" in form, itertools.count()))
 
 
 def kept_form(stored: Any, settings: Settings) -> dict[str, str]:
@@ -120,15 +129,11 @@ def kept_form(stored: Any, settings: Settings) -> dict[str, str]:
         if isinstance(value, str) and len(value) <= LONGEST_VALUE
     }
     if found.get("protocol") != form["protocol"]:
-        kept = {one.key for one in _OF_THE_SESSION}
-        return form | {key: value for key, value in found.items() if key in kept}
+        return form | {key: value for key, value in found.items() if key in _OF_THE_SESSION}
     blocks = {f"{part}{k}" for k in blocks_of(found) for part in ("task", "condition", "epochs")}
     if blocks and blocks <= found.keys():
-        form = {key: value for key, value in form.items() if key[:-1] not in _BLOCK_PARTS}
+        form = {key: value for key, value in form.items() if not _OF_A_BLOCK.fullmatch(key)}
     return form | {key: value for key, value in found.items() if key in form or key in blocks}
-
-
-_BLOCK_PARTS = ("task", "condition", "epochs")
 
 
 def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
@@ -171,6 +176,7 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
         "subject": read("subject", name, "subject"),
         "operator": read("operator", _needed, "operator"),
         "note": read("note", line, "note"),
+        "blinded": form.get(BLINDED) == YES,
     }
     stimulation: dict[str, Any] = {}
     for one in STIMULATION:

@@ -75,6 +75,23 @@ def test_a_kept_form_comes_back_and_a_damaged_one_does_not(form):
         assert kept_form(damaged, BASE) == empty_form(BASE)
 
 
+def test_a_session_stays_blinded_when_the_page_is_loaded_again(form):
+    assert read_form(form, BASE).about["blinded"] is False
+    again = kept_form(form | {"blinded": "yes"}, parse_settings({"seed": 7}))
+    assert read_form(again, BASE).about["blinded"] is True
+
+
+def test_every_block_of_a_protocol_is_in_the_form_and_one_that_was_removed_stays_so():
+    blocks = [{"condition": "OFF", "epochs": k + 1} for k in range(14)]
+    long = parse_settings({"protocol": {"blocks": blocks}})
+    form = empty_form(long) | {"subject": "S01", "operator": "Op"}
+    assert read_form(form, long).settings == long
+    for part in ("task", "condition", "epochs"):
+        del form[f"{part}13"]
+    again = read_form(kept_form(form, long), long)
+    assert again.settings.protocol.blocks == long.protocol.blocks[:13]
+
+
 def test_a_form_of_another_protocol_keeps_who_was_there_alone(form):
     """The values of a protocol file that was edited since are those of the file."""
     kept = form | {"stim_ma": "2", "prbs_amplitude": "1.7"}
