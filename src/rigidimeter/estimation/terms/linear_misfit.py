@@ -126,7 +126,9 @@ def _coupling(joint: Array, omega: Array, angle: Complex, target: Array) -> Foun
         return -stacked(np.column_stack([slopes * passed[:, None], by_softness]))
 
     tried = [
-        optimize.least_squares(residual, [1.0, 1.0, 1.0, softness], jacobian, max_nfev=30)
+        optimize.least_squares(
+            residual, [1.0, 1.0, 1.0, softness], jacobian, method="lm", max_nfev=30
+        )
         for softness in SOFTEST
     ]
     best = min(tried, key=lambda one: float(one.cost))
