@@ -13,6 +13,7 @@ which also lets the cycles begin and end between samples.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -22,6 +23,7 @@ from scipy import optimize, signal
 from scipy.interpolate import CubicSpline
 
 from rigidimeter.estimation.power_lines import power_lines
+from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.screening import before_fit, unusable
 from rigidimeter.estimation.signals import (
     Array,
@@ -172,12 +174,31 @@ def _continued(
     return np.concatenate([early[:, ::-1], values, late], axis=1), n
 
 
+def cycles_of(prepared: PreparedEpoch) -> Cycles:
+    """Return `scoring_cycles` of a prepared epoch.
+
+    Raises
+    ------
+    ValueError
+        As there.
+    """
+    return scoring_cycles(prepared.epoch, prepared.settings.scores)
+
+
 def score_epoch(epoch: Epoch, settings: ScoreSettings, screening: EstimationSettings) -> Score:
     """Return impulse and work per cycle; a bad epoch gives an outcome with its reason."""
-    obstacle = before_fit(epoch, screening)
+    return _score(epoch, before_fit(epoch, screening), lambda: scoring_cycles(epoch, settings))
+
+
+def score_prepared(prepared: PreparedEpoch) -> Score:
+    """Return `score_epoch` of a prepared epoch."""
+    return _score(prepared.epoch, prepared.obstacle, lambda: prepared.once(cycles_of))
+
+
+def _score(epoch: Epoch, obstacle: str, make_cycles: Callable[[], Cycles]) -> Score:
     if not obstacle:
         try:
-            cycles = scoring_cycles(epoch, settings)
+            cycles = make_cycles()
         except ValueError as error:
             obstacle = str(error)
     if obstacle:

@@ -16,7 +16,6 @@ from rigidimeter.estimation import (
     choose_method,
     estimate_delays,
     method_named,
-    score_epoch,
 )
 from rigidimeter.estimation.alignment import MOST_EPOCHS, aligned_prepared
 from rigidimeter.estimation.between_epochs import between_epochs
@@ -27,7 +26,7 @@ from rigidimeter.estimation.diagnostics import checked, checked_together
 from rigidimeter.estimation.diagnostics.delay_check import torque_delay
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, prepare
-from rigidimeter.estimation.scores import line_shares
+from rigidimeter.estimation.scores import line_shares, score_prepared
 from rigidimeter.estimation.screening import before_fit
 from rigidimeter.estimation.stretches import longest_part
 from rigidimeter.recording import Recording
@@ -133,6 +132,10 @@ class Preparation:
         """Return the epochs of imposed sinusoids, on one clock or as they were recorded."""
         return self._imposed if as_recorded else self._on_one_clock(self._imposed)
 
+    def analysed(self, *, as_recorded: bool = False) -> list[PreparedEpoch]:
+        """Return the epochs of both kinds, perturbed ones first."""
+        return [*self.perturbed(as_recorded=as_recorded), *self.imposed(as_recorded=as_recorded)]
+
     def _on_one_clock(self, epochs: Sequence[PreparedEpoch]) -> list[PreparedEpoch]:
         delays = self.delays()
         for prepared in epochs:
@@ -179,8 +182,7 @@ def analyse_prepared(
     fitted = preparation.perturbed(as_recorded=as_recorded)
     scores = []
     for prepared in () if fits_alone else preparation.imposed(as_recorded=as_recorded):
-        settings = prepared.settings
-        scores.append(score_epoch(prepared.epoch, settings.scores, settings.estimation))
+        scores.append(score_prepared(prepared))
         progress(costs.score)
     if estimator.uses_perturbation:
         reason += _without_drive(fitted, bool(reason))

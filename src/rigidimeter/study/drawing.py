@@ -13,9 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.estimation import epoch_signals, scoring_cycles
+from rigidimeter.estimation.prepared import PreparedEpoch
+from rigidimeter.estimation.scores import cycles_of
 from rigidimeter.records import Fit, Score
 from rigidimeter.study.drawn_signals import ChannelFacts, DrawnSignals, EpochTrace, facts_of
-from rigidimeter.study.examples import analysed_epoch, example_epochs, perturbed_epoch
+from rigidimeter.study.examples import (
+    analysed_epoch,
+    example_epochs,
+    perturbed_epoch,
+    prepared_epochs,
+)
 from rigidimeter.study.over_frequency import responses, unexplained_spectra
 from rigidimeter.study.results import StudyResult
 
@@ -74,15 +81,18 @@ def epoch_traces(result: StudyResult) -> Iterator[EpochTrace]:
     analysis = result.analysis
     results: list[Fit | Score] = [*(analysis.fixed_inertia or analysis.fits), *analysis.scores]
     seen: set[tuple[str, str]] = set()
+    prepared = prepared_epochs(result) if result.prepared else {}
     for one in results:
         key = one.source, one.epoch
-        if key not in seen and (trace := _trace(result, one)) is not None:
+        if key not in seen and (trace := _trace(result, one, prepared.get(key))) is not None:
             seen.add(key)
             yield trace
 
 
-def _trace(result: StudyResult, one: Fit | Score) -> EpochTrace | None:
-    epoch = analysed_epoch(result, one)
+def _trace(
+    result: StudyResult, one: Fit | Score, prepared: PreparedEpoch | None
+) -> EpochTrace | None:
+    epoch = analysed_epoch(result, one) if prepared is None else prepared.epoch
     if epoch is None:
         return None
     try:
@@ -96,7 +106,11 @@ def _trace(result: StudyResult, one: Fit | Score) -> EpochTrace | None:
             }
             time_s, highest_hz = signals.time_s, signals.band_hz[1]
         else:
-            cycles = scoring_cycles(epoch, result.settings.scores)
+            cycles = (
+                scoring_cycles(epoch, result.settings.scores)
+                if prepared is None
+                else prepared.once(cycles_of)
+            )
             series = {"torque": cycles.torque_nm, "angle": np.degrees(cycles.angle_rad)}
             time_s, highest_hz = cycles.time_s, 5 * cycles.frequency_hz
     except ValueError:

@@ -59,7 +59,7 @@ def analysed_epoch(result: StudyResult, one: Fit | Score) -> Epoch | None:
     if result.drawn is not None:
         found = (e for e in result.drawn.examples if (e.source, e.label) == key)
         return next(found, None)
-    if isinstance(one, Fit) and result.prepared:
+    if result.prepared:
         return prepared_epochs(result)[key].epoch
     for epoch in result.epochs:
         if (epoch.source, epoch.label) == key:
@@ -68,7 +68,7 @@ def analysed_epoch(result: StudyResult, one: Fit | Score) -> Epoch | None:
 
 
 def prepared_epochs(result: StudyResult) -> dict[tuple[str, str], PreparedEpoch]:
-    """Return the perturbation epochs as they were analysed, by source and label."""
+    """Return the epochs as they were analysed, by source and label."""
     prepared = result.prepared or prepare(
         (aligned(epoch, result.analysis.delays) for epoch in result.epochs), result.settings
     )

@@ -144,8 +144,8 @@ class StudyResult:
     analysis, epochs, settings
         What was analysed; empty for columns of a table.
     prepared : tuple of PreparedEpoch
-        The perturbation epochs as they were analysed, with what was made of them, for the figures;
-        empty where they were not analysed here.
+        The epochs as they were analysed, with what was made of them, for the figures; empty where
+        they were not analysed here.
     drawn : DrawnSignals or None
         What figures and traces show of the samples, where it was made or kept; a result that was
         kept has nothing else of them.

@@ -186,7 +186,7 @@ def analyse_study(
         prepared=tuple(
             prepared
             for own in subjects.values()
-            for prepared in own.perturbed(as_recorded=method_named(main.method).as_recorded)
+            for prepared in own.analysed(as_recorded=method_named(main.method).as_recorded)
         ),
         settings=read.settings,
         conditions=read.names.conditions,
