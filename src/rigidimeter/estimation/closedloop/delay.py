@@ -16,7 +16,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigidimeter.estimation.closedloop.linear_problems import Linearise, Problem, instrumental
+from rigidimeter.estimation.closedloop.linear_problems import (
+    Complex,
+    Linearise,
+    Problem,
+    instrumental,
+)
 from rigidimeter.estimation.closedloop.observation import Observation
 from rigidimeter.estimation.closedloop.refine import LineFit, fit_pooled
 from rigidimeter.estimation.signals import Array
@@ -37,17 +42,24 @@ def delayed(linearise: Linearise) -> Linearise:
     def with_delay(observations: Sequence[Observation], values: Array) -> list[Problem]:
         parameters, delay_s = values[:-1], values[-1]
         problems = []
+        turns: dict[int, tuple[Complex, Complex]] = {}  # epochs of one layout have the same lines,
+        turned: dict[tuple[int, int], Complex] = {}  # and of one perturbation, instruments
         for observation, problem in zip(
             observations, linearise(observations, parameters), strict=True
         ):
-            omega = observation.lines.grid.omega_rad_s
-            turn = np.exp(-1j * omega * delay_s)[:, None]
-            slope = -1j * omega[:, None] * turn
+            omega, instruments = observation.lines.grid.omega_rad_s, problem.instruments
+            if id(omega) not in turns:
+                turn = np.exp(-1j * omega * delay_s)[:, None]
+                turns[id(omega)] = turn, -1j * omega[:, None] * turn
+            turn, slope = turns[id(omega)]
+            both = id(omega), id(instruments)
+            if both not in turned:
+                late = slope * (instruments @ parameters)[:, None]
+                turned[both] = np.hstack([turn * instruments, late])
             late = slope * (problem.regressors @ parameters)[:, None]
-            instrument = slope * (problem.instruments @ parameters)[:, None]
             problems.append(
                 Problem(
-                    np.hstack([turn * problem.instruments, instrument]),
+                    turned[both],
                     np.hstack([turn * problem.regressors, late]),
                     problem.target + late[:, 0] * delay_s,
                 )
@@ -129,12 +141,18 @@ def _unexplained(
 ) -> Array:
     """Return the torque's power up to `SCAN_HIGH_HZ` that the instruments leave, at each delay."""
     left = np.zeros(delays_s.size)
+    turns: dict[int, Complex] = {}
+    bases: dict[tuple[int, int], Array] = {}
     for observation, problem in zip(observations, problems, strict=True):
-        omega = observation.lines.grid.omega_rad_s
+        omega, instruments = observation.lines.grid.omega_rad_s, problem.instruments
         low = omega < 2 * np.pi * SCAN_HIGH_HZ
-        turn = np.exp(1j * omega[low, None] * delays_s)
-        turned, rows = problem.target[low, None] * turn, problem.instruments[low]
+        if id(omega) not in turns:
+            turns[id(omega)] = np.exp(1j * omega[low, None] * delays_s)
+        key = id(omega), id(instruments)
+        if key not in bases:
+            rows = instruments[low]
+            bases[key] = np.linalg.qr(np.vstack([rows.real, rows.imag]))[0]
+        turned, basis = problem.target[low, None] * turns[id(omega)], bases[key]
         both = np.vstack([turned.real, turned.imag])
-        basis, _ = np.linalg.qr(np.vstack([rows.real, rows.imag]))
         left += np.sum(both**2, axis=0) - np.sum((basis.T @ both) ** 2, axis=0)
     return left

@@ -15,10 +15,12 @@ lag window). How many independent lines stand behind it gives the degrees of fre
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.estimation.signals import Array
 
 Complex = NDArray[np.complex128]
@@ -58,11 +60,35 @@ class Smoother:
         share = weight / (self.stop - self.start)[:, None]
         total = np.zeros((len(share) + 1, share.shape[1]))
         np.cumsum(share, axis=0, out=total[1:])
-        # Both ends of the lines that are averaged rise, so those with a line among them are a row.
-        line = np.arange(len(share))
-        first = np.searchsorted(self.stop, line, side="right")
-        last = np.searchsorted(self.start, line, side="right")
+        first, last = self._among
         return total[last] - total[first]
+
+    @cached_property
+    def _among(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """From and to which line each line is averaged in."""
+        # Both ends of the lines that are averaged rise, so those with a line among them are a row.
+        line = np.arange(self.start.size)
+        first = np.searchsorted(self.stop, line, side="right")
+        return first, np.searchsorted(self.start, line, side="right")
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Power of the noise over frequency, for a window of unit energy."""
+
+    omega_rad_s: Array
+    density: Array
+
+    def at(self, lines: Lines) -> Array:
+        """Return the power at the lines of an epoch."""
+        return power_on(lines.grid.omega_rad_s, self.omega_rad_s, self.density)
+
+
+def power_on(wanted_rad_s: Array, omega_rad_s: Array, power: Array) -> Array:
+    """Return power on other lines; epochs of one layout have the same."""
+    if wanted_rad_s is omega_rad_s:
+        return power
+    return np.interp(wanted_rad_s, omega_rad_s, power)
 
 
 def line_covariance(

@@ -18,7 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.estimation.closedloop.between_doubt import moved_elsewhere
-from rigidimeter.estimation.closedloop.line_noise import Smoother, drawn_lines, line_covariance
+from rigidimeter.estimation.closedloop.line_noise import (
+    Shape,
+    Smoother,
+    drawn_lines,
+    line_covariance,
+    power_on,
+)
 from rigidimeter.estimation.closedloop.linear_problems import Linearise, Problem
 from rigidimeter.estimation.closedloop.observation import Observation
 from rigidimeter.estimation.closedloop.spectral_lines import Lines
@@ -53,18 +59,6 @@ estimate; of fewer it is the larger of scatter and lines."""
 
 SHARED_FROM = 4
 """From this many epochs on, they share the shape of their noise."""
-
-
-@dataclass(frozen=True)
-class Shape:
-    """Power of the noise over frequency, for a window of unit energy."""
-
-    omega_rad_s: Array
-    density: Array
-
-    def at(self, lines: Lines) -> Array:
-        """Return the power at the lines of an epoch."""
-        return _on(lines.grid.omega_rad_s, self.omega_rad_s, self.density)
 
 
 @dataclass(frozen=True)
@@ -149,7 +143,7 @@ def fit_single(
         step = inverse @ (weighted.conj().T @ problem.target).real - values
         step = step * (1.0 if iteration < UNDAMPED else 0.5)
         values = values + step
-        scale = np.sqrt(np.diag(_bound([problem], [lines], weight_from)))
+        scale = np.sqrt(np.diag(_bound([problem], [lines], [weighted])))
         if np.all(np.abs(step) < CONVERGED * scale):
             break
     assert problem is not None
@@ -168,7 +162,7 @@ def fit_single(
         values,
         spread * covariance,
         degrees / spread,
-        _bound([problem], [lines], Shape(lines.grid.omega_rad_s, own)),
+        _bound([problem], [lines], [problem.instruments / own[:, None]]),
         _condition([problem], [lines], weight_from),
         weight_from,
         moved_elsewhere([problem], [weight_from.at(lines)], values),
@@ -201,19 +195,19 @@ def fit_pooled(
             shape = _density(everything, problems, values, smoother)
         gram = np.zeros((values.size, values.size))
         moment = np.zeros(values.size)
-        for problem, lines in zip(problems, everything, strict=True):
-            weighted = problem.instruments / shape.at(lines)[:, None]
-            gram += (weighted.conj().T @ problem.regressors).real
-            moment += (weighted.conj().T @ problem.target).real
+        weighted = _weighted(problems, everything, shape)
+        for problem, own in zip(problems, weighted, strict=True):
+            gram += (own.conj().T @ problem.regressors).real
+            moment += (own.conj().T @ problem.target).real
         inverse = _inverse(gram)
         step = (inverse @ moment - values) * (1.0 if iteration < UNDAMPED else 0.5)
         values = values + step
-        bound = _bound(problems, everything, shape)
+        bound = _bound(problems, everything, weighted)
         if np.all(np.abs(step) < CONVERGED * np.sqrt(np.diag(bound))):
             break
     _refuse_unsettled(step, np.sqrt(np.diag(bound)), values)
     covariance, degrees, errors = _pooled_covariance(
-        problems, everything, shape, inverse, values, draws
+        problems, everything, shape, weighted, inverse, values, draws
     )
     fit = LineFit(
         values,
@@ -244,6 +238,7 @@ def _pooled_covariance(
     problems: Sequence[Problem],
     everything: Sequence[Lines],
     shape: Shape,
+    everywhere: Sequence[Complex],
     inverse: Array,
     values: Array,
     draws: int,
@@ -254,13 +249,14 @@ def _pooled_covariance(
     of_lines = np.zeros((p, p))
     squares = np.zeros(p)
     errors, rng = np.zeros((draws, p)), _rng()
-    for i, (problem, lines) in enumerate(zip(problems, everything, strict=True)):
-        weighted = problem.instruments / shape.at(lines)[:, None]
+    smoothers: dict[int, Smoother] = {}
+    for i, (problem, lines, weighted) in enumerate(
+        zip(problems, everything, everywhere, strict=True)
+    ):
+        smoother = smoothers.setdefault(id(lines.grid.line), _smoother([lines]))
         residual = problem.target - problem.regressors @ values
         moments[i] = (weighted.conj().T @ residual).real
-        part, degrees = line_covariance(
-            inverse, weighted, residual, _smoother([lines]), shape.at(lines)
-        )
+        part, degrees = line_covariance(inverse, weighted, residual, smoother, shape.at(lines))
         spread = lines.grid.spread
         of_lines += spread * part
         squares += (spread * np.diag(part)) ** 2 / (degrees / spread)
@@ -297,37 +293,43 @@ def _density(
     total = np.zeros(omega.size)
     for lines, problem in zip(everything, problems, strict=True):
         residual = problem.target - problem.regressors @ values
-        total += _on(omega, lines.grid.omega_rad_s, np.abs(residual) ** 2)
+        total += power_on(omega, lines.grid.omega_rad_s, np.abs(residual) ** 2)
     density = smoother(total / len(everything))
     if not np.all(density > 0):
         raise ValueError("the fit leaves nothing at some frequencies: are the channels simulated?")
     return Shape(omega, density)
 
 
-def _on(wanted_rad_s: Array, omega_rad_s: Array, power: Array) -> Array:
-    """Return power on other lines; epochs of one layout have the same."""
-    if wanted_rad_s is omega_rad_s:
-        return power
-    return np.interp(wanted_rad_s, omega_rad_s, power)
+def _weighted(
+    problems: Sequence[Problem], everything: Sequence[Lines], shape: Shape
+) -> list[Complex]:
+    """Return U of each epoch: the same array for those that share instruments and lines."""
+    made: dict[tuple[int, int], Complex] = {}
+    found = []
+    for problem, lines in zip(problems, everything, strict=True):
+        key = id(problem.instruments), id(lines.grid.omega_rad_s)
+        if key not in made:
+            made[key] = problem.instruments / shape.at(lines)[:, None]
+        found.append(made[key])
+    return found
 
 
-def _bound(problems: Sequence[Problem], everything: Sequence[Lines], shape: Shape) -> Array:
+def _bound(
+    problems: Sequence[Problem], everything: Sequence[Lines], weighted: Sequence[Complex]
+) -> Array:
     """Return (2 Σ Re(Z^H Z) / S)⁻¹."""
     p = problems[0].instruments.shape[1]
     information = np.zeros((p, p))
-    for problem, lines in zip(problems, everything, strict=True):
-        weighted = problem.instruments / shape.at(lines)[:, None]
-        information += 2 * (weighted.conj().T @ problem.instruments).real / lines.grid.spread
+    made: dict[int, Array] = {}
+    for problem, lines, own in zip(problems, everything, weighted, strict=True):
+        if id(own) not in made:
+            made[id(own)] = 2 * (own.conj().T @ problem.instruments).real
+        information += made[id(own)] / lines.grid.spread
     return _inverse(information)
 
 
 def _condition(problems: Sequence[Problem], everything: Sequence[Lines], shape: Shape) -> float:
-    rows = np.concatenate(
-        [
-            problem.instruments / np.sqrt(shape.at(lines))[:, None]
-            for problem, lines in zip(problems[:1], everything[:1], strict=True)
-        ]
-    )
+    rows = problems[0].instruments / np.sqrt(shape.at(everything[0]))[:, None]
     stacked = np.concatenate([rows.real, rows.imag])
     singular = np.linalg.svd(stacked / np.linalg.norm(stacked, axis=0), compute_uv=False)
     return float(singular[0] / singular[-1])
