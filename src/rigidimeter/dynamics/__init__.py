@@ -1,6 +1,13 @@
 """The plant and its loop: joint, drive, sensors, subject as steps, and the linear loop of them."""
 
-from rigidimeter.dynamics.drive_model import EVEN, ArmMotion, DriveModel, lowpass, with_conjugates
+from rigidimeter.dynamics.drive_model import (
+    EVEN,
+    ArmMotion,
+    DriveModel,
+    HeldCommand,
+    lowpass,
+    with_conjugates,
+)
 from rigidimeter.dynamics.joint import (
     JointDynamics,
     arm_response,

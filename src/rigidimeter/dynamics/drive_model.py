@@ -95,7 +95,7 @@ class DriveModel:
     def response(self, s: Complex) -> Complex:
         """Return H(s), without the delay."""
         total = np.zeros(np.shape(s), dtype=np.complex128)
-        for pole, residue, pair in self._modes():
+        for pole, residue, pair in self.modes():
             total += residue / (s - pole)
             if pair:
                 total += residue.conjugate() / (s - pole.conjugate())
@@ -133,7 +133,7 @@ class DriveModel:
         """
         whole, rest_s = self._since_edge(after_s, interval_s)
         motion = np.zeros((3, z.size), dtype=np.complex128)
-        for pole, residue, pair in self._modes():
+        for pole, residue, pair in self.modes():
             both = ((pole, residue), (pole.conjugate(), residue.conjugate()))
             for p, r in both[: 1 + pair]:
                 grown = cmath.exp(p * rest_s)
@@ -158,19 +158,7 @@ class DriveModel:
         is not taken into account. After 0 s the edge of the command has not come yet. `late_s` is
         by how much each tick came later than evenly, if they did not come evenly.
         """
-        sent = command_rad_s[tick]
-        before = np.where(tick > 0, command_rad_s[np.maximum(tick - 1, 0)], 0.0)
-        acceleration = self.jump * np.where(after_s > 0, sent, before)
-        lengths_s = interval_s if late_s is None else interval_s + np.diff(late_s)
-        summed = np.concatenate(([0.0], np.cumsum(command_rad_s[:-1] * lengths_s)))
-        velocity, angle = np.zeros(tick.size), self.gain * (summed[tick] + after_s * sent)
-        for pole, residue, pair in self._modes():
-            state = state_after(pole, command_rad_s, interval_s, tick, after_s, late_s)
-            weight = residue * (1 + pair)
-            acceleration += (weight * pole * state).real
-            velocity += (weight * state).real
-            angle += (weight / pole * state).real
-        return ArmMotion(acceleration, velocity, angle)
+        return HeldCommand(self, command_rad_s, interval_s, late_s).motion(tick, after_s)
 
     def held(self, command_rad_s: Array, interval_s: float) -> ArmMotion:
         """Return the motion at the ticks under held commands, from rest, without the delay."""
@@ -184,7 +172,7 @@ class DriveModel:
         rest = place - whole
         return whole, (rest if rest > EVEN else 0.0) * interval_s
 
-    def _modes(self) -> Iterator[tuple[complex, complex, bool]]:
+    def modes(self) -> Iterator[tuple[complex, complex, bool]]:
         """Yield pole, residue, and whether they stand for a conjugate pair."""
         for pole, residue in zip(self.poles_rad_s, self.residues, strict=True):
             yield pole, residue, pole.imag != 0.0
@@ -192,8 +180,48 @@ class DriveModel:
     def _over(self, power: int) -> Iterator[complex]:
         """Yield half of each part of Σ r λ^power, with the sign of the gain for −1."""
         sign = -1.0 if power == -1 else 1.0
-        for pole, residue, pair in self._modes():
+        for pole, residue, pair in self.modes():
             yield sign * residue * pole**power * (1.0 if pair else 0.5)
+
+
+class HeldCommand:
+    """A command that is held from tick to tick, with the states in which it leaves a drive.
+
+    Parameters
+    ----------
+    drive, command_rad_s, interval_s, late_s
+        As for `DriveModel.motion`.
+    """
+
+    def __init__(
+        self,
+        drive: DriveModel,
+        command_rad_s: Array,
+        interval_s: float,
+        late_s: Array | None = None,
+    ) -> None:
+        self._drive, self._command_rad_s = drive, command_rad_s
+        lengths_s = interval_s if late_s is None else interval_s + np.diff(late_s)
+        self._summed = np.concatenate(([0.0], np.cumsum(command_rad_s[:-1] * lengths_s)))
+        self._states = [
+            state_at_ticks(pole, command_rad_s, interval_s, late_s) for pole in drive.poles_rad_s
+        ]
+
+    def motion(self, tick: NDArray[np.intp], after_s: Array) -> ArmMotion:
+        """Return `DriveModel.motion` so long after ticks of given numbers."""
+        command, drive = self._command_rad_s, self._drive
+        sent = command[tick]
+        before = np.where(tick > 0, command[np.maximum(tick - 1, 0)], 0.0)
+        acceleration = drive.jump * np.where(after_s > 0, sent, before)
+        velocity, angle = np.zeros(tick.size), drive.gain * (self._summed[tick] + after_s * sent)
+        held_s = same_time(after_s)
+        for (pole, residue, pair), at_ticks in zip(drive.modes(), self._states, strict=True):
+            state = state_later(pole, at_ticks[tick], sent, held_s)
+            weight = residue * (1 + pair)
+            acceleration += (weight * pole * state).real
+            velocity += (weight * state).real
+            angle += (weight / pole * state).real
+        return ArmMotion(acceleration, velocity, angle)
 
 
 def lowpass(s: Complex, cutoff_hz: float, order: int) -> Complex:
@@ -218,26 +246,13 @@ def _butterworth_poles(cutoff_hz: float, order: int) -> tuple[complex, ...]:
     return (*upper, complex(-unit)) if order % 2 else tuple(upper)
 
 
-def state_after(
-    pole: complex,
-    command_rad_s: Array,
-    interval_s: float,
-    tick: NDArray[np.intp],
-    after_s: Array,
-    late_s: Array | None = None,
-) -> Array | Complex:
-    """Return x of x' = λ x + c, from rest, so long after the ticks of given numbers.
-
-    A command that came ε late is one in time, and a pulse of c_(k−1) − c_k for ε.
-    """
-    state = state_at_ticks(pole, command_rad_s, interval_s, late_s)
-    return state_later(pole, state[tick], command_rad_s[tick], same_time(after_s))
-
-
 def state_at_ticks(
     pole: complex, command_rad_s: Array, interval_s: float, late_s: Array | None = None
 ) -> Array | Complex:
-    """Return x of x' = λ x + c, from rest, at each tick; real for a pole that is real."""
+    """Return x of x' = λ x + c, from rest, at each tick; real for a pole that is real.
+
+    A command that came ε late is one in time, and a pulse of c_(k−1) − c_k for ε.
+    """
     growth = _growth(pole)
     decay = np.exp(growth * interval_s)
     held = (decay - 1) / growth * command_rad_s

@@ -14,6 +14,7 @@ import numpy as np
 
 from rigidimeter.estimation.closedloop.delay import SCAN_STEP_S, estimate_delay
 from rigidimeter.estimation.closedloop.delay_or_term import CLEAR, likeliest_term
+from rigidimeter.estimation.closedloop.epoch_motion import EpochMotion
 from rigidimeter.estimation.closedloop.linear_problems import (
     direct,
     instrumental,
@@ -21,6 +22,7 @@ from rigidimeter.estimation.closedloop.linear_problems import (
 )
 from rigidimeter.estimation.closedloop.observation import (
     closed_loop_obstacle,
+    motion_of,
     observe,
     observe_motion,
 )
@@ -96,10 +98,11 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
         return Delay(source, remark="no perturbation epoch tells the channels' delay")
     known = [prepared for prepared in sound if not closed_loop_obstacle(prepared.epoch)]
     used = (known or sound)[:MOST_EPOCHS]
+    motions = [motion_of(one) for one in used]
     estimation = used[0].settings.estimation
     longest_s = estimation.longest_delay_s
     try:
-        total_s, error_s, values = _settled(used, perturbed=bool(known))
+        total_s, error_s, values = _settled(used, motions, perturbed=bool(known))
         if not np.isfinite(total_s) or abs(total_s) > longest_s - SCAN_STEP_S / 2:
             return Delay(
                 source,
@@ -115,7 +118,8 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
             )
         if abs(total_s) < max(SIGNIFICANT * error_s, LEAST_S):
             return replace(found, remark="not corrected: not significantly different from zero")
-        half_s, half_error_s, _ = _settled([_in_half_the_band(one) for one in used], perturbed=True)
+        halves = [_in_half_the_band(one) for one in used]
+        half_s, half_error_s, _ = _settled(halves, motions, perturbed=True)
     except ValueError as error:
         return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
     apart_s, allowed_s = abs(half_s - total_s), SIGNIFICANT * np.hypot(error_s, half_error_s)
@@ -140,7 +144,9 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
     return replace(found, corrected=True)
 
 
-def _settled(epochs: Sequence[PreparedEpoch], *, perturbed: bool) -> tuple[float, float, Array]:
+def _settled(
+    epochs: Sequence[PreparedEpoch], motions: Sequence[EpochMotion], *, perturbed: bool
+) -> tuple[float, float, Array]:
     """Return the delay at which none is left, its standard error, in s, and J, B and K with it.
 
     The zero of what is left is sought by secants: between coarse samples moving the torque by what
@@ -152,7 +158,10 @@ def _settled(epochs: Sequence[PreparedEpoch], *, perturbed: bool) -> tuple[float
 
     def left_after(move_s: float) -> LineFit:
         moved = [epoch.moved(move_s) if move_s else epoch for epoch in epochs]
-        observations = [epoch.once(observe if perturbed else observe_motion) for epoch in moved]
+        observations = [
+            epoch.once(observe if perturbed else observe_motion, motion)
+            for epoch, motion in zip(moved, motions, strict=True)
+        ]
         return estimate_delay(
             observations,
             least_squares_start(observations),

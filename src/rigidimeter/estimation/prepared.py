@@ -79,10 +79,13 @@ class PreparedEpoch:
         """Why the epoch cannot be fitted by any method, or an empty text."""
         return before_fit(self.epoch, self.settings.estimation)
 
-    def once(self, make: Callable[[PreparedEpoch], T]) -> T:
-        """Return ``make(self)``, made when it is first asked for."""
+    def once(self, make: Callable[..., T], *helped: object) -> T:
+        """Return ``make(self, *helped)``, made when it is first asked for.
+
+        What helps saves work and changes nothing.
+        """
         if make not in self._made:
-            self._made[make] = make(self)
+            self._made[make] = make(self, *helped)
         found: T = self._made[make]
         return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.dynamics import EVEN, SAME_TIME_S, ArmMotion, DriveModel
+from rigidimeter.dynamics import EVEN, SAME_TIME_S, ArmMotion, DriveModel, HeldCommand
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel
 
@@ -15,9 +15,7 @@ UNEVEN = 1e-3
 
 def driven(drive: DriveModel, command: Channel, time_s: Array) -> ArmMotion:
     """Return the motion under a recorded command, from rest, at any times; exact between ticks."""
-    interval_s = 1.0 / command.mean_rate_hz
-    tick, after_s = since_ticks(command, time_s, drive.delay_s)
-    return drive.motion(command.values, interval_s, tick, after_s, lateness_s(command))
+    return DrivenAt(drive, command)(time_s)
 
 
 class DrivenAt:
@@ -25,6 +23,8 @@ class DrivenAt:
 
     def __init__(self, drive: DriveModel, command: Channel) -> None:
         self.drive, self.command = drive, command
+        interval_s = 1.0 / command.mean_rate_hz
+        self._held = HeldCommand(drive, command.values, interval_s, lateness_s(command))
         self._made: list[tuple[Array, ArmMotion]] = []
 
     def __call__(self, time_s: Array) -> ArmMotion:
@@ -32,7 +32,7 @@ class DrivenAt:
         for own_s, motion in self._made:
             if np.array_equal(own_s, time_s):
                 return motion
-        motion = driven(self.drive, self.command, time_s)
+        motion = self._held.motion(*since_ticks(self.command, time_s, self.drive.delay_s))
         self._made.append((time_s, motion))
         return motion
 

@@ -24,6 +24,7 @@ from rigidimeter.estimation.closedloop.between_samples import (
 from rigidimeter.estimation.closedloop.drive_fit import FoundDrive
 from rigidimeter.estimation.closedloop.drive_friction import half_of_friction
 from rigidimeter.estimation.closedloop.drive_motion import since_ticks
+from rigidimeter.estimation.closedloop.epoch_motion import EpochMotion
 from rigidimeter.estimation.closedloop.excitation import Excitation, excitation
 from rigidimeter.estimation.closedloop.spectral_lines import Grid, Lines, epoch_grid, epoch_lines
 from rigidimeter.estimation.prepared import PreparedEpoch
@@ -95,8 +96,14 @@ def closed_loop_obstacle(epoch: Epoch) -> str:
     return ""
 
 
-def observe(prepared: PreparedEpoch) -> Observation:
+def observe(prepared: PreparedEpoch, motion: EpochMotion | None = None) -> Observation:
     """Return an epoch at all lines of the band.
+
+    Parameters
+    ----------
+    prepared : PreparedEpoch
+    motion : EpochMotion, optional
+        That of the epoch, where it was made already.
 
     Raises
     ------
@@ -107,7 +114,7 @@ def observe(prepared: PreparedEpoch) -> Observation:
     grid = _grid(prepared, None)
     wider = _grid(prepared, None, WIDER)
     everywhere = np.ones(grid.line.size, dtype=np.bool_)
-    return _observed(prepared, perturbation, grid, everywhere, wider)
+    return _observed(prepared, perturbation, grid, everywhere, wider, motion)
 
 
 def observe_periods(prepared: PreparedEpoch) -> Observation:
@@ -133,24 +140,34 @@ def observe_periods(prepared: PreparedEpoch) -> Observation:
     return _observed(part, perturbation, grid, grid.line % periods == 0)
 
 
-def observe_motion(prepared: PreparedEpoch) -> Observation:
-    """Return an epoch whose perturbation is not known, in the band of least squares."""
+def observe_motion(prepared: PreparedEpoch, motion: EpochMotion | None = None) -> Observation:
+    """Return an epoch whose perturbation is not known, in the band of least squares.
+
+    `motion` is as for `observe`.
+    """
     epoch, estimation = prepared.epoch, prepared.settings.estimation
     grid = epoch_grid(epoch, band_hz(epoch, estimation), estimation.trim_s)
     everywhere = np.ones(grid.line.size, dtype=np.bool_)
     # The drive is followed as least squares follows it, or what it does looks like a delay.
-    found = prepared.source.drive if "velocity_command_rad_s" in epoch.channels else None
-    drive = found.model if found is not None else None
-    lines = epoch_lines(epoch, grid, drive, torque_filter_of(estimation))
+    motion = motion_of(prepared) if motion is None else motion
+    lines = epoch_lines(epoch, grid, motion, torque_filter_of(estimation))
     return Observation(lines, epoch.channels["torque_nm"], None, everywhere)
+
+
+def motion_of(prepared: PreparedEpoch) -> EpochMotion:
+    """Return the motion of an epoch, with the drive that its source shows."""
+    command = prepared.epoch.channels.get("velocity_command_rad_s")
+    found = prepared.source.drive if command is not None else None
+    return EpochMotion(prepared.epoch, None if found is None else found.model)
 
 
 def period_s(perturbation: Channel) -> float | None:
     """Return the shortest period of a perturbation; None if it does not repeat within the epoch."""
     values = perturbation.values - np.mean(perturbation.values)
     n = values.size
-    spectrum = fft.rfft(values, 2 * n)
-    products = fft.irfft(np.abs(spectrum) ** 2)[: n // 2 + 1]
+    length = fft.next_fast_len(2 * n, real=True)
+    spectrum = fft.rfft(values, length)
+    products = fft.irfft(np.abs(spectrum) ** 2, length)[: n // 2 + 1]
     power = np.concatenate(([0.0], np.cumsum(values**2)))
     lag = np.arange(products.size)
     scale = np.sqrt((power[n] - power[lag]) * power[n - lag])
@@ -240,6 +257,7 @@ def _observed(
     grid: Grid,
     excited: NDArray[np.bool_],
     wider: Grid | None = None,
+    motion: EpochMotion | None = None,
 ) -> Observation:
     epoch = prepared.epoch
     found = prepared.source.drive
@@ -257,7 +275,8 @@ def _observed(
     )
     made = prepared.source.once(key, lambda: excitation(perturbation, loop, grid))
     torque_filter = torque_filter_of(prepared.settings.estimation)
-    everything = epoch_lines(epoch, wider or grid, drive, torque_filter)
+    motion = motion_of(prepared) if motion is None else motion
+    everything = epoch_lines(epoch, wider or grid, motion, torque_filter)
     rubbing = half_of_friction(epoch, everything.grid, found, torque_filter)
     by_friction = replace(everything, motion=rubbing).on(grid).motion
     everything = replace(everything, motion=everything.motion + rubbing)

@@ -26,24 +26,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.closedloop.between_samples import (
     TorqueFilter,
     driven_behind,
     filtered,
     in_step,
     seen_beyond_samples,
-    without_driven,
 )
-from rigidimeter.estimation.closedloop.drive_motion import DrivenAt, since_ticks
+from rigidimeter.estimation.closedloop.drive_motion import since_ticks
+from rigidimeter.estimation.closedloop.epoch_motion import EpochMotion
 from rigidimeter.estimation.signals import (
     Array,
-    angle_at,
     motion_channels,
     sampled,
     uniform_grid,
     values_at,
-    velocity_at,
 )
 from rigidimeter.estimation.window import repetition, tapered_ends, with_hole
 from rigidimeter.records import Channel, Epoch
@@ -220,7 +217,7 @@ def _layout(
 def epoch_lines(
     epoch: Epoch,
     grid: Grid,
-    drive: DriveModel | None,
+    motion: EpochMotion,
     torque_filter: TorqueFilter | None = None,
 ) -> Lines:
     """Return torque and motion at the lines.
@@ -230,29 +227,25 @@ def epoch_lines(
     epoch : Epoch
     grid : Grid
         From `epoch_grid` for this epoch or one with the same stamps.
-    drive : DriveModel or None
-        If given, what the command did between the samples of the motion is taken into account.
+    motion : EpochMotion
+        That of the epoch. Where its drive is known, what the command did between the samples is
+        taken into account.
     torque_filter : TorqueFilter or None
         That the torque went through; the motion is sent through it too.
     """
     torque = grid.transform(values_at(epoch.channels["torque_nm"], grid.time_s, SAME_TIME))
-    command = epoch.channels.get("velocity_command_rad_s")
-    if drive is not None and command is not None:
-        motion = _between_samples(epoch, grid, drive, command, torque_filter)
-    else:
-        motion = spectra(grid, *_motion(epoch, grid.time_s))
-        motion *= filtered(torque_filter, grid.omega_rad_s)
-    return Lines(grid, torque, motion)
+    if motion.driven_at is not None:
+        return Lines(grid, torque, _between_samples(epoch, grid, motion, torque_filter))
+    lines = spectra(grid, *motion.beyond_at(grid.time_s, SAME_TIME))
+    return Lines(grid, torque, lines * filtered(torque_filter, grid.omega_rad_s))
 
 
 def _between_samples(
-    epoch: Epoch,
-    grid: Grid,
-    drive: DriveModel,
-    command: Channel,
-    torque_filter: TorqueFilter | None,
+    epoch: Epoch, grid: Grid, motion: EpochMotion, torque_filter: TorqueFilter | None
 ) -> Complex:
     """Return the motion that the torque saw, for commands that were held from tick to tick."""
+    assert motion.driven_at is not None
+    drive, command = motion.driven_at.drive, motion.driven_at.command
     angle, velocity = (
         _sampled(epoch.channels.get(name), grid.time_s) for name in ("angle_rad", "velocity_rad_s")
     )
@@ -264,16 +257,14 @@ def _between_samples(
         sent = grid.transform(command.values[tick])
         sampled = spectra(grid, angle, velocity) * filtered(torque_filter, omega)
         return np.asarray(sampled + beyond * sent[:, None])
-    driven_at = DrivenAt(drive, command)
-    rest = without_driven(epoch, driven_at)
-    motion = spectra(grid, *_motion(rest, grid.time_s))
-    motion *= filtered(torque_filter, grid.omega_rad_s)
+    lines = spectra(grid, *motion.beyond_at(grid.time_s, SAME_TIME))
+    lines *= filtered(torque_filter, grid.omega_rad_s)
     # At the stamps of the torque, and from there like the torque.
     torque = epoch.channels["torque_nm"]
-    for column, part in enumerate(driven_behind(driven_at, torque_filter, torque)):
+    for column, part in enumerate(driven_behind(motion.driven_at, torque_filter, torque)):
         there = Channel(torque.name, torque.time_s, part)
-        motion[:, column] += grid.transform(values_at(there, grid.time_s, SAME_TIME))
-    return motion
+        lines[:, column] += grid.transform(values_at(there, grid.time_s, SAME_TIME))
+    return lines
 
 
 def spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array) -> Complex:
@@ -281,14 +272,6 @@ def spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array) -> Complex:
     velocity = grid.transform(velocity_rad_s)
     acceleration = 1j * grid.omega_rad_s * velocity - grid.transform_slope(velocity_rad_s)
     return np.stack([acceleration, velocity, grid.transform(angle_rad)], axis=1)
-
-
-def _motion(epoch: Epoch, time_s: Array) -> tuple[Array, Array]:
-    """Return angle and velocity at the times."""
-    angle, velocity = epoch.channels.get("angle_rad"), epoch.channels.get("velocity_rad_s")
-    if angle is not None and velocity is not None:
-        return values_at(angle, time_s, SAME_TIME), values_at(velocity, time_s, SAME_TIME)
-    return angle_at(epoch, time_s), velocity_at(epoch, time_s)
 
 
 def _sampled(channel: Channel | None, time_s: Array) -> Array | None:

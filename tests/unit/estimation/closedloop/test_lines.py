@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from rigidimeter.estimation.closedloop.epoch_motion import EpochMotion
 from rigidimeter.estimation.closedloop.line_noise import Smoother, line_covariance
 from rigidimeter.estimation.closedloop.spectral_lines import epoch_grid, epoch_lines
 from rigidimeter.records import Channel, Epoch
@@ -25,7 +26,7 @@ def moving(names=("angle_rad", "velocity_rad_s"), offset=0.0, n=4001):
 
 
 def solved(epoch, band=(0.15, 20.0)):
-    lines = epoch_lines(epoch, epoch_grid(epoch, band, 1.0), None)
+    lines = epoch_lines(epoch, epoch_grid(epoch, band, 1.0), EpochMotion(epoch, None))
     rows = np.vstack([lines.motion.real, lines.motion.imag])
     return np.linalg.lstsq(rows, np.hstack([lines.torque_nm.real, lines.torque_nm.imag]))[0]
 
