@@ -79,15 +79,25 @@ def zero_phase_band(values: Array, rate_hz: float, band: tuple[float, float]) ->
     The signal is continued by its mirror image for as long as the lower edge remembers. A point
     reflection, scipy's default, would hang that memory on a single sample with its noise: at the
     paper's rates it tripled the scatter of K.
+
+    Parameters
+    ----------
+    values : array, shape (n,) or (k, n)
+    rate_hz : float
+    band : (float, float)
     """
-    if values.size <= SHORT_MEMORY:
-        raise ValueError(
-            f"{values.size} samples are too few for a filter; it needs {SHORT_MEMORY + 1}"
-        )
+    n = values.shape[-1]
+    if n <= SHORT_MEMORY:
+        raise ValueError(f"{n} samples are too few for a filter; it needs {SHORT_MEMORY + 1}")
     low, high = band
-    lowpass, highpass = _filters(low, high, float(f"{rate_hz:.12g}"))
-    smooth = _both_ways(lowpass, values - np.mean(values), SHORT_MEMORY)
+    lowpass, highpass = _filters(low, high, _to_stamps(rate_hz))
+    smooth = _both_ways(lowpass, values - np.mean(values, axis=-1, keepdims=True), SHORT_MEMORY)
     return _both_ways(highpass, smooth, round(rate_hz / low))
+
+
+def _to_stamps(rate_hz: float) -> float:
+    """Return a rate to the digits that stamps are good for, so that epochs share their filters."""
+    return float(f"{rate_hz:.9g}")
 
 
 _Filter = tuple[Array, Array]
@@ -108,13 +118,16 @@ def _both_ways(through: _Filter, values: Array, memory: int) -> Array:
     That finds the state after a constant anew for each signal, which takes as long as to filter it.
     """
     sections, settled = through
-    past = min(values.size - 1, memory)
+    n = values.shape[-1]
+    past = min(n - 1, memory)
     # The mirror image at each end.
-    whole = np.concatenate((values[past:0:-1], values, values[-2 : -past - 2 : -1]))
+    mirrored = values[..., past:0:-1], values, values[..., -2 : -past - 2 : -1]
+    whole = np.concatenate(mirrored, axis=-1)
+    settled = settled.reshape(-1, *(1,) * (values.ndim - 1), 2)
     for _ in range(2):
-        passed, _ = signal.sosfilt(sections, whole, zi=settled * whole[0])
-        whole = np.ascontiguousarray(passed[::-1])
-    return whole[past : past + values.size]
+        passed, _ = signal.sosfilt(sections, whole, zi=settled * whole[..., :1])
+        whole = np.ascontiguousarray(passed[..., ::-1])
+    return whole[..., past : past + n]
 
 
 def bandlimited_signals(
@@ -146,12 +159,16 @@ def bandlimited_signals(
     trim = max(round(settings.trim_s * rate_hz) - edge, 0)
     keep = sound(epoch, time_s, settings.trim_s)
     keep[:trim] = keep[time_s.size - trim :] = False
+    everything = np.stack(
+        [values_at(torque, time_s), acceleration[inner], velocity[inner], angle[inner]]
+    )
+    torque_nm, acceleration, velocity, angle = zero_phase_band(everything, rate_hz, band)[:, keep]
     return Signals(
         time_s=time_s[keep],
-        torque_nm=zero_phase_band(values_at(torque, time_s), rate_hz, band)[keep],
-        acceleration_rad_s2=zero_phase_band(acceleration[inner], rate_hz, band)[keep],
-        velocity_rad_s=zero_phase_band(velocity[inner], rate_hz, band)[keep],
-        angle_rad=zero_phase_band(angle[inner], rate_hz, band)[keep],
+        torque_nm=torque_nm,
+        acceleration_rad_s2=acceleration,
+        velocity_rad_s=velocity,
+        angle_rad=angle,
         rate_hz=rate_hz,
         band_hz=band,
     )
@@ -180,7 +197,7 @@ def _doubt(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
     doubt, settings = inertia_doubt(prepared, signals), prepared.settings.estimation
 
     def smooth(channel: Channel) -> Array:
-        lowpass, _ = _filters(*signals.band_hz, float(f"{channel.mean_rate_hz:.12g}"))
+        lowpass, _ = _filters(*signals.band_hz, _to_stamps(channel.mean_rate_hz))
         return _both_ways(lowpass, channel.values, SHORT_MEMORY)
 
     moved = moved_by_steps(

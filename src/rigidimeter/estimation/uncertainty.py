@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, stats
+from scipy import fft, special
 
 Array = NDArray[np.float64]
 
@@ -150,7 +150,7 @@ def t_interval(
     values: Array, standard_errors: Array, degrees_of_freedom: float
 ) -> tuple[Array, Array]:
     """Return the ends of the 95 % t intervals: values ∓ t · standard errors."""
-    half = float(stats.t.ppf(0.975, degrees_of_freedom)) * np.asarray(standard_errors)
+    half = float(special.stdtrit(degrees_of_freedom, 0.975)) * np.asarray(standard_errors)
     return np.asarray(values) - half, np.asarray(values) + half
 
 

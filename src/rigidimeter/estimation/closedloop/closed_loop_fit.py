@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student
+from scipy import special
 
 from rigidimeter.estimation.closedloop.between_doubt import between_samples
 from rigidimeter.estimation.closedloop.linear_problems import (
@@ -199,7 +199,7 @@ def _estimate(fit: LineFit, inertia_kg_m2: float | None) -> Estimate:
             fit.values, np.std(fit.drawn, axis=0, ddof=1), low, high, bound, covariance
         )
     else:
-        half = student.ppf(0.975, fit.degrees) * fit.standard_errors
+        half = special.stdtrit(fit.degrees, 0.975) * fit.standard_errors
         low, high = fit.values - half, fit.values + half
         found = Estimate(fit.values, fit.standard_errors, low, high, bound, fit.covariance)
     found = found._replace(low=low - fit.between, high=high + fit.between)

@@ -79,7 +79,7 @@ class Case:
         loop, NaN where it is too much to be told.
     prepared : PreparedEpoch, optional
         The epoch with what was made of it; without it nothing is said of a joint that varies,
-        nor of terms that are missing.
+        of terms that are missing, nor of the controller.
     """
 
     epoch: Epoch

@@ -24,10 +24,14 @@ from rigidimeter.estimation.diagnostics.check_record import (
     in_full,
     push_harmless,
 )
-from rigidimeter.estimation.diagnostics.controller_used import command_made
+from rigidimeter.estimation.diagnostics.controller_used import (
+    command_made,
+    loop_shown,
+    misfit_of_settings,
+)
+from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array
-from rigidimeter.records import Epoch
-from rigidimeter.settings import ControllerSettings, DiagnosticsSettings, Settings
+from rigidimeter.settings import ControllerSettings, Settings
 from rigidimeter.units import per_rad_from_per_deg
 
 REMEDY = (
@@ -39,15 +43,13 @@ PER_DEGREE_WITHIN = 1.5
 """Values that are wrong by 57.3, within this factor, were given per degree."""
 
 
-def controller_misfit(epoch: Epoch, loop: Loop, settings: DiagnosticsSettings) -> Look | None:
+def controller_misfit(prepared: PreparedEpoch, loop: Loop) -> Look | None:
     """Return how far the command is from what the controller makes of perturbation and torque."""
-    made = command_made(epoch, loop)
-    if made is None:
+    misfit = prepared.once(misfit_of_settings)
+    if misfit is None or np.isnan(misfit[0]):
         return None
-    value, factor = made.misfit(loop.controller)
-    if np.isnan(value):
-        return None
-    most = settings.controller_misfit_most_percent
+    value, factor = misfit
+    most = prepared.settings.diagnostics.controller_misfit_most_percent
     look = at_most(
         value,
         most,
@@ -57,27 +59,30 @@ def controller_misfit(epoch: Epoch, loop: Loop, settings: DiagnosticsSettings) -
             f"{factor:.2g} times as large"
         ),
     )
-    shown = made.shown(loop.controller) if look.failed else None
-    if shown is None or made.misfit(shown)[0] > most:
-        return look
-    return look._replace(remedy=_remedy(loop.controller, shown))
+    shown = _controller_shown(prepared, loop) if look.failed else None
+    return look if shown is None else look._replace(remedy=_remedy(loop.controller, shown))
 
 
-def controller_used(epoch: Epoch, loop: Loop, settings: DiagnosticsSettings) -> Loop:
+def controller_used(prepared: PreparedEpoch) -> Loop:
     """Return the loop with the controller that the recording shows.
 
     That is the one of the settings unless another makes the recorded command and it does not.
     """
-    if not all(name in epoch.channels for name in ("velocity_command_rad_s", "perturbation_nm")):
+    loop, channels = loop_shown(prepared), prepared.epoch.channels
+    if not all(name in channels for name in ("velocity_command_rad_s", "perturbation_nm")):
         return loop
-    made = command_made(epoch, loop)
-    most = settings.controller_misfit_most_percent
-    if made is None or not made.misfit(loop.controller)[0] > most:
-        return loop
-    shown = made.shown(loop.controller)
-    if shown is None or made.misfit(shown)[0] > most:
-        return loop
-    return replace(loop, controller=shown)
+    misfit = prepared.once(misfit_of_settings)
+    most = prepared.settings.diagnostics.controller_misfit_most_percent
+    shown = _controller_shown(prepared, loop) if misfit and misfit[0] > most else None
+    return loop if shown is None else replace(loop, controller=shown)
+
+
+def _controller_shown(prepared: PreparedEpoch, loop: Loop) -> ControllerSettings | None:
+    """Return the controller that makes the recorded command, if there is one."""
+    made = command_made(prepared.epoch, loop)
+    shown = made.shown(loop.controller) if made is not None else None
+    most = prepared.settings.diagnostics.controller_misfit_most_percent
+    return None if made is None or shown is None or made.misfit(shown)[0] > most else shown
 
 
 def unstable_loop(parameters: Array, loop: Loop) -> Look | None:
@@ -131,7 +136,7 @@ CONTROLLER_CHECKS = (
     Check(
         "controller_misfit",
         ("velocity_command_rad_s", "perturbation_nm"),
-        lambda c: controller_misfit(c.epoch, c.loop, c.settings) if c.loop is not None else None,
+        lambda c: controller_misfit(c.prepared, c.loop) if c.prepared and c.loop else None,
         "what is computed of the loop is that of another one",
         REMEDY,
         of_fit=False,

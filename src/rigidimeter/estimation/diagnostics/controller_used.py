@@ -18,6 +18,8 @@ from scipy import signal
 
 from rigidimeter.control import admittance, butterworth_lowpass
 from rigidimeter.dynamics import Loop
+from rigidimeter.estimation.closedloop.observation import loop_of
+from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array
 from rigidimeter.estimation.window import with_hole
 from rigidimeter.records import Epoch
@@ -106,6 +108,20 @@ def command_made(epoch: Epoch, loop: Loop) -> CommandMade | None:
         window, steep = with_hole(window, steep, rate_hz, FORGOTTEN_S, hole_s)
     asked = _asked_nm(epoch, loop, command.time_s, rate_hz)
     return CommandMade(command.values, asked, window, rate_hz)
+
+
+def loop_shown(prepared: PreparedEpoch) -> Loop:
+    """Return the loop that the settings describe, with the drive that the recording shows."""
+    found = prepared.source.drive
+    drive = found.model if found is not None else None
+    return loop_of(prepared.settings, prepared.epoch.channels["torque_nm"].rate_hz, drive)
+
+
+def misfit_of_settings(prepared: PreparedEpoch) -> tuple[float, float] | None:
+    """Return `CommandMade.misfit` of the settings' controller; None where nothing can be said."""
+    loop = loop_shown(prepared)
+    made = command_made(prepared.epoch, loop)
+    return None if made is None else made.misfit(loop.controller)
 
 
 def _asked_nm(epoch: Epoch, loop: Loop, ticks_s: Array, rate_hz: float) -> Array:

@@ -7,9 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigidimeter.dynamics import Loop
 from rigidimeter.estimation.bandlimited import bandlimited_signals
-from rigidimeter.estimation.closedloop.observation import loop_of
 from rigidimeter.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.estimation.diagnostics.computed_torque_checks import (
@@ -20,6 +18,7 @@ from rigidimeter.estimation.diagnostics.controller_checks import (
     CONTROLLER_CHECKS,
     controller_used,
 )
+from rigidimeter.estimation.diagnostics.controller_used import loop_shown
 from rigidimeter.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.estimation.diagnostics.missing_term import MISSING_TERM_CHECKS
@@ -114,7 +113,7 @@ def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
         parameters,
         settings.diagnostics,
         position_limit_rad=limit_rad,
-        loop=_loop(prepared),
+        loop=loop_shown(prepared),
         prepared=prepared,
     )
 
@@ -125,16 +124,8 @@ def unbiased(prepared: PreparedEpoch) -> Array:
     The loop is the one that the settings describe, with drive and controller that the recording
     shows.
     """
-    loop = controller_used(prepared.epoch, _loop(prepared), prepared.settings.diagnostics)
-    found = compensated(prepared.signals(bandlimited_signals), loop)
+    found = compensated(prepared.signals(bandlimited_signals), controller_used(prepared))
     return np.full(3, np.nan) if found is None else found
-
-
-def _loop(prepared: PreparedEpoch) -> Loop:
-    """Return the loop that the settings describe, with the drive that the recording shows."""
-    found = prepared.source.drive
-    drive = found.model if found is not None else None
-    return loop_of(prepared.settings, prepared.epoch.channels["torque_nm"].rate_hz, drive)
 
 
 def _seen_without_fit(prepared: PreparedEpoch) -> dict[str, Look | None]:

@@ -130,7 +130,7 @@ def velocity_shape(
     # Lines across what is left out are not each other's slopes, and the band remembers for seconds.
     there = sound(epoch, time_s, EDGE_SAMPLES / rate_hz)
     signals[0] = np.where(there, signals[0], signals[1])
-    derived, measured, changing = (zero_phase_band(one, rate_hz, band)[kept] for one in signals)
+    derived, measured, changing = zero_phase_band(np.stack(signals), rate_hz, band)[:, kept]
     size = float(np.linalg.norm(derived))
     if not (size > 0 and np.any(measured)):
         return None

@@ -77,8 +77,9 @@ def test_every_level_that_can_be_set_belongs_to_a_check(sound):
     )
     findings = diagnose(case)
     names = [finding.name for finding in findings]
-    # What is found where epochs are fitted; what varies within one, and terms that are missing, are
-    # looked for in a prepared epoch (test_varying, test_missing_term).
+    # What is found where epochs are fitted; what varies within one, terms that are missing, and the
+    # controller are looked for in a prepared epoch (test_varying, test_missing_term,
+    # test_controller_checks).
     varying = [name for name in DiagnosticLevels.model_fields if name.startswith("varying_")]
     of_fits = [
         "lack_of_fit",
@@ -86,6 +87,7 @@ def test_every_level_that_can_be_set_belongs_to_a_check(sound):
         "between_samples",
         "torque_delay",
         "missing_term",
+        "controller_misfit",
         *varying,
     ]
     assert sorted([*names, *of_fits]) == sorted(DiagnosticLevels.model_fields)
