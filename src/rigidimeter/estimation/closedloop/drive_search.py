@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import leastsq
 
 from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.closedloop.drive_motion import since_ticks
@@ -98,21 +98,29 @@ def search(
         return terms.fitted(structure, samples, numerator, float(np.mean(left**2)))
 
     def found(x: Array, left: Callable[[Array], Array]) -> Array:
+        place_of_x = x.tobytes()
+        at_x: list[Array] = []
+
         def slopes(place: Array) -> Array:
-            return _slopes(left, place)
+            if place.tobytes() != place_of_x:
+                return _slopes(left, place)
+            if not at_x:  # asked for twice: the solver looks at their shape first
+                at_x.append(_slopes(left, place))
+            return at_x[0]
 
         scale = np.append(0.1 * degrees, 0.1)[: x.size]
-        done = least_squares(
+        done, *_ = leastsq(
             left,
             x,
-            jac=slopes,
-            method="lm",
-            x_scale=scale,
+            Dfun=slopes,
+            full_output=True,
+            diag=1.0 / scale,
             ftol=1e-6,
             xtol=1e-6,
-            max_nfev=MOST_TRIES,
+            gtol=1e-8,
+            maxfev=MOST_TRIES,
         )
-        return np.asarray(done.x)
+        return np.asarray(done)
 
     begin = coordinates_of(structure, start, interval_s)
     begin[-1] = max(begin[-1], SHORT)

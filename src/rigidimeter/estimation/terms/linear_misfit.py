@@ -125,16 +125,23 @@ def _coupling(joint: Array, omega: Array, angle: Complex, target: Array) -> Foun
         by_softness = -(path**2) * passed / start[2]
         return -stacked(np.column_stack([slopes * passed[:, None], by_softness]))
 
-    tried = [
-        optimize.least_squares(
-            residual, [1.0, 1.0, 1.0, softness], jacobian, method="lm", max_nfev=30
+    tried = []
+    for softness in SOFTEST:
+        values, *_ = optimize.leastsq(
+            residual,
+            [1.0, 1.0, 1.0, softness],
+            Dfun=jacobian,
+            full_output=True,
+            ftol=1e-8,
+            xtol=1e-8,
+            gtol=1e-8,
+            maxfev=30,
         )
-        for softness in SOFTEST
-    ]
-    best = min(tried, key=lambda one: float(one.cost))
-    softness = float(best.x[3]) / float(start[2])
+        tried.append((float(np.sum(residual(values) ** 2)), values))
+    remains, values = min(tried, key=lambda one: one[0])
+    softness = float(values[3]) / float(start[2])
     value = 1.0 / softness if softness != 0 else np.inf
-    return ("coupling", value, 0.0, np.asarray(best.x[:3] * start)), 2.0 * float(best.cost)
+    return ("coupling", value, 0.0, np.asarray(values[:3] * start)), remains
 
 
 def _both_directions(motion: Complex, omega: Array, target: Complex) -> Found:
