@@ -7,6 +7,7 @@ a person would add for what no file says, and what must come of it.
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -198,4 +199,11 @@ DIALECTS: Mapping[str, Dialect] = {
         "r.csv", csv("Time,torque_nm,angle_rad", 45352.5 + T / 86400, M, A, digits=17)
     ),
     "dates": Dialect("r.csv", _DATED.encode()),
+    "dates of a zone": Dialect("r.csv", re.sub(r"(?m)^(2024[^,]*)", r"\1+01:00", _DATED).encode()),
+    "nanoseconds since 1970": Dialect(
+        "r.csv", csv("%time,torque_nm,angle_rad", 1.7e18 + 1e9 * T, M, A, digits=17)
+    ),
+    "names over two lines": Dialect(
+        "r.csv", csv('"Time\n(s)","Torque\n(Nm)","Angle\n(deg)"', T, M, D)
+    ),
 }  # fmt: skip

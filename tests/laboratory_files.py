@@ -140,6 +140,12 @@ LABORATORY: Mapping[str, Dialect] = {
             "of block\nChannelTitle=\tTorque\tAngle\nRange=\t10 V\t10 V\nUnitName=\tNm\tdeg",
             T, M, D, mark="\t"),
     ),
+    "LabChart, two blocks": Dialect(
+        "r.txt",
+        2 * csv("Interval=\t5 ms\nChannelTitle=\tTorque\tAngle\nUnitName=\tNm\tdeg", T, M, D,
+                mark="\t"),
+        refused="2 blocks of LabChart",
+    ),
     "a time for each channel, two rates": Dialect("r.csv", _each_its_time()),
     "decimal commas in quotes": Dialect(
         "r.csv", _lines('"temps (s)","couple (Nm)","angle (degré)"', *(

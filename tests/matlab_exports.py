@@ -220,6 +220,10 @@ EXPORTS: Mapping[str, tuple] = {
     "MATLAB matrix beside its time": (_entry(matrix(t_ms=MILLI * T)),),
     "MATLAB, a force and its lever arm": (_entry({"t_s": T, "F_N": M / 0.2, "phi_deg": D,
                                                   "lever_arm_m": 0.2}),),
+    "MATLAB structures beside their time": (
+        _entry({"rec": {"t_s": T, "torque": {"data": M, "units": "Nm"},
+                        "angle": {"data": D, "units": "deg"}}}),
+    ),
     "MATLAB timeseries": (lambda path: write_timeseries(path, implicit=False),),
     "MATLAB timeseries, even stamps": (lambda path: write_timeseries(path, implicit=True),),
     "MATLAB 7.3 of LabChart": (lambda path: write_mat73(path, labchart(blocks=2)),),

@@ -21,6 +21,7 @@ from rigidimeter.recording.channels.readings import (
     options_text,
     readings,
     sign_fault,
+    usual_units,
 )
 from rigidimeter.recording.channels.wrapping import unwrapped, wrapping_text
 from rigidimeter.recording.formats.columns import (
@@ -186,7 +187,10 @@ def _unstated(
     *,
     usable: bool,
 ) -> list[str]:
-    vary: dict[str, tuple[str, ...]] = {taken.standard: () for taken in choice.unstated}
+    vary = {
+        taken.standard: usual_units(taken.standard, choice.taken, raw) if usable else ()
+        for taken in choice.unstated
+    }
     columns = ", ".join(repr(taken.column) for taken in choice.unstated)
     text = (
         f"{table.source}: the unit of {columns} is stated nowhere, so nothing is estimated; say "

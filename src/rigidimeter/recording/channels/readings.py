@@ -38,7 +38,7 @@ FASTEST_MOTION_HZ, FASTEST_RATE_HZ = 100.0, 5e4
 FEWEST = 100
 SHORTEST_S = 5.0
 """What is shorter is not estimated."""
-RARE_TIME_UNITS = ("us", "days")
+RARE_TIME_UNITS = ("us", "ns", "days")
 CONFUSED: Mapping[str, tuple[str, str]] = {
     "angle_rad": ("rad", "deg"),
     "velocity_rad_s": ("rad/s", "deg/s"),
@@ -199,10 +199,21 @@ def usual_units(
     usual = BY_STANDARD[standard].usual
     if standard != "time_s" or "time_s" not in raw:
         return usual
-    seen = [look_at(taken, raw, None, {"time_s": unit}) for unit in usual]
-    if all(one is not None and any(d.standard == "time_s" for d in doubts(one)) for one in seen):
-        return (*usual, *RARE_TIME_UNITS)
-    return usual
+    if _possible(usual, taken, raw):
+        return usual
+    return _possible(RARE_TIME_UNITS, taken, raw) or (*usual, *RARE_TIME_UNITS)
+
+
+def _possible(
+    units: tuple[str, ...], taken: Mapping[str, Taken], raw: Mapping[str, Array]
+) -> tuple[str, ...]:
+    """Return those of some units of the time with which a recording may be one."""
+    seen = {unit: look_at(taken, raw, None, {"time_s": unit}) for unit in units}
+    return tuple(
+        unit
+        for unit, one in seen.items()
+        if one is None or all(doubt.standard != "time_s" for doubt in doubts(one))
+    )
 
 
 def look_at(

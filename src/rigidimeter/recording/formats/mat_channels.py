@@ -139,9 +139,19 @@ def _by_hand(groups: Mapping[str, Fields], place: str) -> list[Channel]:
         return []
     (values,) = columns
     time_s = _clock(fields, place, values.size, rate_hz)
-    if time_s is None and (rate_hz or not place.endswith(")")):
+    beside = place.endswith(")") or _is_timed(groups, place, values.size)
+    if time_s is None and (rate_hz or not beside):
         return []
     return [Channel(stated_name(fields, place), stated_unit(fields), values, time_s)]
+
+
+def _is_timed(groups: Mapping[str, Fields], place: str, count: int) -> bool:
+    """Whether a structure above has a column of the time of so many samples."""
+    return any(
+        entry.size == count and read_header(name).kind == "time"
+        for fields in fields_above(groups, place)[1:]
+        for name, entry in fields.items()
+    )
 
 
 def _labels(fields: Fields, matrix: Stored) -> list[str]:

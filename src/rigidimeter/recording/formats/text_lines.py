@@ -21,6 +21,8 @@ from rigidimeter.errors import UserError
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _HEAD_BYTES = 2**16
 _FOOTER = 50
+_NAME_LINES = 16
+"""What opens a quotation and does not close it within so many lines is no list of names."""
 _MISSING = {"", "na", "n/a", "#n/a", "nan", "null", "none", "-", "–", "."}
 
 
@@ -75,6 +77,22 @@ def _decoded(data: bytes) -> str:
         if _CONTROL.search(text):  # no text at all
             raise
         return text
+
+
+def whole_names(data: bytes) -> bytes:
+    """Return the text with names that go over several lines, in quotes, on the first.
+
+    Empty lines stand in for those that it had, so that all lines keep their numbers.
+    """
+    first, n_lines = b"", 0
+    for line in data.split(b"\n", _NAME_LINES)[:_NAME_LINES]:
+        first = first + b" " + line if n_lines else line
+        n_lines += 1
+        if first.count(b'"') % 2 == 0:
+            break
+    if n_lines == 1 or first.count(b'"') % 2:
+        return data
+    return first + b"\n" * n_lines + data.split(b"\n", n_lines)[n_lines]
 
 
 def content(data: bytes) -> tuple[bytes, NDArray[np.int64]]:

@@ -43,8 +43,10 @@ from rigidimeter.recording.formats.text_lines import (
     read_utf8,
     records,
     trimmed,
+    whole_names,
 )
 from rigidimeter.recording.formats.text_preambles import known_head, without_later_heads
+from rigidimeter.recording.formats.text_stamps import stamps_s
 from rigidimeter.recording.formats.vicon_text import is_vicon, vicon_table
 
 _DECIMAL_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
@@ -53,7 +55,7 @@ _CALIBRATION = re.compile(
     r"|\d\s*(?:m?V|counts?|digits?|LSB|bits?)\s*(?:/|per)\s*[\w·.*°]+"
 )
 _SECONDS = re.compile(r"(?i)[^\[(]*[\[(]\s*s(?:ec)?\s*[\])](?: \(\d+\))?")
-_STAMP = re.compile(r"(\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d([.,]\d+)?")
+_LABCHART = b"Interval="
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,12 @@ def read_text_recording(path: Path, layout: Layout | None = None) -> Table:
         If it is not such a file; the sentence names the line where there is one.
     """
     example = "time_s,torque_nm,angle_rad"
-    whole = without_later_heads(read_utf8(path, RECORDING_BYTES))
+    whole = whole_names(without_later_heads(read_utf8(path, RECORDING_BYTES)))
+    if whole.startswith(_LABCHART) and b"\n" + _LABCHART in whole:
+        raise UserError(
+            f"{path}: holds {whole.count(_LABCHART)} blocks of LabChart, each with a head and a "
+            "time of its own; export each block to a file of its own"
+        )
     if whole.startswith(SPIKE2):
         return spike2_table(str(path), whole)
     if is_vicon(whole):
@@ -203,7 +210,7 @@ def read_text_recording(path: Path, layout: Layout | None = None) -> Table:
     if text.head.in_pairs or _is_pairs(text.names):
         return table_of_pairs(Table(text.source, columns, lines=text.lines, units=units))
     for name in text.names:
-        if read_header(name).kind == "time" and (stamps := _stamps(columns[name])) is not None:
+        if read_header(name).kind == "time" and (stamps := stamps_s(columns[name])) is not None:
             columns[name], units[name] = stamps, "s"
     return Table(text.source, columns, text.head.scalars, lines=text.lines, units=units)
 
@@ -219,26 +226,6 @@ def _is_pairs(names: Sequence[str]) -> bool:
     """Whether every second column is a channel, and the one before it a time in s by its name."""
     in_s = [_SECONDS.fullmatch(name) is not None for name in names]
     return len(names) > 2 and in_s == [True, False] * (len(names) // 2)
-
-
-def _stamps(column: NDArray[Any]) -> NDArray[np.float64] | None:
-    """Return dates and times of day as seconds since the first; None where they are none."""
-    if column.dtype != object or not column.size or not _STAMP.fullmatch(str(column[0]).strip()):
-        return None
-    import pandas as pd
-
-    texts = pd.Series(column).str.strip().str.replace(",", ".")
-    try:
-        if re.match(r"\d{1,2}:", texts[0]):
-            since = pd.to_timedelta(texts)
-            midnights = (since.diff() < -pd.Timedelta(hours=12)).cumsum()
-            since = since + pd.to_timedelta(midnights, unit="D")
-        else:
-            when = pd.to_datetime(texts, format="ISO8601")
-            since = when - when[0]
-    except (ValueError, TypeError, OverflowError):
-        return None
-    return np.asarray(since.dt.total_seconds(), dtype=np.float64)
 
 
 @dataclass(frozen=True)
