@@ -127,6 +127,17 @@ LABORATORY: Mapping[str, Dialect] = {
         "r.csv",
         csv("Trial,time (s),torque (Nm),angle (deg)", np.repeat([1, 2], HALF), _RESTART_S, M, D),
     ),
+    "degrees stated as rad, a short trial at the end": Dialect(
+        "r.csv",
+        csv("Trial,time_s,torque_nm,angle_rad", np.repeat([1, 2], [T.size - 800, 800]),
+            np.concatenate([T[:-800], T[:800]]), M, D / 8),
+        refused="unusually fast",
+    ),
+    "a short trial at the beginning": Dialect(
+        "r.csv",
+        csv("Trial,time (s),torque (Nm),angle (deg)", np.repeat([2, 1], [800, T.size - 800]),
+            np.concatenate([T[:800], T[:-800]]), M, D),
+    ),
     "sample numbers, the rate in a line of text": Dialect(
         "r.csv", csv("Sampling rate: 200 Hz\nSample,Torque (Nm),Angle (deg)", np.arange(T.size), M,
                      D),

@@ -20,6 +20,7 @@ from rigidimeter.recording.channels.looks import Array, Look, RoughFit, look
 from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.unit_text import factor
 from rigidimeter.recording.channels.wrapping import unwrapped
+from rigidimeter.recording.formats.columns import one_after_another
 
 LARGEST_RAD = 2 * math.pi
 LARGEST_SPEED_RAD_S = 20.0
@@ -236,6 +237,7 @@ def look_at(
         return unwrapped(values)[0] if name == "angle_rad" else values
 
     time_s = si("time_s") if "time_s" in raw else np.arange(raw[motion].size) / (rate_hz or 1.0)
+    time_s = one_after_another(time_s)
     signals = []
     for name in ("torque_nm", motion):
         values = si(name)

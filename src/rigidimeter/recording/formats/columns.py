@@ -97,12 +97,7 @@ def time_stamps(
     time_s = to_si(values)
     starts = restarts(values)
     if labels is not None and starts.size and np.all(labels[starts] != labels[starts - 1]):
-        ends_s = time_s[starts - 1] + APART_S - time_s[starts]
-        time_s = time_s + np.repeat(
-            np.concatenate([[0.0], np.cumsum(ends_s)]),
-            np.diff(starts, prepend=0, append=values.size),
-        )
-        values = time_s
+        values = time_s = one_after_another(time_s)
     _increasing(table, name, values)
     if rate_hz is not None:
         _agreeing(table, name, time_s, rate_hz)
@@ -112,6 +107,15 @@ def time_stamps(
 def restarts(values: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the rows in which a time goes back."""
     return np.flatnonzero(np.diff(values) < 0) + 1
+
+
+def one_after_another(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return times that go back nowhere: each stretch begins `APART_S` after the one before it."""
+    starts = restarts(time_s)
+    ends_s = time_s[starts - 1] + APART_S - time_s[starts]
+    later_s: NDArray[np.float64] = np.concatenate([[0.0], np.cumsum(ends_s)])
+    lengths = np.diff(starts, prepend=0, append=time_s.size)
+    return np.add(time_s, np.repeat(later_s, lengths), dtype=np.float64)
 
 
 def counts_samples(values: NDArray[np.float64]) -> bool:
