@@ -154,6 +154,6 @@ EXPORTED_TEXT: Mapping[str, Dialect] = {
     "1'234.5": Dialect("r.csv", grouped(_SEMICOLON, "'", ".", ";").encode()),
     "1,234.5 without quotes": Dialect(
         "r.csv", grouped(_COMMA, ",", ".", ",").encode(),
-        refused="values, but the first line names 3",
+        refused="without a comma between thousands",
     ),
 }  # fmt: skip

@@ -25,7 +25,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.channels.lever_arm import states_lever_arm
 from rigidimeter.recording.formats.clocked_table import table_of_pairs
-from rigidimeter.recording.formats.grouped_numbers import ungrouped
+from rigidimeter.recording.formats.grouped_numbers import THOUSANDS, ungrouped
 from rigidimeter.recording.formats.spike2_text import FIRST as SPIKE2
 from rigidimeter.recording.formats.spike2_text import spike2_table
 from rigidimeter.recording.formats.table import CALIBRATION, Table, printable
@@ -307,6 +307,8 @@ def _open(
         hint = ""
         if delimiter == "," and count > len(head.names):
             hint = "; where numbers have a decimal comma, separate the columns by semicolons"
+            if THOUSANDS.search(body.split(b"\n", starts[wrong[0]] + 1)[starts[wrong[0]]]):
+                hint = "; write numbers without a comma between thousands, or in quotes"
         named = "first line names" if head.n_before == 1 else "head of the file names"
         raise UserError(
             f"{source}, line {line} has {count} value{'' if count == 1 else 's'}, but the {named} "
