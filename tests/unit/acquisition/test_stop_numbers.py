@@ -12,7 +12,7 @@ from tests.unit.acquisition.exact_rig import INTERVAL_S, made
 from rigidimeter.acquisition.stop_account import Found, Latched, StopAccount, stop_account
 from rigidimeter.acquisition.stop_remedies import REMEDIES, SUSPENDED
 from rigidimeter.guard import Cause
-from rigidimeter.guard.agreement import OLD_SHARE, SUMMED_S, WRONG_SHARE
+from rigidimeter.guard.agreement import OLD_SHARE, SQUARED_S, SUMMED_S, WRONG_GAIN, WRONG_SHARE
 from rigidimeter.guard.torque_answer import SHOWN_MEMORY_S
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.settings import parse_settings
@@ -212,6 +212,23 @@ def test_other_means_are_told_where_they_are_the_larger_ones():
     limit = told(Cause.VELOCITY_WRONG, consistency={"means": means}).limit
     assert limit == pytest.approx(math.degrees(AGREEMENT.unseen_rad))
     assert told(Cause.SELDOM_FRESH, consistency={"means": means}).value == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize(
+    ("moved_rad2", "reported_rad2", "unit"),
+    [
+        (0.005, 0.02, "times the change of the angle"),
+        (0.02, 0.005, "times the velocity"),
+    ],
+)
+def test_a_velocity_of_another_size_is_told_by_how_much(moved_rad2, reported_rad2, unit):
+    consistency = latched(Cause.VELOCITY_WRONG).consistency
+    means = consistency.means._replace(
+        moved_rad2=moved_rad2, reported_rad2=reported_rad2, apart_rad2=0.005
+    )
+    found = told(Cause.VELOCITY_WRONG, consistency={"means": means})
+    assert (found.value, found.limit) == (pytest.approx(2.0), WRONG_GAIN)
+    assert (found.unit, found.duration_s) == (unit, SQUARED_S)
 
 
 @pytest.mark.parametrize(
