@@ -6,6 +6,10 @@ and the low-pass F of the settings (`rigidimeter.dynamics.linear_loop`). From on
     p − F M' = B_c c(k) + β (c(k) − c(k − 1)),    β = B_c d / (1 − d),    d = e^(−B_c T/J_c)
 
 so inertia and damping follow from a recorded command by least squares.
+
+A movement that is imposed beside the perturbation adds a line to the command that no torque asked
+for. The line at which the two differ most is therefore left out: a wrong controller is as wrong at
+all the others.
 """
 
 from __future__ import annotations
@@ -27,6 +31,12 @@ from rigidimeter.settings import ControllerSettings
 
 COMPARED_HZ = (0.5, 10.0)
 """Below, the start of the epoch still counts; above, how the torque is held between its samples."""
+
+LINE_BINS = 2
+"""Half the width of a line in the window."""
+
+LEAST_LEFT = 0.01
+"""Of the command's power: with less beside that line, the line is compared too."""
 
 FORGOTTEN_S = 1.0
 """So long after a stretch that is left out the comparison counts in full again."""
@@ -54,11 +64,8 @@ class CommandMade:
 
         In % of the command, and as a factor of it; NaN where nothing was commanded.
         """
-        decay, gain = admittance(
-            controller.inertia_kg_m2, controller.damping_nm_s_rad, 1.0 / self.rate_hz
-        )
-        expected = signal.lfilter([gain], [1.0, -decay], self.asked_nm)
-        sent, made = self._lines(self.command_rad_s, expected)
+        both = self._both(controller)
+        sent, made = both[:, self._kept(*both)]
         power = float(np.sum(np.abs(sent) ** 2))
         if power == 0.0:
             return np.nan, np.nan
@@ -68,9 +75,9 @@ class CommandMade:
     def shown(self, controller: ControllerSettings) -> ControllerSettings | None:
         """Return the controller with the inertia and damping that fit best, if there are such."""
         command = self.command_rad_s
-        sent, step, asked = self._lines(
-            command, np.diff(command, prepend=command[0]), self.asked_nm
-        )
+        step_rad_s = np.diff(command, prepend=command[0])
+        kept = self._kept(*self._both(controller))
+        sent, step, asked = self._lines(command, step_rad_s, self.asked_nm)[:, kept]
         columns = np.stack([sent, step], axis=1)
         stacked = np.concatenate([columns.real, columns.imag])
         wanted = np.concatenate([asked.real, asked.imag])
@@ -82,6 +89,22 @@ class CommandMade:
             inertia *= damping / beta / np.log1p(damping / beta)
         values = {"inertia_kg_m2": float(inertia), "damping_nm_s_rad": max(damping, 0.0)}
         return controller.model_copy(update=values)
+
+    def _both(self, controller: ControllerSettings) -> NDArray[np.complex128]:
+        """Return the lines of the command and of what a controller makes."""
+        decay, gain = admittance(
+            controller.inertia_kg_m2, controller.damping_nm_s_rad, 1.0 / self.rate_hz
+        )
+        made_rad_s = signal.lfilter([gain], [1.0, -decay], self.asked_nm)
+        return self._lines(self.command_rad_s, made_rad_s)
+
+    @staticmethod
+    def _kept(sent: NDArray[np.complex128], made: NDArray[np.complex128]) -> NDArray[np.bool_]:
+        """Return which lines are compared: all but the one at which the two differ most."""
+        kept = np.abs(np.arange(sent.size) - np.argmax(np.abs(sent - made))) > LINE_BINS
+        power = np.abs(sent) ** 2
+        enough = np.sum(power[kept]) > LEAST_LEFT * np.sum(power)
+        return kept if enough else np.ones(sent.size, dtype=np.bool_)
 
     def _lines(self, *signals: Array) -> NDArray[np.complex128]:
         first, last = (int(edge * self.window.size / self.rate_hz) for edge in COMPARED_HZ)

@@ -7,7 +7,9 @@ import pytest
 
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.estimation import fit_epochs
+from rigidimeter.estimation.closedloop.observation import loop_of
 from rigidimeter.estimation.diagnostics import checked
+from rigidimeter.estimation.diagnostics.controller_used import command_made
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.settings import changed_settings, parse_settings
 from rigidimeter.virtual.batch import simulate_epochs
@@ -74,6 +76,22 @@ def test_a_controller_given_per_degree_is_named_with_the_one_that_the_recording_
     for part in ("[controller] inertia_kg_m2 and damping_nm_s_rad", "per degree"):
         assert part in both["controller_misfit"].remedy
     assert "the recording shows 0.0458 kg·m² and 1.6 N·m·s/rad" in both["controller_misfit"].remedy
+
+
+@pytest.mark.parametrize("imposed_rad_s", [0.0, 0.33])
+def test_a_movement_that_is_imposed_beside_the_perturbation_is_no_other_controller(imposed_rad_s):
+    epoch, settings, _ = fitted("bandlimited", {})
+    command = epoch.channels["velocity_command_rad_s"]
+    moved = command.values + imposed_rad_s * np.sin(2 * np.pi * 0.53 * command.time_s)
+    channels = {**epoch.channels, "velocity_command_rad_s": replace(command, values=moved)}
+    loop = loop_of(settings, epoch.channels["torque_nm"].rate_hz, None)
+    made = command_made(replace(epoch, channels=channels), loop)
+    assert made.misfit(loop.controller)[0] < 5.0
+    other = loop.controller.model_copy(update=WRONG["controller"])
+    assert made.misfit(other)[0] == pytest.approx(50.0, abs=5.0)
+    shown = made.shown(other)
+    assert shown.inertia_kg_m2 == pytest.approx(loop.controller.inertia_kg_m2, rel=0.05)
+    assert shown.damping_nm_s_rad == pytest.approx(loop.controller.damping_nm_s_rad, rel=0.05)
 
 
 @pytest.mark.parametrize("times", [10.0, 57.3])
