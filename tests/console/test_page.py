@@ -168,6 +168,31 @@ def test_a_session_from_the_form_to_its_end(console, chromium):
     assert np.unique(ticks).size == ticks.size
 
 
+PRESS_AT_ONCE = """() => {
+  const button = document.getElementById("emergency");
+  const waiting = setInterval(() => {
+    if (button.disabled) return;
+    clearInterval(waiting);
+    window.pressed = document.getElementById("state").textContent;
+    button.dispatchEvent(new PointerEvent("pointerdown"));
+  }, 5);
+}"""
+
+
+def test_the_emergency_stop_works_before_the_first_tick(console, chromium):
+    desk = console()
+    page = open_page(chromium, desk)
+    fill(page, "subject", "S01")
+    fill(page, "operator", "Op")
+    page.evaluate(PRESS_AT_ONCE)
+    page.get_by_role("button", name="Start session").click()
+    page.wait_for_function("document.getElementById('state').textContent.startsWith('ended')")
+    assert page.evaluate("window.pressed").startswith("starting")
+    assert "emergency stop was pressed" in text(page, "banner")
+    for folder in desk.sessions.glob("*/samples.arrows"):
+        assert not np.any(read_samples(folder)["velocity_command_rad_s"])
+
+
 def test_the_emergency_stop_stops(console, chromium, lateness):
     desk = console()
     page = open_page(chromium, desk)

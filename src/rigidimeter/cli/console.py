@@ -149,6 +149,7 @@ def lead_session(desk: Desk, request: StartRequest, realtime: Realtime) -> Ended
         require_packages(planned.settings)
         planned = planned.blinded() if planned.about.get("blinded") else planned
         look = desk.console(planned.shown(virtual=rig is None), folder)
+        desk.refuse_stopped()
         ended = run_planned(planned, folder, rig, realtime, look, desk.operator_seen_ns)
         desk.told_to_end = bool(ended.signals)
         good, of = count_epochs(ended.folder)

@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.acquisition.processes.status_values import Flag
 from rigidimeter.acquisition.run_states import State
 from rigidimeter.console.page.presence import Presence
 from rigidimeter.console.session_plan import SessionPlan
+from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings
 
 
@@ -104,6 +106,7 @@ class Desk:
         self.starting = ""
         self.checking = ""
         self.check_stopped = False
+        self.stop_pressed = False
         self.told_to_end = False
         self._now_ns = now_ns
         self._requests: queue.SimpleQueue[StartRequest] = queue.SimpleQueue()
@@ -133,6 +136,10 @@ class Desk:
         """Stop the check of the rig, if one runs."""
         self.check_stopped = True
 
+    def press_stop(self) -> None:
+        """Keep the emergency stop for a session that starts and is not in shared memory yet."""
+        self.stop_pressed = self.in_session
+
     def end_check(self) -> None:
         """Give the rig back."""
         self.checking = ""
@@ -141,7 +148,7 @@ class Desk:
         """Ask for a session; return False if something else has the rig."""
         if self.busy:
             return False
-        self.starting = request.folder
+        self.starting, self.stop_pressed = request.folder, False
         self._requests.put(request)
         return True
 
@@ -155,12 +162,24 @@ class Desk:
             except queue.Empty:
                 continue
 
+    def refuse_stopped(self) -> None:
+        """Refuse a session whose start the emergency stop has ended.
+
+        Raises
+        ------
+        UserError
+        """
+        if self.stop_pressed:
+            raise UserError("the emergency stop was pressed while the session started")
+
     def console(self, plan: SessionPlan, folder: Path) -> Callable[[SessionMemory], None]:
         """Return what `supervise` calls about 20 times a second."""
         self._count += 1
         self._still = True
 
         def look(shared: SessionMemory) -> None:
+            if self.stop_pressed:
+                shared.status.raise_flag(Flag.EMERGENCY_STOP)
             loop = shared.status.loop()
             self._still = loop is None or loop.tick < 0 or loop.state == State.PAUSED
             if self.running is None:
@@ -176,4 +195,5 @@ class Desk:
         """Say how the session ended."""
         self.finished = FinishedSession(self._count, folder, outcome, sentences)
         self.running = None
+        self.stop_pressed = False
         self.starting = ""

@@ -49,6 +49,8 @@ MOST_NOTES = 20
 """Notes that wait for the loop to take them."""
 
 _HELLO_S = 5.0
+_NOTE = '{"kind":"note"'
+"""How the page begins a note. Each has one answer: whether it was taken."""
 
 
 @dataclass(eq=False)
@@ -143,7 +145,8 @@ class LiveSockets:
         try:
             self._obey(page, parse_message(text))
         except (RefusedMessage, ValueError) as error:
-            page.tell(json.dumps({"say": str(error)}))
+            is_note = text.startswith(_NOTE)
+            page.tell(_refused(str(error)) if is_note else json.dumps({"say": str(error)}))
 
     def _obey(self, page: _Page, message: Message) -> None:
         """Do what a page in control says; a page that looks is told so."""
@@ -157,7 +160,8 @@ class LiveSockets:
         if message.kind == "hello":
             return
         if not presence.has_control(page.secret):
-            page.tell(json.dumps({"say": "this page can only look: another one has control"}))
+            why = "this page can only look: another one has control"
+            page.tell(_refused(why) if message.kind == "note" else json.dumps({"say": why}))
             return
         if message.kind == "leave":
             presence.leave(page.secret, now_ns)
@@ -165,6 +169,10 @@ class LiveSockets:
             self._desk.stop_check()
         attached = self._attached
         if attached is None:
+            if message.kind == "emergency":
+                self._desk.press_stop()
+            elif message.kind == "note":
+                page.tell(_refused("no session runs, so nothing was noted"))
             return
         status = attached.memory.status
         if message.kind == "emergency":
@@ -179,8 +187,9 @@ class LiveSockets:
             if len(attached.notes) < MOST_NOTES:
                 attached.notes.append(json_line(message.note).decode())
                 attached.post_notes()
+                page.tell(json.dumps({"noted": True}))
             else:
-                page.tell(json.dumps({"say": "the loop takes no notes now; write it again later"}))
+                page.tell(_refused("the loop takes no notes now; send it again later"))
 
     async def pump(self) -> None:
         """Send samples and state to every page, for ever."""
@@ -231,6 +240,10 @@ class LiveSockets:
         for page in self._pages:
             control = desk.presence.has_control(page.secret)
             page.tell(json.dumps({"state": state, "control": control}))
+
+
+def _refused(why: str) -> str:
+    return json.dumps({"noted": False, "say": why})
 
 
 async def _send(page: _Page) -> None:

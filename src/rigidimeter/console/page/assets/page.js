@@ -7,7 +7,7 @@
   const random = () => Array.from(crypto.getRandomValues(new Uint8Array(18)), (b) => b.toString(16).padStart(2, "0")).join("");
   const tab = sessionStorage.getItem("rig-tab") || random();
   sessionStorage.setItem("rig-tab", tab);
-  let page = "", socket = null, control = false, away = false, heard = 0, rated = null, seen = null;
+  let page = "", socket = null, control = false, away = false, heard = 0, rated = null, seen = null, asked = null;
 
   const say = (message) => { if (socket && socket.readyState === 1) socket.send(JSON.stringify(message)); };
   const node = (name, className, text) => { const made = document.createElement(name); made.className = className; if (text) made.textContent = text; return made; };
@@ -27,7 +27,7 @@
     socket.binaryType = "arraybuffer";
     socket.onopen = () => { heard = performance.now(); say({ kind: "hello", page, tab }); };
     socket.onmessage = (event) => typeof event.data === "string" ? told(JSON.parse(event.data)) : traces.samples(event.data);
-    socket.onclose = () => { control = false; setTimeout(connect, 200); };
+    socket.onclose = () => { control = false; noted(false); setTimeout(connect, 200); };
   }
 
   function view(name) {
@@ -47,12 +47,14 @@
 
   function told(message) {
     heard = performance.now();
+    if (message.noted !== undefined) noted(message.noted);
     if (message.say) return remark(message.say);
+    if (!message.state) return;
     control = message.control;
     const { session, finished, starting, checking } = message.state;
     $("take").hidden = control;
     show("role", control ? "" : "this page can only look");
-    $("emergency").disabled = !(control && (session || checking));
+    $("emergency").disabled = !(control && (session || checking || starting));
     $("save-form").hidden = !(control && session && session.save);
     const can = session ? session.orders : [];
     for (const one of document.querySelectorAll("[data-order]")) one.disabled = !control || !can.includes(one.dataset.order);
@@ -107,7 +109,20 @@
   function clear() { traces.clear(); rated = null; show("rated", "–"); $("said").replaceChildren(); $("limits").replaceChildren(); }
 
   function leave() { away = true; say({ kind: "leave" }); }
-  function note(what, text) { say({ kind: "note", what, text, by: "" }); remark(`${what}: ${text}`); }
+  // What the server took is shown as noted, and only then is its field emptied.
+  function note(said, text, field) {
+    if (asked) return;
+    if (!connected()) return remark(`not noted, there is no connection: ${text}`);
+    asked = { text, field, value: field && field.value };
+    say({ kind: "note", ...said });
+  }
+  function noted(taken) {
+    if (!asked) return;
+    const { text, field, value } = asked;
+    asked = null;
+    remark(taken ? text : `not noted: ${text}`);
+    if (taken && field && field.value === value) field.value = "";
+  }
   function emergency() { say({ kind: "emergency" }); if (!$("emergency").disabled) remark("emergency stop"); }
 
   function score(text) {
@@ -124,18 +139,16 @@
     $("emergency").onclick = (event) => { if (event.detail === 0) emergency(); };
     addEventListener("keydown", (event) => { if (event.key === "Escape") emergency(); }, true);
     $("take").onclick = () => socket.close();
-    $("note-form").onsubmit = (event) => { event.preventDefault(); if ($("note").value.trim()) note("note", $("note").value); $("note").value = ""; };
+    $("note-form").onsubmit = (event) => { event.preventDefault(); const text = $("note").value; if (text.trim()) note({ what: "note", text, by: "" }, `note: ${text}`, $("note")); };
     $("save-form").onsubmit = (event) => { event.preventDefault(); say({ kind: "save", folder: $("save-folder").value }); };
-    $("mark").onclick = () => note("mark", "moment marked");
+    $("mark").onclick = () => note({ what: "mark", text: "moment marked", by: "" }, "mark: moment marked");
     $("rating-form").onsubmit = (event) => {
       event.preventDefault();
       const value = score($("score").value), by = $("examiner").value.trim();
       if (rated === null) return remark("there is no epoch to rate yet");
       if (value === null) return remark(`${$("score").value || "an empty score"} is no score: write a number like 1.5 or 1,5`);
       if (!by) return remark("a rating needs the examiner's name or code");
-      say({ kind: "note", what: "rating", text: "", by, epoch: rated.number, score: value });
-      remark(`rating of epoch ${rated.place}: ${value} by ${by}`);
-      $("score").value = "";
+      note({ what: "rating", text: "", by, epoch: rated.number, score: value }, `rating of epoch ${rated.place}: ${value} by ${by}`, $("score"));
     };
     addEventListener("pagehide", leave);
     document.addEventListener("visibilitychange", () => { if (document.hidden) leave(); else away = false; });
