@@ -185,12 +185,15 @@ def test_the_emergency_stop_works_before_the_first_tick(console, chromium):
     fill(page, "subject", "S01")
     fill(page, "operator", "Op")
     page.evaluate(PRESS_AT_ONCE)
+    before = {*desk.sessions.glob("*/samples.arrows")}
     page.get_by_role("button", name="Start session").click()
-    page.wait_for_function("document.getElementById('state').textContent.startsWith('ended')")
+    page.wait_for_function(
+        "window.pressed && document.getElementById('state').textContent.startsWith('ended')"
+    )
     assert page.evaluate("window.pressed").startswith("starting")
     assert "emergency stop was pressed" in text(page, "banner")
-    for folder in desk.sessions.glob("*/samples.arrows"):
-        assert not np.any(read_samples(folder)["velocity_command_rad_s"])
+    for path in {*desk.sessions.glob("*/samples.arrows")} - before:
+        assert not np.any(read_samples(path)["velocity_command_rad_s"])
 
 
 def test_the_emergency_stop_stops(console, chromium, lateness):

@@ -50,7 +50,7 @@ MOST_NOTES = 20
 
 _HELLO_S = 5.0
 _NOTE = '{"kind":"note"'
-"""How the page begins a note. Each has one answer: whether it was taken."""
+"""How the page begins a note. Each has one answer while a session runs: whether it was taken."""
 
 
 @dataclass(eq=False)
@@ -171,8 +171,6 @@ class LiveSockets:
         if attached is None:
             if message.kind == "emergency":
                 self._desk.press_stop()
-            elif message.kind == "note":
-                page.tell(_refused("no session runs, so nothing was noted"))
             return
         status = attached.memory.status
         if message.kind == "emergency":

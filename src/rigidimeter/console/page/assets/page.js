@@ -60,6 +60,7 @@
     for (const one of document.querySelectorAll("[data-order]")) one.disabled = !control || !can.includes(one.dataset.order);
     for (const one of document.querySelectorAll("#note-form *, #rating-form *")) one.disabled = !control || !session;
     if (session) return during(session);
+    noted(false);
     show("state", starting ? `starting ${starting} …` : checking ? checking : finished ? `ended: ${finished.outcome}` : "no session runs");
     const key = finished ? `ended ${finished.number}` : starting ? `starting ${starting}` : "";
     if (seen !== key) {
