@@ -52,13 +52,23 @@ def open_regular(path: Path, most_bytes: int) -> io.BufferedReader:
         If there is none, it is not a regular file (a pipe or a device may never end), it is larger
         than its bound, or it cannot be opened.
     """
+    with ExitStack() as on_failure:
+        file = on_failure.enter_context(_opened(path, most_bytes))
+        if _noted.get() is not None:
+            with refused(path, "cannot be read"):
+                _note(path, hashlib.file_digest(file, "sha256").hexdigest())
+                file.seek(0)
+        on_failure.pop_all()
+    return file
+
+
+def _opened(path: Path, most_bytes: int) -> io.BufferedReader:
     try:
         _check(path, os.stat(path), most_bytes)
         # Another file may have this name by now; without O_NONBLOCK a pipe waits for its writer.
         with ExitStack() as on_failure:
             file = on_failure.enter_context(open(path, "rb", opener=_without_waiting))
             _check(path, os.fstat(file.fileno()), most_bytes)
-            _note(path, file)
             on_failure.pop_all()
         return file
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
@@ -85,13 +95,9 @@ def noted_digests() -> Iterator[dict[Path, str]]:
         _noted.reset(token)
 
 
-def _note(path: Path, file: io.BufferedReader) -> None:
+def _note(path: Path, digest: str) -> None:
     noted = _noted.get()
-    if noted is None:
-        return
-    digest = hashlib.file_digest(file, "sha256").hexdigest()
-    file.seek(0)
-    if noted.setdefault(path, digest) != digest:
+    if noted is not None and noted.setdefault(path, digest) != digest:
         raise UserError(f"{path}: was changed while it was read; run the command again")
 
 
@@ -114,9 +120,12 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
     UserError
         As `open_regular`.
     """
-    with open_regular(path, most_bytes) as file, refused(path, "cannot be read"):
+    with _opened(path, most_bytes) as file, refused(path, "cannot be read"):
         # Not read(most_bytes), which would make room for as much.
-        return file.read(os.fstat(file.fileno()).st_size)
+        content = file.read(os.fstat(file.fileno()).st_size)
+    if _noted.get() is not None:
+        _note(path, hashlib.sha256(content).hexdigest())
+    return content
 
 
 def read_json(path: Path) -> Any:

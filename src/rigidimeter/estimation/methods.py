@@ -105,8 +105,19 @@ def _answered(prepared: PreparedEpoch) -> bool:
         return True  # the fit says why
 
 
+def prepared_signals(prepared: PreparedEpoch, method: str) -> Signals:
+    """Return the signals that a method fitted; those of ``bandlimited`` where it fits none.
+
+    Raises
+    ------
+    ValueError
+        If the epoch cannot be fitted; the text says why.
+    """
+    return prepared.signals(method_named(method).signals or bandlimited_signals)
+
+
 def epoch_signals(epoch: Epoch, method: str, settings: EstimationSettings) -> Signals:
-    """Return the signals that a method fits; those of ``bandlimited`` where it fits none.
+    """Return `prepared_signals` of an epoch alone, whose drive is not known.
 
     Raises
     ------

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.estimation import epoch_signals, scoring_cycles
+from rigidimeter.estimation.methods import prepared_signals
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.scores import cycles_of
 from rigidimeter.records import Fit, Score
@@ -97,7 +98,11 @@ def _trace(
         return None
     try:
         if isinstance(one, Fit):
-            signals = epoch_signals(epoch, one.method, result.settings.estimation)
+            signals = (
+                epoch_signals(epoch, one.method, result.settings.estimation)
+                if prepared is None
+                else prepared_signals(prepared, one.method)
+            )
             model = signals.motion @ np.asarray(one.value)
             series = {
                 "torque": signals.torque_nm,

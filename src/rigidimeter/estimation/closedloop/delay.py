@@ -23,7 +23,12 @@ from rigidimeter.estimation.closedloop.linear_problems import (
     instrumental,
 )
 from rigidimeter.estimation.closedloop.observation import Observation
-from rigidimeter.estimation.closedloop.refine import LineFit, fit_pooled
+from rigidimeter.estimation.closedloop.refine import (
+    LineFit,
+    PooledSolution,
+    solve_pooled,
+    with_uncertainty,
+)
 from rigidimeter.estimation.signals import Array
 
 SCAN_STEP_S = 0.005
@@ -97,29 +102,29 @@ def estimate_delay(
     # The valleys of the scan, the deepest first, and none: the subject may have dug the deepest.
     inner = np.r_[True, left[1:] < left[:-1]] & np.r_[left[:-1] < left[1:], True]
     valleys = sorted(np.flatnonzero(inner), key=lambda i: left[i])[:MOST_VALLEYS]
-    best: LineFit | None = None
+    best: PooledSolution | None = None
     for near_s in dict.fromkeys([*(float(delays[i]) for i in valleys), 0.0]):
         near = _solved(observations, problems, near_s)
         try:
-            fit, _ = fit_pooled(observations, delayed(linearise), np.append(near, near_s))
+            found = solve_pooled(observations, delayed(linearise), np.append(near, near_s))
         except ValueError:
             continue  # nothing settles from there
-        if abs(fit.values[-1]) > longest_s or fit.values[0] <= 0:
+        if abs(found.values[-1]) > longest_s or found.values[0] <= 0:
             continue  # no joint has a negative inertia
-        if best is None or unlikeliness(fit) < unlikeliness(best):
-            best = fit
+        if best is None or _unlikeliness(found) < _unlikeliness(best):
+            best = found
     if best is None:
         raise ValueError("no delay explains the torque")
-    return best
+    return with_uncertainty(best)
 
 
-def unlikeliness(fit: LineFit) -> float:
+def _unlikeliness(found: PooledSolution) -> float:
     """Return Σ log S over the lines: twice the Whittle log-likelihood's negative, but a constant.
 
     Every line counts by the logarithm of what is left in it, so a subject who pushes slowly and
     strongly does not outvote the lines above.
     """
-    return float(np.sum(np.log(fit.shape.density)))
+    return float(np.sum(np.log(found.shape.density)))
 
 
 def _solved(

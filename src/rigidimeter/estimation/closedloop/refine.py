@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigidimeter.estimation.closedloop.between_doubt import moved_elsewhere
 from rigidimeter.estimation.closedloop.line_noise import (
@@ -23,14 +22,19 @@ from rigidimeter.estimation.closedloop.line_noise import (
     Smoother,
     drawn_lines,
     line_covariance,
-    power_on,
 )
-from rigidimeter.estimation.closedloop.linear_problems import Linearise, Problem
+from rigidimeter.estimation.closedloop.line_weights import (
+    condition_number,
+    scaled_inverse,
+    shared_density,
+    smoother_for,
+    variance_bound,
+    weighted_instruments,
+)
+from rigidimeter.estimation.closedloop.linear_problems import Complex, Linearise, Problem
 from rigidimeter.estimation.closedloop.observation import Observation
 from rigidimeter.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.estimation.signals import Array
-
-Complex = NDArray[np.complex128]
 
 ITERATIONS = 25
 CONVERGED = 0.02
@@ -46,12 +50,6 @@ this fraction of the parameter itself, means that there is no solution."""
 
 BOOTSTRAP_SEED = 1
 """The same epochs give the same interval every time."""
-
-ENOUGH_LINES = 9
-"""How many lines, over epochs and neighbours, the power of the noise is averaged over at least."""
-
-NEIGHBOURS = 0.1
-"""And over neighbours within this fraction of a line's own number."""
 
 ENOUGH_EPOCHS = 10
 """From this many epochs on, the scatter between them alone gives the covariance of the pooled
@@ -98,6 +96,34 @@ class LineFit:
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
 
 
+@dataclass(frozen=True)
+class PooledSolution:
+    """Parameters that epochs share, where the iteration settled.
+
+    Attributes
+    ----------
+    values : array, shape (p,)
+    shape : Shape
+    bound : array, shape (p, p)
+        As in `LineFit`.
+    problems : sequence of Problem
+        At the solution.
+    everything : sequence of Lines
+    weighted : sequence of array
+        U of each epoch.
+    inverse : array, shape (p, p)
+        C.
+    """
+
+    values: Array
+    shape: Shape
+    bound: Array
+    problems: Sequence[Problem]
+    everything: Sequence[Lines]
+    weighted: Sequence[Complex]
+    inverse: Array
+
+
 def fit_single(
     observation: Observation,
     linearise: Linearise,
@@ -128,7 +154,7 @@ def fit_single(
         iteration does not settle.
     """
     lines = observation.lines
-    smoother = _smoother([lines])
+    smoother = smoother_for([lines])
     values = np.array(start, dtype=np.float64)
     weight_from = shape
     fixed = problem is not None
@@ -136,14 +162,14 @@ def fit_single(
         if problem is None or not fixed:
             (problem,) = linearise([observation], values)
         if shape is None and iteration < UNDAMPED:
-            weight_from = _density([lines], [problem], values, smoother)
+            weight_from = shared_density([lines], [problem], values, smoother)
         assert weight_from is not None
         weighted = problem.instruments / weight_from.at(lines)[:, None]
-        inverse = _inverse((weighted.conj().T @ problem.regressors).real)
+        inverse = scaled_inverse((weighted.conj().T @ problem.regressors).real)
         step = inverse @ (weighted.conj().T @ problem.target).real - values
         step = step * (1.0 if iteration < UNDAMPED else 0.5)
         values = values + step
-        scale = np.sqrt(np.diag(_bound([problem], [lines], [weighted])))
+        scale = np.sqrt(np.diag(variance_bound([problem], [lines], [weighted])))
         if np.all(np.abs(step) < CONVERGED * scale):
             break
     assert problem is not None
@@ -162,8 +188,8 @@ def fit_single(
         values,
         spread * covariance,
         degrees / spread,
-        _bound([problem], [lines], [problem.instruments / own[:, None]]),
-        _condition([problem], [lines], weight_from),
+        variance_bound([problem], [lines], [problem.instruments / own[:, None]]),
+        condition_number([problem], [lines], weight_from),
         weight_from,
         moved_elsewhere([problem], [weight_from.at(lines)], values),
         values + np.sqrt(spread) * drawn_lines(inverse, weighted, residual, _rng(), draws)
@@ -186,40 +212,57 @@ def fit_pooled(
     ValueError
         If the perturbation did not move the joint enough to tell the parameters apart.
     """
+    solution = solve_pooled(observations, linearise, start)
+    return with_uncertainty(solution, draws), list(solution.problems)
+
+
+def solve_pooled(
+    observations: Sequence[Observation], linearise: Linearise, start: Array
+) -> PooledSolution:
+    """Iterate until weights and linearisation of epochs that share the joint no longer change.
+
+    Raises
+    ------
+    ValueError
+        As `fit_pooled`.
+    """
     everything = [observation.lines for observation in observations]
-    smoother = _smoother(everything)
+    smoother = smoother_for(everything)
     values = np.array(start, dtype=np.float64)
     for iteration in range(ITERATIONS):
         problems = linearise(observations, values)
         if iteration < UNDAMPED:
-            shape = _density(everything, problems, values, smoother)
+            shape = shared_density(everything, problems, values, smoother)
         gram = np.zeros((values.size, values.size))
         moment = np.zeros(values.size)
-        weighted = _weighted(problems, everything, shape)
+        weighted = weighted_instruments(problems, everything, shape)
         for problem, own in zip(problems, weighted, strict=True):
             gram += (own.conj().T @ problem.regressors).real
             moment += (own.conj().T @ problem.target).real
-        inverse = _inverse(gram)
+        inverse = scaled_inverse(gram)
         step = (inverse @ moment - values) * (1.0 if iteration < UNDAMPED else 0.5)
         values = values + step
-        bound = _bound(problems, everything, weighted)
+        bound = variance_bound(problems, everything, weighted)
         if np.all(np.abs(step) < CONVERGED * np.sqrt(np.diag(bound))):
             break
     _refuse_unsettled(step, np.sqrt(np.diag(bound)), values)
-    covariance, degrees, errors = _pooled_covariance(
-        problems, everything, shape, weighted, inverse, values, draws
-    )
-    fit = LineFit(
+    return PooledSolution(values, shape, bound, problems, everything, weighted, inverse)
+
+
+def with_uncertainty(solution: PooledSolution, draws: int = 0) -> LineFit:
+    """Return a solution with its covariance and, if draws are asked for, parameters drawn."""
+    everything, shape, values = solution.everything, solution.shape, solution.values
+    covariance, degrees, errors = _pooled_covariance(solution, draws)
+    return LineFit(
         values,
         covariance,
         degrees,
-        bound,
-        _condition(problems, everything, shape),
+        solution.bound,
+        condition_number(solution.problems, everything, shape),
         shape,
-        moved_elsewhere(problems, [shape.at(lines) for lines in everything], values),
+        moved_elsewhere(solution.problems, [shape.at(lines) for lines in everything], values),
         values + errors if draws else None,
     )
-    return fit, problems
 
 
 def _refuse_unsettled(step: Array, scale: Array, values: Array) -> None:
@@ -234,26 +277,19 @@ def _rng() -> np.random.Generator:
     return np.random.default_rng(BOOTSTRAP_SEED)
 
 
-def _pooled_covariance(
-    problems: Sequence[Problem],
-    everything: Sequence[Lines],
-    shape: Shape,
-    everywhere: Sequence[Complex],
-    inverse: Array,
-    values: Array,
-    draws: int,
-) -> tuple[Array, Array, Array]:
+def _pooled_covariance(solution: PooledSolution, draws: int) -> tuple[Array, Array, Array]:
     """Return covariance, degrees of freedom and, if draws are asked for, errors drawn."""
-    p, count = values.size, len(problems)
+    shape, inverse, values = solution.shape, solution.inverse, solution.values
+    p, count = values.size, len(solution.problems)
     moments = np.empty((count, p))
     of_lines = np.zeros((p, p))
     squares = np.zeros(p)
     errors, rng = np.zeros((draws, p)), _rng()
     smoothers: dict[int, Smoother] = {}
     for i, (problem, lines, weighted) in enumerate(
-        zip(problems, everything, everywhere, strict=True)
+        zip(solution.problems, solution.everything, solution.weighted, strict=True)
     ):
-        smoother = smoothers.setdefault(id(lines.grid.line), _smoother([lines]))
+        smoother = smoothers.setdefault(id(lines.grid.line), smoother_for([lines]))
         residual = problem.target - problem.regressors @ values
         moments[i] = (weighted.conj().T @ residual).real
         part, degrees = line_covariance(inverse, weighted, residual, smoother, shape.at(lines))
@@ -275,72 +311,3 @@ def _pooled_covariance(
     scale = np.sqrt(np.maximum(np.diag(between) / np.diag(of_lines), 1.0))
     covariance = of_lines * np.outer(scale, scale)
     return covariance, np.where(wider, count - 1.0, degrees_of_lines), errors * scale
-
-
-def _smoother(everything: Sequence[Lines]) -> Smoother:
-    needed = -(-ENOUGH_LINES // len(everything))
-    return Smoother.over(everything[0].grid.line, needed // 2, NEIGHBOURS)
-
-
-def _density(
-    everything: Sequence[Lines],
-    problems: Sequence[Problem],
-    values: Array,
-    smoother: Smoother,
-) -> Shape:
-    """Return the mean power of the residuals on the lines of the first epoch, smoothed."""
-    omega = everything[0].grid.omega_rad_s
-    total = np.zeros(omega.size)
-    for lines, problem in zip(everything, problems, strict=True):
-        residual = problem.target - problem.regressors @ values
-        total += power_on(omega, lines.grid.omega_rad_s, np.abs(residual) ** 2)
-    density = smoother(total / len(everything))
-    if not np.all(density > 0):
-        raise ValueError("the fit leaves nothing at some frequencies: are the channels simulated?")
-    return Shape(omega, density)
-
-
-def _weighted(
-    problems: Sequence[Problem], everything: Sequence[Lines], shape: Shape
-) -> list[Complex]:
-    """Return U of each epoch: the same array for those that share instruments and lines."""
-    made: dict[tuple[int, int], Complex] = {}
-    found = []
-    for problem, lines in zip(problems, everything, strict=True):
-        key = id(problem.instruments), id(lines.grid.omega_rad_s)
-        if key not in made:
-            made[key] = problem.instruments / shape.at(lines)[:, None]
-        found.append(made[key])
-    return found
-
-
-def _bound(
-    problems: Sequence[Problem], everything: Sequence[Lines], weighted: Sequence[Complex]
-) -> Array:
-    """Return (2 Σ Re(Z^H Z) / S)⁻¹."""
-    p = problems[0].instruments.shape[1]
-    information = np.zeros((p, p))
-    made: dict[int, Array] = {}
-    for problem, lines, own in zip(problems, everything, weighted, strict=True):
-        if id(own) not in made:
-            made[id(own)] = 2 * (own.conj().T @ problem.instruments).real
-        information += made[id(own)] / lines.grid.spread
-    return _inverse(information)
-
-
-def _condition(problems: Sequence[Problem], everything: Sequence[Lines], shape: Shape) -> float:
-    rows = problems[0].instruments / np.sqrt(shape.at(everything[0]))[:, None]
-    stacked = np.concatenate([rows.real, rows.imag])
-    singular = np.linalg.svd(stacked / np.linalg.norm(stacked, axis=0), compute_uv=False)
-    return float(singular[0] / singular[-1])
-
-
-def _inverse(matrix: Array) -> Array:
-    """Invert a small matrix whose columns differ by orders of magnitude."""
-    scale = np.sqrt(np.abs(np.diag(matrix)))
-    if not np.all(np.isfinite(matrix)) or not np.all(scale > 0):
-        raise ValueError("the perturbation did not move the joint")
-    scaled = matrix / np.outer(scale, scale)
-    if np.linalg.cond(scaled) > 1e10:
-        raise ValueError("the motion that the perturbation causes cannot distinguish J, B and K")
-    return np.asarray(np.linalg.inv(scaled) / np.outer(scale, scale), dtype=np.float64)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from rigidimeter.estimation.closedloop.line_noise import Smoother
+from rigidimeter.estimation.closedloop.line_weights import ENOUGH_LINES, NEIGHBOURS
 from rigidimeter.estimation.closedloop.linear_problems import LEAST
 from rigidimeter.estimation.closedloop.observation import (
     Observation,
@@ -23,7 +24,6 @@ from rigidimeter.estimation.closedloop.observation import (
     observe,
     observe_motion,
 )
-from rigidimeter.estimation.closedloop.refine import ENOUGH_LINES, NEIGHBOURS
 from rigidimeter.estimation.closedloop.spectral_lines import Grid
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array
