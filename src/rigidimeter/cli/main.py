@@ -6,6 +6,7 @@ Modules of the command line import heavy libraries inside their functions, so th
 
 from __future__ import annotations
 
+import gc
 import io
 import os
 import signal
@@ -131,6 +132,8 @@ def main() -> None:
     # Before NumPy is imported: matrices here are small, and a second thread mostly waits, in a busy
     # loop, for the first.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Each full collection goes over what every imported module made, 50 ms, and finds little.
+    gc.set_threshold(10_000, 10, 10)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT):  # also where a parent ignores it
         signal.signal(number, _terminated)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as `nohup` does, for a long study
