@@ -58,6 +58,7 @@ class AfterView:
         self._root = desk.place.root
         self._shown = -1
         self._ran = False
+        self._computing = False
         self._rows: dict[str, SessionRow] = {}
         self._acts = Acts(
             recover=self._recover,
@@ -224,8 +225,15 @@ class AfterView:
         """Show what a command says of a session, or of the study; return whether it was run."""
         if not self._may_act():
             return False
+        if self._computing:  # by the first click of a double one, or by another button
+            ui.notify("the command before is still computing")
+            return False
+        self._computing = True
         self._answer.set_content("<p>computing …</p>")
-        answer = await self._work.command(command, str(self._root / session), *options)
+        try:
+            answer = await self._work.command(command, str(self._root / session), *options)
+        finally:
+            self._computing = False
         self._answer.set_content(answer.html())
         return True
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from rigidimeter.console.page.desk import Place
 from rigidimeter.errors import UserError
+from rigidimeter.recording.study_toml import STUDY_FILE, read_study_toml
 from rigidimeter.study.extended_folder import extend_study
 
 
@@ -18,3 +19,20 @@ def extended(place: Place) -> list[str]:
         return extend_study(place.root, known=list(place.settings.subject))
     except (UserError, OSError) as error:
         return [f"not in the study: {error}"]
+
+
+def off_scale(place: Place, score: float) -> str:
+    """Return what is to be said of a score outside the study's scale; an empty text of others."""
+    path = place.root / STUDY_FILE
+    if place.one_session or not path.is_file():
+        return ""
+    try:
+        low, high = read_study_toml(path).rating.scale
+    except UserError:
+        return ""  # the reading of the study says why
+    if low <= score <= high:
+        return ""
+    return (
+        f"noted, but {score:g} is outside the scale of {low:g} to {high:g} in {path}: rate the "
+        "epoch again, or change `scale` there; the study cannot be compared until then"
+    )

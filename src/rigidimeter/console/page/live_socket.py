@@ -24,6 +24,7 @@ from rigidimeter.console.band_torque import BandTorque
 from rigidimeter.console.observer import Observer
 from rigidimeter.console.orders import save_to
 from rigidimeter.console.page.desk import Desk, RunningSession
+from rigidimeter.console.page.kept_study import off_scale
 from rigidimeter.console.page.page_messages import Message, RefusedMessage, parse_message
 from rigidimeter.console.page.session_state import is_known, points, session_state
 from rigidimeter.console.trace_reader import TraceReader
@@ -185,7 +186,9 @@ class LiveSockets:
             if len(attached.notes) < MOST_NOTES:
                 attached.notes.append(json_line(message.note).decode())
                 attached.post_notes()
-                page.tell(json.dumps({"noted": True}))
+                score = message.note.get("score")
+                doubt = "" if score is None else off_scale(self._desk.place, score)
+                page.tell(json.dumps({"noted": True} | ({"say": doubt} if doubt else {})))
             else:
                 page.tell(_refused("the loop takes no notes now; send it again later"))
 

@@ -230,6 +230,12 @@ def _numbers(text: str, what: str) -> list[float]:
     parts = [part for part in text.split(";") if part.strip()]
     if not parts:
         raise UserError(f"{what}: write times in s, such as 10; 20")
+    before, comma, behind = text.strip().partition(",")
+    if comma and len(parts) == 1 and len(behind) > 1:
+        raise UserError(
+            f"{what}: {text.strip()} may be one time, {before}.{behind}, or two, "
+            f"{before}; {behind}; write it with a point or a semicolon"
+        )
     return [number(part, what) for part in parts]
 
 

@@ -6,6 +6,7 @@ A process cannot hold up the server, whatever it computes.
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
@@ -17,6 +18,9 @@ from rigidimeter.console.page.rig_steps import RigStep
 from rigidimeter.settings import Settings
 
 LONGEST_S = 300.0
+
+NICENESS = 10
+"""Of a command that computes: a session that is started beside it comes first."""
 
 QUESTION = "question: "
 """With which a command begins a line that somebody must answer."""
@@ -91,6 +95,8 @@ class Work:
                 stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.STDOUT,
             )  # fmt: skip
+            with suppress(ProcessLookupError):  # a session may be started meanwhile
+                os.setpriority(os.PRIO_PROCESS, process.pid, NICENESS)
             try:
                 out, _ = await asyncio.wait_for(process.communicate(), timeout_s)
             except TimeoutError:

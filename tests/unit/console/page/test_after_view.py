@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from nicegui.page import page
 
 from rigidimeter.console.page.after_view import AfterView
 from rigidimeter.console.page.desk import Desk, Place
-from rigidimeter.console.page.work import Work
+from rigidimeter.console.page.work import Answer, Work
 from rigidimeter.recording import SessionWriter
 from rigidimeter.settings import Settings
 
@@ -80,3 +81,26 @@ def test_rows_say_what_is_known_now(client, tmp_path):
     assert "epoch 2 · OFF · prbs · not ended" in words
     assert "still being recorded" not in words
     assert list(shown(client, ui.button).values()).count("Repeat") == 2
+
+
+def test_a_double_click_runs_a_command_once(client, tmp_path):
+    asked = []
+
+    class Slow(Work):
+        async def command(self, *arguments, **_):
+            asked.append(arguments)
+            await asyncio.sleep(0.01)
+            return Answer(True, "done")
+
+    view = AfterView(Desk(Place(tmp_path, Settings(), "")), Slow(), lambda: True, ui.label())
+
+    async def run(command):
+        with client:
+            return await view._command(command, "S01-1")
+
+    async def twice():
+        return await asyncio.gather(run("estimate"), run("estimate"))
+
+    assert asyncio.run(twice()) == [True, False]
+    assert asyncio.run(run("report"))
+    assert [command for command, _ in asked] == ["estimate", "report"]

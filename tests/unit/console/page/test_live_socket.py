@@ -52,6 +52,19 @@ def test_a_note_has_one_answer_that_says_whether_it_was_taken(said):
     assert (answer["noted"], "only look" in answer["say"]) == (False, True)
 
 
+def test_a_rating_outside_the_scale_of_the_study_is_noted_and_said(said, tmp_path):
+    say, _ = said
+    rating = {"kind": "note", "what": "rating", "text": "", "by": "E1", "epoch": 1, "score": 4}
+    assert say(rating) == [{"noted": True}]  # there is no study yet
+    study = 'schema = "rigidimeter.study/1"\ntitle = "E"\nreference = "OFF"\nother = "DBS"\n'
+    (tmp_path / "study.toml").write_text(f"{study}[rating]\nscale = [0, 3]\n", encoding="utf-8")
+    (answer,) = say(rating)
+    assert answer["noted"]
+    assert "4 is outside the scale of 0 to 3" in answer["say"]
+    assert str(tmp_path / "study.toml") in answer["say"]
+    assert say(rating | {"score": 3}) == [{"noted": True}]
+
+
 def test_another_folder_is_taken_when_the_disk_takes_nothing(said, tmp_path):
     say, status = said
     order = {"kind": "save", "folder": str(tmp_path / "disk")}

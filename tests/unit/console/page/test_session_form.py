@@ -36,6 +36,8 @@ def test_numbers_are_read_with_a_comma_and_refused_by_the_settings(form):
     assert entered.settings is not None
     assert entered.settings.prbs.amplitude_nm == 1.5
     assert entered.settings.protocol.rests_s == [10.0, 12.5]
+    errors = read_form(form | {"rests": "10,20"}, BASE).errors
+    assert "one time, 10.20, or two, 10; 20" in errors["rests"]
     errors = read_form(form | {"prbs_amplitude": "99"}, BASE).errors
     assert errors.keys() == {"prbs_amplitude"}
     assert "at most 50 N·m" in errors["prbs_amplitude"]

@@ -63,3 +63,13 @@ def test_an_answer_names_no_folder_that_is_gone_and_no_markup():
         '<summary>All numbers</summary><pre tabindex="0">…/protocol.toml: '
         "&lt;b&gt;wrong&lt;/b&gt;</pre></details>"
     )
+
+
+def test_a_command_that_computes_gives_way_to_a_session(monkeypatch):
+    script = """
+import os, time
+while os.getpriority(os.PRIO_PROCESS, 0) < 10: time.sleep(0.01)
+print("gives way")
+"""
+    monkeypatch.setattr(work, "_python", lambda: (sys.executable, "-S", "-c", script))
+    assert asyncio.run(Work().command(timeout_s=30.0)) == Answer(True, "gives way")
