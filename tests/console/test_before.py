@@ -15,8 +15,14 @@ def test_before_a_session(console, chromium):
     (desk.place / "long.toml").write_text(protocol.replace("duration_s = 2.0", "duration_s = 3.0"))
     (desk.place / "wrong.toml").write_text("prbs.duration_s = -1.0\n")
     page = open_page(chromium, desk)
-    page.set_viewport_size({"width": 820, "height": 1180})
-    assert page.evaluate("document.documentElement.scrollWidth") <= 820
+    for width in (390, 820):  # a telephone, a tablet
+        page.set_viewport_size({"width": width, "height": 1180})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        check = page.get_by_role("button", name="Check the rig")
+        words = check.locator("xpath=ancestor::*[contains(@class, 'step')][1]")
+        assert words.evaluate(
+            "(step) => [...step.children].every((one) => one.scrollWidth <= one.clientWidth + 1)"
+        )
     fill(page, "subject", "S01")
     fill(page, "operator", "Op")
     page.get_by_text("not right yet").wait_for(state="hidden")

@@ -143,6 +143,9 @@ def test_a_session_from_the_form_to_its_end(console, chromium):
     page.wait_for_function("window.written + window.replaced > 20")
     assert page.evaluate("window.replaced") == 0  # or the memory of the browser rises
     assert_reached_by_tab(page, "Save")  # the last control of a session that runs
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    page.set_viewport_size({"width": 820, "height": 420})
     page.locator("#note").fill("<b>coughs</b>")
     page.keyboard.press("Enter")
     page.reload()

@@ -102,7 +102,7 @@
       write(row.lastChild, `${sign} ${text}`);
     });
     rated = session.rate;
-    show("rated", rated === null ? "after the first epoch" : `epoch ${rated.place}`);
+    show("rated", rated === null ? "no epoch yet" : `epoch ${rated.place}`);
   }
 
   function banner(text, good) { const at = $("banner"); at.hidden = !text; at.classList.toggle("good", !!good); write(at, text); }
