@@ -1,4 +1,4 @@
-"""Collects what the faults' tests measure; `python -m tests.faults.measure` makes a table of it."""
+"""Collects what the faults' tests measure; `python -m tests.faults.measure` makes tables of it."""
 
 from __future__ import annotations
 

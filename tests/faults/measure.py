@@ -1,9 +1,10 @@
-"""Measure every fault's reaction and write the table of `docs/reference/hazards.md`.
+"""Measure every fault's reaction and write the tables of two pages of `docs/reference`.
 
     python -m tests.faults.measure              runs the tests, about four minutes
     python -m tests.faults.measure LINES.jsonl  takes what a run noted
 
-Only what stands between the two marks in the document is replaced.
+The faults go to `hazards.md`, every case to `guard-laws.md`; only what stands between the two marks
+of a page is replaced.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from typing import Any
 from tests.faults.rigs import RIGS
 
 ROOT = Path(__file__).parents[2]
-DOCUMENT = ROOT / "docs" / "reference" / "hazards.md"
+HAZARDS = ROOT / "docs" / "reference" / "hazards.md"
+GUARD_LAWS = ROOT / "docs" / "reference" / "guard-laws.md"
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 FAULTS: dict[int, tuple[str, str, str]] = {
@@ -150,23 +152,27 @@ def cases(notes: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def between_the_marks(page: Path, body: str) -> None:
+    """Replace what stands between the two marks of a page."""
+    head, begin, rest = page.read_text(encoding="utf-8").partition(BEGIN)
+    _, end, tail = rest.partition(END)
+    if not (begin and end):
+        sys.exit(f"{page.name} has no marks to write between: {BEGIN} … {END}")
+    page.write_text(f"{head}{BEGIN}\n\n{body}\n\n{END}{tail}", encoding="utf-8")
+
+
 def main() -> None:
-    """Write the table into the document."""
+    """Write the tables into the pages."""
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else measure()
     notes = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
     missing = sorted(set(FAULTS) - {note["fault"] for note in notes})
     if missing:
         sys.exit(f"nothing was measured of fault {missing[0]}")
-    text = DOCUMENT.read_text(encoding="utf-8")
-    head, _, rest = text.partition(BEGIN)
-    _, _, tail = rest.partition(END)
     load = os.getloadavg()[0]
     python = f"Python {platform.python_version()}, {os.cpu_count()} processors, load {load:.1f}"
-    body = (
-        f"\n\nMeasured with {python}; {len(notes)} cases.\n\n{table(notes)}\n\n"
-        f"### Every case\n\n{cases(notes)}\n\n"
-    )
-    DOCUMENT.write_text(f"{head}{BEGIN}{body}{END}{tail}", encoding="utf-8")
+    measured = f"Measured with {python}; {len(notes)} cases."
+    between_the_marks(HAZARDS, f"{measured}\n\n{table(notes)}")
+    between_the_marks(GUARD_LAWS, cases(notes))
 
 
 if __name__ == "__main__":
