@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.conversion import EXAMPLE_ARM, Conversion, conversion
-from rigidimeter.recording.channels.headers import Header, read_header
+from rigidimeter.recording.channels.headers import Header, fits, read_header
 from rigidimeter.recording.channels.lever_arm import lever_arm
 from rigidimeter.recording.channels.quantities import BY_STANDARD, QUANTITIES
 from rigidimeter.recording.channels.unit_text import expression, ratio
@@ -22,6 +22,8 @@ from rigidimeter.recording.formats.table import Table, alike, nearest
 LABELS = ("epoch", "condition", "task")
 MOTION = ("velocity_rad_s", "angle_rad")
 STANDARD = (*BY_STANDARD, *LABELS)
+_LEAST_LIKE = 0.4
+"""Of a column that is named as the nearest, where its unit does not tell."""
 _UNCALIBRATED = ("volt", "millivolt", "microvolt", "count")
 
 
@@ -237,12 +239,26 @@ def _missing(table: Table, choice: Choice, what: str, standards: tuple[str, ...]
         name, why = next(iter(table.others.items()))
         text += f" ({name} is no column but {why})"
     if not free:
-        matrices = [name for name, why in table.others.items() if "×" in why]
-        remedy = f"; save each column of {matrices[0]} under a name of its own" if matrices else ""
+        parts = [
+            f"; save each {'column' if '×' in why else 'part'} of {name} under a name of its own"
+            for name, why in table.others.items()
+            if "×" in why or why.endswith("objects")
+        ]
+        remedy = parts[0] if parts else ""
         return [f"{text}, and none is left to be it{remedy}"]
-    ranked = [(alike(standard, name), standard, name) for standard in standards for name in free]
-    _, standard, name = max(ranked, key=lambda entry: entry[0])
+    ranked = [
+        (fits(BY_STANDARD[standard].name, read_header(name, table.units.get(name, "")).unit),
+         alike(standard, name), standard, name)
+        for standard in standards for name in free
+    ]  # fmt: skip
+    of_unit, likeness, standard, name = max(ranked, key=lambda entry: entry[:2])
     short = BY_STANDARD[standard].name
+    if not of_unit and likeness < _LEAST_LIKE:
+        unit = BY_STANDARD[standard].usual[-1]
+        return [
+            f"{text}, and no name of them is known; say which it is, as in --column {short}=NAME "
+            f"--unit {short}={unit}, and likewise of the time and the other quantities"
+        ]
     option = shlex.quote(f"{short}={name}")
     return [f"{text}; the nearest is {name}: if it is the one, say --column {option}"]
 

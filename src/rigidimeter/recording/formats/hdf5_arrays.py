@@ -99,7 +99,7 @@ def _h5py(path: Path) -> Any:
         import h5py
     except ImportError:
         raise UserError(
-            f"{path} is a MATLAB file of version 7.3, which needs one more package: "
+            f"{path} is an HDF5 file, as MATLAB 7.3 writes, which needs one more package: "
             "pip install 'rigidimeter[matlab]' (or save it in MATLAB with -v7)"
         ) from None
     return h5py

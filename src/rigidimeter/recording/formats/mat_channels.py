@@ -38,7 +38,7 @@ from rigidimeter.recording.formats.stored_arrays import Stored
 from rigidimeter.recording.formats.table import Table, sorted_arrays, table_of_arrays
 
 _VALUES = ("values", "data", "wave", "signal", "signals", "samples")
-_LABELS = ("labels", "names", "colheaders", "channels", "titles", "channelnames", *NAMES)
+_LABELS = ("labels", "names", "colheaders", "channels", "titles", "channelnames", "columns", *NAMES)
 _STARTS = ("start", "t0", "starttime", "start_time")
 _SAME = 0.01
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from rigidimeter.documents import open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
+from rigidimeter.recording.formats.mat_channels import table_of_variables
 from rigidimeter.recording.formats.stored_arrays import Expansion, Stored, check_count
-from rigidimeter.recording.formats.table import Table, table_of_arrays
+from rigidimeter.recording.formats.table import Table
 
 
 def read_npz(path: Path) -> Table:
@@ -42,7 +43,7 @@ def read_npz(path: Path) -> Table:
                 member.filename.removesuffix(".npy"): _stored(path, archive, member, expansion)
                 for member in members
             }
-    return table_of_arrays(str(path), entries)
+    return table_of_variables(str(path), entries)
 
 
 def _stored(

@@ -26,6 +26,7 @@ from rigidimeter.recording.formats.export_folder import (
     is_export_folder,
     read_export_folder,
 )
+from rigidimeter.recording.formats.hdf5_file import read_hdf5
 from rigidimeter.recording.formats.mat_export import (
     is_mat_export,
     mat_export_settings,
@@ -109,7 +110,7 @@ READERS: list[Reader] = [
     ),
     Reader(
         "text table",
-        (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".sto", ".mot"),
+        (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".sto", ".mot", ".gz"),
         read_text_recording,
         of_text=True,
     ),
@@ -154,6 +155,7 @@ READERS: list[Reader] = [
         made_by="LabRecorder",
         extra="xdf",
     ),
+    Reader("HDF5 file", (".h5", ".hdf5"), read_hdf5, made_by="h5py", extra="matlab"),
     Reader("TDMS file", (".tdms",), read_tdms, made_by="LabVIEW", extra="tdms"),
     Reader("C3D file", (".c3d",), read_c3d, made_by="a program of motion capture", extra="c3d"),
     Reader("BIOPAC file", (".acq",), read_biopac, made_by="AcqKnowledge", extra="biopac"),
@@ -172,6 +174,15 @@ READERS: list[Reader] = [
     ),
 ]
 """Every format. Of several readers for one path the first counts."""
+_IGOR = "in Igor Pro save the waves as delimited text, with their names, and read the .txt file"
+_WAYS = {
+    ".npy": "it names no columns, so save them by name in Python: numpy.savez('recording.npz', "
+    "time_s=..., torque_nm=..., angle_rad=...)",
+    **dict.fromkeys((".itx", ".ibw", ".pxp"), _IGOR),
+    **dict.fromkeys((".adicht", ".adibin"), "export it from LabChart as .mat or as text"),
+    ".zip": "unpack it and read the files in it",
+}
+"""What helps with files of other types."""
 
 
 def reader_of(path: Path) -> Reader:
@@ -195,6 +206,8 @@ def reader_of(path: Path) -> Reader:
             f"{path} is a folder without manifest.json, so it is not a session folder; give a "
             f"session folder or a {known} file"
         )
+    if suffix in _WAYS:
+        raise UserError(f"{path} is a {path.suffix} file, which is not read; {_WAYS[suffix]}")
     what = f"of type {path.suffix}" if path.suffix else "without a suffix"
     raise UserError(f"{path} is a file {what}; what can be read is {known}")
 

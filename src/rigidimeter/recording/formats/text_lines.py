@@ -1,25 +1,31 @@
 """The lines of a text file: decoded, without comments and blank lines, and their cells counted.
 
-The text is UTF-8, UTF-16 with its byte order mark, or what Windows writes in western Europe.
+The text is UTF-8, UTF-16 with its byte order mark, or what Windows writes in western Europe; gzip
+may have compressed it.
 """
 
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import os
 import re
+import zlib
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.documents import open_regular
+from rigidimeter.documents.bounds import EXPANDED_BYTES, EXPANSION, size_text
 from rigidimeter.documents.escaping import NUMBER
 from rigidimeter.errors import UserError
 
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _HEAD_BYTES = 2**16
+_GZIP = b"\x1f\x8b"
 _FOOTER = 50
 _NAME_LINES = 16
 """What opens a quotation and does not close it within so many lines is no list of names."""
@@ -38,12 +44,31 @@ def read_utf8(path: Path, most_bytes: int) -> bytes:
     with open_regular(path, most_bytes) as file:
         try:
             data = file.read(_HEAD_BYTES)
-            if len(data) == _HEAD_BYTES:
+            if data.startswith(_GZIP):
+                file.seek(0)
+                data = _expanded(path, file, most_bytes)
+            elif len(data) == _HEAD_BYTES:
                 _refuse_zeros(source, data)  # before the rest of a large file
                 data += file.read(os.fstat(file.fileno()).st_size)
         except OSError as error:
             raise UserError(f"{source}: cannot be read ({error.strerror or error})") from None
     return _utf8(source, data)
+
+
+def _expanded(path: Path, file: BinaryIO, most_bytes: int) -> bytes:
+    """Return what a file that gzip compressed holds."""
+    most = min(most_bytes, max(EXPANDED_BYTES, EXPANSION * os.fstat(file.fileno()).st_size))
+    try:
+        data = gzip.GzipFile(fileobj=file).read(most + 1)
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise UserError(
+            f"{path} is not a complete gzip file ({error}); compress the text once more"
+        ) from None
+    if len(data) > most:
+        raise UserError(
+            f"{path}: expands to more than {size_text(most)}; split the recording, or expand it"
+        )
+    return data
 
 
 def _utf8(source: str, data: bytes) -> bytes:
