@@ -13,6 +13,12 @@ from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
+from rigidimeter.recording.channels.held_values import (
+    held_rows,
+    held_text,
+    sample_numbers,
+    without_repeats,
+)
 from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.readings import (
     confusions,
@@ -123,6 +129,13 @@ def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
         if n_turns:
             text = f"{table.source}: column {names['angle_rad']!r} {wrapping_text(n_turns)}"
             notices.append(Notice("warning", text))
+    for standard in (*MOTION, "torque_nm"):
+        if standard in values and (count := held_rows(values[standard])) > 1:
+            moves = standard in MOTION
+            if moves:
+                values[standard] = without_repeats(values[standard], count)
+            text = f"{table.source}: column {names[standard]!r} {held_text(count, moves=moves)}"
+            notices.append(Notice("warning", text))
     if options.reaction:
         values["torque_nm"] = -values["torque_nm"]
     notices += [Notice("error", text) for text in strays]
@@ -169,7 +182,7 @@ def _time(table: Table, choice: Choice, raw: Mapping[str, Array], rate_hz: float
     taken = choice.taken.get("time_s")
     if taken is None:
         first = choice.taken["torque_nm"].column
-        return np.arange(table.columns[first].size) / (rate_hz or 1.0)
+        return sample_numbers(table, table.columns[first].size) / (rate_hz or 1.0)
     if taken.to_si is None or "time_s" not in raw:
         return np.empty(0)
     label = choice.taken.get("epoch")

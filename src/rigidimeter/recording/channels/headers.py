@@ -16,6 +16,11 @@ _STORED = {one.name: one.standard for one in QUANTITIES}
 _TIMES = ("second", "millisecond", "microsecond")
 """A column with only such a name, such as ``mSec``, is the time."""
 _BRACKETS = re.compile(r"(.*?)[\s_]*[\[({<]([^\[\](){}<>]*)[\])}>]\s*", re.DOTALL)
+SCALED = re.compile(
+    r"(?i)(?:(?<![a-z])x|[×*·])\s*10+\b|/\s*10+\s*$|\b10+\s*[x×*·]|\b10\s*\^"
+    r"|(?<![\d.])0[.,]\d|\de-?\d"
+)
+"""A power of ten in a name: its unit is not that of the values, as in ``Angle*10 [deg]``."""
 _SEPARATED = re.compile(r"(.*\S)\s*(?:\s/\s|/|,|;|:|\sin\s|\s-\s)\s*(\S.*)", re.DOTALL)
 
 
@@ -67,7 +72,8 @@ def read_header(name: str, unit: str = "") -> Header:
 def _own(name: str) -> Header:
     bracketed = _BRACKETS.fullmatch(name)
     if bracketed is not None and expression(bracketed[2]):
-        return Header(_kind(bracketed[1]), bracketed[2].strip())
+        scaled = SCALED.search(bracketed[1])
+        return Header(_kind(bracketed[1]), "" if scaled else bracketed[2].strip())
     separated = _SEPARATED.fullmatch(name)
     if separated is not None and fits(_kind(separated[1]), separated[2]):
         return Header(_kind(separated[1]), separated[2].strip())
@@ -75,11 +81,16 @@ def _own(name: str) -> Header:
     for count in (3, 2, 1):
         if count < len(parts):
             kind, unit = _kind(" ".join(parts[:-count])), "_".join(parts[-count:])
-            if fits(kind, unit):
+            if fits(kind, unit) and _is_whole(unit) and not SCALED.search(" ".join(parts)):
                 return Header(kind, unit)
     if len(name.strip()) > 1 and expression(name) in _TIMES:
         return Header("time", name.strip())
     return Header(_kind(name), "")
+
+
+def _is_whole(unit: str) -> bool:
+    """Whether it is no piece of what brackets hold, as of `(0.1 deg)`."""
+    return all(unit.count(a) == unit.count(b) for a, b in ("()", "[]", "{}", "<>"))
 
 
 def _kind(text: str) -> str:

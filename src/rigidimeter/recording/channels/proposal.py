@@ -22,7 +22,7 @@ from rigidimeter.recording.channels.channels_of_table import (
     numbers_rows,
 )
 from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
-from rigidimeter.recording.channels.headers import read_header
+from rigidimeter.recording.channels.headers import SCALED, read_header
 from rigidimeter.recording.channels.lever_arm import lever_arm
 from rigidimeter.recording.channels.looks import Array, Look
 from rigidimeter.recording.channels.quantities import BY_STANDARD
@@ -212,8 +212,9 @@ def _units(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOption
 
 
 def _unknown_unit(column: str) -> bool:
-    """Whether a name states something in brackets that is no unit, such as gons or degrees."""
-    return bool(re.search(r"[\[(]", column)) and not read_header(column).unit
+    """Whether a name states what is no unit, in brackets or as a factor, as in `0.1 deg`."""
+    states = re.search(r"[\[(]", column) or SCALED.search(column)
+    return bool(states) and not read_header(column).unit
 
 
 def _chosen(table: Table, options: ReadOptions) -> Choice:

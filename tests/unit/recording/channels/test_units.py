@@ -62,6 +62,12 @@ def test_degrees_in_german_and_gons_in_french_are_not_told_apart():
         ("data.torque_Nm", "torque", "Nm"), ("Torque X [Nm]", "torque", "Nm"),
         ("EMG biceps [mV]", "emg", "mV"), ("Speed (rpm)", "velocity", "rpm"),
         ("torque", "torque", ""), ("torque_m", "torque", ""), ("angle (grad)", "angle", ""),
+        ("Angle (0.1 deg)", "angle", ""), ("Angle 0,1 deg", "angle", ""),
+        ("Time (10 ms)", "time", ""), ("Angle*10 [deg]", "angle", ""),
+        ("Angle x10 deg", "angle", ""), ("100 x Torque (Nm)", "torque", ""),
+        ("Torque 1e-3 Nm", "torque", ""), ("Angle/10 [deg]", "angle", ""),
+        ("Torque 10 [Nm]", "torque", "Nm"), ("Index 2 angle_deg", "angle", "deg"),
+        ("dev/10/angle_deg", "angle", "deg"),
         ("Torque Error [Nm]", "", "Nm"), ("torque command [Nm]", "", "Nm"), ("Sample", "", ""),
     ],
 )  # fmt: skip

@@ -1,0 +1,63 @@
+"""Columns whose rows are repeats of a slower sensor, or have lost samples between them."""
+
+import numpy as np
+import pytest
+from tests.known_joint import TRUTH, angle_rad, torque_nm
+
+from rigidimeter.estimation import fit_epoch
+from rigidimeter.recording.channels.channels_of_table import channels_of_table
+from rigidimeter.recording.channels.held_values import held_rows
+from rigidimeter.recording.formats.read_options import ReadOptions
+from rigidimeter.recording.formats.table import Table
+from rigidimeter.recording.formats.table_epochs import epochs_from_table
+from rigidimeter.settings import load_settings
+
+TIME_S = np.arange(20000) / 1000.0
+TORQUE_NM = torque_nm(TIME_S)
+
+
+def held(values, count, first=0):
+    rows = np.maximum((np.arange(values.size) - first) // count * count + first, 0)
+    return values[rows]
+
+
+@pytest.mark.parametrize("first", [0, 3])
+def test_a_slower_angle_that_is_repeated_gives_the_joint(first):
+    angle = held(angle_rad(TIME_S), 10, first)
+    table = Table("r.csv", {"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle_rad": angle})
+    epochs, notices = epochs_from_table(table, ReadOptions())
+    assert "holds each value for 10 rows" in notices[0].text
+    fit = fit_epoch(epochs[0], "bandlimited", load_settings(None))
+    np.testing.assert_allclose(fit.value, TRUTH, rtol=5e-3)
+
+
+def test_a_torque_that_is_repeated_is_a_warning():
+    columns = {"time_s": TIME_S, "torque_nm": held(TORQUE_NM, 10), "angle_rad": angle_rad(TIME_S)}
+    read = channels_of_table(Table("r.csv", columns), ReadOptions())
+    np.testing.assert_array_equal(read.values["torque_nm"], columns["torque_nm"])
+    assert "leave the repeats blank" in read.notices[0].text
+
+
+def test_an_encoder_at_rest_or_coarse_is_not_a_slower_sensor():
+    coarse = np.round(angle_rad(TIME_S) / 0.002) * 0.002
+    assert held_rows(coarse) == 1
+    assert held_rows(np.zeros(1000)) == 1
+    assert held_rows(np.repeat([0.0, 0.1], 5000)) == 1
+    assert held_rows(angle_rad(TIME_S)) == 1
+
+
+@pytest.mark.parametrize("name", ["Sample", "PacketCounter", "Frame #"])
+def test_samples_that_are_lost_are_a_gap_by_their_numbers(name):
+    kept = np.r_[0:4000, 7000:20000]
+    columns = {name: kept.astype(float), "torque_nm": TORQUE_NM[kept],
+               "angle_rad": angle_rad(TIME_S)[kept]}  # fmt: skip
+    read = channels_of_table(Table("r.csv", columns), ReadOptions(rate_hz=1000.0))
+    np.testing.assert_allclose(read.time_s, TIME_S[kept], atol=1e-12)
+
+
+def test_numbers_that_begin_anew_or_skip_evenly_are_no_clock():
+    for numbers in (np.arange(20000) % 256, 5 * np.arange(20000)):
+        columns = {"Sample": numbers.astype(float), "torque_nm": TORQUE_NM,
+                   "angle_rad": angle_rad(TIME_S)}  # fmt: skip
+        read = channels_of_table(Table("r.csv", columns), ReadOptions(rate_hz=1000.0))
+        np.testing.assert_allclose(read.time_s, TIME_S, atol=1e-12)
