@@ -101,7 +101,7 @@ def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
     try:
         if "time_s" not in names and rate_hz is None:
             rate_hz = own_rate(table)
-        time_s = _time(table, choice, raw, rate_hz)
+        time_s = _time(table, choice, raw, rate_hz, of_user=options.rate_hz is not None)
     except UserError as error:
         faults.append(str(error))
     usable = (
@@ -178,11 +178,14 @@ def _about_emg(table: Table, values: Mapping[str, Array]) -> list[Notice]:
     return [Notice("warning", text)]
 
 
-def _time(table: Table, choice: Choice, raw: Mapping[str, Array], rate_hz: float | None) -> Array:
+def _time(
+    table: Table, choice: Choice, raw: Mapping[str, Array], rate_hz: float | None, *, of_user: bool
+) -> Array:
     taken = choice.taken.get("time_s")
     if taken is None:
         first = choice.taken["torque_nm"].column
-        return sample_numbers(table, table.columns[first].size) / (rate_hz or 1.0)
+        numbers = sample_numbers(table, table.columns[first].size, of_rows=of_user)
+        return numbers / (rate_hz or 1.0)
     if taken.to_si is None or "time_s" not in raw:
         return np.empty(0)
     label = choice.taken.get("epoch")

@@ -156,9 +156,10 @@ def _take(
     if not unit:
         if header.stated_twice:
             name = BY_STANDARD[standard].name
+            known = header.unit if expression(header.unit) else header.stated_twice
             choice.faults.append(
                 f"{table.source}: column {column!r} is in {header.stated_twice} by its name and in "
-                f"{header.unit} by the file; say which, as in --unit {name}={header.unit}"
+                f"{header.unit} by the file; say which, as in --unit {name}={known}"
             )
             return
         unit = header.unit if expression(header.unit) else ""

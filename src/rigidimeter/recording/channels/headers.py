@@ -17,10 +17,11 @@ _TIMES = ("second", "millisecond", "microsecond")
 """A column with only such a name, such as ``mSec``, is the time."""
 _BRACKETS = re.compile(r"(.*?)[\s_]*[\[({<]([^\[\](){}<>]*)[\])}>]\s*", re.DOTALL)
 SCALED = re.compile(
-    r"(?i)(?:(?<![a-z])x|[×*·])\s*10+\b|/\s*10+\s*$|\b10+\s*[x×*·]|\b10\s*\^"
+    r"(?i)(?:(?<![a-z])x|[×*·])\s*10+\b|/\s*10+\s*$|\b1/10+\b|\b10+\s*[x×*·]|\b10\s*\^"
     r"|(?<![\d.])0[.,]\d|\de-?\d"
 )
 """A power of ten in a name: its unit is not that of the values, as in ``Angle*10 [deg]``."""
+_NO_UNIT = re.compile(r"(?i)[\W_\d]*|n\W?a\W?|none|null|unknown|units?|a\W?u\W?|arb\b.*|.*less")
 _SEPARATED = re.compile(r"(.*\S)\s*(?:\s/\s|/|,|;|:|\sin\s|\s-\s)\s*(\S.*)", re.DOTALL)
 
 
@@ -62,7 +63,7 @@ def read_header(name: str, unit: str = "") -> Header:
         found = _own(text)
         if found.kind:
             break
-    if not unit or not expression(unit):
+    if _NO_UNIT.fullmatch(unit) or not (expression(unit) or found.unit):
         return found
     if found.unit and expression(found.unit) != expression(unit):
         return Header(found.kind, unit, found.unit)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.quantities import words_of
 from rigidimeter.recording.formats.table import Table
 
@@ -18,6 +19,8 @@ _LEAST_CHANGES = 20
 _LEAST_SHARE = 0.5
 """Of the samples of a slower sensor that differ from the one before; a coarse encoder has fewer."""
 _REGULAR = 0.99
+_BEGIN_ANEW = (2**8, 2**16)
+"""Where the counters of devices begin anew."""
 _COUNTERS = {"sample", "samples", "frame", "frames", "index", "counter"}
 
 
@@ -52,8 +55,21 @@ def held_text(count: int, *, moves: bool) -> str:
     return f"{held}; if it is a slower sensor, leave the repeats blank: they bias J, B and K"
 
 
-def sample_numbers(table: Table, size: int) -> Array:
-    """Return the number of each row, by a column of them if samples are lost between the rows."""
+def sample_numbers(table: Table, size: int, *, of_rows: bool) -> Array:
+    """Return the number of each row, by a column of them if samples are lost between the rows.
+
+    Parameters
+    ----------
+    table : Table
+    size : int
+    of_rows : bool
+        Whether the sampling rate is that of the rows, as the user gives it.
+
+    Raises
+    ------
+    UserError
+        If the numbers skip evenly, and the rate may be that of what they count.
+    """
     for name in table.columns:
         if not _COUNTERS.intersection(words_of(name)):
             continue
@@ -61,8 +77,17 @@ def sample_numbers(table: Table, size: int) -> Array:
         if numbers.dtype == object or numbers.size != size:
             continue
         steps = np.diff(numbers)
-        if np.all(steps >= 1) and np.all(steps % 1 == 0) and np.median(steps) == 1:
-            return np.asarray(numbers - numbers[0], dtype=np.float64)
+        if numbers.max() + 1 in _BEGIN_ANEW:
+            steps %= numbers.max() + 1
+        usual = np.median(steps)
+        if not (usual >= 1 and np.all(steps > 0) and np.all(steps % usual == 0)):
+            continue
+        if usual > 1 and not of_rows:
+            raise UserError(
+                f"{table.source}: column {name!r} goes up by {usual:g} from row to row, so the "
+                "sampling rate that the file states may not be that of the rows; say --rate-hz"
+            )
+        return np.asarray(np.concatenate([[0.0], np.cumsum(steps / usual)]))
     return np.arange(size, dtype=np.float64)
 
 

@@ -158,12 +158,12 @@ def _trials(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOptio
     choice = _chosen(table, options)
     raw, _ = _raw(table, choice, options)
     starts = restarts(raw["time_s"]) if "time_s" in raw else np.empty(0)
-    if not starts.size or "epoch" in choice.taken:
+    if not starts.size or 2 * starts.size > raw["time_s"].size or "epoch" in choice.taken:
         return options
     for name, column in table.columns.items():
-        if column.size == raw["time_s"].size and np.array_equal(
-            np.flatnonzero(column[1:] != column[:-1]) + 1, starts
-        ):
+        if name == choice.taken["time_s"].column or column.size != raw["time_s"].size:
+            continue
+        if np.array_equal(np.flatnonzero(column[1:] != column[:-1]) + 1, starts):
             reasons.append(f"the time starts anew where {name!r} changes")
             return replace(options, columns={**options.columns, "epoch": name})
     return options

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from tests.known_joint import TRUTH, angle_rad, torque_nm
 
+from rigidimeter.errors import UserError
 from rigidimeter.estimation import fit_epoch
 from rigidimeter.recording.channels.channels_of_table import channels_of_table
 from rigidimeter.recording.channels.held_values import held_rows
@@ -55,9 +56,26 @@ def test_samples_that_are_lost_are_a_gap_by_their_numbers(name):
     np.testing.assert_allclose(read.time_s, TIME_S[kept], atol=1e-12)
 
 
-def test_numbers_that_begin_anew_or_skip_evenly_are_no_clock():
-    for numbers in (np.arange(20000) % 256, 5 * np.arange(20000)):
-        columns = {"Sample": numbers.astype(float), "torque_nm": TORQUE_NM,
-                   "angle_rad": angle_rad(TIME_S)}  # fmt: skip
-        read = channels_of_table(Table("r.csv", columns), ReadOptions(rate_hz=1000.0))
-        np.testing.assert_allclose(read.time_s, TIME_S, atol=1e-12)
+def sampled(numbers, kept=slice(None)):
+    columns = {"Sample": numbers.astype(float), "torque_nm": TORQUE_NM[kept],
+               "angle_rad": angle_rad(TIME_S)[kept]}  # fmt: skip
+    return Table("r.csv", columns, {"fs": 1000.0})
+
+
+def test_a_counter_of_a_device_begins_anew():
+    kept = np.r_[0:4000, 4100:20000]
+    read = channels_of_table(sampled(kept % 256, kept), ReadOptions())
+    np.testing.assert_allclose(read.time_s, TIME_S[kept], atol=1e-12)
+
+
+def test_numbers_that_begin_anew_with_trials_are_no_clock():
+    read = channels_of_table(sampled(np.arange(20000) % 5000), ReadOptions())
+    np.testing.assert_allclose(read.time_s, TIME_S, atol=1e-12)
+
+
+def test_numbers_that_skip_evenly_leave_the_rate_in_doubt():
+    table = sampled(5 * np.arange(20000))
+    with pytest.raises(UserError, match="goes up by 5 from row to row"):
+        channels_of_table(table, ReadOptions())
+    read = channels_of_table(table, ReadOptions(rate_hz=1000.0))
+    np.testing.assert_allclose(read.time_s, TIME_S, atol=1e-12)

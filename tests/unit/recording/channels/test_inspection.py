@@ -34,6 +34,13 @@ def test_what_the_numbers_decide_is_proposed_and_reads_the_file():
     np.testing.assert_allclose(read.values["angle_rad"], 2 * angle_rad(time_s), rtol=1e-12)
 
 
+def test_a_time_that_runs_backwards_is_told_so_and_has_no_trials():
+    columns = {"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle_rad": ANGLE_RAD}
+    found = inspected(**{name: values[::-1].copy() for name, values in columns.items()})
+    assert "time_s goes back" in found.proposal.unsaid[0]
+    assert "epoch" not in found.options.columns
+
+
 def test_a_table_without_a_torque_is_told_so():
     found = inspected(time=TIME_S, angle=ANGLE_RAD)
     assert "has no column torque_nm" in found.proposal.unsaid[0]

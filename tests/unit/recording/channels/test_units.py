@@ -63,7 +63,8 @@ def test_degrees_in_german_and_gons_in_french_are_not_told_apart():
         ("EMG biceps [mV]", "emg", "mV"), ("Speed (rpm)", "velocity", "rpm"),
         ("torque", "torque", ""), ("torque_m", "torque", ""), ("angle (grad)", "angle", ""),
         ("Angle (0.1 deg)", "angle", ""), ("Angle 0,1 deg", "angle", ""),
-        ("Time (10 ms)", "time", ""), ("Angle*10 [deg]", "angle", ""),
+        ("Angle in 1/10 deg", "angle", ""), ("Time (10 ms)", "time", ""),
+        ("Angle*10 [deg]", "angle", ""),
         ("Angle x10 deg", "angle", ""), ("100 x Torque (Nm)", "torque", ""),
         ("Torque 1e-3 Nm", "torque", ""), ("Angle/10 [deg]", "angle", ""),
         ("Torque 10 [Nm]", "torque", "Nm"), ("Index 2 angle_deg", "angle", "deg"),
@@ -80,6 +81,14 @@ def test_a_name_and_a_row_of_units_that_disagree():
     assert read_header("angle_deg", "rad").stated_twice == "deg"
     assert read_header("angle [deg]", "°").stated_twice == ""
     assert read_header("Torque", "N-m").unit == "N-m"
+
+
+def test_a_unit_of_the_file_that_is_not_known_contradicts_the_name():
+    assert read_header("torque_nm", "Nm/kg").stated_twice == "nm"
+    assert read_header("angle_deg", "0.1 deg").stated_twice == "deg"
+    for nothing in ("", "-", "n/a", "a.u.", "None", "1", "dimensionless", "unknown"):
+        assert read_header("angle_deg", nothing).stated_twice == ""
+    assert read_header("torque", "Nm/kg").unit == ""
 
 
 @pytest.mark.parametrize(
