@@ -133,7 +133,7 @@ def main() -> None:
     # loop, for the first.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Each full collection goes over what every imported module made, 50 ms, and finds little.
-    gc.set_threshold(10_000, 10, 10)
+    gc.set_threshold(50_000, 10, 10)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT):  # also where a parent ignores it
         signal.signal(number, _terminated)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as `nohup` does, for a long study

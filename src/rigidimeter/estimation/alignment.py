@@ -40,6 +40,10 @@ ROUNDS = 6
 sees the torque against motion that was not recorded."""
 
 SETTLED_S = 1e-5
+
+IN_VALLEY_S = 0.2 * SCAN_STEP_S
+"""With less left than this the valley is known: the next search begins in it, and nowhere else."""
+
 MOST_STRETCH = 6.0
 """A secant may go so many times as far as what is left."""
 
@@ -156,24 +160,23 @@ def _settled(
     """
     longest_s = epochs[0].settings.estimation.longest_delay_s
 
-    def left_after(move_s: float) -> LineFit:
+    def left_after(move_s: float, near: Array | None = None) -> LineFit:
         moved = [epoch.moved(move_s) if move_s else epoch for epoch in epochs]
         observations = [
             epoch.once(observe if perturbed else observe_motion, motion)
             for epoch, motion in zip(moved, motions, strict=True)
         ]
-        return estimate_delay(
-            observations,
-            least_squares_start(observations),
-            longest_s,
-            instrumental if perturbed else direct,
-        )
+        linearise = instrumental if perturbed else direct
+        start = least_squares_start(observations) if near is None else near[:-1]
+        return estimate_delay(observations, start, longest_s, linearise, near)
 
     tried: list[tuple[float, float]] = []
     total_s = 0.0
+    near: Array | None = None
     for _ in range(ROUNDS if perturbed else 1):
-        fit = left_after(total_s)
+        fit = left_after(total_s, near)
         left_s, error_s = float(fit.values[-1]), float(fit.standard_errors[-1])
+        near = fit.values if abs(left_s) < IN_VALLEY_S else None
         stretch = 1.0
         if tried and abs(left_s) < abs(tried[-1][1]):
             stretch = _stretch((total_s, left_s), tried[-1])
@@ -193,10 +196,10 @@ def _settled(
     root, apart_s = tried[-1], 2.0 * error_s * abs(stretch)
     stretches = []
     for move_s in (root[0] - apart_s, root[0] + apart_s):
-        near = min(tried, key=lambda one: abs(one[0] - move_s))
-        if abs(near[0] - move_s) > 0.5 * apart_s:
-            near = move_s, float(left_after(move_s).values[-1])
-        stretches.append(abs(_stretch(root, near)))
+        beside = min(tried, key=lambda one: abs(one[0] - move_s))
+        if abs(beside[0] - move_s) > 0.5 * apart_s:
+            beside = move_s, float(left_after(move_s, fit.values).values[-1])
+        stretches.append(abs(_stretch(root, beside)))
     error_s *= max(stretches)
     return total_s, error_s, fit.values[:-1]
 

@@ -13,7 +13,6 @@ of what is left out (`estimation.stretches`).
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
@@ -33,6 +32,7 @@ from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import (
     Array,
     Signals,
+    columns_at,
     grid_rate_hz,
     kinematics,
     motion_channels,
@@ -185,10 +185,8 @@ def _motion(
     rest = kinematics(without_driven(epoch, driven_at), time_s)
     torque = epoch.channels["torque_nm"]
     caused = driven_behind(driven_at, torque_filter_of(settings), torque)
-    angle, velocity, acceleration = (
-        beyond + values_at(replace(torque, values=part), time_s)
-        for beyond, part in zip(rest, caused[::-1], strict=True)
-    )
+    # One spline of the three, at the stamps that they share.
+    angle, velocity, acceleration = np.stack(rest) + columns_at(torque, caused[::-1], time_s)
     return angle, velocity, acceleration
 
 

@@ -8,6 +8,7 @@ integral without a separate difference scheme.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -131,6 +132,14 @@ def values_at(channel: Channel, time_s: Array, share: float = AS_SAMPLED) -> Arr
     """Return a channel at the times; without a spline where it was `sampled` at them."""
     place = sampled(channel, time_s, share)
     return channel.values[place] if place is not None else np.asarray(spline(channel)(time_s))
+
+
+def columns_at(channel: Channel, columns: Sequence[Array], time_s: Array) -> Array:
+    """Return `values_at` of several columns at the stamps of a channel, shape (k, n)."""
+    place = sampled(channel, time_s)
+    if place is not None:
+        return np.stack([column[place] for column in columns])
+    return np.asarray(CubicSpline(channel.time_s, np.stack(columns), axis=1)(time_s))
 
 
 def values_and_slopes(channel: Channel, time_s: Array) -> tuple[Array, Array]:

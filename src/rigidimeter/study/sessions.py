@@ -186,22 +186,6 @@ def _read(
         raise _Refused(f"{path}: there is no such session folder or recording")
     from_session = is_session(path)
     reader_of(path)
-    files = _files_of_samples(path, from_session=from_session)
-    for file in files:
-        open_regular(file, RECORDING_BYTES).close()
-        digests[str(PurePath(source) / file.relative_to(path))] = noted[file]
-    # Before the condition is looked at: a copy under another name is no less a copy.
-    digest = noted.get(path / SAMPLES if from_session else files[0], "") if files else ""
-    first = samples.get(digest, row) if digest else row
-    if first not in before:
-        raise _Refused(
-            f"{path} holds the same samples as {first['path']} ({line_of(first)}); "
-            "take the copy out"
-        )
-    samples.setdefault(digest, row)
-    condition = names.named(row["condition"])
-    if condition is None:
-        raise _Refused(names.unknown(row["condition"]))
     settings = recorded_settings(path)
     if from_session:
         events, _ = read_events(path / EVENTS) if (path / EVENTS).is_file() else ([], False)
@@ -215,6 +199,23 @@ def _read(
         epochs, said = _joined(read.folder, row, options, noted, digests)
     else:
         epochs, said = read_recording(path, options)
+    files = _files_of_samples(path, from_session=from_session)
+    for file in files:
+        if file not in noted:
+            open_regular(file, RECORDING_BYTES).close()
+        digests[str(PurePath(source) / file.relative_to(path))] = noted[file]
+    # Before the condition is looked at: a copy under another name is no less a copy.
+    digest = noted[path / SAMPLES if from_session else files[0]] if files else ""
+    first = samples.get(digest, row) if digest else row
+    if first not in before:
+        raise _Refused(
+            f"{path} holds the same samples as {first['path']} ({line_of(first)}); "
+            "take the copy out"
+        )
+    samples.setdefault(digest, row)
+    condition = names.named(row["condition"])
+    if condition is None:
+        raise _Refused(names.unknown(row["condition"]))
     epochs, differing = _of_condition(path, row, condition, beside, epochs, names)
     said = [*said, *differing]
     tasks = [task_of(epoch, settings or Settings()) for epoch in epochs]

@@ -79,6 +79,7 @@ def estimate_delay(
     start: Array,
     longest_s: float,
     linearise: Linearise = instrumental,
+    near: Array | None = None,
 ) -> LineFit:
     """Return J, B, K and the delay of the torque against the motion, in s, pooled.
 
@@ -90,12 +91,16 @@ def estimate_delay(
     longest_s : float
         The search is between minus and plus this delay.
     linearise : callable
+    near : array, shape (4,), optional
+        J, B, K and the delay at which the search begins, where it is known which valley is meant.
 
     Raises
     ------
     ValueError
         If the parameters cannot be told apart.
     """
+    if near is not None:
+        return with_uncertainty(solve_pooled(observations, delayed(linearise), near))
     problems = linearise(observations, start)
     delays = np.linspace(-longest_s, longest_s, 2 * max(round(longest_s / SCAN_STEP_S), 1) + 1)
     left = _unexplained(observations, problems, delays)
