@@ -15,9 +15,10 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
 from rigidimeter.recording.channels.held_values import (
     held_rows,
-    held_text,
+    knots,
+    only_at,
     sample_numbers,
-    without_repeats,
+    slower_text,
 )
 from rigidimeter.recording.channels.quantities import BY_STANDARD
 from rigidimeter.recording.channels.readings import (
@@ -129,12 +130,16 @@ def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
         if n_turns:
             text = f"{table.source}: column {names['angle_rad']!r} {wrapping_text(n_turns)}"
             notices.append(Notice("warning", text))
-    for standard in (*MOTION, "torque_nm"):
-        if standard in values and (count := held_rows(values[standard])) > 1:
+    for standard in (name for name in (*MOTION, "torque_nm") if name in values):
+        held = rows = held_rows(values[standard])
+        if not rows.size and standard == "angle_rad":  # a velocity bends where the torque steps
+            rows = knots(values[standard])
+        if rows.size:
             moves = standard in MOTION
             if moves:
-                values[standard] = without_repeats(values[standard], count)
-            text = f"{table.source}: column {names[standard]!r} {held_text(count, moves=moves)}"
+                values[standard] = only_at(values[standard], rows)
+            text = slower_text(rows, held=bool(held.size), moves=moves)
+            text = f"{table.source}: column {names[standard]!r} {text}"
             notices.append(Notice("warning", text))
     if options.reaction:
         values["torque_nm"] = -values["torque_nm"]

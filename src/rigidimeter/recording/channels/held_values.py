@@ -1,7 +1,8 @@
 """Rows that are not what they seem: repeats of a slower sensor, and samples that were lost.
 
 A sensor of 50 samples/s in a table of 1000 rows/s is often repeated for 20 rows. No joint moves in
-such steps: fitted as they are, they make J and K far too small. The repeats are taken for blanks.
+such steps: fitted as they are, they make J and K far too small. The repeats are taken for blanks,
+as is what was interpolated by straight lines.
 """
 
 from __future__ import annotations
@@ -19,40 +20,49 @@ _LEAST_CHANGES = 20
 _LEAST_SHARE = 0.5
 """Of the samples of a slower sensor that differ from the one before; a coarse encoder has fewer."""
 _REGULAR = 0.99
+_BEND = 30.0
+"""Of a bend between two straight lines over the median, which is rounding."""
 _BEGIN_ANEW = (2**8, 2**16)
 """Where the counters of devices begin anew."""
 _COUNTERS = {"sample", "samples", "frame", "frames", "index", "counter"}
 
 
-def held_rows(values: Array) -> int:
-    """Return for how many rows a column repeats each of its values, 1 where it does not.
+def held_rows(values: Array) -> NDArray[np.intp]:
+    """Return the rows with samples of a column that repeats each of them; none where it does not.
 
     Examples
     --------
-    >>> held_rows(np.repeat(np.sin(np.arange(50.0)), 4))
-    4
+    >>> held_rows(np.repeat(np.sin(np.arange(50.0)), 4))[:3]
+    array([0, 4, 8])
     """
-    changes, count = _changes(values)
-    if changes.size < _LEAST_CHANGES or count < 2:
-        return 1
-    regular = np.mean((changes - changes[-1]) % count == 0) >= _REGULAR
-    return count if regular and changes.size >= _LEAST_SHARE * values.size / count else 1
+    return _evenly(np.flatnonzero(values[1:] != values[:-1]) + 1, values.size)
 
 
-def without_repeats(values: Array, count: int) -> Array:
-    """Return a column with NaN where it repeats what it holds for `count` rows."""
+def knots(values: Array) -> NDArray[np.intp]:
+    """Return the rows with samples of a column that has straight lines between them, or none."""
+    if not np.all(np.isfinite(values)):
+        return np.empty(0, dtype=np.intp)
+    bends = np.abs(np.diff(values, 2))
+    straight = _BEND * np.median(bends) if bends.size else 0.0
+    return _evenly(np.flatnonzero(bends > straight) + 1, values.size)
+
+
+def only_at(values: Array, rows: NDArray[np.intp]) -> Array:
+    """Return a column with NaN in all rows but these."""
     kept = np.full(values.size, np.nan)
-    first = _changes(values)[0][-1] % count
-    kept[first::count] = values[first::count]
+    kept[rows] = values[rows]
     return kept
 
 
-def held_text(count: int, *, moves: bool) -> str:
+def slower_text(rows: NDArray[np.intp], *, held: bool, moves: bool) -> str:
     """Return what to know of such a column; a torque, unlike a motion, may come in steps."""
-    held = f"holds each value for {count} rows"
+    count = rows[1] - rows[0]
+    if not held:
+        return f"has straight lines of {count} rows, so it is read as a slower sensor at their ends"
+    text = f"holds each value for {count} rows"
     if moves:
-        return f"{held}, so it is read as a slower sensor, sampled in the first row of each"
-    return f"{held}; if it is a slower sensor, leave the repeats blank: they bias J, B and K"
+        return f"{text}, so it is read as a slower sensor, sampled in the first row of each"
+    return f"{text}; if it is a slower sensor, leave the repeats blank: they bias J, B and K"
 
 
 def sample_numbers(table: Table, size: int, *, of_rows: bool) -> Array:
@@ -91,7 +101,12 @@ def sample_numbers(table: Table, size: int, *, of_rows: bool) -> Array:
     return np.arange(size, dtype=np.float64)
 
 
-def _changes(values: Array) -> tuple[NDArray[np.intp], int]:
-    """Return the rows in which a column has a new value, and how many mostly lie between them."""
-    changes = np.flatnonzero(values[1:] != values[:-1]) + 1
-    return changes, int(np.median(np.diff(changes))) if changes.size > 1 else 0
+def _evenly(rows: NDArray[np.intp], size: int) -> NDArray[np.intp]:
+    """Return even rows to which nearly all of these belong and most of which they are, or none."""
+    count = int(np.median(np.diff(rows))) if rows.size >= _LEAST_CHANGES else 0
+    if count < 2 or rows.size < _LEAST_SHARE * size / count:
+        return np.empty(0, dtype=np.intp)
+    first = rows[-1] % count
+    if np.mean(rows % count == first) < _REGULAR:
+        return np.empty(0, dtype=np.intp)
+    return np.arange(first, size, count)

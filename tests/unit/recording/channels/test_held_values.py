@@ -7,7 +7,7 @@ from tests.known_joint import TRUTH, angle_rad, torque_nm
 from rigidimeter.errors import UserError
 from rigidimeter.estimation import fit_epoch
 from rigidimeter.recording.channels.channels_of_table import channels_of_table
-from rigidimeter.recording.channels.held_values import held_rows
+from rigidimeter.recording.channels.held_values import held_rows, knots
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.table_epochs import epochs_from_table
@@ -39,12 +39,23 @@ def test_a_torque_that_is_repeated_is_a_warning():
     assert "leave the repeats blank" in read.notices[0].text
 
 
-def test_an_encoder_at_rest_or_coarse_is_not_a_slower_sensor():
-    coarse = np.round(angle_rad(TIME_S) / 0.002) * 0.002
-    assert held_rows(coarse) == 1
-    assert held_rows(np.zeros(1000)) == 1
-    assert held_rows(np.repeat([0.0, 0.1], 5000)) == 1
-    assert held_rows(angle_rad(TIME_S)) == 1
+@pytest.mark.parametrize("digits", [15, 6])
+def test_an_angle_that_was_interpolated_by_lines_gives_the_joint(digits):
+    angle = np.interp(TIME_S, TIME_S[::10], angle_rad(TIME_S[::10]).round(digits)).round(digits)
+    table = Table("r.csv", {"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle_rad": angle})
+    epochs, notices = epochs_from_table(table, ReadOptions())
+    assert "straight lines of 10 rows" in notices[0].text
+    fit = fit_epoch(epochs[0], "bandlimited", load_settings(None))
+    np.testing.assert_allclose(fit.value, TRUTH, rtol=5e-3)
+
+
+@pytest.mark.parametrize("found", [held_rows, knots])
+def test_an_encoder_at_rest_or_coarse_is_not_a_slower_sensor(found):
+    angle = angle_rad(TIME_S)
+    noisy = angle + 1e-5 * np.random.default_rng(1).normal(size=angle.size)
+    coarse = np.round(angle / 0.002) * 0.002
+    for values in (angle, noisy, coarse, np.zeros(1000), np.repeat([0.0, 0.1], 5000)):
+        assert found(values).size == 0
 
 
 @pytest.mark.parametrize("name", ["Sample", "PacketCounter", "Frame #"])
