@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.choice import MOTION, Choice, Taken, choose
 from rigidimeter.recording.channels.held_values import (
+    SLOWEST_S,
     held_rows,
     knots,
     only_at,
@@ -134,7 +135,7 @@ def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
         held = rows = held_rows(values[standard])
         if not rows.size and standard == "angle_rad":  # a velocity bends where the torque steps
             rows = knots(values[standard])
-        if rows.size:
+        if rows.size and time_s[rows[1]] - time_s[rows[0]] <= SLOWEST_S:
             moves = standard in MOTION
             if moves:
                 values[standard] = only_at(values[standard], rows)

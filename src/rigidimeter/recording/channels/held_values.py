@@ -16,6 +16,8 @@ from rigidimeter.recording.formats.table import Table
 
 Array = NDArray[np.float64]
 
+SLOWEST_S = 0.1
+"""Between samples of a slower sensor; what lasts longer is a step or a ramp of the motion."""
 _LEAST_CHANGES = 20
 _LEAST_SHARE = 0.5
 """Of the samples of a slower sensor that differ from the one before; a coarse encoder has fewer."""

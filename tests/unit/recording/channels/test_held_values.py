@@ -49,6 +49,16 @@ def test_an_angle_that_was_interpolated_by_lines_gives_the_joint(digits):
     np.testing.assert_allclose(fit.value, TRUTH, rtol=5e-3)
 
 
+@pytest.mark.parametrize("ramps", [False, True])
+def test_steps_and_ramps_of_the_motion_are_no_slower_sensor(ramps):
+    to_and_fro = np.abs(np.arange(20000) % 1000 - 500) / 500.0
+    angle = 0.2 * to_and_fro if ramps else 0.05 * (to_and_fro > 0.5)
+    columns = {"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle_rad": angle}
+    read = channels_of_table(Table("r.csv", columns), ReadOptions())
+    np.testing.assert_array_equal(read.values["angle_rad"], angle)
+    assert not any("slower sensor" in notice.text for notice in read.notices)
+
+
 @pytest.mark.parametrize("found", [held_rows, knots])
 def test_an_encoder_at_rest_or_coarse_is_not_a_slower_sensor(found):
     angle = angle_rad(TIME_S)
