@@ -47,7 +47,7 @@ and half the interval of J, in %; "covered" counts intervals of J, B and K that 
 {3 * EPOCHS}; "doubted" counts epochs with the finding `between_samples`. Each parameter shall be
 within 2, 1 and 0.5 %, or be doubted with an interval that holds the truth; "broken" counts epochs
 with one that is neither. [What happens between the samples](../explanation/between-samples.md)
-explains the method and what is broken.
+explains the method and its limits; this page has only the measured tables.
 """
 
 
