@@ -24,6 +24,10 @@ _LEAST_SHARE = 0.5
 _REGULAR = 0.99
 _BEND = 30.0
 """Of a bend between two straight lines over the median, which is rounding."""
+_STRAIGHT = 1.2
+"""Of the RMS about the straight lines over the median bend: 0.7 for rounding, and above 1.6 for the
+curves between the steps of a simulated perturbation, if they last `_FEWEST_ROWS`."""
+_FEWEST_ROWS = 4
 _BEGIN_ANEW = (2**8, 2**16)
 """Where the counters of devices begin anew."""
 _COUNTERS = {"sample", "samples", "frame", "frames", "index", "counter"}
@@ -42,11 +46,18 @@ def held_rows(values: Array) -> NDArray[np.intp]:
 
 def knots(values: Array) -> NDArray[np.intp]:
     """Return the rows with samples of a column that has straight lines between them, or none."""
-    if not np.all(np.isfinite(values)):
-        return np.empty(0, dtype=np.intp)
+    none = np.empty(0, dtype=np.intp)
+    if values.size < 3 or not np.all(np.isfinite(values)):
+        return none
     bends = np.abs(np.diff(values, 2))
-    straight = _BEND * np.median(bends) if bends.size else 0.0
-    return _evenly(np.flatnonzero(bends > straight) + 1, values.size)
+    usual = float(np.median(bends))
+    rows = _evenly(np.flatnonzero(bends > _BEND * usual) + 1, values.size)
+    if rows.size < 2 or rows[1] - rows[0] < _FEWEST_ROWS:
+        return none
+    between = np.arange(rows[0], rows[-1])
+    about = values[between] - np.interp(between, rows, values[rows])
+    rounding = 8 * np.finfo(np.float64).eps * np.max(np.abs(values))
+    return rows if np.sqrt(np.mean(about**2)) <= _STRAIGHT * usual + rounding else none
 
 
 def only_at(values: Array, rows: NDArray[np.intp]) -> Array:

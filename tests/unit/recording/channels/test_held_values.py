@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 from tests.known_joint import TRUTH, angle_rad, torque_nm
 
 from rigidimeter.errors import UserError
@@ -57,6 +58,15 @@ def test_steps_and_ramps_of_the_motion_are_no_slower_sensor(ramps):
     read = channels_of_table(Table("r.csv", columns), ReadOptions())
     np.testing.assert_array_equal(read.values["angle_rad"], angle)
     assert not any("slower sensor" in notice.text for notice in read.notices)
+
+
+@pytest.mark.parametrize("count", [5, 10, 50])
+def test_a_simulated_velocity_that_bends_with_the_perturbation_is_no_slower_sensor(count):
+    sequence = np.resize(2.0 * signal.max_len_seq(8)[0] - 1.0, 20000 // count)
+    decay = np.exp(-1.0 / 67.0)  # a velocity without noise under steps of torque
+    velocity = signal.lfilter([0.0, 1.0 - decay], [1.0, -decay], np.repeat(sequence, count))
+    assert knots(velocity).size == 0
+    assert held_rows(velocity).size == 0
 
 
 @pytest.mark.parametrize("found", [held_rows, knots])
