@@ -16,7 +16,7 @@ from tests.unit.console.test_session_progress import EPOCHS, ended, started
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.status_values import Condition, Flag, LoopStatus, Role
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order, State
-from rigidimeter.console import SessionPlan, terminal_view
+from rigidimeter.console import SessionPlan, discard_typed, terminal_view
 from rigidimeter.console.line_view import LineView
 from rigidimeter.console.screen_view import ScreenView
 from rigidimeter.console.tty import ENTER, LEAVE, Tty
@@ -246,6 +246,25 @@ def test_it_begins_with_the_other_screen():
     far, near = pty.openpty()
     with ScreenView(Tty(near, near), PLAN):
         assert os.read(far, 100) == ENTER
+    os.close(far)
+    os.close(near)
+
+
+@pytest.mark.parametrize("ended", [Tty.leave, None])
+def test_what_was_typed_and_not_read_goes_to_nobody(ended):
+    far, near = pty.openpty()
+    with os.fdopen(os.dup(near)) as keyboard:
+        screen = Tty(near, near)
+        screen.enter()
+        if ended is None:
+            screen.leave()
+        os.write(far, b"half an order\n")
+        assert select.select([near], [], [], 10.0)[0]
+        if ended is None:
+            discard_typed(keyboard)
+        else:
+            ended(screen)
+    assert not select.select([near], [], [], 0)[0]
     os.close(far)
     os.close(near)
 
