@@ -143,9 +143,6 @@ def test_a_session_from_the_form_to_its_end(console, chromium):
     page.wait_for_function("window.written + window.replaced > 20")
     assert page.evaluate("window.replaced") == 0  # or the memory of the browser rises
     assert_reached_by_tab(page, "Save")  # the last control of a session that runs
-    page.set_viewport_size({"width": 390, "height": 844})
-    assert page.evaluate("document.documentElement.scrollWidth") <= 390
-    page.set_viewport_size({"width": 820, "height": 420})
     page.locator("#note").fill("<b>coughs</b>")
     page.keyboard.press("Enter")
     page.reload()
@@ -157,6 +154,10 @@ def test_a_session_from_the_form_to_its_end(console, chromium):
     page.keyboard.press("Enter")
     assert desk.ended()["outcome"] == "success"
     page.wait_for_function("document.body.dataset.view === 'after'")
+    page.get_by_role("button", name="During").click()
+    page.set_viewport_size({"width": 390, "height": 844})  # a telephone's
+    assert page.locator("#panes canvas").count() > 0
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
     events, about = desk.events(), read_manifest(desk.folder())["about"]
     notes = {event["what"]: event for event in events if event["event"] == "note"}
     assert notes["note"]["text"] == "<b>coughs</b>"
