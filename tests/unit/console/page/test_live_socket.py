@@ -1,16 +1,26 @@
-"""What the server does with the words of a page."""
+"""What the server does with the messages of a page, without a browser and without a clock."""
 
+import asyncio
 import json
+import math
+import time
 from collections import deque
 from types import SimpleNamespace
 
 import pytest
+from starlette.websockets import WebSocketDisconnect
+from tests.unit.acquisition.exact_rig import LONGEST
+from tests.unit.acquisition.whole_session import RETURN, session
 
 from rigidimeter.acquisition.processes import shared_memory
+from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.acquisition.processes.sink import SharedSupervision
 from rigidimeter.acquisition.processes.status_values import Condition, Flag, Role
+from rigidimeter.acquisition.run_states import NOTHING, Command
 from rigidimeter.console.page.desk import Desk, Place, StartRequest
 from rigidimeter.console.page.live_socket import LiveSockets, _Page
+from rigidimeter.console.page.page_messages import ORDERS
 from rigidimeter.errors import UserError
 from rigidimeter.settings import Settings
 
@@ -98,3 +108,176 @@ def test_the_emergency_stop_counts_while_a_session_starts(tmp_path, monkeypatch)
     desk.over(tmp_path, "not run", ())
     assert desk.ask(StartRequest("second"))
     desk.refuse_stopped()
+
+
+class Operator:
+    """A page in control, and one that only looks, beside a session in shared memory."""
+
+    def __init__(self, place):
+        self.memory = SessionMemory.create(tick_rate_hz=50.0, ring_s=1.0)
+        self.status = self.memory.status
+        self.desk = Desk(Place(place, Settings(), "defaults"))
+        self.desk.presence.arrive("page", "tab", 1, session=False)
+        self.sockets = LiveSockets(self.desk)
+        self.sockets._attached = SimpleNamespace(memory=self.memory, notes=deque())
+        self.told = []
+
+    def sends(self, kind, page="page", **values):
+        one = _Page(None, page)
+        self.sockets._hear(one, json.dumps({"kind": kind, **values}))
+        self.told += one.waiting
+
+    def orders(self):
+        """Return the commands that wait for the loop."""
+        return list(iter(lambda: self.status.take().command, Command.NONE))
+
+    def session(self, messages):
+        """Run a session in which the page sends each of these at its tick."""
+
+        def change(tick, reading):
+            assert tick < LONGEST, "it goes on for ever"
+            for message in messages.get(tick, ()):
+                self.sends(**message)
+            return reading
+
+        for role in (Role.CONSOLE, Role.RECORDER):
+            self.status.beat(role, 1)
+        still = {"now_ns": lambda: 1, "boot_ns": lambda: 1}
+        return session(SharedSupervision(self.memory, **still), change=change)
+
+
+@pytest.fixture
+def operator(tmp_path, monkeypatch):
+    monkeypatch.setattr(shared_memory, "WHERE", tmp_path)
+    made = Operator(tmp_path)
+    yield made
+    made.memory.close()
+
+
+SENT = 30
+"""A tick in the first epoch, in which the arm moves."""
+
+
+def commands(ran):
+    return [sample.velocity_command_rad_s for sample in ran.sink.samples]
+
+
+def test_the_emergency_stop_takes_the_power_and_nothing_is_commanded_after_it(operator):
+    ran = operator.session({SENT: [{"kind": "emergency"}]})
+    assert ran.error is None
+    assert commands(ran)[SENT - 1] != 0.0  # it had to be stopped
+    assert set(commands(ran)[SENT:]) == {0.0}
+    read = [k for k, call in enumerate(ran.rig.calls) if call[0] == "read"][SENT]
+    after = ran.rig.calls[read + 1 :]
+    assert after[0] == ("disable",)
+    assert {call for call in after if call[0] in ("write", "enable")} == {("write", 0.0)}
+    assert ran.epochs == [(1, "fail")]
+    assert "the emergency stop was pressed" in ran.result.reason
+    assert operator.told == []
+
+
+def test_a_page_that_is_left_has_the_arm_held_until_it_says_to_go_on(operator):
+    resumed = SENT + 100  # longer than what was left of the epoch
+    ran = operator.session(
+        {
+            SENT: [{"kind": "leave"}],
+            resumed: [{"kind": "order", "command": "resume"}],
+        }
+    )
+    assert ran.error is None
+    paused, went_on = ran.sink.of("order")
+    assert (paused["command"], paused["state"]) == ("pause_now", "paused")
+    assert went_on["command"] == "resume"
+    assert any(commands(ran)[SENT - 5 : SENT])
+    assert not any(sample.perturbation_nm for sample in ran.sink.samples[SENT + 1 : resumed])
+    assert not any(commands(ran)[SENT + RETURN + 2 : resumed])  # once it is back at the start
+    assert any(commands(ran)[resumed:])
+    assert ran.rig.of("disable") == [None]  # at the end
+
+
+def test_the_stop_and_a_page_that_leaves_also_end_a_check_of_the_rig(operator):
+    for kind in ("emergency", "leave"):
+        assert operator.desk.begin_check("daily check")
+        operator.sends("beat")
+        assert not operator.desk.check_stopped
+        operator.sends(kind)
+        assert operator.desk.check_stopped, kind
+        operator.desk.end_check()
+
+
+def test_each_message_does_what_it_says_and_nothing_else(operator):
+    status = operator.status
+    for name, command in ORDERS.items():
+        operator.sends("order", command=name)
+        assert operator.orders() == [command]
+    operator.sends("leave")
+    assert operator.orders() == [Command.PAUSE_NOW]
+    assert not any(status.flag(flag) for flag in Flag)
+    operator.sends("emergency")
+    assert status.take() is NOTHING
+    assert [flag for flag in Flag if status.flag(flag)] == [Flag.EMERGENCY_STOP]
+    assert operator.told == []
+
+
+def test_a_page_that_only_looks_orders_nothing_and_its_beat_is_nobodys(operator):
+    for kind in ("beat", "leave", "emergency"):
+        operator.sends(kind, "another")
+    operator.sends("order", "another", command="abort")
+    assert operator.orders() == []
+    assert not any(operator.status.flag(flag) for flag in Flag)
+    assert operator.status.age_s(Role.CONSOLE) == math.inf
+    assert ["only look" in said for said in operator.told] == [True] * 3
+    operator.sends("beat")
+    assert operator.status.age_s(Role.CONSOLE) < math.inf
+
+
+def test_a_page_is_there_by_its_beat_and_may_be_away_once_it_said_so(operator):
+    presence = operator.desk.presence
+    later_ns = time.monotonic_ns() + 5_000_000_000
+    operator.sends("beat")
+    beat_ns = presence.seen_ns(later_ns, still=True)
+    assert 1 < beat_ns < later_ns
+    operator.sends("leave")
+    assert presence.seen_ns(later_ns, still=True) == later_ns
+    assert presence.seen_ns(later_ns, still=False) == beat_ns
+
+
+class Socket:
+    """Says these messages and is closed then."""
+
+    def __init__(self, *messages):
+        self.messages, self.closed = [json.dumps(one) for one in messages], None
+
+    async def accept(self):
+        pass
+
+    async def receive_text(self):
+        if not self.messages:
+            raise WebSocketDisconnect(1001)
+        return self.messages.pop(0)
+
+    async def close(self, code):
+        self.closed = code
+
+
+HELLO = {"kind": "hello", "page": "page", "tab": "tab"}
+
+
+def test_nobody_is_there_once_the_connection_is_closed(operator):
+    presence, sockets = operator.desk.presence, operator.sockets
+    presence.gone("page")
+    sockets.admit("page")
+    asyncio.run(sockets.serve(Socket(HELLO, {"kind": "beat"}, {"kind": "leave"})))
+    assert operator.orders() == [Command.PAUSE_NOW]
+    assert operator.status.age_s(Role.CONSOLE) < math.inf
+    assert not presence.has_control("page")
+    operator.sends("emergency")
+    assert not operator.status.flag(Flag.EMERGENCY_STOP)
+
+
+def test_a_page_that_was_not_sent_from_here_is_turned_away(operator):
+    socket = Socket(HELLO, {"kind": "emergency"})
+    operator.desk.presence.gone("page")
+    asyncio.run(operator.sockets.serve(socket))
+    assert (socket.closed, len(socket.messages)) == (1008, 1)
+    assert not operator.status.flag(Flag.EMERGENCY_STOP)
