@@ -110,7 +110,8 @@ class FakeDrive:
         while self._queue and self._queue[0][0] <= now_s + 1e-9:
             wanted_rad_s = self._faults.get("command_scale", 1.0) * self._queue.popleft()[1]
             self._arm.command(wanted_rad_s + self._faults.get("drift_rad_s", 0.0))
-        silent = "deaf_watchdog" not in self._faults and now_s - self._written_s > 0.1
+        after_s = self._faults.get("stops_after_s", 0.1)
+        silent = "deaf_watchdog" not in self._faults and now_s - self._written_s > after_s
         if self._on and (silent or self._pressed()):
             self._halt()
             self._status, self._cause = 8, Cause.DRIVE_FAULT

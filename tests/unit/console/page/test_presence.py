@@ -1,7 +1,12 @@
 """Whose beat counts, and for how long a page that said so may be away."""
 
+from types import SimpleNamespace
+
 import pytest
 
+from rigidimeter.acquisition.processes.status_values import LoopStatus
+from rigidimeter.acquisition.run_states import State
+from rigidimeter.console.page.desk import Desk, Place
 from rigidimeter.console.page.presence import AWAY_S, SILENT_S, Presence
 
 S = 1_000_000_000
@@ -72,3 +77,17 @@ def test_a_page_that_is_lost_without_a_word_gives_control_to_the_next(presence):
     presence.gone("page")
     assert not presence.arrive("other", "other tab", BEGAN + S // 10, session=True)
     assert presence.arrive("other", "other tab", BEGAN + round(SILENT_S * S) + 1, session=True)
+
+
+@pytest.mark.parametrize(("state", "may"), [(State.PAUSED, True), (State.RUNNING, False)])
+def test_a_page_may_be_away_from_a_session_that_shows_that_it_is_paused(tmp_path, state, may):
+    now_ns = BEGAN + 2 * S
+    desk = Desk(Place(tmp_path, None, ""), now_ns=lambda: now_ns)
+    desk.presence.arrive("page", "tab", BEGAN, session=False)
+    assert desk.operator_seen_ns() == BEGAN
+    desk.presence.leave("page", BEGAN + S)
+    desk.presence.gone("page")
+    loop = LoopStatus(tick=1, state=int(state))
+    status = SimpleNamespace(loop=lambda: loop)
+    desk.console(None, tmp_path)(SimpleNamespace(status=status, names=()))
+    assert desk.operator_seen_ns() == (now_ns if may else BEGAN)
