@@ -1,4 +1,4 @@
-"""`rigidimeter run --resume` on hardware: the joint must stand where the session began."""
+"""`rigidimeter run`: what is refused before it starts, what it is told, how it ends."""
 
 from __future__ import annotations
 
@@ -8,9 +8,13 @@ from types import SimpleNamespace
 
 import pytest
 
+from rigidimeter.acquisition.processes.loop_process import Realtime
+from rigidimeter.cli.console import lead_session
 from rigidimeter.cli.realtime_rig import HOME_TOLERANCE_RAD
+from rigidimeter.console.page.desk import Desk, Place, StartRequest
 from rigidimeter.devices.composed import Home
 from rigidimeter.devices.rigfile import RigFile, load_rig
+from rigidimeter.errors import UserError
 from rigidimeter.experiment import plan
 from rigidimeter.recording import SessionWriter
 from rigidimeter.settings import parse_settings
@@ -176,3 +180,18 @@ def test_a_page_is_for_a_new_session_with_an_operator(tmp_path, rigidimeter):
     result = rigidimeter("run", "--out", tmp_path / "s", "--console", "--unattended")
     assert result.status == 1
     assert "--console goes with neither --unattended nor --resume" in result.err
+
+
+def test_a_session_on_the_page_runs_only_while_the_page_is_there(tmp_path, monkeypatch):
+    told = {}
+
+    def supervise(target, recording, **options):
+        told.update(options)
+        raise UserError("that is enough")
+
+    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", supervise)
+    settings = parse_settings({})
+    desk = Desk(Place(tmp_path, settings, "the defaults"))
+    assert lead_session(desk, StartRequest("s", settings), Realtime()) is None
+    assert told["operator_seen_ns"] == desk.operator_seen_ns
+    assert desk.finished.sentences == ("that is enough",)
