@@ -1,14 +1,19 @@
 import errno
+import json
+import os
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition.processes.recorder import Recorder, Recording
+from rigidimeter.acquisition.processes import full_disk
+from rigidimeter.acquisition.processes.recorder import Patience, Recorder, Recording
 from rigidimeter.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.acquisition.processes.ring_recovery import recover_from_rings
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.acquisition.processes.sink import RingSink
+from rigidimeter.acquisition.processes.status_values import Condition, Flag, Role
 from rigidimeter.errors import UserError
 from rigidimeter.recording import session_folder as folder_module
 from rigidimeter.recording.event_log import read_events
@@ -96,6 +101,55 @@ def test_everything_is_recorded(rig):
     assert rig.kinds() == ["session_started", "epoch_started", "epoch_ended", "session_ended"]
 
 
+def noted(rig):
+    """Return a list that gets the kind of each event and the number of each sample, as written."""
+    order, columns, line = [], rig.writer.columns, rig.writer.line
+
+    def write_columns(values):
+        columns(values)
+        order.extend(values["tick"].tolist())
+
+    def write_line(text):
+        line(text)
+        order.append(json.loads(text)["event"])
+
+    rig.writer.columns, rig.writer.line = write_columns, write_line
+    return order
+
+
+def test_samples_are_written_before_the_event_that_follows_them(rig):
+    order = noted(rig)
+    rig.begin()
+    rig.run(3)
+    rig.end()
+    rig.recorder.drain()
+    ended = ["epoch_ended", "session_ended"]
+    assert order == ["session_started", "epoch_started", 0, 1, 2, *ended]
+
+
+def test_and_events_before_the_samples_that_follow_them(rig):
+    """Though the loop goes on while the recorder looks how many there are."""
+    order = noted(rig)
+
+    class Busy(EventRing):
+        looked = False
+
+        @property
+        def written(self):
+            count = super().written
+            if not self.looked:
+                self.looked = True
+                rig.begin()
+                rig.run(1)
+            return count
+
+    rig.recorder._events = busy = Busy.attach(rig.events.name)
+    rig.recorder.drain()
+    rig.recorder.drain()
+    assert order == ["session_started", "epoch_started", 0]
+    busy.close()
+
+
 def test_a_loop_that_died_leaves_a_closed_session(rig):
     rig.begin()
     rig.run(50)
@@ -148,6 +202,91 @@ def test_a_full_disk_loses_and_repeats_nothing(rig, room, monkeypatch):
     assert rig.recorder.ended
     assert rig.ticks() == 550
     assert rig.kinds() == ["session_started", "epoch_started", "epoch_ended", "session_ended"]
+
+
+FULL = OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.fixture
+def disk(rig, monkeypatch):
+    """Give what the recorder knows of its disk, and a clock that stands still."""
+    clock = SimpleNamespace(now_s=1000.0)
+    clock.monotonic = lambda: clock.now_s
+    monkeypatch.setattr(full_disk, "time", clock)
+    recording = Recording(rig.folder, Settings(), virtual=True)
+    disk = full_disk.FullDisk(recording, rig.shared, Patience(), os.getppid())
+    return disk, clock
+
+
+@pytest.mark.parametrize("closing", [False, True])
+def test_a_disk_is_given_up_once_the_session_is_over_and_somebody_said_so(rig, disk, closing):
+    disk, clock = disk
+    status, allowed_s = rig.shared_status, Patience().disk_s
+
+    def given_up_after(seconds, *, over=closing):
+        clock.now_s += seconds
+        return disk.given_up(over=over)
+
+    disk.refuses(FULL)
+    assert not given_up_after(0.0)
+    assert not given_up_after(2 * allowed_s, over=True)  # there may be room yet, or another folder
+    status.raise_flag(Flag.END_ASKED)
+    assert not given_up_after(0.0, over=False)
+    assert not given_up_after(2 * allowed_s, over=False)  # the loop runs
+    if not closing:
+        status.set_condition(Role.LOOP, Condition.DONE)
+    assert not given_up_after(0.0)
+    assert not given_up_after(allowed_s)
+    assert given_up_after(1e-3)
+
+
+def test_a_disk_that_took_something_again_is_tried_as_long_as_before(rig, disk):
+    disk, clock = disk
+    rig.shared_status.raise_flag(Flag.END_ASKED)
+    disk.refuses(FULL)
+    assert not disk.given_up(over=True)
+    clock.now_s += Patience().disk_s - 1.0
+    disk.takes(rig.recorder)
+    assert not disk.given_up(over=True)
+    disk.refuses(FULL)
+    clock.now_s += 2.0
+    assert not disk.given_up(over=True)
+
+
+def test_a_session_that_ended_on_a_full_disk_is_whole_in_another_folder(rig, disk, tmp_path):
+    disk, _ = disk
+    rig.begin()
+    rig.run(250)
+    rig.end()
+    close, rig.writer.close_files = rig.writer.close_files, lambda: (_ for _ in ()).throw(FULL)
+    with pytest.raises(OSError, match="No space"):
+        rig.recorder.drain()
+    disk.refuses(FULL)
+    assert disk.other_folder() is None
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "file").touch()
+    rig.shared_status.ask_folder(tmp_path / "taken")
+    assert disk.other_folder() is None
+    disk.refuses(FULL)
+    assert f"(not {tmp_path / 'taken'}: " in rig.shared_status.note(Role.RECORDER)
+    old, rig.folder = rig.folder, tmp_path / "other"
+    rig.shared_status.ask_folder(rig.folder)
+    rig.recorder.move(disk.other_folder())
+    rig.recorder.drain()
+    disk.takes(rig.recorder)
+    assert disk.other_folder() is None  # as long as no other is asked for
+    assert rig.recorder.ended
+    assert rig.shared_status.folder() == rig.folder
+    assert rig.ticks() == 250
+    assert rig.kinds()[-1] == "session_ended"
+    assert rig.kinds().count("session_ended") == 1
+    events, _ = read_events(rig.folder / "events.jsonl")
+    assert [e["from"] for e in events if e["event"] == "recording_moved"] == [str(old)]
+    disk.refuses(FULL)
+    note = rig.shared_status.note(Role.RECORDER)
+    assert note.startswith(f"{rig.folder}: nothing can be written there")
+    assert "(not " not in note
+    close()
 
 
 def test_samples_that_found_no_room_are_told(rig):

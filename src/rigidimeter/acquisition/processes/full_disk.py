@@ -89,11 +89,12 @@ class FullDisk:
         old, new = self._recording.folder, replace(self._recording, folder=asked)
         try:
             writer = new.writer()
+            # First: the old record may hold the end of the session, and nothing follows that.
+            writer.line(json_line({"event": "recording_moved", "from": str(old)}))
             copy_record(old, writer, new, lambda: self._shared.status.beat(Role.RECORDER))
         except (UserError, OSError) as error:
             self._refusal = f" (not {asked}: {error})"
             return None
-        writer.line(json_line({"event": "recording_moved", "from": str(old)}))
         self._recording = new
         self._shared.status.show_folder(asked)
         return writer
