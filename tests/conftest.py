@@ -18,7 +18,7 @@ import hypothesis
 import pytest
 import typer
 import typer.testing
-from tests.lateness import PRESENT, LatenessProbe, run_beside_probe
+from tests.lateness import PRESENT, LatenessProbe, run_beside_probe, unjudged
 
 from rigidimeter.cli.main import main
 from rigidimeter.settings import parse_settings
@@ -171,3 +171,19 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
 def lateness() -> LatenessProbe:
     """Give the probe that runs beside this test."""
     return PRESENT[0]
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--unjudged", metavar="FILE", help="write the tests that were not judged here")
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    """Name the tests by the clock that a busy machine left without a result."""
+    lines = unjudged(terminalreporter.stats.get("skipped", []))
+    if file := config.getoption("--unjudged"):
+        Path(file).write_text("".join(f"{line}\n" for line in lines), "utf-8")
+    elif lines:
+        terminalreporter.section("not judged")
+        terminalreporter.write("".join(f"{line}\n" for line in lines))

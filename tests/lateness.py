@@ -10,7 +10,9 @@ allows what the probe saw in addition:
 A machine that stood still for longer than a test can resolve says nothing about the software, so
 the test is repeated after a pause. If that happens every time, the test is reported as skipped,
 with the reason and what it last found: it has neither failed nor passed. That holds for a test that
-passed with so wide a bound that it would have passed whatever happened. A failure is believed only
+passed with so wide a bound that it would have passed whatever happened. These are listed at the
+end (`unjudged`). What must come before what is therefore also tested on a clock of the test's own,
+where nothing is late. A failure is believed only
 where the machine was more punctual still, because on
 a wire one lateness adds to another (`FAILURE_SHARE`). The probes are processes and not threads:
 what the software under test does to its own interpreter must not widen a bound. They are started
@@ -28,7 +30,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Self
@@ -209,8 +211,24 @@ def same_priority(pid: int) -> None:
             os.sched_setscheduler(int(thread.name), os.sched_getscheduler(0), os.sched_getparam(0))
 
 
+UNJUDGED = "unjudged"
+"""The property of a report that says why the test was not judged."""
+
+
+def unjudged(reports: Iterable[Any]) -> list[str]:
+    """Return a line for each test that was not judged."""
+    found = {report.nodeid: dict(report.user_properties).get(UNJUDGED) for report in reports}
+    return [f"{name}: {why}" for name, why in found.items() if why]
+
+
 PRESENT: list[LatenessProbe] = []
 """The probe beside the test that runs, for helpers that are no fixtures."""
+
+
+def _error(report: Any) -> str:
+    """Return the first line of what failed in a test."""
+    crash = getattr(report.longrepr, "reprcrash", None)
+    return f"; it last failed with {crash.message.splitlines()[0]}" if crash is not None else ""
 
 
 def run_beside_probe(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
@@ -249,6 +267,7 @@ def run_beside_probe(item: pytest.Item, nextitem: pytest.Item | None) -> bool | 
         for report in reports:
             if report.failed or report.when == "call":
                 found = f"; it last found: {report.longreprtext[-2000:]}" if report.failed else ""
+                report.user_properties.append((UNJUDGED, why + _error(report)))
                 report.outcome = "skipped"
                 report.longrepr = (str(item.path), item.location[1] or 0, why + found)
     for report in reports:

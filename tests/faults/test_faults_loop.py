@@ -7,12 +7,11 @@ import signal
 
 import numpy as np
 import pytest
-from tests.faults.rigs import ASCII, RIGS, Line, Wrong, bench
+from tests.faults.rigs import ASCII, RIGS, Wrong, bench
 from tests.faults.trials import AT_S, Desk, assert_came_to_rest, assert_stopped, assert_whole, run
 
 from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.devices.base import DeviceError
-from rigidimeter.devices.composed import ComposedRig
 from rigidimeter.guard import Cause, Reaction
 from rigidimeter.units import rad_from_deg
 
@@ -157,41 +156,6 @@ def test_fault_20_failure_half_way_through_enable(rig, tmp_path, measured):
         if made.line is not None:
             assert not made.line.closed
         measured(20, rig, "refuses to be enabled: no motion")
-
-
-class Stubborn:
-    """A device of which every step of the way out fails."""
-
-    def __init__(self, tried):
-        self._tried = tried
-
-    def __getattr__(self, name):
-        def step(*_):
-            self._tried.append(name)
-            raise RuntimeError(name)
-
-        return step
-
-
-@pytest.mark.parametrize("rig", ["rdt_canopen", "rdt_ascii"])
-def test_fault_20_every_step_of_the_way_out_is_tried(rig):
-    sensor, drive = [], []
-    line = Line(lambda: 0.0)
-    composed = ComposedRig(Stubborn(sensor), Stubborn(drive), 50.0, line)
-    line.close_contact()
-    with pytest.raises(RuntimeError):
-        composed.close()
-    assert (drive, sensor, line.closed) == (["disable", "close"], ["close"], False)
-    assert line.port_closed
-
-
-def test_fault_20_a_contact_that_cannot_be_opened_spares_no_step():
-    sensor, drive, line = [], [], []
-    composed = ComposedRig(Stubborn(sensor), Stubborn(drive), 50.0, Stubborn(line))
-    with pytest.raises(RuntimeError):
-        composed.close()
-    assert (drive, sensor) == (["disable", "close"], ["close"])
-    assert line == ["open_contact", "close"]
 
 
 @pytest.mark.parametrize("rig", RIGS)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from tests import lateness
-from tests.__main__ import TIMED
+from tests.__main__ import TIMED, too_many_unjudged
 from tests.conftest import REALTIME
 from tests.lateness import ATTEMPTS, LatenessProbe
 
@@ -47,9 +47,10 @@ class Still(LatenessProbe):
         pass
 
 
-def judged_once(pytester, body):
+def judged_once(pytester, body, *options):
     """Run a test of that body beside the probe; `ran` gets a letter for each attempt."""
     pytester.makeconftest(
+        "from tests.conftest import pytest_addoption, pytest_terminal_summary\n"
         "from tests.lateness import run_beside_probe\n"
         "def pytest_runtest_protocol(item, nextitem):\n"
         "    return run_beside_probe(item, nextitem)\n"
@@ -63,7 +64,7 @@ def judged_once(pytester, body):
         "        file.write('x')\n"
         f"    {body}\n"
     )
-    return pytester.runpytest_inprocess("-rs", "-p", "no:cacheprovider", "-W", "ignore")
+    return pytester.runpytest_inprocess("-rs", "-p", "no:cacheprovider", "-W", "ignore", *options)
 
 
 @pytest.mark.parametrize(
@@ -84,6 +85,44 @@ def test_a_machine_that_stood_still_is_no_judge(pytester, monkeypatch, body, sti
     ran.assert_outcomes(**{outcome: 1})
     assert (pytester.path / "ran").read_text() == "x" * runs
     assert ("too busy to judge" in ran.stdout.str()) == (runs == ATTEMPTS)
+
+
+@pytest.mark.parametrize(
+    ("body", "error"),
+    [
+        ("assert PRESENT[0].worst_s(0.0) < 9", ""),
+        ("assert False, 'late'", "; it last failed with AssertionError: late"),
+    ],
+)
+def test_what_was_not_judged_is_named_and_counted(pytester, monkeypatch, capsys, body, error):
+    monkeypatch.setattr(lateness, "LatenessProbe", Still)
+    monkeypatch.setattr(Still, "left", 99)
+    monkeypatch.setattr(lateness, "PAUSE_S", 0.0)
+    name = "test_what_was_not_judged_is_named_and_counted.py::test_it"
+    line = f"{name}: the machine is too busy to judge: it woke a sleeping process "
+    ran = judged_once(pytester, body)
+    assert "= not judged =" in ran.stdout.str()
+    assert line in ran.stdout.str()
+    path = pytester.path / "unjudged"
+    judged_once(pytester, body, "--unjudged", path)
+    capsys.readouterr()
+    assert not too_many_unjudged(path, 1)
+    assert too_many_unjudged(path, 0)
+    said = capsys.readouterr().out
+    assert said.count("not judged, which is neither passed nor failed: 1\n") == 2
+    assert said.count(f"{line}200, 200, 200, 200, 200 ms late in 5 attempts, and this") == 2
+    assert said.count(f" test resolves 50 ms{error}\n") == 2
+    assert said.count("0 may be left without a result") == 1
+
+
+def test_what_was_judged_is_not_counted(pytester, tmp_path, capsys):
+    for k, body in enumerate(("assert True", "pytest.skip('not here')")):
+        path = tmp_path / str(k)
+        judged_once(pytester, body, "--unjudged", path)
+        capsys.readouterr()
+        assert not too_many_unjudged(path, 0)
+    assert not too_many_unjudged(tmp_path / "broken off", 0)
+    assert capsys.readouterr().out == ""
 
 
 def test_make_test_looks_for_tests_in_real_time_wherever_there_are_some():

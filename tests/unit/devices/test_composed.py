@@ -138,3 +138,35 @@ def test_a_rig_without_a_contact_ends_by_its_drive(drive):
     rig.close()
     assert drive.asked == ["stop", "disable", "disable", "close"]
     assert sensor.closed
+
+
+class Stubborn:
+    """A device of which every step of the way out fails."""
+
+    def __init__(self) -> None:
+        self.tried: list[str] = []
+
+    def __getattr__(self, name):
+        def step(*_):
+            self.tried.append(name)
+            raise RuntimeError(name)
+
+        return step
+
+
+def test_every_step_of_the_way_out_is_tried(line, port):
+    sensor, drive = Stubborn(), Stubborn()
+    rig = ComposedRig(sensor, drive, 50.0, line)
+    line.close_contact()
+    with pytest.raises(RuntimeError):
+        rig.close()
+    assert (drive.tried, sensor.tried) == (["disable", "close"], ["close"])
+    assert (port.rts, port.closed) == (False, True)
+
+
+def test_a_contact_that_cannot_be_opened_spares_no_step():
+    sensor, drive, contact = Stubborn(), Stubborn(), Stubborn()
+    with pytest.raises(RuntimeError):
+        ComposedRig(sensor, drive, 50.0, contact).close()
+    assert (drive.tried, sensor.tried) == (["disable", "close"], ["close"])
+    assert contact.tried == ["open_contact", "close"]
