@@ -1,4 +1,4 @@
-"""Faults made by hand, where the loop decides what the arm does: each must fail a fast test.
+"""Faults made by hand in what decides what the arm does: each must fail a fast test.
 
 Each has the exact text in the source, which occurs there once, what stands there instead, and what
 it would do to the arm or to the record. The guard's small faults are made by `mutants`.
@@ -36,6 +36,14 @@ ZEROING = "acquisition/zeroing.py"
 RUN = "acquisition/controller_run.py"
 STATES = "acquisition/run_states.py"
 SINK = "acquisition/processes/sink.py"
+SIGNALS, DISK, LOOP, RECORDER, RECORDS, CONSOLE = (
+    f"acquisition/processes/{name}.py"
+    for name in (
+        *("end_signals", "full_disk", "loop_process", "recorder", "recorder_process"),
+        "supervise",
+    )
+)
+PAGE, PAGES_DESK = "console/page/live_socket.py", "console/page/desk.py"
 STEP, WATCH, LIMITS = "guard/step.py", "guard/watch.py", "guard/limits.py"
 AGREEMENT = "guard/agreement.py"
 CONSISTENCY, ANSWER = "guard/consistency.py", "guard/torque_answer.py"
@@ -80,6 +88,7 @@ HAND_MADE = tuple(
             "a ramp that cannot be recorded is a blow",
         ),
         (RAMP, "        _ramp_unrecorded(loop)\n", "", "a fault of the program leaves it moving"),
+        (RAMP, "except BaseException:", "except Exception:", "an interrupt leaves it moving"),
         (
             RAMP,
             "math.ceil(abs(loop.guard.velocity_rad_s) / _brake_rad_s(loop))",
@@ -347,5 +356,82 @@ HAND_MADE = tuple(
             "",
             "a loop that runs is taken for one that hangs",
         ),
+        # Between the processes
+        (LOOP, " or os.getppid() != console_pid:", ":", "nobody is there when it begins"),
+        (LOOP, "        console_pid=console_pid,\n", "", "a killed console is missed for a while"),
+        (
+            LOOP,
+            "    except BaseException as error:",
+            "    except ZeroDivisionError as error:",
+            "a loop that fails leaves the record open",
+        ),
+        (RECORDS, "        loop.kill()\n", "", "a loop that hangs may move the arm again"),
+        (
+            RECORDS,
+            "os.getppid() != console_pid or ",
+            "",
+            "a recorder without console and loop never ends",
+        ),
+        (
+            CONSOLE,
+            "            status.raise_flag(Flag.END_ASKED)\n",
+            "",
+            "a console that fails kills a loop that moves the arm",
+        ),
+        (
+            CONSOLE,
+            "            self._status.raise_flag(Flag.END_ASKED)\n",
+            "",
+            "the arm moves on, and nobody sees it",
+        ),
+        (
+            CONSOLE,
+            "beat(Role.CONSOLE, self._operator_seen_ns())",
+            "beat(Role.CONSOLE)",
+            "the arm moves on for a page that is gone",
+        ),
+        (CONSOLE, "            loop.kill()\n", "", "a loop that hangs keeps the program for ever"),
+        (
+            SIGNALS,
+            "    signal.signal(signal.SIGTSTP, signal.SIG_IGN)\n",
+            "",
+            "Ctrl-Z leaves the last command in force",
+        ),
+        (SIGNALS, "signal.SIGINT and first", "signal.SIGINT", "a second Ctrl-C does nothing"),
+        (
+            RECORDER,
+            "            self._copy(event.samples_before)\n",
+            "",
+            "an epoch has ended in a record that lacks its samples",
+        ),
+        (
+            DISK,
+            "            self._over_s = None\n",
+            "",
+            "a disk with room again is given up at once",
+        ),
+        (DISK, "        self._recording = new\n", "", "the operator is told of another disk"),
+        # The page
+        (
+            PAGE,
+            "status.raise_flag(Flag.EMERGENCY_STOP)",
+            "status.post(Order(Command.PAUSE_NOW))",
+            "the emergency stop only pauses",
+        ),
+        (
+            PAGE,
+            "status.post(Order(Command.PAUSE_NOW))",
+            "pass",
+            "a page that is left pauses nothing",
+        ),
+        (PAGE, "if not presence.has_control(page.secret):", "if False:", "anybody may order"),
+        (
+            PAGE,
+            "self._attached is not None and presence.has_control(page.secret)",
+            "self._attached is not None",
+            "a page that only looks keeps the arm moving",
+        ),
+        (PAGE, "            presence.gone(page.secret)\n", "", "a page that is gone keeps control"),
+        (PAGES_DESK, "still=self._still", "still=True", "the arm moves on without a page"),
     )
 )

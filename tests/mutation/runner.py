@@ -78,6 +78,19 @@ TESTS = {
 }
 """Of each module, below `tests/unit`."""
 
+_WATCHED = ("acquisition/test_watched_processes.py",)
+BY_HAND = {
+    "acquisition/processes/end_signals.py": ("acquisition/test_signals.py",),
+    "acquisition/processes/full_disk.py": ("acquisition/test_ring_recovery.py",),
+    "acquisition/processes/loop_process.py": _WATCHED,
+    "acquisition/processes/recorder.py": ("acquisition/test_ring_recovery.py",),
+    "acquisition/processes/recorder_process.py": _WATCHED,
+    "acquisition/processes/supervise.py": _WATCHED,
+    "console/page/desk.py": ("console/page/test_presence.py",),
+    "console/page/live_socket.py": ("console/page/test_live_socket.py",),
+}
+"""The same of modules in which only the faults made by hand are looked for."""
+
 CPU_S, WALL_S = 30, 600
 """A mutant that takes more goes round for ever, or waits for ever: that is seen, too."""
 
@@ -120,7 +133,8 @@ class _First:
 
 def tests_of(path: Path) -> tuple[str, ...]:
     """Return the files of the tests of a module, as pytest takes them."""
-    return tuple(f"{UNIT}/{test}" for test in TESTS[path.relative_to(PACKAGE).as_posix()])
+    name = path.relative_to(PACKAGE).as_posix()
+    return tuple(f"{UNIT}/{test}" for test in {**TESTS, **BY_HAND}[name])
 
 
 def seen_by(
