@@ -5,32 +5,46 @@ Each runs in this process, and what it would start or kill only notes that it wa
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
+from tests.unit.acquisition.whole_session import RATE_HZ, VALUES
 
 from rigidimeter.acquisition.processes import (
     loop_process,
     recorder_process,
+    ring_recovery,
     shared_memory,
     sink,
     supervise,
 )
+from rigidimeter.acquisition.processes.realtime_scheduling import Prepared
 from rigidimeter.acquisition.processes.recorder import Patience, Recording
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.acquisition.processes.status_values import Condition, Flag, Role
+from rigidimeter.acquisition.run_states import Command, Order, State
+from rigidimeter.cli.realtime_rig import run_loop
 from rigidimeter.errors import UserError
+from rigidimeter.experiment import plan
 from rigidimeter.guard import Cause
-from rigidimeter.settings import Settings
+from rigidimeter.recording.event_log import read_events
+from rigidimeter.recording.sample_log import Sample
+from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.settings import Settings, parse_settings
 
 PATIENCE = Patience()
+SETTINGS = parse_settings(VALUES)
+PREPARED = Prepared(None, None, None, False, None, False, ())
 NS = 1_000_000_000
 BEGAN = 1000 * NS
 
@@ -38,7 +52,7 @@ BEGAN = 1000 * NS
 @pytest.fixture
 def shared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SessionMemory]:
     monkeypatch.setattr(shared_memory, "WHERE", tmp_path)
-    made = SessionMemory.create(tick_rate_hz=100.0, ring_s=1.0)
+    made = SessionMemory.create(tick_rate_hz=RATE_HZ, ring_s=60.0)
     yield made
     made.close()
 
@@ -114,8 +128,9 @@ def loop_main(
     shared: SessionMemory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., int]:
     """Run the loop's process in this one with a target; return its exit status."""
+    called: list[str] = []
     for name in ("raise_flags", "_leave_real_time"):  # they are for a process of its own
-        monkeypatch.setattr(loop_process, name, lambda *_: None)
+        monkeypatch.setattr(loop_process, name, lambda *_, name=name: called.append(name))
     monkeypatch.setattr(loop_process, "WatchedProcess", lambda _: Watched())
     status = shared.status
     for role in (Role.CONSOLE, Role.RECORDER):
@@ -123,9 +138,16 @@ def loop_main(
     status.set_condition(Role.RECORDER, Condition.READY)
 
     def run(
-        target: Callable[[loop_process.LoopSide], object], console_pid: int = os.getppid()
+        target: Callable[[loop_process.LoopSide], object],
+        console_pid: int = os.getppid(),
+        settings: Settings = SETTINGS,
+        attended: bool = True,
     ) -> int:
+        targeted = []
+
         def whole(side: loop_process.LoopSide) -> None:
+            targeted.append(side)
+            assert called == ["raise_flags"]
             try:
                 target(side)
             finally:
@@ -134,12 +156,14 @@ def loop_main(
         with pytest.raises(SystemExit) as ended:
             loop_process.loop_main(
                 whole,
-                Recording(tmp_path / "session", Settings()),
+                Recording(tmp_path / "session", settings),
                 shared.names,
-                loop_process.Realtime(),
+                loop_process.Realtime(attended=attended),
                 PATIENCE,
                 console_pid,
             )
+        assert called[0] == "raise_flags"
+        assert "_leave_real_time" in called or not targeted
         return int(ended.value.code or 0)
 
     return run
@@ -169,6 +193,24 @@ def test_the_loop_stops_for_a_console_that_was_killed_however_long_silence_is_al
     assert causes == [Cause.NONE, Cause.CONSOLE_LOST]
 
 
+def test_the_loop_is_as_patient_as_the_settings_say(
+    loop_main: Callable[..., int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: dict[str, Any] = {}
+
+    def supervision(*_: object, **options: Any) -> SimpleNamespace:
+        told.update(options)
+        return SimpleNamespace()
+
+    monkeypatch.setattr(loop_process, "SharedSupervision", supervision)
+    limits = {"console_lost_s": 0.7, "recorder_lost_s": 3.0, "stall_s": 0.05}
+    settings = parse_settings({**VALUES, "loop": limits})
+    loop_main(lambda _: None, settings=settings, attended=False)
+    lag = round((3.0 + 2 * PATIENCE.look_s) * RATE_HZ)
+    rest = {"most_lag": lag, "attended": False, "console_pid": os.getppid()}
+    assert told == {**limits, **rest}
+
+
 @pytest.mark.parametrize(
     ("error", "code", "reason"),
     [
@@ -195,6 +237,113 @@ def test_a_target_that_ends_without_closing_the_session_has_it_closed(
     }
     ended = Condition.FAILED if code else Condition.DONE
     assert shared.status.condition(Role.LOOP) is ended
+
+
+class Clock:
+    """Is never late, and acts in the first epoch, when the arm moves, and a second later."""
+
+    origin_s = 0.0
+
+    def __init__(self, shared: SessionMemory, *acts: Callable[[], object]) -> None:
+        self.samples, self.acts, self.in_epoch = shared.samples, list(acts), 0
+        self.acted = -1
+
+    def wait_until(self, deadline_s: float) -> float:
+        self.samples.recorded = written = self.samples.written
+        assert written < 1000, "it goes on for ever"
+        if written:
+            self.in_epoch += self.samples.rows(written - 1, written)["epoch"][0] == 1
+        if self.acts and self.in_epoch >= 20 and self.acted < 0:
+            self.acted = written
+            self.acts.pop(0)()
+        elif self.acts and self.acted > 0 and written >= self.acted + RATE_HZ:
+            self.acts.pop(0)()
+        return deadline_s
+
+
+@pytest.fixture
+def run_on_clock(
+    loop_main: Callable[..., int], shared: SessionMemory, monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., Clock]:
+    """Run the target that `run` gives the loop's process, on the virtual rig; return the clock."""
+
+    def run(*acts: Callable[[], object]) -> Clock:
+        clock = Clock(shared, *acts)
+        monkeypatch.setattr("rigidimeter.acquisition.clock.DeadlineClock", lambda: clock)
+        monkeypatch.setattr(loop_process, "prepare_loop_process", lambda **_: PREPARED)
+        protocol = plan(SETTINGS.protocol, SETTINGS.prbs, SETTINGS.sinusoid, 1)
+        assert loop_main(partial(run_loop, SETTINGS, protocol, None, None)) == 0
+        return clock
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("act", "outcome", "reason"),
+    [
+        ("raise_flag EMERGENCY_STOP", "fail", Cause.EMERGENCY_STOP.sentence),
+        ("raise_flag END_ASKED", "fail", Cause.SIGNAL.sentence),
+        ("raise_flag ABORT_ASKED", "abort", "aborted by the operator"),
+        ("post ABORT", "abort", "aborted by the operator"),
+        ("post HALT", "fail", Cause.OPERATOR_HALT.sentence),
+        ("the console is killed", "fail", Cause.CONSOLE_LOST.sentence),
+        ("the console is silent", "fail", Cause.CONSOLE_LOST.sentence),
+        ("the recorder is silent", "fail", Cause.RECORDER_LOST.sentence),
+    ],
+)
+def test_whoever_stops_the_loop_no_velocity_is_commanded_after_it(
+    run_on_clock: Callable[..., Clock],
+    shared: SessionMemory,
+    monkeypatch: pytest.MonkeyPatch,
+    act: str,
+    outcome: str,
+    reason: str,
+) -> None:
+    status = shared.status
+
+    def acts() -> None:
+        kind, _, name = act.partition(" ")
+        if kind == "raise_flag":
+            status.raise_flag(Flag[name])
+        elif kind == "post":
+            status.post(Order(Command[name]))
+        elif name.endswith("killed"):
+            monkeypatch.setattr(sink, "getppid", lambda: 1)
+        else:
+            status.beat(Role.CONSOLE if "console" in name else Role.RECORDER, 1)
+
+    clock = run_on_clock(acts)
+    assert status.loop().until_s > 0.0  # type: ignore[union-attr]
+    sent = np.abs(shared.samples.rows(0, shared.samples.written)["velocity_command_rad_s"])
+    assert sent[clock.acted - 1] > 0.0
+    after = sent[clock.acted :]
+    limit = math.radians(SETTINGS.guard.acceleration_limit_deg_s2) / RATE_HZ
+    at_once = act.endswith(("EMERGENCY_STOP", "HALT"))
+    assert not after[1 if at_once else 1 + math.ceil(sent[clock.acted - 1] / limit) :].any()
+    assert np.all(np.diff(after) <= 0.0)
+    events = [shared.events.get(k).facts for k in range(shared.events.written)]
+    assert "sensor_zeroed" in [event["event"] for event in events]
+    assert events[-1]["event"] == "session_ended"
+    assert events[-1]["outcome"] == outcome
+    assert reason in events[-1]["reason"]
+
+
+def test_a_loop_that_is_paused_holds_the_arm_and_shows_that_it_is(
+    run_on_clock: Callable[..., Clock], shared: SessionMemory
+) -> None:
+    """By which a page may be away for a while."""
+    status, shown = shared.status, []
+
+    def later() -> None:
+        shown.append(status.loop())
+        status.post(Order(Command.ABORT))
+
+    clock = run_on_clock(lambda: status.post(Order(Command.PAUSE_NOW)), later)
+    (loop,) = shown
+    assert loop is not None
+    assert (loop.state, loop.velocity_command_rad_s) == (State.PAUSED, 0.0)
+    sent = shared.samples.rows(clock.acted, shared.samples.written)["velocity_command_rad_s"]
+    assert not sent[1 + round(SETTINGS.protocol.return_s * RATE_HZ) + 1 :].any()
 
 
 # The recorder's process
@@ -239,6 +388,91 @@ def test_the_recorder_waits_for_no_loop_once_the_console_is_gone(shared: Session
     assert recorder_process._loop_lost(status, None, PATIENCE, console + 1) == never
     status.raise_flag(Flag.END_ASKED)
     assert recorder_process._loop_lost(status, None, PATIENCE, console) == never
+
+
+def test_a_session_whose_loop_was_killed_is_closed_with_all_that_it_made(
+    shared: SessionMemory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loop = Watched()
+    loop.kill()
+    monkeypatch.setattr(recorder_process, "raise_flags", lambda _: None)
+    monkeypatch.setattr(recorder_process, "WatchedProcess", lambda _: loop)
+    naps = iter([time.sleep] * 1000)  # an end to one that waits for ever
+    monkeypatch.setattr(recorder_process.time, "sleep", lambda s: next(naps)(min(s, 0.005)))
+    shared.status.join(Role.LOOP)
+    made = sink.RingSink(shared, RATE_HZ)
+    made.event("session_started", time_s=0.0)
+    named = {"label": "one", "task": "prbs", "condition": "OFF"}
+    made.event("epoch_started", epoch=1, **named, time_s=0.0)
+    for k in range(30):
+        made.sample(Sample(k, k / RATE_HZ, 0.0, 1, *[0.5] * 9, 0))
+    recording = Recording(tmp_path / "session", Settings())
+    recorder_process.recorder_main(recording, shared.names, PATIENCE, os.getppid())
+    assert shared.status.condition(Role.RECORDER) is Condition.DONE
+    assert read_samples(recording.folder / "samples.arrows")["tick"].size == 30
+    events, torn = read_events(recording.folder / "events.jsonl")
+    assert not torn
+    kinds = ["session_started", "epoch_started", "epoch_ended", "session_ended"]
+    assert [event["event"] for event in events] == kinds
+    for event in events[2:]:
+        assert event["outcome"] == "fail"
+        assert event["reason"].startswith("the loop's process ended without closing the session")
+
+
+# Whoever is left
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """Give a clock that goes on only while it is slept."""
+    clock = SimpleNamespace(now_s=1000.0)
+    clock.monotonic = lambda: clock.now_s
+    clock.sleep = lambda seconds: setattr(clock, "now_s", clock.now_s + seconds)
+    monkeypatch.setattr(ring_recovery, "time", clock)
+    return clock
+
+
+def test_a_recorder_that_hangs_is_ended_before_its_work_is_done_by_another(
+    shared: SessionMemory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, clock: SimpleNamespace
+) -> None:
+    recorder, began_s, looks = Watched(), clock.now_s, []
+    status = SharedStatus(shared.status.memory, lambda: round(NS * clock.now_s))
+    status.beat(Role.RECORDER, 1)
+    memory = SessionMemory(shared.samples, shared.events, status)
+
+    def recover(*_: object) -> None:
+        assert recorder.killed, "two of them write"
+        looks.append("recovered")
+
+    monkeypatch.setattr(ring_recovery, "recover_from_rings", recover)
+    remarks = ring_recovery.complete(
+        memory,
+        Recording(tmp_path / "session", Settings()),
+        recorder,  # type: ignore[arg-type]
+        PATIENCE,
+        lambda: looks.append(clock.now_s),
+    )
+    assert remarks == ["the recorder did not answer for 8 s and was ended"]
+    assert looks[-1] == "recovered"
+    waited_s = [at_s - began_s for at_s in looks[:-1]]
+    assert PATIENCE.hung_s - 0.03 < waited_s[-1] < PATIENCE.hung_s + 0.03
+
+
+def test_a_recorder_that_is_slow_is_left_to_its_work(
+    shared: SessionMemory, tmp_path: Path, clock: SimpleNamespace
+) -> None:
+    recorder = Watched()
+    status = SharedStatus(shared.status.memory, lambda: round(NS * clock.now_s))
+    memory = SessionMemory(shared.samples, shared.events, status)
+
+    def look() -> None:
+        status.beat(Role.RECORDER)
+        if clock.now_s > 1060.0:
+            status.set_condition(Role.RECORDER, Condition.DONE)
+
+    recording = Recording(tmp_path / "session", Settings())
+    assert ring_recovery.complete(memory, recording, recorder, PATIENCE, look) == []  # type: ignore[arg-type]
+    assert not recorder.killed
 
 
 # The console's process
