@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test check bench bench-loop hazards mutation fuzz clean
+.PHONY: install demo test check bench bench-loop hazards mutation golden fuzz clean
 
 install: $(STAMP)
 
@@ -50,6 +50,10 @@ hazards: install
 mutation: install
 	$(BIN)/python -m tests.mutation --hand-made
 	$(BIN)/python -m tests.mutation
+
+# Look at the difference of tests/golden/answers.txt before you commit it.
+golden: install
+	$(BIN)/python -m tests.golden
 
 SEED ?= 1
 CASES ?= 4000

@@ -3,8 +3,7 @@
 The study is the virtual one of the paper's size, made once, by the other tree if there is one: what
 an older version recorded is read by both. Each command runs by turns from both
 trees, on a fresh copy of the study, so that no run finds what another one kept. CPU time is user
-and system time of the process and its children. `kept-report` is a report after a comparison of the
-same copy, which is not counted.
+and system time of the process and its children.
 
     python -m benchmarks.cpu_commands --against ../other/src
     python -m benchmarks.cpu_commands --against ../other/src --command compare --repeats 5
@@ -25,7 +24,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 SOURCE = Path(__file__).parents[1] / "src"
-COMMANDS = ("compare", "estimate", "report", "kept-report", "reproduce")
+COMMANDS = ("compare", "estimate", "report", "reproduce")
 
 
 class Cost(NamedTuple):
@@ -65,7 +64,7 @@ def run(source: Path, folder: Path, *arguments: object) -> Cost:
 
 
 def measured(command: str, source: Path, study: Path) -> Cost:
-    """Run one of the commands on a fresh copy of the study, `kept-report` after a comparison."""
+    """Run one of the commands on a fresh copy of the study."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         if command == "reproduce":
@@ -81,9 +80,7 @@ def measured(command: str, source: Path, study: Path) -> Cost:
             ],
             "report": ["report", "study", "--out", "report"],
         }
-        if command == "kept-report":
-            run(source, folder, *arguments["compare"])
-        return run(source, folder, *arguments[command.removeprefix("kept-")])
+        return run(source, folder, *arguments[command])
 
 
 def made(study: Path, source: Path) -> Path:

@@ -88,7 +88,7 @@ RATING_TESTS = (
 def bench_settings() -> Settings:
     """Return the settings of every epoch; the subjects are given with each."""
     rig = {**PAPER_RATES, "tick_rate_hz": TICKS_HZ}
-    return parse_settings({"rig": rig, "estimation": {"intervals": "white"}})
+    return parse_settings({"rig": rig})
 
 
 class Scorer:

@@ -53,7 +53,6 @@ def tiny(condition: str, seed: int, *, task: str = "prbs", epochs: int = 2, **ta
             },
             "scores": {"cycles": 4},
             "zeroing": {"duration_s": 0.2},
-            "estimation": {"intervals": "white"},
             "protocol": {
                 "blocks": [
                     {"task": task, "condition": condition, "epochs": epochs},

@@ -42,7 +42,7 @@ def test_a_description_that_is_wrong(compared, study, edit, old, new, told) -> N
     ("method", "told"),
     [
         ("ivv", "ivv: there is no such method; the nearest is iv"),
-        ("ml", "ml: maximum likelihood was removed"),
+        ("ml", "ml: there is no such method; the nearest is"),
     ],
 )
 def test_an_unknown_method(compared, study, method, told) -> None:

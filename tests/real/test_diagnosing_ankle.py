@@ -10,7 +10,7 @@ from rigidimeter.estimation import epoch_signals, fit_inertia_damping_stiffness,
 from rigidimeter.estimation.diagnostics import Case, checked, diagnose
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.estimation.terms import fit_terms, wideband_signals
-from rigidimeter.estimation.uncertainty import block_bootstrap, hac_covariance
+from rigidimeter.estimation.uncertainty import hac_covariance
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.readers import read_recording
 from rigidimeter.records import Channel
@@ -69,9 +69,6 @@ def test_intervals_for_a_coloured_residual_are_wider_than_those_for_a_white_one(
     coloured = hac_covariance(np.linalg.inv(A.T @ A), A * residual[:, None])
     textbook = np.std(residual) * np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
     assert coloured.standard_errors[2] > 2.0 * textbook[2]
-    drawn = block_bootstrap(A, signals.torque_nm, np.random.default_rng(0), draws=400)
-    ratio = np.sqrt(np.diag(drawn.covariance)) / coloured.standard_errors
-    assert np.all((ratio > 0.5) & (ratio < 2.0)), ratio
 
 
 @pytest.mark.parametrize("name", ["z_df", "z_df2", "z_pf"])

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from rigidimeter.recording.study_folder import StudyFolder
     from rigidimeter.records import Analysis, Fit, Notice, Score
     from rigidimeter.study import StudyResult
-    from rigidimeter.study.kept_origin import Asked
 
 _OF_STUDIES_TOO = ("paths", "method", "band_hz", "controller", "settings")
 """Fields of `Recordings` that do not say how to read a single recording."""
@@ -182,8 +181,6 @@ def analyse_study_folder(
     from rigidimeter.cli.progress import Meter
     from rigidimeter.settings import load_settings
     from rigidimeter.study import analyse_study, keep, read_study
-    from rigidimeter.study.drawing import drawn_signals
-    from rigidimeter.study.kept_result import keep_result
 
     chosen = load_settings(recordings.settings) if recordings.settings is not None else None
     with Meter("read", 1.0) as meter:
@@ -198,62 +195,13 @@ def analyse_study_folder(
     read = replace(read, settings=recordings.adjust(read.settings))
     with Meter("study", 1.0) as meter:
         result = analyse_study(read, seed=seed, resamples=resamples, progress=meter.advance)
-    with Meter("traces", 1.0) as meter:
-        result = replace(result, drawn=drawn_signals(result, meter.advance))
     changes, not_kept = [], ""
     try:
         changes = keep(read, result)
-        keep_result(read, result, asked_of(recordings, pair, seed, resamples))
     except UserError as error:
         not_kept = str(error)
     result = replace(result, changes=tuple(changes))
     return AnalysedStudy(_with_provenance(result, read.folder, read.gathered.digests), not_kept)
-
-
-def kept_study(folder: Path, recordings: Recordings, key: Path | None = None) -> AnalysedStudy:
-    """Return what the last command kept of a study; analyse it where that does not hold.
-
-    Raises
-    ------
-    UserError
-        If there is nothing to analyse.
-    """
-    from rigidimeter.study.kept_result import take_kept
-
-    found, reason = take_kept(folder, asked_of(recordings), key)
-    if found is not None:
-        return AnalysedStudy(_with_provenance(found.result, found.folder, found.digests), "")
-    if reason:
-        echo(f"the study is analysed again: {reason}", err=True)
-    return analyse_study_folder(folder, recordings, key)
-
-
-def asked_of(
-    recordings: Recordings,
-    pair: tuple[str | None, str | None] = (None, None),
-    seed: int = 1,
-    resamples: int = 9999,
-) -> Asked:
-    """Return the options of an analysis of a study as JSON has them.
-
-    Raises
-    ------
-    UserError
-        If the settings cannot be read.
-    """
-    from rigidimeter.settings import load_settings
-    from rigidimeter.study.kept_origin import asked
-
-    given = recordings.settings
-    return asked(
-        method=recordings.method,
-        settings=None if given is None else load_settings(given),
-        band_hz=recordings.band_hz,
-        controller=recordings.controller,
-        pair=pair,
-        seed=seed,
-        resamples=resamples,
-    )
 
 
 def _with_provenance(

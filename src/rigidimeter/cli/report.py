@@ -12,8 +12,8 @@ import typer
 
 from rigidimeter.cli.inputs import (
     analyse_recordings,
+    analyse_study_folder,
     command_line,
-    kept_study,
     say_analysed,
     study_of,
 )
@@ -66,7 +66,7 @@ def report(
                 f"--out {out}: is the study or its kept analysis; name another folder, such as "
                 f"{folder / 'report'}"
             )
-        study = kept_study(folder, recordings, key)
+        study = analyse_study_folder(folder, recordings, key)
         last: Callable[[], int] = study.say
         result = study.result
     else:

@@ -26,7 +26,7 @@ from rigidimeter.estimation.closedloop.between_samples import (
     without_driven,
 )
 from rigidimeter.estimation.closedloop.drive_motion import DrivenAt
-from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares, intervals_text
+from rigidimeter.estimation.least_squares import INTERVALS_TEXT, POOLED_TEXT, fit_least_squares
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import (
@@ -211,7 +211,7 @@ BANDLIMITED = Method(
     methods_text="by least squares of signals that passed one zero-phase filter",
     fit=partial(fit_least_squares, "bandlimited", bandlimited_signals, _doubt),
     signals=bandlimited_signals,
-    intervals_text=intervals_text,
+    intervals_text=INTERVALS_TEXT,
     pooled_text=POOLED_TEXT,
     in_sensitivity=True,
 )

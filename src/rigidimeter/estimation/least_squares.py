@@ -5,9 +5,8 @@ the condition number is not squared, and a motion that cannot distinguish the pa
 large condition number instead of as a confident wrong answer.
 
 Residuals are coloured: by the subject, by drift, and by the band itself. Standard errors and
-intervals therefore are those of `uncertainty`, which hold for any colour. The textbook ones are
-there too: a residual that is white within high − low Hz has 2·(high − low) independent values a
-second, whatever the sampling rate, so σ² (AᵀA)⁻¹ is scaled by rate / (2·(high − low)).
+intervals therefore are those of `uncertainty`, which hold for any colour. Those of `published`, as
+the paper's method has them, take the residual for white: σ² (AᵀA)⁻¹.
 """
 
 from __future__ import annotations
@@ -21,31 +20,18 @@ from scipy import fft
 
 from rigidimeter.estimation.closedloop.as_sampled import NONE, InertiaDoubt
 from rigidimeter.estimation.closedloop.line_noise import Smoother
-from rigidimeter.estimation.linear_solution import Solution, solve
+from rigidimeter.estimation.linear_solution import solve
 from rigidimeter.estimation.method_record import Progress
 from rigidimeter.estimation.prepared import PreparedEpoch, SignalsOf
 from rigidimeter.estimation.screening import after_fit, unusable
 from rigidimeter.estimation.signals import Array, Signals
 from rigidimeter.estimation.uncertainty import (
     Estimate,
-    block_bootstrap,
     cramer_rao_coloured,
     hac_covariance,
     t_interval,
 )
 from rigidimeter.records import Fit, Outcome
-from rigidimeter.settings import EstimationSettings
-
-BOOTSTRAP_SEED = 1
-"""The same epoch gives the same interval every time."""
-
-
-_RESIDUALS = {
-    "hac": "a residual of any colour (lowest cosines of the scores, quantiles of Student’s t)",
-    "bootstrap": "a residual of any colour (blocks of the epoch drawn again)",
-    "white": "a residual that is white within the band, as sensor noise is and voluntary torque "
-    "is not",
-}
 
 POOLED_TEXT = (
     "The joint is taken for one that does not change, and where epochs differ by more than "
@@ -53,13 +39,11 @@ POOLED_TEXT = (
 )
 
 
-def intervals_text(settings: EstimationSettings) -> str:
-    """Return what the intervals of least squares hold for."""
-    return (
-        f"Intervals hold for {_RESIDUALS[settings.intervals]}, and do not include bias: "
-        "torque that something but the robot adds in a closed loop pulls least squares away from "
-        "the joint"
-    )
+INTERVALS_TEXT = (
+    "Intervals hold for a residual of any colour (lowest cosines of the scores, quantiles of "
+    "Student’s t), and do not include bias: torque that something but the robot adds in a closed "
+    "loop pulls least squares away from the joint"
+)
 
 
 class _Kept(NamedTuple):
@@ -73,7 +57,8 @@ class _Kept(NamedTuple):
 def fit_inertia_damping_stiffness(
     signals: Signals,
     inertia_kg_m2: float | None = None,
-    settings: EstimationSettings | None = None,
+    *,
+    white: bool = False,
 ) -> Fit:
     """Fit Eq. 6, or Eq. 7 when the inertia is given.
 
@@ -83,8 +68,8 @@ def fit_inertia_damping_stiffness(
         Torque and motion on one grid.
     inertia_kg_m2 : float, optional
         Hold J at this value and fit B and K alone; its standard error is then 0.
-    settings : EstimationSettings, optional
-        How intervals are made.
+    white : bool
+        Whether intervals take the residual for white, as textbooks do.
 
     Returns
     -------
@@ -96,7 +81,6 @@ def fit_inertia_damping_stiffness(
     ValueError
         If the regressors are rank deficient: the motion cannot distinguish the parameters.
     """
-    settings = settings or EstimationSettings()
     torque = target = signals.torque_nm
     if inertia_kg_m2 is None:
         regressors, solved = signals.motion, signals.solution
@@ -110,10 +94,15 @@ def fit_inertia_damping_stiffness(
         raise ValueError(
             "the motion cannot distinguish J, B and K: its regressors are linearly dependent"
         )
-    values = solved.values
-    residual = target - regressors @ values
-    covariance, low, high = _interval(signals, regressors, residual, solved, settings)
+    residual = target - regressors @ solved.values
+    values, bread = solved.values, solved.bread
+    if white:
+        degrees = float(residual.size - values.size)
+        covariance = float(residual @ residual) / degrees * bread
+    else:
+        covariance, degrees = hac_covariance(bread, regressors * residual[:, None])
     se = np.sqrt(np.diag(covariance))
+    low, high = t_interval(values, se, degrees)
     bound = _bound(signals, regressors, residual)
     estimate = Estimate(values, se, low, high, bound, covariance)
     if inertia_kg_m2 is not None:
@@ -138,6 +127,8 @@ def fit_least_squares(
     inertia_kg_m2: float | None = None,
     progress: Progress = lambda _: None,
     pooled: bool = True,
+    *,
+    white: bool = False,
 ) -> tuple[list[Fit], list[Fit]]:
     """Fit every epoch, and all epochs of a condition put one after the other.
 
@@ -151,9 +142,7 @@ def fit_least_squares(
         epoch = prepared.epoch
         try:
             signals = prepared.signals(signals_of)
-            found = fit_inertia_damping_stiffness(
-                signals, inertia_kg_m2, prepared.settings.estimation
-            )
+            found = fit_inertia_damping_stiffness(signals, inertia_kg_m2, white=white)
         except ValueError as error:
             outcome = unusable(epoch, str(error))
             fits.append(Fit(epoch.source, epoch.label, epoch.condition, method, outcome))
@@ -175,17 +164,14 @@ def fit_least_squares(
     groups = list(kept.items()) if pooled else []
     if len(groups) > 1:
         groups.append(("", [member for _, members in groups for member in members]))
-    return fits, [
-        _pooled(name, members, epochs[0].settings.estimation, inertia_kg_m2)
-        for name, members in groups
-    ]
+    return fits, [_pooled(name, members, inertia_kg_m2, white) for name, members in groups]
 
 
 def _pooled(
     condition: str,
     members: Sequence[_Kept],
-    settings: EstimationSettings,
     inertia_kg_m2: float | None,
+    white: bool,
 ) -> Fit:
     """Return the fit to all epochs of a condition, put one after the other."""
     fits, parts, doubts = zip(*members, strict=True)
@@ -198,7 +184,7 @@ def _pooled(
         velocity_rad_s=np.concatenate([part.velocity_rad_s for part in parts]),
         angle_rad=np.concatenate([part.angle_rad for part in parts]),
     )
-    found = fit_inertia_damping_stiffness(together, inertia_kg_m2, settings)
+    found = fit_inertia_damping_stiffness(together, inertia_kg_m2, white=white)
     return replace(
         _widened(found, doubts[0].away),
         findings=doubts[0].findings,
@@ -213,32 +199,6 @@ def _widened(fit: Fit, away: Array) -> Fit:
     """Return a fit that may be so far away for each unit of J, whatever chance does."""
     moved = abs(float(fit.value[0])) * away
     return replace(fit, low=fit.low - moved, high=fit.high + moved)
-
-
-def _interval(
-    signals: Signals,
-    regressors: Array,
-    residual: Array,
-    solved: Solution,
-    settings: EstimationSettings,
-) -> tuple[Array, Array, Array]:
-    """Return the covariance and the ends of the 95 % intervals."""
-    values, bread = solved.values, solved.bread
-    n, p = regressors.shape
-    if settings.intervals == "bootstrap":
-        rng = np.random.default_rng(BOOTSTRAP_SEED)
-        target = regressors @ values + residual
-        drawn = block_bootstrap(regressors, target, rng, draws=settings.bootstrap_draws)
-        return drawn.covariance, drawn.low, drawn.high
-    if settings.intervals == "white":
-        low, high = signals.band_hz
-        independent_per_sample = min(1.0, 2.0 * (high - low) / signals.rate_hz)
-        # As many degrees of freedom are left as there are independent values less the parameters.
-        degrees = max(n * independent_per_sample - p, 1.0)
-        covariance = float(residual @ residual) / degrees * bread
-    else:
-        covariance, degrees = hac_covariance(bread, regressors * residual[:, None])
-    return covariance, *t_interval(values, np.sqrt(np.diag(covariance)), degrees)
 
 
 def _bound(signals: Signals, regressors: Array, residual: Array) -> Array:

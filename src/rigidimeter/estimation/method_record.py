@@ -8,7 +8,6 @@ from typing import Protocol
 
 from rigidimeter.estimation.prepared import PreparedEpoch, SignalsOf
 from rigidimeter.records import Fit
-from rigidimeter.settings import EstimationSettings
 
 Progress = Callable[[float], None]
 """Called with the amount of work that was done since the last call."""
@@ -68,8 +67,8 @@ class Method:
         Keys of `reporting.references` that the methods text cites.
     signals : callable, optional
         The signals that it fits, where these are not those of ``bandlimited``.
-    intervals_text : callable
-        What the intervals hold for, under given settings.
+    intervals_text : str
+        What the intervals hold for.
     pooled_text : str
         What the intervals of the pooled estimates hold for.
     as_recorded : bool
@@ -85,9 +84,7 @@ class Method:
     fit: FitEpochs
     references: tuple[str, ...] = ()
     signals: SignalsOf | None = None
-    intervals_text: Callable[[EstimationSettings], str] = lambda _: (
-        "Intervals are those that the method gives"
-    )
+    intervals_text: str = "Intervals are those that the method gives"
     pooled_text: str = "Those of all epochs together are its own too"
     as_recorded: bool = False
     in_sensitivity: bool = False

@@ -21,12 +21,6 @@ from rigidimeter.settings import EstimationSettings, Settings
 METHODS: list[Method] = [PUBLISHED, BANDLIMITED, IV, SPECTRAL]
 """Every estimator. Code from outside the package may append its own."""
 
-REMOVED = {
-    "ml": "maximum likelihood was removed, as it was no more precise than instrumental variables "
-    "and a wrong controller biased it: use iv"
-}
-"""Estimators that there were, and what to use instead."""
-
 MOST_TRIED = 5
 """From this many epochs it is known whether the motion follows the perturbation."""
 
@@ -39,8 +33,6 @@ def method_names() -> tuple[str, ...]:
 def no_such_method(name: str) -> str:
     """Return why `--method` cannot be `name`, and what it may be."""
     known = method_names()
-    if name in REMOVED:
-        return f"{REMOVED[name]} (known: {', '.join(known)})"
     (near,) = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
     return f"there is no such method; the nearest is {near} (known: {', '.join(known)})"
 

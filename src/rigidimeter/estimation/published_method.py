@@ -20,7 +20,7 @@ from scipy import signal
 
 from rigidimeter.dynamics import DriveModel
 from rigidimeter.estimation.closedloop.as_sampled import as_they_are
-from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares, intervals_text
+from rigidimeter.estimation.least_squares import POOLED_TEXT, fit_least_squares
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.signals import (
     Array,
@@ -94,10 +94,10 @@ PUBLISHED = Method(
     title="least squares as the paper prints it",
     needs=(),
     methods_text="by ordinary least squares in the time domain, as published",
-    fit=partial(fit_least_squares, "published", published_signals, as_they_are),
+    fit=partial(fit_least_squares, "published", published_signals, as_they_are, white=True),
     references=("paper",),
     signals=published_signals,
-    intervals_text=intervals_text,
+    intervals_text="Intervals take the residual for white and do not include bias",
     pooled_text=POOLED_TEXT,
     as_recorded=True,
     in_sensitivity=True,

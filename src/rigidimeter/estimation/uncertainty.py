@@ -6,20 +6,16 @@ Least squares solves Aᵀ(M − A p) = 0, so that
 
 The textbook S = σ² AᵀA takes the residual e for white. Voluntary torque, tremor and drift are not,
 and S then also counts how the scores g = a e are correlated over time: n times their spectral
-density at frequency zero. Two ways to it:
-
-- `hac_covariance`: the mean square of K cosine sums of the scores, all below the frequency
-  K / (2 T). It is positive by construction and has K degrees of freedom, so that t quantiles make
-  up for what little a short epoch knows (Lazarus, Lewis, Stock and Watson 2018, J. Bus. Econ.
-  Stat. 36:541).
-- `block_bootstrap`: solve again and again with blocks of the epoch drawn at random (Künsch 1989).
+density at frequency zero. `hac_covariance` takes the mean square of K cosine sums of the scores,
+all below the frequency K / (2 T). It is positive by construction and has K degrees of freedom, so
+that t quantiles make up for what little a short epoch knows (Lazarus, Lewis, Stock and Watson 2018,
+J. Bus. Econ. Stat. 36:541).
 
 `cramer_rao_coloured` is what no unbiased estimate can beat.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -37,10 +33,6 @@ same at 100 and at 1000 samples/s.
 """
 
 FEWEST_COSINES = 6
-BLOCK_CORRELATION_TIMES = 3.0
-FEWEST_BLOCKS = 4
-MOST_BLOCKS = 250
-"""Shorter blocks than this many to an epoch gain nothing and cost memory."""
 
 
 class Estimate(NamedTuple):
@@ -75,14 +67,6 @@ class Scatter(NamedTuple):
     def standard_errors(self) -> Array:
         """The roots of the diagonal, shape (p,)."""
         return np.sqrt(np.diag(self.covariance))
-
-
-class Bootstrap(NamedTuple):
-    """Scatter of the drawn solutions, shape (p, p), and the 95 % interval, shape (p,) each."""
-
-    covariance: Array
-    low: Array
-    high: Array
 
 
 def correlation_samples(scores: Array) -> Array:
@@ -152,49 +136,6 @@ def t_interval(
     """Return the ends of the 95 % t intervals: values ∓ t · standard errors."""
     half = float(special.stdtrit(degrees_of_freedom, 0.975)) * np.asarray(standard_errors)
     return np.asarray(values) - half, np.asarray(values) + half
-
-
-def block_bootstrap(
-    regressors: Array, target: Array, rng: np.random.Generator, *, draws: int = 999
-) -> Bootstrap:
-    """Solve AᵀA p = AᵀM for epochs put together from blocks of this one.
-
-    Blocks may begin anywhere and run on from the end to the beginning. Only AᵀA and AᵀM of a block
-    are needed; they are differences of running sums, so a draw costs as many additions as it has
-    blocks.
-
-    Parameters
-    ----------
-    regressors : array, shape (n, p)
-    target : array, shape (n,)
-    rng : numpy.random.Generator
-    draws : int
-    """
-    n, p = regressors.shape
-    # Unit lengths, as in the fit, so that units do not decide the conditioning of AᵀA.
-    scale = np.linalg.norm(regressors, axis=0)
-    A = regressors / scale
-    solution = np.linalg.solve(A.T @ A, A.T @ target)
-    block = _block_samples(A * (target - A @ solution)[:, None])
-    products = np.einsum("ni,nj->nij", A, np.column_stack([A, target])).reshape(n, -1)
-    running = np.concatenate(
-        ([np.zeros(products.shape[1])], np.cumsum(np.tile(products, (2, 1)), 0))
-    )
-    lengths = np.full(math.ceil(n / block), block, dtype=np.int64)
-    lengths[-1] = n - block * (lengths.size - 1)
-    starts = rng.integers(0, n, size=(draws, lengths.size))
-    sums = (running[starts + lengths] - running[starts]).sum(axis=1).reshape(draws, p, p + 1)
-    solutions = np.linalg.solve(sums[:, :, :p], sums[:, :, p:])[:, :, 0] / scale
-    low, high = np.quantile(solutions, [0.025, 0.975], axis=0)
-    return Bootstrap(np.atleast_2d(np.cov(solutions, rowvar=False)), low, high)
-
-
-def _block_samples(scores: Array) -> int:
-    """Return the length of a block: three correlation times, and at least four to an epoch."""
-    n = len(scores)
-    slowest = float(np.max(correlation_samples(scores)))
-    wanted = max(math.ceil(BLOCK_CORRELATION_TIMES * slowest), math.ceil(n / MOST_BLOCKS))
-    return min(wanted, max(n // FEWEST_BLOCKS, 1))
 
 
 def cramer_rao_coloured(regressors: Array, density: Array, rate_hz: float) -> Array:

@@ -67,8 +67,7 @@ def highpass_errors_percent(reading: str, way: str, *, alike: bool) -> Triple:
         velocity_rad_s=treated(raw.velocity_rad_s, filtered=alike),
         angle_rad=treated(raw.angle_rad, filtered=True),
     )
-    white = estimation.model_copy(update={"intervals": "white"})
-    return errors_percent(fit_inertia_damping_stiffness(cut, settings=white).value)
+    return errors_percent(fit_inertia_damping_stiffness(cut, white=True).value)
 
 
 def _ideal_signals(reading: str, settings: Settings) -> Signals:
@@ -110,10 +109,9 @@ def equation_7(context: Context) -> Row:
     In the noise-free loop nothing but Eq. 7 itself can put B and K off.
     """
     signals = _ideal_signals("per degree", context.settings)
-    white = context.settings.estimation.model_copy(update={"intervals": "white"})
 
     def held(inertia_kg_m2: float) -> Triple:
-        fit = fit_inertia_damping_stiffness(signals, inertia_kg_m2, white)
+        fit = fit_inertia_damping_stiffness(signals, inertia_kg_m2, white=True)
         return errors_percent(fit.value)
 
     true, other = held(printed.SEC_34.inertia_kg_m2), held(printed.FIG_4.inertia_kg_m2)

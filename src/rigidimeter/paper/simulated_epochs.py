@@ -215,8 +215,6 @@ def _voluntary(context: Context) -> Mapping[str, Triple]:
         voluntary_sd_nm=VOLUNTARY_SD_NM,
     )
     settings = Settings(seed=context.seed, subject={"OFF": subject})
-    white = settings.estimation.model_copy(update={"intervals": "white"})
-    settings = settings.model_copy(update={"estimation": white})
     perturbation = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
     bias = predicted_precision(perturbation, settings, subject).least_squares_bias
     batch = simulate_epochs(settings, context.pooled_epochs)

@@ -84,10 +84,10 @@ def read_estimates(path: Path) -> Analysis:
             tuple(_fit(row, method) for row in fixed["epochs"]),
             _number(fixed["inertia_kg_m2"]),
             tuple(_score(row) for row in document["scores"]),
-            _read_pooled(document.get("pooled"), method),
-            tuple(_read_delay(row) for row in document.get("delays", ())),
-            str(document.get("method_reason", "")),
-            tuple(_band_estimate(row) for row in document.get("sensitivity", ())),
+            _read_pooled(document["pooled"], method),
+            tuple(_read_delay(row) for row in document["delays"]),
+            str(document["method_reason"]),
+            tuple(_band_estimate(row) for row in document["sensitivity"]),
         )
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UserError(
@@ -124,12 +124,11 @@ def _pooled(fits: Sequence[Fit]) -> dict[str, Any] | None:
 
 def _fit(row: Mapping[str, Any], method: str) -> Fit:
     low, high = row["band_hz"] or (math.nan, math.nan)
-    # A document of an older version lacks the ends of the intervals.
     numbers: dict[str, Any] = {
-        vector: readonly([_number(row.get(name + ending)) for name in _PARAMETERS])
+        vector: readonly([_number(row[name + ending]) for name in _PARAMETERS])
         for vector, ending in PARAMETER_VECTORS.items()
     }
-    numbers |= {name: _number(row.get(name)) for name in STATISTICS}
+    numbers |= {name: _number(row[name]) for name in STATISTICS}
     return Fit(
         source=str(row["source"]),
         epoch=str(row["epoch"]),
@@ -138,7 +137,7 @@ def _fit(row: Mapping[str, Any], method: str) -> Fit:
         outcome=_read_outcome(row, _PARAMETERS),
         n_samples=int(row["n_samples"]),
         band_hz=(float(low), float(high)),
-        findings=tuple(_read_finding(found) for found in row.get("findings", ())),
+        findings=tuple(_read_finding(found) for found in row["findings"]),
         **numbers,
     )
 

@@ -12,7 +12,6 @@ from typing import Any, Literal
 from markupsafe import Markup
 from matplotlib.figure import Figure as Drawing
 
-from rigidimeter.reporting.epoch_marks import Mark
 from rigidimeter.study import StudyResult
 
 Kind = Literal[
@@ -121,10 +120,9 @@ class Figure:
         Returns the drawing; called when the report is written.
     size : {"broad", "tall", "small"}
         On the page; small figures are side by side.
-    marks : mapping of str to sequence of Mark
-        The epochs that points stand for, in the order of the points, by the `gid` of their line.
-
-    What is drawn, as numbers, is written to ``figures/NAME.csv``.
+    marks : mapping of str to sequence of (str, str)
+        Source and label of the epochs that points stand for, in the order of the points, by the
+        `gid` of their line.
     """
 
     name: str
@@ -132,7 +130,7 @@ class Figure:
     alt: str
     draw: Callable[[], Drawing]
     size: Literal["broad", "tall", "small"] = "broad"
-    marks: Mapping[str, Sequence[Mark]] = field(default_factory=dict)
+    marks: Mapping[str, Sequence[tuple[str, str]]] = field(default_factory=dict)
 
 
 Block = Markup | Table | Figure

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 
 from markupsafe import Markup, escape
 
-from rigidimeter.reporting.epoch_marks import Mark
-
 COLOURS = {
     "#000000": "ink",
     "#1c1c1c": "ink",
@@ -40,7 +38,7 @@ def inline_svg(
     svg: str,
     name: str,
     alt: str,
-    marks: Mapping[str, Sequence[Mark]],
+    marks: Mapping[str, Sequence[tuple[str, str]]],
     places: Mapping[tuple[str, str], int],
 ) -> Markup:
     """Return an SVG document of `style.svg_text` as an element of the page.
@@ -52,7 +50,7 @@ def inline_svg(
         Of the figure; the names inside begin with it, for a page has many figures.
     alt : str
         What it shows, for those who cannot see it.
-    marks : mapping of str to sequence of Mark
+    marks : mapping of str to sequence of (str, str)
         By the group of a line of points: what each of its points stands for, in their order.
     places : mapping of (str, str) to int
         The place of the traces of an epoch, by source and label.
@@ -93,9 +91,12 @@ def _styled_once(points: re.Match[str]) -> str:
 
 
 def _marked(
-    text: str, group: str, own: Sequence[Mark], places: Mapping[tuple[str, str], int]
+    text: str,
+    group: str,
+    own: Sequence[tuple[str, str]],
+    places: Mapping[tuple[str, str], int],
 ) -> str:
-    """Return the SVG with the words of each point of a group, and the place of its traces."""
+    """Return the SVG with the epoch of each point of a group, and the place of its traces."""
     start = text.find(f'<g id="{group}">')
     if start < 0:
         return text
@@ -105,8 +106,8 @@ def _marked(
         return text
     drawn = []
     for attributes, mark in zip(points, own, strict=True):
-        place = places.get((mark.source, mark.epoch))
+        place = places.get(mark)
         traces = "" if place is None else f' data-epoch="{place}"'
-        drawn.append(f"<use {attributes}{traces}><title>{escape(mark.words)}</title></use>")
+        drawn.append(f"<use {attributes}{traces}><title>epoch {escape(mark[1])}</title></use>")
     given = iter(drawn)
     return text[:start] + _POINT.sub(lambda _: next(given), text[start:stop]) + text[stop:]

@@ -19,8 +19,6 @@ from rigidimeter.study import (
     estimate,
     recording_result,
 )
-from rigidimeter.study.kept_origin import asked
-from rigidimeter.study.kept_result import take_kept
 
 TITLE = "Joint rigidity"
 
@@ -40,8 +38,7 @@ def report(
     ----------
     result : StudyResult, Analysis, Recording, path or sequence of paths
         What `compare`, `estimate` or `read` returned; or a study folder, session folders and files,
-        which are read and analysed; of a study what `rigidimeter compare` kept is taken while it
-        holds. Estimates alone have no figures of the recorded signals.
+        which are read and analysed. Estimates alone have no figures of the recorded signals.
     out : path
         The folder; made if it does not exist. Files of the same names are replaced.
     title : str, optional
@@ -85,6 +82,5 @@ def _result(
         )
     paths = [Path(result)] if isinstance(result, (str, PathLike)) else [Path(one) for one in result]
     if len(paths) == 1 and is_study(paths[0]):
-        kept, _ = take_kept(paths[0], asked())
-        return compare(paths[0]) if kept is None else kept.result
+        return compare(paths[0])
     return _result(read(paths))

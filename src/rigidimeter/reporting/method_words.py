@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from rigidimeter.estimation import METHODS, Method
-from rigidimeter.settings import EstimationSettings
 
 
 def method_of(name: str) -> Method | None:
@@ -17,10 +16,10 @@ def method_title(name: str) -> str:
     return name if method is None else method.title
 
 
-def interval_basis(name: str, settings: EstimationSettings) -> str:
+def interval_basis(name: str) -> str:
     """Return what the intervals of a method hold for."""
     method = method_of(name)
-    return "" if method is None else method.intervals_text(settings)
+    return "" if method is None else method.intervals_text
 
 
 def pooled_basis(name: str) -> str:

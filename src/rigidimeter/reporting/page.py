@@ -18,7 +18,6 @@ from markupsafe import Markup
 from rigidimeter.documents import csv_text, visible
 from rigidimeter.reporting import first_screen
 from rigidimeter.reporting.contents import Block, Column, Figure, Section, Table
-from rigidimeter.reporting.drawn_data import drawn_csv
 from rigidimeter.reporting.epoch_traces import page_traces, traces_json
 from rigidimeter.reporting.inline_svg import inline_svg
 from rigidimeter.reporting.numbers import interval, number, p_value, short_names
@@ -106,11 +105,8 @@ def write_report(
     figures = [block for _, blocks in made for block in blocks if isinstance(block, Figure)]
     mark = _mark(result)
     svg: dict[str, str] = {}
-    drawn: dict[str, str] = {}
     for figure in figures:
-        drawing = figure.draw()
-        drawn[figure.name] = drawn_csv(drawing)
-        svg[figure.name] = svg_text(drawing, mark)
+        svg[figure.name] = svg_text(figure.draw(), mark)
         progress(0.5 + 0.5 * len(svg) / len(figures))
     (out / "tables").mkdir(parents=True, exist_ok=True)
     (out / "figures").mkdir(parents=True, exist_ok=True)
@@ -118,7 +114,6 @@ def write_report(
         _write(out / "tables" / f"{table.name}.csv", _csv(table))
     for name, text in svg.items():
         _write(out / "figures" / f"{file_stem(name)}.svg", text)
-        _write(out / "figures" / f"{file_stem(name)}.csv", drawn[name])
     if result.sessions:
         _write(out / "methods.txt", methods_prose(result).text)
     page = out / "report.html"

@@ -28,9 +28,6 @@ class EstimationSettings(Section):
     `torque_lowpass_hz` is the corner of the low-pass in the torque sensor or its amplifier, a
     Butterworth filter of the given order; 0 where there is none, or none below half the rate. What
     it does to the torque is then done to the motion too.
-
-    `intervals` says how standard errors and intervals are made: "hac" holds for any residual,
-    "bootstrap" draws blocks, "white" takes the residual for white within the band.
     """
 
     band_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
@@ -43,8 +40,6 @@ class EstimationSettings(Section):
     shortest_epoch_s: float = quantity(5.0, "s", 1.0, 600.0)
     published_highpass_hz: float = quantity(0.2, "Hz", 0.001, 10.0)
     published_highpass_order: int = quantity(2, "1", 1, 6)
-    intervals: Literal["hac", "bootstrap", "white"] = "hac"
-    bootstrap_draws: int = quantity(999, "1", 100, 100_000)
     correct_delay: bool = True
     longest_delay_s: float = quantity(0.04, "s", 0.001, 0.2)
 

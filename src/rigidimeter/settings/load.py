@@ -12,6 +12,9 @@ from rigidimeter.errors import UserError
 from rigidimeter.settings.messages import Model, validated
 from rigidimeter.settings.models import Settings
 
+REMOVED = ("intervals", "bootstrap_draws")
+"""Keys of [estimation] in older sessions, from when there were three kinds of interval."""
+
 
 def parse_settings(values: Mapping[str, Any], *, source: str = "settings") -> Settings:
     """Validate a nested mapping.
@@ -22,6 +25,10 @@ def parse_settings(values: Mapping[str, Any], *, source: str = "settings") -> Se
         Naming each offending key, its value, its unit and the allowed range; for an unknown key
         the nearest known one.
     """
+    estimation = values.get("estimation")
+    if isinstance(estimation, Mapping) and any(key in estimation for key in REMOVED):
+        kept = {key: value for key, value in estimation.items() if key not in REMOVED}
+        values = {**values, "estimation": kept}
     return validated(Settings, values, source)
 
 
@@ -52,7 +59,14 @@ def load_settings(path: Path | None) -> Settings:
     """
     if path is None:
         return Settings()
-    return parse_settings(read_toml(path), source=str(path))
+    values = read_toml(path)
+    for key in REMOVED:
+        if key in (values.get("estimation") or {}):
+            raise UserError(
+                f"{path}: estimation.{key} was removed, since all intervals hold for a residual of "
+                "any colour; leave the line out"
+            )
+    return parse_settings(values, source=str(path))
 
 
 def dump_settings(settings: Settings) -> dict[str, Any]:

@@ -4,7 +4,6 @@
     STUDY/analysis/estimates.json   the estimates, as `rigidimeter estimate` writes them
     STUDY/analysis/comparison.json  every conclusion
     STUDY/analysis/*.csv            the same as tables
-    STUDY/analysis/kept.json        the result for the next report (`study.kept_result`)
 
 A file whose bytes would be the same is not written again. `comparison.json` and then `inputs.json`
 are written last: a run that was cut off leaves those of the run before, and the next one says what
@@ -34,8 +33,6 @@ INPUTS_SCHEMA = "rigidimeter.study-inputs/1"
 ANALYSIS = "analysis"
 UNCHANGED = "nothing has changed since the last analysis"
 INPUTS, COMPARISON = "inputs.json", "comparison.json"
-
-OLD_SCHEMA = "rigidimeter.study-comparison/1"
 
 _SHOWN = 12
 _TABLES = ("conclusion", "precision", "comparisons", "days", "effect_differences", "ratings",
@@ -87,15 +84,6 @@ def keep(read: StudyRead, study: StudyResult) -> list[str]:
     if before is not None and not said:
         said.append(UNCHANGED)
     return said
-
-
-def results_changed(folder: Path) -> str:
-    """Return the first result in the folder that is not as it was written; empty if all are."""
-    for name, digest in _results(_object(folder / INPUTS)).items():
-        path = folder / name
-        if not path.is_file() or _file_digest(path) != digest:
-            return name
-    return ""
 
 
 def _inputs(read: StudyRead, study: StudyResult) -> dict[str, Any]:
@@ -190,8 +178,6 @@ def _moved(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
 def _numbers(document: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield what a reader would look at, by the name of the test."""
     try:
-        if document["schema"] == OLD_SCHEMA:
-            document = _upgraded(document)
         for c in document["comparisons"]:
             if c["measure"] != RATING.name:  # an older document tests the corrected scores apart
                 row = {f"n {name}": group["n"] for name, group in c["groups"].items()}
@@ -216,21 +202,6 @@ def _numbers(document: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]
         yield "epochs left out", {"count": len(document["exclusions"])}
     except (KeyError, TypeError, AttributeError):
         return  # of another version
-
-
-def _upgraded(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a document of the older schema, which listed tests and effects apart, as a new one."""
-    days = {each["measure"]: each for each in document["day_tests"]}
-    effects = {
-        each["measure"]: each["effects"] | {"p_holm": each["p_holm"]}
-        for each in document["effects"]
-    }
-    rows = {each["measure"]: each for each in document["comparisons"]}
-    comparisons = [
-        {"measure": name, "days": days.get(name), **effects.get(name, {}), **rows.get(name, {})}
-        for name in dict.fromkeys([*rows, *effects])
-    ]
-    return {**document, "comparisons": comparisons}
 
 
 def _from_to(old: Any, new: Any) -> str:

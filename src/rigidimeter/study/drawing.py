@@ -7,7 +7,7 @@ far as that leaves enough points for the highest frequency.
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +17,11 @@ from rigidimeter.estimation.methods import prepared_signals
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.scores import cycles_of
 from rigidimeter.records import Fit, Score
-from rigidimeter.study.drawn_signals import ChannelFacts, DrawnSignals, EpochTrace, facts_of
+from rigidimeter.study.drawn_signals import ChannelFacts, EpochTrace, facts_of
 from rigidimeter.study.examples import (
     analysed_epoch,
-    example_epochs,
-    perturbed_epoch,
     prepared_epochs,
 )
-from rigidimeter.study.over_frequency import responses, unexplained_spectra
 from rigidimeter.study.results import StudyResult
 
 MOST_POINTS = 800
@@ -34,51 +31,13 @@ POINTS_PER_CYCLE = 3.0
 _STEPS = 2**15 - 1
 
 
-def drawn_signals(
-    result: StudyResult, progress: Callable[[float], None] = lambda _: None
-) -> DrawnSignals:
-    """Return all that a page shows of the samples of a result.
-
-    Parameters
-    ----------
-    result : StudyResult
-        With the samples of its epochs.
-    progress : callable
-        Called with the share of the work that was done since, 1 in all.
-    """
-    total = 2 * len(result.analysis.fits) + len(result.analysis.scores) or 1
-    traces = []
-    for trace in epoch_traces(result):
-        traces.append(trace)
-        progress(1 / total)
-    examples = example_epochs(result)
-    perturbed = perturbed_epoch(result)
-    named = {(epoch.source, epoch.label) for epoch in examples}
-    other = perturbed is not None and (perturbed.source, perturbed.label) not in named
-    over_frequency = responses(result)
-    progress(len(result.analysis.fits) / total)
-    return DrawnSignals(
-        channel_facts(result),
-        examples,
-        (perturbed,) if perturbed is not None and other else (),
-        over_frequency,
-        unexplained_spectra(result),
-        tuple(traces),
-    )
-
-
 def channel_facts(result: StudyResult) -> tuple[tuple[ChannelFacts, ...], ...]:
     """Return what tables say of the channels of each epoch, in the order of the epochs."""
-    if result.drawn is not None:
-        return result.drawn.channels
     return tuple(tuple(map(facts_of, epoch.channels.values())) for epoch in result.epochs)
 
 
 def epoch_traces(result: StudyResult) -> Iterator[EpochTrace]:
     """Yield what the page shows of each epoch that was fitted or scored, each once."""
-    if result.drawn is not None:
-        yield from result.drawn.traces
-        return
     analysis = result.analysis
     results: list[Fit | Score] = [*(analysis.fixed_inertia or analysis.fits), *analysis.scores]
     seen: set[tuple[str, str]] = set()

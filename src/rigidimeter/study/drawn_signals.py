@@ -1,8 +1,4 @@
-"""What figures and traces show of the samples of a study, as values without the samples.
-
-They are made while the epochs are held (`study.drawing.drawn_signals`) and kept with the analysis,
-so that a page is drawn again without reading a recording.
-"""
+"""What figures and traces show of the samples of a study, as values without the samples."""
 
 from __future__ import annotations
 
@@ -12,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.records import Channel, Epoch
+from rigidimeter.records import Channel
 
 Array = NDArray[np.float64]
 
@@ -104,29 +100,3 @@ class EpochTrace:
     shown_s: float
     length_s: float
     series: Mapping[str, tuple[float, str]]
-
-
-@dataclass(frozen=True)
-class DrawnSignals:
-    """All that a page shows of the samples.
-
-    Attributes
-    ----------
-    channels : tuple of tuple of ChannelFacts
-        Of each epoch of the result, in its order.
-    examples : tuple of Epoch
-        The epochs that represent their condition, as they were analysed, with their samples.
-    perturbed : tuple of Epoch
-        The epoch whose perturbation is drawn, where it is none of the examples.
-    responses : mapping of str to Response
-        By condition.
-    spectra : tuple of Spectrum
-    traces : tuple of EpochTrace
-    """
-
-    channels: tuple[tuple[ChannelFacts, ...], ...]
-    examples: tuple[Epoch, ...]
-    perturbed: tuple[Epoch, ...]
-    responses: Mapping[str, Response]
-    spectra: tuple[Spectrum, ...]
-    traces: tuple[EpochTrace, ...]

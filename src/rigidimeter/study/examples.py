@@ -52,13 +52,9 @@ def representative_scores(result: StudyResult) -> list[Score]:
 def analysed_epoch(result: StudyResult, one: Fit | Score) -> Epoch | None:
     """Return the epoch of a fit or score as it was analysed.
 
-    Its delay is corrected, and what is left out is left out. Of a result without its samples only
-    the examples are held.
+    Its delay is corrected, and what is left out is left out.
     """
     key = one.source, one.epoch
-    if result.drawn is not None:
-        found = (e for e in result.drawn.examples if (e.source, e.label) == key)
-        return next(found, None)
     if result.prepared:
         return prepared_epochs(result)[key].epoch
     for epoch in result.epochs:
@@ -85,8 +81,7 @@ def example_epochs(result: StudyResult) -> tuple[Epoch, ...]:
 def perturbed_epoch(result: StudyResult) -> Epoch | None:
     """Return the epoch whose perturbation is drawn: an example, or the first that has one."""
     shown = [e for fit in representative_fits(result) if (e := analysed_epoch(result, fit))]
-    others = result.epochs if result.drawn is None else result.drawn.perturbed
-    found = (each for each in (*shown, *others) if drawable_perturbation(each) is not None)
+    found = (each for each in (*shown, *result.epochs) if drawable_perturbation(each) is not None)
     return next(found, None)
 
 

@@ -23,8 +23,6 @@ SAME_FREQUENCY = 1e-3
 
 def responses(result: StudyResult) -> dict[str, Response]:
     """Return torque over angle of each condition, without a model, where its epochs allow it."""
-    if result.drawn is not None:
-        return dict(result.drawn.responses)
     shown: dict[str, Response] = {}
     prepared = prepared_epochs(result)
     for condition in result.condition_names:
@@ -71,8 +69,6 @@ def same_lines(observations: Sequence[Observation]) -> list[Observation]:
 
 def unexplained_spectra(result: StudyResult) -> tuple[Spectrum, ...]:
     """Return the spectrum of the torque that J, B and K leave, of each included fit."""
-    if result.drawn is not None:
-        return result.drawn.spectra
     found = []
     by_name = prepared_epochs(result)
     for fit in result.analysis.fits:

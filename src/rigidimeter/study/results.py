@@ -15,7 +15,6 @@ from rigidimeter.statistics import (
     EffectDifference,
 )
 from rigidimeter.study.compared import Comparison, comparison_rows
-from rigidimeter.study.drawn_signals import DrawnSignals
 from rigidimeter.study.measures import Measure
 from rigidimeter.study.ratings_found import RatingsFound
 
@@ -146,9 +145,6 @@ class StudyResult:
     prepared : tuple of PreparedEpoch
         The epochs as they were analysed, with what was made of them, for the figures; empty where
         they were not analysed here.
-    drawn : DrawnSignals or None
-        What figures and traces show of the samples, where it was made or kept; a result that was
-        kept has nothing else of them.
     provenance : mapping of str to str
     conditions, sessions, blinded, virtual, ratings, sensitivity, exclusions, left_out, changes
         Of a study folder alone; `sessions` is empty if there is none. `blinded`: the conditions are
@@ -172,7 +168,6 @@ class StudyResult:
     analysis: Analysis = Analysis("", (), (), math.nan, ())  # noqa: RUF009
     epochs: tuple[Epoch, ...] = ()
     prepared: tuple[PreparedEpoch, ...] = field(default=(), repr=False, compare=False)
-    drawn: DrawnSignals | None = field(default=None, repr=False, compare=False)
     settings: Settings = field(default_factory=Settings)
     provenance: Mapping[str, str] = field(default_factory=dict)
     conditions: tuple[Condition, ...] = ()

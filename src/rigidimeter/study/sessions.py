@@ -59,15 +59,12 @@ class Gathered:
         SHA-256 of every file of every recording in the table, as it was read, by its path below the
         study.
     notices : tuple of Notice
-    elsewhere : tuple of Path
-        What was read of recordings that lies outside the study.
     """
 
     sessions: tuple[Session, ...]
     left_out: tuple[LeftOut, ...]
     digests: dict[str, str]
     notices: tuple[Notice, ...]
-    elsewhere: tuple[Path, ...] = ()
 
     @property
     def epochs(self) -> tuple[Epoch, ...]:
@@ -121,7 +118,6 @@ def gather(
     rows_at: dict[Path, list[Row]] = {}
     for row in read.sessions:
         rows_at.setdefault(place_of(read.folder / row["path"]), []).append(row)
-    elsewhere: list[Path] = []
 
     def leave_out(row: Row, reason: str) -> None:
         text = reason if reason.startswith(row.where) else f"{row.where}: {reason}"
@@ -139,7 +135,7 @@ def gather(
                 try:
                     session, said = _read(read, row, names, beside, at, samples, digests, noted)
                 finally:
-                    elsewhere += _note_others(read.folder, noted, digests)
+                    _note_others(read.folder, noted, digests)
         except (_Refused, UserError) as error:
             leave_out(row, " / ".join(str(error).splitlines()))
         except OSError as error:  # such as a path too long for the file system
@@ -159,7 +155,7 @@ def gather(
             + " / ".join(n.text for n in notices if n.level == "error")
         )
     told = tuple(dict.fromkeys(notices))
-    return Gathered(tuple(sessions), tuple(left_out), digests, told, tuple(elsewhere))
+    return Gathered(tuple(sessions), tuple(left_out), digests, told)
 
 
 def _read(
@@ -240,11 +236,10 @@ def _files_of_samples(path: Path, *, from_session: bool) -> list[Path]:
     return sorted(files, key=lambda file: file.stat().st_size)[-1:]
 
 
-def _note_others(folder: Path, noted: Mapping[Path, str], digests: dict[str, str]) -> list[Path]:
-    """Note what else was read, such as a sidecar; return what lies outside the study."""
-    below = {path: path.relative_to(folder) for path in noted if path.is_relative_to(folder)}
-    digests.update({name.as_posix(): noted[path] for path, name in below.items()})
-    return [path for path in noted if path not in below]
+def _note_others(folder: Path, noted: Mapping[Path, str], digests: dict[str, str]) -> None:
+    """Note what else was read below the study, such as a sidecar."""
+    below = {path.relative_to(folder): path for path in noted if path.is_relative_to(folder)}
+    digests.update({name.as_posix(): noted[path] for name, path in below.items()})
 
 
 def _options(

@@ -67,7 +67,6 @@ def test_settings_are_used(arrays):
     ("change", "words"),
     [
         ({"method": "magic"}, "no such method; the nearest is"),
-        ({"method": "ml"}, "maximum likelihood was removed, .*: use iv"),
         ({"method": "iv", "perturbation_nm": None}, "method iv needs perturbation_nm"),
         ({"angle_rad": None, "velocity_rad_s": None}, "neither velocity_rad_s nor angle_rad"),
         ({"torque_nm": np.ones((10, 2))}, r"torque_nm must have one dimension, not .*\(10, 2\)"),

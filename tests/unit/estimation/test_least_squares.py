@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from rigidimeter.estimation import Signals, fit_inertia_damping_stiffness
-from rigidimeter.settings import EstimationSettings
 
 TRUTH = np.array([0.0045, 0.1368, 1.751])
 
@@ -38,12 +37,12 @@ def test_standard_errors_are_the_scatter_over_noise():
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), scatter, rtol=0.15)
 
 
-def test_a_band_limited_residual_counts_as_few_as_it_has_values():
-    white = EstimationSettings(intervals="white")
-    whole = fit_inertia_damping_stiffness(signals(0.02), settings=white)
-    tenth = fit_inertia_damping_stiffness(signals(0.02, band=(0.0, 5.0)), settings=white)
-    ratio = np.array(tenth.se) / np.array(whole.se)
-    np.testing.assert_allclose(ratio, np.sqrt(10.0), rtol=0.01)
+def test_textbook_errors_take_the_residual_for_white():
+    found = fit_inertia_damping_stiffness(noisy := signals(0.02), white=True)
+    residual = noisy.torque_nm - noisy.motion @ found.value
+    variance = residual @ residual / (residual.size - 3)
+    expected = variance * np.linalg.inv(noisy.motion.T @ noisy.motion)
+    np.testing.assert_allclose(found.covariance, expected, rtol=1e-9)
 
 
 def test_it_survives_units_that_square_to_nothing():

@@ -5,8 +5,6 @@ import pytest
 from scipy import signal
 
 from rigidimeter.estimation.uncertainty import (
-    _block_samples,
-    block_bootstrap,
     correlation_samples,
     cramer_rao_coloured,
     hac_covariance,
@@ -84,11 +82,6 @@ def by_hac(A, e, rng):
     return t_interval(error, found.standard_errors, found.degrees_of_freedom)
 
 
-def by_bootstrap(A, e, rng):
-    found = block_bootstrap(A, e, rng, draws=199)
-    return found.low, found.high
-
-
 @pytest.mark.parametrize("noise", [white, first_order, voluntary])
 def test_intervals_of_95_percent_hold(noise):
     # Measured in 3000 trials: 93 to 96 %. In 100 trials a true 93 % shows as 85 % or more, but for
@@ -115,33 +108,6 @@ def test_intervals_of_95_percent_hold_in_many_trials(noise):
     assert np.all((held > 92.5) & (held < 97.0)), held
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("noise", [white, first_order, voluntary])
-def test_intervals_of_the_bootstrap_nearly_hold(noise):
-    held = coverage(noise, range(600), by_bootstrap)
-    print(f"bootstrap, {noise.__name__}: {held.round(1)}")
-    assert np.all((held > 86.0) & (held < 98.5)), held
-
-
-def test_the_bootstrap_scatters_as_the_noise_does():
-    rng = np.random.default_rng(6)
-    A = motion(rng)
-    target = A @ JOINT + 0.05 * white(rng)
-    found = block_bootstrap(A, target, rng, draws=2000)
-    expected = 0.05 * np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
-    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), expected, rtol=0.2)
-    assert np.all(found.low < JOINT + 3 * expected)
-    assert np.all(found.high > JOINT - 3 * expected)
-
-
-def test_the_bootstrap_of_an_exact_epoch_does_not_scatter():
-    rng = np.random.default_rng(7)
-    A = motion(rng)
-    found = block_bootstrap(A, A @ JOINT, rng, draws=50)
-    np.testing.assert_allclose(found.low, JOINT, rtol=1e-9)
-    np.testing.assert_allclose(found.high, JOINT, rtol=1e-9)
-
-
 def test_the_cosines_and_the_small_sample_factor_are_those_of_the_formula():
     rng = np.random.default_rng(15)
     bread, _, scores = fitted(motion(rng), voluntary(rng))
@@ -153,11 +119,6 @@ def test_the_cosines_and_the_small_sample_factor_are_those_of_the_formula():
     middle = sums.T @ sums / j.size * independent / (independent - 3)
     np.testing.assert_allclose(found.covariance, bread @ middle @ bread.T, rtol=1e-9)
     np.testing.assert_allclose(found.standard_errors**2, np.diag(found.covariance), rtol=1e-12)
-
-
-def test_a_residual_that_only_drifts_still_leaves_four_blocks():
-    assert _block_samples(np.linspace(-1.0, 1.0, N)[:, None]) == N // 4
-    assert _block_samples(np.random.default_rng(8).standard_normal((N, 1))) < 20
 
 
 def test_too_few_samples_and_wrong_shapes_are_refused():

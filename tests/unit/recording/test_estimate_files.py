@@ -93,26 +93,6 @@ def test_the_document_has_the_published_keys(tmp_path):
     assert half["stiffness_nm_rad_p"] == 1 / 3
 
 
-def test_a_document_of_the_first_version_is_still_read(tmp_path):
-    write_estimates_json(tmp_path / "e.json", ANALYSIS)
-    document = json.loads((tmp_path / "e.json").read_text())
-    for name in ("pooled", "delays", "method_reason", "sensitivity"):
-        del document[name]
-    for row in [*document["epochs"], *document["fixed_inertia"]["epochs"]]:
-        del row["findings"]
-        for key in [key for key in row if key.endswith(("_low", "_high", "_bound"))]:
-            del row[key]
-    (tmp_path / "e.json").write_text(json.dumps(document))
-    analysis = read_estimates(tmp_path / "e.json")
-    assert analysis.fits[0].stiffness_nm_rad == 1.7
-    assert analysis.pooled == ()
-
-
-def test_estimates_by_a_method_that_was_removed_are_still_read(tmp_path):
-    write_estimates_json(tmp_path / "e.json", replace(ANALYSIS, method="ml"))
-    assert {fit.method for fit in read_estimates(tmp_path / "e.json").fits} == {"ml"}
-
-
 def test_one_condition_is_pooled_once(tmp_path):
     only = replace(ANALYSIS, pooled=(POOLED,))
     write_estimates_json(tmp_path / "e.json", only)

@@ -1,8 +1,6 @@
 """Figures from arrays: complete, labelled, alike each time, and without trace."""
 
-import csv
 import dataclasses
-import io
 from xml.etree import ElementTree as ET
 
 import matplotlib as mpl
@@ -12,7 +10,6 @@ from matplotlib.figure import Figure
 
 from rigidimeter.estimation import epoch_signals, scoring_cycles
 from rigidimeter.records import BandEstimate, Channel
-from rigidimeter.reporting.drawn_data import COLUMNS, drawn_csv
 from rigidimeter.reporting.sections.distribution import distribution
 from rigidimeter.reporting.sections.other_bands import band_sensitivity
 from rigidimeter.reporting.sections.perturbation_figure import changes, perturbation, spectrum
@@ -213,15 +210,3 @@ def test_a_channel_on_a_late_clock_is_drawn_from_its_origin() -> None:
     late = dataclasses.replace(PRBS, time_s=1.7e9 + STAMPS)
     above, _ = perturbation(late, 1.7e9).axes
     assert above.get_xlim() == (0.0, 7.0)
-
-
-def test_what_is_drawn_is_a_row_for_each_point_with_cells_as_they_are_escaped() -> None:
-    figure = Figure()
-    axes = figure.add_subplot()
-    axes.set_title("=1, a")
-    axes.set_xlabel("Time\n(s)")
-    axes.plot([0.1, 2.0], [-1e-20, np.nan], label="OFF")
-    rows = list(csv.reader(io.StringIO(drawn_csv(figure))))
-    assert rows[0] == list(COLUMNS)
-    shared = ["1", "'=1, a", "Time (s)", "", "1", "OFF"]
-    assert rows[1:] == [[*shared, "0.1", "-1e-20"], [*shared, "2.0", ""]]

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from markupsafe import escape
 
-from rigidimeter.reporting.epoch_marks import Mark
 from rigidimeter.reporting.epoch_traces import page_traces, traces_json
 from rigidimeter.reporting.inline_svg import inline_svg
 from rigidimeter.reporting.sections.distribution import distribution
@@ -19,15 +18,19 @@ from rigidimeter.study.drawing import MOST_POINTS, POINTS_PER_CYCLE, packed, thi
 NAME = '<b> 0.12345 #0072b2 id="x"'
 
 
-def drawn(values: list[float], marks: list[Mark], places: dict[tuple[str, str], int]) -> str:
+def drawn(
+    values: list[float], marks: list[tuple[str, str]], places: dict[tuple[str, str], int]
+) -> str:
     figure = distribution("y (1)", {NAME: values}, {NAME: "#0072B2"})
     return inline_svg(svg_text(figure), "a/b", 'A "drawing"', {"epochs-0": marks}, places)
 
 
-def test_points_carry_the_words_and_traces_of_their_epochs_in_order() -> None:
-    marks = [Mark("s", str(k), f"epoch {k} <&>") for k in range(3)]
-    text = drawn([1.0, 3.0, 2.0], marks, {("s", "2"): 7})
-    assert re.findall(r"<title>(.*?)</title>", text) == [escape(mark.words) for mark in marks]
+def test_points_carry_the_names_and_traces_of_their_epochs_in_order() -> None:
+    marks = [("s", f"{k} <&>") for k in range(3)]
+    text = drawn([1.0, 3.0, 2.0], marks, {("s", "2 <&>"): 7})
+    assert re.findall(r"<title>(.*?)</title>", text) == [
+        f"epoch {escape(label)}" for _, label in marks
+    ]
     uses = re.findall(r"<use ([^>]*)><title>", text)
     assert ["data-epoch" in use for use in uses] == [False, False, True]
     assert 'data-epoch="7"' in uses[2]
@@ -37,7 +40,7 @@ def test_points_carry_the_words_and_traces_of_their_epochs_in_order() -> None:
 
 
 def test_points_that_cannot_be_told_apart_get_no_words() -> None:
-    assert "<title>" not in drawn([1.0, 2.0], [Mark("s", "0", "one")], {})
+    assert "<title>" not in drawn([1.0, 2.0], [("s", "0")], {})
 
 
 def test_text_stays_as_it_is_and_names_and_colours_are_those_of_the_page() -> None:

@@ -120,7 +120,6 @@ def test_every_figure_of_the_page_lies_beside_it(written: Path, page: Page) -> N
     stored = [path.read_bytes() for path in (written.parent / "figures").glob("*.svg")]
     assert page.tags.count("figcaption") == len(stored)
     names = {path.stem for path in (written.parent / "figures").glob("*.svg")}
-    assert names == {path.stem for path in (written.parent / "figures").glob("*.csv")}
     assert names == {
         "distribution_inertia_kg_m2",
         "distribution_damping_nm_s_rad",
@@ -228,7 +227,7 @@ def test_a_method_asked_for_by_name_says_so(study: StudyResult, make_study) -> N
         in text
     )
     assert "The delay between torque and motion was not estimated." in text
-    assert "Intervals hold for a residual of any colour" in text
+    assert "Intervals take the residual for white" in text
     assert "The joint is taken for one that does not change" in text
 
 

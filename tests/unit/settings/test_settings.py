@@ -135,3 +135,12 @@ def test_a_stamp_that_takes_off_too_much_makes_a_reading_old(name):
         parse_settings(values)
     values["guard"]["stale_s"] = 0.065
     parse_settings(values)
+
+
+def test_a_kind_of_interval_is_read_in_an_old_session_and_refused_in_a_file(tmp_path):
+    old = {"estimation": {"intervals": "white", "bootstrap_draws": 99, "trim_s": 0.5}}
+    assert parse_settings(old).estimation.trim_s == 0.5
+    assert "intervals" not in dump_settings(parse_settings(old))["estimation"]
+    (tmp_path / "rig.toml").write_text('[estimation]\nintervals = "white"\n')
+    with pytest.raises(UserError, match=r"rig.toml: estimation.intervals was removed"):
+        load_settings(tmp_path / "rig.toml")

@@ -162,39 +162,6 @@ def test_a_run_that_was_cut_off_is_made_up_for(
     assert not list((study / "analysis").glob("*.edited*"))
 
 
-def older(document: dict) -> dict:
-    """Return the document as `rigidimeter.study-comparison/1` had it."""
-    comparisons, tests, effects = [], [], []
-    for row in document["comparisons"]:
-        who = {name: row[name] for name in ("measure", "title", "unit")}
-        tests += [who | row["days"]] if row["measure"] != "rating" else []
-        sizes = {name: value for name, value in row.items() if name.startswith(("r_", "rank_b"))}
-        effects.append(who | {"effects": sizes, "p_holm": row["p_holm"]})
-        if row["measure"] != "rating":
-            comparisons.append({name: row[name] for name in row if name != "days"})
-    changed = {"comparisons": comparisons, "day_tests": tests, "effects": effects}
-    return {**document, "schema": "rigidimeter.study-comparison/1", **changed}
-
-
-def test_an_archive_of_the_older_schema_is_read(study: Path) -> None:
-    path, inputs = (study / "analysis" / name for name in ("comparison.json", "inputs.json"))
-    document = older(json.loads(path.read_text()))
-    document["day_tests"][0]["p"] = 0.125
-    document["effects"][-1]["effects"]["rank_biserial"] = -0.5
-    text = json.dumps(document)
-    path.write_text(text)
-    record = json.loads(inputs.read_text())
-    record["results"]["comparison.json"] = hashlib.sha256(text.encode()).hexdigest()
-    inputs.write_text(json.dumps(record))
-    said = kept(study)
-    assert [text.partition(":")[0] for text in said] == [
-        f"{document['comparisons'][0]['measure']} by days",
-        "rating, effect size",
-    ]
-    assert "p 0.125 → " in said[0]
-    assert "rank_biserial -0.5 → " in said[1]
-
-
 def test_what_the_seed_moves_is_told(study: Path) -> None:
     read = read_study(study)
     found = analyse_study(read, seed=2, resamples=RESAMPLES)

@@ -113,14 +113,14 @@ def _fit_condition(
     progress: Progress,
 ) -> tuple[dict[int, Fit], list[Fit]]:
     """Return the fit of each epoch of a condition, and that of all of them that count."""
-    linearise, draws = _problems(method, inertia_kg_m2), _draws(settings)
+    linearise = _problems(method, inertia_kg_m2)
     good = [member for member in members if member.epoch.closed.included]
     start = _start(good or members, inertia_kg_m2)
     shared: LineFit | None = None
     made: dict[int, Problem] = {}
     if good:
         try:
-            shared, problems = fit_pooled([m.observation for m in good], linearise, start, draws)
+            shared, problems = fit_pooled([m.observation for m in good], linearise, start)
         except ValueError:
             pass  # each epoch will say why
         else:
@@ -137,7 +137,6 @@ def _fit_condition(
                 shared.values if shared is not None else start,
                 share.shape if share is not None else None,
                 made.get(place) if share is not None else None,
-                draws,
             )
         except ValueError as error:
             fits[place] = _without_numbers(epoch, method.name, str(error))
@@ -169,7 +168,7 @@ def _fit_all(
     linearise, start = _problems(method, inertia_kg_m2), _start(members, inertia_kg_m2)
     observations = [member.observation for member in members]
     try:
-        everything, _ = fit_pooled(observations, linearise, start, _draws(settings))
+        everything, _ = fit_pooled(observations, linearise, start)
     except ValueError:
         return []  # the epochs have said why
     return [_pooled_fit(method.name, "", everything, members, inertia_kg_m2)]
@@ -184,25 +183,12 @@ def _start(members: Sequence[_Member], inertia_kg_m2: float | None) -> Array:
     return start if inertia_kg_m2 is None else start[1:]
 
 
-def _draws(settings: Settings) -> int:
-    estimation = settings.estimation
-    return estimation.bootstrap_draws if estimation.intervals == "bootstrap" else 0
-
-
 def _estimate(fit: LineFit, inertia_kg_m2: float | None) -> Estimate:
     """Return J, B and K with their uncertainty, as a `Fit` holds them."""
     bound = np.sqrt(np.diag(fit.bound))
-    if fit.drawn is not None:
-        covariance = np.atleast_2d(np.cov(fit.drawn, rowvar=False))
-        low, high = np.quantile(fit.drawn, [0.025, 0.975], axis=0)
-        found = Estimate(
-            fit.values, np.std(fit.drawn, axis=0, ddof=1), low, high, bound, covariance
-        )
-    else:
-        half = special.stdtrit(fit.degrees, 0.975) * fit.standard_errors
-        low, high = fit.values - half, fit.values + half
-        found = Estimate(fit.values, fit.standard_errors, low, high, bound, fit.covariance)
-    found = found._replace(low=low - fit.between, high=high + fit.between)
+    half = special.stdtrit(fit.degrees, 0.975) * fit.standard_errors + fit.between
+    low, high = fit.values - half, fit.values + half
+    found = Estimate(fit.values, fit.standard_errors, low, high, bound, fit.covariance)
     return found if inertia_kg_m2 is None else found.with_inertia(inertia_kg_m2)
 
 

@@ -128,29 +128,3 @@ def line_covariance(
     share = smoother.adjoint(effect * shape[:, None]) * (density / shape)[:, None]
     degrees = 2 * np.sum(share, axis=0) ** 2 / np.sum(share**2, axis=0)
     return covariance, degrees
-
-
-def drawn_lines(
-    inverse: Array, weighted: Complex, residual: Complex, rng: np.random.Generator, draws: int
-) -> Array:
-    """Return errors of the parameters, drawn by giving each line of the residual a new phase.
-
-    The lines of a record are independent whatever the colour of the noise, so each is a block of
-    its own: the wild bootstrap (Wu 1986; Liu 1988) with complex normal multipliers.
-
-    Parameters
-    ----------
-    inverse, weighted, residual
-        As for `line_covariance`.
-    rng : numpy.random.Generator
-    draws : int
-
-    Returns
-    -------
-    array, shape (draws, p)
-    """
-    m, p = weighted.shape
-    scores = weighted.conj() * residual[:, None] * np.sqrt(2 * m / max(2 * m - p, 1))
-    multipliers = rng.standard_normal((draws, m, 2)) * np.sqrt(0.5)
-    moments = multipliers[:, :, 0] @ scores.real - multipliers[:, :, 1] @ scores.imag
-    return np.asarray(moments @ inverse.T, dtype=np.float64)

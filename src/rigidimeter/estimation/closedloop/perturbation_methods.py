@@ -13,7 +13,6 @@ from rigidimeter.estimation.closedloop.linear_problems import instrumental, peri
 from rigidimeter.estimation.closedloop.observation import observe, observe_periods
 from rigidimeter.estimation.closedloop.refine import ENOUGH_EPOCHS
 from rigidimeter.estimation.method_record import Method
-from rigidimeter.settings import EstimationSettings
 
 CLOSED_LOOP: Mapping[str, LineMethod] = {
     "iv": LineMethod("iv", observe, instrumental),
@@ -22,17 +21,10 @@ CLOSED_LOOP: Mapping[str, LineMethod] = {
 """The methods that need the perturbation."""
 
 
-def _intervals_text(settings: EstimationSettings) -> str:
-    if settings.intervals == "bootstrap":
-        return (
-            "Intervals are made by giving each spectral line of the residual a new phase, torque "
-            "that something but the robot adds included"
-        )
-    return (
-        "Intervals are made from the power of the residual at each frequency, torque that "
-        "something but the robot adds included"
-    )
-
+_INTERVALS_TEXT = (
+    "Intervals are made from the power of the residual at each frequency, torque that "
+    "something but the robot adds included"
+)
 
 _POOLED_TEXT = (
     f"From {ENOUGH_EPOCHS} epochs on they come from the scatter between epochs; with fewer, the "
@@ -47,7 +39,7 @@ IV = Method(
     methods_text="by refined instrumental variables made from the known perturbation",
     fit=partial(fit_closed_loop, CLOSED_LOOP["iv"]),
     references=("riv", "riv_loop"),
-    intervals_text=_intervals_text,
+    intervals_text=_INTERVALS_TEXT,
     pooled_text=_POOLED_TEXT,
     in_sensitivity=True,
 )
@@ -57,6 +49,6 @@ SPECTRAL = Method(
     needs=("perturbation_nm",),
     methods_text="by instrumental variables at the lines of the periodic perturbation",
     fit=partial(fit_closed_loop, CLOSED_LOOP["spectral"]),
-    intervals_text=_intervals_text,
+    intervals_text=_INTERVALS_TEXT,
     pooled_text=_POOLED_TEXT,
 )

@@ -20,7 +20,6 @@ from rigidimeter.estimation.closedloop.between_doubt import moved_elsewhere
 from rigidimeter.estimation.closedloop.line_noise import (
     Shape,
     Smoother,
-    drawn_lines,
     line_covariance,
 )
 from rigidimeter.estimation.closedloop.line_weights import (
@@ -48,9 +47,6 @@ SETTLED, SETTLED_SHARE = 0.5, 0.01
 """After so many iterations a step of more than this fraction of a standard error, and of more than
 this fraction of the parameter itself, means that there is no solution."""
 
-BOOTSTRAP_SEED = 1
-"""The same epochs give the same interval every time."""
-
 ENOUGH_EPOCHS = 10
 """From this many epochs on, the scatter between them alone gives the covariance of the pooled
 estimate; of fewer it is the larger of scatter and lines."""
@@ -77,8 +73,6 @@ class LineFit:
     shape : Shape
     between : array, shape (p,)
         How far each parameter may be elsewhere for what is not known of the drive.
-    drawn : array, shape (draws, p), or None
-        Parameters drawn by bootstrap, if that was asked for.
     """
 
     values: Array
@@ -88,7 +82,6 @@ class LineFit:
     condition_number: float
     shape: Shape
     between: Array
-    drawn: Array | None = None
 
     @property
     def standard_errors(self) -> Array:
@@ -130,7 +123,6 @@ def fit_single(
     start: Array,
     shape: Shape | None = None,
     problem: Problem | None = None,
-    draws: int = 0,
 ) -> LineFit:
     """Fit one epoch.
 
@@ -144,8 +136,6 @@ def fit_single(
         Power of the noise that epochs of the same kind share; else this epoch's own is found.
     problem : Problem, optional
         Use this problem and do not iterate: for instruments from a pooled estimate.
-    draws : int
-        Of the bootstrap; none if 0.
 
     Raises
     ------
@@ -192,14 +182,11 @@ def fit_single(
         condition_number([problem], [lines], weight_from),
         weight_from,
         moved_elsewhere([problem], [weight_from.at(lines)], values),
-        values + np.sqrt(spread) * drawn_lines(inverse, weighted, residual, _rng(), draws)
-        if draws
-        else None,
     )
 
 
 def fit_pooled(
-    observations: Sequence[Observation], linearise: Linearise, start: Array, draws: int = 0
+    observations: Sequence[Observation], linearise: Linearise, start: Array
 ) -> tuple[LineFit, list[Problem]]:
     """Fit epochs that share the joint; also return their problems at the solution.
 
@@ -213,7 +200,7 @@ def fit_pooled(
         If the perturbation did not move the joint enough to tell the parameters apart.
     """
     solution = solve_pooled(observations, linearise, start)
-    return with_uncertainty(solution, draws), list(solution.problems)
+    return with_uncertainty(solution), list(solution.problems)
 
 
 def solve_pooled(
@@ -249,10 +236,10 @@ def solve_pooled(
     return PooledSolution(values, shape, bound, problems, everything, weighted, inverse)
 
 
-def with_uncertainty(solution: PooledSolution, draws: int = 0) -> LineFit:
-    """Return a solution with its covariance and, if draws are asked for, parameters drawn."""
+def with_uncertainty(solution: PooledSolution) -> LineFit:
+    """Return a solution with its covariance."""
     everything, shape, values = solution.everything, solution.shape, solution.values
-    covariance, degrees, errors = _pooled_covariance(solution, draws)
+    covariance, degrees = _pooled_covariance(solution)
     return LineFit(
         values,
         covariance,
@@ -261,7 +248,6 @@ def with_uncertainty(solution: PooledSolution, draws: int = 0) -> LineFit:
         condition_number(solution.problems, everything, shape),
         shape,
         moved_elsewhere(solution.problems, [shape.at(lines) for lines in everything], values),
-        values + errors if draws else None,
     )
 
 
@@ -273,18 +259,13 @@ def _refuse_unsettled(step: Array, scale: Array, values: Array) -> None:
         )
 
 
-def _rng() -> np.random.Generator:
-    return np.random.default_rng(BOOTSTRAP_SEED)
-
-
-def _pooled_covariance(solution: PooledSolution, draws: int) -> tuple[Array, Array, Array]:
-    """Return covariance, degrees of freedom and, if draws are asked for, errors drawn."""
+def _pooled_covariance(solution: PooledSolution) -> tuple[Array, Array]:
+    """Return covariance and degrees of freedom."""
     shape, inverse, values = solution.shape, solution.inverse, solution.values
     p, count = values.size, len(solution.problems)
     moments = np.empty((count, p))
     of_lines = np.zeros((p, p))
     squares = np.zeros(p)
-    errors, rng = np.zeros((draws, p)), _rng()
     smoothers: dict[int, Smoother] = {}
     for i, (problem, lines, weighted) in enumerate(
         zip(solution.problems, solution.everything, solution.weighted, strict=True)
@@ -296,18 +277,13 @@ def _pooled_covariance(solution: PooledSolution, draws: int) -> tuple[Array, Arr
         spread = lines.grid.spread
         of_lines += spread * part
         squares += (spread * np.diag(part)) ** 2 / (degrees / spread)
-        if draws and count < ENOUGH_EPOCHS:
-            errors += np.sqrt(spread) * drawn_lines(inverse, weighted, residual, rng, draws)
     between = inverse @ (moments.T @ moments) @ inverse.T * (count / max(count - 1, 1))
-    if draws and count >= ENOUGH_EPOCHS:  # each epoch is a block
-        times = rng.multinomial(count, np.full(count, 1.0 / count), size=draws)
-        errors = times @ moments @ inverse.T
     if count >= ENOUGH_EPOCHS:
-        return between, np.full(p, count - 1.0), errors
+        return between, np.full(p, count - 1.0)
     degrees_of_lines = np.diag(of_lines) ** 2 / squares
     wider = np.diag(between) > np.diag(of_lines)
     if count == 1 or not np.any(wider):
-        return of_lines, degrees_of_lines, errors
+        return of_lines, degrees_of_lines
     scale = np.sqrt(np.maximum(np.diag(between) / np.diag(of_lines), 1.0))
     covariance = of_lines * np.outer(scale, scale)
-    return covariance, np.where(wider, count - 1.0, degrees_of_lines), errors * scale
+    return covariance, np.where(wider, count - 1.0, degrees_of_lines)

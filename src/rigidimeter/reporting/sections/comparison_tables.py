@@ -151,7 +151,7 @@ def _all_epochs(result: StudyResult) -> Iterator[Block]:
         result,
         note=(
             "One J, B and K fitted to all epochs of a condition at once. "
-            f"{interval_basis(result.analysis.method, result.settings.estimation)}. "
+            f"{interval_basis(result.analysis.method)}. "
             f"{pooled_basis(result.analysis.method)}. The file also has standard errors and the "
             "smallest standard errors possible."
         ),

@@ -19,7 +19,6 @@ from rigidimeter.reporting.contents import (
     from_study_folder,
     paragraph,
 )
-from rigidimeter.reporting.epoch_marks import Mark, mark_of
 from rigidimeter.reporting.numbers import axis_unit, condition_name, number
 from rigidimeter.reporting.style import (
     GREY,
@@ -106,10 +105,10 @@ def _by_day(c: Comparison) -> dict[tuple[str, str, str], list[Observation]]:
     return own
 
 
-def _marks(c: Comparison) -> dict[str, list[Mark]]:
+def _marks(c: Comparison) -> dict[str, list[tuple[str, str]]]:
     own = _by_day(c)
     return {
-        f"epochs-{place}": [mark_of(o, c.measure) for o in own[m.subject, m.day, m.condition]]
+        f"epochs-{place}": [(o.source, o.epoch) for o in own[m.subject, m.day, m.condition]]
         for place, m in enumerate(c.day_medians)
     }
 

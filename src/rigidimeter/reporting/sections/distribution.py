@@ -12,7 +12,6 @@ from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
 from rigidimeter.reporting.contents import Block, Figure, Section, paragraph
-from rigidimeter.reporting.epoch_marks import mark_of
 from rigidimeter.reporting.numbers import (
     axis_unit,
     condition_name,
@@ -67,7 +66,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
             ),
             "small",
             marks={
-                f"epochs-{place}": [mark_of(o, c.measure) for o in c.of(key)]
+                f"epochs-{place}": [(o.source, o.epoch) for o in c.of(key)]
                 for place, key in enumerate(c.summaries)
             },
         )

@@ -137,7 +137,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             "not include the error of the median J. The files also have standard errors and, in "
             "columns that end with <code>_bound</code>, the smallest standard error that an "
             "unbiased estimate from the same excitation and noise could have (Cramér–Rao)."
-        ).format(interval_basis(analysis.method, result.settings.estimation))
+        ).format(interval_basis(analysis.method))
     )
     band, in_which = _band(analysis.fits)
     found: tuple[Column, ...] = ()

@@ -1,1 +1,0 @@
-"""What `benchmarks.same_numbers` is made of: inputs, extraction from documents, comparison."""
