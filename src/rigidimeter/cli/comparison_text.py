@@ -134,7 +134,8 @@ def _days(found: StudyResult) -> Iterator[Block]:
     if not tested:
         return
     yield ""
-    yield Heading(f"{found.reference} − {found.other}: days, not epochs")
+    units = " and ".join(dict.fromkeys(f"{d.unit}s" for _, d in tested))
+    yield Heading(f"{found.reference} − {found.other}: {units}, not epochs")
     rows: list[Sequence[str] | str] = []
     for c, d in tested:
         rows.append(c.measure.label)
@@ -167,9 +168,8 @@ def _effects(found: StudyResult) -> Iterator[Block]:
     sized = [(c.measure, c.effects) for c in found.comparisons if c.effects is not None]
     if not sized:
         return
-    resampled = "whole days" if found.sessions else "sessions or single values"
     yield ""
-    yield Heading(f"Effect sizes, 95 % intervals by resampling {resampled}")
+    yield Heading(f"Effect sizes, 95 % intervals by resampling {found.resampled}")
     effects = [
         (
             measure.title,

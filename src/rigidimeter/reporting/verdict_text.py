@@ -12,6 +12,7 @@ from rigidimeter.reporting.numbers import (
     interval,
     number,
     p_value,
+    plural,
     series,
     within,
 )
@@ -36,6 +37,7 @@ _WITHHELD: dict[Literal["not supported", "cannot be decided"], str] = {
 }
 
 
+_MOST_PATHS = 3
 LEAST_P = 0.0001
 """Below this a sentence does not say how small p is; tables do."""
 
@@ -61,7 +63,18 @@ def verdict(result: StudyResult) -> Verdict:
         lead, *rest = _sentences(result, concluded)
         if concluded.of("lower", "higher"):
             rest += _largest(result)
-    return Verdict(prefix + lead, (*rest, *doubt_sentence(result.analysis)))
+    return Verdict(prefix + lead, (*_left_out(result), *rest, *doubt_sentence(result.analysis)))
+
+
+def _left_out(result: StudyResult) -> list[str]:
+    """Return which sessions of a study do not count; nothing where all do."""
+    paths = list(dict.fromkeys(out.path for out in result.left_out))
+    if not paths:
+        return []
+    total = len({*paths, *(session.source for session in result.sessions)})
+    shown = series(paths) if len(paths) <= _MOST_PATHS else ", ".join(paths[:_MOST_PATHS]) + ", …"
+    are = "is" if len(paths) == 1 else "are"
+    return [f"{len(paths)} of {plural(total, 'session')} {are} left out: {shown}."]
 
 
 def _sentences(result: StudyResult, concluded: Conclusions) -> list[str]:
@@ -90,7 +103,7 @@ def _sentences(result: StudyResult, concluded: Conclusions) -> list[str]:
     found += _withheld(concluded, "cannot be decided")
     if concluded.tested:
         adjusted = f"; p adjusted by Holm’s method for {concluded.tested} measures"
-        found.append(f"Tested by {concluded.basis}{adjusted if concluded.tested > 1 else ''}.")
+        found.append(f"Tested by {concluded.units}{adjusted if concluded.tested > 1 else ''}.")
     return found
 
 

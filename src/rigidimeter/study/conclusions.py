@@ -57,6 +57,13 @@ class Conclusions:
         return tuple(one for one in self.each if one.verdict in verdicts)
 
     @property
+    def units(self) -> str:
+        """What the tests compared: days, subjects, recordings or values."""
+        tests = (one.comparison.days for one in self.each if not math.isnan(one.p))
+        units = [f"{test.unit}s" for test in tests if test is not None]
+        return " and ".join(dict.fromkeys(units)) if self.basis == "days" and units else self.basis
+
+    @property
     def tested(self) -> int:
         """The number of measures that were tested."""
         return sum(not math.isnan(one.p) for one in self.each)

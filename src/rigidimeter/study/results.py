@@ -201,6 +201,13 @@ class StudyResult:
         """Whether J was held at each subject's own median, for there are several subjects."""
         return len({session.subject for session in self.sessions}) > 1
 
+    @property
+    def resampled(self) -> str:
+        """What the bootstrap of the effect sizes resamples."""
+        if not self.sessions:
+            return "sessions or single values"
+        return "the days of each subject" if self.several_subjects else "whole days"
+
     def comparison(self, measure: str) -> Comparison | None:
         """Return the comparison of a measure by its stored name."""
         return next((each for each in self.comparisons if each.measure.name == measure), None)

@@ -256,3 +256,37 @@ def test_one_recording_of_both_conditions_has_a_row_for_each(study: Path) -> Non
     assert [(s.day, s.condition) for s in found.sessions[-2:]] == [("9", "OFF"), ("9", "DBS")]
     table.write_text(rows + "sessions/both,M1,8,DBS\n")
     assert any("must agree on both" in n.text for n in analysed(study).notices)
+
+
+def test_three_subjects_are_compared_and_words_say_so(study: Path, rigidimeter) -> None:
+    """Each has a session in both conditions, so subjects are what is tested."""
+    (study / "ratings.csv").unlink()
+    rows = [f"sessions/{k}-OFF,S{k},1,OFF\nsessions/{k + 1}-DBS,S{k},2,DBS" for k in (1, 2, 3)]
+    (study / "sessions.csv").write_text("\n".join(["path,subject,day,condition", *rows]))
+    ran = rigidimeter("compare", study, "--resamples", "200")
+    out = " ".join(ran.out.split())
+    assert "Tested by subjects" in out
+    assert "means of subjects; p and intervals by the test of subjects" in out
+    assert "OFF − DBS: subjects, not epochs" in out
+    assert "paired t-test of 3 subjects" in out
+    assert "by resampling the days of each subject" in out
+    assert "by days" not in out
+
+
+def test_a_session_of_two_conditions_has_one_vote_on_the_protocol(study: Path, rigidimeter) -> None:
+    """Of three sessions two are of one protocol; the third has a row for each of its conditions."""
+    (study / "ratings.csv").unlink()
+    blocks = [{"task": "sinusoid", "condition": name, "epochs": 2} for name in ("OFF", "DBS")]
+    protocol = {"blocks": blocks, "rests_s": [0.5], "return_s": 0.5}
+    sinusoid = tiny("OFF", 1).sinusoid.model_dump() | {"amplitude_deg": 6.0}
+    settings = tiny("OFF", 55, task="sinusoid", protocol=protocol, sinusoid=sinusoid)
+    run_virtual_session(settings, study / "sessions/both")
+    rows = ["sessions/both,M1,9,OFF", "sessions/both,M1,9,DBS"]
+    rows += ["sessions/1-OFF,M1,1,OFF", "sessions/2-DBS,M1,2,DBS"]
+    (study / "sessions.csv").write_text("\n".join(["path,subject,day,condition", *rows]))
+    found = analysed(study)
+    assert [out.path for out in found.left_out] == ["sessions/both"] * 2
+    assert "but 2 of 3 sessions, such as sessions/1-OFF" in found.left_out[0].reason
+    ran = rigidimeter("compare", study, "--resamples", "200")
+    first = " ".join(ran.out.split("\n\n")[0].split())
+    assert "1 of 3 sessions is left out: sessions/both." in first
