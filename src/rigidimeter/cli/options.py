@@ -21,7 +21,9 @@ class RegistryCommand(TyperCommand):
         if len(options) == len(self.params) and "--settings" in with_value:
             for before, word in pairwise(["", *args]):
                 if word.endswith(".toml") and word[0] != "-" and before not in with_value:
-                    raise typer.BadParameter(f"{word}: if it holds settings, say --settings {shlex.quote(word)}", ctx)
+                    raise typer.BadParameter(
+                        f"{word}: if it holds settings, say --settings {shlex.quote(word)}", ctx
+                    )
         return super().parse_args(ctx, args)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:

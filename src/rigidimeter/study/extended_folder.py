@@ -139,7 +139,7 @@ def _added(
         new = [name for name in _new(study, recorded, defined) if name in session.conditions]
         if new:
             refused.append(
-                f"{path}: is not in the study, for {study / STUDY_FILE} does not have its condition "
+                f"{path}: is not in the study, for {study / STUDY_FILE} lacks its condition "
                 f"{new[0]}: write [conditions.{toml_key(new[0])}] there and add the session again"
             )
             return []

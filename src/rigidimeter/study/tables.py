@@ -52,7 +52,9 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
         "inertia_by_subject": result.several_subjects,
         "conclusion": result_table(result, "conclusion"),
         "quality": None if light is None else light.row(),
-        "comparisons": [comparison_values(comparison) for comparison in result.comparisons],
+        "comparisons": [
+            comparison_values(comparison) for comparison in (*result.comparisons, *result.further)
+        ],
         "days": result_table(result, "days"),
         "effect_differences": result_table(result, "effect_differences"),
         "ratings": None if result.ratings is None else ratings_document(result.ratings),
@@ -211,7 +213,7 @@ def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
 TABLES: Mapping[str, Callable[[StudyResult], Rows]] = {
     "conclusion": conclusion_rows,
     "precision": precision_rows,
-    "comparisons": lambda result: comparison_rows(result.comparisons),
+    "comparisons": lambda result: comparison_rows((*result.comparisons, *result.further)),
     "summaries": lambda result: list(_summaries(result)),
     "days": lambda result: list(_days(result)),
     "effect_differences": lambda result: list(_effect_differences(result)),

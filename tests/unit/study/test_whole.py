@@ -1,6 +1,7 @@
 """A study folder from its tables to its conclusions, held against the parts done by hand."""
 
 import csv
+import json
 import math
 import shutil
 from dataclasses import replace
@@ -289,4 +290,41 @@ def test_a_session_of_two_conditions_has_one_vote_on_the_protocol(study: Path, r
     assert "but 2 of 3 sessions, such as sessions/1-OFF" in found.left_out[0].reason
     ran = rigidimeter("compare", study, "--resamples", "200")
     first = " ".join(ran.out.split("\n\n")[0].split())
-    assert "1 of 3 sessions is left out: sessions/both." in first
+    assert "1 of 3 sessions is left out." in first
+
+
+def test_a_third_condition_is_compared_with_the_first_and_p_is_adjusted_for_all(
+    study: Path, edit, rigidimeter, tmp_path
+) -> None:
+    """Work and impulse of three conditions: two differences with OFF each, Holm over four."""
+    (study / "ratings.csv").unlink()
+    edit(study / "study.toml", "[conditions.DBS]", "[conditions.LOW]\n[conditions.DBS]")
+    low = {"LOW": {"damping_nm_s_rad": 0.125, "stiffness_nm_rad": 1.5}}
+    for day in ("4", "5", "6"):
+        record(study / f"sessions/{day}-A-LOW", "LOW", int(day), task="sinusoid", subject=low)
+    rows = [f"sessions/{day}-A-LOW,M1,{day},LOW" for day in ("4", "5", "6")]
+    table = study / "sessions.csv"
+    head, *before = table.read_text().splitlines()
+    table.write_text("\n".join([head, *rows, *before]) + "\n")
+    out = tmp_path / "found.json"
+    ran = rigidimeter("compare", study, "--resamples", "200", "--json", out)
+    assert ran.status == 0, ran.err
+    text = " ".join(ran.out.split())
+    assert "p adjusted by Holm’s method for 4 tests" in text
+    assert "OFF − LOW: days, not epochs" in text
+    document = json.loads(out.read_text())
+    concluded = {(c["measure"], c["other"]): c for c in document["conclusion"]}
+    assert {other for _, other in concluded} == {"DBS", "LOW"}
+    p = {key: c["p"] for key, c in concluded.items()}
+    np.testing.assert_allclose([c["p_holm"] for c in concluded.values()], holm([*p.values()]))
+    pair = rigidimeter("compare", study, "--other", "LOW", "--resamples", "200", "--json", out)
+    assert pair.status == 0
+    alone = {c["measure"]: c["p"] for c in json.loads(out.read_text())["conclusion"]}
+    assert alone == {measure: p[measure, "LOW"] for measure in alone}
+    found = analysed(study)
+    assert found.condition_names == ("OFF", "LOW", "DBS")
+    again = rigidimeter("report", study, "--out", tmp_path / "page")
+    assert again.status == 0, again.err
+    page = (tmp_path / "page/report.html").read_text()
+    assert "LOW against OFF" in page
+    assert "DBS against OFF" in page

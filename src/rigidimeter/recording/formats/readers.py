@@ -204,8 +204,8 @@ def reader_of(path: Path) -> Reader:
     known = _any_of(list(dict.fromkeys(s for reader in READERS for s in reader.suffixes)))
     if (path / STUDY_FILE).is_file():
         raise UserError(
-            f"{path} is a study folder: compare its conditions with `rigidimeter compare {path}`, or "
-            "give one of its session folders or recordings"
+            f"{path} is a study folder: compare its conditions with `rigidimeter compare {path}`, "
+            "or give one of its session folders or recordings"
         )
     if path.is_dir():
         raise UserError(
