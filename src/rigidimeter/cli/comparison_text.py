@@ -101,8 +101,8 @@ def _epochs(found: StudyResult) -> Iterator[Block]:
     groups: list[Sequence[str] | str] = []
     for c in found.comparisons:
         groups.append(c.measure.label)
-        names = (*c.pair, *(each.other for each in found.further_pairs))
-        for name in (name for name in names if name in c.summaries):
+        compared = {*c.pair, *(each.other for each in found.further)} & c.summaries.keys()
+        for name in (name for name in found.condition_names if name in compared):
             s = c.summaries[name]
             excluded = f"{c.excluded[name]}" if c.measure.counted == "epochs" else ""
             quartiles = f"{s.q1:.4g} to {s.q3:.4g}"

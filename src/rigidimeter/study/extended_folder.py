@@ -176,7 +176,7 @@ def _described(
 ) -> list[str]:
     """Write `study.toml`, or add to one that is the program's own; return what could not be."""
     path = study / STUDY_FILE
-    names = list(dict.fromkeys(name for name in recorded if name in known))
+    names = [name for name in known if name in recorded]
     title, pair = study.resolve().name, pair_of(names, known)
     conditions: dict[str, ConditionTable] = {}
     own = True

@@ -115,7 +115,8 @@ def _sensitivity(result: StudyResult) -> Iterator[dict[str, Any]]:
 
 def _summaries(result: StudyResult) -> Iterator[dict[str, Any]]:
     for c in result.comparisons:
-        for name, summary in c.summaries.items():
+        for name in (name for name in result.condition_names if name in c.summaries):
+            summary = c.summaries[name]
             if summary.n or c.excluded[name]:
                 counts = {"condition": name, "n": summary.n, "excluded": c.excluded[name]}
                 yield measure_names(c.measure) | counts | asdict(summary)

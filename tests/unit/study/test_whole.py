@@ -25,6 +25,7 @@ from rigidimeter.study import (
     compare_analysis,
     estimate,
     read_study,
+    result_table,
 )
 from rigidimeter.virtual.virtual_session import run_virtual_session
 
@@ -322,7 +323,10 @@ def test_a_third_condition_is_compared_with_the_first_and_p_is_adjusted_for_all(
     alone = {c["measure"]: c["p"] for c in json.loads(out.read_text())["conclusion"]}
     assert alone == {measure: p[measure, "LOW"] for measure in alone}
     found = analysed(study)
-    assert found.condition_names == ("OFF", "LOW", "DBS")
+    rows = [row["condition"] for row in result_table(found, "summaries")]
+    assert rows == ["OFF", "LOW", "DBS"] * 2  # as in study.toml, not as the table or the folders
+    shown = ran.out.partition("Each condition")[2].partition("Wilcoxon")[0]
+    assert [word for word in shown.split() if word in DAYS or word == "LOW"][:3] == rows[:3]
     again = rigidimeter("report", study, "--out", tmp_path / "page")
     assert again.status == 0, again.err
     page = (tmp_path / "page/report.html").read_text()
