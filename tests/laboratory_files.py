@@ -190,6 +190,35 @@ LABORATORY: Mapping[str, Dialect] = {
         csv("t [s],M [Nm],phi [deg]", T, M, np.where(np.arange(T.size) % 50, D + 340.0, 0.0)),
         refused="is too fast for a limb",
     ),
+    "decimated after the rate of the head": Dialect(
+        "r.csv",
+        csv("# Sampling rate: 1000 Hz, decimated by 5 for export\ntorque [Nm],angle [rad]", M,
+            ANGLE_RAD),
+        refused="say --rate-hz",
+    ),
+    "decimated, beside a time": Dialect(
+        "r.csv",
+        csv("# Sampling rate: 1000 Hz\n# downsampled by 5\nt [s],torque [Nm],angle [deg]", T, M, D),
+    ),
+    "decimation 1": Dialect(
+        "r.csv", csv("# Decimation: 1\n# fs = 200 Hz\ntorque [Nm],angle [deg]", M, D)
+    ),
+    "a velocity in degrees, stated as rad/s, beside an angle": Dialect(
+        "r.csv",
+        csv("t [s],M [Nm],phi [rad],omega [rad/s]", T, M, ANGLE_RAD, np.degrees(VELOCITY_RAD_S)),
+    ),
+    "a velocity in rad/s, stated as degrees, beside an angle": Dialect(
+        "r.csv", csv("t [s],M [Nm],phi [rad],omega [deg/s]", T, M, ANGLE_RAD, VELOCITY_RAD_S)
+    ),
+    "a velocity with the other sign beside an angle": Dialect(
+        "r.csv", csv("t [s],M [Nm],phi [rad],omega [rad/s]", T, M, ANGLE_RAD, -VELOCITY_RAD_S),
+        refused="--scale velocity=-1",
+    ),
+    "an angle and a velocity at twice the rate": Dialect(
+        "r.csv",
+        csv("# fs = 400 Hz\nM [Nm],phi [rad],omega [rad/s]", M, ANGLE_RAD, VELOCITY_RAD_S),
+        refused="check both units and the rate",
+    ),
     "velocity alone, reaction": Dialect(
         "r.csv",
         csv("t_ms;Mz_Nm;omega_deg_s", MILLI * T, -M, np.degrees(VELOCITY_RAD_S), mark=";"),

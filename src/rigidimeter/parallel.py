@@ -32,6 +32,7 @@ def each(
     scheduler: str = "",
     in_order: bool = False,
     on_death: Callable[[Item], Result] | None = None,
+    on_lost: Callable[[list[str]], None] = lambda _: None,
 ) -> Generator[tuple[Item, Result], None, None]:
     """Yield every item with its result, as they are done.
 
@@ -51,6 +52,9 @@ def each(
     on_death : callable, optional
         Gives the result of an item that ended its process twice, such as one that needs more memory
         than there is. Without it that raises.
+    on_lost : callable
+        Called at the end with the addresses of the workers that were in the cluster at the
+        beginning and have left it. Others have done what they had begun.
 
     Raises
     ------
@@ -62,7 +66,7 @@ def each(
             yield item, function(item)
         return
     with ExitStack() as stack:
-        new_call, deaths = _workers(jobs, scheduler, in_order, stack)
+        new_call, deaths = _workers(jobs, scheduler, in_order, stack, on_lost)
         waiting = _Given(items)
         ended = False
         while not ended:
@@ -132,7 +136,11 @@ class _Given(Iterator[tuple[int, Item]]):
 
 
 def _workers(
-    jobs: int, scheduler: str, in_order: bool, stack: ExitStack
+    jobs: int,
+    scheduler: str,
+    in_order: bool,
+    stack: ExitStack,
+    on_lost: Callable[[list[str]], None],
 ) -> tuple[Callable[[], Any], tuple[type[BaseException], ...]]:
     """Return what makes a call that runs tasks, and the exceptions that say that a process ended.
 
@@ -143,6 +151,8 @@ def _workers(
     deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
     if scheduler:
         client, killed = _client(scheduler, stack)
+        begun_with = list(client.scheduler_info(n_workers=-1)["workers"])
+        stack.callback(_lost, client, begun_with, on_lost)
         deaths = (killed,)
         stack.enter_context(parallel_config(backend="dask", client=client))
     else:
@@ -155,6 +165,12 @@ def _workers(
         pre_dispatch=f"{_AHEAD} * n_jobs",
     )
     return new_call, deaths
+
+
+def _lost(client: Any, before: list[str], on_lost: Callable[[list[str]], None]) -> None:
+    now = client.scheduler_info(n_workers=-1)["workers"]
+    if gone := [address for address in before if address not in now]:
+        on_lost(gone)
 
 
 def _client(scheduler: str, stack: ExitStack) -> tuple[Any, type[BaseException]]:

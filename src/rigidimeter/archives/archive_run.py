@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -43,6 +44,8 @@ class BatchResult:
         Inputs that had been estimated before, with the same content, settings and version.
     failed : tuple of str
         Why inputs, or parts of them, gave nothing: one sentence each.
+    lost_workers : tuple of str
+        Addresses of workers that left the cluster before the end.
     """
 
     path: Path
@@ -50,6 +53,7 @@ class BatchResult:
     epochs: int
     before: int
     failed: tuple[str, ...]
+    lost_workers: tuple[str, ...] = ()
 
     def table(self) -> pd.DataFrame:
         """Return the rows as a pandas table."""
@@ -118,18 +122,17 @@ def batch(
     how = _how(method, condition, settings, changes or {}, reading)
     beside = place.with_name(f"{place.name}.parts")
     named = [inputs] if isinstance(inputs, str | Path) else inputs
-    if scheduler:  # its workers have other working directories
-        named = [Path(one).absolute() for one in named]
     listed = [*inputs_of(named, (place, beside))]
     if not listed:
         raise UserError("no input is named")
     with Parts(beside) as parts:
         _take_over(place, parts)
         work = _Work(listed, how, parts)
+        lost: list[str] = []
         for _ in range(2):  # again for a copy of an input that failed under another name
-            run = partial(_answered, how=how)
+            run = partial(_answered, how=how, folder=Path.cwd() if scheduler else None)
             for task, rows in each(run, work.left(), jobs=jobs, scheduler=scheduler,
-                                   on_death=_dead):  # fmt: skip
+                                   on_death=_dead, on_lost=lost.extend):  # fmt: skip
                 work.done(task, rows)
                 progress(work.share)
         try:
@@ -139,7 +142,9 @@ def batch(
                 f"{error}; give the command again, which goes on from {beside}"
             ) from None
         parts.remove()
-    return BatchResult(place, len(listed), work.epochs, work.before, tuple(work.reasons))
+    return BatchResult(
+        place, len(listed), work.epochs, work.before, tuple(work.reasons), tuple(lost)
+    )
 
 
 def _how(
@@ -166,8 +171,25 @@ class _Task(NamedTuple):
     digest: str
 
 
-def _answered(task: _Task, how: How) -> list[Row]:
-    return answer(task.input, task.digest, how)
+def _answered(task: _Task, how: How, folder: Path | None) -> list[Row]:
+    """Return the rows of an input; `folder` is what its path starts from, where that is not here.
+
+    Rows name the input as it was given.
+    """
+    one = task.input
+    if folder is None or one.path.is_absolute():
+        return answer(one, task.digest, how)
+    study = one.study
+    if study is not None:
+        read = replace(study.folder, folder=folder / study.folder.folder)
+        study = replace(study, folder=read)
+    rows = answer(replace(one, path=folder / one.path, study=study), task.digest, how)
+    start = f"{folder}{os.sep}"
+    return [
+        {name: cell.replace(start, "") if isinstance(cell, str) else cell
+         for name, cell in row.items()}
+        for row in rows
+    ]  # fmt: skip
 
 
 def _dead(task: _Task) -> list[Row]:

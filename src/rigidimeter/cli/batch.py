@@ -75,6 +75,12 @@ def batch(
         echo(f"error: {reason}", err=True)
     if len(done.failed) > _SHOWN:
         echo(f"error: {len(done.failed) - _SHOWN} more, each a row of {out}", err=True)
+    if done.lost_workers:
+        echo(
+            f"warning: left the cluster before the end: {', '.join(done.lost_workers)}; others "
+            "have estimated what was begun there",
+            err=True,
+        )
     before = f", {done.before} of them estimated before" if done.before else ""
     echo(f"{out}: {done.epochs} epochs of {done.inputs} inputs{before}")
     raise typer.Exit(int(bool(done.failed)))

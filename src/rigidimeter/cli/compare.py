@@ -40,7 +40,13 @@ def compare(
         ),
     ] = None,
     other: Annotated[
-        str | None, typer.Option("--other", metavar="NAME", help="The second condition.")
+        str | None,
+        typer.Option(
+            "--other",
+            metavar="NAME",
+            help="The second condition. Default: the next one, and each further one is compared "
+            "with the first, too.",
+        ),
     ] = None,
     json_out: JsonOption = None,
     csv_out: CsvOption = None,
@@ -73,7 +79,7 @@ def compare(
     ] = 9999,
     key: KeyOption = None,
 ) -> None:
-    """Compare two conditions in J, B, K, angular impulse and work, or in columns of a table.
+    """Compare conditions in J, B, K, angular impulse and work, or in columns of a table.
 
     Median and quartiles, the two-sided Wilcoxon rank-sum test (asymptotic, ties and continuity
     corrected), effect size r = z/√N, and the Hodges-Lehmann shift with its 95 % interval. Effect

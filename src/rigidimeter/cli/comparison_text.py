@@ -39,7 +39,8 @@ def comparison_blocks(found: StudyResult) -> Iterator[Block]:
         codes = ", ".join(condition.name for condition in found.conditions)
         yield ""
         yield f"Blinded: the conditions are the codes {codes}; give the key with --key."
-    yield from _days(found)
+    for pair in (found, *found.further_pairs):
+        yield from _days(pair)
     yield from _effects(found)
     if found.ratings is not None:
         yield from _ratings(found.ratings)
@@ -54,8 +55,6 @@ def _first_screen(found: StudyResult) -> Iterator[Block]:
         LIGHTS,
         gravest_words,
         light_words,
-        strip,
-        tested_words,
     )
     from rigidimeter.study import traffic_light
 
@@ -63,6 +62,13 @@ def _first_screen(found: StudyResult) -> Iterator[Block]:
     if light is not None:
         words = f"Data quality: {LIGHTS[light.level][1]}. {light_words(light)} "
         yield words + gravest_words(light)
+    for pair in (found, *found.further_pairs):
+        yield from _in_short(pair)
+
+
+def _in_short(found: StudyResult) -> Iterator[Block]:
+    from rigidimeter.reporting.first_screen import strip, tested_words
+
     rows = strip(found)
     if not rows:
         return
@@ -90,21 +96,27 @@ def _first_screen(found: StudyResult) -> Iterator[Block]:
 
 def _epochs(found: StudyResult) -> Iterator[Block]:
     """Yield each condition in each measure, and the rank-sum tests."""
-    from rigidimeter.study import TEST
-
     if found.source:
         yield f"{found.source} by {found.by}: {found.reference} − {found.other}"
     groups: list[Sequence[str] | str] = []
     for c in found.comparisons:
         groups.append(c.measure.label)
-        for name in c.pair:
+        compared = {*c.pair, *(each.other for each in found.further)} & c.summaries.keys()
+        for name in (name for name in found.condition_names if name in compared):
             s = c.summaries[name]
             excluded = f"{c.excluded[name]}" if c.measure.counted == "epochs" else ""
             quartiles = f"{s.q1:.4g} to {s.q3:.4g}"
             groups.append((name, f"{s.n}", excluded, f"{s.median:.4g}", quartiles))
     yield Heading("Each condition")
     yield Table(("condition", "n", "excluded", "median", "quartiles"), groups, "<>>>=")
-    yield ""
+    for pair in (found, *found.further_pairs):
+        yield ""
+        yield from _rank_tests(pair)
+
+
+def _rank_tests(found: StudyResult) -> Iterator[Block]:
+    from rigidimeter.study import TEST
+
     tested = [(c, c.test) for c in found.comparisons if c.test is not None]
     if tested:
         yield Heading(f"{found.reference} − {found.other}, {TEST}")
@@ -134,7 +146,8 @@ def _days(found: StudyResult) -> Iterator[Block]:
     if not tested:
         return
     yield ""
-    yield Heading(f"{found.reference} − {found.other}: days, not epochs")
+    units = " and ".join(dict.fromkeys(f"{d.unit}s" for _, d in tested))
+    yield Heading(f"{found.reference} − {found.other}: {units}, not epochs")
     rows: list[Sequence[str] | str] = []
     for c, d in tested:
         rows.append(c.measure.label)
@@ -167,9 +180,8 @@ def _effects(found: StudyResult) -> Iterator[Block]:
     sized = [(c.measure, c.effects) for c in found.comparisons if c.effects is not None]
     if not sized:
         return
-    resampled = "whole days" if found.sessions else "sessions or single values"
     yield ""
-    yield Heading(f"Effect sizes, 95 % intervals by resampling {resampled}")
+    yield Heading(f"Effect sizes, 95 % intervals by resampling {found.resampled}")
     effects = [
         (
             measure.title,

@@ -77,7 +77,7 @@ def estimate_blocks(result: StudyResult) -> list[Block]:
 
     parts: list[Sequence[Block]] = [[Heading(verdict(result).lead)]]
     parts += [part(result.analysis) for part in (_method, _delays, _fits, _fixed_inertia)]
-    parts.append(_together(result) or _pooled(result.analysis))
+    parts.append(_together(result) or _pooled(result))
     parts += [_findings(result.analysis), _scores(result.analysis)]
     return [block for part in parts if part for block in (*part, "")][:-1]
 
@@ -149,9 +149,12 @@ def _fixed_inertia(analysis: Analysis) -> list[Block]:
     ]
 
 
-def _pooled(analysis: Analysis) -> list[Block]:
+def _pooled(result: StudyResult) -> list[Block]:
     from rigidimeter.records import PARAMETERS
+    from rigidimeter.study import split_pooled
 
+    of_each, overall = split_pooled(result.analysis)
+    fits = [of_each[name] for name in result.condition_names if name in of_each]
     rows = [
         (
             "" if i else fit.condition or "all",
@@ -160,7 +163,7 @@ def _pooled(analysis: Analysis) -> list[Block]:
             "" if math.isnan(fit.low[i]) else f"[{fit.low[i]:.5g}, {fit.high[i]:.5g}]",
             parameter.unit,
         )
-        for fit in analysis.pooled
+        for fit in (*fits, *([] if overall is None else [overall]))
         for i, parameter in enumerate(PARAMETERS)
     ]
     headings = ("condition", "", "estimate", "95 % interval", "unit")

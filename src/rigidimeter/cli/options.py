@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +13,18 @@ from typer.core import TyperArgument, TyperCommand, TyperOption
 
 class RegistryCommand(TyperCommand):
     """A command whose help lists formats, estimators and terms, those of `--load` too."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Refuse a TOML file without `--settings` where nothing but options is taken."""
+        options = [each for each in self.params if isinstance(each, TyperOption)]
+        with_value = {name for each in options if not each.is_flag for name in each.opts}
+        if len(options) == len(self.params) and "--settings" in with_value:
+            for before, word in pairwise(["", *args]):
+                if word.endswith(".toml") and word[0] != "-" and before not in with_value:
+                    raise typer.BadParameter(
+                        f"{word}: if it holds settings, say --settings {shlex.quote(word)}", ctx
+                    )
+        return super().parse_args(ctx, args)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Fill in what there is to choose from; only here, because it imports all of it."""

@@ -12,6 +12,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, show
+from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.study import RatingsFound
@@ -79,10 +80,18 @@ def ratings(
     """
     from rigidimeter.documents import write_json
     from rigidimeter.recording.formats import read_text_table
+    from rigidimeter.recording.study_folder import is_study
+    from rigidimeter.recording.study_tables import table_path
     from rigidimeter.records import Notice
     from rigidimeter.study.ratings_found import ratings_document
     from rigidimeter.study.ratings_model import model_ratings
 
+    if is_study(table):
+        path = table_path(table, "ratings")
+        raise UserError(
+            f"{table} is a study folder: `rigidimeter compare {table}` models its ratings with the "
+            f"rest; for the ratings alone give their table, {path}"
+        )
     keep_inputs((json_out,), (table,))
     columns = {
         "condition": condition,

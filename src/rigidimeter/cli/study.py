@@ -70,8 +70,9 @@ def add(
 ) -> None:
     """Add recorded sessions to a study folder: subject, day, conditions, stimulation, ratings.
 
-    `console` does so after each session. What was written or changed by hand stays as it is; a
-    session whose row is made a comment (#) is not added again.
+    `console` does so after each session. What was written or changed by hand stays as it is: a
+    study.toml that was edited must have the conditions of a session, and a session whose row is
+    made a comment (#) is not added again.
 
     \b
     For example:
@@ -81,10 +82,12 @@ def add(
     """
     from rigidimeter.study.extended_folder import extend_study
 
-    for line in extend_study(folder, sessions or None, subject=subject) or [
-        f"{folder}: nothing is new"
-    ]:
+    refused: list[str] = []
+    said = extend_study(folder, sessions or None, subject=subject, refused=refused)
+    for line in said or ([] if refused else [f"{folder}: nothing is new"]):
         echo(line)
+    if refused:
+        raise UserError(*refused)
 
 
 @study.command()

@@ -83,8 +83,8 @@ def tested_words(result: StudyResult) -> str:
     if concluded is None:
         return ""
     centres = {one.difference.centre for one in concluded.each}
-    what = "medians" if centres == {"median"} else f"means of {concluded.basis}"
-    text = f"{what}; p and intervals by the test of {concluded.basis}"
+    what = "medians" if centres == {"median"} else f"means of {concluded.units}"
+    text = f"{what}; p and intervals by the test of {concluded.units}"
     if concluded.tested > 1:
         text += " for each measure alone; the conclusion follows p in brackets, adjusted for all"
     return text

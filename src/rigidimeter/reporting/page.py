@@ -167,8 +167,11 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
         script=Markup(script),
         script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii"),
         verdict=verdict(result),
-        strip=first_screen.strip(result),
-        tested=first_screen.tested_words(result),
+        strips=[
+            (pair, first_screen.tested_words(pair), rows)
+            for pair in (result, *result.further_pairs)
+            if (rows := first_screen.strip(pair))
+        ],
         precision=first_screen.precision_tables(result),
         light=light,
         screen=first_screen,

@@ -100,7 +100,7 @@ def _effects(result: StudyResult, cite: Cited) -> list[str]:
         return []
     how = []
     if "BCa" in methods:
-        how.append(f"BCa bootstrap intervals that resample whole days {cite('bca')}")
+        how.append(f"BCa bootstrap intervals that resample {result.resampled} {cite('bca')}")
     if "Newcombe" in methods:
         which = "where the conditions do not overlap, " if "BCa" in methods else ""
         how.append(f"{which}Newcombe’s intervals {cite('newcombe')}")

@@ -12,6 +12,7 @@ from rigidimeter.reporting.numbers import (
     interval,
     number,
     p_value,
+    plural,
     series,
     within,
 )
@@ -59,13 +60,28 @@ def verdict(result: StudyResult) -> Verdict:
         lead, *rest = [_only_condition(result)]
     else:
         lead, *rest = _sentences(result, concluded)
+        for pair in result.further_pairs:
+            further = conclude(pair)
+            rest += [] if further is None else _sentences(pair, further)
+        rest += _tested(concluded)
         if concluded.of("lower", "higher"):
             rest += _largest(result)
+    lead += _left_out(result)
     return Verdict(prefix + lead, (*rest, *doubt_sentence(result.analysis)))
 
 
+def _left_out(result: StudyResult) -> str:
+    """Return how many sessions of a study do not count; nothing where all do."""
+    paths = {out.path for out in result.left_out}
+    if not paths:
+        return ""
+    total = len(paths | {session.source for session in result.sessions})
+    are = "is" if len(paths) == 1 else "are"
+    return f" {len(paths)} of {plural(total, 'session')} {are} left out."
+
+
 def _sentences(result: StudyResult, concluded: Conclusions) -> list[str]:
-    """Return a sentence for each kind of verdict, the most important first, and the test."""
+    """Return a sentence for each kind of verdict, the most important first."""
     reference, other = condition_name(result.reference), condition_name(result.other)
     shown = [
         f"{other} is {side} than {reference} in {series(_with_size(own))}"
@@ -87,11 +103,17 @@ def _sentences(result: StudyResult, concluded: Conclusions) -> list[str]:
             f"No difference between {reference} and {other} is shown in {titles} ({p}"
             f"{f'; {reason}' if reason else ''})."
         )
-    found += _withheld(concluded, "cannot be decided")
-    if concluded.tested:
-        adjusted = f"; p adjusted by Holm’s method for {concluded.tested} measures"
-        found.append(f"Tested by {concluded.basis}{adjusted if concluded.tested > 1 else ''}.")
-    return found
+    return found + _withheld(concluded, "cannot be decided")
+
+
+def _tested(concluded: Conclusions) -> list[str]:
+    """Return what was compared in the tests, and for how many of them p is adjusted."""
+    count = concluded.adjusted_for
+    if not count:
+        return []
+    what = "measures" if count == concluded.tested else "tests"
+    adjusted = f"; p adjusted by Holm’s method for {count} {what}" if count > 1 else ""
+    return [f"Tested by {concluded.units}{adjusted}."]
 
 
 def _withheld(

@@ -29,7 +29,10 @@ FEWEST_SUBJECTS = 3
 
 
 class Tested(NamedTuple):
-    """A difference of two means with its standard error and degrees of freedom, and the test."""
+    """A difference of two means with its standard error and degrees of freedom, and the test.
+
+    `unit` is what was compared: ``day`` or ``subject``.
+    """
 
     estimate: float
     se: float
@@ -37,6 +40,7 @@ class Tested(NamedTuple):
     words: str
     mean_x: float
     mean_y: float
+    unit: str = "day"
 
 
 def test_by_levels(epochs: Epochs, names: tuple[str, str]) -> Tested:
@@ -135,7 +139,7 @@ def _of_units(
             f"the means of the {unit}s do not vary, so there is no error to test against"
         ) from None
     words = _in_words(found, int(both.sum()), unit, names)
-    return Tested(found.estimate, found.se, found.df, words, found.mean_x, found.mean_y)
+    return Tested(found.estimate, found.se, found.df, words, found.mean_x, found.mean_y, unit)
 
 
 def _in_words(found: PartiallyPaired, both: int, unit: str, names: tuple[str, str]) -> str:

@@ -57,6 +57,8 @@ class DayDifference:
         The test in words, without its degrees of freedom; empty where there is none.
     mean_x, mean_y : float
         The means that `estimate` is the difference of.
+    unit : str
+        What was compared: ``day``, or ``subject`` where there were enough.
     """
 
     estimate: float = math.nan
@@ -76,6 +78,7 @@ class DayDifference:
     test: str = ""
     mean_x: float = math.nan
     mean_y: float = math.nan
+    unit: str = "day"
 
     @property
     def few(self) -> str:
@@ -85,7 +88,7 @@ class DayDifference:
         errors = float(t_distribution.isf((1 - self.confidence) / 2, self.df))
         return (
             f"with {_degrees(self.df)} only a difference above {errors:.3g} "
-            "standard errors is shown; more days would show smaller ones"
+            f"standard errors is shown; more {self.unit}s would show smaller ones"
         )
 
 
@@ -176,6 +179,7 @@ def day_difference(
         test=tested.words,
         mean_x=tested.mean_x,
         mean_y=tested.mean_y,
+        unit=tested.unit,
     )
 
 

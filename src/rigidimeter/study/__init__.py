@@ -7,7 +7,7 @@ installed.
 from rigidimeter.study.analysis import Preparation, estimate, task_of
 from rigidimeter.study.archive import UNCHANGED, keep
 from rigidimeter.study.compare_input import compare
-from rigidimeter.study.compared import TEST, Comparison, DayMedian
+from rigidimeter.study.compared import TEST, Comparison, DayMedian, comparison_rows
 from rigidimeter.study.comparison import (
     compare_analysis,
     compare_measures,

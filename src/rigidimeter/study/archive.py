@@ -179,16 +179,18 @@ def _numbers(document: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]
     """Yield what a reader would look at, by the name of the test."""
     try:
         for c in document["comparisons"]:
+            name = c["measure"]
+            if c.get("other", document["other"]) != document["other"]:  # of a further condition
+                name += f", {c['reference']} − {c['other']}"
             if c["measure"] != RATING.name:  # an older document tests the corrected scores apart
-                row = {f"n {name}": group["n"] for name, group in c["groups"].items()}
-                row |= {f"median {name}": group["median"] for name, group in c["groups"].items()}
-                yield c["measure"], row | {name: c.get(name) for name in _COMPARED}
+                row = {f"n {one}": group["n"] for one, group in c["groups"].items()}
+                row |= {f"median {one}": group["median"] for one, group in c["groups"].items()}
+                yield name, row | {key: c.get(key) for key in _COMPARED}
                 if c["days"] is not None:
-                    days = {name: c["days"][name] for name in _BY_DAYS}
-                    yield f"{c['measure']} by days", days
+                    yield f"{name} by days", {key: c["days"][key] for key in _BY_DAYS}
             if c.get("rank_biserial") is not None:
-                sizes = {name: c[name] for name in _SIZES}
-                yield f"{c['measure']}, effect size", sizes | {"p by Holm": c["p_holm"]}
+                sizes = {key: c[key] for key in _SIZES}
+                yield f"{name}, effect size", sizes | {"p by Holm": c["p_holm"]}
         for d in document["effect_differences"]:
             row = {name: d[name] for name in ("estimate", "low", "high", "p")}
             yield f"{d['first']} − {d['second']}, difference of effect sizes", row

@@ -17,7 +17,13 @@ from rigidimeter.recording.study_folder import is_study
 from rigidimeter.records import Analysis, Notice
 from rigidimeter.settings import Settings, settings_from
 from rigidimeter.study.compared import Comparison
-from rigidimeter.study.comparison import compare_analysis, compare_measures, measured
+from rigidimeter.study.comparison import (
+    against_reference,
+    compare_analysis,
+    compare_measures,
+    measured,
+    with_further,
+)
 from rigidimeter.study.measures import Measure, Observation, chosen_pair, conditions, off_first
 from rigidimeter.study.results import StudyResult
 from rigidimeter.study.study_analysis import analyse_study, read_study
@@ -53,7 +59,8 @@ def compare(
         file of them; or a table, or the CSV file of one, with `value` and `by`.
     other, reference : str, optional
         The two conditions; differences are reference − other. Where not given, those of the study,
-        or the only two, ``OFF`` first.
+        or the first two, ``OFF`` first. Without `other` each further condition is compared with the
+        reference, too.
     value : str or sequence of str, optional
         Columns of the table to compare.
     by : str
@@ -109,8 +116,16 @@ def compare(
             "what estimate returns, for a table also value=, the columns to compare"
         )
     analysis = x if isinstance(x, Analysis) else read_estimates(Path(x))
-    pair = chosen_pair(conditions(analysis), wanted)
-    return compare_analysis(analysis, *pair, seed=seed, resamples=resamples, progress=progress)
+    known = conditions(analysis)
+    pair = chosen_pair(known, wanted)
+    return compare_analysis(
+        analysis,
+        *pair,
+        seed=seed,
+        resamples=resamples,
+        further=() if other is not None else [name for name in known if name not in pair],
+        progress=progress,
+    )
 
 
 def _names(value: str | Sequence[str] | None) -> list[str]:
@@ -154,7 +169,8 @@ def _compare_columns(
     by : str
         The column that names the group.
     pair : tuple of str or None
-        Reference and other group; the first two where not given, ``OFF`` first where it occurs.
+        Reference and other group; the first two where not given, ``OFF`` first where it occurs, and
+        without the other each further group with the reference.
     session : str, optional
         A column whose labels are resampled as units; else each row is one.
     seed, resamples : int
@@ -177,7 +193,8 @@ def _compare_columns(
         holder=f"column {by} of {table.source} has",
         remedy="name another column with --by",
     )
-    rows, notices = _kept(table, labels, names, by)
+    further = [name for name in known if name not in names] if pair[1] is None else []
+    rows, notices = _kept(table, labels, [*names, *further], by)
     comparisons = []
     for name in dict.fromkeys(values):
         one, said = _column(table, name, labels, units, names, rows)
@@ -186,7 +203,8 @@ def _compare_columns(
     tested, differences = compare_measures(
         comparisons, seed=seed, resamples=resamples, progress=progress
     )
-    for each in tested:
+    tested, more = with_further(tested, against_reference(tested, further))
+    for each in (*tested, *more):
         notices += _cautions(table.source, each, units is not None)
     return StudyResult(
         "",
@@ -198,6 +216,7 @@ def _compare_columns(
         resamples,
         source=table.source,
         by=by,
+        further=more,
     )
 
 

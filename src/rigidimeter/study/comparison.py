@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -45,13 +45,14 @@ def compare_analysis(
     seed: int = 1,
     resamples: int = 9999,
     title: str = "",
+    further: Sequence[str] = (),
     progress: Progress = lambda _: None,
 ) -> StudyResult:
     """Compare two conditions of an analysis in J, B, K, impulse and work.
 
     B and K are those with the inertia held. Every epoch counts as one observation. Without names
-    the first two conditions that `conditions` gives are compared; an analysis with one condition
-    gives its summaries and no test.
+    the first condition that `conditions` gives is compared with each other one; an analysis with
+    one condition gives its summaries and no test.
 
     Parameters
     ----------
@@ -60,6 +61,8 @@ def compare_analysis(
     seed, resamples : int
         Of the bootstrap; with 0 resamples there are no effect sizes with intervals.
     title : str
+    further : sequence of str
+        Conditions that are compared with the reference, too, where both names are given.
     progress : callable
         Called with the share of the work that was done since, 1 in all.
     """
@@ -70,8 +73,19 @@ def compare_analysis(
     comparisons, differences = compare_measures(
         comparisons, seed=seed, resamples=resamples, progress=progress
     )
+    others = further if other is not None else [n for n in names if n not in (first, second)]
+    comparisons, more = with_further(comparisons, against_reference(comparisons, others))
     return StudyResult(
-        title, first, second, comparisons, differences, (), seed, resamples, analysis=analysis
+        title,
+        first,
+        second,
+        comparisons,
+        differences,
+        (),
+        seed,
+        resamples,
+        analysis=analysis,
+        further=more,
     )
 
 
@@ -204,6 +218,30 @@ def compare_measures(
     )
 
 
+def against_reference(
+    comparisons: Sequence[Comparison], others: Iterable[str]
+) -> tuple[Comparison, ...]:
+    """Return the comparisons of other conditions with the reference, not yet tested."""
+    return tuple(
+        replace(each, other=other, test=None, effects=None, remark="", p_holm=math.nan)
+        for other in others
+        for each in comparisons
+        if other in each.summaries
+    )
+
+
+def with_further(
+    comparisons: Sequence[Comparison], further: Sequence[Comparison]
+) -> tuple[tuple[Comparison, ...], tuple[Comparison, ...]]:
+    """Test further comparisons by ranks, and adjust p of all of them together."""
+    if not further:
+        return tuple(comparisons), ()
+    every = (*comparisons, *map(rank_test, further))
+    adjusted = holm([each.test.p if each.test else math.nan for each in every])
+    every = tuple(replace(each, p_holm=p) for each, p in zip(every, adjusted, strict=True))
+    return every[: len(comparisons)], every[len(comparisons) :]
+
+
 def rank_test(comparison: Comparison) -> Comparison:
     """Return the comparison with its rank-sum test, or why there is none."""
     if not comparison.other:
@@ -224,10 +262,15 @@ def day_tests(
 ) -> tuple[Comparison, ...]:
     """Return paired comparisons with their tests by days, adjusted for all of them, and medians.
 
-    `ready` holds tests that were made elsewhere, by measure: that of the ratings.
+    `ready` holds tests that were made elsewhere, by measure: that of the ratings. A comparison that
+    has its test keeps it.
     """
     ready = ready or {}
-    found = [ready.get(each.measure.name) or day_test(each) for each in comparisons if each.paired]
+    found = [
+        each.days or ready.get(each.measure.name) or day_test(each)
+        for each in comparisons
+        if each.paired
+    ]
     adjusted = iter(zip(found, holm([each.p for each in found]), strict=True))
     done = []
     for each in comparisons:

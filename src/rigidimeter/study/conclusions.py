@@ -47,14 +47,22 @@ class Conclusion:
 
 @dataclass(frozen=True)
 class Conclusions:
-    """The conclusions on all measures, what was tested, and how many measures it was."""
+    """The conclusions on all measures, what was tested, and how many tests p is adjusted for."""
 
     basis: Basis
     each: tuple[Conclusion, ...]
+    adjusted_for: int = 0
 
     def of(self, *verdicts: Verdict) -> tuple[Conclusion, ...]:
         """Return those with one of these verdicts."""
         return tuple(one for one in self.each if one.verdict in verdicts)
+
+    @property
+    def units(self) -> str:
+        """What the tests compared: days, subjects, recordings or values."""
+        tests = (one.comparison.days for one in self.each if not math.isnan(one.p))
+        units = [f"{test.unit}s" for test in tests if test is not None]
+        return " and ".join(dict.fromkeys(units)) if self.basis == "days" and units else self.basis
 
     @property
     def tested(self) -> int:
@@ -69,8 +77,10 @@ def conclude(result: StudyResult) -> Conclusions | None:
         return None
     basis = basis_of(compared)
     tests = [tested(c, basis) for c in compared]
-    adjusted = holm([test.p for test in tests])
-    with_p = len([test for test in tests if not math.isnan(test.p)])
+    # Of each other condition with the reference: p is adjusted for these as well.
+    p_further = [tested(c, basis).p for c in result.further if c.paired]
+    adjusted = holm([*(test.p for test in tests), *p_further])[: len(tests)]
+    with_p = sum(not math.isnan(p) for p in (*(test.p for test in tests), *p_further))
     moved = next(
         (
             test.comparison
@@ -98,14 +108,12 @@ def conclude(result: StudyResult) -> Conclusions | None:
             few = c.days.few if c.days is not None and basis == "days" else ""
             verdict, reason = "no difference shown", hidden(c, result) or few
         found.append(Conclusion(c, verdict, test.difference, p, reason))
-    return Conclusions(basis, tuple(sorted(found, key=lambda one: one.comparison.measure.place)))
+    ordered = tuple(sorted(found, key=lambda one: one.comparison.measure.place))
+    return Conclusions(basis, ordered, with_p)
 
 
 def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
     """Return the conclusions as rows of a document."""
-    concluded = conclude(result)
-    if concluded is None:
-        return []
     return [
         {
             **measure_names(one.comparison.measure),
@@ -117,5 +125,7 @@ def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
             "tested_by": concluded.basis,
             "reason": one.reason,
         }
+        for concluded in map(conclude, (result, *result.further_pairs))
+        if concluded is not None
         for one in concluded.each
     ]

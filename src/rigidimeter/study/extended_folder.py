@@ -7,7 +7,7 @@ edited stays as it is.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,7 +34,7 @@ from rigidimeter.study.recorded_sessions import (
     session_rows,
     stimulated,
 )
-from rigidimeter.study.study_text import is_own, own_text, pair_of, study_text
+from rigidimeter.study.study_text import is_own, own_text, pair_of, study_text, toml_key
 
 
 def extend_study(
@@ -43,6 +43,7 @@ def extend_study(
     *,
     subject: str = "",
     known: Sequence[str] | None = None,
+    refused: list[str] | None = None,
 ) -> list[str]:
     """Add recorded sessions to a study folder, which is made if it is none yet.
 
@@ -57,6 +58,9 @@ def extend_study(
         Of sessions that do not say theirs.
     known : sequence of str, optional
         Names of conditions; any other may be a code. Those of the session's settings by default.
+    refused : list of str, optional
+        Takes the sentences about sessions of a condition that an edited `study.toml` does not know;
+        by default they are among those that are returned.
 
     Returns
     -------
@@ -83,7 +87,8 @@ def extend_study(
                 f"{folder}: lies outside the study folder {study}; copy or link it there to add it"
             )
             continue
-        said += _added(study, table, Path(path), subject, known, asked=asked)
+        kept_out = said if refused is None else refused
+        said += _added(study, table, Path(path), subject, known, kept_out, asked=asked)
     return said
 
 
@@ -102,6 +107,7 @@ def _added(
     path: Path,
     subject: str,
     known: Sequence[str] | None,
+    refused: list[str],
     *,
     asked: bool,
 ) -> list[str]:
@@ -127,6 +133,16 @@ def _added(
         ]
     recorded = [*(row["condition"] for row in before), *session.conditions]
     names = list(manifest["settings"]["subject"]) if known is None else list(known)
+    if is_study(study) and not is_own(read_bytes(study / STUDY_FILE, DOCUMENT_BYTES)):
+        about = read_study_toml(study / STUDY_FILE)
+        defined = about.conditions or (about.reference, about.other)
+        new = [name for name in _new(study, recorded, defined) if name in session.conditions]
+        if new:
+            refused.append(
+                f"{path}: is not in the study, for {study / STUDY_FILE} lacks its condition "
+                f"{new[0]}: write [conditions.{toml_key(new[0])}] there and add the session again"
+            )
+            return []
     said = _described(study, session, recorded, names)
     ratings = table_path(study, "ratings")
     # The row of the session comes last: what was interrupted before is done again.
@@ -144,12 +160,23 @@ def _virtual(folder: Path) -> bool | None:
         return None
 
 
+def _new(study: Path, recorded: Sequence[str], defined: Collection[str]) -> list[str]:
+    """Return the recorded conditions that a study does not know; not its codes.
+
+    Where it knows none of them, all are codes, and the study is analysed blinded.
+    """
+    codes = {row["code"] for row in table_rows(table_path(study, "key"), "key")}
+    if not codes and set(recorded).isdisjoint(defined):
+        return []
+    return [name for name in dict.fromkeys(recorded) if name not in defined and name not in codes]
+
+
 def _described(
     study: Path, session: RecordedSession, recorded: Sequence[str], known: list[str]
 ) -> list[str]:
     """Write `study.toml`, or add to one that is the program's own; return what could not be."""
     path = study / STUDY_FILE
-    names = list(dict.fromkeys(name for name in recorded if name in known))
+    names = [name for name in known if name in recorded]
     title, pair = study.resolve().name, pair_of(names, known)
     conditions: dict[str, ConditionTable] = {}
     own = True
@@ -159,6 +186,7 @@ def _described(
         pair = pair if own else (about.reference, about.other)
     for name in (*pair, *names):
         conditions.setdefault(name, ConditionTable())
+    conditions |= {name: ConditionTable() for name in _new(study, recorded, conditions)}
     said = []
     for name in stimulated(session, pair[0]):
         if name not in conditions:  # a code; whose stimulation it was would tell

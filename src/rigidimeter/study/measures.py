@@ -128,7 +128,7 @@ def chosen_pair(
     Raises
     ------
     UserError
-        If a name is unknown, both are one, or it is not clear which two are meant.
+        If a name is unknown, both are one, or there are not two.
     """
     listed = ", ".join(known[:_SHOWN]) + (", ..." if len(known) > _SHOWN else "")
     for option, name in zip(("--reference", "--other"), wanted, strict=True):
@@ -141,9 +141,5 @@ def chosen_pair(
         raise UserError(f"--reference and --other are both {first}; name two conditions")
     if len(known) < 2:
         raise UserError(f"a comparison needs two conditions; {holder} {listed or 'none'}; {remedy}")
-    if len(known) > 2 and None in wanted:
-        raise UserError(
-            f"choose two of {len(known)} conditions with --reference and --other; {holder} {listed}"
-        )
     first = first or next(name for name in known if name != second)
     return first, second or next(name for name in known if name != first)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from typing import TYPE_CHECKING, Literal
 
@@ -134,6 +134,9 @@ class StudyResult:
         The conditions that are compared; `other` is empty where there is only one.
     comparisons : tuple of Comparison
         One for each measure; the ratings of a study are the last.
+    further : tuple of Comparison
+        Those of each other condition with the reference, where no two were chosen; p is adjusted
+        for these and `comparisons` together.
     differences : tuple of EffectPair
     notices : tuple of Notice
     seed, resamples : int
@@ -180,21 +183,47 @@ class StudyResult:
     left_out: tuple[LeftOut, ...] = ()
     changes: tuple[str, ...] = ()
     own_rig: bool = False
+    further: tuple[Comparison, ...] = ()
+
+    @property
+    def further_pairs(self) -> tuple[StudyResult, ...]:
+        """The same result with each further condition in the place of `other`."""
+        every = (*self.comparisons, *self.further)
+        return tuple(
+            replace(
+                self,
+                other=other,
+                comparisons=tuple(c for c in self.further if c.other == other),
+                further=tuple(c for c in every if c.other != other),
+                ratings=None if self.ratings is None else replace(self.ratings, other=other),
+            )
+            for other in dict.fromkeys(c.other for c in self.further)
+        )
 
     @property
     def condition_names(self) -> tuple[str, ...]:
-        """All conditions in one order: as compared, then as recorded."""
+        """All conditions in the order of the study or the protocol, then as recorded."""
         compared = [name for name in (self.reference, self.other) if name]
         found = self.analysis
         results: tuple[Fit | Score, ...] = (*found.fits, *found.fixed_inertia, *found.scores)
         recorded = [each.condition for each in (*self.epochs, *results)]
         tabled = [name for each in self.comparisons for name in each.summaries]
-        return tuple(dict.fromkeys([*compared, *recorded, *tabled]))
+        order = [each.name for each in self.conditions]
+        order = order or [block.condition for block in self.settings.protocol.blocks]
+        found_in = dict.fromkeys([*compared, *recorded, *tabled])
+        return tuple(sorted(found_in, key=lambda n: order.index(n) if n in order else len(order)))
 
     @property
     def several_subjects(self) -> bool:
         """Whether J was held at each subject's own median, for there are several subjects."""
         return len({session.subject for session in self.sessions}) > 1
+
+    @property
+    def resampled(self) -> str:
+        """What the bootstrap of the effect sizes resamples."""
+        if not self.sessions:
+            return "sessions or single values"
+        return "the days of each subject" if self.several_subjects else "whole days"
 
     def comparison(self, measure: str) -> Comparison | None:
         """Return the comparison of a measure by its stored name."""
@@ -204,7 +233,7 @@ class StudyResult:
         """Return the comparisons as a pandas table, a row for each measure."""
         import pandas as pd
 
-        return pd.DataFrame(comparison_rows(self.comparisons))
+        return pd.DataFrame(comparison_rows((*self.comparisons, *self.further)))
 
     def _repr_html_(self) -> str:
         columns = ["title", "unit", "median_reference", "median_other", "shift", "shift_low",

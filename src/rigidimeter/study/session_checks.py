@@ -59,7 +59,9 @@ def commanded_otherwise(sessions: Sequence[Session]) -> list[tuple[Row, str]]:
             and any(epoch.task == task for epoch in session.epochs)
             and not any(session.row is other for other, _ in found)
         ]
-        counts = Counter(json.dumps(values, sort_keys=True) for _, values in versions)
+        # A recording of two conditions has two rows, and is one all the same.
+        recordings = {session.entry.source: values for session, values in versions}
+        counts = Counter(json.dumps(values, sort_keys=True) for values in recordings.values())
         if len(counts) < 2:
             continue
         most = counts.most_common(1)[0][0]
@@ -75,7 +77,7 @@ def commanded_otherwise(sessions: Sequence[Session]) -> list[tuple[Row, str]]:
                 (
                     session.row,
                     f"{session.entry.path} is of another version of the protocol: it was recorded "
-                    f"with {told}, but {counts[most]} of {len(versions)} sessions, such as "
+                    f"with {told}, but {counts[most]} of {len(recordings)} sessions, such as "
                     f"{example.path}, with {wanted}",
                 )
             )

@@ -20,7 +20,14 @@ from rigidimeter.records import Analysis, Epoch, Notice
 from rigidimeter.settings import Settings
 from rigidimeter.study.analysis import Preparation, analyse_prepared
 from rigidimeter.study.blinding import Naming, naming
-from rigidimeter.study.comparison import compare_measures, day_tests, gathered
+from rigidimeter.study.compared import Comparison
+from rigidimeter.study.comparison import (
+    against_reference,
+    compare_measures,
+    day_tests,
+    gathered,
+    with_further,
+)
 from rigidimeter.study.exclusions import exclusions_of, operators_exclusions
 from rigidimeter.study.measures import MEASURES, RATING, chosen_pair
 from rigidimeter.study.ratings_model import rated, ratings_comparison, ratings_days
@@ -51,6 +58,8 @@ class StudyRead:
     method : str
         Of `study.toml`, or what was given instead.
     notices : tuple of Notice
+    further : tuple of str
+        Conditions with epochs that are compared with the reference beside those of `names.pair`.
     """
 
     folder: StudyFolder
@@ -61,6 +70,7 @@ class StudyRead:
     settings: Settings
     method: str
     notices: tuple[Notice, ...]
+    further: tuple[str, ...] = ()
 
 
 def read_study(
@@ -105,6 +115,7 @@ def read_study(
         names = replace(names, pair=chosen_pair(names.known, wanted, holder=holder))
     gathered = gather(read, names, progress=progress)
     epochs, operator, excluded = operators_exclusions(read, gathered)
+    there = {epoch.condition for epoch in epochs} - {*names.pair}
     return StudyRead(
         read,
         names,
@@ -114,6 +125,7 @@ def read_study(
         settings or gathered.settings or Settings(),
         chosen,
         (*read.notices, *said, *gathered.notices, *excluded),
+        tuple(name for name in names.known if name in there) if pair[1] is None else (),
     )
 
 
@@ -159,10 +171,11 @@ def analyse_study(
         resamples=resamples,
         progress=lambda share: done(share * statistics),
     )
+    comparisons, further = with_further(comparisons, _further(read, comparisons))
     notices += [*lacking([c for c in comparisons if c.measure is not RATING], pair), *said]
-    comparisons = day_tests(
-        comparisons, {} if ratings is None else {RATING.name: ratings_days(ratings)}
-    )
+    ready = {} if ratings is None else {RATING.name: ratings_days(ratings)}
+    every = day_tests((*comparisons, *further), ready)
+    comparisons, further = every[: len(comparisons)], every[len(comparisons) :]
     rows: list[SensitivityRow] = []
     if others:
         analyses = {main.method: main}
@@ -198,7 +211,21 @@ def analyse_study(
         exclusions=tuple(exclusions_of(read.epochs, main, sessions, read.operator)),
         left_out=read.gathered.left_out,
         own_rig=read.gathered.settings is not None,
+        further=further,
     )
+
+
+def _further(read: StudyRead, comparisons: Sequence[Comparison]) -> list[Comparison]:
+    """Return the comparisons of further conditions; of the ratings with their test by days."""
+    found = []
+    for c in against_reference(comparisons, read.further):
+        if c.measure is not RATING:
+            found.append(c)
+            continue
+        ratings, _ = rated(read.folder, replace(read.names, pair=(c.reference, c.other)))
+        if ratings is not None:
+            found.append(replace(ratings_comparison(ratings), days=ratings_days(ratings)))
+    return found
 
 
 def estimate_study(

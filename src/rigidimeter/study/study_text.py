@@ -97,12 +97,17 @@ def pair_of(recorded: list[str], known: list[str]) -> tuple[str, str]:
 
 def _condition(name: str, table: ConditionTable, reference: str) -> str:
     given = table.model_dump(exclude_unset=True, exclude={"title"})
-    lines = [f"[conditions.{name if name.isidentifier() else _text(name)}]"]
+    lines = [f"[conditions.{toml_key(name)}]"]
     lines.append(f"title = {_text(table.title or _TITLES.get(name, ''))}")
     lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in given.items()
               if value is not None]  # fmt: skip
     ending = _NOT_WRITTEN if not given and name != reference else ""
     return "\n".join(lines) + "\n" + ending
+
+
+def toml_key(name: str) -> str:
+    """Return a name as a key of TOML, quoted where it must be."""
+    return name if name.isidentifier() and name.isascii() else _text(name)
 
 
 def _text(value: str) -> str:

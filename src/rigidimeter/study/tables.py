@@ -52,7 +52,9 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
         "inertia_by_subject": result.several_subjects,
         "conclusion": result_table(result, "conclusion"),
         "quality": None if light is None else light.row(),
-        "comparisons": [comparison_values(comparison) for comparison in result.comparisons],
+        "comparisons": [
+            comparison_values(comparison) for comparison in (*result.comparisons, *result.further)
+        ],
         "days": result_table(result, "days"),
         "effect_differences": result_table(result, "effect_differences"),
         "ratings": None if result.ratings is None else ratings_document(result.ratings),
@@ -113,7 +115,8 @@ def _sensitivity(result: StudyResult) -> Iterator[dict[str, Any]]:
 
 def _summaries(result: StudyResult) -> Iterator[dict[str, Any]]:
     for c in result.comparisons:
-        for name, summary in c.summaries.items():
+        for name in (name for name in result.condition_names if name in c.summaries):
+            summary = c.summaries[name]
             if summary.n or c.excluded[name]:
                 counts = {"condition": name, "n": summary.n, "excluded": c.excluded[name]}
                 yield measure_names(c.measure) | counts | asdict(summary)
@@ -211,7 +214,7 @@ def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
 TABLES: Mapping[str, Callable[[StudyResult], Rows]] = {
     "conclusion": conclusion_rows,
     "precision": precision_rows,
-    "comparisons": lambda result: comparison_rows(result.comparisons),
+    "comparisons": lambda result: comparison_rows((*result.comparisons, *result.further)),
     "summaries": lambda result: list(_summaries(result)),
     "days": lambda result: list(_days(result)),
     "effect_differences": lambda result: list(_effect_differences(result)),

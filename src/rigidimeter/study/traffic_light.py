@@ -71,7 +71,8 @@ def traffic_light(result: StudyResult) -> TrafficLight | None:
     unsupported = () if concluded is None else concluded.of("not supported")
     text = finding.text if finding else unsupported[0].reason if unsupported else ""
     if result.left_out and not text:
-        text = f"{len(result.left_out)} of the study's recordings could not be used"
+        n_out = len({out.path for out in result.left_out})
+        text = f"{n_out} of the study's recordings could not be used"
     impossible = any(fit.inertia_kg_m2 <= 0 for fit in analysis.fits if fit.outcome.included)
     if impossible:
         text = "J is not greater than zero in some epochs, which is impossible"

@@ -352,3 +352,23 @@ def test_what_was_not_estimated_is_a_dash_and_has_no_error():
     assert "nan" not in text
     assert not re.search(r"\d ?±", text)
     assert text.count("0.137") == 3
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (("design", "off.toml"), "say --settings off.toml"),
+        (("simulate", "off.toml"), "say --settings off.toml"),
+        (("simulate", "--out", "session", "off.toml"), "say --settings off.toml"),
+        (("estimate", "study"), "`rigidimeter compare study`"),
+        (("ratings", "study"), "give their table, study/ratings.csv"),
+    ],
+)
+def test_an_input_in_the_wrong_place_is_answered_with_the_right_one(
+    rigidimeter, tmp_path, monkeypatch, command, words
+):
+    monkeypatch.chdir(tmp_path)
+    assert rigidimeter("study", "new", "study").status == 0
+    ran = rigidimeter(*command)
+    assert ran.status != 0
+    assert words in " ".join(ran.err.split())

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.statistics import rank_biserial, ranksum
+from rigidimeter.statistics import holm, rank_biserial, ranksum
 
 
 def table(path: Path, m: int = 20, n: int = 12) -> tuple[Path, dict[str, np.ndarray]]:
@@ -124,12 +124,19 @@ def test_three_against_three_cannot_show_a_difference(compared, tmp_path) -> Non
     assert "exact p of 0.1" in found["notices"][0]["text"]
 
 
-def test_more_groups_are_chosen_by_name(compared, tmp_path) -> None:
-    path, _ = table(tmp_path / "t.csv")
-    ran, _ = compared(path, "--value", "a", "--by", "day")
-    assert ran.status == 1
-    assert "choose two of 10 conditions" in ran.err
-    assert "column day of" in ran.err
+def test_each_further_group_is_compared_with_the_first_or_two_are_named(compared, tmp_path) -> None:
+    path, columns = table(tmp_path / "t.csv")
+    ran, found = compared(path, "--value", "a", "--by", "day")
+    assert ran.status == 0
+    tested = [c for c in found["comparisons"] if c["p"] is not None]
+    assert {c["reference"] for c in tested} == {"OFF0"}
+    assert [c["other"] for c in tested] == ["OFF1", "OFF2", "OFF3", "OFF4", "DBS0", "DBS1"]
+    a, of = columns["a"], [f"{'OFF' if k < 20 else 'DBS'}{k % 5}" for k in range(32)]
+    first = [a[k] for k in range(32) if of[k] == "OFF0"]
+    for c in tested:
+        expected = ranksum(first, [a[k] for k in range(32) if of[k] == c["other"]])
+        assert c["p"] == pytest.approx(expected.p)
+    assert [c["p_holm"] for c in tested] == pytest.approx(holm([c["p"] for c in tested]))
     ran, found = compared(
         path, "--value", "a", "--by", "day", "--reference", "OFF1", "--other", "OFF0"
     )

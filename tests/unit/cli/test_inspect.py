@@ -120,3 +120,56 @@ def test_a_calibration_in_a_comment_is_shown(rigidimeter, tmp_path):
     said = " ".join(ran.out.split())
     assert "the file says 'gain 0.0024 Nm/count'" in said
     assert "is in counts, and torque is needed in Nm: say --scale 'torque=2.5 Nm/counts'" in said
+
+
+def _written(path, head, *columns):
+    np.savetxt(path, np.c_[columns], delimiter=",", header=head, comments="")
+    return path
+
+
+def test_a_rate_of_which_rows_were_left_out_is_asked_for(tmp_path, rigidimeter):
+    """Read at 1000 Hz, J would be 25 and B 5 times too small."""
+    every_10_ms = torque_nm(TIME_S), angle_rad(TIME_S)
+    head = "# Sampling rate: 1000 Hz, decimated by 10 for export\ntorque [Nm],angle [rad]"
+    path = _written(tmp_path / "r.csv", head, *every_10_ms)
+    refused = rigidimeter("estimate", path)
+    assert refused.status == 1
+    assert "'Sampling rate: 1000 Hz, decimated by 10 for export'" in refused.err
+    assert "say --rate-hz" in refused.err
+    out = tmp_path / "out.json"
+    assert rigidimeter("estimate", path, "--rate-hz", "100", "--json", out).status == 0
+    assert stiffness(out) == pytest.approx(STIFFNESS_NM_RAD, rel=0.02)
+
+
+def test_a_velocity_that_is_not_the_derivative_of_the_angle_is_refused(tmp_path, rigidimeter):
+    columns = (TIME_S, torque_nm(TIME_S), angle_rad(TIME_S))
+    velocity = np.degrees(angle_rad(TIME_S, derivative=1))
+    head = "time [s],torque [Nm],angle [rad],velocity [rad/s]"
+    path = _written(tmp_path / "r.csv", head, *columns, velocity)
+    refused = rigidimeter("estimate", path)
+    assert refused.status == 1
+    assert "'velocity [rad/s]' is in rad/s, but the velocity is 56.7 times" in refused.err
+    assert "say --unit velocity=deg/s" in refused.err
+    out = tmp_path / "out.json"
+    ran = rigidimeter("estimate", path, "--unit", "velocity=deg/s", "--json", out)
+    assert ran.status == 0
+    assert stiffness(out) == pytest.approx(STIFFNESS_NM_RAD, rel=0.02)
+    insists = ("--unit", "velocity=rad/s", "--unit", "angle=rad")
+    believed = rigidimeter("estimate", path, *insists)
+    assert "it is read as the unit that was given says" in believed.err
+
+
+def test_a_column_of_trials_that_is_not_used_is_named(tmp_path, rigidimeter):
+    columns = (TIME_S, torque_nm(TIME_S), angle_rad(TIME_S))
+    head = "time [s],torque [Nm],angle [rad],Trial No."
+    path = _written(tmp_path / "r.csv", head, *columns, 1 + TIME_S // 8)
+    ran = rigidimeter("estimate", path)
+    assert ran.status == 0
+    assert "column 'Trial No.' (1, 2, 3) is not used" in ran.err
+    assert "--column 'epoch=Trial No.' reads each of its labels as an epoch" in ran.err
+    out = tmp_path / "out.json"
+    cut = rigidimeter("estimate", path, "--column", "epoch=Trial No.", "--json", out)
+    assert "is not used" not in cut.err
+    assert [one["epoch"] for one in json.loads(out.read_text())["epochs"]] == ["1", "2", "3"]
+    once = _written(tmp_path / "once.csv", head, *columns, np.ones(TIME_S.size))
+    assert "is not used" not in rigidimeter("estimate", once).err

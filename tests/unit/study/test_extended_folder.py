@@ -110,6 +110,27 @@ def test_codes_stay_codes(tmp_path):
     assert about.conditions["DBS"].frequency_hz is None
 
 
+def test_a_third_condition_is_written_or_the_session_is_refused(rigidimeter, tmp_path):
+    """What `compare` would throw out is not reported as added."""
+    for name in ("OFF", "DBS", "low DBS"):
+        record(tmp_path / name, name)
+        assert rigidimeter("study", "add", tmp_path).status == 0
+    about = read_study_folder(tmp_path).about
+    assert [*about.conditions] == ["OFF", "DBS", "low DBS"]
+    assert (about.reference, about.other) == ("OFF", "DBS")
+    toml, table = tmp_path / "study.toml", tmp_path / "sessions.csv"
+    toml.write_text(toml.read_text() + "# mine\n")
+    before = table.read_text()
+    record(tmp_path / "d", "cold arm")
+    ran = rigidimeter("study", "add", tmp_path, tmp_path / "d")
+    assert ran.status == 1
+    assert 'write [conditions."cold arm"] there and add the session again' in ran.err
+    assert table.read_text() == before
+    toml.write_text(toml.read_text() + '[conditions."cold arm"]\n')
+    assert rigidimeter("study", "add", tmp_path).status == 0
+    assert cells(tmp_path, "sessions")[-1][:4] == ["d", "S01", "2026-03-01", "cold arm"]
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [

@@ -1,6 +1,7 @@
 """A study folder from its tables to its conclusions, held against the parts done by hand."""
 
 import csv
+import json
 import math
 import shutil
 from dataclasses import replace
@@ -24,6 +25,7 @@ from rigidimeter.study import (
     compare_analysis,
     estimate,
     read_study,
+    result_table,
 )
 from rigidimeter.virtual.virtual_session import run_virtual_session
 
@@ -256,3 +258,77 @@ def test_one_recording_of_both_conditions_has_a_row_for_each(study: Path) -> Non
     assert [(s.day, s.condition) for s in found.sessions[-2:]] == [("9", "OFF"), ("9", "DBS")]
     table.write_text(rows + "sessions/both,M1,8,DBS\n")
     assert any("must agree on both" in n.text for n in analysed(study).notices)
+
+
+def test_three_subjects_are_compared_and_words_say_so(study: Path, rigidimeter) -> None:
+    """Each has a session in both conditions, so subjects are what is tested."""
+    (study / "ratings.csv").unlink()
+    rows = [f"sessions/{k}-OFF,S{k},1,OFF\nsessions/{k + 1}-DBS,S{k},2,DBS" for k in (1, 2, 3)]
+    (study / "sessions.csv").write_text("\n".join(["path,subject,day,condition", *rows]))
+    ran = rigidimeter("compare", study, "--resamples", "200")
+    out = " ".join(ran.out.split())
+    assert "Tested by subjects" in out
+    assert "means of subjects; p and intervals by the test of subjects" in out
+    assert "OFF − DBS: subjects, not epochs" in out
+    assert "paired t-test of 3 subjects" in out
+    assert "by resampling the days of each subject" in out
+    assert "by days" not in out
+
+
+def test_a_session_of_two_conditions_has_one_vote_on_the_protocol(study: Path, rigidimeter) -> None:
+    """Of three sessions two are of one protocol; the third has a row for each of its conditions."""
+    (study / "ratings.csv").unlink()
+    blocks = [{"task": "sinusoid", "condition": name, "epochs": 2} for name in ("OFF", "DBS")]
+    protocol = {"blocks": blocks, "rests_s": [0.5], "return_s": 0.5}
+    sinusoid = tiny("OFF", 1).sinusoid.model_dump() | {"amplitude_deg": 6.0}
+    settings = tiny("OFF", 55, task="sinusoid", protocol=protocol, sinusoid=sinusoid)
+    run_virtual_session(settings, study / "sessions/both")
+    rows = ["sessions/both,M1,9,OFF", "sessions/both,M1,9,DBS"]
+    rows += ["sessions/1-OFF,M1,1,OFF", "sessions/2-DBS,M1,2,DBS"]
+    (study / "sessions.csv").write_text("\n".join(["path,subject,day,condition", *rows]))
+    found = analysed(study)
+    assert [out.path for out in found.left_out] == ["sessions/both"] * 2
+    assert "but 2 of 3 sessions, such as sessions/1-OFF" in found.left_out[0].reason
+    ran = rigidimeter("compare", study, "--resamples", "200")
+    first = " ".join(ran.out.split("\n\n")[0].split())
+    assert "1 of 3 sessions is left out." in first
+
+
+def test_a_third_condition_is_compared_with_the_first_and_p_is_adjusted_for_all(
+    study: Path, edit, rigidimeter, tmp_path
+) -> None:
+    """Work and impulse of three conditions: two differences with OFF each, Holm over four."""
+    (study / "ratings.csv").unlink()
+    edit(study / "study.toml", "[conditions.DBS]", "[conditions.LOW]\n[conditions.DBS]")
+    low = {"LOW": {"damping_nm_s_rad": 0.125, "stiffness_nm_rad": 1.5}}
+    for day in ("4", "5", "6"):
+        record(study / f"sessions/{day}-A-LOW", "LOW", int(day), task="sinusoid", subject=low)
+    rows = [f"sessions/{day}-A-LOW,M1,{day},LOW" for day in ("4", "5", "6")]
+    table = study / "sessions.csv"
+    head, *before = table.read_text().splitlines()
+    table.write_text("\n".join([head, *rows, *before]) + "\n")
+    out = tmp_path / "found.json"
+    ran = rigidimeter("compare", study, "--resamples", "200", "--json", out)
+    assert ran.status == 0, ran.err
+    text = " ".join(ran.out.split())
+    assert "p adjusted by Holm’s method for 4 tests" in text
+    assert "OFF − LOW: days, not epochs" in text
+    document = json.loads(out.read_text())
+    concluded = {(c["measure"], c["other"]): c for c in document["conclusion"]}
+    assert {other for _, other in concluded} == {"DBS", "LOW"}
+    p = {key: c["p"] for key, c in concluded.items()}
+    np.testing.assert_allclose([c["p_holm"] for c in concluded.values()], holm([*p.values()]))
+    pair = rigidimeter("compare", study, "--other", "LOW", "--resamples", "200", "--json", out)
+    assert pair.status == 0
+    alone = {c["measure"]: c["p"] for c in json.loads(out.read_text())["conclusion"]}
+    assert alone == {measure: p[measure, "LOW"] for measure in alone}
+    found = analysed(study)
+    rows = [row["condition"] for row in result_table(found, "summaries")]
+    assert rows == ["OFF", "LOW", "DBS"] * 2  # as in study.toml, not as the table or the folders
+    shown = ran.out.partition("Each condition")[2].partition("Wilcoxon")[0]
+    assert [word for word in shown.split() if word in DAYS or word == "LOW"][:3] == rows[:3]
+    again = rigidimeter("report", study, "--out", tmp_path / "page")
+    assert again.status == 0, again.err
+    page = (tmp_path / "page/report.html").read_text()
+    assert "LOW against OFF" in page
+    assert "DBS against OFF" in page

@@ -26,6 +26,7 @@ from rigidimeter.recording.channels.readings import (
     confusions,
     doubts,
     look_at,
+    matching_text,
     options_text,
     readings,
     sign_fault,
@@ -40,6 +41,7 @@ from rigidimeter.recording.formats.columns import (
     same_length,
     time_stamps,
 )
+from rigidimeter.recording.formats.cutting import unused_labels
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
 from rigidimeter.records import Notice
@@ -114,6 +116,8 @@ def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
     if choice.unstated:
         faults += _unstated(table, choice, raw, rate_hz, usable=usable)
     notices = [Notice("warning", text) for text in choice.unused]
+    if "epoch" not in names:
+        notices += unused_labels(table, names.values(), table.columns[names["torque_nm"]].size)
     if not faults and usable:
         found, warned = _doubtful(table, choice.taken, raw, options, rate_hz)
         faults += found
@@ -250,7 +254,7 @@ def _doubtful(
     of_file = {
         name: one.to_si.factor
         for name, one in taken.items()
-        if name in ("torque_nm", motion) and one.to_si is not None and not one.of_user
+        if name in ("torque_nm", *MOTION) and one.to_si is not None and not one.of_user
     }
     for doubt in doubts(seen) or confusions(seen, of_file):
         one = taken.get(doubt.standard)
@@ -259,11 +263,16 @@ def _doubtful(
             text = f"{table.source}: {doubt.text} at the sampling rate of {rate_hz:g} Hz; {option}"
             (faults if options.rate_hz is None else warnings).append(text)
             continue
+        if one.of_user and doubt.beside:
+            one = taken[doubt.beside]
         text = f"{table.source}: column {one.column!r} is in {one.unit}, but {doubt.text}"
         if one.of_user:
             warnings.append(f"{text}; it is read as the unit that was given says")
             continue
         vary = {doubt.standard: doubt.units}
+        if doubt.beside:
+            faults.append(f"{text}; {matching_text(taken, signed, rate_hz)}")
+            continue
         text += f"; say {options_text(vary)}"
         if one.standard == "time_s" and numbers_rows(taken, raw):
             text += ", or --rate-hz if it numbers the samples"

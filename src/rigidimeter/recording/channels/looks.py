@@ -23,6 +23,8 @@ HIGHEST_RATE_HZ = 1000.0
 SPEED_OVER_S = 0.03
 """An angle is differenced over this time: noise of 0.001 rad at 10 kHz would be 10 rad/s."""
 _CONDITION = 100.0
+_FOLLOWS = 0.9
+"""R² from which a velocity is that of the angle, whatever its unit."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,11 @@ class Look:
         without an angle.
     speed_rad_s : float
         Exceeded 1 % of the time.
+    velocity_ratio : float
+        Slope of a velocity beside the angle over the angle's derivative; NaN without such a
+        velocity, or where the two do not follow each other.
+    velocity_speed_rad_s : float
+        Of a velocity beside the angle, exceeded 1 % of the time; NaN without one.
     torque_nm, power_w : float
         Largest torque; torque times speed, exceeded 1 % of the time.
     motion_hz : float
@@ -68,6 +75,8 @@ class Look:
     range_rad: float
     turned_rad: float
     speed_rad_s: float
+    velocity_ratio: float
+    velocity_speed_rad_s: float
     torque_nm: float
     power_w: float
     motion_hz: float
@@ -75,21 +84,35 @@ class Look:
     swapped: RoughFit | None
 
 
-def look(torque: tuple[Array, Array], motion: tuple[Array, Array], *, is_angle: bool) -> Look:
+def look(
+    torque: tuple[Array, Array],
+    motion: tuple[Array, Array],
+    beside: tuple[Array, Array] | None = None,
+    *,
+    is_angle: bool,
+) -> Look:
     """Look at a recording.
 
     Parameters
     ----------
     torque, motion : (array, array)
         Time in s and values, each with its own clock; two samples or more.
+    beside : (array, array), optional
+        A velocity in rad/s beside the angle.
     is_angle : bool
         Whether the motion is an angle in rad, and not a velocity in rad/s.
     """
     with np.errstate(all="ignore"):  # of numbers that are refused elsewhere
-        return _look(torque, motion, is_angle=is_angle)
+        return _look(torque, motion, beside, is_angle=is_angle)
 
 
-def _look(torque: tuple[Array, Array], motion: tuple[Array, Array], *, is_angle: bool) -> Look:
+def _look(
+    torque: tuple[Array, Array],
+    motion: tuple[Array, Array],
+    beside: tuple[Array, Array] | None,
+    *,
+    is_angle: bool,
+) -> Look:
     time_s, values = motion
     step_s = float(np.median(np.diff(time_s)))
     row_s = min(step_s, float(np.median(np.diff(torque[0]))))
@@ -123,12 +146,37 @@ def _look(torque: tuple[Array, Array], motion: tuple[Array, Array], *, is_angle:
         float(np.ptp(angle)) if is_angle else math.nan,
         float(abs(angle[-1] - angle[0])) if is_angle else math.nan,
         float(np.quantile(speed, 0.99)),
+        math.nan if beside is None else _velocity_ratio(beside, motion),
+        math.nan if beside is None else float(np.quantile(np.abs(beside[1]), 0.99)),
         float(np.max(np.abs(torque[1]))),
         float(np.quantile(power, 0.99)),
         rms[0] / (2 * math.pi * rms[1]) if rms[0] * rms[1] > 0 else math.nan,
         fit,
         swapped,
     )
+
+
+def _velocity_ratio(velocity: tuple[Array, Array], angle: tuple[Array, Array]) -> float:
+    """Return the slope of a velocity over the angle's derivative, both averaged over 30 ms.
+
+    With ω(t) the velocity and θ(t) the angle, the slope of ∫ω dt over θ(t + T) − θ(t), T = 30 ms:
+    1 of one motion in matching units, 57.3 of a velocity in deg/s beside an angle in rad. NaN where
+    they do not follow each other (R² up to 0.9), such as a velocity that a filter made late.
+    """
+    grid = _grid(velocity, angle, is_angle=True)
+    if grid is None:
+        return math.nan
+    rate_hz, velocity_rad_s, angle_rad = grid
+    over = max(1, round(SPEED_OVER_S * rate_hz))
+    travelled = np.cumsum(0.5 * (velocity_rad_s[1:] + velocity_rad_s[:-1])) / rate_hz
+    travelled = np.concatenate(([0.0], travelled))
+    areas, turned = (values[over:] - values[:-over] for values in (travelled, angle_rad))
+    areas, turned = areas - areas.mean(), turned - turned.mean()
+    together = float(areas @ turned)
+    sizes = float(areas @ areas), float(turned @ turned)
+    if not together**2 > _FOLLOWS * sizes[0] * sizes[1]:
+        return math.nan
+    return together / sizes[1]
 
 
 def _grid(

@@ -65,6 +65,8 @@ _WORDS: Mapping[str, str] = {
     "emg": "emg semg elektromyogramm",
     "command": "command commanded cmd setpoint target soll sollwert consigne comando mando "
     "reference desired demand demanded gewenst gewenste",
+    "epoch": "trial trials block bloc bloque blocco blok run lauf segment sweep epoch epoche "
+    "repetition rep wiederholung durchgang versuch essai prova ensayo poging",
     "no sample": "error err std sd sem quality status flag limit acceleration beschleunigung",
 }
 _WORD: Mapping[str, str] = {word: kind for kind, text in _WORDS.items() for word in text.split()}
@@ -98,6 +100,12 @@ def kind_of(words: list[str]) -> str:
         return "velocity_command" if "velocity" in kinds else ""
     order = ("perturbation", "emg", "velocity", "torque", "angle", "force", "time")
     return next((kind for kind in order if kind in kinds), "")
+
+
+def names_epochs(name: str) -> bool:
+    """Whether a column's name is that of trials, blocks or runs, and of no quantity."""
+    words = words_of(name)
+    return not kind_of(words) and "epoch" in map(_kind, words)
 
 
 def _kind(word: str) -> str:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimeter.recording.channels.choice import Taken
+from rigidimeter.recording.channels.choice import MOTION, Taken
 from rigidimeter.recording.channels.conversion import Conversion
 from rigidimeter.recording.channels.looks import Array, Look, RoughFit, look
 from rigidimeter.recording.channels.quantities import BY_STANDARD
@@ -33,6 +33,10 @@ BELIEVED_SPEED_RAD_S, BELIEVED_TORQUE_NM = (0.2, 5.0), (0.2, 100.0)
 for the smaller (deg, N·mm). As the units differ by 57 and 1000, no recording is believed in both.
 Joints from a finger to a knee, and a human ankle, reach 0.7 to 0.9 rad/s when they are perturbed at
 random, and 2.2 rad/s in a sinusoid of 20° at 1 Hz."""
+MATCHING_RATIO = 1.3
+"""A velocity is at most so many times as large, or as small, as the derivative of the angle: noise
+of 0.5 rad/s, an encoder of 0.1° and a low-pass of 20 Hz leave 0.96 to 1.0, units are 6.3 and 57
+apart."""
 SLOWEST_MOTION_HZ = 0.02
 SLOWEST_RATE_HZ = 5.0
 FASTEST_MOTION_HZ, FASTEST_RATE_HZ = 100.0, 5e4
@@ -52,11 +56,15 @@ _MUCH = 0.3
 
 @dataclass(frozen=True)
 class Doubt:
-    """Why a quantity's unit cannot be right, or is not believed; the units to offer, if not all."""
+    """Why a quantity's unit cannot be right, or is not believed; the units to offer, if not all.
+
+    `beside` is a second quantity whose unit may be the wrong one instead.
+    """
 
     standard: str
     text: str
     units: tuple[str, ...] = ()
+    beside: str = ""
 
 
 def doubts(seen: Look) -> list[Doubt]:
@@ -80,10 +88,30 @@ def doubts(seen: Look) -> list[Doubt]:
     if seen.largest_rad > LARGEST_RAD and not turns_on:
         text = f"an angle of {seen.largest_rad:.4g} rad is more than one turn"
         found.append(Doubt("angle_rad", text))
-    elif seen.speed_rad_s > LARGEST_SPEED_RAD_S and not turns_on:
-        name = "velocity_rad_s" if math.isnan(seen.largest_rad) else "angle_rad"
-        found.append(Doubt(name, f"a speed of {seen.speed_rad_s:.4g} rad/s is too fast for a limb"))
+    elif not turns_on:
+        found += [
+            Doubt(name, f"a speed of {speed:.4g} rad/s is too fast for a limb")
+            for name, speed in _speeds(seen).items()
+            if speed > LARGEST_SPEED_RAD_S
+        ]
+    ratio = seen.velocity_ratio
+    if not (found or math.isnan(ratio) or 1 / MATCHING_RATIO <= ratio <= MATCHING_RATIO):
+        text = f"the velocity is {ratio:.3g} times the derivative of the angle"
+        found.append(Doubt("velocity_rad_s", text, beside="angle_rad"))
     return found
+
+
+def _speeds(seen: Look) -> dict[str, float]:
+    """Return the speed of each motion by which its unit can be judged.
+
+    That of a velocity beside an angle is judged by the angle, where it follows the angle.
+    """
+    if math.isnan(seen.largest_rad):
+        return {"velocity_rad_s": seen.speed_rad_s}
+    speeds = {"angle_rad": seen.speed_rad_s, "velocity_rad_s": seen.velocity_speed_rad_s}
+    if not math.isnan(seen.velocity_ratio) or math.isnan(seen.velocity_speed_rad_s):
+        del speeds["velocity_rad_s"]
+    return speeds
 
 
 def confusions(seen: Look, factors: Mapping[str, float]) -> list[Doubt]:
@@ -100,7 +128,7 @@ def confusions(seen: Look, factors: Mapping[str, float]) -> list[Doubt]:
     turns_on = seen.turned_rad >= 0.5 * seen.range_rad and seen.power_w <= LARGEST_POWER_W
     measured = {"torque_nm": seen.torque_nm}
     if not turns_on:
-        measured |= dict.fromkeys(("angle_rad", "velocity_rad_s"), seen.speed_rad_s)
+        measured |= _speeds(seen)
     found = []
     for standard in (name for name in measured if name in factors):
         units = CONFUSED[standard]
@@ -180,6 +208,8 @@ def readings(
     """
     motion = "angle_rad" if "angle_rad" in raw else "velocity_rad_s"
     varied = [name for name in ("time_s", "torque_nm", motion) if name in vary]
+    if not varied:  # a velocity beside an angle: J, B and K are by the angle
+        return []
     usual = {name: vary[name] or usual_units(name, taken, raw) for name in varied}
     lines = []
     for units in itertools.product(*usual.values()):
@@ -238,14 +268,36 @@ def look_at(
 
     time_s = si("time_s") if "time_s" in raw else np.arange(raw[motion].size) / (rate_hz or 1.0)
     time_s = one_after_another(time_s)
-    signals = []
-    for name in ("torque_nm", motion):
-        values = si(name)
-        here = np.isfinite(values) & np.isfinite(time_s)
-        if np.count_nonzero(here) < 2:
-            return None
-        signals.append((time_s[here], values[here]))
-    return look(signals[0], signals[1], is_angle=motion == "angle_rad")
+    signals = {}
+    for name in ("torque_nm", *MOTION):
+        if name in raw:
+            values = si(name)
+            here = np.isfinite(values) & np.isfinite(time_s)
+            if np.count_nonzero(here) >= 2:
+                signals[name] = time_s[here], values[here]
+    if "torque_nm" not in signals or motion not in signals:
+        return None
+    beside = signals.get("velocity_rad_s") if motion == "angle_rad" else None
+    return look(signals["torque_nm"], signals[motion], beside, is_angle=motion == "angle_rad")
+
+
+def matching_text(
+    taken: Mapping[str, Taken], raw: Mapping[str, Array], rate_hz: float | None
+) -> str:
+    """Return the option with which a velocity is the derivative of the angle beside it."""
+    options = []
+    for name in ("velocity_rad_s", "angle_rad"):
+        for unit in BY_STANDARD[name].usual:
+            seen = look_at(taken, raw, rate_hz, {name: unit})
+            if seen is not None and not doubts(seen):
+                options.append(f"--unit {BY_STANDARD[name].name}={unit}")
+    if not options:
+        turned = {**raw, "velocity_rad_s": -raw["velocity_rad_s"]}
+        seen = look_at(taken, turned, rate_hz, {})
+        if seen is not None and not doubts(seen):
+            options.append("--scale velocity=-1")
+    remedy = f"say {' or '.join(options)}" if options else "check both units and the rate"
+    return f"{remedy}; if both units are right, say --unit for both"
 
 
 def options_text(vary: Mapping[str, tuple[str, ...]]) -> str:

@@ -150,8 +150,12 @@ def own_rates(table: Table) -> dict[str, float]:
     return {
         name: float(value)
         for name, value in table.scalars.items()
-        if name.rsplit(".", 1)[-1] in RATE_NAMES and not isinstance(value, str)
+        if _names_rate(name) and not isinstance(value, str)
     }
+
+
+def _names_rate(name: str) -> bool:
+    return name.rsplit(".", 1)[-1] in RATE_NAMES
 
 
 def own_rate(table: Table) -> float:
@@ -164,6 +168,12 @@ def own_rate(table: Table) -> float:
     """
     found = own_rates(table)
     if not found:
+        told = [str(value) for name, value in table.scalars.items() if _names_rate(name)]
+        if told:
+            raise UserError(
+                f"{table.source} states its sampling rate as {told[0][:120]!r}, which does not say "
+                "how many rows there are in a second; say --rate-hz"
+            )
         near = nearest("time_s", table.columns, least=0.7) or "NAME"
         option = shlex.quote(f"time={near}")
         raise UserError(

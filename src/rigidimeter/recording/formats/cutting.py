@@ -5,6 +5,8 @@ Rows are counted from 0; a stretch ends before its `stop`.
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -14,11 +16,14 @@ from numpy.typing import NDArray
 
 from rigidimeter.documents.bounds import EPOCHS
 from rigidimeter.errors import UserError
+from rigidimeter.recording.channels.quantities import names_epochs
 from rigidimeter.recording.formats.columns import seconds
 from rigidimeter.recording.formats.gaps import Rows, longest_s
 from rigidimeter.recording.formats.table import Table, label_text
 from rigidimeter.records import Notice
 
+ROWS_A_LABEL = 100
+"""A column whose label changes more often, on average, is no column of trials."""
 _COMPLETE = 0.95
 
 
@@ -106,6 +111,32 @@ def by_length(source: str, clock: Rows, length_s: float) -> tuple[list[Stretch],
             f"--epoch-length-s {length_s:g}"
         )
     return stretches, notices
+
+
+def unused_labels(table: Table, used: Collection[str], n_rows: int) -> list[Notice]:
+    """Return a warning for each column that numbers trials by its name and values, and is unused.
+
+    Parameters
+    ----------
+    table : Table
+    used : collection of str
+        Columns that are used.
+    n_rows : int
+    """
+    notices = []
+    for name in (one for one in table.columns if one not in used and names_epochs(one)):
+        column = table.columns[name]
+        runs = _runs(column, n_rows // ROWS_A_LABEL) if column.size == n_rows else []
+        labels = [label for label, _, _ in runs if label]
+        if len(runs) > 1 and labels:
+            shown = ", ".join(labels[:3]) + (", …" if labels[3:] else "")
+            option = shlex.quote(f"epoch={name}")
+            text = (
+                f"{table.source}: column {name!r} ({shown}) is not used; --column {option} reads "
+                "each of its labels as an epoch"
+            )
+            notices.append(Notice("warning", text))
+    return notices
 
 
 def constant_label(table: Table, standard: str, column: NDArray[Any], stretch: Stretch) -> str:

@@ -46,6 +46,7 @@ from rigidimeter.recording.formats.text_head import Layout
 from rigidimeter.recording.formats.text_table import read_text_recording
 from rigidimeter.recording.formats.xdf_file import read_xdf, xdf_settings
 from rigidimeter.recording.session_epochs import is_session, read_session, session_settings
+from rigidimeter.recording.study_toml import STUDY_FILE
 from rigidimeter.records import Epoch, Notice
 from rigidimeter.settings import Settings
 
@@ -201,6 +202,11 @@ def reader_of(path: Path) -> Reader:
         if reader.sniff is None or reader.sniff(path):
             return reader
     known = _any_of(list(dict.fromkeys(s for reader in READERS for s in reader.suffixes)))
+    if (path / STUDY_FILE).is_file():
+        raise UserError(
+            f"{path} is a study folder: compare its conditions with `rigidimeter compare {path}`, "
+            "or give one of its session folders or recordings"
+        )
     if path.is_dir():
         raise UserError(
             f"{path} is a folder without manifest.json, so it is not a session folder; give a "

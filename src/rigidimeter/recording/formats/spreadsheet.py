@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import datetime as dt
 import io
+import os
+import subprocess
+import sys
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.documents import open_regular
-from rigidimeter.documents.bounds import MIB
+from rigidimeter.documents.bounds import MIB, size_text
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.stored_arrays import Expansion, check_count
 from rigidimeter.recording.formats.table import Table
@@ -26,6 +29,28 @@ from rigidimeter.recording.formats.text_head import HEAD_LINES, Head, Layout, fo
 SPREADSHEET_BYTES = 256 * MIB
 """Of a sheet with a million rows, as many as one may have, of ten columns."""
 
+SHEET_BYTES = 4096 * MIB
+"""Of memory, for one sheet; a million rows of ten columns take 800 MB."""
+
+_TRIAL = """
+import io, sys
+from python_calamine import CalamineWorkbook
+data = sys.stdin.buffer.read()
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[1]),) * 2)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+except (ImportError, ValueError):
+    pass
+try:
+    book = CalamineWorkbook.from_filelike(io.BytesIO(data))
+except Exception:
+    CalamineWorkbook.from_path(sys.argv[2])  # states that an OpenDocument sheet has too many cells
+    raise
+for name in book.sheet_names:
+    print(name, flush=True)
+    book.get_sheet_by_name(name)
+"""
 _EXAMPLE = "time_s, torque_nm, angle_rad"
 
 
@@ -80,6 +105,7 @@ def _sheets(path: Path) -> dict[str, list[list[Any]]]:
                 raise ValueError("an entry is damaged")
     from python_calamine import CalamineWorkbook
 
+    _check_size(path, data)
     try:
         book = CalamineWorkbook.from_filelike(io.BytesIO(data))
         sheets = ((name, book.get_sheet_by_name(name).to_python()) for name in book.sheet_names)
@@ -88,6 +114,26 @@ def _sheets(path: Path) -> dict[str, list[list[Any]]]:
         if isinstance(error, Exception) or type(error).__name__ != "PanicException":
             raise
         raise ValueError(str(error)) from None  # a panic of calamine is no Exception
+
+
+def _check_size(path: Path, data: bytes) -> None:
+    """Refuse a workbook that ends the process: a sheet takes memory up to its last row and column.
+
+    Calamine takes it at once, and where there is not as much, Rust aborts. So another process tries
+    first; what is an exception there is one here.
+    """
+    command = [sys.executable, "-P", "-c", _TRIAL, str(SHEET_BYTES), os.fspath(path)]
+    tried = subprocess.run(
+        command, input=data, capture_output=True, check=False, env=os.environ | {"PYTHONUTF8": "1"}
+    )
+    if tried.returncode not in (0, 1) or b"Cell limit exceeded" in tried.stderr:
+        names = tried.stdout.decode("utf-8", "replace").splitlines()
+        sheet = f", sheet {names[-1]}" if names else ""
+        raise UserError(
+            f"{path}{sheet}: needs more than {size_text(SHEET_BYTES)} or is damaged; a cell far "
+            "below or to the right of the recording makes a sheet that large, so delete the rows "
+            "and columns beyond it, or save the sheet as CSV"
+        )
 
 
 def _table(path: Path, sheet: str, rows: list[list[Any]], layout: Layout) -> Table:

@@ -36,6 +36,11 @@ _INTERVAL = re.compile(
     r"(?i)(?<![^\W_])(?:dt|abtastzeit|(?:sampl|abtast|bemonster)\w*[\s_-]*(?:interval|period)\w*"
     rf"|abtastintervall)(?![^\W_])\D*?{_AMOUNT}\s*(ms|msec|s|sec|us|µs)(?![^\W_/])(?!\s*/)"
 )
+_DECIMATED = re.compile(
+    r"(?i)(?:decimat|d[ée]cim[ée]|decimeer|dezimier|diezm|(?:down|sub|sous|unter)[\s-]?(?:sampl|abtast"
+    r"|[ée]chant)|\bevery\s+\d+(?:nd|rd|th)\b)(?!\w*[\s:=]*(?:1|no|none|off)\b(?![.,]\d))"
+)
+"""Says that rows were left out, so that a rate beside it may be that of all rows."""
 
 
 @dataclass(frozen=True)
@@ -217,16 +222,23 @@ def _named(
 
 
 def stated_rate(lines: Sequence[str]) -> dict[str, float | str]:
-    """Return the sampling rate that lines before the rows state, if they state one."""
-    found = set()
+    """Return the sampling rate that lines before the rows state, if they state one.
+
+    Where they also say that rows were left out, it is the text of those lines.
+    """
+    found, told = set(), list[str]()
     for line in lines:
         pairs = [*_RATE.findall(line), *((n, kilo) for kilo, n in _RATE_BEHIND.findall(line))]
-        found |= {_amount(number) * (1000.0 if kilo else 1.0) for number, kilo in pairs}
-        found |= {
+        rates = {_amount(number) * (1000.0 if kilo else 1.0) for number, kilo in pairs}
+        rates |= {
             1.0 / (_amount(number) * (factor(unit, "time_s") or 1.0))
             for number, unit in _INTERVAL.findall(line)
             if _amount(number)
         }
+        found |= rates
+        told += [line.strip()] if rates or _DECIMATED.search(line) else []
+    if found and any(map(_DECIMATED.search, told)):
+        return {"rate_hz": "; ".join(dict.fromkeys(told))}
     return {"rate_hz": found.pop()} if len(found) == 1 else {}
 
 

@@ -18,7 +18,7 @@ from rigidimeter.reporting.method_words import interval_basis, pooled_basis
 from rigidimeter.reporting.numbers import condition_name, series
 from rigidimeter.reporting.prose_statistics import day_tests_in_words
 from rigidimeter.reporting.sections.estimate_tables import pooled_table
-from rigidimeter.study import StudyResult, result_table
+from rigidimeter.study import StudyResult, comparison_rows, result_table
 
 _EPOCHS_NOTE = Markup(
     "All differences are {pair}. Two-sided Wilcoxon rank-sum test, asymptotic (normal "
@@ -39,9 +39,19 @@ def _comparison(result: StudyResult) -> Iterator[Block]:
     if not any(c.paired for c in result.comparisons):
         yield paragraph("No two conditions were compared.")
         return
-    yield from _epochs(result)
-    if not any(c.days for c in result.comparisons):
-        return
+    pairs = (result, *result.further_pairs)
+    for number, pair in enumerate(pairs, start=1):
+        yield from _epochs(pair, _table_name(number))
+    for number, pair in enumerate(pairs, start=1):
+        if any(c.days for c in pair.comparisons):
+            yield from _by_days(pair, _table_name(number))
+
+
+def _table_name(number: int) -> str:
+    return "comparisons" if number == 1 else f"comparisons_{number}"
+
+
+def _by_days(result: StudyResult, name: str) -> Iterator[Block]:
     used = dict.fromkeys(day_tests_in_words(result)) or ("No test by days could be made",)
     ratings = (
         " Ratings are those less the examiners’ offsets; their model has an offset for each "
@@ -51,7 +61,7 @@ def _comparison(result: StudyResult) -> Iterator[Block]:
     )
     percent = _percent(c.days.confidence for c in result.comparisons if c.days)
     yield Table(
-        "comparisons",
+        name,
         f"{_pair(result)}: days counted",
         (
             Column("title", "Measure", "text", below="unit"),
@@ -66,14 +76,14 @@ def _comparison(result: StudyResult) -> Iterator[Block]:
             Column("days_day_share", "Between days", "percent"),
             Column("days_remark", "Remark", "reason"),
         ),
-        result_table(result, "comparisons"),
+        comparison_rows(result.comparisons),
         note=_DAYS_NOTE.format(
             tests="; ".join(text[:1].upper() + text[1:] for text in used), ratings=ratings
         ),
     )
 
 
-def _epochs(result: StudyResult) -> Iterator[Block]:
+def _epochs(result: StudyResult, table: str) -> Iterator[Block]:
     """Yield the comparison over epochs, as it is in every report."""
     percent = _percent(c.test.confidence for c in result.comparisons if c.test)
     sides = {"reference": condition_name(result.reference), "other": condition_name(result.other)}
@@ -97,10 +107,10 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
         Column("remark", "Remark", "reason"),
     ]
     yield Table(
-        "comparisons",
+        table,
         f"{_pair(result)}: each epoch counted",
         tuple(columns),
-        result_table(result, "comparisons"),
+        comparison_rows(result.comparisons),
         note=_EPOCHS_NOTE.format(pair=f"{sides['reference']} − {sides['other']}"),
     )
     yield paragraph(

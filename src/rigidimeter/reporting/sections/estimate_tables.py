@@ -61,7 +61,10 @@ def pooled_table(result: StudyResult, note: str) -> Table:
     """Return the fits to all epochs of each condition together, and to all of them."""
     by_condition, overall = split_pooled(result.analysis)
     band, in_which = _band(result.analysis.pooled)
-    named = [*by_condition.items()] + ([(ALL_CONDITIONS, overall)] if overall else [])
+    ordered = [name for name in result.condition_names if name in by_condition]
+    named = [(name, by_condition[name]) for name in ordered] + (
+        [(ALL_CONDITIONS, overall)] if overall else []
+    )
     return Table(
         "pooled",
         f"All epochs of a condition together{in_which}",

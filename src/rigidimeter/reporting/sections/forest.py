@@ -35,8 +35,8 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     reference, other = condition_name(result.reference), condition_name(result.other)
     yield Figure(
         "effects",
-        f"Effect sizes r with {percent} intervals from resampling whole days. Dotted lines: "
-        "small (0.1), medium (0.3) and large (0.5) effects. Grey ticks: the largest r that "
+        f"Effect sizes r with {percent} intervals from resampling {result.resampled}. Dotted "
+        "lines: small (0.1), medium (0.3) and large (0.5) effects. Grey ticks: the largest r that "
         "these group sizes allow, which differs between measures.",
         f"Effect sizes r with {percent} intervals. "
         f"{'; '.join(f'{c.measure.title} {_in_words(effects)}' for c, effects in found)}.",

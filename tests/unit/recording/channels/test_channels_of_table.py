@@ -14,6 +14,7 @@ from rigidimeter.recording.formats.table import Table
 TIME_S = np.arange(4000) / 200.0
 TORQUE_NM, ANGLE_RAD = torque_nm(TIME_S), angle_rad(TIME_S)
 ANGLE_DEG = np.degrees(ANGLE_RAD)
+VELOCITY_RAD_S = angle_rad(TIME_S, derivative=1)
 
 
 def table(units=None, **columns):
@@ -190,3 +191,24 @@ def test_a_matrix_with_its_labels_is_refused_with_a_way_on():
 def test_a_time_is_no_candidate_for_the_torque():
     columns = {"time_s": TIME_S, "t_torque [s]": TIME_S, "torque [Nm]": TORQUE_NM}
     assert_si(channels_of_table(table(**columns, angle_rad=ANGLE_RAD), ReadOptions()))
+
+
+NOISE = np.random.default_rng(7)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "angle"),
+    [
+        (VELOCITY_RAD_S + NOISE.normal(scale=0.5, size=TIME_S.size), ANGLE_RAD),
+        (VELOCITY_RAD_S, np.radians(0.1) * np.round(ANGLE_DEG / 0.1)),
+        (np.interp(TIME_S - 0.01, TIME_S, VELOCITY_RAD_S), ANGLE_RAD),
+        (np.interp(TIME_S - 0.1, TIME_S, VELOCITY_RAD_S), ANGLE_RAD),
+        (VELOCITY_RAD_S + 0.5, np.where(TIME_S < 10.0, ANGLE_RAD, np.nan)),
+    ],
+    ids=["noise", "steps of an encoder", "late", "too late to judge", "offset, half of the angle"],
+)
+def test_a_velocity_that_a_sensor_would_give_is_accepted_in_its_unit_alone(velocity, angle):
+    whole = {"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle_rad": angle}
+    channels_of_table(table(**whole, velocity_rad_s=velocity), ReadOptions())
+    in_degrees = table(**whole, velocity_rad_s=np.degrees(velocity))
+    assert "--unit velocity=deg/s" in refusal(in_degrees)[0]

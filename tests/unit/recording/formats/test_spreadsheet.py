@@ -85,14 +85,14 @@ MANIFEST = (
 CELL = '<table:table-cell office:value-type="{}" {}><text:p>{}</text:p></table:table-cell>'
 
 
-def test_an_opendocument_sheet(tmp_path):
-    """In the layout that LibreOffice writes."""
+def opendocument(path, after=""):
+    """Write a recording in the layout of LibreOffice, and what follows its rows."""
     cells = [[CELL.format("string", "", name) for name in ("t_s", "M_Nm", "phi_deg")]]
     cells += [
         [CELL.format("float", f'office:value="{float(v)!r}"', v) for v in row]
         for row in zip(TIME_S[:50], TORQUE_NM[:50], ANGLE_DEG[:50], strict=True)
     ]
-    rows = "".join(f"<table:table-row>{''.join(row)}</table:table-row>" for row in cells)
+    rows = "".join(f"<table:table-row>{''.join(row)}</table:table-row>" for row in cells) + after
     of = "urn:oasis:names:tc:opendocument:xmlns"
     content = (
         '<?xml version="1.0" encoding="UTF-8"?><office:document-content '
@@ -100,13 +100,44 @@ def test_an_opendocument_sheet(tmp_path):
         '<office:body><office:spreadsheet><table:table table:name="Sheet1">'
         f"{rows}</table:table></office:spreadsheet></office:body></office:document-content>"
     )
-    path = tmp_path / "r.ods"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
         archive.writestr("META-INF/manifest.xml", MANIFEST)
         archive.writestr("content.xml", content)
-    table = read_table(path)
+    return path
+
+
+def test_an_opendocument_sheet(tmp_path):
+    table = read_table(opendocument(tmp_path / "r.ods"))
     np.testing.assert_array_equal(table.columns["M_Nm"], TORQUE_NM[:50])
+
+
+FAR = (
+    '<table:table-row table:number-rows-repeated="1048525"><table:table-cell '
+    'table:number-columns-repeated="16384"/></table:table-row><table:table-row><table:table-cell '
+    'table:number-columns-repeated="16383"/>'
+    + CELL.format("float", 'office:value="1"', 1)
+    + "</table:table-row>"
+)
+
+
+@pytest.mark.parametrize("name", ["r.xlsx", "r.ods"])
+def test_a_cell_in_the_last_row_and_column_is_a_sentence(tmp_path, rigidimeter, name):
+    """The library asks for 400 GB at once, and ends the process that asks."""
+    path = tmp_path / name
+    if name.endswith("ods"):
+        opendocument(path, FAR)
+    else:
+        with xlsxwriter.Workbook(path) as book:
+            book.add_worksheet("Notes").write(0, 0, "none")
+            sheet = book.add_worksheet("Sheet1")
+            sheet.write(0, 0, "time_s")
+            sheet.write(1_048_575, 16_383, 1.0)
+    ran = rigidimeter("estimate", path)
+    assert ran.status == 1
+    assert str(path) in ran.err
+    assert "needs more than 4 GiB" in ran.err
+    assert "delete the rows and columns beyond it" in ran.err
 
 
 def test_a_sheet_that_expands_a_thousandfold_is_refused(tmp_path):
