@@ -15,6 +15,7 @@ from rigidimeter.records.epochs import (
     Notice,
     Outcome,
     Task,
+    Ticks,
     readonly,
 )
 from rigidimeter.records.estimates import FIT_NUMBERS, STATISTICS, Delay, Finding, Fit, Score
@@ -40,5 +41,6 @@ __all__ = [
     "Outcome",
     "Score",
     "Task",
+    "Ticks",
     "readonly",
 ]
