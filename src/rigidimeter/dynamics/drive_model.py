@@ -253,16 +253,18 @@ def state_at_ticks(
         From each tick to the next; one number if they came evenly.
     """
     growth = _growth(pole)
-    decay = np.exp(growth * lengths_s)
-    added = (decay - 1) / growth * command_rad_s[:-1]
-    if np.ndim(lengths_s) == 0:
-        return np.append(0.0, scipy.signal.lfilter([1.0], [1.0, -decay], added))
+    if isinstance(lengths_s, float):
+        decay = np.exp(growth * lengths_s)
+        held = (decay - 1) / growth * command_rad_s
+        return np.asarray(scipy.signal.lfilter([0.0, 1.0], [1.0, -decay], held))
     # With x → a x + b for each tick, one stretch after another is a₂ a₁ x + (a₂ b₁ + b₂): the
     # stretches that end at the ticks are made twice as long until all begin at the first.
-    state, step = added, 1
-    while step < state.size and np.any(decay):
-        state = np.append(state[:step], state[step:] + decay[step:] * state[:-step])
-        decay = np.append(decay[:step], decay[step:] * decay[:-step])
+    decays = np.exp(growth * lengths_s)
+    state = (decays - 1) / growth * command_rad_s[:-1]
+    step = 1
+    while step < state.size and np.any(decays):
+        state = np.append(state[:step], state[step:] + decays[step:] * state[:-step])
+        decays = np.append(decays[:step], decays[step:] * decays[:-step])
         step *= 2
     return np.append(0.0, state)
 

@@ -14,7 +14,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.lost_samples import STAMPS, lost_stretches
 from rigidimeter.recording.session_files import SessionFiles, read_session_files
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES, read_manifest
-from rigidimeter.records import Channel, Epoch, Motion, Notice, Outcome, Ticks
+from rigidimeter.records import LATE_TICK, Channel, Epoch, Motion, Notice, Outcome, Ticks
 from rigidimeter.settings import Settings, parse_settings
 
 CHANNELS = ("torque_nm", "angle_rad", "velocity_rad_s", "velocity_command_rad_s", "perturbation_nm")
@@ -224,7 +224,7 @@ def epoch_of_samples(
 
 def _ticks(late: NDArray[Any]) -> Ticks:
     """Return the counts of ticks that came late by so many ticks, shape (n,)."""
-    return Ticks(late.size, int(np.sum(late > 0.5)), int(np.sum(np.floor(late))))
+    return Ticks(late.size, int(np.sum(late > LATE_TICK)), int(np.sum(np.floor(late))))
 
 
 def _sampled(

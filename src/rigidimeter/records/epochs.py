@@ -158,6 +158,10 @@ class LeftOut(NamedTuple):
         return self.check == LOST_SAMPLES
 
 
+LATE_TICK = 0.5
+"""A tick that begins by more than so much of its length after it was due is late."""
+
+
 class Ticks(NamedTuple):
     """How punctual the loop was in an epoch.
 
@@ -165,15 +169,20 @@ class Ticks(NamedTuple):
     ----------
     ran : int
     late : int
-        Of those that ran, how many began more than half a tick after they were due.
+        Of those that ran, how many were late.
     missed : int
-        That never ran, because the one before them was still late when they were due. Nothing was
-        sent at them: the drive held its command.
+        That never ran, because the loop was still late when they were due. Nothing was sent at
+        them: the drive held its command.
     """
 
     ran: int
     late: int
     missed: int
+
+    @property
+    def missed_percent(self) -> float:
+        """The share of the ticks due that never ran."""
+        return 100.0 * self.missed / (self.ran + self.missed)
 
 
 @dataclass(frozen=True)
