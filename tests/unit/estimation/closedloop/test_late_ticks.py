@@ -15,7 +15,7 @@ from rigidimeter.estimation.methods import method_named
 from rigidimeter.estimation.prepared import prepare
 from rigidimeter.experiment import plan
 from rigidimeter.recording import SessionWriter, read
-from rigidimeter.records import Channel
+from rigidimeter.records import Channel, Ticks
 from rigidimeter.settings import parse_settings
 
 EPOCH_S = 12.0
@@ -51,6 +51,40 @@ def estimated(epoch, method="iv"):
     (prepared,) = prepare([epoch], SETTINGS)
     (fit,), _ = method_named(method).fit([prepared], None, lambda _: None, False)
     return checked(prepared, fit)
+
+
+def test_late_and_missed_ticks_are_counted(recorded):
+    epoch, _ = recorded({500: 0.0005, 700: 0.0204, 900: 0.0006})
+    assert epoch.ticks == Ticks(ran=11980, late=2, missed=20)
+    assert epoch.ticks.missed_percent == pytest.approx(100 * 20 / 12000)
+
+
+@pytest.mark.parametrize(
+    ("missed", "method", "level"),
+    [(12, "iv", None), (13, "iv", "note"), (13, "bandlimited", "note"), (13, "published", "doubt")],
+)
+def test_above_a_thousandth_missed_ticks_are_a_finding_that_says_what_they_do(
+    recorded, missed, method, level
+):
+    epoch, _ = recorded({})
+    fit = estimated(replace(epoch, ticks=Ticks(12000 - missed, 4, missed)), method)
+    found = {each.name: each for each in fit.findings}.get("missed_ticks")
+    if level is None:
+        assert found is None
+        return
+    assert found.level == level
+    assert found.text.startswith(
+        "13 of 12000 ticks never ran (0.11 %, at most 0.1 %), and 4 were late: the drive held its "
+        "command at them"
+    )
+    assert ("nothing moves J, B and K beyond their intervals" in found.text) == (level == "note")
+    assert "--cpu" in found.remedy
+
+
+def test_without_the_loops_own_counts_nothing_is_said_of_ticks(recorded):
+    epoch, _ = recorded({})
+    fit = estimated(replace(epoch, ticks=None))
+    assert "missed_ticks" not in {each.name for each in fit.findings}
 
 
 def some_late(ticks, seed=0):
