@@ -152,6 +152,7 @@ def _drives() -> Iterator[Scenario]:
         drive={"kind": VELOCITY_PI, "bandwidth_hz": 50.0, "friction_nm": 3.0},
     )
     yield scenario("slow position loop 40/s", DRIVE, drive={"kind": POSITION_LOOP})
+    yield scenario("2 % of ticks late, 1 ms", controller={"late": 0.02})
     yield scenario(
         "controller twice the settings",
         controller={"inertia_kg_m2": 0.0916732, "damping_nm_s_rad": 3.208564},

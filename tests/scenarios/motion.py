@@ -144,7 +144,7 @@ def _late(history, place):
 
 @njit(cache=True, error_model="numpy")
 def _run(
-    joint, drive, path, filter_b, filter_a, decay, gain, courses, asked, seen, added, x, ratio
+    joint, drive, path, filter_b, filter_a, decay, gain, courses, asked, seen, added, x, ratio, runs
 ):
     """Run an epoch; see `run`. `seen` is the fine step of the newest torque sample at each tick."""
     ticks = asked.size
@@ -152,7 +152,8 @@ def _run(
     h = 1.0 / FINE_HZ
     angle, velocity, torque = np.empty(steps), np.empty(steps), np.empty(steps)
     limb = np.zeros(steps + 1)
-    commands = np.zeros(ticks)
+    commands, in_force = np.zeros(ticks), np.zeros(steps)
+    tick, sent, due = 0, 0.0, 0
     course, now = np.empty(courses.shape[0]), np.empty(x.size)
     slopes = np.empty((4, x.size))
     held_b1 = held_b2 = admitted = 0.0
@@ -162,21 +163,26 @@ def _run(
     for k in range(steps):
         time_s = k * h
         limb[k] = x[5] if soft else x[1]
-        tick = k // ratio
-        before = commands[(k - 1 - behind) // ratio] if k - 1 - behind >= 0 else 0.0
+        before = in_force[k - 1 - behind] if k - 1 - behind >= 0 else 0.0
         _at(courses, time_s, course)
         angle[k], velocity[k] = x[0], x[1]
         torque[k] = _change(
             joint, drive, path, x, before, course, _late(limb[: k + 1], k - late), slopes[0]
         )
-        if k % ratio == 0:
+        while tick < ticks and runs[tick] < 0:
+            tick += 1  # missed
+        if tick < ticks and runs[tick] == k:
             reading = torque[seen[tick]] + added[tick] if seen[tick] >= 0 else 0.0
             smooth = filter_b[0] * reading + held_b1
             held_b1 = filter_b[1] * reading - filter_a[1] * smooth + held_b2
             held_b2 = filter_b[2] * reading - filter_a[2] * smooth
-            admitted = decay * admitted + gain * (asked[tick] - smooth)
-            commands[tick] = admitted + course[IMPOSED]
-        command = commands[(k - behind) // ratio] if k >= behind else 0.0
+            for _ in range(due, tick + 1):
+                admitted = decay * admitted + gain * (asked[tick] - smooth)
+            commands[tick] = sent = admitted + course[IMPOSED]
+            tick += 1
+            due = tick
+        in_force[k] = sent
+        command = in_force[k - behind] if k >= behind else 0.0
         for stage in range(4):
             if stage == 0 and command == before:
                 continue  # it is there already
@@ -210,6 +216,7 @@ def run(
     perturbation_nm: Array,
     seen: NDArray[np.int64],
     added_nm: Array,
+    runs: NDArray[np.int64] | None = None,
     start_rad: float = 0.0,
     start_rad_s: float = 0.0,
 ) -> tuple[Array, Array, Array, Array]:
@@ -225,6 +232,8 @@ def run(
         The fine step at which the newest torque sample of each tick was taken; −1 for none yet.
     added_nm : array, shape (ticks,)
         Noise of that sample.
+    runs : array of int, shape (ticks,)
+        The fine step at which each tick runs, −1 where it is missed; when it is due if not given.
     start_rad, start_rad_s : float
         Of the limb behind a cuff; everything else starts from rest.
     """
@@ -239,7 +248,7 @@ def run(
     angle, velocity, torque, commands = _run(
         joint, drive, path, numerator, denominator, decay,
         (1.0 - decay) / controller.damping_nm_s_rad, courses, perturbation_nm, seen, added_nm,
-        state, ratio,
+        state, ratio, np.arange(perturbation_nm.size) * ratio if runs is None else runs,
     )  # fmt: skip
     return angle, velocity, torque, commands
 

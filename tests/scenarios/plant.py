@@ -126,9 +126,14 @@ class Controller(NamedTuple):
     inertia_kg_m2, damping_nm_s_rad : float
     torque_cutoff_hz : float
     tick_rate_hz : float
+    late, late_s : float
+        Share of the ticks that are late, and by how much in the mean. Those that are due meanwhile
+        are missed.
     """
 
     inertia_kg_m2: float
     damping_nm_s_rad: float
     torque_cutoff_hz: float = 20.0
     tick_rate_hz: float = 1000.0
+    late: float = 0.0
+    late_s: float = 0.001

@@ -13,7 +13,7 @@ from tests.scenarios.plant import Controller, Drive, Joint, TorquePath
 from tests.scenarios.sensors import Sensor, kept, newest, recorded, stamp_errors_s, taken
 from tests.scenarios.subject import Subject, courses
 
-from rigidimeter.records import Channel, Epoch
+from rigidimeter.records import Channel, Epoch, Ticks
 
 Array = NDArray[np.float64]
 MEASURED = ("torque_nm", "angle_rad", "velocity_rad_s")
@@ -69,6 +69,7 @@ def _epoch(setup: Setup, number: int, rng: np.random.Generator) -> tuple[Epoch, 
     at_ms = np.arange(course.shape[1]) / COURSE_HZ
     added = setup.torque.noise * rng.standard_normal(torque_steps.size)
     added += np.interp(torque_steps / FINE_HZ, at_ms, course[ADDED])
+    runs = ticks_run(setup.controller, ticks, rng)
     angle, velocity, torque, command = run(
         setup.joint,
         setup.drive,
@@ -78,14 +79,18 @@ def _epoch(setup: Setup, number: int, rng: np.random.Generator) -> tuple[Epoch, 
         perturbation,
         np.where(which >= 0, torque_steps[which], -1),
         added[which],
+        runs,
     )
     channels = [
         _channel("torque_nm", torque[torque_steps] + added, torque_steps, setup.torque, rng)
     ]
     channels += _motion(setup, angle, velocity, rng)
-    tick_s = np.arange(ticks) / tick_rate_hz
-    channels.append(Channel("velocity_command_rad_s", tick_s, command))
-    channels.append(Channel("perturbation_nm", tick_s, perturbation))
+    ran = runs >= 0
+    late_by = runs / FINE_HZ * tick_rate_hz - np.arange(ticks)
+    late = ran & ((late_by > 0.5) | ~np.roll(ran, 1))
+    tick_s = runs[ran] / FINE_HZ
+    channels.append(Channel("velocity_command_rad_s", tick_s, command[ran]))
+    channels.append(Channel("perturbation_nm", tick_s, perturbation[ran]))
     epoch = Epoch(
         source="simulated elsewhere",
         label=str(number),
@@ -94,9 +99,27 @@ def _epoch(setup: Setup, number: int, rng: np.random.Generator) -> tuple[Epoch, 
         task="prbs",
         excitation_hz=asked.band_hz,
         virtual=True,
+        ticks=Ticks(int(np.sum(ran)), int(np.sum(late)), int(np.sum(~ran))),
     )
     J, B, K = setup.joint.inertia_kg_m2, setup.joint.damping_nm_s_rad, setup.joint.stiffness_nm_rad
     return epoch, np.array([J, B * course[DAMPING].mean(), K * course[STIFFNESS].mean()])
+
+
+def ticks_run(controller: Controller, ticks: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return the fine step at which each tick runs, −1 where it is missed."""
+    ratio = round(FINE_HZ / controller.tick_rate_hz)
+    runs = np.arange(ticks) * ratio
+    if not controller.late:
+        return runs
+    late = rng.exponential(controller.late_s * FINE_HZ, ticks).astype(np.int64)
+    late[rng.random(ticks) >= controller.late] = 0
+    for tick in np.flatnonzero(late):
+        # A tick that is late by whole ticks runs as the last of those that are due by then.
+        runs_as = min(tick + late[tick] // ratio, ticks - 1)
+        if runs[tick] >= 0:
+            at = min(tick * ratio + late[tick], (runs_as + 1) * ratio - 1)
+            runs[tick:runs_as], runs[runs_as] = -1, at
+    return runs
 
 
 def _channel(

@@ -229,6 +229,7 @@ def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
         outcome=ending,
         reason=why,
         limited_ticks=ticks.limited_ticks,
+        late_ticks=ticks.late_ticks,
         missed_ticks=ticks.missed_ticks,
         counts=dict(session.rig.counts),
         **({"again_as": again.number} if again is not None else {}),

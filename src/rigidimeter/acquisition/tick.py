@@ -42,6 +42,7 @@ from rigidimeter.guard import (
     released,
 )
 from rigidimeter.recording.sample_log import Sample
+from rigidimeter.records import LATE_TICK
 from rigidimeter.settings import LONGEST_STEP, Settings
 
 REST = -1
@@ -59,13 +60,14 @@ class TickResult(NamedTuple):
 
     `limit_time_s` is when the position limit first held the command back, NaN if it never did.
     `cause` is why the guard latched, `Cause.NONE` if it did not. `limited_ticks` counts the
-    commands that the guard changed, for whatever limit; `missed_ticks` the ticks that were left
-    out. `interrupted` says whether an operator ended the stretch.
+    commands that the guard changed, for whatever limit; `late_ticks` and `missed_ticks` are as
+    `records.Ticks` has them. `interrupted` says whether an operator ended the stretch.
     """
 
     limit_time_s: float
     cause: Cause
     limited_ticks: int
+    late_ticks: int = 0
     missed_ticks: int = 0
     interrupted: bool = False
 
@@ -113,6 +115,7 @@ class ControlLoop:
         self.supervision = supervision or NoSupervision()
         self.rate_hz = settings.rig.tick_rate_hz
         self.interval_s = 1.0 / self.rate_hz
+        self.late_s = LATE_TICK * self.interval_s
         self.ticks_per_second = round(self.rate_hz)
         self.missed_limit = settings.loop.missed_in_a_row
         self.stall_ticks = settings.loop.stall_s * self.rate_hz
@@ -127,7 +130,7 @@ class ControlLoop:
         self.tick = self.until_tick = 0
         self.elapsed_ticks = 1
         self.late_in_a_row = 0
-        self.missed_ticks = 0
+        self.late_ticks = self.missed_ticks = 0
         self.limited_ticks = 0
         self.limit_time_s = math.nan
         self.angle_rad = 0.0
@@ -198,7 +201,7 @@ def run_ticks(
         Also run where the guard has latched already: the rig stands still, held.
     """
     loop.limit_time_s = math.nan
-    loop.limited_ticks = loop.missed_ticks = 0
+    loop.limited_ticks = loop.late_ticks = loop.missed_ticks = 0
     known = loop.guard.reaction if latched else 0
     interrupted = False
     loop.until_tick = loop.tick + n
@@ -214,7 +217,7 @@ def run_ticks(
             break
         if loop.tick % loop.ticks_per_second == 0:
             loop.progress(loop.time_s)
-    counts = loop.limited_ticks, loop.missed_ticks
+    counts = loop.limited_ticks, loop.late_ticks, loop.missed_ticks
     return TickResult(loop.limit_time_s, loop.cause, *counts, interrupted)
 
 
@@ -235,6 +238,8 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
     due_s = loop.tick / loop.rate_hz
     now_s = loop.clock.wait_until(due_s)
     lateness_s = now_s - due_s
+    if lateness_s > loop.late_s:
+        loop.late_ticks += 1
     late = 0  # a cause, if so many ticks were late
     if lateness_s >= loop.interval_s:
         late = _miss(loop, int(lateness_s * loop.rate_hz))

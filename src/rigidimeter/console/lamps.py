@@ -138,7 +138,7 @@ def _lateness(settings: Settings, loop: LoopStatus, recent: RecentSamples) -> La
     largest_s, tick_s = recent.largest_lateness_s, 1.0 / settings.rig.tick_rate_hz
     words = (
         f"at most {1e3 * largest_s:.1f} ms late, limit {1e3 * settings.loop.stall_s:g} ms; "
-        f"{loop.missed_deadlines} of {loop.tick + 1} deadlines missed"
+        f"{loop.late_ticks} late and {loop.missed_ticks} missed of {loop.tick + 1} ticks"
     )
     return Lamp("lateness", Level.WATCH if largest_s >= tick_s else Level.GOOD, words)
 

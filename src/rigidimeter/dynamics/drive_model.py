@@ -147,18 +147,16 @@ class DriveModel:
     def motion(
         self,
         command_rad_s: Array,
-        interval_s: float,
+        lengths_s: float | Array,
         tick: NDArray[np.intp],
         after_s: Array,
-        late_s: Array | None = None,
     ) -> ArmMotion:
         """Return the motion under held commands, from rest, so long after ticks of given numbers.
 
-        `after_s` is from 0 up to the interval, or beyond it where nothing more was sent; the delay
-        is not taken into account. After 0 s the edge of the command has not come yet. `late_s` is
-        by how much each tick came later than evenly, if they did not come evenly.
+        `after_s` is from 0 up to the next tick, or beyond it where nothing more was sent; the delay
+        is not taken into account. After 0 s the edge of the command has not come yet.
         """
-        return HeldCommand(self, command_rad_s, interval_s, late_s).motion(tick, after_s)
+        return HeldCommand(self, command_rad_s, lengths_s).motion(tick, after_s)
 
     def held(self, command_rad_s: Array, interval_s: float) -> ArmMotion:
         """Return the motion at the ticks under held commands, from rest, without the delay."""
@@ -189,22 +187,17 @@ class HeldCommand:
 
     Parameters
     ----------
-    drive, command_rad_s, interval_s, late_s
-        As for `DriveModel.motion`.
+    drive : DriveModel
+    command_rad_s : array, shape (n,)
+    lengths_s : float or array, shape (n - 1,)
+        From each tick to the next; one number if they came evenly.
     """
 
-    def __init__(
-        self,
-        drive: DriveModel,
-        command_rad_s: Array,
-        interval_s: float,
-        late_s: Array | None = None,
-    ) -> None:
+    def __init__(self, drive: DriveModel, command_rad_s: Array, lengths_s: float | Array) -> None:
         self._drive, self._command_rad_s = drive, command_rad_s
-        lengths_s = interval_s if late_s is None else interval_s + np.diff(late_s)
         self._summed = np.concatenate(([0.0], np.cumsum(command_rad_s[:-1] * lengths_s)))
         self._states = [
-            state_at_ticks(pole, command_rad_s, interval_s, late_s) for pole in drive.poles_rad_s
+            state_at_ticks(pole, command_rad_s, lengths_s) for pole in drive.poles_rad_s
         ]
 
     def motion(self, tick: NDArray[np.intp], after_s: Array) -> ArmMotion:
@@ -247,22 +240,33 @@ def _butterworth_poles(cutoff_hz: float, order: int) -> tuple[complex, ...]:
 
 
 def state_at_ticks(
-    pole: complex, command_rad_s: Array, interval_s: float, late_s: Array | None = None
+    pole: complex, command_rad_s: Array, lengths_s: float | Array
 ) -> Array | Complex:
     """Return x of x' = λ x + c, from rest, at each tick; real for a pole that is real.
 
-    A command that came ε late is one in time, and a pulse of c_(k−1) − c_k for ε.
+    Parameters
+    ----------
+    pole : complex
+        λ, in rad/s.
+    command_rad_s : array, shape (n,)
+    lengths_s : float or array, shape (n - 1,)
+        From each tick to the next; one number if they came evenly.
     """
     growth = _growth(pole)
-    decay = np.exp(growth * interval_s)
-    held = (decay - 1) / growth * command_rad_s
-    if late_s is None:
+    if isinstance(lengths_s, float):
+        decay = np.exp(growth * lengths_s)
+        held = (decay - 1) / growth * command_rad_s
         return np.asarray(scipy.signal.lfilter([0.0, 1.0], [1.0, -decay], held))
-    before = np.concatenate(([0.0], command_rad_s[:-1]))
-    grown = np.exp(growth * late_s)
-    held = held + decay * (1 - 1 / grown) / growth * (before - command_rad_s)
-    state = scipy.signal.lfilter([0.0, 1.0], [1.0, -decay], held)
-    return np.asarray(grown * state + (grown - 1) / growth * before)
+    # With x → a x + b for each tick, one stretch after another is a₂ a₁ x + (a₂ b₁ + b₂): the
+    # stretches that end at the ticks are made twice as long until all begin at the first.
+    decays = np.exp(growth * lengths_s)
+    state = (decays - 1) / growth * command_rad_s[:-1]
+    step = 1
+    while step < state.size and np.any(decays):
+        state = np.append(state[:step], state[step:] + decays[step:] * state[:-step])
+        decays = np.append(decays[:step], decays[step:] * decays[:-step])
+        step *= 2
+    return np.append(0.0, state)
 
 
 def state_at_every(

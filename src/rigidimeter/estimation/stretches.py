@@ -9,6 +9,10 @@ Where samples are lost, every channel gets stamps as even as its others, so that
 even samples can be made of these too. What was commanded there is not known either: the command
 goes on a straight line, the perturbation keeps its level, and what follows from them is forgotten
 as what was before the epoch is.
+
+At a tick that our own loop missed nothing was sent, and the drive held its command: its stamps stay
+as they are. Rows that are missing in other files may be either, and are taken for lost, the command
+on a straight line; too few for a cut, they leave what follows from it as it is.
 """
 
 from __future__ import annotations
@@ -24,6 +28,9 @@ from rigidimeter.settings import EstimationSettings
 
 LEAST_USED_S = 1.0
 
+GAP = 1.5
+"""In mean intervals: where two samples are further apart, some between them are missing."""
+
 
 def sound(epoch: Epoch, time_s: Array, margin_s: float = 0.0) -> NDArray[np.bool_]:
     """Return at which times nothing within `margin_s` is left out."""
@@ -37,12 +44,17 @@ def bridged(epoch: Epoch) -> Epoch:
     """Return the epoch with torque and motion on a straight line over what is left out.
 
     Command and perturbation stay where they were recorded: they are causes, and what follows the
-    stretch depends on them.
+    stretch depends on them. Missing samples of a command are filled in where it is not known that
+    none was sent.
     """
-    if not epoch.left_out:
-        return epoch
     lost = [stretch for stretch in epoch.left_out if stretch.lost]
-    channels = {name: _evenly(one, lost) for name, one in epoch.channels.items()}
+    unsaid = [LeftOut(-np.inf, np.inf)] if epoch.ticks is None else lost
+    channels = {
+        name: _evenly(one, unsaid if name == "velocity_command_rad_s" else lost)
+        for name, one in epoch.channels.items()
+    }
+    if not epoch.left_out and all(channels[name] is one for name, one in epoch.channels.items()):
+        return epoch
     epoch = replace(epoch, channels=channels)
     for channel in _fitted(epoch):
         kept = sound(epoch, channel.time_s)
@@ -60,6 +72,7 @@ def _evenly(channel: Channel, lost: list[LeftOut]) -> Channel:
     if not lost or steps_s.size == 0:
         return channel
     missing = np.maximum(np.rint(steps_s * channel.rate_hz).astype(np.intp) - 1, 0)
+    missing[steps_s < GAP / channel.mean_rate_hz] = 0
     middle_s = channel.time_s[:-1] + 0.5 * steps_s
     missing[
         ~np.any([(one.start_s < middle_s) & (middle_s < one.stop_s) for one in lost], axis=0)

@@ -79,6 +79,8 @@ def _plain(epoch: Mapping[str, Any]) -> Row:
         "excitation_high_hz": high_hz,
         "motion_frequency_hz": frequency_hz,
         "left_out": left_out,
+        "late_ticks": (epoch.get("ticks") or {}).get("late"),
+        "missed_ticks": (epoch.get("ticks") or {}).get("missed"),
     }
 
 

@@ -278,6 +278,7 @@ def _epoch(epoch: Epoch) -> dict[str, Any]:
         "motion": None if epoch.motion is None else asdict(epoch.motion),
         "excitation_hz": epoch.excitation_hz,
         "left_out": [each._asdict() for each in epoch.left_out],
+        "ticks": None if epoch.ticks is None else epoch.ticks._asdict(),
         "channels": {name: extent(channel) for name, channel in epoch.channels.items()},
     }
 

@@ -101,7 +101,7 @@ _SENTENCES = {
     Cause.DRIVE_LOST: "the drive no longer answered",
     Cause.EMERGENCY_STOP: "the emergency stop was pressed",
     Cause.OPERATOR_HALT: "the operator halted the rig",
-    Cause.DEADLINES_MISSED: "the loop missed its deadline too often in a row",
+    Cause.DEADLINES_MISSED: "the loop missed ticks too often in a row",
     Cause.STALLED: "the loop stood still for too long",
     Cause.CONSOLE_LOST: "the operator's console no longer answered",
     Cause.RECORDER_LOST: "the recorder no longer answered",

@@ -15,7 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.records import CHANNEL_UNITS, Channel, Epoch, LeftOut, Motion, Notice, Outcome
+from rigidimeter.records import (
+    CHANNEL_UNITS,
+    Channel,
+    Epoch,
+    LeftOut,
+    Motion,
+    Notice,
+    Outcome,
+    Ticks,
+)
 from rigidimeter.settings import Settings, parse_settings
 
 EXPORT_SCHEMA = "rigidimeter.export/1"
@@ -160,7 +169,7 @@ def _epoch(
     facts: Mapping[str, Any], channels: Mapping[str, Channel], source: str, *, virtual: bool
 ) -> Epoch:
     motion, band = facts.get("motion"), facts.get("excitation_hz")
-    task = facts.get("task")
+    ticks, task = facts.get("ticks"), facts.get("task")
     if task not in (None, "prbs", "sinusoid"):
         raise ValueError(f"task {task!r}")
     if facts["outcome"] not in ("included", "excluded", "failed"):
@@ -176,4 +185,5 @@ def _epoch(
         closed=Outcome(facts["outcome"], str(facts.get("reason", ""))),
         virtual=virtual,
         left_out=tuple(LeftOut(**each) for each in facts.get("left_out", ())),
+        ticks=None if ticks is None else Ticks(**ticks),
     )

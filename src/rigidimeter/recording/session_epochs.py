@@ -14,7 +14,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.lost_samples import STAMPS, lost_stretches
 from rigidimeter.recording.session_files import SessionFiles, read_session_files
 from rigidimeter.recording.session_folder import EVENTS, MANIFEST, SAMPLES, read_manifest
-from rigidimeter.records import Channel, Epoch, Motion, Notice, Outcome
+from rigidimeter.records import LATE_TICK, Channel, Epoch, Motion, Notice, Outcome, Ticks
 from rigidimeter.settings import Settings, parse_settings
 
 CHANNELS = ("torque_nm", "angle_rad", "velocity_rad_s", "velocity_command_rad_s", "perturbation_nm")
@@ -49,7 +49,7 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
     UserError
         If a file of the folder is missing or unreadable.
     """
-    files = read_session_files(folder, (*CHANNELS, *STAMPS, "epoch", "limited"))
+    files = read_session_files(folder, (*CHANNELS, *STAMPS, "epoch", "limited", "lateness_s"))
     manifest, samples, events = files.manifest, files.samples.columns, files.log.events
     settings = _settings(folder, manifest)
     notices = _damage(folder, files)
@@ -218,7 +218,13 @@ def epoch_of_samples(
         ),
         closed=closed,
         virtual=virtual,
+        ticks=_ticks(samples["lateness_s"][rows] * settings.rig.tick_rate_hz),
     )
+
+
+def _ticks(late: NDArray[Any]) -> Ticks:
+    """Return the counts of ticks that came late by so many ticks, shape (n,)."""
+    return Ticks(late.size, int(np.sum(late > LATE_TICK)), int(np.sum(np.floor(late))))
 
 
 def _sampled(

@@ -7,6 +7,7 @@ from rigidimeter.records.analysis_record import Analysis
 from rigidimeter.records.band_estimate import BandEstimate
 from rigidimeter.records.epochs import (
     CHANNEL_UNITS,
+    LATE_TICK,
     LOST_SAMPLES,
     Channel,
     Epoch,
@@ -15,6 +16,7 @@ from rigidimeter.records.epochs import (
     Notice,
     Outcome,
     Task,
+    Ticks,
     readonly,
 )
 from rigidimeter.records.estimates import FIT_NUMBERS, STATISTICS, Delay, Finding, Fit, Score
@@ -23,6 +25,7 @@ from rigidimeter.records.parameters import PARAMETER_VECTORS, PARAMETERS
 __all__ = [
     "CHANNEL_UNITS",
     "FIT_NUMBERS",
+    "LATE_TICK",
     "LOST_SAMPLES",
     "PARAMETERS",
     "PARAMETER_VECTORS",
@@ -40,5 +43,6 @@ __all__ = [
     "Outcome",
     "Score",
     "Task",
+    "Ticks",
     "readonly",
 ]

@@ -158,6 +158,33 @@ class LeftOut(NamedTuple):
         return self.check == LOST_SAMPLES
 
 
+LATE_TICK = 0.5
+"""A tick that begins by more than so much of its length after it was due is late."""
+
+
+class Ticks(NamedTuple):
+    """How punctual the loop was in an epoch.
+
+    Attributes
+    ----------
+    ran : int
+    late : int
+        Of those that ran, how many were late.
+    missed : int
+        That never ran, because the loop was still late when they were due. Nothing was sent at
+        them: the drive held its command.
+    """
+
+    ran: int
+    late: int
+    missed: int
+
+    @property
+    def missed_percent(self) -> float:
+        """The share of the ticks due that never ran."""
+        return 100.0 * self.missed / (self.ran + self.missed)
+
+
 @dataclass(frozen=True)
 class Epoch:
     """A stretch of recording in which one perturbation ran.
@@ -187,6 +214,8 @@ class Epoch:
         What of it is not used.
     clock_error_s : float
         Standard error of the offset between the clocks of torque and motion, where it was found.
+    ticks : Ticks or None
+        Those of the loop that sent the command; None where the recording does not say.
     """
 
     source: str
@@ -200,6 +229,7 @@ class Epoch:
     virtual: bool = False
     left_out: tuple[LeftOut, ...] = ()
     clock_error_s: float = 0.0
+    ticks: Ticks | None = None
 
     @property
     def name(self) -> str:

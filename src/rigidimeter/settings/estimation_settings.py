@@ -107,6 +107,7 @@ class DiagnosticLevels(Section):
     velocity_delay: Level = "doubt"
     torque_delay: Level = "doubt"
     velocity_shape: Level = "doubt"
+    missed_ticks: Level = "doubt"
     guard_limited: Level = "doubt"
     position_limit: Level = "doubt"
     negative_parameters: Level = "doubt"
@@ -165,6 +166,7 @@ class DiagnosticsSettings(Section):
     velocity_scale_most_percent: float = quantity(10.0, "%", 0.1, 1000.0)
     velocity_delay_most_ms: float = quantity(5.0, "ms", 0.01, 1000.0)
     velocity_shape_most_percent: float = quantity(5.0, "%", 0.0, 1000.0)
+    missed_ticks_most_percent: float = quantity(0.1, "%", 0.0, 100.0)
     limited_most_percent: float = quantity(1.0, "%", 0.0, 100.0)
     position_most_percent: float = quantity(98.0, "%", 1.0, 100.0)
     controller_misfit_most_percent: float = quantity(20.0, "%", 0.0, 1000.0)

@@ -21,7 +21,7 @@ def test_a_late_tick_is_not_made_up_for_and_everybody_is_told():
     assert [round(t / INTERVAL_S) for t in loop.clock.deadlines_s] == [0, 1, 2, 3, 6, 7, 8, 9]
     assert samples[3].lateness_s == pytest.approx(0.0025)
     assert samples[3].time_s == pytest.approx(0.0055)
-    assert (ended.missed_ticks, ended.cause) == (2, Cause.NONE)
+    assert (ended.late_ticks, ended.missed_ticks, ended.cause) == (1, 2, Cause.NONE)
     assert run_ticks(loop, 1, 3, constant(0.0)).missed_ticks == 0
 
 
@@ -29,6 +29,13 @@ def test_a_tick_late_by_less_than_its_length_misses_none_by_its_length_one():
     for late_s, missed in ((0.00099, 0), (0.001, 1)):
         loop, _ = made(SETTINGS, late={0: late_s})
         assert run_ticks(loop, 1, 5, constant(0.0)).missed_ticks == missed
+
+
+def test_a_tick_late_by_more_than_half_of_one_is_late_and_nothing_is_missed():
+    loop, _ = made(SETTINGS, late={1: 0.0005, 3: 0.00051, 5: 0.0009})
+    ended = run_ticks(loop, 1, 10, constant(0.0))
+    assert (ended.late_ticks, ended.missed_ticks) == (2, 0)
+    assert run_ticks(loop, 1, 3, constant(0.0)).late_ticks == 0
 
 
 def test_a_tick_late_beyond_the_end_of_its_stretch_is_its_last():

@@ -135,11 +135,12 @@ def test_what_the_loop_shows_is_the_sample(shared):
         assert getattr(status, name) == getattr(whole, name), name
 
 
-def test_a_tick_that_is_late_by_a_whole_one_is_a_missed_deadline(shared):
+def test_a_tick_late_by_more_than_half_is_late_and_whole_ones_were_missed(shared):
     sink = RingSink(shared, tick_rate_hz=10.0)
-    for k, late_s in enumerate((0.0, 0.0995, 0.1, 0.25)):
+    for k, late_s in enumerate((0.0, 0.05, 0.051, 0.0995, 0.1, 0.25)):
         sink.sample(sample(0.1 * k, late_s))
-    assert shared.status.loop().missed_deadlines == 2
+    status = shared.status.loop()
+    assert (status.late_ticks, status.missed_ticks) == (4, 3)
 
 
 @pytest.mark.parametrize("state", [State.STOPPING, State.FAULTED])

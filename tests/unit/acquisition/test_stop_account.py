@@ -89,7 +89,7 @@ def test_deadlines_missed_in_a_row():
     late = {0: 0.001, 2: 0.001, 4: 0.001}
     account = stopped(late=late, values={"loop": {"missed_in_a_row": 3}})
     assert account.sentence.startswith(
-        "the loop missed its deadline too often in a row: 3 ticks in a row, for 3 ms, "
+        "the loop missed ticks too often in a row: 3 ticks in a row, for 3 ms, "
         "limit 3 ticks in a row (loop.missed_in_a_row)"
     )
 

@@ -158,7 +158,7 @@ def test_all_lamps_are_good_and_say_what_they_know():
     assert found["limits"].words == "angle 10.0 of 40 deg (25 %)"
     assert found["sensor"].words == "torque 1 ms old, limit 100 ms"
     assert found["lateness"].words == (
-        "at most 0.1 ms late, limit 40 ms; 0 of 30001 deadlines missed"
+        "at most 0.1 ms late, limit 40 ms; 0 late and 0 missed of 30001 ticks"
     )
     assert found["recorder"].words == "0.1 s of samples wait, limit 2 s"
     assert found["disk"].words == "40.0 GB free, 0 s not yet on the disk"

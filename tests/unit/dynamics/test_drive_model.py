@@ -123,3 +123,26 @@ def test_the_state_at_every_so_many_ticks_is_that_of_each_tick(pole, first, stri
     assert found == pytest.approx(np.array(states[first::stride]), rel=1e-12)
     each = state_at_ticks(pole, command, 1e-3)
     assert each == pytest.approx(np.array(states), rel=1e-12)
+
+
+@pytest.mark.parametrize("rate", [20.0, 300.0, 6000.0])
+def test_a_command_that_is_held_for_many_ticks_moves_the_drive_by_the_closed_form(rate):
+    """v' = λ (c − v) is the sum of its steps: v(t) = Σ (c_k − c_(k−1)) (1 − e^(−λ (t − t_k)))."""
+    rng = np.random.default_rng(0)
+    lengths_s = 1e-3 * rng.choice(
+        [0.4, 1.0, 1.6, 20.4, 500.0], size=299, p=[0.2, 0.5, 0.2, 0.08, 0.02]
+    )
+    ticks_s = np.concatenate(([0.0], np.cumsum(lengths_s)))
+    commands = rng.standard_normal(300)
+    after_s = rng.uniform(0.0, 1.0, 299) * lengths_s
+    since_s = (ticks_s[:-1] + after_s)[:, None] - ticks_s
+    steps = np.diff(commands, prepend=0.0)
+    velocity = np.sum(steps * -np.expm1(-rate * np.maximum(since_s, 0.0)), axis=1)
+    angle = np.sum(steps * np.maximum(since_s, 0.0), axis=1) - velocity / rate
+    model = DriveModel((complex(-rate),), (complex(rate),))
+    found = model.motion(commands, lengths_s, np.arange(299), after_s)
+    np.testing.assert_allclose(found.velocity_rad_s, velocity, atol=1e-11)
+    np.testing.assert_allclose(found.angle_rad, angle, atol=1e-11)
+    np.testing.assert_allclose(
+        found.acceleration_rad_s2, rate * (commands[:-1] - velocity), rtol=1e-9, atol=1e-8
+    )

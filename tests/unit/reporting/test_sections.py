@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import pytest
 from matplotlib.figure import Figure as Drawing
 
-from rigidimeter.records import Delay, Outcome
+from rigidimeter.records import Delay, Outcome, Ticks
 from rigidimeter.reporting import SECTIONS, Column, Figure, Section, Table, paragraph, report
 from rigidimeter.reporting.contents import Block
 from rigidimeter.reporting.page import contents
@@ -181,6 +181,14 @@ def test_counts_add_up(study: StudyResult) -> None:
         ("imposed sinusoid", "OFF", 4),
         ("imposed sinusoid", "DBS", 4),
     }
+
+
+def test_late_and_missed_ticks_are_counted_epoch_by_epoch(study: StudyResult) -> None:
+    late = dataclasses.replace(study.epochs[0], ticks=Ticks(19_000, 200, 1000))
+    unknown = [dataclasses.replace(epoch, ticks=None) for epoch in study.epochs[1:]]
+    rows = rows_of(dataclasses.replace(study, epochs=(late, *unknown)), "ticks")
+    counts = {"ran": 19_000, "late": 200, "missed": 1000, "missed_percent": 5.0}
+    assert rows == [{"source": late.source, "epoch": late.label, **counts}]
 
 
 def test_three_conditions_are_all_summarised(make_study, make_analysis) -> None:

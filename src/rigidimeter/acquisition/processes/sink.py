@@ -23,6 +23,7 @@ from rigidimeter.acquisition.tick import ControlLoop
 from rigidimeter.guard import Cause
 from rigidimeter.recording.sample_log import Sample
 from rigidimeter.recording.session_folder import Ending
+from rigidimeter.records import LATE_TICK
 
 CLOCK_BOOTTIME = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
 """Goes on while the computer is suspended, where the system has such a clock."""
@@ -45,7 +46,7 @@ class RingSink:
     shared : SessionMemory
         The loop's heart beats there with every sample, and its status is shown now and then.
     tick_rate_hz : float
-        A tick that is later than a whole one has missed its deadline.
+        Late and missed ticks are counted by it.
     """
 
     def __init__(self, shared: SessionMemory, tick_rate_hz: float) -> None:
@@ -53,8 +54,8 @@ class RingSink:
         self._push = shared.samples.push
         self._words = shared.status.memory.words
         self._heart = shared.status.places()[-1]
-        self._interval_s = 1.0 / tick_rate_hz
-        self._missed = 0
+        self._rate_hz = tick_rate_hz
+        self._late = self._missed = 0
         self._state, self._pending = State.IDLE, 0
         self._loop: ControlLoop | None = None
         self._begun = False
@@ -67,8 +68,10 @@ class RingSink:
         self._push(sample)
         self.last_time_s = time_s = sample.time_s
         self._words[self._heart] = monotonic_ns()
-        if sample.lateness_s >= self._interval_s:
-            self._missed += 1
+        late_ticks = sample.lateness_s * self._rate_hz
+        if late_ticks > LATE_TICK:
+            self._late += 1
+            self._missed += int(late_ticks)
         if time_s >= self._show_s:
             self._show_s = time_s + SHOWN_S
             self._show(sample)
@@ -84,7 +87,8 @@ class RingSink:
                 tick=sample.tick,
                 epoch=sample.epoch,
                 cause=sample.cause,
-                missed_deadlines=self._missed,
+                late_ticks=self._late,
+                missed_ticks=self._missed,
                 pending=self._pending,
                 time_s=sample.time_s,
                 angle_rad=sample.angle_rad,

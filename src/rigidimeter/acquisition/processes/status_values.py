@@ -60,7 +60,8 @@ class LoopStatus(NamedTuple):
     tick: int = -1
     epoch: int = -1
     cause: int = int(Cause.NONE)
-    missed_deadlines: int = 0
+    late_ticks: int = 0
+    missed_ticks: int = 0
     pending: int = 0
     time_s: float = 0.0
     angle_rad: float = math.nan

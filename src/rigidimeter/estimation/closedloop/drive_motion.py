@@ -23,8 +23,7 @@ class DrivenAt:
 
     def __init__(self, drive: DriveModel, command: Channel) -> None:
         self.drive, self.command = drive, command
-        interval_s = 1.0 / command.mean_rate_hz
-        self._held = HeldCommand(drive, command.values, interval_s, lateness_s(command))
+        self._held = HeldCommand(drive, command.values, lengths_s(command))
         self._made: list[tuple[Array, ArmMotion]] = []
 
     def __call__(self, time_s: Array) -> ArmMotion:
@@ -37,12 +36,13 @@ class DrivenAt:
         return motion
 
 
-def lateness_s(command: Channel) -> Array | None:
-    """Return by how much each tick came later than evenly, at least 0; None where all were even."""
+def lengths_s(command: Channel) -> float | Array:
+    """Return the time from each tick to the next, shape (n - 1,); one number if all came evenly."""
     interval_s = 1.0 / command.mean_rate_hz
-    late_s = command.time_s - command.time_s[0] - interval_s * np.arange(len(command))
-    late_s -= np.min(late_s)
-    return late_s if np.max(late_s) > UNEVEN * interval_s else None
+    even_s = command.time_s[0] + interval_s * np.arange(len(command))
+    if np.ptp(command.time_s - even_s) <= UNEVEN * interval_s:
+        return interval_s
+    return np.diff(command.time_s)
 
 
 def since_ticks(

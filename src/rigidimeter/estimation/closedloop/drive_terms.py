@@ -21,7 +21,7 @@ from rigidimeter.dynamics.drive_model import (
     state_at_ticks,
     state_later,
 )
-from rigidimeter.estimation.closedloop.drive_motion import lateness_s, since_ticks
+from rigidimeter.estimation.closedloop.drive_motion import lengths_s, since_ticks
 from rigidimeter.estimation.signals import Array
 from rigidimeter.records import Channel
 
@@ -248,8 +248,7 @@ class Acting:
 
     def __init__(self, channel: Channel, time_s: Array) -> None:
         self._channel, self._time_s = channel, time_s
-        self._interval_s = 1.0 / channel.mean_rate_hz
-        self._uneven_s = lateness_s(channel)
+        self._lengths_s = lengths_s(channel)
         self._late_s = math.nan
         self._at_ticks: dict[complex, Array | Complex] = {}
         self._states: dict[complex, Array] = {}
@@ -275,8 +274,8 @@ class Acting:
             self._late_s = late_s
             self._states.clear()
             steps = np.diff(self._tick)
-            strided = steps.size and self._uneven_s is None and steps[0] > 1
-            self._stride = int(steps[0]) if strided and np.all(steps == steps[0]) else 0
+            strided = steps.size and steps[0] > 1 and np.all(steps == steps[0])
+            self._stride = int(steps[0]) if strided else 0
         if pole not in self._states:
             if len(self._states) >= MOST_STATES:
                 self._states.clear()
@@ -288,11 +287,11 @@ class Acting:
     def _before(self, pole: complex) -> Array | Complex:
         """Return the state at the tick before each time."""
         values, first = self._channel.values, int(self._tick[0])
-        if self._stride:
+        if self._stride and isinstance(self._lengths_s, float):
             used = values[: int(self._tick[-1]) + 1]
-            return state_at_every(pole, used, self._interval_s, first, self._stride)
+            return state_at_every(pole, used, self._lengths_s, first, self._stride)
         if pole not in self._at_ticks:
             if len(self._at_ticks) >= MOST_STATES:
                 self._at_ticks.clear()
-            self._at_ticks[pole] = state_at_ticks(pole, values, self._interval_s, self._uneven_s)
+            self._at_ticks[pole] = state_at_ticks(pole, values, self._lengths_s)
         return self._at_ticks[pole][self._tick]

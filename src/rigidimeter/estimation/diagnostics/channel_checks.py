@@ -23,7 +23,7 @@ from rigidimeter.estimation.diagnostics.check_record import (
     in_full,
 )
 from rigidimeter.estimation.stretches import left_out_s
-from rigidimeter.records import LOST_SAMPLES, Channel, Epoch, LeftOut
+from rigidimeter.records import LOST_SAMPLES, Channel, Epoch, LeftOut, Ticks
 from rigidimeter.settings import DiagnosticsSettings
 
 MOST_SHOWN = 3
@@ -133,6 +133,28 @@ def _rest(epoch: Epoch) -> str:
     return f"{whole_s - left_out_s(epoch):.3g} of {whole_s:.3g} s are used"
 
 
+def missed_ticks(ticks: Ticks, settings: DiagnosticsSettings) -> Look:
+    """Return in what share of the ticks that were due the loop did not run, in %."""
+    most = settings.missed_ticks_most_percent
+    fact = (
+        f"{ticks.missed} of {ticks.ran + ticks.missed} ticks never ran "
+        f"({in_full(ticks.missed_percent)} %, at most {most:g} %), and {ticks.late} were late"
+    )
+    return at_most(ticks.missed_percent, most, fact)
+
+
+def _followed(case: Case, look: Look) -> str:
+    """Return that the estimate follows a command that was held, where it knows the drive."""
+    del look
+    by_samples = case.method is None or case.method.as_recorded
+    if by_samples or case.prepared is None or case.prepared.source.drive is None:
+        return ""
+    return (
+        "the drive held its command at them, and the estimate allows for that: nothing moves J, B "
+        "and K beyond their intervals"
+    )
+
+
 def guard_limited(limited: ArrayLike, settings: DiagnosticsSettings) -> Look:
     """Return in what share of the ticks the guard changed the command.
 
@@ -208,6 +230,17 @@ CHANNEL_CHECKS = (
         "read a copy of the recording that is whole; test the disk that it was on",
         of_fit=False,
         harmless=_said_lost,
+    ),
+    Check(
+        "missed_ticks",
+        ("velocity_command_rad_s",),
+        lambda c: None if c.epoch.ticks is None else missed_ticks(c.epoch.ticks, c.settings),
+        "the drive held its command at them, and how the joint then moved between the samples is "
+        "not known",
+        "run it on a processor of its own with `--cpu N`, close other programs, or lower "
+        "rig.tick_rate_hz",
+        of_fit=False,
+        harmless=_followed,
     ),
     Check(
         "guard_limited",

@@ -7,6 +7,7 @@ k-th epoch in them. So the epochs are those of the session folder.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,12 @@ def epochs_of_samples(
     samples = {name: columns[name].astype(kind) for name, kind in sample_dtypes().items()}
     settings = settings_of_samples(described, source)
     virtual = _fact(described, "virtual") == "true"
-    notices = _lost(source, samples["tick"])
+    ticks_late = samples["lateness_s"] * settings.rig.tick_rate_hz
+    lost = _lost(samples["tick"], ticks_late)
+    notices = []
+    if lost > 0:
+        text = "ticks are not in the recording of the stream; they are in the session folder"
+        notices.append(Notice("warning", f"{source}: {lost} {text}"))
     first, last = epoch_extents(samples["epoch"])
     ordered = sorted(markers, key=lambda each: each[0])
     starts = [text.split("/") for _, text in ordered if text.startswith("epoch_start/")]
@@ -91,22 +97,18 @@ def epochs_of_samples(
             closed = Outcome("excluded", f"it ended with {outcome or 'no marker'}")
         rows = slice(first[number], last[number] + 1)
         started = {"label": label, "task": task, "condition": condition}
-        epochs.append(
-            epoch_of_samples(source, settings, samples, rows, started, closed, virtual=virtual)
-        )
+        epoch = epoch_of_samples(source, settings, samples, rows, started, closed, virtual=virtual)
+        if _lost(samples["tick"][rows], ticks_late[rows]):
+            epoch = replace(epoch, ticks=None)  # commands are missing that the drive got
+        epochs.append(epoch)
     return epochs, notices
 
 
-def _lost(source: str, tick: NDArray[Any]) -> list[Notice]:
-    """Say how many samples the recording program did not receive."""
-    lost = int(tick[-1] - tick[0] + 1 - tick.size) if tick.size else 0
-    if lost <= 0:
-        return []
-    text = (
-        f"{source}: {lost} ticks are not in the recording of the stream; they are in the session "
-        "folder, unless the loop itself was late"
-    )
-    return [Notice("warning", text)]
+def _lost(tick: NDArray[Any], ticks_late: NDArray[np.float64]) -> int:
+    """Return how many samples the recording program did not receive: missed ticks have none."""
+    if not tick.size:
+        return 0
+    return int(tick[-1] - tick[0] + 1 - tick.size - np.sum(np.floor(ticks_late[1:])))
 
 
 def _fact(described: Mapping[str, Any], name: str) -> str:

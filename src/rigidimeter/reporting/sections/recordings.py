@@ -95,6 +95,27 @@ def _design(result: StudyResult) -> Iterator[Block]:
         list(_counts(result)),
         empty="There are no epochs.",
     )
+    yield Table(
+        "ticks",
+        "Late and missed ticks of the loop",
+        (
+            Column("source", "Source", "source"),
+            Column("epoch", "Epoch", "label"),
+            Column("ran", "Ticks", "count"),
+            Column("late", "Late", "count"),
+            Column("missed", "Missed", "count"),
+            Column("missed_percent", "Missed (%)"),
+        ),
+        [
+            {"source": epoch.source, "epoch": epoch.label, **epoch.ticks._asdict()}
+            | {"missed_percent": epoch.ticks.missed_percent}
+            for epoch in result.epochs
+            if epoch.ticks is not None
+        ],
+        note="A tick that began more than half a tick after it was due was late; one that never "
+        "ran was missed, and the drive held its command.",
+        folding=True,
+    )
     names = ("part", "quantity", "value", "unit")
     yield Table(
         "design",

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from rigidimeter.estimation.closedloop.drive_fit import STRUCTURES, fit_drive
 from rigidimeter.estimation.closedloop.drive_motion import driven, since_ticks
 from rigidimeter.estimation.closedloop.drive_search import _slopes, explainable
 from rigidimeter.estimation.closedloop.drive_terms import Fitted, Samples
-from rigidimeter.records import Channel, Epoch
+from rigidimeter.records import Channel, Epoch, Ticks
 
 
 def stepped(commands, bandwidth_hz=40.0, ratio=0.8, interval_s=1e-3):
@@ -129,6 +130,9 @@ def test_a_command_that_was_logged_more_slowly_than_it_was_sent_gives_no_drive()
     velocity = driven(model, command, command.time_s).velocity_rad_s[::10]
     epoch = recorded(fine[::10], velocity, 0.005)
     assert fit_drive(epoch, DriveModel.second_order(50.0, 0.7071)) is None
+    # A loop of ours logs each command, so there the stairs are known.
+    ours = replace(epoch, ticks=Ticks(2000, 0, 0))
+    assert fit_drive(ours, DriveModel.second_order(50.0, 0.7071)) is not None
 
 
 def drive_of(poles, numerator):

@@ -44,7 +44,7 @@ def test_the_epochs_are_those_of_the_folder(session: Path, received) -> None:
     assert settings_of_samples(received["described"], "there") == read(session).settings
 
 
-def test_samples_that_were_not_received_are_counted(received) -> None:
+def test_samples_that_were_not_received_are_counted(session: Path, received) -> None:
     columns = {
         name: np.delete(values, slice(100, 150)) for name, values in received["columns"].items()
     }
@@ -52,6 +52,18 @@ def test_samples_that_were_not_received_are_counted(received) -> None:
     assert notice.level == "warning"
     assert "50 ticks are not in the recording" in notice.text
     assert len(epochs) == 2
+    # What was sent in them is not known; in the other epoch every tick is.
+    assert [epoch.ticks for epoch in epochs] == [None, read(session).epochs[1].ticks]
+
+
+def test_missed_ticks_are_not_taken_for_lost(received) -> None:
+    columns = {
+        name: np.delete(values, slice(100, 150)) for name, values in received["columns"].items()
+    }
+    columns["lateness_s"][100] = 50.2 / 250.0
+    epochs, notices = epochs_of_samples("there", **{**received, "columns": columns})
+    assert notices == []
+    assert (epochs[0].ticks.late, epochs[0].ticks.missed) == (1, 50)
 
 
 def test_an_epoch_whose_end_was_not_received_does_not_count(received) -> None:
