@@ -20,9 +20,6 @@ from rigidimeter.settings import Settings, parse_settings
 CHANNELS = ("torque_nm", "angle_rad", "velocity_rad_s", "velocity_command_rad_s", "perturbation_nm")
 """The columns of samples that an epoch has."""
 
-MUCH_LIMITED = 0.01
-"""Above this share of limited ticks there is a warning."""
-
 
 def is_session(path: Path) -> bool:
     """Whether the path is a folder with a manifest, regular or not: reading it says what it is."""
@@ -96,16 +93,6 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
         if number not in ended and files.ended and files.log.damaged:
             line = f"line {files.log.damaged[0]} of {EVENTS} is damaged"
             ended[number] = {"outcome": "fail", "reason": f"how it ended is not known: {line}"}
-        share = float(np.mean(samples["limited"][rows] > 0))
-        if share > MUCH_LIMITED:
-            notices.append(
-                Notice(
-                    "warning",
-                    f"{folder}, epoch {event['label']}: the guard changed {100 * share:.0f} % of "
-                    "the commands, so the arm did not follow the perturbation as designed; see the "
-                    "column limited of its samples, and the limits in [guard]",
-                )
-            )
         closed = _closed(samples["time_s"][rows], ended.get(number))
         virtual = bool(manifest["virtual"])
         epoch = epoch_of_samples(
@@ -218,13 +205,16 @@ def epoch_of_samples(
         ),
         closed=closed,
         virtual=virtual,
-        ticks=_ticks(samples["lateness_s"][rows] * settings.rig.tick_rate_hz),
+        ticks=_ticks(
+            samples["lateness_s"][rows] * settings.rig.tick_rate_hz, samples["limited"][rows]
+        ),
     )
 
 
-def _ticks(late: NDArray[Any]) -> Ticks:
-    """Return the counts of ticks that came late by so many ticks, shape (n,)."""
-    return Ticks(late.size, int(np.sum(late > LATE_TICK)), int(np.sum(np.floor(late))))
+def _ticks(late: NDArray[Any], limited: NDArray[Any]) -> Ticks:
+    """Return the counts of ticks that came late by so many ticks, and were limited, shape (n,)."""
+    counts = np.sum(late > LATE_TICK), np.sum(np.floor(late)), np.sum(limited > 0)
+    return Ticks(late.size, *map(int, counts))
 
 
 def _sampled(

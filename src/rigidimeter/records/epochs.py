@@ -173,11 +173,14 @@ class Ticks(NamedTuple):
     missed : int
         That never ran, because the loop was still late when they were due. Nothing was sent at
         them: the drive held its command.
+    limited : int
+        Of those that ran, at how many the guard changed the command.
     """
 
     ran: int
     late: int
     missed: int
+    limited: int = 0
 
     @property
     def missed_percent(self) -> float:

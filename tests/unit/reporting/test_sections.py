@@ -184,10 +184,10 @@ def test_counts_add_up(study: StudyResult) -> None:
 
 
 def test_late_and_missed_ticks_are_counted_epoch_by_epoch(study: StudyResult) -> None:
-    late = dataclasses.replace(study.epochs[0], ticks=Ticks(19_000, 200, 1000))
+    late = dataclasses.replace(study.epochs[0], ticks=Ticks(19_000, 200, 1000, 50))
     unknown = [dataclasses.replace(epoch, ticks=None) for epoch in study.epochs[1:]]
     rows = rows_of(dataclasses.replace(study, epochs=(late, *unknown)), "ticks")
-    counts = {"ran": 19_000, "late": 200, "missed": 1000, "missed_percent": 5.0}
+    counts = {"ran": 19_000, "late": 200, "missed": 1000, "limited": 50, "missed_percent": 5.0}
     assert rows == [{"source": late.source, "epoch": late.label, **counts}]
 
 

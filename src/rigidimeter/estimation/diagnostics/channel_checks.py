@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rigidimeter.estimation.bad_stretches import FITTED, longest_repetition, share_at_extremes
 from rigidimeter.estimation.diagnostics.check_record import (
@@ -155,16 +154,9 @@ def _followed(case: Case, look: Look) -> str:
     )
 
 
-def guard_limited(limited: ArrayLike, settings: DiagnosticsSettings) -> Look:
-    """Return in what share of the ticks the guard changed the command.
-
-    Parameters
-    ----------
-    limited : array, shape (n,)
-        The recorded column: 0 where the command was sent as asked for.
-    settings : DiagnosticsSettings
-    """
-    value = 100.0 * float(np.mean(np.asarray(limited) > 0))
+def guard_limited(ticks: Ticks, settings: DiagnosticsSettings) -> Look:
+    """Return in what share of the ticks the guard changed the command, in %."""
+    value = 100.0 * ticks.limited / ticks.ran
     most = settings.limited_most_percent
     return at_most(
         value, most, f"the guard changed {in_full(value)} % of the commands (at most {most:g} %)"
@@ -245,7 +237,7 @@ CHANNEL_CHECKS = (
     Check(
         "guard_limited",
         (),
-        lambda c: None if c.limited is None else guard_limited(c.limited, c.settings),
+        lambda c: None if c.epoch.ticks is None else guard_limited(c.epoch.ticks, c.settings),
         "the arm did not follow the perturbation as designed",
         "use a smaller perturbation or wider limits in [guard]",
         of_fit=False,

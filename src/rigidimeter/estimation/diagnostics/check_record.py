@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rigidimeter.dynamics import Loop
 from rigidimeter.estimation.method_record import Method
@@ -64,8 +63,6 @@ class Case:
     parameters : array, shape (3,)
         J in kg·m², B in N·m·s/rad, K in N·m/rad.
     settings : DiagnosticsSettings
-    limited : array, shape (m,), optional
-        The recorded column of what the guard changed.
     position_limit_rad : float, optional
         Where the position limit was, each way from angle 0.
     fit : Fit, optional
@@ -86,7 +83,6 @@ class Case:
     signals: Signals
     parameters: Array
     settings: DiagnosticsSettings
-    limited: ArrayLike | None = None
     position_limit_rad: float | None = None
     fit: Fit | None = None
     method: Method | None = None

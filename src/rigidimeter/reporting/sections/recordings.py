@@ -105,6 +105,7 @@ def _design(result: StudyResult) -> Iterator[Block]:
             Column("late", "Late", "count"),
             Column("missed", "Missed", "count"),
             Column("missed_percent", "Missed (%)"),
+            Column("limited", "Limited", "count"),
         ),
         [
             {"source": epoch.source, "epoch": epoch.label, **epoch.ticks._asdict()}
@@ -113,7 +114,7 @@ def _design(result: StudyResult) -> Iterator[Block]:
             if epoch.ticks is not None
         ],
         note="A tick that began more than half a tick after it was due was late; one that never "
-        "ran was missed, and the drive held its command.",
+        "ran was missed, and the drive held its command. At a limited one the guard changed it.",
         folding=True,
     )
     names = ("part", "quantity", "value", "unit")

@@ -32,7 +32,7 @@ from rigidimeter.estimation.diagnostics import (
     fit_checks,
     reconstructed_torque_nm,
 )
-from rigidimeter.records import Channel
+from rigidimeter.records import Channel, Ticks
 from rigidimeter.settings import (
     ControllerSettings,
     DiagnosticLevels,
@@ -55,7 +55,7 @@ saturation = judged(channel_checks.saturation)
 
 
 def test_a_sound_epoch_passes_every_check(sound):
-    findings = diagnose(Case(*sound, SETTINGS, np.zeros(N), 1.0))
+    findings = diagnose(Case(*sound, SETTINGS, 1.0))
     assert [finding for finding in findings if not passed(finding)] == []
     assert len(findings) > 12
 
@@ -64,11 +64,13 @@ def test_every_level_that_can_be_set_belongs_to_a_check(sound):
     epoch, signals, parameters = sound
     emg = with_channel(epoch, "emg_v", 1e-5 * np.random.default_rng(1).standard_normal(N))
     case = Case(
-        with_channel(emg, "velocity_command_rad_s", emg.channels["velocity_rad_s"].values),
+        replace(
+            with_channel(emg, "velocity_command_rad_s", emg.channels["velocity_rad_s"].values),
+            ticks=Ticks(N, 0, 0),
+        ),
         signals,
         parameters,
         SETTINGS.model_copy(update={"gravity_nm": 0.1}),
-        np.zeros(N),
         1.0,
         fit=fit_inertia_damping_stiffness(signals),
         method=BANDLIMITED,
@@ -164,10 +166,9 @@ def test_a_sensor_that_hung_is_excluded_and_the_place_is_told(sound):
 
 
 def test_the_guard_and_the_position_limit_are_counted(sound):
-    limited = np.zeros(1000)
-    limited[:50] = 2
-    assert guard_limited(limited, SETTINGS).value == pytest.approx(5.0)
-    assert_failed(guard_limited(limited, SETTINGS), "5 % of the commands")
+    limited = guard_limited(Ticks(1000, 0, 0, limited=50), SETTINGS)
+    assert limited.value == pytest.approx(5.0)
+    assert_failed(limited, "5 % of the commands")
     angle = Channel("angle_rad", T, 0.5 * np.sin(T))
     assert_failed(position_limit(angle, 0.5, SETTINGS), "100 % of the position limit of 28.6 deg")
     assert passed(position_limit(angle, 0.7, SETTINGS))
