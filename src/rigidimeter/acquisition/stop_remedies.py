@@ -62,7 +62,8 @@ REMEDIES: dict[Cause, str] = {
     "`rigidimeter check`",
     Cause.VELOCITY_WRONG: "check sign, unit and scale of the velocity that the drive reports: "
     "`rigidimeter commission`",
-    Cause.TORQUE_SILENT: _CABLE,
+    Cause.TORQUE_SILENT: f"{_CABLE}; if the sensor is in order, the drive is faster than "
+    "rig.drive_bandwidth_hz says: `rigidimeter commission` measures it",
     Cause.TORQUE_SIGN: "turn the sign of the torque sensor in the rig file, then "
     "`rigidimeter check`; if it is right, the subject pushed",
     Cause.SELDOM_FRESH: "check the sensor's connection and the rate that the rig file states",

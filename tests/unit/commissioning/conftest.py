@@ -215,6 +215,7 @@ def fake_rig(rigfile: RigFile, monkeypatch: Any) -> Callable[..., FakeRig]:
         push_nm = [0.0]
         arm = EmulatedArm(
             JointDynamics(*joint),
+            bandwidth_hz=faults.get("bandwidth_hz", 50.0),
             noise_sd_nm=noise_sd_nm,
             voluntary_nm=lambda _: push_nm[0],
             now=time.now,
