@@ -57,7 +57,8 @@ REMEDIES: dict[Cause, str] = {
     Cause.RECORD_OVERFLOW: "make room, or record to a faster local disk",
     Cause.SOFTWARE: "please report this with the session folder: the program is wrong",
     Cause.SIGNAL: "continue the session with `rigidimeter run --resume`",
-    Cause.STAMP_AHEAD: "check the latency that the rig file states for this device",
+    Cause.STAMP_AHEAD: "check the clock that the driver stamps with, the latency that the rig "
+    "file states for this device, and the rate that the device states",
     Cause.MOVED_AT_REST: "look for a drive that does not hold, a brake, or a hand on the rig; then "
     "`rigidimeter check`",
     Cause.VELOCITY_WRONG: "check sign, unit and scale of the velocity that the drive reports: "

@@ -72,7 +72,8 @@ class FakeSensor:
         while len(history) > 1 and history[1].time_s <= now_s - late_s + 1e-9:
             history.popleft()
         # A sensor that does not know its delay stamps what it sends with the time of sending.
-        return history[0]._replace(time_s=self._sample.time_s)
+        ahead_s = faults.get("stamp_ahead_s", 0.0)
+        return history[0]._replace(time_s=self._sample.time_s + ahead_s)
 
     def close(self) -> None: ...
 

@@ -308,3 +308,14 @@ def test_the_bandwidth_is_compared_with_what_the_settings_say(
     assert (
         f"rig.drive_bandwidth_hz = {told_hz:g} Hz is not this drive's" in check.remedy
     ) is remarked
+
+
+def test_stamps_of_times_to_come_are_caught_at_rest(commissioned: Any) -> None:
+    """The guard allows a stamp to be wrong by the reaction time, so it says nothing of 15 ms."""
+    record = commissioned(stamp_ahead_s=0.015)
+    assert failed(record) == ["age of torque samples"]
+    assert record.failed[0].sentence.startswith(
+        "age of torque samples: -15 ms, at most -15 ms, must be above 0, at most 100 ms; a stamp"
+    )
+    names = [check.name for check in record.checks]
+    assert "motion when enabled" not in names
