@@ -22,8 +22,9 @@ REMEDIES: dict[Cause, str] = {
     Cause.TORQUE_NOT_FINITE: _CABLE,
     Cause.MOTION_NOT_FINITE: "check the encoder's cable and plug, then `rigidimeter check`",
     Cause.COMMAND_NOT_FINITE: "please report this with the session folder: the program is wrong",
-    Cause.POSITION_LIMIT_EXCEEDED: "move the arm back by hand without power; if it was not there, "
-    "the encoder jumped: `rigidimeter check`",
+    Cause.POSITION_LIMIT_EXCEEDED: "when the session has ended and the drive has said that its "
+    "power is off, move the arm back by hand; if it was not there, the encoder jumped: "
+    "`rigidimeter check`",
     Cause.MOTION_STALE: "check the drive's connection, or raise the limit if the drive answers "
     "more slowly than that",
     Cause.TORQUE_STALE: "check the sensor's connection, or raise the limit if its samples come "

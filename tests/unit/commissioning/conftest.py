@@ -81,7 +81,7 @@ class FakeSensor:
 class FakeDrive:
     def __init__(self, arm: EmulatedArm, now: Callable[[], float], faults: Mapping[str, Any]):
         self._arm, self._now, self._faults = arm, now, faults
-        self._on, self._status, self._cause = False, 0, Cause.NONE
+        self._on, self._status, self._cause = "on_before" in faults, 0, Cause.NONE
         self._written_s = 0.0
         self._queue: deque[tuple[float, float]] = deque()
         self.counts: dict[str, int] = {"received": 0, "lost": 0}

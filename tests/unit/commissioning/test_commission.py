@@ -266,6 +266,19 @@ def test_hands_are_asked_for_only_after_the_drive_said_that_it_has_no_power(
     assert not any("torque of" in question for question in asked)
 
 
+def test_no_hand_is_asked_for_while_a_drive_has_power_from_before(commissioned: Any) -> None:
+    asked: list[str] = []
+
+    def ask(question: str, world: Any) -> bool:
+        asked.append(question)
+        return at_hand(question, world)
+
+    record = commissioned(ask=ask, known_angle_deg=10.0, on_before=True)
+    assert failed(record) == ["devices answer"]
+    assert "keep hands off the joint" in record.failed[0].sentence
+    assert asked == []
+
+
 def test_a_drive_quicker_than_the_settings_say_is_no_silent_torque(
     commissioned: Any, settings: Any
 ) -> None:
