@@ -223,15 +223,15 @@ def as_measured(
     UserError
         If the settings do not go together with the drive as it was measured.
     """
-    kept, guard = today.reference, settings.guard
-    drive = {
-        "drive_bandwidth_hz": commissioned.numbers.get(
-            "bandwidth_hz", settings.rig.drive_bandwidth_hz
-        )
-    }
-    measured = changed_settings(settings, {"rig": drive}, f"{commissioned.rig_name}, as measured")
+    kept, guard, told_hz = today.reference, settings.guard, settings.rig.drive_bandwidth_hz
+    drive_hz = commissioned.numbers.get("bandwidth_hz", told_hz)
+    source = f"{commissioned.rig_name}, as measured"
+    measured = changed_settings(settings, {"rig": {"drive_bandwidth_hz": drive_hz}}, source)
+    shows_inertia = answer_limits(measured).shows_inertia
+    if not shows_inertia and told_hz > drive_hz:  # no more than that can be measured
+        measured = settings
     given = "least_inertia_kg_m2" in guard.model_fields_set
-    if kept is None or given or not answer_limits(measured).shows_inertia:
+    if kept is None or given or not shows_inertia:
         return measured
     floor = max(guard.least_inertia_kg_m2, FLOOR_SHARE * _shown(measured.rig) * kept.inertia_kg_m2)
     return changed_settings(measured, {"guard": {"least_inertia_kg_m2": floor}})

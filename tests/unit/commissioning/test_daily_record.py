@@ -25,7 +25,7 @@ from rigidimeter.commissioning.daily_record import MUST_PASS, Reference
 from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.dynamics import DriveModel
 from rigidimeter.errors import UserError
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.settings import Settings, changed_settings, parse_settings
 
 NOW = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
 COMMISSIONED: Any = SimpleNamespace(digest="of the commissioning")
@@ -185,6 +185,9 @@ def test_the_floor_is_half_of_what_an_even_acceleration_shows_at_the_ticks(
 def test_ticks_that_show_no_inertia_do_not_raise_the_floor(record: DailyRecord) -> None:
     settings = as_measured(at_100_hz(), measured(53.1), heavy(record))
     assert settings.guard.least_inertia_kg_m2 == 0.0005
+    assert settings.rig.drive_bandwidth_hz == 53.1  # at least
+    told = changed_settings(at_100_hz(), {"rig": {"drive_bandwidth_hz": 200.0}})
+    assert as_measured(told, measured(53.1), heavy(record)) == told
 
 
 def at_100_hz() -> Settings:
