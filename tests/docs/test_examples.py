@@ -2,12 +2,16 @@
 
 import runpy
 import sys
+import time
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.cli.main import app
+from rigidimeter.devices.rigfile import load_rig
+from rigidimeter.guard import Cause
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -42,3 +46,46 @@ def test_filter_alike_shows_that_a_filter_on_the_position_alone_biases(
     inertia_percent = {" ".join(row[:-4]): float(row[-4]) for row in rows}
     assert abs(inertia_percent["all four, zero phase"]) < 2.0
     assert abs(inertia_percent["position only, causal"]) > 10.0
+
+
+def test_a_robot_that_blocks_is_read_from_a_process_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sensor and drive share it, its stamps are on the loop's clock, and `disable` holds."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    file = tmp_path / "RIG.toml"
+    file.write_text(
+        '[torque_sensor]\ndriver = "robot_driver:RobotTorque"\n'
+        '[drive]\ndriver = "robot_driver:RobotDrive"\n'
+    )
+    clock = DeadlineClock()
+    time.sleep(0.1)  # its zero is not that of any other process
+    rig = load_rig(file).build(clock.now_s, 250.0)
+    try:
+        rig.connect()
+        rig.configure()
+        (shared,) = sys.modules["robot_driver"].Connection.open_ones.values()
+        assert shared.users == 2
+        rig.enable()
+        took_s, ages_s = [], []
+        for _ in range(100):
+            clock.wait_until(clock.now_s() + 0.004)
+            began_s = time.perf_counter()
+            reading = rig.read()
+            rig.write(0.5)
+            took_s.append(time.perf_counter() - began_s)
+            ages_s.append(clock.now_s() - reading.torque_time_s)
+        assert reading.cause == Cause.NONE
+        assert sorted(took_s)[50] < 2e-4  # a wait of the robot is 1 ms
+        assert -1e-3 < sorted(ages_s)[50] < 0.02
+        assert reading.angle_rad > 0.1
+        rig.disable()
+        clock.wait_until(clock.now_s() + 0.1)
+        assert not rig.powered
+        held_rad = rig.read().angle_rad
+        rig.write(0.5)
+        clock.wait_until(clock.now_s() + 0.1)
+        assert rig.read().angle_rad == pytest.approx(held_rad, abs=1e-6)
+    finally:
+        rig.close()
+    assert not sys.modules["robot_driver"].Connection.open_ones

@@ -287,3 +287,14 @@ def test_fault_15_not_as_commanded(rig, case, tmp_path, measured):
             # A drive that does not obey is not waited for: the power goes once zero was sent.
             assert trial.disabled_s - trial.fault_s <= trial.zero_s + 2 / made.rate_hz
         measured(15, rig, case, trial, bound_s)
+
+
+def test_a_port_that_vanishes_as_the_session_ends_leaves_the_power_unconfirmed(tmp_path):
+    """In its last tick, when all epochs are done: nobody may believe that the drive is off."""
+    with bench(ASCII) as made:
+        trial = run(made, tmp_path / "s", made.drive_emulator.close, at_s=1.5 - 1 / made.rate_hz)
+        assert [event["outcome"] for event in trial.of("epoch_ended")] == ["success"]
+        assert trial.result.outcome == "fail"
+        assert "the drive has not said so: keep hands off the joint" in trial.result.reason
+        assert trial.of("session_ended")[0]["reason"] == trial.result.reason
+        assert made.drive._line._thread.is_alive()  # it answers nothing, and fails nothing

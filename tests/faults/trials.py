@@ -73,6 +73,10 @@ class Tap:
     def counts(self) -> Any:
         return self._rig.counts
 
+    @property
+    def powered(self) -> bool:
+        return bool(self._rig.powered)
+
     def read(self, elapsed_ticks: int = 1) -> Any:
         for at in [at for at in self._acts if at <= self.ticks]:
             act = self._acts.pop(at)
@@ -82,7 +86,8 @@ class Tap:
 
     def write(self, velocity_rad_s: float) -> float:
         self.ticks += 1
-        self.written.append(velocity_rad_s)
+        if math.isnan(self.disabled_s):
+            self.written.append(velocity_rad_s)
         return float(self._rig.write(velocity_rad_s))
 
     def disable(self) -> None:

@@ -299,10 +299,17 @@ HAND_MADE = tuple(
         ),
         (
             SESSION,
-            "            _brake_and_disable(session)\n        finally:",
-            "            _brake_and_disable(session)\n        except ZeroDivisionError:\n"
+            " else run.outcome\n        finally:",
+            " else run.outcome\n        except ZeroDivisionError:\n"
             "            raise\n        else:",
             "where disabling fails the record stays open",
+        ),
+        (SESSION, "    if rig.powered:", "    if False:", "a drive that is not off asks for hands"),
+        (
+            SESSION,
+            "moved_rad > most_rad and work_j > 0.0",
+            "False",
+            "a drive that moves with its power off is a success",
         ),
         (
             SESSION,

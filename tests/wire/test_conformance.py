@@ -22,6 +22,8 @@ from rigidimeter.devices.conformance import (
     OtherEnd,
     SensorFixture,
 )
+from rigidimeter.devices.conformance.fixture import ConformanceError
+from rigidimeter.devices.conformance.sensor_checks import sensor_samples_flow
 from rigidimeter.dynamics.joint import JointDynamics
 from rigidimeter.emulation.ascii_emulator import AsciiEmulator
 from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
@@ -160,3 +162,16 @@ def test_drive(
 ) -> None:
     with fixture() as made:
         check(made)
+
+
+def test_a_sensor_that_its_driver_calls_frozen_a_little_later_does_not_pass() -> None:
+    """The same six counts again and again: `AtiRdt` says so after `frozen_s`, 50 ms."""
+    settings = {"address": "127.0.0.1", "timeout_s": 0.5}
+    with RdtEmulator(EmulatedArm(JOINT)) as emulator:
+        emulator.misbehave("frozen_values")
+        ports = {"port": emulator.port, "http_port": emulator.http_port}
+        fixture = SensorFixture(
+            lambda: AtiRdt(AtiRdt.Settings(**settings, **ports), time.monotonic), time.monotonic
+        )
+        with pytest.raises(ConformanceError, match="a good sample has no cause; TORQUE_FROZEN"):
+            sensor_samples_flow(fixture)

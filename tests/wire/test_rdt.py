@@ -270,7 +270,7 @@ def test_the_sequence_wraps_around_without_loss(arm, sensor_of):
 
 def test_every_misbehaviour_is_tried():
     elsewhere = {"changed_units", "changed_calibration", "changed_bias"}
-    pages = {"unknown_units", "rdt_disabled", "page_status", "deaf"}
+    pages = {"unknown_units", "rdt_disabled", "page_status", "page_rate", "deaf"}
     http = {name for name in MISBEHAVIOURS if name.startswith("http_")}
     assert {name for name, *_ in RUNNING} | elsewhere | pages | http == set(MISBEHAVIOURS)
 

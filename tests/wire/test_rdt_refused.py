@@ -56,6 +56,15 @@ def test_a_sensor_that_cannot_be_used_is_refused(emulator, sensor_of, lateness, 
     sensor.configure()  # and it can be used when it is right again
 
 
+@pytest.mark.parametrize("stated_hz", [7000.0, 500.0])
+def test_a_stream_of_another_rate_than_the_page_states_is_refused(emulator, sensor_of, stated_hz):
+    """1,000 records/s taken for 7,000/s seem 3.4 s old after 4 s, for 500/s never old at all."""
+    emulator.misbehave("page_rate", stated_hz)
+    words = f"its page states {stated_hz:g} records/s and it sends (9|10)[0-9]{{2}}"
+    with pytest.raises(DeviceError, match=words):
+        sensor_of(emulator).configure()
+
+
 def test_no_web_server_and_no_sensor_are_refused(arm, sensor_of):
     with RdtEmulator(arm) as emulator:
         pass

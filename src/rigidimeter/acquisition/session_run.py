@@ -22,6 +22,7 @@ from rigidimeter.experiment import PlannedEpoch, Protocol, prbs_nm, sinusoid
 from rigidimeter.guard import Cause, Reaction, why_ended
 from rigidimeter.recording.session_folder import Ending
 from rigidimeter.settings import Settings
+from rigidimeter.units import deg_from_rad
 
 BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
 
@@ -30,6 +31,10 @@ LOOK_S = 0.1
 
 BRAKE_S = 0.1
 """For so long a drive that left its state brakes by its own ramp before its power goes."""
+
+
+WATCHED_S = 1.0
+"""For so long the joint is watched once its power is off."""
 
 
 @dataclass(frozen=True)
@@ -296,6 +301,9 @@ def _close(session: _Session) -> None:
             run.change_state(Run(State.STOPPING))
         try:
             _brake_and_disable(session)
+            if why := _after_power(session):
+                run.reason = f"{run.reason}; {why}" if run.reason else why
+                run.outcome = "fail" if run.outcome == "success" else run.outcome
         finally:
             time_s = run.loop.time_s
             if run.open_epoch is not None:
@@ -314,3 +322,33 @@ def _brake_and_disable(session: _Session) -> None:
             hold(loop, BRAKE_S)
     finally:
         rig.disable()
+
+
+def _after_power(session: _Session) -> str:
+    """Watch the joint once its power is off; return in a clause what keeps hands off it.
+
+    Its weight, or whoever takes the arm out, may move it: they do work on the drive. Where the
+    drive moves the joint, W = ∫ M dθ is above zero.
+    """
+    loop, rig = session.run.loop, session.rig
+    settle_s, most_rad = loop.agreement.settle_s, loop.agreement.hold_rad
+    work_j = moved_rad = 0.0
+    began_rad = before_rad = math.nan
+    for k in range(1, round(WATCHED_S * loop.rate_hz) + 1):
+        loop.clock.wait_until((loop.tick + k) / loop.rate_hz)
+        reading = rig.read()
+        rig.write(0.0)  # a drive may speak only when it is spoken to
+        angle_rad = reading.angle_rad
+        if k < settle_s * loop.rate_hz or not math.isfinite(angle_rad + reading.torque_nm):
+            continue
+        if math.isnan(began_rad):
+            began_rad = before_rad = angle_rad
+        work_j += reading.torque_nm * (angle_rad - before_rad)
+        moved_rad, before_rad = max(moved_rad, abs(angle_rad - began_rad)), angle_rad
+    if rig.powered:
+        why = f"{WATCHED_S:g} s after it was told to switch its power off the drive has not said so"
+    elif moved_rad > most_rad and work_j > 0.0:
+        why = f"the drive moved the joint by {deg_from_rad(moved_rad):.1f} deg with its power off"
+    else:
+        return ""
+    return f"{why}: keep hands off the joint, press the emergency stop, and look at its wiring"

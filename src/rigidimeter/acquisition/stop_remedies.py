@@ -22,8 +22,9 @@ REMEDIES: dict[Cause, str] = {
     Cause.TORQUE_NOT_FINITE: _CABLE,
     Cause.MOTION_NOT_FINITE: "check the encoder's cable and plug, then `rigidimeter check`",
     Cause.COMMAND_NOT_FINITE: "please report this with the session folder: the program is wrong",
-    Cause.POSITION_LIMIT_EXCEEDED: "move the arm back by hand without power; if it was not there, "
-    "the encoder jumped: `rigidimeter check`",
+    Cause.POSITION_LIMIT_EXCEEDED: "when the session has ended and the drive has said that its "
+    "power is off, move the arm back by hand; if it was not there, the encoder jumped: "
+    "`rigidimeter check`",
     Cause.MOTION_STALE: "check the drive's connection, or raise the limit if the drive answers "
     "more slowly than that",
     Cause.TORQUE_STALE: "check the sensor's connection, or raise the limit if its samples come "
@@ -57,12 +58,14 @@ REMEDIES: dict[Cause, str] = {
     Cause.RECORD_OVERFLOW: "make room, or record to a faster local disk",
     Cause.SOFTWARE: "please report this with the session folder: the program is wrong",
     Cause.SIGNAL: "continue the session with `rigidimeter run --resume`",
-    Cause.STAMP_AHEAD: "check the latency that the rig file states for this device",
+    Cause.STAMP_AHEAD: "check the clock that the driver stamps with, the latency that the rig "
+    "file states for this device, and the rate that the device states",
     Cause.MOVED_AT_REST: "look for a drive that does not hold, a brake, or a hand on the rig; then "
     "`rigidimeter check`",
     Cause.VELOCITY_WRONG: "check sign, unit and scale of the velocity that the drive reports: "
     "`rigidimeter commission`",
-    Cause.TORQUE_SILENT: _CABLE,
+    Cause.TORQUE_SILENT: f"{_CABLE}; if the sensor is in order, the drive is faster than "
+    "rig.drive_bandwidth_hz says: `rigidimeter commission` measures it",
     Cause.TORQUE_SIGN: "turn the sign of the torque sensor in the rig file, then "
     "`rigidimeter check`; if it is right, the subject pushed",
     Cause.SELDOM_FRESH: "check the sensor's connection and the rate that the rig file states",

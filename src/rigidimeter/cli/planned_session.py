@@ -125,14 +125,14 @@ def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
     """
     if rig is None:
         return planned
-    from rigidimeter.commissioning import check_record, require_daily_check, with_measured_floor
+    from rigidimeter.commissioning import as_measured, check_record, require_daily_check
     from rigidimeter.devices.rigfile import load_rig
 
     rigfile, settings = load_rig(rig), planned.settings
     commissioned = check_record(rigfile, None, settings)
     today = require_daily_check(rigfile, commissioned, settings, settings_path=planned.source)
     rigfile.claim().close()
-    return replace(planned, settings=with_measured_floor(settings, today))
+    return replace(planned, settings=as_measured(settings, commissioned, today))
 
 
 def run_planned(

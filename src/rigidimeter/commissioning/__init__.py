@@ -11,10 +11,10 @@ from rigidimeter.commissioning.coverage import check_record
 from rigidimeter.commissioning.daily_check import Compared, daily_check
 from rigidimeter.commissioning.daily_record import (
     DailyRecord,
+    as_measured,
     daily_path,
     read_daily,
     require_daily_check,
-    with_measured_floor,
     write_daily,
 )
 from rigidimeter.commissioning.sequence import commission

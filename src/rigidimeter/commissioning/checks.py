@@ -29,7 +29,7 @@ class Check:
     outcome : str
         "passed", "failed", "not possible here", or "not tried" where nobody was there to do it.
     remedy : str
-        What to do about it; empty where it passed.
+        What to do about it; where it passed a remark, as a rule empty.
     """
 
     name: str

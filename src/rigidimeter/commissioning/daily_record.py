@@ -6,6 +6,7 @@ to one content of the rig file and to one commissioning record, and holds for so
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime, timedelta
@@ -17,8 +18,10 @@ from rigidimeter.commissioning.commissioning_record import CommissioningRecord
 from rigidimeter.commissioning.sealed_record import RecordKind, read_sealed, write_sealed
 from rigidimeter.commissioning.torque_checks import DELAY, PRECISION, SIGN
 from rigidimeter.devices.rigfile import RigFile
+from rigidimeter.dynamics import DriveModel
 from rigidimeter.errors import UserError
-from rigidimeter.settings import Settings
+from rigidimeter.guard import answer_limits
+from rigidimeter.settings import RigSettings, Settings, changed_settings
 
 KIND = RecordKind(
     "rigidimeter.check/1", "daily check", "rigidimeter check RIG.toml", "check the rig again"
@@ -27,7 +30,7 @@ AHEAD = timedelta(minutes=10)
 """So much may the clock have been set back since a check was made."""
 
 FLOOR_SHARE = 0.5
-"""Of the reference inertia, below which a sensor in a session is not believed."""
+"""Of what the reference inertia shows, below which a sensor in a session is not believed."""
 
 MUST_PASS = ("motion when enabled", "angle per command", SIGN, PRECISION, DELAY)
 """Checks without which a rig is not run; beside them, none may have failed."""
@@ -205,15 +208,47 @@ def require_daily_check(
     return record
 
 
-def with_measured_floor(settings: Settings, record: DailyRecord) -> Settings:
-    """Return the settings with half the reference inertia as `guard.least_inertia_kg_m2`.
+def as_measured(
+    settings: Settings, commissioned: CommissioningRecord, today: DailyRecord
+) -> Settings:
+    """Return the settings with what the guard goes by as it was measured.
 
-    An arm adds inertia to what is mounted beyond the sensor and takes none away, so a session shows
-    at least that. A value that the settings give stays, and nothing is lowered.
+    The bandwidth of the drive is that of the commissioning record. `guard.least_inertia_kg_m2` is
+    half of what the reference inertia shows at the ticks, where ticks show it: an arm adds inertia
+    to what is mounted beyond the sensor and takes none away. A value that the settings give stays,
+    and nothing is lowered.
+
+    Raises
+    ------
+    UserError
+        If the settings do not go together with the drive as it was measured.
     """
-    guard, kept = settings.guard, record.reference
-    if kept is None or "least_inertia_kg_m2" in guard.model_fields_set:
-        return settings
-    floor = max(guard.least_inertia_kg_m2, FLOOR_SHARE * kept.inertia_kg_m2)
-    raised = guard.model_copy(update={"least_inertia_kg_m2": floor})
-    return settings.model_copy(update={"guard": raised})
+    kept, guard, told_hz = today.reference, settings.guard, settings.rig.drive_bandwidth_hz
+    drive_hz = commissioned.numbers.get("bandwidth_hz", told_hz)
+    source = f"{commissioned.rig_name}, as measured"
+    measured = changed_settings(settings, {"rig": {"drive_bandwidth_hz": drive_hz}}, source)
+    shows_inertia = answer_limits(measured).shows_inertia
+    if not shows_inertia and told_hz > drive_hz:  # no more than that can be measured
+        measured = settings
+    given = "least_inertia_kg_m2" in guard.model_fields_set
+    if kept is None or given or not shows_inertia:
+        return measured
+    floor = max(guard.least_inertia_kg_m2, FLOOR_SHARE * _shown(measured.rig) * kept.inertia_kg_m2)
+    return changed_settings(measured, {"guard": {"least_inertia_kg_m2": floor}})
+
+
+def _shown(rig: RigSettings) -> float:
+    """Return the share of an inertia that torques read at the ticks show.
+
+    Where the command rises by the same at each tick, each step of it adds its own acceleration
+    h(t) = 2 Re(r exp(λt)), and the torque of a tick shows the sum of them over all ticks T, 2 T, …
+    after a step, in place of the mean acceleration:
+
+        S = T Σ h(n T) = 2 T Re(r exp(λT) / (1 − exp(λT)))
+
+    It is 1 where a step takes many ticks, and 0 where it is over before the next.
+    """
+    drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
+    (pole,), (residue,) = drive.poles_rad_s, drive.residues
+    left = cmath.exp(pole / rig.tick_rate_hz)
+    return 2.0 / rig.tick_rate_hz * (residue * left / (1.0 - left)).real

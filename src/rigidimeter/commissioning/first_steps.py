@@ -79,7 +79,7 @@ def at_rest(setup: Setup, found: Findings, duration_s: float) -> None:
     before = dict(rig.counts)
     readings = listen(setup, duration_s)
     found.checks += rate_checks(
-        "torque", readings.torque_time_s, settings.rig.torque.rate_hz, settings
+        "torque", readings.time_s, readings.torque_time_s, settings.rig.torque.rate_hz, settings
     )
     found.checks.append(lost_check(before, rig.counts, setup.limits.lost_percent))
     found.checks += noise_checks(readings, settings)
@@ -93,9 +93,8 @@ def small_move(setup: Setup, found: Findings, rest_s: float) -> bool:
     settings, limits = setup.settings, setup.limits
     setup.operator.say(f"A small move of {limits.nudge_deg:g} deg.")
     resting = trial(setup, hold(rest_s))
-    found.checks += rate_checks(
-        "motion", resting.readings.motion_time_s, settings.rig.motion.rate_hz, settings
-    )
+    still, rate_hz = resting.readings, settings.rig.motion.rate_hz
+    found.checks += rate_checks("motion", still.time_s, still.motion_time_s, rate_hz, settings)
     found.checks.append(drift_check(resting.readings, 0.5 * limits.nudge_deg))
     if resting.cause is not Cause.NONE:
         words = resting.cause.sentence

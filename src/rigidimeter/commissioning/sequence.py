@@ -41,7 +41,7 @@ from rigidimeter.commissioning.motion_tests import (
 )
 from rigidimeter.commissioning.static_tests import facts_checks
 from rigidimeter.commissioning.stopping import emergency_stop_checks, watchdog_checks
-from rigidimeter.commissioning.trial import Setup
+from rigidimeter.commissioning.trial import Setup, require_no_power
 from rigidimeter.devices.base import DeviceError
 from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.guard import Cause
@@ -118,6 +118,7 @@ def _try_all(setup: Setup, found: Findings, facts: Mapping[str, Any]) -> None:
 
 def _by_hand(setup: Setup, found: Findings) -> None:
     """Ask for the mechanical stops and a known angle, without power."""
+    require_no_power(setup)
     found.checks.append(
         ask_operator(
             setup.operator,

@@ -15,6 +15,9 @@ from rigidimeter.settings import Settings
 
 BAD_COUNTS = ("lost", "damaged", "short", "reordered", "repeated", "refused", "unsent")
 FEWEST_VALUES = 3
+AHEAD_S = 1e-3
+"""A reading may come so much after the time that its tick notes."""
+
 NOISE = "torque noise (SD)"
 BRAKING = "braking_rad_s2"
 """What a drive's facts call the slowest of its own ways to brake."""
@@ -70,17 +73,18 @@ def _braking(braking_rad_s2: float | None, settings: Settings) -> Check:
 
 def rate_checks(
     role: str,
+    time_s: Array,
     stamps_s: Array,
     expected_hz: float,
     settings: Settings,
 ) -> list[Check]:
-    """Check that new samples come often enough and never stay away.
+    """Check that new samples come often enough, never stay away, and are stamped when taken.
 
     Parameters
     ----------
     role : {"torque", "motion"}
-    stamps_s : array, shape (n,)
-        One a tick.
+    time_s, stamps_s : array, shape (n,)
+        When each tick ran, and the stamp of its reading.
     expected_hz : float
         What the settings say of this sensor.
     """
@@ -94,7 +98,18 @@ def rate_checks(
         * min(expected_hz, settings.rig.tick_rate_hz)
     )
     gap_s = float(np.max(np.diff(stamps))) if len(stamps) > 1 else math.inf
+    ages_s = (time_s - stamps_s)[np.isfinite(stamps_s)]
+    usual_s, oldest_s = (np.median(ages_s), ages_s.max()) if len(ages_s) else (math.inf, math.inf)
+    stale_s = settings.guard.stale_s
     return [
+        yes(
+            f"age of {role} samples",
+            bool(usual_s >= -AHEAD_S and oldest_s <= stale_s),
+            f"{number(usual_s, 's')}, at most {number(oldest_s, 's')}",
+            f"above 0, at most {number(stale_s, 's')}",
+            "a stamp must be the time of the loop's clock at which the sample was taken: look at "
+            "the clock that the driver takes it from, and at the rate that the device states",
+        ),
         above(
             f"{role} samples",
             rate_hz,

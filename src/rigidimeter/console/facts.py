@@ -119,6 +119,7 @@ def facts(
     history: Sequence[LiveEstimate] = (),
     recent: RecentSamples | None = None,
     recorder: RecorderState | None = None,
+    caution: str = "",
 ) -> Facts:
     """Return what the operator needs to know now.
 
@@ -131,6 +132,8 @@ def facts(
         The live estimates of the last seconds, oldest first.
     recent : RecentSamples
     recorder : RecorderState
+    caution : str
+        What is wrong with the torque of the last epoch.
     """
     recent, recorder = recent or RecentSamples(), recorder or RecorderState()
     state = State(loop.state)
@@ -153,7 +156,7 @@ def facts(
         angle_deg=deg_from_rad(loop.angle_rad),
         torque_nm=recent.torque_nm,
         distances=distances,
-        lamps=lamps(plan.settings, loop, recent, distances, recorder, left_s),
+        lamps=lamps(plan.settings, loop, recent, distances, recorder, left_s, caution),
         cause=Cause(loop.cause),
         stop_words=_stop_words(progress, loop),
     )

@@ -95,11 +95,15 @@ def lamps(
     distances: Sequence[LimitDistance],
     recorder: RecorderState,
     session_left_s: float,
+    caution: str = "",
 ) -> tuple[Lamp, ...]:
     """Return the lamps, in the order in which they are shown."""
+    sensor = _reading("sensor", "torque", recent, recent.torque_age_s, settings.guard.stale_s)
+    if caution and sensor.level <= Level.WATCH:
+        sensor = Lamp("sensor", Level.WATCH, f"{caution}; {sensor.words}")
     made = (
         _limits(recent, distances),
-        _reading("sensor", "torque", recent, recent.torque_age_s, settings.guard.stale_s),
+        sensor,
         _reading("drive", "angle", recent, recent.motion_age_s, settings.guard.stale_s),
         _lateness(settings, loop, recent),
         _recorder(settings, recorder),

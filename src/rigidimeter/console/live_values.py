@@ -13,6 +13,14 @@ A value means something once
 
 An imposed sinusoid has one frequency, at which K − J ω² is all that can be known of J and K, so
 nothing is shown of it.
+
+When an epoch has ended, two numbers tell of the torque sensor, both in proportion to its gain.
+
+- J is of the arm and of what the rig has beyond the sensor. Unlike B and K it does not change from
+  epoch to epoch. It is not less than the rig's alone, which the daily check knows, and lies among
+  the arms that the margins hold for.
+- The torque's change from one tick to the next is noise, and J times the change of the
+  acceleration, which is the same in each epoch.
 """
 
 from __future__ import annotations
@@ -20,13 +28,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import NormalDist
+from statistics import NormalDist, median
 
 from rigidimeter.acquisition.processes.status_values import LiveEstimate
 from rigidimeter.settings import OnlineSettings
 
 MOST_PART = 0.5
 """Half an interval, and a shift, above this part of the value say that it is not known yet."""
+
+KNOWN_PART = 0.1
+"""J is known where its standard error is below this part of it."""
+
+ALIKE, LIGHTER, STEPS = 1.6, 0.8, 3.0
+"""J is within so many times that of other epochs, and at least so much of the rig's alone; the
+torque changes from tick to tick by less than so many times as much as in others."""
 
 NORMAL_95 = NormalDist().inv_cdf(0.975)
 
@@ -119,3 +134,47 @@ def _value(
         elif not shift < MOST_PART * abs(value):
             why = "still changes"
     return LiveValue(symbol, unit, value, half_width, not why, why)
+
+
+def caution(
+    now: LiveEstimate,
+    before: Sequence[LiveEstimate],
+    arms_kg_m2: tuple[float, float],
+    alone_kg_m2: float = 0.0,
+) -> str:
+    """Return what of the torque in an epoch that has ended is not as it must be; empty if nothing.
+
+    Parameters
+    ----------
+    now : LiveEstimate
+        The last of the epoch, in which a torque perturbed.
+    before : sequence of LiveEstimate
+        The last of each such epoch before it.
+    arms_kg_m2 : tuple of float
+        Least and largest J for which the margins hold.
+    alone_kg_m2 : float
+        J of what the rig has beyond the sensor, 0 if not known.
+    """
+    check = "look at the torque sensor and its cable, and type `rigidimeter check`"
+    usual_nm = median([one.step_nm for one in before if one.step_nm > 0.0] or [math.inf])
+    if now.step_nm > STEPS * usual_nm:
+        times = f"{now.step_nm / usual_nm:.1f} times as much from tick to tick as in those before"
+        return f"the torque changed {times}: noise, another gain, or a tremor; {check}"
+    if not _known(now):
+        return ""
+    inertia, others = now.inertia_kg_m2, [one.inertia_kg_m2 for one in before if _known(one)]
+    usual = median(others) if others else math.nan
+    least, most = arms_kg_m2
+    for low, high, what in (
+        (LIGHTER * alone_kg_m2, math.inf, f"less than the rig's alone, {alone_kg_m2:.3g}"),
+        (usual / ALIKE, usual * ALIKE, f"{inertia / usual:.2g} times that of the epochs before"),
+        (least, most, f"not within {least:.3g} to {most:.3g}, for which the margins hold"),
+    ):
+        if inertia < low or inertia > high:
+            found = f"J {inertia:.3g} kg·m² is {what}"
+            return f"{found}: another gain of the torque sensor, or another arm; {check}"
+    return ""
+
+
+def _known(one: LiveEstimate) -> bool:
+    return one.inertia_kg_m2_se < KNOWN_PART * one.inertia_kg_m2

@@ -12,9 +12,13 @@ from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.status_values import LiveEstimate, LoopStatus, Role
 from rigidimeter.console.facts import Facts, facts
 from rigidimeter.console.lamps import RecorderState
+from rigidimeter.console.live_values import caution, settling_s
 from rigidimeter.console.recent_samples import RECENT_S, recent_samples
 from rigidimeter.console.session_plan import SessionPlan
 from rigidimeter.console.session_progress import Progress, progress_after, progress_at_start
+
+TICKS_SHOW = 5.0
+"""Ticks at least so many times as fast as the drive show an inertia as it is, to a tenth."""
 
 MOST_ESTIMATES = 4000
 """Live estimates that are remembered, which come ten times a second: more than five minutes."""
@@ -37,6 +41,8 @@ class Observer:
         self._rows: NDArray[np.void] = np.empty(0, ROW)
         self._history: deque[LiveEstimate] = deque(maxlen=MOST_ESTIMATES)
         self._loop = LoopStatus()
+        self._perturbed: dict[int, LiveEstimate] = {}
+        self._cautions: dict[int, str] = {}
         self.progress: Progress = progress_at_start(plan.epochs)
 
     def look(self) -> Facts:
@@ -61,7 +67,31 @@ class Observer:
             self._history,
             recent_samples(rows),
             self._recorder(),
+            self._caution(),
         )
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the operator should know after the session too."""
+        return (*self.progress.remarks, *filter(None, self._cautions.values()))
+
+    def _caution(self) -> str:
+        """Return what is wrong with the torque of the last epoch that ended, by its estimate."""
+        settings, now = self._plan.settings, self._history[-1] if self._history else LiveEstimate()
+        ended = [one for one in self.progress.ended if one.number == now.epoch]
+        long_enough = now.time_s - now.since_s >= settling_s(settings.online)
+        if ended and ended[-1].task == "prbs" and long_enough:
+            self._cautions.pop(now.epoch, None)  # one that has a caution is no measure for others
+            before = [self._perturbed[number] for number, why in self._cautions.items() if not why]
+            rig, margins = settings.rig, settings.margins
+            inertia = settings.subject[ended[-1].condition].inertia_kg_m2
+            arms = margins.joint_factor_low * inertia, margins.joint_factor_high * inertia
+            shown = rig.tick_rate_hz >= TICKS_SHOW * rig.drive_bandwidth_hz
+            alone = self.progress.alone_kg_m2 if shown else 0.0
+            words = caution(now, before, arms, alone)
+            self._perturbed[now.epoch] = now
+            self._cautions[now.epoch] = f"epoch {ended[-1].place}: {words}" if words else ""
+        return next(reversed(self._cautions.values()), "")
 
     def _recorder(self) -> RecorderState:
         status, samples = self._shared.status, self._shared.samples

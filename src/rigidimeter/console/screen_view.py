@@ -71,7 +71,7 @@ class ScreenView:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What other processes printed where this screen covered it."""
-        return self._observer.progress.remarks if self._observer is not None else ()
+        return self._observer.remarks if self._observer is not None else ()
 
     @property
     def messages(self) -> tuple[str, ...]:

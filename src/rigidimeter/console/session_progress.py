@@ -49,6 +49,8 @@ class Progress:
         What the loop's process was refused, and which checks of the rig were never made.
     zeroed : bool
         Whether the torque sensor was zeroed.
+    alone_kg_m2 : float
+        J of what the rig has beyond the torque sensor, by the daily check; 0 if not known.
     stop : str
         Why the guard last stopped or held the rig, with value, limit and remedy.
     outcome, reason : str
@@ -63,6 +65,7 @@ class Progress:
     ended: tuple[EndedEpoch, ...] = ()
     remarks: tuple[str, ...] = ()
     zeroed: bool = False
+    alone_kg_m2: float = 0.0
     stop: str = ""
     outcome: str = ""
     reason: str = ""
@@ -82,6 +85,8 @@ def progress_after(progress: Progress, event: Mapping[str, Any]) -> Progress:
         return _ended(progress, event)
     if kind == "sensor_zeroed":
         return replace(progress, zeroed=not event["refused"])
+    if kind == "daily_check":
+        return replace(progress, alone_kg_m2=event.get("inertia_kg_m2", 0.0))
     if kind == "loop_prepared":
         return replace(progress, remarks=(*progress.remarks, *event["refused"]))
     if kind == "not_commissioned":

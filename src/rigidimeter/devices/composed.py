@@ -55,7 +55,8 @@ class Home(NamedTuple):
             raise DeviceError(
                 f"drive: the joint stands at {math.degrees(angle_rad):.1f} deg of the drive's "
                 f"scale; it must be within {math.degrees(self.tolerance_rad):.1f} deg of "
-                f"{math.degrees(self.angle_rad):.1f} deg, so bring it there by hand and try again"
+                f"{math.degrees(self.angle_rad):.1f} deg, so bring it there by hand when the "
+                "drive's power is off, and try again"
             )
 
 

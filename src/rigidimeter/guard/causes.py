@@ -111,7 +111,8 @@ _SENTENCES = {
     Cause.STAMP_AHEAD: "a reading bore the time of a moment still to come",
     Cause.MOVED_AT_REST: "the joint moved while it was told to stand still",
     Cause.VELOCITY_WRONG: "the velocity reading did not agree with the change of the angle",
-    Cause.TORQUE_SILENT: "the joint was accelerated and the torque sensor did not show it",
+    Cause.TORQUE_SILENT: "the joint was accelerated and the torque sensor did not show it, or the "
+    "drive is faster than rig.drive_bandwidth_hz",
     Cause.TORQUE_SIGN: "the torque sensor answered the perturbation with the wrong sign",
     Cause.SELDOM_FRESH: "fresh readings came too seldom",
     Cause.HELD_AT_LIMIT: "the joint was driven against the position limit for too long: the "

@@ -27,6 +27,7 @@ class ExactRig:
     """
 
     origin_rad = 0.25
+    powered = False
 
     def __init__(
         self, change=lambda tick, reading: reading, interval_s=INTERVAL_S, inertia_kg_m2=0.0
@@ -58,6 +59,13 @@ class ExactRig:
         self.calls.append(("write", velocity_rad_s))
         self.velocity_rad_s = velocity_rad_s
         return velocity_rad_s
+
+    @property
+    def until_off(self):
+        """The calls until the power was last taken away; then it is read, and told to stand."""
+        end = len(self.calls) - self.calls[::-1].index(("disable",))
+        assert {*self.calls[end:]} <= {("read", 1), ("write", 0.0)}
+        return self.calls[:end]
 
     def of(self, name):
         """Return the arguments of the calls of this name."""

@@ -43,7 +43,7 @@ def test_a_session_runs_what_was_planned_tells_it_and_takes_the_power_away():
         "counts": {"lost": 3},
     }
     assert ran.rig.calls[0] == ("enable",)
-    assert ran.rig.calls[-2:] == [("write", 0.0), ("disable",)]
+    assert ran.rig.until_off[-2:] == [("write", 0.0), ("disable",)]
     assert ran.rig.of("disable") == [None]
     assert [run.state for run in ran.states] == [State.RUNNING, State.STOPPING]
     epochs = [s.epoch for s in ran.sink.samples][: 2 * (EPOCH + REST)]
@@ -171,7 +171,7 @@ def test_a_stop_and_an_abort(orders, ended, outcome, reason):
     assert [how for _, how in ran.epochs] == ended
     assert (ran.result.outcome, ran.result.reason) == (outcome, reason)
     assert ran.sink.closed[0][1:] == (outcome, reason)
-    assert ran.rig.calls[-1] == ("disable",)
+    assert ran.rig.until_off[-1] == ("disable",)
     assert ran.states[-1].state is State.STOPPING
 
 
@@ -235,7 +235,7 @@ def test_a_stop_of_the_guard_ends_the_session_with_its_cause():
     assert latched[0]["time_s"] == first.time_s
     assert latched[0]["time_s"] == pytest.approx(20 / RATE_HZ)
     assert ran.states[-1].state is State.FAULTED
-    assert ran.rig.calls[-1] == ("disable",)
+    assert ran.rig.until_off[-1] == ("disable",)
     assert ran.rig.of("stop") == []
 
 

@@ -64,7 +64,7 @@ def test_what_one_process_shows_another_sees(shared_status):
         **{k: pytest.approx(v, nan_ok=True) for k, v in LoopStatus()._asdict().items()}
     )
     status = LoopStatus(1, 12, 3, 5, 9, 4, 2, 1.5, 0.1, 0.2, 0.3, 0.4, 0.5, 21.5, 0.6)
-    live = LiveEstimate(12, 1, 7, 3, 0.5, 1.5, 0.08, 0.001, 0.4, 0.1, 1.7, 0.2, 4.0)
+    live = LiveEstimate(12, 1, 7, 3, 0.5, 1.5, 0.08, 0.001, 0.4, 0.1, 1.7, 0.2, 4.0, 0.01)
     shared_status.show_loop(status)
     shared_status.show_live(live)
     shared_status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full: µ")

@@ -72,7 +72,8 @@ class FakeSensor:
         while len(history) > 1 and history[1].time_s <= now_s - late_s + 1e-9:
             history.popleft()
         # A sensor that does not know its delay stamps what it sends with the time of sending.
-        return history[0]._replace(time_s=self._sample.time_s)
+        ahead_s = faults.get("stamp_ahead_s", 0.0)
+        return history[0]._replace(time_s=self._sample.time_s + ahead_s)
 
     def close(self) -> None: ...
 
@@ -80,7 +81,7 @@ class FakeSensor:
 class FakeDrive:
     def __init__(self, arm: EmulatedArm, now: Callable[[], float], faults: Mapping[str, Any]):
         self._arm, self._now, self._faults = arm, now, faults
-        self._on, self._status, self._cause = False, 0, Cause.NONE
+        self._on, self._status, self._cause = "on_before" in faults, 0, Cause.NONE
         self._written_s = 0.0
         self._queue: deque[tuple[float, float]] = deque()
         self.counts: dict[str, int] = {"received": 0, "lost": 0}
@@ -216,6 +217,7 @@ def fake_rig(rigfile: RigFile, monkeypatch: Any) -> Callable[..., FakeRig]:
         push_nm = [0.0]
         arm = EmulatedArm(
             JointDynamics(*joint),
+            bandwidth_hz=faults.get("bandwidth_hz", 50.0),
             noise_sd_nm=noise_sd_nm,
             voluntary_nm=lambda _: push_nm[0],
             now=time.now,

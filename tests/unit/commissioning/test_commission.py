@@ -1,13 +1,22 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.unit.commissioning.conftest import at_hand
 
+from rigidimeter.acquisition import ControlLoop
+from rigidimeter.acquisition.clock import SimulatedClock
+from rigidimeter.acquisition.control_modes import perturb
+from rigidimeter.commissioning import as_measured
 from rigidimeter.commissioning.commissioning_record import A_PERSON_TELLS
-from rigidimeter.settings import SubjectSettings
+from rigidimeter.devices.simulated import SimulatedRig
+from rigidimeter.experiment import prbs_nm
+from rigidimeter.guard import Cause
+from rigidimeter.settings import Settings, SubjectSettings, changed_settings, parse_settings
 
 
 def failed(record: Any) -> list[str]:
@@ -269,3 +278,71 @@ def test_hands_are_asked_for_only_after_the_drive_said_that_it_has_no_power(
     assert failed(record) == ["devices answer"]
     assert "keep hands off the joint" in record.failed[0].sentence
     assert not any("torque of" in question for question in asked)
+
+
+def test_no_hand_is_asked_for_while_a_drive_has_power_from_before(commissioned: Any) -> None:
+    asked: list[str] = []
+
+    def ask(question: str, world: Any) -> bool:
+        asked.append(question)
+        return at_hand(question, world)
+
+    record = commissioned(ask=ask, known_angle_deg=10.0, on_before=True)
+    assert failed(record) == ["devices answer"]
+    assert "keep hands off the joint" in record.failed[0].sentence
+    assert asked == []
+
+
+def test_a_drive_quicker_than_the_settings_say_is_no_silent_torque(
+    commissioned: Any, settings: Any
+) -> None:
+    """100 Hz at 100 ticks/s where the settings say 50 Hz: it is at its velocity before each tick.
+
+    With half the joint's inertia as the floor the guard stopped the first epoch at 0.03 s.
+    """
+    found = commissioned(bandwidth_hz=100.0)
+    assert failed(found) == []
+    today: Any = SimpleNamespace(reference=SimpleNamespace(inertia_kg_m2=0.0045))
+    told = parse_settings({"rig": settings.rig.model_dump(), "guard": {"reaction_time_s": 0.1}})
+    measured = as_measured(told, found, today)
+    floor = {"least_inertia_kg_m2": 0.5 * 0.0045}
+    assert perturbed_by_100_hz(changed_settings(told, {"guard": floor})) == (
+        Cause.TORQUE_SILENT,
+        pytest.approx(0.03),
+    )
+    assert perturbed_by_100_hz(measured) == (Cause.NONE, pytest.approx(2.0))
+
+
+def perturbed_by_100_hz(settings: Settings) -> tuple[Cause, float]:
+    """Return the cause that ended 2 s of perturbation on a simulated drive of 100 Hz, and when."""
+    quick = settings.rig.model_copy(update={"drive_bandwidth_hz": 100.0})
+    rig = SimulatedRig(quick, settings.subject["OFF"], np.random.default_rng(1))
+    loop = ControlLoop(settings, rig, SimulatedClock(), lambda _: None)
+    rig.enable()
+    perturb(loop, 0, prbs_nm(settings.prbs, 100.0)[:200].tolist())
+    return loop.cause, loop.time_s
+
+
+@pytest.mark.parametrize(("told_hz", "remarked"), [(20.0, True), (50.0, False), (200.0, False)])
+def test_the_bandwidth_is_compared_with_what_the_settings_say(
+    commissioned: Any, settings: Any, told_hz: float, remarked: bool
+) -> None:
+    """Nothing above 53 Hz can be told apart at 100 ticks/s."""
+    rig = settings.rig.model_copy(update={"drive_bandwidth_hz": told_hz})
+    found = commissioned(tables={"rig": rig})
+    check = next(check for check in found.checks if check.name == "bandwidth of the drive")
+    assert check.passed
+    assert (
+        f"rig.drive_bandwidth_hz = {told_hz:g} Hz is not this drive's" in check.remedy
+    ) is remarked
+
+
+def test_stamps_of_times_to_come_are_caught_at_rest(commissioned: Any) -> None:
+    """The guard allows a stamp to be wrong by the reaction time, so it says nothing of 15 ms."""
+    record = commissioned(stamp_ahead_s=0.015)
+    assert failed(record) == ["age of torque samples"]
+    assert record.failed[0].sentence.startswith(
+        "age of torque samples: -15 ms, at most -15 ms, must be above 0, at most 100 ms; a stamp"
+    )
+    names = [check.name for check in record.checks]
+    assert "motion when enabled" not in names

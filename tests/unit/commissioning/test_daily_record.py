@@ -9,21 +9,23 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rigidimeter.commissioning import (
     Check,
     DailyRecord,
+    as_measured,
     daily_path,
     read_daily,
     require_daily_check,
-    with_measured_floor,
     write_daily,
 )
 from rigidimeter.commissioning.daily_record import MUST_PASS, Reference
 from rigidimeter.devices.rigfile import RigFile
+from rigidimeter.dynamics import DriveModel
 from rigidimeter.errors import UserError
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.settings import Settings, changed_settings, parse_settings
 
 NOW = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
 COMMISSIONED: Any = SimpleNamespace(digest="of the commissioning")
@@ -145,6 +147,10 @@ def test_nothing_that_matters_may_be_missing(
         require(rigfile)
 
 
+def measured(bandwidth_hz: float = 50.0) -> Any:
+    return SimpleNamespace(rig_name="rig", numbers={"bandwidth_hz": bandwidth_hz})
+
+
 @pytest.mark.parametrize(
     ("guard", "inertia_kg_m2", "floor_kg_m2"),
     [
@@ -159,6 +165,44 @@ def test_half_the_measured_inertia_is_the_guards_floor(
 ) -> None:
     assert record.reference is not None
     today = replace(record, reference=replace(record.reference, inertia_kg_m2=inertia_kg_m2))
-    settings = with_measured_floor(parse_settings({"guard": guard}), today)
-    assert settings.guard.least_inertia_kg_m2 == pytest.approx(floor_kg_m2)
-    assert with_measured_floor(settings, replace(record, reference=None)) == settings
+    settings = as_measured(parse_settings({"guard": guard}), measured(), today)
+    assert settings.guard.least_inertia_kg_m2 == pytest.approx(floor_kg_m2, rel=0.01)
+    assert as_measured(settings, measured(), replace(record, reference=None)) == settings
+
+
+@pytest.mark.parametrize("bandwidth_hz", [20.0, 50.0, 53.0])
+def test_the_floor_is_half_of_what_an_even_acceleration_shows_at_the_ticks(
+    record: DailyRecord, bandwidth_hz: float
+) -> None:
+    """The command rises by 1 rad/s each 10 ms, so the acceleration is 100 rad/s² on average."""
+    drive = DriveModel.second_order(bandwidth_hz, 0.7071)
+    seen_rad_s2 = drive.held(np.arange(100.0), 0.01).acceleration_rad_s2[-1]
+    settings = as_measured(at_100_hz(), measured(bandwidth_hz), heavy(record))
+    assert settings.rig.drive_bandwidth_hz == bandwidth_hz
+    assert settings.guard.least_inertia_kg_m2 == pytest.approx(0.5 * 0.02 * seen_rad_s2 / 100.0)
+
+
+def test_ticks_that_show_no_inertia_do_not_raise_the_floor(record: DailyRecord) -> None:
+    settings = as_measured(at_100_hz(), measured(53.1), heavy(record))
+    assert settings.guard.least_inertia_kg_m2 == 0.0005
+    assert settings.rig.drive_bandwidth_hz == 53.1  # at least
+    told = changed_settings(at_100_hz(), {"rig": {"drive_bandwidth_hz": 200.0}})
+    assert as_measured(told, measured(53.1), heavy(record)) == told
+
+
+def at_100_hz() -> Settings:
+    sensor = {"rate_hz": 100.0}
+    rig = {"tick_rate_hz": 100.0, "torque": sensor, "motion": sensor}
+    return parse_settings({"rig": rig, "guard": {"reaction_time_s": 0.1}})
+
+
+def heavy(record: DailyRecord) -> DailyRecord:
+    assert record.reference is not None
+    return replace(record, reference=replace(record.reference, inertia_kg_m2=0.02))
+
+
+def test_a_reaction_time_too_short_for_the_drive_as_it_was_measured_is_refused(
+    record: DailyRecord,
+) -> None:
+    with pytest.raises(UserError, match=r"rig, as measured: .*reaction_time_s = 0.02"):
+        as_measured(Settings(), measured(10.0), record)

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rigidimeter.acquisition.processes.status_values import LiveEstimate
-from rigidimeter.console.live_values import live_values, settling_s
+from rigidimeter.console.live_values import caution, live_values, settling_s
 from rigidimeter.estimation.online import STATE_SIZE, online_design, online_step
 from rigidimeter.settings import OnlineSettings
 
@@ -123,3 +123,41 @@ def test_an_estimate_that_began_anew_is_not_compared_with_the_one_before():
     old = [one._replace(since_s=0.0, stiffness_nm_rad=9.0) for one in steady(20.0)]
     new = [one._replace(since_s=20.0, time_s=20.0 + one.time_s) for one in steady(6.0)]
     assert live_values([*old, *new], "prbs", SETTINGS)[2].settled
+
+
+ARMS = (0.25 * 0.0045, 4.0 * 0.0045)
+
+
+def of_epoch(J, se_part=0.02, step_nm=0.01):
+    return LiveEstimate(inertia_kg_m2=J, inertia_kg_m2_se=se_part * J, step_nm=step_nm)
+
+
+BEFORE = [of_epoch(J) for J in (0.0044, 0.0045, 0.006)]
+
+
+@pytest.mark.parametrize(
+    ("now", "words"),
+    [
+        (of_epoch(0.5 * 0.0045), "J 0.00225 kg·m² is 0.5 times that of the epochs before"),
+        (of_epoch(1.61 * 0.0045), "1.6 times that of the epochs before"),
+        (of_epoch(1.59 * 0.0045), ""),
+        (of_epoch(0.63 * 0.0045), ""),
+        (of_epoch(0.5 * 0.0045, se_part=0.11), ""),  # J is not known well enough
+        (of_epoch(-0.5, se_part=-0.01), ""),
+        (of_epoch(0.0045, step_nm=0.031), "3.1 times as much from tick to tick as in those before"),
+        (of_epoch(0.0045, se_part=9.0, step_nm=0.1), "10.0 times"),
+        (of_epoch(0.0045, step_nm=0.029), ""),
+        (LiveEstimate(), ""),
+    ],
+)
+def test_a_torque_unlike_that_of_the_epochs_before_is_named(now, words):
+    found = caution(now, BEFORE, ARMS)
+    assert words in found
+    assert bool(found) is bool(words)
+
+
+def test_the_first_epoch_is_compared_with_the_rig_and_the_arms_that_were_commissioned():
+    assert caution(of_epoch(0.0045), [], ARMS, 0.005) == ""  # 0.9 of it: a live estimate is no more
+    assert "is less than the rig's alone, 0.006: " in caution(of_epoch(0.0045), [], ARMS, 0.006)
+    assert "not within 0.00112 to 0.018, " in caution(of_epoch(0.045), [], ARMS)
+    assert caution(of_epoch(0.00225), [], ARMS) == ""

@@ -1,14 +1,20 @@
 """A session followed from the memory that its processes share."""
 
+import numpy as np
 import pytest
 from tests.unit.acquisition.exact_rig import Desk
 from tests.unit.acquisition.whole_session import RATE_HZ, VALUES, session
 
+from rigidimeter.acquisition.clock import SimulatedClock
+from rigidimeter.acquisition.processes.live_estimate import Estimator
+from rigidimeter.acquisition.processes.ring import SampleReader
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.sink import RingSink
 from rigidimeter.acquisition.processes.status_values import LiveEstimate
 from rigidimeter.acquisition.run_states import Command
-from rigidimeter.console import Observer, SessionPlan
+from rigidimeter.acquisition.session_run import run_session
+from rigidimeter.console import Level, Observer, SessionPlan
+from rigidimeter.devices.simulated import SimulatedRig
 from rigidimeter.experiment import plan
 from rigidimeter.settings import parse_settings
 
@@ -97,3 +103,75 @@ def test_live_estimates_are_remembered_for_one_epoch(shared):
     shared.status.show_live(LiveEstimate(2000, epoch=2))
     observer.look()
     assert len(observer._history) == 1
+
+
+EPOCH_S = 6.0
+
+
+class Gain(SimulatedRig):
+    """Its torque has another gain, and noise, in the epochs that `wrong` names."""
+
+    def __init__(self, settings, wrong):
+        subject = settings.subject["OFF"]
+        super().__init__(settings.rig, subject, np.random.default_rng(1))
+        self.wrong, self.gain, self.noise_nm = wrong, 1.0, 0.0
+        self.noise = np.random.default_rng(2)
+
+    def new(self, planned):
+        self.gain, self.noise_nm = self.wrong.get(planned.number, (1.0, 0.0))
+        return {}
+
+    def read(self, elapsed_ticks=1):
+        found = super().read(elapsed_ticks)
+        noise_nm = self.noise_nm * float(self.noise.standard_normal())
+        return found._replace(torque_nm=self.gain * found.torque_nm + noise_nm)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({}, ""),
+        ({3: (0.5, 0.0)}, "epoch 3: J 0.00223 kg·m² is 0.5 times that of the epochs before"),
+        ({1: (10.0, 0.0)}, "epoch 1: J 0.04"),  # outside the arms that were commissioned
+        ({3: (1.0, 0.5)}, "epoch 3: the torque changed"),
+    ],
+)
+def test_a_torque_that_was_wrong_through_an_epoch_is_named_at_its_end(wrong, words):
+    """From the loop to the lamp; nothing stops, and the recording is complete."""
+    rate = {"rate_hz": 250.0}
+    settings = parse_settings(
+        {
+            "rig": {"tick_rate_hz": 250.0, "torque": rate, "motion": rate},
+            "prbs": {"duration_s": EPOCH_S},
+            "guard": {"reaction_time_s": 0.05},
+            "protocol": {"blocks": [{"epochs": 3}], "rests_s": [1.0], "return_s": 0.6},
+        }
+    )
+    protocol = plan(settings.protocol, settings.prbs, settings.sinusoid, 1)
+    memory = SessionMemory.create(250.0, 60.0)
+    try:
+        estimator, reader = Estimator(settings.online, 250.0), SampleReader(memory.samples)
+        observer = Observer(SessionPlan(settings, protocol.epochs), memory)
+        seen = []
+
+        def look(time_s):
+            memory.status.show_live(estimator.take(*reader.read()))
+            sensor = next(lamp for lamp in observer.look().lamps if lamp.name == "sensor")
+            seen.append((time_s, sensor.level, sensor.words))
+
+        sink, rig = RingSink(memory, 250.0), Gain(settings, wrong)
+        clock, before = SimulatedClock(), {"before_epoch": rig.new}
+        result = run_session(protocol, settings, rig, clock, sink, progress=look, **before)
+        look(99.0)
+    finally:
+        memory.unlink()
+        memory.close()
+    assert (result.outcome, result.epochs_good) == ("success", 3)
+    cautions = [(time_s, text) for time_s, level, text in seen if level is Level.WATCH]
+    assert bool(cautions) is bool(words)
+    assert [text for text in observer.remarks if words not in text] == []
+    if words:
+        (epoch,) = wrong
+        assert EPOCH_S * epoch < cautions[0][0] <= (EPOCH_S + 1.0) * epoch + 1.0
+        assert words in cautions[0][1]
+        assert words in observer.remarks[0]

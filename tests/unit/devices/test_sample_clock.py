@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from rigidimeter.devices.ati.sample_clock import SampleClock
+from rigidimeter.devices.ati.sample_clock import LONGEST_DELAY_S, SampleClock
 
 RATE_HZ = 1000.0
 DRIFT = 700e-6
@@ -72,3 +72,18 @@ def test_of_an_unknown_rate_a_sample_is_as_old_as_its_arrival():
     assert [clock.taken_s(t, 1) for t in (1.0, 5.0)] == [1.0, 5.0]
     clock.restart(math.nan)
     assert clock.taken_s(7.0, 1) == 7.0
+
+
+@pytest.mark.parametrize("rate", [1.3, 7.0])
+def test_a_counter_that_gains_on_the_clock_bears_times_to_come(rate):
+    """It gains rate - 1 s a second; the first sample may have been late by 0.1 s of it."""
+    arrivals_s = [0.001 * k / rate for k in range(2000)]
+    found_s = ages_s(arrivals_s)
+    passed_s = arrivals_s[-1]
+    ahead_s = (rate - 1.0) * passed_s - LONGEST_DELAY_S - DRIFT * passed_s
+    assert found_s[-1] == pytest.approx(-ahead_s, rel=1e-6)
+    assert max(found_s) < 1e-9
+
+
+def test_a_first_sample_that_was_late_makes_no_other_early():
+    assert ages_s([0.099, *(0.001 * k for k in range(1, 100))])[1:] == pytest.approx([0.0] * 99)

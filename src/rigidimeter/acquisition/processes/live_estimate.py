@@ -7,6 +7,7 @@ then, which is how the filters begin, and no condition is mixed with another. Re
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections import deque
@@ -51,6 +52,7 @@ class Estimator:
         self._tick, self._epoch = -1, REST
         self.since_s = self._time_s = 0.0
         self._last: NDArray[np.void] = np.empty(0, ROW)
+        self._steps, self._steps_nm2 = 0, 0.0
 
     def take(self, rows: NDArray[np.void], missed: int) -> LiveEstimate:
         """Take samples; return what is known after them."""
@@ -63,7 +65,8 @@ class Estimator:
             epoch=self._epoch,
             since_s=self.since_s,
             time_s=self._time_s,
-            **{name: getattr(found, name) for name in LiveEstimate._fields[6:]},
+            **{name: getattr(found, name) for name in LiveEstimate._fields[6:-1]},
+            step_nm=math.sqrt(self._steps_nm2 / self._steps) if self._steps else math.nan,
         )
 
     def steps(self, rows: NDArray[np.void], missed: int) -> Iterator[int]:
@@ -81,6 +84,7 @@ class Estimator:
             if gap or epoch != self._epoch:
                 self._epoch, self.since_s = epoch, float(part["time_s"][0])
                 self._state, self._last = [0.0] * STATE_SIZE, part[:0]
+                self._steps, self._steps_nm2 = 0, 0.0
             yield from self._take(part)
 
     def torque(self) -> tuple[float, float]:
@@ -95,6 +99,9 @@ class Estimator:
         ticks = rows["tick"]
         if self._last.size:  # of the epoch, and already taken: the first of the lines begins there
             rows, ticks = np.concatenate((self._last, rows)), np.append(self._last["tick"], ticks)
+        steps_nm = np.diff(rows["torque_nm"])[np.diff(ticks) == 1]
+        self._steps += steps_nm.size
+        self._steps_nm2 += float(np.nansum(steps_nm * steps_nm))
         every = np.arange(ticks[0] + self._last.size, ticks[-1] + 1)
         columns = [np.interp(every, ticks, rows[name]).tolist() for name in _TAKEN]
         self._last = rows[-1:].copy()

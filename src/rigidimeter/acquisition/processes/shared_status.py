@@ -117,7 +117,7 @@ class SharedStatus:
         self._now_ns = now_ns
         self._noted = 0
         self._loop = _Block(memory, _STATUS, "@7q8d")
-        self._live = _Block(memory, _LIVE, "@4q9d")
+        self._live = _Block(memory, _LIVE, "@4q10d")
         note = f"@q{NOTE_BYTES}s"
         self._notes = [
             _Block(memory, (_NOTES_BYTE + role * _NOTE_BYTES) // 8, note) for role in Role

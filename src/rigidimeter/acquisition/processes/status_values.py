@@ -78,7 +78,8 @@ class LiveEstimate(NamedTuple):
 
     Every epoch is estimated anew, so that no condition is mixed with another: `epoch` is the last
     one of which samples were taken, `since_s` and `time_s` when the first and the last of them was.
-    `missed_samples` is how many it could not read in time, in all.
+    `missed_samples` is how many it could not read in time, in all. `step_nm` is the root of the
+    mean squared change of the torque from one tick to the next in that epoch.
     """
 
     tick: int = -1
@@ -94,3 +95,4 @@ class LiveEstimate(NamedTuple):
     stiffness_nm_rad: float = math.nan
     stiffness_nm_rad_se: float = math.inf
     memory_s: float = 0.0
+    step_nm: float = math.nan

@@ -152,7 +152,7 @@ class AsciiLine:
             self._port.reset_input_buffer()
             self._port.write(request.encode("ascii") + b"\r")
             answer = self._port.read_until(b"\r", LONGEST_REPLY)
-        except OSError:  # serial.SerialException is one; a port that is gone counts as no reply
+        except Exception:  # OSError or termios.error: a port that is gone counts as no reply
             return None
         if not answer.endswith(b"\r"):
             return None

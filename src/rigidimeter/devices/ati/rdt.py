@@ -40,6 +40,7 @@ from rigidimeter.devices.ati.rdt_setup import (
     fetch_page,
     refuse_unexpected,
 )
+from rigidimeter.devices.ati.sample_clock import LONGEST_DELAY_S
 from rigidimeter.devices.base import DeviceError, DeviceFacts, Now, TorqueSample
 from rigidimeter.guard import Cause
 
@@ -55,8 +56,9 @@ SO_TIMESTAMPNS = 35
 TIMESPEC = struct.Struct("@qq")
 NOTE_BYTES = socket.CMSG_SPACE(TIMESPEC.size)
 LONGEST_WAIT_S = 0.2
-LONGEST_DELAY_S = 0.1
-"""From a request to the first sample: a sensor answers in some ms, and samples may be so old."""
+COUNTED_S, GIVE_UP_S, RATE_TOLERANCE = 0.1, 1.0, 0.1
+"""The records are counted for at least so long, until they come at the stated rate to this share,
+or for longer than a busy computer may hold them up."""
 
 
 class AtiRdt:
@@ -132,6 +134,7 @@ class AtiRdt:
             weight * scale for weight, scale in zip(settings.weights, scales, strict=True)
         ]
         self._start(page)
+        self._count(page.sample_rate_hz)
         self._page, self._configured = page, True
         values = asdict(page)
         del values["internal_rate_hz"]  # no more is known of the torque for it
@@ -278,6 +281,21 @@ class AtiRdt:
             f"{self._device}: {answer} from {host}:{port} within {limit_s:g} s, "
             f"packets counted: {self.counts}; check firewall, port and that RDT is enabled"
         )
+
+    def _count(self, stated_hz: float) -> None:
+        """Refuse a stream of another rate than the page states: its stamps would be wrong."""
+        began_s, first = self._now(), self._stream.sequence
+        passed_s = rate_hz = 0.0
+        while passed_s < COUNTED_S or abs(rate_hz / stated_hz - 1.0) > RATE_TOLERANCE:
+            if not self._wait(began_s + GIVE_UP_S):
+                raise DeviceError(
+                    f"{self._device}: its page states {stated_hz:.4g} records/s and it sends "
+                    f"{rate_hz:.4g}; set the RDT output rate on the sensor's Communications page, "
+                    "and power the sensor off and on"
+                )
+            self.read()
+            passed_s = self._now() - began_s
+            rate_hz = (self._stream.sequence - first) % 2**32 / passed_s
 
     def _first_sample(self, until_s: float) -> TorqueSample | None:
         while self._wait(until_s):

@@ -7,13 +7,18 @@ than the fastest packet so far is
 
 so a packet that lay anywhere on its way, in the sensor, the network or the computer, is as old as
 it is, however it arrives. The two clocks need not agree: m may rise by the drift d (s/s), which
-hides a delay that grows more slowly than that, and follows a sensor that is fast at once. A delay
+hides a delay that grows more slowly than that, and follows a packet that is faster at once. But no
+packet is faster than the first by more than the first may have been late. A counter that gains more
+than that on the clock has another rate than f: its samples then bear times still to come. A delay
 that is the same from the first packet on cannot be seen here: the age is that beyond it.
 """
 
 from __future__ import annotations
 
 import math
+
+LONGEST_DELAY_S = 0.1
+"""From a request to the first sample: a sensor answers in some ms, and samples may be so old."""
 
 
 class SampleClock:
@@ -33,7 +38,7 @@ class SampleClock:
         """Begin with the next sample; NaN if the rate is unknown, samples then have no age."""
         self._interval_s = 1.0 / rate_hz
         self._count = 0
-        self._offset_s = math.inf
+        self._offset_s, self._least_s = math.inf, -math.inf
         self._arrived_s = -math.inf
 
     def taken_s(self, arrived_s: float, steps: int) -> float:
@@ -59,7 +64,12 @@ class SampleClock:
             return arrived_s
         self._count += steps
         counted_s = self._count * self._interval_s
-        passed_s = max(arrived_s - self._arrived_s, 0.0)
-        self._offset_s = min(arrived_s - counted_s, self._offset_s + self._drift * passed_s)
+        if math.isinf(self._offset_s):
+            self._offset_s = arrived_s - counted_s
+            self._least_s, self._arrived_s = self._offset_s - LONGEST_DELAY_S, arrived_s
+        drift_s = self._drift * max(arrived_s - self._arrived_s, 0.0)
+        self._least_s -= drift_s
+        self._offset_s = min(arrived_s - counted_s, self._offset_s + drift_s)
+        self._offset_s = max(self._offset_s, self._least_s)
         self._arrived_s = arrived_s
         return self._offset_s + counted_s

@@ -55,6 +55,8 @@ class SensorFixture:
         Makes the device stop sending from then on.
     tick_s, settle_s, longest_read_s : float
         Interval of the reads; how long starting may take; how long a `read` may take.
+    watch_s : float
+        How long good samples are watched: longer than the driver takes to call a device frozen.
     """
 
     make: Callable[[], TorqueSensor]
@@ -63,6 +65,7 @@ class SensorFixture:
     tick_s: float = 0.005
     settle_s: float = 0.5
     longest_read_s: float = 0.002
+    watch_s: float = 0.3
 
 
 @dataclass(frozen=True)

@@ -40,12 +40,17 @@ def sensor_facts_are_complete(fixture: SensorFixture) -> None:
 
 
 def sensor_samples_flow(fixture: SensorFixture) -> None:
-    """Finite samples without a cause and with new time stamps arrive."""
+    """Finite samples without a cause and with new time stamps arrive, for as long as is watched.
+
+    A driver may take a while to say that its device is frozen.
+    """
     with _sampling(fixture) as sensor:
         first = sensor.read()
         wait_for(lambda: sensor.read().time_s > first.time_s, fixture, "a new sample arrives")
-        sample = sensor.read()
-        check_sample(sample, sample.torque_nm, fixture.now)
+        for _ in range(math.ceil(fixture.watch_s / fixture.tick_s)):
+            sample = sensor.read()
+            check_sample(sample, sample.torque_nm, fixture.now)
+            time.sleep(fixture.tick_s)
 
 
 def sensor_read_never_waits(fixture: SensorFixture) -> None:

@@ -58,6 +58,7 @@ MISBEHAVIOURS = {
     "changed_calibration": "The page shows another transducer with twice the counts.",
     "changed_bias": "The page shows another software bias.",
     "rdt_disabled": "The page shows RDT disabled.",
+    "page_rate": "The page states `value` records/s (7000).",
     "page_status": "The page shows the status bits `value` (the supply too low).",
     "http_silent": "The web server accepts requests and does not answer.",
     "http_slow": "The web server answers after `value` s (0.5).",

@@ -74,6 +74,8 @@ def page_text(page: PageFacts) -> bytes:
 def page_with_faults(page: PageFacts, faults: Faults) -> PageFacts:
     """Return the page with these misbehaviours applied."""
     page = replace(page, status=int(fault_value(faults, "page_status", SUPPLY_LOW) or 0))
+    if "page_rate" in faults:
+        page = replace(page, rate_hz=fault_value(faults, "page_rate", 7000.0) or 7000.0)
     if "changed_units" in faults:
         page = replace(page, torque_unit="lbf-in")
     if "unknown_units" in faults:
