@@ -33,7 +33,8 @@ from typing import Any
 import numpy as np
 import psutil
 from playwright.sync_api import Browser, Page
-from tests.console.opened import Console, browser, open_page
+from tests.browser import open_browser
+from tests.console.opened import Console, open_page
 
 from benchmarks.console_gaps import gaps
 from benchmarks.console_lateness import lateness
@@ -140,7 +141,7 @@ def stops(clicks: int, freezes: int) -> None:
     with tempfile.TemporaryDirectory() as name:
         console = Console(Path(name), protocol=PROTOCOL)
         try:
-            with browser() as opened:
+            with open_browser() as opened:
                 page = open_page(opened, console)
                 for _ in range(clicks):
                     click(page, console, measured)

@@ -26,9 +26,8 @@ from typing import Any
 import numpy as np
 import psutil
 from numpy.typing import NDArray
-from playwright.sync_api import sync_playwright
 from scipy import stats
-from tests.console.opened import CHROMIUM
+from tests.browser import open_browser
 
 from benchmarks import console_running
 from benchmarks.console_gaps import gaps
@@ -139,10 +138,7 @@ def _serve_page(names: tuple[str, str, str], plan: SessionPlan, folder: Path, dr
     server = PageServer(desk, Work(), "127.0.0.1", 0)
     server.start()
     parent = os.getppid()
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-dev-shm-usage"]
-        )
+    with open_browser() as opened:
         page = opened.new_page(viewport={"width": 1280, "height": 800})
         page.goto(server.address)
         page.wait_for_function("window.rigDrawnS > 0", timeout=1e3 * STARTS_S)

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page
 from statsmodels.regression.linear_model import OLS
 from statsmodels.tools import add_constant
-from tests.console.opened import Console, browser, open_page, start, wait_for
+from tests.browser import open_browser
+from tests.console.opened import Console, open_page, start, wait_for
 
 RUNS = "document.getElementById('state').textContent === 'epoch runs'"
 LOOK_S = 10.0
@@ -78,7 +79,7 @@ def memory(minutes: float, rows: str = "") -> None:
     with tempfile.TemporaryDirectory() as name:
         console = Console(Path(name), protocol=PROTOCOL.format(seconds=60.0, epochs=epochs))
         try:
-            with browser() as opened:
+            with open_browser() as opened:
                 page = open_page(opened, console)
                 pids = renderers(opened)
                 tools = page.context.new_cdp_session(page)

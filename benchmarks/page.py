@@ -1,4 +1,4 @@
-"""How large a report's page is, and what opening it costs in Debian's chromium.
+"""How large a report's page is, and what opening it costs in a browser.
 
 The time is that of the page's thread until the page is loaded, in processor time, which other work
 on the machine hardly changes; the time on the clock stands beside it.
@@ -9,12 +9,11 @@ on the machine hardly changes; the time on the clock stands beside it.
 from __future__ import annotations
 
 import argparse
-import shutil
 import statistics
 from collections.abc import Sequence
 from pathlib import Path
 
-from playwright.sync_api import sync_playwright
+from tests.browser import open_browser
 
 SCREEN = (1280, 800)
 
@@ -25,13 +24,10 @@ def opened(page: Path, repeats: int) -> list[tuple[float, float]]:
     Raises
     ------
     SystemExit
-        Without a chromium.
+        Without a browser.
     """
     found = []
-    if (chromium := shutil.which("chromium")) is None:
-        raise SystemExit("there is no chromium: apt-get install chromium")
-    with sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    with open_browser() as browser:
         for _ in range(repeats):
             tab = browser.new_page(viewport={"width": SCREEN[0], "height": SCREEN[1]})
             session = tab.context.new_cdp_session(tab)
@@ -42,7 +38,6 @@ def opened(page: Path, repeats: int) -> list[tuple[float, float]]:
             wall = "performance.getEntriesByType('navigation')[0].loadEventEnd / 1000"
             found.append((float(cpu_s), float(tab.evaluate(wall))))
             tab.close()
-        browser.close()
     return found
 
 

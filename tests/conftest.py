@@ -23,7 +23,7 @@ from tests.lateness import PRESENT, LatenessProbe, run_beside_probe, unjudged
 from rigidimeter.cli.main import main
 from rigidimeter.settings import parse_settings
 
-pytest_plugins = ["pytester", "tests.small_study"]
+pytest_plugins = ["pytester", "tests.browser", "tests.small_study"]
 
 Simulate = Callable[..., Path]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -60,14 +61,18 @@ def _file(name: str, file: str, write: Callable, *arguments: object, more: tuple
     return name, lambda folder: write(folder / file, *arguments), file, command
 
 
+_BIOPAC = (
+    _file(".acq file", "r.acq", instruments.write_acq, _SIGNALS),
+    _file("compressed .acq", "r.acq", _biopac),
+)
 _MOTION = "set/sub-01/motion/sub-01_task-elbow_tracksys-torque"
 FILES: tuple[Made, ...] = (
     *(
         _file(f"{suffix} file", f"r{suffix}", write, _SIGNALS,
               more=_MILLIVOLTS if suffix == ".plx" else ())
-        for suffix, write in instruments.WRITERS.items()
+        for suffix, write in instruments.WRITERS.items() if suffix != ".acq"
     ),
-    _file("compressed .acq", "r.acq", _biopac),
+    *(_BIOPAC if find_spec("bioread") else ()),
     _file("LabVIEW text", "r.lvm", _labview),
     _file("MATLAB table", "r.mat", _matlab_table),
     _file("MATLAB timetable", "r.mat", _matlab_timetable),

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,8 @@ def write_c3d(path: Path, signals: Sequence[Signal]) -> None:
 
 def write_acq(path: Path, signals: Sequence[Signal], *, compressed: bool = False) -> None:
     """Write a file of AcqKnowledge 3.8.1: rates are whole parts of the first one."""
-    from bioread import headers
+    why = "needs bioread: pip install 'rigidimeter[biopac]'"
+    headers = pytest.importorskip("bioread.headers", reason=why)
 
     def packed(kind: type, **fields: object) -> bytes:
         head = kind.for_revision(headers.V_381, "<", "latin1")._struct_class()

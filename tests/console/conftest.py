@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 from playwright.sync_api import Browser
-from tests.console.opened import Console, browser
+from tests.console.opened import Console
 
 # At a quarter of the usual rate: how fast the loop can be is not what is tested.
 PROTOCOL = """
@@ -17,17 +17,11 @@ zeroing.duration_s = 0.5
 """
 
 
-@pytest.fixture(scope="module")
-def opened_browser() -> Iterator[Browser]:
-    with browser() as opened:
-        yield opened
-
-
 @pytest.fixture
-def chromium(opened_browser: Browser) -> Iterator[Browser]:
+def chromium(browser: Browser) -> Iterator[Browser]:
     """Give the browser of the module without a page."""
-    yield opened_browser
-    for context in opened_browser.contexts:
+    yield browser
+    for context in browser.contexts:
         context.close()
 
 

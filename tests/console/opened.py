@@ -8,14 +8,12 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
-CHROMIUM = "/usr/bin/chromium"
 STARTS_S = 90.0
 """Processes that load take so long on a machine that does a dozen other things at once."""
 
@@ -104,17 +102,6 @@ def wait_for(what: Callable[[], Any], timeout_s: float = STARTS_S) -> Any:
             return found
         assert time.monotonic() < until_s, f"{what} did not come true within {timeout_s} s"
         time.sleep(0.02)
-
-
-@contextmanager
-def browser() -> Iterator[Browser]:
-    """Open Debian's Chromium."""
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-dev-shm-usage"]
-        )
-        yield opened
-        opened.close()
 
 
 def open_page(opened: Browser, console: Console, **options: Any) -> Page:

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from PIL import Image
 from playwright.sync_api import Page
-from tests.console.opened import Console, browser, fill, open_page, start
+from tests.browser import open_browser
+from tests.console.opened import Console, fill, open_page, start
 from tests.console.operator_day import (
     LONG_MS,
     RUNS,
@@ -83,7 +84,7 @@ def run_rest(desk: Console, page: Page, name: str, button: str, until: str) -> N
 def pictures(folder: Path, sessions: Path) -> None:
     """Run the day and take its pictures."""
     desk = Console(sessions, protocol=PROTOCOL)
-    with browser() as opened:
+    with open_browser() as opened:
         page = open_page(opened, desk)
         page.get_by_text("Stimulation (leave empty").click()
         for key, value in {"subject": "S01", "operator": "Kim", "stim_frequency": "130",

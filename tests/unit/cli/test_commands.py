@@ -312,7 +312,7 @@ def test_what_is_read_is_never_written_over(rigidimeter, simulate, tmp_path):
 
 def test_files_are_written_even_when_nobody_reads_the_words(simulate, tmp_path):
     folder, out = simulate(), tmp_path / "out.json"
-    command = f"{sys.executable} -m rigidimeter estimate {folder} --json {out} | true"
+    command = f"'{sys.executable}' -m rigidimeter estimate {folder} --json {out} | true"
     ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
     assert "Traceback" not in ran.stderr
     assert json.loads(out.read_text())["epochs"]
@@ -320,7 +320,7 @@ def test_files_are_written_even_when_nobody_reads_the_words(simulate, tmp_path):
 
 def test_a_terminal_without_our_signs_or_space_is_no_traceback():
     """A sign would fail when it is printed, the space when all is written at the end."""
-    command = f"PYTHONIOENCODING=cp1252 {sys.executable} -m rigidimeter design > /dev/full"
+    command = f"PYTHONIOENCODING=cp1252 '{sys.executable}' -m rigidimeter design > /dev/full"
     ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
     assert "Traceback" not in ran.stderr
     assert "No space left on device" in ran.stderr

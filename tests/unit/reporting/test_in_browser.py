@@ -1,13 +1,12 @@
 """The page as a browser shows and prints it: nothing is cut, every link leads somewhere."""
 
 import re
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 from tests.unit.reporting.cohorts import Design, made_study
 
 from rigidimeter.reporting import SECTIONS
@@ -15,24 +14,12 @@ from rigidimeter.reporting import page as page_module
 from rigidimeter.reporting.page import write_report
 from rigidimeter.study import StudyResult, compare_analysis
 
-CHROMIUM = shutil.which("chromium")
-pytestmark = pytest.mark.skipif(
-    CHROMIUM is None, reason="needs Debian's chromium: apt-get install chromium"
-)
 DESKTOP, PHONE = (1280, 800), (390, 844)
 SCREENS = Path(__file__).parents[3] / "build" / "screens"
 READY_MS = 5000
 """Of a small page on a machine that does other work too."""
 LONG = ("perturbation", "torque", "voluntary", "loops", "impedance", "recorded")
 """Figures of recordings, which take long to draw."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as driver:
-        started = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """A folder of sessions becomes a study, and keeps what people wrote."""
 
-from datetime import UTC
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -13,6 +13,9 @@ from rigidimeter.study.extended_folder import extend_study
 from rigidimeter.study.recorded_sessions import recorded_session, session_rows
 from rigidimeter.study.study_text import is_own
 
+NOON = datetime(2026, 3, 1, 12).astimezone(UTC).isoformat()
+"""By the clock on this computer's wall: a session is of the day that it had there."""
+
 STIMULATION = {"frequency_hz": 130.0, "amplitude_ma": 2.5}
 
 
@@ -20,7 +23,7 @@ def record(folder: Path, *conditions: str, subject="S01", closed=True, virtual=T
     """Write a session of one epoch a condition, rated 1.5 and then, in its first epoch, 2."""
     writer = SessionWriter(folder, Settings(), [], {}, virtual=virtual,
                            about={"subject": subject, **about},
-                           created_utc="2026-03-01T12:00:00+00:00")  # fmt: skip
+                           created_utc=NOON)  # fmt: skip
     for number, condition in enumerate(conditions, start=1):
         begun = {"epoch": number, "label": str(number), "task": "prbs", "condition": condition}
         writer.event("epoch_started", time_s=1.0 * number, **begun)

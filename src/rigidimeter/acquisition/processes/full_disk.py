@@ -8,6 +8,7 @@ in memory until `rigidimeter recover` finds it.
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import time
@@ -49,7 +50,7 @@ class FullDisk:
         self._console_pid = console_pid
         self._since_s: float | None = None
         self._over_s: float | None = None
-        self._said_s = 0.0
+        self._said_s = -math.inf
         self._asked: Path | None = None
         self._refusal = ""
 
@@ -57,7 +58,7 @@ class FullDisk:
         """Note that a write succeeded."""
         if self._since_s is not None:
             recorder.note("recording_resumed", after_s=round(time.monotonic() - self._since_s, 3))
-            self._since_s, self._said_s, self._refusal = None, 0.0, ""
+            self._since_s, self._said_s, self._refusal = None, -math.inf, ""
 
     def refuses(self, error: OSError) -> None:
         """Note that a write failed, and tell the operator now and then."""
@@ -85,7 +86,7 @@ class FullDisk:
         asked = self._shared.status.asked_folder()
         if asked is None or asked == self._asked:
             return None
-        self._asked, self._said_s = asked, 0.0
+        self._asked, self._said_s = asked, -math.inf
         old, new = self._recording.folder, replace(self._recording, folder=asked)
         try:
             writer = new.writer()
