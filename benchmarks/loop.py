@@ -5,7 +5,9 @@
 The loop runs as it does on a rig: in a process of its own, with recorder, live estimator and
 console beside it, and a Python program that never rests. Its lateness is read from the session
 folder, where every tick that was run must be. `cyclictest` is C, does nothing but wake up, and has
-the same priority: what it shows is the machine. Both leave out a tick whose time has gone by. The
+the same priority: what it shows is the machine. A late tick wakes up by more than half a tick after
+its time. Both leave out a tick whose time has gone by when the one before it wakes up, and
+`cyclictest` does not count what it left out: whoever wakes up by n whole ticks late misses n. The
 figures are medians over the runs.
 """
 
@@ -97,6 +99,8 @@ class Lateness(NamedTuple):
 
     ours_us: tuple[float, ...]
     theirs_us: tuple[float, ...]
+    ours_late: int
+    theirs_late: int
     ours_missed: int
     theirs_missed: int
     recorded: int
@@ -126,6 +130,14 @@ def histogram_us(text: str) -> np.ndarray[Any, np.dtype[np.int64]]:
             late_us, count = line.split()
             counts[int(late_us)] = int(count)
     return counts
+
+
+def late_and_missed(counts: np.ndarray[Any, np.dtype[np.int64]], rate_hz: float) -> tuple[int, int]:
+    """Return how many ticks of a histogram were late, and how many were left out after them."""
+    late_us, tick_us = np.arange(counts.size), 1e6 / rate_hz
+    return int(counts[late_us > 0.5 * tick_us].sum()), int(
+        counts @ (late_us // tick_us).astype(int)
+    )
 
 
 def quantiles_us(counts: np.ndarray[Any, np.dtype[np.int64]]) -> tuple[float, ...]:
@@ -161,14 +173,16 @@ def measure(
     counts = histogram_us(beside[0].communicate()[0])
     samples = read_samples(folder / "samples.arrows")
     late_s = samples["lateness_s"][samples["time_s"] >= SKIPPED_S]
-    late = int(np.sum(late_s >= 1.0 / rate_hz))
-    left_out = int(np.sum(np.diff(samples["tick"][samples["time_s"] >= SKIPPED_S]) - 1))
+    missed = int(np.sum(np.diff(samples["tick"][samples["time_s"] >= SKIPPED_S]) - 1))
+    theirs_late, theirs_missed = late_and_missed(counts, rate_hz)
     recorded = np.unique(samples["tick"]).size
     return Lateness(
         tuple(1e6 * float(q) for q in np.quantile(late_s, SHARES)),
         quantiles_us(counts),
-        late + left_out,
-        int(counts[min(HISTOGRAM_US, round(1e6 / rate_hz)) :].sum()),
+        int(np.sum(late_s > 0.5 / rate_hz)),
+        theirs_late,
+        missed,
+        theirs_missed,
         recorded,
         ended.samples - recorded,
         ended,
@@ -186,11 +200,14 @@ def rows(name: str, found: list[Lateness], rate_hz: float) -> list[str]:
             f"| {name}, {rate_hz:g} Hz: p{100 * share:g} of lateness / cyclictest "
             f"| {ours:.0f} µs | {theirs:.0f} µs | {ratio:.2f} |"
         )
-    lines.append(
-        f"| {name}, {rate_hz:g} Hz: ticks late by a whole tick or left out / of cyclictest "
-        f"| {statistics.median(run.ours_missed for run in found):g} "
-        f"| {statistics.median(run.theirs_missed for run in found):g} | |"
-    )
+    for what in ("late", "missed"):
+        ours, theirs = (
+            statistics.median(getattr(run, f"{whose}_{what}") for run in found)
+            for whose in ("ours", "theirs")
+        )
+        lines.append(
+            f"| {name}, {rate_hz:g} Hz: {what} ticks / of cyclictest | {ours:g} | {theirs:g} | |"
+        )
     lines.append(
         f"| {name}, {rate_hz:g} Hz: ticks recorded / not recorded "
         f"| {sum(run.recorded for run in found)} | {sum(run.not_recorded for run in found)} | |"

@@ -68,7 +68,7 @@ def session_on(
     try:
         rig.connect()
         side.sink.event("rig_configured", **rig.configure())
-        supervision = loop.Timed(side, duration_s)
+        supervision = loop.Timed(side, clock.now_s() + duration_s)
         side.ready()
         run_session(
             protocol,
