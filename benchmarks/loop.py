@@ -20,7 +20,6 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -28,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rigidimeter.acquisition.clock import DeadlineClock
-from rigidimeter.acquisition.processes.loop_process import LoopSide, LoopTarget, Realtime
+from rigidimeter.acquisition.processes.loop_process import LoopSide, Realtime
 from rigidimeter.acquisition.processes.recorder import Recording
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.supervise import Ended, supervise
@@ -44,9 +43,6 @@ SHARES = (0.5, 0.99, 0.999)
 HISTOGRAM_US = 50_000
 SKIPPED_S = 1.0
 """The first second is left out, of both: processes start then."""
-
-Workload = Callable[[Settings, float], LoopTarget]
-"""Makes what the loop's process runs, from the settings and the seconds it should last."""
 
 
 class Timed:
@@ -88,10 +84,6 @@ def virtual_session(settings: Settings, duration_s: float, side: LoopSide) -> No
         supervision=supervision,
         state_changed=side.sink.state_changed,
     )
-
-
-def virtual(settings: Settings, duration_s: float) -> LoopTarget:
-    return partial(virtual_session, settings, duration_s)
 
 
 class Lateness(NamedTuple):
@@ -145,10 +137,8 @@ def quantiles_us(counts: np.ndarray[Any, np.dtype[np.int64]]) -> tuple[float, ..
     return tuple(float(np.searchsorted(below, share * below[-1])) for share in SHARES)
 
 
-def measure(
-    workload: Workload, settings: Settings, seconds: float, folder: Path, cpu: int
-) -> Lateness:
-    """Run a workload once, beside cyclictest and a busy program."""
+def measure(settings: Settings, seconds: float, folder: Path, cpu: int) -> Lateness:
+    """Run the loop once, beside cyclictest and a busy program."""
     rate_hz = settings.rig.tick_rate_hz
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     beside: list[subprocess.Popen[str]] = []
@@ -160,7 +150,7 @@ def measure(
 
     try:
         ended = supervise(
-            workload(settings, seconds),
+            partial(virtual_session, settings, seconds),
             Recording(folder, settings, virtual=True),
             realtime=Realtime(priority=PRIORITY, cpu=cpu, attended=False),
             console=console,
@@ -189,7 +179,7 @@ def measure(
     )
 
 
-def rows(name: str, found: list[Lateness], rate_hz: float) -> list[str]:
+def rows(found: list[Lateness], rate_hz: float) -> list[str]:
     """Return the table of some runs."""
     lines = []
     for k, share in enumerate(SHARES):
@@ -197,7 +187,7 @@ def rows(name: str, found: list[Lateness], rate_hz: float) -> list[str]:
         theirs = statistics.median(run.theirs_us[k] for run in found)
         ratio = statistics.median(run.ours_us[k] / max(run.theirs_us[k], 1.0) for run in found)
         lines.append(
-            f"| {name}, {rate_hz:g} Hz: p{100 * share:g} of lateness / cyclictest "
+            f"| {rate_hz:g} Hz: p{100 * share:g} of lateness / cyclictest "
             f"| {ours:.0f} µs | {theirs:.0f} µs | {ratio:.2f} |"
         )
     for what in ("late", "missed"):
@@ -205,11 +195,9 @@ def rows(name: str, found: list[Lateness], rate_hz: float) -> list[str]:
             statistics.median(getattr(run, f"{whose}_{what}") for run in found)
             for whose in ("ours", "theirs")
         )
-        lines.append(
-            f"| {name}, {rate_hz:g} Hz: {what} ticks / of cyclictest | {ours:g} | {theirs:g} | |"
-        )
+        lines.append(f"| {rate_hz:g} Hz: {what} ticks / of cyclictest | {ours:g} | {theirs:g} | |")
     lines.append(
-        f"| {name}, {rate_hz:g} Hz: ticks recorded / not recorded "
+        f"| {rate_hz:g} Hz: ticks recorded / not recorded "
         f"| {sum(run.recorded for run in found)} | {sum(run.not_recorded for run in found)} | |"
     )
     return lines
@@ -226,7 +214,7 @@ def patient(rate_hz: float) -> Settings:
     )  # fmt: skip
 
 
-def main(workloads: dict[str, Workload] | None = None) -> None:
+def main() -> None:
     parser = argparse.ArgumentParser(description="How late the loop's ticks are.")
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--runs", type=int, default=3)
@@ -236,18 +224,14 @@ def main(workloads: dict[str, Workload] | None = None) -> None:
     if shutil.which("cyclictest") is None:
         raise SystemExit("cyclictest is not installed; it is in the package rt-tests")
     print("| what / reference | ours | reference | ratio |\n| --- | ---: | ---: | ---: |")
-    for name, workload in (workloads or {"virtual rig": virtual}).items():
-        for rate_hz in asked.rates:
-            settings = patient(rate_hz)
-            found = []
-            for _ in range(asked.runs):
-                with tempfile.TemporaryDirectory() as folder:
-                    found.append(
-                        measure(workload, settings, asked.seconds, Path(folder) / "s", asked.cpu)
-                    )
-                last = found[-1]
-                print(f"run: {last}", file=sys.stderr)
-            print("\n".join(rows(name, found, rate_hz)), flush=True)
+    for rate_hz in asked.rates:
+        settings = patient(rate_hz)
+        found = []
+        for _ in range(asked.runs):
+            with tempfile.TemporaryDirectory() as folder:
+                found.append(measure(settings, asked.seconds, Path(folder) / "s", asked.cpu))
+            print(f"run: {found[-1]}", file=sys.stderr)
+        print("\n".join(rows(found, rate_hz)), flush=True)
 
 
 if __name__ == "__main__":

@@ -40,8 +40,8 @@ SMALLEST = {
 }
 """Arguments by module, a line for each run."""
 
-REAL_TIME = {"loop", "wires", "console", "page"}
-"""Those that keep real time or need a browser: `tests.console.test_benchmarks`."""
+REAL_TIME = {"loop", "console", "page"}
+"""Those that keep real time or need a browser: `tests.faults.test_realtime_benchmarks`."""
 
 
 def smaller(name: str, module: ModuleType, folder: Path) -> Mapping[str, Any]:
