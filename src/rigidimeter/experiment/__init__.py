@@ -1,6 +1,6 @@
 """The experiment before it runs: perturbations, session order, predicted precision, power."""
 
-from rigidimeter.experiment.demand import demand, ideal_response, time_constant_s
+from rigidimeter.experiment.demand import demand, ideal_response, time_constant_s, too_few_cycles
 from rigidimeter.experiment.design_document import design_document
 from rigidimeter.experiment.epochs_needed import (
     Detection,

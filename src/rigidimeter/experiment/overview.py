@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 
 from rigidimeter.dynamics import JointDynamics, Stability, loop_stability, median_joint
 from rigidimeter.errors import UserError
-from rigidimeter.experiment.demand import Demand, beyond_limits, demand, ideal_response
+from rigidimeter.experiment.demand import (
+    Demand,
+    beyond_limits,
+    demand,
+    ideal_response,
+    too_few_cycles,
+)
 from rigidimeter.experiment.epochs_needed import Detection, Wanted, detect, planned_epochs
 from rigidimeter.experiment.joint_bandwidth import Corners, corners
 from rigidimeter.experiment.multisine import MultisineComparison, compare_multisine
@@ -66,8 +72,8 @@ class Design:
     remarks : tuple of str
         For each condition without an entry in `precision`, why it has none.
     warnings : tuple of str
-        A sentence for each limit of the guard that a perturbation would pass; those on stability
-        are in `stability`.
+        A sentence for each limit of the guard that a perturbation would pass, and for a sinusoid
+        too short for the cycles to be scored; those on stability are in `stability`.
     detections : tuple of Detection
         Epochs needed for each difference that was asked for.
     criterion : str or None
@@ -163,7 +169,7 @@ def design(
     perturbation_nm = readonly(prbs_nm(chosen.prbs, rate_hz))
     angle_rad, velocity_rad_s = map(readonly, sinusoid(chosen.sinusoid, rate_hz))
     sinusoid_demand = demand(angle_rad, velocity_rad_s, rate_hz, guard)
-    warnings = list(beyond_limits("the sinusoid", sinusoid_demand, guard))
+    warnings = [*beyond_limits("the sinusoid", sinusoid_demand, guard), *too_few_cycles(chosen)]
 
     joints: dict[str, JointDynamics | None] = {"free arm": None}
     for condition, subject in chosen.subject.items():
@@ -178,6 +184,10 @@ def design(
     stable = all(margins.stable for margins in stability.conditions.values())
     precision, remarks = _precision(chosen, perturbation_nm, stability)
     searched = search is not None and stable
+    # Before the search, which takes long: what it cannot be made of is refused at once.
+    multisine = None
+    if with_multisine and stable and precision:
+        multisine = compare_multisine(chosen, perturbation_nm, precision)
     return Design(
         settings=chosen,
         perturbation_nm=perturbation_nm,
@@ -201,7 +211,7 @@ def design(
         criterion=search,
         present=assess(chosen, search) if searched and search else None,
         ranked=optimise(chosen, search, progress) if searched and search else None,
-        multisine=compare_multisine(chosen, perturbation_nm) if with_multisine and stable else None,
+        multisine=multisine,
     )
 
 
