@@ -26,7 +26,7 @@ from rigidimeter.experiment.demand import (
     too_few_cycles,
 )
 from rigidimeter.experiment.epochs_needed import Detection, Wanted, detect, planned_epochs
-from rigidimeter.experiment.joint_bandwidth import Corners, corners
+from rigidimeter.experiment.joint_bandwidth import APPENDIX_A, Corners, Forearm, corners
 from rigidimeter.experiment.multisine import MultisineComparison, compare_multisine
 from rigidimeter.experiment.optimise import Candidate, assess, check_criterion, optimise
 from rigidimeter.experiment.perturbation_band import BandCheck, check_band
@@ -56,6 +56,8 @@ class Design:
         Whether the PRBS covers the wanted band.
     bandwidth : Corners
         The bandwidth of the arm of App. A.
+    forearm : Forearm or None
+        Of that arm, if it is not the paper's.
     protocol : Protocol
         The session.
     planned_epochs : mapping of str to int
@@ -104,6 +106,7 @@ class Design:
     present: Candidate | None = None
     ranked: tuple[Candidate, ...] | None = None
     multisine: MultisineComparison | None = None
+    forearm: Forearm | None = None
 
     def table(self) -> pd.DataFrame:
         """Return the predicted standard errors, one row a condition and method."""
@@ -131,6 +134,7 @@ def design(
     alpha: float = 0.05,
     search: str | None = None,
     with_multisine: bool = False,
+    forearm: Forearm | None = None,
     progress: Callable[[float], None] = lambda _: None,
     **changes: Any,
 ) -> Design:
@@ -151,6 +155,8 @@ def design(
         Search for a better PRBS by this criterion.
     with_multisine : bool
         Compare with a multisine.
+    forearm : Forearm, optional
+        For the bandwidth of App. A; without it, that of the arm as printed.
     progress : callable
         Called with the share of the search that was done since, 1 in all.
     **changes
@@ -194,7 +200,7 @@ def design(
         angle_rad=angle_rad,
         velocity_rad_s=velocity_rad_s,
         band=check_band(chosen.prbs, rate_hz),
-        bandwidth=corners(),
+        bandwidth=corners(forearm.arm() if forearm else APPENDIX_A),
         protocol=plan(chosen.protocol, chosen.prbs, chosen.sinusoid, chosen.seed),
         planned_epochs=planned_epochs(chosen),
         sinusoid_demand=sinusoid_demand,
@@ -212,6 +218,7 @@ def design(
         present=assess(chosen, search) if searched and search else None,
         ranked=optimise(chosen, search, progress) if searched and search else None,
         multisine=multisine,
+        forearm=forearm,
     )
 
 

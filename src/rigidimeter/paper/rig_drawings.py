@@ -17,6 +17,7 @@ from scipy.constants import g
 
 from rigidimeter.control import admittance, admittance_step, biquad_step, butterworth_lowpass
 from rigidimeter.control.filters import BiquadState
+from rigidimeter.experiment import Forearm
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Row, bounded, within_percent
 from rigidimeter.paper.context import Context
@@ -34,8 +35,8 @@ _ARM, _SUBJECT, _LINE = "#CFE3F1", "#F3E3D3", "#222222"
 
 def figure_1(context: Context) -> Row:
     """Compare the part of the weight in K with K, the axis tilted as far as by eye."""
-    mass_kg = printed.APP_A_FOREARM_SHARE * printed.APP_A_BODY_MASS_KG
-    weight_nm = mass_kg * g * printed.APP_A_FOREARM_M / 2.0
+    forearm = Forearm()
+    weight_nm = forearm.mass_kg * g * forearm.length_m / 2.0
     stiffness = printed.SEC_34.stiffness_nm_rad
     tilted = 100.0 * weight_nm * math.sin(math.radians(_TILT_DEG)) / stiffness
     return Row(
