@@ -151,15 +151,17 @@ def larger_effects(names: Sequence[str], other: str, context: Context) -> Row:
             name: effect_from_p(p_of(m), COUNTS[m.counted]["OFF"], COUNTS[m.counted]["DBS"])
             for name, m in MEASURED.items()
         }
+        found = []
         for name in names:
             d = compare_published(effects[name], effects[other])
-            texts.append(
-                f"{name} less {other}, {place}, {d.estimate:+.2f} [{d.low:+.2f} to "
-                f"{d.high:+.2f}], p = {p_value(d.p)}".replace("-", "−")
+            found.append(
+                f"{name} {d.estimate:+.2f} [{d.low:+.2f} to {d.high:+.2f}], p = {p_value(d.p)}"
             )
             checks.append(bounded(f"Lower end, {name} less {other}, {place}", "1", d.low, low=0.0))
+        texts.append(f"{place}: {', '.join(found)}".replace("-", "−"))
     return Row(
-        ours="difference of the rank-biserial correlations with 95 % interval: " + "; ".join(texts),
+        ours=f"rank-biserial correlation less that of {other}, with 95 % interval. "
+        + "; ".join(texts),
         checks=tuple(checks),
     )
 

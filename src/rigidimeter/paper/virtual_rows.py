@@ -83,7 +83,7 @@ def torque_figure(name: str, context: Context) -> Row:
         ours="virtual OFF epoch with the median stiffness "
         f"(J {number(joint.inertia_kg_m2)}, held at the median of all epochs, "
         f"B {number(joint.damping_nm_s_rad)}, K {number(joint.stiffness_nm_rad)}): {text}",
-        reading='Of which epochs its "median values" are the paper does not tell; ours are those '
+        reading='The paper does not say of which epochs its "median values" are; ours are those '
         "of the epoch that is drawn. Estimated: parameters times measured motion; simulated: the "
         "motion by integration of the perturbation alone; all in one band.",
         unpublished=f"{_MISSING}an epoch of the virtual study stands in.",
