@@ -42,7 +42,6 @@ bench: install
 # Beside cyclictest, of Debian's rt-tests.
 bench-loop: install
 	$(BIN)/python -m benchmarks.loop --seconds 60 --runs 3
-	$(BIN)/python -m benchmarks.wires loop --seconds 60 --runs 3 --rates 1000
 
 hazards: install
 	$(BIN)/python -m tests.faults.measure

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from benchmarks.paired import Row, in_ms, paired
+from benchmarks.paired import REPEATS, Row, in_ms, paired
 from rigidimeter.acquisition import ControlLoop, SimulatedClock, perturb
 from rigidimeter.control import BiquadState, admittance_step, biquad_step
 from rigidimeter.devices import SimulatedRig
@@ -34,7 +34,7 @@ Matrices = tuple[NDArray[np.float64], ...]
 
 SETTINGS = Settings()
 JOINT = JointDynamics(0.0045, 0.1368, 1.751)
-REPEATS = 21
+STEADY_REPEATS = 21
 ORDER = 7
 EPOCHS = 8
 
@@ -109,16 +109,16 @@ class Steady:
         return self.rows["torque_nm"][0]
 
 
-def against_lfilter(steady: Steady) -> Row:
+def against_lfilter(steady: Steady, repeats: int) -> Row:
     b, a = signal.ss2tf(*linear_loop(steady.bench))
     ideal = Steady(ideal_settings())
     difference = np.abs(ideal() - signal.lfilter(b[0], a, ideal.wanted_nm)).max()
     assert difference < 1e-6, f"the linear loop differs by {difference:.2g} N·m"
     name = f"batch epoch of 20 s at 1 kHz, steady / scipy.signal.lfilter of order {ORDER}"
-    return in_ms(name, paired(steady, lambda: signal.lfilter(b[0], a, steady.wanted_nm), REPEATS))
+    return in_ms(name, paired(steady, lambda: signal.lfilter(b[0], a, steady.wanted_nm), repeats))
 
 
-def against_control(steady: Steady) -> list[Row]:
+def against_control(steady: Steady, repeats: int) -> list[Row]:
     try:
         import control
     except ImportError:
@@ -126,14 +126,13 @@ def against_control(steady: Steady) -> list[Row]:
         return []
     system = control.ss(*linear_loop(steady.bench), 1e-3)
     name = "batch epoch of 20 s at 1 kHz, steady / control.forced_response"
-    return [
-        in_ms(
-            name, paired(steady, lambda: control.forced_response(system, inputs=steady.wanted_nm))
-        )
-    ]
+    times_s = paired(
+        steady, lambda: control.forced_response(system, inputs=steady.wanted_nm), repeats
+    )
+    return [in_ms(name, times_s)]
 
 
-def against_mujoco() -> list[Row]:
+def against_mujoco(repeats: int) -> list[Row]:
     try:
         import mujoco
         from mujoco import rollout
@@ -160,11 +159,11 @@ def against_mujoco() -> list[Row]:
         f"batch, {EPOCHS} epochs of 20 s at 1 kHz, steady / mujoco.rollout of as many of a hinge "
         "with a velocity servo"
     )
-    work = paired(many, lambda: rollout.rollout(model, data, starts, commands), REPEATS)
+    work = paired(many, lambda: rollout.rollout(model, data, starts, commands), repeats)
     return [in_ms(name, work)]
 
 
-def against_loop() -> Row:
+def against_loop(repeats: int) -> Row:
     """From seed to columns, random numbers and all, against the loop in the interpreter."""
     wanted = prbs_nm(SETTINGS.prbs, SETTINGS.rig.tick_rate_hz).tolist()
 
@@ -174,7 +173,7 @@ def against_loop() -> Row:
         perturb(ControlLoop(SETTINGS, rig, SimulatedClock(), [].append), 1, wanted)
 
     name = "batch epoch of 20 s at 1 kHz with its random numbers / the loop in the interpreter"
-    return in_ms(name, paired(lambda: list(simulate_chunks(SETTINGS, 1)), interpreted))
+    return in_ms(name, paired(lambda: list(simulate_chunks(SETTINGS, 1)), interpreted, repeats))
 
 
 def measured_run(n_epochs: int) -> dict[str, float]:
@@ -195,7 +194,7 @@ def apart(n_epochs: int) -> dict[str, float]:
     return dict(json.loads(ran.stdout))
 
 
-def growth(few: int = 100, many: int = 10_000) -> list[Row]:
+def growth(few: int, many: int) -> list[Row]:
     """Cost per epoch and peak memory of many epochs, against those of few."""
     small, large = apart(few), apart(many)
     return [
@@ -207,15 +206,19 @@ def growth(few: int = 100, many: int = 10_000) -> list[Row]:
     ]
 
 
-def rows() -> list[Row]:
-    """Return what was measured."""
+def rows(
+    steady_repeats: int = STEADY_REPEATS,
+    repeats: int = REPEATS,
+    grows: tuple[int, int] = (100, 10_000),
+) -> list[Row]:
+    """Return what was measured; of epochs as few as many of `grows` are run."""
     steady = Steady(SETTINGS)
     return [
-        against_lfilter(steady),
-        *against_control(steady),
-        *against_mujoco(),
-        against_loop(),
-        *growth(),
+        against_lfilter(steady, steady_repeats),
+        *against_control(steady, repeats),
+        *against_mujoco(steady_repeats),
+        against_loop(repeats),
+        *growth(*grows),
     ]
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 
@@ -103,10 +102,11 @@ def read(page: str) -> Rows:
     return rows
 
 
-def main(structures: Sequence[str]) -> None:
+def main() -> None:
     """Write the rows of some structures into the page, each as soon as it is known."""
+    structures = sys.argv[1:] or STRUCTURES
     rows = read(TABLE.read_text(encoding="utf-8")) if TABLE.exists() else {}
-    for rate_hz, structure, lowpass_hz in product(FIRST_HZ, structures or STRUCTURES, FILTERS_HZ):
+    for rate_hz, structure, lowpass_hz in product(FIRST_HZ, structures, FILTERS_HZ):
         found = cells(structure, rate_hz, lowpass_hz)
         corner = f"{lowpass_hz:g} Hz" if lowpass_hz else "none"
         rows[structure.lower(), f"{rate_hz:g}", corner] = found
@@ -115,4 +115,4 @@ def main(structures: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

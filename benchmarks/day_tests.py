@@ -207,8 +207,10 @@ def shares(case: Case, draws: int, mixed: int, seed: list[int]) -> list[float]:
     return [float(share) for share in 100 * np.nanmean(found, axis=0)]
 
 
-def main(draws: int, mixed: int, chosen: str = "") -> None:
+def main() -> None:
     """Print the table of the cases whose names hold some text."""
+    draws, mixed = map(int, sys.argv[1:3] or ("4000", "100"))
+    chosen = " ".join(sys.argv[3:])
     print(f"{draws} draws, {mixed} of the mixed models, seed {SEED}; size / power in %.\n")
     print("| days | epochs | mixed | mixed, one offset a day | by days |")
     print("| --- | ---: | ---: | ---: | ---: |")
@@ -220,4 +222,4 @@ def main(draws: int, mixed: int, chosen: str = "") -> None:
 
 
 if __name__ == "__main__":
-    main(*(int(n) for n in sys.argv[1:3] or ("4000", "100")), *sys.argv[3:4])
+    main()

@@ -6,16 +6,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from benchmarks.paired import Row, in_ms, paired
+from benchmarks.paired import REPEATS, Row, in_ms, paired
 from rigidimeter.estimation import fit_epoch, fit_epochs
 from rigidimeter.settings import Settings
 from rigidimeter.virtual.batch import simulate_epochs
 
 
-def rows() -> list[Row]:
-    """Return what was measured."""
+def rows(count: int = 12, repeats: int = REPEATS) -> list[Row]:
+    """Return what was measured; so many epochs are fitted together."""
     settings = Settings()
-    batch = simulate_epochs(settings, 12)
+    batch = simulate_epochs(settings, count)
     epochs = [batch.epoch(i) for i in range(len(batch))]
     rng = np.random.default_rng(0)
     n = len(epochs[0].channels["torque_nm"])
@@ -24,22 +24,22 @@ def rows() -> list[Row]:
     def bare() -> None:
         np.linalg.lstsq(A, b, rcond=None)
 
-    works: dict[str, tuple[Callable[[], object], float]] = {
-        "iv with intervals, twelve epochs of 20 s at 1 kHz fitted together, each": (
+    works: dict[str, tuple[Callable[[], object], int]] = {
+        f"iv with intervals, {count} epochs of 20 s at 1 kHz fitted together, each": (
             lambda: fit_epochs(epochs, "iv", settings),
-            12.0,
+            count,
         ),
         "bandlimited with intervals": (
             lambda: fit_epoch(epochs[0], "bandlimited", settings),
-            1.0,
+            1,
         ),
         "published with intervals": (
             lambda: fit_epoch(epochs[0], "published", settings),
-            1.0,
+            1,
         ),
     }
     found = []
     for name, (work, share) in works.items():
-        ours, reference = paired(work, bare)
+        ours, reference = paired(work, bare, repeats)
         found.append(in_ms(f"{name} / numpy.linalg.lstsq on {n} × 3", (ours / share, reference)))
     return found

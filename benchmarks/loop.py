@@ -5,7 +5,9 @@
 The loop runs as it does on a rig: in a process of its own, with recorder, live estimator and
 console beside it, and a Python program that never rests. Its lateness is read from the session
 folder, where every tick that was run must be. `cyclictest` is C, does nothing but wake up, and has
-the same priority: what it shows is the machine. Both leave out a tick whose time has gone by. The
+the same priority: what it shows is the machine. A late tick wakes up by more than half a tick after
+its time. Both leave out a tick whose time has gone by when the one before it wakes up, and
+`cyclictest` does not count what it left out: whoever wakes up by n whole ticks late misses n. The
 figures are medians over the runs.
 """
 
@@ -18,7 +20,6 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rigidimeter.acquisition.clock import DeadlineClock
-from rigidimeter.acquisition.processes.loop_process import LoopSide, LoopTarget, Realtime
+from rigidimeter.acquisition.processes.loop_process import LoopSide, Realtime
 from rigidimeter.acquisition.processes.recorder import Recording
 from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.supervise import Ended, supervise
@@ -42,9 +43,6 @@ SHARES = (0.5, 0.99, 0.999)
 HISTOGRAM_US = 50_000
 SKIPPED_S = 1.0
 """The first second is left out, of both: processes start then."""
-
-Workload = Callable[[Settings, float], LoopTarget]
-"""Makes what the loop's process runs, from the settings and the seconds it should last."""
 
 
 class Timed:
@@ -88,15 +86,13 @@ def virtual_session(settings: Settings, duration_s: float, side: LoopSide) -> No
     )
 
 
-def virtual(settings: Settings, duration_s: float) -> LoopTarget:
-    return partial(virtual_session, settings, duration_s)
-
-
 class Lateness(NamedTuple):
     """Of one run. Quantiles in µs, of ours and of cyclictest; the rest counts ticks."""
 
     ours_us: tuple[float, ...]
     theirs_us: tuple[float, ...]
+    ours_late: int
+    theirs_late: int
     ours_missed: int
     theirs_missed: int
     recorded: int
@@ -128,15 +124,21 @@ def histogram_us(text: str) -> np.ndarray[Any, np.dtype[np.int64]]:
     return counts
 
 
+def late_and_missed(counts: np.ndarray[Any, np.dtype[np.int64]], rate_hz: float) -> tuple[int, int]:
+    """Return how many ticks of a histogram were late, and how many were left out after them."""
+    late_us, tick_us = np.arange(counts.size), 1e6 / rate_hz
+    return int(counts[late_us > 0.5 * tick_us].sum()), int(
+        counts @ (late_us // tick_us).astype(int)
+    )
+
+
 def quantiles_us(counts: np.ndarray[Any, np.dtype[np.int64]]) -> tuple[float, ...]:
     below = np.cumsum(counts)
     return tuple(float(np.searchsorted(below, share * below[-1])) for share in SHARES)
 
 
-def measure(
-    workload: Workload, settings: Settings, seconds: float, folder: Path, cpu: int
-) -> Lateness:
-    """Run a workload once, beside cyclictest and a busy program."""
+def measure(settings: Settings, seconds: float, folder: Path, cpu: int) -> Lateness:
+    """Run the loop once, beside cyclictest and a busy program."""
     rate_hz = settings.rig.tick_rate_hz
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     beside: list[subprocess.Popen[str]] = []
@@ -148,7 +150,7 @@ def measure(
 
     try:
         ended = supervise(
-            workload(settings, seconds),
+            partial(virtual_session, settings, seconds),
             Recording(folder, settings, virtual=True),
             realtime=Realtime(priority=PRIORITY, cpu=cpu, attended=False),
             console=console,
@@ -161,21 +163,23 @@ def measure(
     counts = histogram_us(beside[0].communicate()[0])
     samples = read_samples(folder / "samples.arrows")
     late_s = samples["lateness_s"][samples["time_s"] >= SKIPPED_S]
-    late = int(np.sum(late_s >= 1.0 / rate_hz))
-    left_out = int(np.sum(np.diff(samples["tick"][samples["time_s"] >= SKIPPED_S]) - 1))
+    missed = int(np.sum(np.diff(samples["tick"][samples["time_s"] >= SKIPPED_S]) - 1))
+    theirs_late, theirs_missed = late_and_missed(counts, rate_hz)
     recorded = np.unique(samples["tick"]).size
     return Lateness(
         tuple(1e6 * float(q) for q in np.quantile(late_s, SHARES)),
         quantiles_us(counts),
-        late + left_out,
-        int(counts[min(HISTOGRAM_US, round(1e6 / rate_hz)) :].sum()),
+        int(np.sum(late_s > 0.5 / rate_hz)),
+        theirs_late,
+        missed,
+        theirs_missed,
         recorded,
         ended.samples - recorded,
         ended,
     )
 
 
-def rows(name: str, found: list[Lateness], rate_hz: float) -> list[str]:
+def rows(found: list[Lateness], rate_hz: float) -> list[str]:
     """Return the table of some runs."""
     lines = []
     for k, share in enumerate(SHARES):
@@ -183,16 +187,17 @@ def rows(name: str, found: list[Lateness], rate_hz: float) -> list[str]:
         theirs = statistics.median(run.theirs_us[k] for run in found)
         ratio = statistics.median(run.ours_us[k] / max(run.theirs_us[k], 1.0) for run in found)
         lines.append(
-            f"| {name}, {rate_hz:g} Hz: p{100 * share:g} of lateness / cyclictest "
+            f"| {rate_hz:g} Hz: p{100 * share:g} of lateness / cyclictest "
             f"| {ours:.0f} µs | {theirs:.0f} µs | {ratio:.2f} |"
         )
+    for what in ("late", "missed"):
+        ours, theirs = (
+            statistics.median(getattr(run, f"{whose}_{what}") for run in found)
+            for whose in ("ours", "theirs")
+        )
+        lines.append(f"| {rate_hz:g} Hz: {what} ticks / of cyclictest | {ours:g} | {theirs:g} | |")
     lines.append(
-        f"| {name}, {rate_hz:g} Hz: ticks late by a whole tick or left out / of cyclictest "
-        f"| {statistics.median(run.ours_missed for run in found):g} "
-        f"| {statistics.median(run.theirs_missed for run in found):g} | |"
-    )
-    lines.append(
-        f"| {name}, {rate_hz:g} Hz: ticks recorded / not recorded "
+        f"| {rate_hz:g} Hz: ticks recorded / not recorded "
         f"| {sum(run.recorded for run in found)} | {sum(run.not_recorded for run in found)} | |"
     )
     return lines
@@ -209,7 +214,7 @@ def patient(rate_hz: float) -> Settings:
     )  # fmt: skip
 
 
-def main(workloads: dict[str, Workload] | None = None) -> None:
+def main() -> None:
     parser = argparse.ArgumentParser(description="How late the loop's ticks are.")
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--runs", type=int, default=3)
@@ -219,18 +224,14 @@ def main(workloads: dict[str, Workload] | None = None) -> None:
     if shutil.which("cyclictest") is None:
         raise SystemExit("cyclictest is not installed; it is in the package rt-tests")
     print("| what / reference | ours | reference | ratio |\n| --- | ---: | ---: | ---: |")
-    for name, workload in (workloads or {"virtual rig": virtual}).items():
-        for rate_hz in asked.rates:
-            settings = patient(rate_hz)
-            found = []
-            for _ in range(asked.runs):
-                with tempfile.TemporaryDirectory() as folder:
-                    found.append(
-                        measure(workload, settings, asked.seconds, Path(folder) / "s", asked.cpu)
-                    )
-                last = found[-1]
-                print(f"run: {last}", file=sys.stderr)
-            print("\n".join(rows(name, found, rate_hz)), flush=True)
+    for rate_hz in asked.rates:
+        settings = patient(rate_hz)
+        found = []
+        for _ in range(asked.runs):
+            with tempfile.TemporaryDirectory() as folder:
+                found.append(measure(settings, asked.seconds, Path(folder) / "s", asked.cpu))
+            print(f"run: {found[-1]}", file=sys.stderr)
+        print("\n".join(rows(found, rate_hz)), flush=True)
 
 
 if __name__ == "__main__":

@@ -35,6 +35,7 @@ from rigidimeter.paper.printed_effects import n_from, p_from, r_from
 from rigidimeter.paper.protocol_rows import cycles_counted
 from rigidimeter.paper.score_rows import scaled, scored, work_change_percent, work_closed_form_j
 from rigidimeter.paper.simulated_epochs import noise_runs, voluntary_errors_percent
+from rigidimeter.reporting.numbers import number
 
 HEAVY = {  # made of simulations
     "sec-1-voluntary-ols", "sec-1-voluntary-iv", "sec-3.4-mean", "sec-3.4-mean-iv", "sec-3.4-sd",
@@ -114,9 +115,9 @@ def test_verdicts(rows: dict[str, Row]) -> None:
         "eq-2", "eq-6-highpass", "eq-6-highpass-per-radian", "eq-8-largest", "fig-6b",
         "table-2-mupdrs", "table-2-stiffness", "p-mupdrs", "p-work", "p-viscosity", "p-stiffness",
         "sec-1-voluntary-ols", "sec-2.3-cycles-epoch", "sec-3.1-f-test", "sec-3.2-cancel",
-        "sec-3.4-sd", "sec-3.4-noise", "sec-4-better", "k-printed", "app-a-units", "app-a-inertia",
-        "app-a-damping", "eq-5", "fig-3b", "table-1", "sec-2.5-sequences", "sec-3.6-order",
-        "sec-3.4-mean",
+        "sec-3.4-sd", "sec-3.4-noise", "sec-4-better", "sec-4-mupdrs", "k-printed",
+        "app-a-units", "app-a-inertia", "app-a-damping", "eq-5", "fig-3b", "table-1",
+        "sec-2.5-sequences", "sec-3.6-order", "sec-3.4-mean",
     }  # fmt: skip
 
 
@@ -249,6 +250,36 @@ def test_an_uneven_arm_by_closed_form() -> None:
 def test_the_order_of_effects_rests_on_which_p_is_taken(rows: dict[str, Row]) -> None:
     margins = [check.ours for check in rows["sec-3.6-order"].checks]
     assert margins == pytest.approx([0.35 - 0.31, 0.311 - 0.329, 0.346 - 0.373], abs=1.5e-3)
+
+
+def test_the_ratings_effect_is_not_significantly_smaller() -> None:
+    """r√N σ/(m n/2) with σ² = m n (m + n + 1)/12: 0.51 for the stiffness, 0.23 for the ratings."""
+    effects = [
+        r * math.sqrt(m + n) * math.sqrt(m * n * (m + n + 1) / 12) / (m * n / 2)
+        for r, m, n in ((0.37, 78, 23), (0.18, 27, 12))
+    ]
+    row = MAKERS["sec-4-mupdrs"](Context())
+    assert len(row.checks) == 4 * 3  # the objective measures, by each set of prints
+    assert not any(check.within for check in row.checks)
+    printed_r = row.ours.split("r as printed: ")[1]
+    assert f"stiffness {effects[0] - effects[1]:+.2f} [−" in printed_r
+
+
+def test_the_drawn_epoch_is_of_median_stiffness(rows: dict[str, Row], context: Context) -> None:
+    fits = [fit for fit in context.study.analysis.fixed_inertia if fit.condition == "OFF"]
+    ranked = sorted(fit.stiffness_nm_rad for fit in fits if fit.outcome.included)
+    median = ranked[(len(ranked) - 1) // 2]
+    assert f"with the median stiffness (J {number(context.study.analysis.inertia_kg_m2)}, " in (
+        rows["fig-4b"].ours
+    )
+    assert f"K {number(median)})" in rows["fig-4b"].ours
+
+
+def test_figure_2_shows_the_loop_and_the_free_bodies(rows: dict[str, Row]) -> None:
+    assert [figure.name for figure in rows["fig-2"].figures] == ["fig-2", "fig-2b"]
+    texts = [text.get_text() for text in rows["fig-2"].figures[1].draw().axes[0].texts]
+    assert "J_p θ″ = M_meas + M_sub − B_p θ′ − K_p θ" in texts  # Eq. 5, left
+    assert "J_c θ″ = M_PRBS − M_meas − B_c θ′" in texts  # Eq. 5, right
 
 
 def test_highpass_on_the_position_alone() -> None:

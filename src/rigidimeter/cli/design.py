@@ -61,6 +61,22 @@ def design(
             help="Compare the PRBS with a multisine; with --out also write multisine.csv.",
         ),
     ] = False,
+    body_mass_kg: Annotated[
+        float | None,
+        typer.Option(
+            "--body-mass",
+            metavar="KG",
+            help="Body mass for the bandwidth of App. A, whose subject has 7.7 kg.",
+        ),
+    ] = None,
+    forearm_m: Annotated[
+        float | None,
+        typer.Option(
+            "--forearm",
+            metavar="M",
+            help="Length of the forearm for the bandwidth of App. A, where it has 0.15 m.",
+        ),
+    ] = None,
 ) -> None:
     """Predict stability, standard errors and the number of epochs needed, before anything moves.
 
@@ -74,16 +90,19 @@ def design(
       rigidimeter design --settings rig.toml --out planned --json numbers.json
       rigidimeter design --settings rig.toml --detect damping=20% --power 0.8
       rigidimeter design --settings rig.toml --optimise --multisine
+      rigidimeter design --body-mass 70 --forearm 0.26
     """
     from rigidimeter.cli.design_text import design_blocks
     from rigidimeter.cli.progress import Meter
     from rigidimeter.documents import write_json
     from rigidimeter.dynamics import refuse_unstable
-    from rigidimeter.experiment import check_criterion, design_document
+    from rigidimeter.experiment import Forearm, check_criterion, design_document
     from rigidimeter.experiment import design as compute
 
     keep_inputs((json_out,), [settings] if settings is not None else [])
     check_criterion(criterion)
+    size = {"body_mass_kg": body_mass_kg, "length_m": forearm_m}
+    given = {name: value for name, value in size.items() if value is not None}
     with Meter("design", 1.0, from_first=True) as meter:
         designed = compute(
             settings,
@@ -92,6 +111,7 @@ def design(
             alpha=alpha,
             search=criterion if optimise else None,
             with_multisine=multisine,
+            forearm=Forearm(**given) if given else None,
             progress=meter.advance,
         )
     show(design_blocks(designed, power, alpha))

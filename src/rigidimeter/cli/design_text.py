@@ -118,11 +118,18 @@ def _controller(design: Design) -> Iterator[Block]:
 
 
 def _bandwidth(design: Design) -> Iterator[Block]:
-    table = design.bandwidth
+    table, forearm = design.bandwidth, design.forearm
     yield Heading(
         f"Bandwidth (−3 dB) of the arm of App. A, J, B, K ±{table.uncertainty_percent:g} %"
     )
-    notes = {table.equation_8.signs: "Eq. 8", table.widest.signs: "widest"}
+    if forearm is not None:
+        yield (
+            f"  body mass {forearm.body_mass_kg:g} kg, forearm {forearm.length_m:g} m: J is "
+            f"the forearm's {forearm.inertia_kg_m2:.3g} kg·m² with the robot's and the "
+            "controller's of App. A, B and K are as there"
+        )
+    eight = "Eq. 8" if forearm is None else "as Eq. 8"
+    notes = {table.equation_8.signs: eight, table.widest.signs: "widest"}
     rows = [
         (
             "".join("−0+"[sign + 1] for sign in corner.signs) if any(corner.signs) else "nominal",

@@ -17,6 +17,7 @@ from rigidimeter.cli.terminal_tables import Block, Heading, Table, number_text, 
 
 if TYPE_CHECKING:
     from rigidimeter.records import Analysis, Fit, Score
+    from rigidimeter.settings import ScoreSettings
     from rigidimeter.study import StudyResult
 
 _DIGITS = ("#.5g", "#.4g", "#.4g")
@@ -78,7 +79,7 @@ def estimate_blocks(result: StudyResult) -> list[Block]:
     parts: list[Sequence[Block]] = [[Heading(verdict(result).lead)]]
     parts += [part(result.analysis) for part in (_method, _delays, _fits, _fixed_inertia)]
     parts.append(_together(result) or _pooled(result))
-    parts += [_findings(result.analysis), _scores(result.analysis)]
+    parts += [_findings(result.analysis), _scores(result.analysis.scores, result.settings.scores)]
     return [block for part in parts if part for block in (*part, "")][:-1]
 
 
@@ -220,22 +221,29 @@ def _fit_table(fits: Sequence[Fit], checked: Sequence[Fit], first: int = 0) -> T
     )
 
 
-def _scores(analysis: Analysis) -> list[Block]:
-    scores = analysis.scores
+def _scores(scores: Sequence[Score], wanted: ScoreSettings) -> list[Block]:
     rows = [
         (
             score.epoch,
             score.condition,
             number_text(score.impulse_nm_s, ".5g"),
             number_text(score.work_j, ".5g"),
+            f"{score.n_cycles or ''}",
         )
         for score in scores
     ]
     if not rows:
         return []
-    headings = ("epoch", "condition", "impulse\nN·m·s", "work\nJ")
-    table = Table(headings, _by_source(scores, rows, [""] * len(rows)), "<<>>")
-    return [Heading("Scores of each sinusoidal epoch, per cycle"), table]
+    headings = ("epoch", "condition", "impulse\nN·m·s", "work\nJ", "cycles")
+    table = Table(headings, _by_source(scores, rows, [""] * len(rows)), "<<>>>")
+    remarks = []
+    if short := [score.n_cycles for score in scores if 0 < score.n_cycles < wanted.cycles]:
+        remarks = [
+            f"Warning: {len(short)} of {len(scores)} epochs were scored over fewer than "
+            f"scores.cycles = {wanted.cycles} cycles, the fewest {min(short)}: the motion less "
+            f"scores.discard_s = {wanted.discard_s:g} s at each end holds no more."
+        ]
+    return [Heading("Scores of each sinusoidal epoch, per cycle"), table, *remarks]
 
 
 def _by_source(

@@ -54,6 +54,7 @@ def simulate(
       rigidimeter simulate --out session --task prbs --condition DBS --epochs 12 --paper-rates
     """
     from rigidimeter.cli.progress import Meter
+    from rigidimeter.experiment import too_few_cycles
     from rigidimeter.recording.resume import count_epochs, require_all
     from rigidimeter.settings import changed_settings, load_settings
     from rigidimeter.virtual.study_design import PAPER_RATES
@@ -74,6 +75,9 @@ def simulate(
     if paper_rates:
         changes["rig"] = PAPER_RATES
     chosen = changed_settings(chosen, changes, "the options")
+    if any(block.task == "sinusoid" for block in chosen.protocol.blocks):
+        for warning in too_few_cycles(chosen):
+            echo(f"warning: {warning}", err=True)
     with Meter("simulate", session_length_s(chosen)) as meter:
         result = run_virtual_session(chosen, out, real_time=real_time, progress=meter.reach)
     good, of = count_epochs(out)

@@ -116,8 +116,7 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     padding_s = 3 / settings.band_low_hz  # the slowest part of the filter settles in that time
     start = max(motion.start_s + settings.discard_s, float(grid[0]))
     stop = min(motion.start_s + motion.duration_s - settings.discard_s, float(grid[-1]))
-    available = int(np.floor((stop - start) * motion.frequency_hz + 1e-6))
-    n_cycles = min(settings.cycles, available)
+    n_cycles = settings.cycles_in(stop - start, motion.frequency_hz)
     if n_cycles < 1:
         raise ValueError(
             f"the {motion.frequency_hz:.3g} Hz motion of {motion.duration_s:.3g} s holds no whole "

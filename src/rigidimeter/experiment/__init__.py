@@ -1,6 +1,6 @@
 """The experiment before it runs: perturbations, session order, predicted precision, power."""
 
-from rigidimeter.experiment.demand import demand, ideal_response, time_constant_s
+from rigidimeter.experiment.demand import demand, ideal_response, time_constant_s, too_few_cycles
 from rigidimeter.experiment.design_document import design_document
 from rigidimeter.experiment.epochs_needed import (
     Detection,
@@ -10,7 +10,7 @@ from rigidimeter.experiment.epochs_needed import (
     ranksum_power,
     sample_size,
 )
-from rigidimeter.experiment.joint_bandwidth import APPENDIX_A, Corner, corners
+from rigidimeter.experiment.joint_bandwidth import APPENDIX_A, Corner, Forearm, corners
 from rigidimeter.experiment.multisine import MultisineComparison, compare_multisine, multisine_nm
 from rigidimeter.experiment.optimise import Candidate, check_criterion, optimise, prbs_toml
 from rigidimeter.experiment.overview import Design, design

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigidimeter.dynamics import JointDynamics, arm_response
-from rigidimeter.settings import GAP_S, ControllerSettings, GuardSettings
+from rigidimeter.settings import GAP_S, ControllerSettings, GuardSettings, Settings
 from rigidimeter.units import deg_from_rad, rad_from_deg
 
 
@@ -164,4 +164,19 @@ def beyond_limits(what: str, needs: Demand, guard: GuardSettings) -> tuple[str, 
         f"{getattr(guard, key):g} {unit}"
         for key, verb, value, unit in rows
         if deg_from_rad(value) > getattr(guard, key)
+    )
+
+
+def too_few_cycles(settings: Settings) -> tuple[str, ...]:
+    """Return a sentence if the sinusoid holds fewer whole cycles than are to be scored."""
+    sinusoid, scores = settings.sinusoid, settings.scores
+    ends_s = 2.0 * scores.discard_s
+    found = scores.cycles_in(sinusoid.motion_s - ends_s, sinusoid.frequency_hz)
+    if found >= scores.cycles:
+        return ()
+    wanted_s = scores.cycles / sinusoid.frequency_hz + ends_s
+    return (
+        f"sinusoid.motion_s = {sinusoid.motion_s:g} s less scores.discard_s = "
+        f"{scores.discard_s:g} s at each end holds {max(found, 0)} of the scores.cycles = "
+        f"{scores.cycles} cycles to be scored; {wanted_s:g} s hold all of them",
     )

@@ -76,6 +76,7 @@ def _commanded(design: Design) -> dict[str, Any]:
         },
         "bandwidth": {
             "uncertainty_percent": table.uncertainty_percent,
+            "forearm": design.forearm and design.forearm._asdict(),
             "nominal": _corner(table.nominal),
             "corners": [_corner(corner) for corner in table.corners],
             "equation_8": _corner(table.equation_8),

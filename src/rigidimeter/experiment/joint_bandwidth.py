@@ -14,9 +14,11 @@ perturbation reaches, and both are reported.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.errors import UserError
 
 APPENDIX_A = JointDynamics(inertia_kg_m2=0.0052, damping_nm_s_rad=0.088, stiffness_nm_rad=1.5)
 """The nominal arm with robot and controller of App. A, of which Eq. 8 is half in each value.
@@ -27,8 +29,52 @@ its printed parts (forearm 8.6625e-4, robot 4e-3, controller 8e-4) sum to 0.0056
 the controller per radian where Sec. 2.4.2 gives it per degree.
 """
 
+FOREARM_SHARE = 0.015
+ROBOT_INERTIA_KG_M2 = 4e-3
+CONTROLLER_INERTIA_KG_M2 = 8e-4
+"""App. A: the forearm's share of the body's mass, and the parts of the inertia beside it."""
+
 _EQUATION_8_SIGNS = (-1, -1, -1)
 """The corner (of J, B, K) that the paper calls the one with the largest bandwidth."""
+
+
+class Forearm(NamedTuple):
+    """A forearm as App. A takes it: 1.5 % of the body's mass, a rod that turns about its end.
+
+    Without values it is that of App. A, whose length is not printed: 150 mm give its inertia.
+
+    Raises
+    ------
+    UserError
+        By `arm`, if mass or length are not those of a body.
+    """
+
+    body_mass_kg: float = 7.7
+    length_m: float = 0.150
+
+    @property
+    def mass_kg(self) -> float:
+        """Its own mass."""
+        return FOREARM_SHARE * self.body_mass_kg
+
+    @property
+    def inertia_kg_m2(self) -> float:
+        """Its inertia about the elbow, m l²/3."""
+        return self.mass_kg * self.length_m**2 / 3.0
+
+    def arm(self) -> JointDynamics:
+        """Return the arm of App. A with this forearm; its inertia is the sum of its parts."""
+        for what, value, most, unit in (
+            ("body mass", self.body_mass_kg, 500.0, "kg"),
+            ("forearm", self.length_m, 1.0, "m"),
+        ):
+            if not 0.0 < value <= most:
+                raise UserError(
+                    f"a {what} of {value:g} {unit} is not possible; it must be above 0 and at "
+                    f"most {most:g} {unit}"
+                )
+        total = self.inertia_kg_m2 + ROBOT_INERTIA_KG_M2 + CONTROLLER_INERTIA_KG_M2
+        return replace(APPENDIX_A, inertia_kg_m2=total)
 
 
 @dataclass(frozen=True)

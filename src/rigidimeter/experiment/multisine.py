@@ -17,6 +17,7 @@ domain swapping algorithm", IEEE Trans. Instrum. Meas. 37, 1988.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
 from rigidimeter.experiment.perturbations import tick_count, tick_times_s
-from rigidimeter.experiment.precision import predicted_precision
+from rigidimeter.experiment.precision import Precision, predicted_precision
 from rigidimeter.records import readonly
 from rigidimeter.settings import Settings
 
@@ -106,17 +107,18 @@ def multisine_nm(settings: Settings) -> NDArray[np.float64]:
         If the band holds no line, or the period is longer than the epoch.
     """
     prbs, own, rate_hz = settings.prbs, settings.multisine, settings.rig.tick_rate_hz
-    if own.period_s > prbs.duration_s:
+    period_s = own.period_s or prbs.duration_s
+    if period_s > prbs.duration_s:
         raise UserError(
-            f"multisine.period_s = {own.period_s:g} s is longer than prbs.duration_s = "
+            f"multisine.period_s = {period_s:g} s is longer than prbs.duration_s = "
             f"{prbs.duration_s:g} s: its lines would run together; make it at most that"
         )
     high_hz = min(prbs.wanted_high_hz, 0.45 * rate_hz)
-    first = max(1, math.ceil(prbs.wanted_low_hz * own.period_s - 1e-9))
-    last = math.floor(high_hz * own.period_s + 1e-9)
+    first = max(1, math.ceil(prbs.wanted_low_hz * period_s - 1e-9))
+    last = math.floor(high_hz * period_s + 1e-9)
     if last < first:
         raise UserError(
-            f"multisine.period_s = {own.period_s:g} s puts no line into the wanted band "
+            f"multisine.period_s = {period_s:g} s puts no line into the wanted band "
             f"{prbs.wanted_low_hz:g} to {high_hz:g} Hz; make it longer"
         )
     rng = np.random.default_rng([settings.seed, _STREAM]) if own.phases == "random" else None
@@ -124,7 +126,7 @@ def multisine_nm(settings: Settings) -> NDArray[np.float64]:
     time_s = tick_times_s(tick_count(prbs.duration_s, rate_hz), rate_hz)
     torque = np.zeros(time_s.size)
     for k, phase in enumerate(phases, start=first):
-        torque += np.cos(2.0 * np.pi * k / own.period_s * time_s + phase)
+        torque += np.cos(2.0 * np.pi * k / period_s * time_s + phase)
     torque -= np.mean(torque)
     return np.asarray(torque * (prbs.amplitude_nm / np.max(np.abs(torque))))
 
@@ -144,9 +146,11 @@ class MultisineComparison:
 
 
 def compare_multisine(
-    settings: Settings, perturbation_nm: NDArray[np.float64]
+    settings: Settings,
+    perturbation_nm: NDArray[np.float64],
+    of_prbs: Mapping[str, Precision],
 ) -> MultisineComparison:
-    """Return the multisine and its standard errors beside those of the PRBS.
+    """Return the multisine and its standard errors beside those of the PRBS in each condition.
 
     Raises
     ------
@@ -155,9 +159,8 @@ def compare_multisine(
     """
     torque = multisine_nm(settings)
     errors: dict[str, dict[str, tuple[float, float, float]]] = {}
-    for name, subject in settings.subject.items():
-        ours = predicted_precision(perturbation_nm, settings, subject)
-        its = predicted_precision(torque, settings, subject)
+    for name, ours in of_prbs.items():
+        its = predicted_precision(torque, settings, settings.subject[name])
         scales = {
             "same_peak_torque": float(np.max(np.abs(perturbation_nm)) / np.max(np.abs(torque))),
             "same_angle_sd": ours.angle_sd_rad / its.angle_sd_rad,

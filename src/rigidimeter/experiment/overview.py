@@ -18,9 +18,15 @@ from numpy.typing import NDArray
 
 from rigidimeter.dynamics import JointDynamics, Stability, loop_stability, median_joint
 from rigidimeter.errors import UserError
-from rigidimeter.experiment.demand import Demand, beyond_limits, demand, ideal_response
+from rigidimeter.experiment.demand import (
+    Demand,
+    beyond_limits,
+    demand,
+    ideal_response,
+    too_few_cycles,
+)
 from rigidimeter.experiment.epochs_needed import Detection, Wanted, detect, planned_epochs
-from rigidimeter.experiment.joint_bandwidth import Corners, corners
+from rigidimeter.experiment.joint_bandwidth import APPENDIX_A, Corners, Forearm, corners
 from rigidimeter.experiment.multisine import MultisineComparison, compare_multisine
 from rigidimeter.experiment.optimise import Candidate, assess, check_criterion, optimise
 from rigidimeter.experiment.perturbation_band import BandCheck, check_band
@@ -50,6 +56,8 @@ class Design:
         Whether the PRBS covers the wanted band.
     bandwidth : Corners
         The bandwidth of the arm of App. A.
+    forearm : Forearm or None
+        Of that arm, if it is not the paper's.
     protocol : Protocol
         The session.
     planned_epochs : mapping of str to int
@@ -66,8 +74,8 @@ class Design:
     remarks : tuple of str
         For each condition without an entry in `precision`, why it has none.
     warnings : tuple of str
-        A sentence for each limit of the guard that a perturbation would pass; those on stability
-        are in `stability`.
+        A sentence for each limit of the guard that a perturbation would pass, and for a sinusoid
+        too short for the cycles to be scored; those on stability are in `stability`.
     detections : tuple of Detection
         Epochs needed for each difference that was asked for.
     criterion : str or None
@@ -98,6 +106,7 @@ class Design:
     present: Candidate | None = None
     ranked: tuple[Candidate, ...] | None = None
     multisine: MultisineComparison | None = None
+    forearm: Forearm | None = None
 
     def table(self) -> pd.DataFrame:
         """Return the predicted standard errors, one row a condition and method."""
@@ -125,6 +134,7 @@ def design(
     alpha: float = 0.05,
     search: str | None = None,
     with_multisine: bool = False,
+    forearm: Forearm | None = None,
     progress: Callable[[float], None] = lambda _: None,
     **changes: Any,
 ) -> Design:
@@ -145,6 +155,8 @@ def design(
         Search for a better PRBS by this criterion.
     with_multisine : bool
         Compare with a multisine.
+    forearm : Forearm, optional
+        For the bandwidth of App. A; without it, that of the arm as printed.
     progress : callable
         Called with the share of the search that was done since, 1 in all.
     **changes
@@ -163,7 +175,7 @@ def design(
     perturbation_nm = readonly(prbs_nm(chosen.prbs, rate_hz))
     angle_rad, velocity_rad_s = map(readonly, sinusoid(chosen.sinusoid, rate_hz))
     sinusoid_demand = demand(angle_rad, velocity_rad_s, rate_hz, guard)
-    warnings = list(beyond_limits("the sinusoid", sinusoid_demand, guard))
+    warnings = [*beyond_limits("the sinusoid", sinusoid_demand, guard), *too_few_cycles(chosen)]
 
     joints: dict[str, JointDynamics | None] = {"free arm": None}
     for condition, subject in chosen.subject.items():
@@ -178,13 +190,17 @@ def design(
     stable = all(margins.stable for margins in stability.conditions.values())
     precision, remarks = _precision(chosen, perturbation_nm, stability)
     searched = search is not None and stable
+    # Before the search, which takes long: what it cannot be made of is refused at once.
+    multisine = None
+    if with_multisine and stable and precision:
+        multisine = compare_multisine(chosen, perturbation_nm, precision)
     return Design(
         settings=chosen,
         perturbation_nm=perturbation_nm,
         angle_rad=angle_rad,
         velocity_rad_s=velocity_rad_s,
         band=check_band(chosen.prbs, rate_hz),
-        bandwidth=corners(),
+        bandwidth=corners(forearm.arm() if forearm else APPENDIX_A),
         protocol=plan(chosen.protocol, chosen.prbs, chosen.sinusoid, chosen.seed),
         planned_epochs=planned_epochs(chosen),
         sinusoid_demand=sinusoid_demand,
@@ -201,7 +217,8 @@ def design(
         criterion=search,
         present=assess(chosen, search) if searched and search else None,
         ranked=optimise(chosen, search, progress) if searched and search else None,
-        multisine=compare_multisine(chosen, perturbation_nm) if with_multisine and stable else None,
+        multisine=multisine,
+        forearm=forearm,
     )
 
 

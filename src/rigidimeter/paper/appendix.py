@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from functools import partial
 
-from rigidimeter.experiment import APPENDIX_A, Corner, corners
+from rigidimeter.experiment import APPENDIX_A, Corner, Forearm, corners
+from rigidimeter.experiment.joint_bandwidth import CONTROLLER_INERTIA_KG_M2, ROBOT_INERTIA_KG_M2
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Row, near, rounded, within_percent
 from rigidimeter.paper.context import Context
@@ -19,15 +20,15 @@ BANDWIDTH_PERCENT = 5.0
 
 def forearm_inertia(context: Context) -> Row:
     """Compare the forearm as a rod about its end, m l²/3."""
-    mass_kg = printed.APP_A_FOREARM_SHARE * printed.APP_A_BODY_MASS_KG
-    length_m = math.sqrt(3.0 * printed.APP_A_FOREARM_INERTIA / mass_kg)
-    ours = mass_kg * printed.APP_A_FOREARM_M**2 / 3.0
+    forearm = Forearm()
+    length_m = math.sqrt(3.0 * printed.APP_A_FOREARM_INERTIA / forearm.mass_kg)
+    ours = forearm.inertia_kg_m2
     return Row(
-        ours=f"m = {number(mass_kg)} kg; the printed inertia asks for l = {number(length_m)} m, "
-        f"and l = {printed.APP_A_FOREARM_M:.3f} m gives {number(ours, 5)} kg·m²",
+        ours=f"m = {number(forearm.mass_kg)} kg; the printed inertia asks for "
+        f"l = {number(length_m)} m, and l = {forearm.length_m:.3f} m gives {number(ours, 5)} kg·m²",
         checks=(
             rounded(
-                f"Forearm inertia at l = {printed.APP_A_FOREARM_M:.3f} m",
+                f"Forearm inertia at l = {forearm.length_m:.3f} m",
                 "kg·m²",
                 printed.APP_A_FOREARM_INERTIA,
                 ours,
@@ -39,12 +40,8 @@ def forearm_inertia(context: Context) -> Row:
 
 def total_inertia(context: Context) -> Row:
     """Compare the sum of forearm, robot and controller."""
-    total = (
-        printed.APP_A_FOREARM_INERTIA
-        + printed.APP_A_ROBOT_INERTIA
-        + printed.APP_A_CONTROLLER_INERTIA
-    )
-    estimated = printed.FIG_4.inertia_kg_m2 + printed.APP_A_CONTROLLER_INERTIA
+    total = printed.APP_A_FOREARM_INERTIA + ROBOT_INERTIA_KG_M2 + CONTROLLER_INERTIA_KG_M2
+    estimated = printed.FIG_4.inertia_kg_m2 + CONTROLLER_INERTIA_KG_M2
     return Row(
         ours=f"{number(total)} kg·m²",
         reading="0.0052 is kept as the nominal value, because Eq. 8 is half of it. (The median "

@@ -22,17 +22,12 @@ BAND_HZ = (0.15, 10.0)
 BANDWIDTH_HZ = 3.5
 """Sec. 2.4.3: the worst-case cutoff."""
 
-APP_A_BODY_MASS_KG, APP_A_FOREARM_SHARE = 7.7, 0.015
 APP_A_FOREARM_INERTIA = 8.6625e-4
-APP_A_FOREARM_M = 0.150
-APP_A_ROBOT_INERTIA = 4e-3
-APP_A_CONTROLLER_INERTIA = 0.0008
 APP_A_INERTIA_TOTAL = 0.0052
 APP_A_ELBOW_DAMPING = 0.06
 APP_A_CONTROLLER_DAMPING = 0.028
 APP_A_DAMPING_TOTAL = 0.0088
-"""App. A: mass in kg and share of it, inertia in kg·m², damping in N·m·s/rad; the length of the
-forearm is not printed, and 150 mm gives its inertia (row app-a-forearm)."""
+"""App. A: inertia in kg·m², damping in N·m·s/rad; more of it in `experiment.joint_bandwidth`."""
 
 EQUATION_8 = JointDynamics(0.0026, 0.044, 0.75)
 """App. A: "the transfer function with the largest bandwidth"."""

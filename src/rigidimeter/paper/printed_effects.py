@@ -9,7 +9,7 @@ model without intercept tests "both means are zero" unless it is given the contr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy.stats import norm
@@ -52,6 +52,12 @@ _PRINTS: Mapping[str, Callable[[Measured], float]] = {
     "the text": lambda measured: measured.p_text,
 }
 """The two places where p is printed; a comparison of measures takes all of one place."""
+
+_AS_P: Mapping[str, Callable[[Measured], float]] = {
+    **{f"p of {place}": p_of for place, p_of in _PRINTS.items()},
+    "r as printed": lambda measured: p_from(measured.r, measured.n),
+}
+"""The same, and the p that the printed r and N come to."""
 
 
 def line_of_table_2(name: str, context: Context) -> Row:
@@ -137,23 +143,25 @@ def order_of_effects(context: Context) -> Row:
     )
 
 
-def better_than_work(context: Context) -> Row:
-    """Compare the effects of viscosity and stiffness with that of the work."""
+def larger_effects(names: Sequence[str], other: str, context: Context) -> Row:
+    """Compare the effects of some measures with that of another: all p of one place, or all r."""
     texts, checks = [], []
-    for place, p_of in _PRINTS.items():
+    for place, p_of in _AS_P.items():
         effects = {
             name: effect_from_p(p_of(m), COUNTS[m.counted]["OFF"], COUNTS[m.counted]["DBS"])
             for name, m in MEASURED.items()
         }
-        for name in ("viscosity", "stiffness"):
-            d = compare_published(effects[name], effects["work"])
-            texts.append(
-                f"{name} less work, p of {place}, {d.estimate:+.2f} [{d.low:+.2f} to "
-                f"{d.high:+.2f}], p = {p_value(d.p)}".replace("-", "−")
+        found = []
+        for name in names:
+            d = compare_published(effects[name], effects[other])
+            found.append(
+                f"{name} {d.estimate:+.2f} [{d.low:+.2f} to {d.high:+.2f}], p = {p_value(d.p)}"
             )
-            checks.append(bounded(f"Lower end, {name} less work, {place}", "1", d.low, low=0.0))
+            checks.append(bounded(f"Lower end, {name} less {other}, {place}", "1", d.low, low=0.0))
+        texts.append(f"{place}: {', '.join(found)}".replace("-", "−"))
     return Row(
-        ours="difference of the rank-biserial correlations with 95 % interval: " + "; ".join(texts),
+        ours=f"rank-biserial correlation less that of {other}, with 95 % interval. "
+        + "; ".join(texts),
         checks=tuple(checks),
     )
 

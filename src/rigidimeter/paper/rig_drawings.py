@@ -17,6 +17,7 @@ from scipy.constants import g
 
 from rigidimeter.control import admittance, admittance_step, biquad_step, butterworth_lowpass
 from rigidimeter.control.filters import BiquadState
+from rigidimeter.experiment import Forearm
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Row, bounded, within_percent
 from rigidimeter.paper.context import Context
@@ -34,8 +35,8 @@ _ARM, _SUBJECT, _LINE = "#CFE3F1", "#F3E3D3", "#222222"
 
 def figure_1(context: Context) -> Row:
     """Compare the part of the weight in K with K, the axis tilted as far as by eye."""
-    mass_kg = printed.APP_A_FOREARM_SHARE * printed.APP_A_BODY_MASS_KG
-    weight_nm = mass_kg * g * printed.APP_A_FOREARM_M / 2.0
+    forearm = Forearm()
+    weight_nm = forearm.mass_kg * g * forearm.length_m / 2.0
     stiffness = printed.SEC_34.stiffness_nm_rad
     tilted = 100.0 * weight_nm * math.sin(math.radians(_TILT_DEG)) / stiffness
     return Row(
@@ -81,6 +82,14 @@ def figure_2(context: Context) -> Row:
                 "not show.",
                 "Block diagram: perturbation and torque, admittance, guard, drive, arm, sensor.",
                 draw_loop,
+            ),
+            Figure(
+                "fig-2b",
+                "Fig. 2(b), drawn for this software: the two bodies that Eq. 5 cuts apart at the "
+                "torque sensor, one of them in software. Counter-clockwise is positive.",
+                "Free-body diagram: the controller's inertia under M_PRBS, M_meas and its damping; "
+                "arm and robot under M_meas, M_sub, damping and stiffness.",
+                draw_free_bodies,
             ),
         ),
     )
@@ -175,6 +184,52 @@ def draw_loop() -> Drawing:
         ):
             axes.text(at_x, at_y, text, ha="center", va="bottom", fontsize=8)
     return figure
+
+
+def draw_free_bodies() -> Drawing:
+    """Draw the torques on the controller's body and on that of arm and robot, as in Eq. 5."""
+    with styled():
+        figure = Drawing(figsize=(7.4, 3.4))
+        axes = _canvas(figure, (-0.5, 14.5), (-1.5, 5.4))
+        for x, title, body, forward, backward, balance in (
+            (3.2, "admittance controller, in software", "J_c", ["M_PRBS"],
+             ["B_c θ′", "M_meas"], "J_c θ″ = M_PRBS − M_meas − B_c θ′"),
+            (10.8, "arm with the robot's arm", "J_p", ["M_meas", "M_sub"],
+             ["B_p θ′", "K_p θ"], "J_p θ″ = M_meas + M_sub − B_p θ′ − K_p θ"),
+        ):  # fmt: skip
+            axes.add_patch(Circle((x, 2.0), 1.0, fc=_ARM, ec=_LINE))
+            axes.plot(x, 2.0, "o", color=_LINE, markersize=3)
+            axes.text(x, 2.3, body, ha="center", va="bottom", fontsize=9)
+            axes.text(x, 4.8, title, ha="center", va="center", fontsize=9)
+            axes.text(x, -1.0, balance, ha="center", va="center", fontsize=9)
+            # Those that drive it at its left, those that oppose the motion at its right.
+            for k, text in enumerate(forward):
+                _turn(axes, (x, 2.0), 1.4 + 0.5 * k, (137.0, 240.0), text, "#0072B2")
+            for k, text in enumerate(backward):
+                _turn(axes, (x, 2.0), 1.4 + 0.5 * k, (43.0, -60.0), text, "#D55E00")
+        axes.annotate("", xy=(7.9, 2.0), xytext=(6.1, 2.0),
+                      arrowprops={"arrowstyle": "<->", "color": GREY})  # fmt: skip
+        axes.text(7.0, 2.2, "same θ", ha="center", va="bottom", fontsize=8)
+    return figure
+
+
+def _turn(
+    axes: Axes,
+    centre: tuple[float, float],
+    radius: float,
+    degrees: tuple[float, float],
+    text: str,
+    colour: str,
+) -> None:
+    """Draw a torque as an arrow about a centre from one angle to another, with its name."""
+    angle = np.radians(np.linspace(*degrees, 60))
+    x, y = centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)
+    axes.plot(x[:-1], y[:-1], color=colour, linewidth=1.6)
+    axes.annotate("", xy=(x[-1], y[-1]), xytext=(x[-3], y[-3]),
+                  arrowprops={"arrowstyle": "-|>", "color": colour, "shrinkA": 0,
+                              "shrinkB": 0})  # fmt: skip
+    inward = "left" if x[0] < centre[0] else "right"
+    axes.text(x[0], y[0] + 0.1, text, color=colour, ha=inward, va="bottom", fontsize=8)
 
 
 def _canvas(figure: Drawing, x: tuple[float, float], y: tuple[float, float]) -> Axes:

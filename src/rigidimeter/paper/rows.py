@@ -82,7 +82,10 @@ MAKERS: Mapping[str, Maker] = {
     "p-stiffness": partial(effects.p_of_text, "stiffness"),
     "k-printed": protocol.one_stiffness,
     "sec-3.6-order": effects.order_of_effects,
-    "sec-4-better": effects.better_than_work,
+    "sec-4-better": partial(effects.larger_effects, ("viscosity", "stiffness"), "work"),
+    "sec-4-mupdrs": partial(
+        effects.larger_effects, ("impulse", "work", "viscosity", "stiffness"), "mupdrs"
+    ),
     "sec-3.4-mean": simulated.mean_errors,
     "sec-3.4-mean-iv": simulated.mean_errors_by_instruments,
     "sec-3.4-sd": simulated.spread_of_errors,

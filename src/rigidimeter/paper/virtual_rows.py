@@ -80,10 +80,12 @@ def torque_figure(name: str, context: Context) -> Row:
     inside = (time_s >= _WINDOW_S[0]) & (time_s <= _WINDOW_S[1])
     shown = f"{_place(name)} from virtual data: {shows}"
     return Row(
-        ours=f"virtual OFF epoch of median fit (J {number(joint.inertia_kg_m2)}, "
+        ours="virtual OFF epoch with the median stiffness "
+        f"(J {number(joint.inertia_kg_m2)}, held at the median of all epochs, "
         f"B {number(joint.damping_nm_s_rad)}, K {number(joint.stiffness_nm_rad)}): {text}",
-        reading="Estimated: parameters times measured motion; simulated: the motion by integration "
-        "of the perturbation alone; all in one band.",
+        reading='The paper does not say of which epochs its "median values" are; ours are those '
+        "of the epoch that is drawn. Estimated: parameters times measured motion; simulated: the "
+        "motion by integration of the perturbation alone; all in one band.",
         unpublished=f"{_MISSING}an epoch of the virtual study stands in.",
         figures=(
             Figure(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, Literal, Self
 
 from pydantic import model_validator
@@ -63,6 +64,10 @@ class ScoreSettings(Section):
     band_high_hz: float = quantity(5.0, "Hz", 0.1, 100.0)
     cycles: int = quantity(8, "1", 1, 1000)
     discard_s: float = quantity(1.0, "s", 0.0, 60.0)
+
+    def cycles_in(self, length_s: float, frequency_hz: float) -> int:
+        """Return how many whole cycles are scored of a motion without its discarded ends."""
+        return min(self.cycles, math.floor(length_s * frequency_hz + 1e-6))
 
 
 class DiagnosticLevels(Section):

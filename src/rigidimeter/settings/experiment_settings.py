@@ -119,9 +119,10 @@ class OptimiseSettings(Section):
 class MultisineSettings(Section):
     """A multisine in place of the PRBS: equal lines at whole multiples of 1 / `period_s`.
 
-    It lies in the wanted band of `[prbs]`, lasts as long, and has the same peak torque.
+    It lies in the wanted band of `[prbs]`, lasts as long, and has the same peak torque. Without
+    `period_s`, which is 0, its period is that of the epoch.
     """
 
-    period_s: float = quantity(20.0, "s", 0.1, 3600.0)
+    period_s: float = quantity(0.0, "s", 0.0, 3600.0)
     phases: Literal["schroeder", "random"] = "schroeder"
     crest_steps: int = quantity(200, "1", 0, 10000)

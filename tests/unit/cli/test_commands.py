@@ -82,6 +82,28 @@ def test_a_session_goes_from_simulation_to_estimate_to_comparison(rigidimeter, t
     assert "work_j" in (tmp_path / "c.csv").read_text()
 
 
+def test_a_motion_too_short_for_the_cycles_is_named_by_each_command(rigidimeter, tmp_path):
+    """3 s of 2 Hz less 1 s at each end hold 2 cycles."""
+    settings, session = tmp_path / "short.toml", tmp_path / "session"
+    settings.write_text(
+        """
+        rig = {tick_rate_hz = 250.0, torque.rate_hz = 250.0, motion.rate_hz = 250.0}
+        sinusoid = {motion_s = 3.0, duration_s = 5.0, frequency_hz = 2.0, amplitude_deg = 5.0}
+        [protocol]
+        rests_s = [1.0]
+        return_s = 1.0
+        blocks = [{task = "sinusoid", condition = "OFF", epochs = 1}]
+        """
+    )
+    said = "holds 2 of the scores.cycles = 8 cycles to be scored; 6 s hold all of them"
+    assert said in " ".join(rigidimeter("design", "--settings", settings).out.split())
+    assert said in rigidimeter("simulate", "--settings", settings, "--out", session).err
+    words = " ".join(rigidimeter("estimate", session).out.split())
+    assert (
+        "1 of 1 epochs were scored over fewer than scores.cycles = 8 cycles, the fewest 2" in words
+    )
+
+
 def test_published_and_bandlimited_differ_as_the_ledger_says(rigidimeter, simulate, tmp_path):
     folder = simulate()
     found = {}

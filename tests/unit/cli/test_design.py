@@ -46,6 +46,16 @@ def test_prints_the_numbers() -> None:
     assert "Warning" not in words
 
 
+def test_the_bandwidth_of_another_subject(tmp_path: Path) -> None:
+    numbers = tmp_path / "numbers.json"
+    words = " ".join(run("--body-mass", "80", "--json", str(numbers)).split())
+    assert "body mass 80 kg, forearm 0.15 m: J is the forearm's 0.009 kg·m² with" in words
+    assert "as Eq. 8" in words
+    bandwidth = json.loads(numbers.read_text())["bandwidth"]
+    assert bandwidth["forearm"] == {"body_mass_kg": 80.0, "length_m": 0.15}
+    assert bandwidth["nominal"]["inertia_kg_m2"] == pytest.approx(0.009 + 0.0048)
+
+
 def test_writes_what_will_be_commanded(tmp_path: Path) -> None:
     folder, numbers = tmp_path / "new" / "planned", tmp_path / "numbers.json"
     run("--out", str(folder), "--json", str(numbers))

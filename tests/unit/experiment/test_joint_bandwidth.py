@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.experiment import APPENDIX_A, corners
+from rigidimeter.errors import UserError
+from rigidimeter.experiment import APPENDIX_A, Forearm, corners, design
 
 
 def test_a_corner_of_a_critically_damped_joint() -> None:
@@ -47,3 +48,27 @@ def test_an_uncertainty_out_of_range_is_refused(uncertainty: float) -> None:
 def test_a_joint_without_stiffness_has_no_bandwidth() -> None:
     with pytest.raises(ValueError, match="stiffness"):
         corners(JointDynamics(1.0, 1.0, 0.0))
+
+
+def test_a_forearm_of_another_size() -> None:
+    """1.5 % of 80 kg as a rod of 0.3 m: 1.2 · 0.09 / 3 = 0.036 kg·m², and robot and controller."""
+    arm = Forearm(80.0, 0.3).arm()
+    assert arm.inertia_kg_m2 == pytest.approx(0.036 + 4e-3 + 8e-4)
+    assert (arm.damping_nm_s_rad, arm.stiffness_nm_rad) == (0.088, 1.5)
+    assert Forearm().inertia_kg_m2 == pytest.approx(8.6625e-4)  # as printed
+    found = design(forearm=Forearm(80.0, 0.3))
+    assert found.bandwidth == corners(arm)
+    assert design().bandwidth == corners(APPENDIX_A)
+
+
+@pytest.mark.parametrize(
+    ("forearm", "message"),
+    [
+        (Forearm(0.0), "a body mass of 0 kg is not possible; it must be above 0 and at most 500"),
+        (Forearm(length_m=26.0), "a forearm of 26 m is not possible; it must be .* at most 1 m"),
+        (Forearm(length_m=math.nan), "a forearm of nan m"),
+    ],
+)
+def test_a_forearm_that_is_none_is_refused(forearm: Forearm, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        design(forearm=forearm)

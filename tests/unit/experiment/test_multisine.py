@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from rigidimeter.errors import UserError
-from rigidimeter.experiment import compare_multisine, multisine_nm, prbs_nm, predicted_precision
+from rigidimeter.experiment import (
+    compare_multisine,
+    design,
+    multisine_nm,
+    prbs_nm,
+    predicted_precision,
+)
 from rigidimeter.experiment.multisine import crest_factor, multisine_phases_rad
 from rigidimeter.settings import Settings, parse_settings
 
@@ -68,12 +74,39 @@ def test_periods_that_do_not_fit_are_refused() -> None:
         multisine_nm(parse_settings({"prbs": narrow, "multisine": {"period_s": 3.0}}))
 
 
+def test_its_period_is_that_of_a_short_epoch() -> None:
+    found = design(prbs={"duration_s": 5.0}, with_multisine=True).multisine
+    assert found is not None
+    lines = np.abs(np.fft.rfft(found.torque_nm)) / found.torque_nm.size  # every 0.2 Hz
+    strong = np.flatnonzero(lines > 0.5 * lines.max())
+    assert strong.tolist() == list(range(1, 51))  # 0.2 to 10 Hz
+
+
+def test_an_epoch_too_short_for_a_standard_error_is_a_remark() -> None:
+    found = design(prbs={"duration_s": 2.0}, with_multisine=True)
+    assert found.multisine is None
+    assert "no standard errors, since" in found.remarks[0]
+
+
+def test_what_it_cannot_be_made_of_is_refused_before_the_search() -> None:
+    done: list[float] = []
+    with pytest.raises(UserError, match=r"multisine\.period_s = 25 s"):
+        design(
+            multisine={"period_s": 25.0},
+            with_multisine=True,
+            search="minimax",
+            optimise={"clocks": 2, "bits_low": 7, "bits_high": 7},
+            progress=done.append,
+        )
+    assert not done
+
+
 def test_the_multisine_beside_the_prbs() -> None:
     settings = Settings()
     torque = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
-    found = compare_multisine(settings, torque)
-    assert 1.4 < found.crest_factor < 1.6
     ours = predicted_precision(torque, settings, settings.subject["OFF"])
+    found = compare_multisine(settings, torque, {"OFF": ours})
+    assert 1.4 < found.crest_factor < 1.6
     its = predicted_precision(found.torque_nm, settings, settings.subject["OFF"])
     errors = found.errors["OFF"]
     assert errors["prbs"] == ours.iv.free

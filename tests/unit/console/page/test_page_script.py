@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 import rigidimeter.console.page as package
 from rigidimeter.console.page.page_messages import ORDERS, parse_message
@@ -25,18 +24,6 @@ window.WebSocket = class {
 };
 """
 CHECKING = {"starting": "", "checking": "daily check", "session": None, "finished": None}
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    path = shutil.which("chromium")
-    if path is None:
-        pytest.skip("needs Debian's chromium: apt-get install chromium")
-    with sync_playwright() as driver:
-        options = ["--no-sandbox", "--disable-dev-shm-usage"]
-        started = driver.chromium.launch(executable_path=path, args=options)
-        yield started
-        started.close()
 
 
 class Operator:

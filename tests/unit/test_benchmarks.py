@@ -1,0 +1,104 @@
+"""Every benchmark runs to its end, in its smallest form; the numbers that it prints are no test."""
+
+import importlib
+import re
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+from benchmarks import batch
+from benchmarks.loop import late_and_missed
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+
+SMALLEST = {
+    "__main__": "--quick",
+    "accuracy": "--share 0 --only rates",
+    "archive": "--epochs 8",
+    "between_samples": "PI",
+    "calibration": "0.001",
+    "checks_cost": "--epochs 1 --repeats 1 --parts",
+    "cpu_commands": "--command estimate --repeats 1 --study {study}",
+    "day_tests": "2 1 3 days each",
+    "false_alarms": "--hours 1e-5",
+    "lack_of_fit": "--recordings 1",
+    "model_terms": "--epochs 1 --only relaxed",
+    "null_studies": "--studies 1 --processes 1",
+    "same_numbers": "--group design",
+    "scenarios.__main__": "--only relaxed --recordings 1 --methods bandlimited",
+    "size": "",
+    "tick": "--repeats 1",
+    "torque_sign": "--epochs 1 --sizes small",
+    "untrue": "",
+    "verdicts": "run {folder}/studies --studies 1 --seconds 0.01\ntable {folder}/studies",
+}
+"""Arguments by module, a line for each run."""
+
+REAL_TIME = {"loop", "console", "page"}
+"""Those that keep real time or need a browser: `tests.faults.test_realtime_benchmarks`."""
+
+
+def smaller(name: str, module: ModuleType, folder: Path) -> Mapping[str, Any]:
+    """Return what a module is to do less of than its arguments can say, and where to write."""
+    if name == "between_samples":
+        return {"TABLE": folder / "page.md", "FIRST_HZ": (100.0,), "FILTERS_HZ": (0.0,)}
+    if name == "archive":
+        return {"apart": module.measured}
+    if name == "false_alarms":
+        (kind, *_), compiled = module.kinds(), module.compiled
+        return {"kinds": lambda: [kind], "compiled": lambda: interpreted(compiled)}
+    if name == "torque_sign":
+        one = dict([*module.SUBJECTS.items()][:1])
+        return {"RATES": module.RATES[:1], "SUBJECTS": one, "MOMENTS_S": module.MOMENTS_S[:1]}
+    if name == "untrue":
+        return {"CASES": dict([*module.CASES.items()][:1]), "SEEDS": 1}
+    return {"DAYS": 2} if name == "verdicts" else {}
+
+
+def interpreted(compiled: Callable[[], Any]) -> Any:
+    """Return the guard's laws as they are put together; to compile them takes half a minute."""
+    with patch("numba.njit", lambda function, **_: function):
+        return compiled()
+
+
+def modules() -> Iterator[str]:
+    """Yield the benchmarks that can be run."""
+    for path in sorted(BENCHMARKS.rglob("*.py")):
+        if path.name == "__main__.py" or '__name__ == "__main__"' in path.read_text("utf-8"):
+            yield ".".join(path.relative_to(BENCHMARKS).with_suffix("").parts)
+
+
+def test_every_benchmark_is_here() -> None:
+    in_the_table = {"batch", "online"}  # rows of `python -m benchmarks`
+    assert set(modules()) == SMALLEST.keys() | REAL_TIME | in_the_table
+
+
+@pytest.mark.parametrize("name", SMALLEST)
+def test_it_runs_to_its_end(
+    name: str,
+    tmp_path: Path,
+    scored_study: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    module = importlib.import_module(f"benchmarks.{name}")
+    for what, value in smaller(name, module, tmp_path).items():
+        monkeypatch.setattr(module, what, value)
+    monkeypatch.setattr(batch, "apart", batch.measured_run)
+    for line in SMALLEST[name].format(folder=tmp_path, study=scored_study).split("\n"):
+        monkeypatch.setattr(sys, "argv", [name, *shlex.split(line)])
+        module.main()
+    assert re.search(r"\d", capsys.readouterr().out)
+
+
+def test_ticks_of_cyclictest_are_counted_as_ours() -> None:
+    """At 1 kHz: 0.4 and 0.6 ms late miss none, 1 ms the next tick, 3.4 ms the next three."""
+    counts = np.bincount([400, 600, 1000, 1999, 3400, 3400], minlength=5000)
+    assert late_and_missed(counts, 1000.0) == (5, 1 + 1 + 3 + 3)
+    assert late_and_missed(counts, 100.0) == (0, 0)
