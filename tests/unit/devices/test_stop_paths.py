@@ -15,7 +15,7 @@ import pytest
 
 from rigidimeter.devices.base import DeviceError
 from rigidimeter.devices.cia402.drive import Cia402Drive
-from rigidimeter.devices.cia402.state_words import OPERATIONAL, Control
+from rigidimeter.devices.cia402.state_words import OPERATIONAL, PRE_OPERATIONAL, STOPPED, Control
 from rigidimeter.guard import Cause
 
 _channels = itertools.count()
@@ -23,6 +23,7 @@ IN_OPERATION, DISABLED, QUICK_STOP, FAULT = 0x27, 0x40, 0x07, 0x08
 SYNC, HEARTBEAT = ("sync",), ("heartbeat", OPERATIONAL)
 OFF_BY_SDO = ("sdo", b"\x2b\x40\x60\x00\x00\x00\x00\x00")
 ASKED_BY_SDO = ("sdo", b"\x40\x00\x10\x00\x00\x00\x00\x00")
+STATE_BY_SDO = ("sdo", b"\x40\x41\x60\x00\x00\x00\x00\x00")
 STOP_BY_SDO = ("sdo", b"\x2b\x40\x60\x00\x02\x00\x00\x00")
 
 
@@ -91,9 +92,9 @@ class Node:
         if heartbeat is not None:
             self.send(0x701, [heartbeat])
 
-    def quiet_tick(self):
+    def quiet_tick(self, network_state=OPERATIONAL):
         """A tick in which the node only beats; return what was sent."""
-        self.send(0x701, [OPERATIONAL])
+        self.send(0x701, [network_state])
         self.clock.time_s += 0.002
         self.drive.read()
         self.drive.write(0.5)
@@ -143,7 +144,7 @@ def test_a_tick_is_a_sync_a_command_and_a_heartbeat_when_due(node):
 def test_stop_is_sent_both_ways_and_kept(node):
     node.tick()
     node.drive.stop()
-    assert node.sent() == [("command", 0x02, 0.0), STOP_BY_SDO]
+    assert node.sent() == [STOP_BY_SDO, ("command", 0x02, 0.0)]
     assert node.drive.write(0.5) == 0.0
     assert node.sent() == [("command", 0x02, 0.0)]
     node.drive.stop()
@@ -155,7 +156,7 @@ def test_stop_is_sent_both_ways_and_kept(node):
 def test_disable_is_sent_both_ways_and_nothing_takes_it_back(node):
     node.tick()
     node.drive.disable()
-    assert node.sent() == [("command", 0x00, 0.0), OFF_BY_SDO]
+    assert node.sent() == [OFF_BY_SDO, ("command", 0x00, 0.0)]
     node.drive.stop()
     assert node.sent() == []  # a quick stop would bring the power back
     assert node.drive.write(0.5) == 0.0
@@ -166,7 +167,7 @@ def test_disable_is_sent_both_ways_and_nothing_takes_it_back(node):
 def test_close_takes_the_power_and_the_node_out_of_operation(node):
     node.tick()
     node.drive.close()
-    off = [("command", 0x00, 0.0), OFF_BY_SDO, ("network", b"\x80\x01")]
+    off = [OFF_BY_SDO, ("command", 0x00, 0.0), ("network", b"\x80\x01")]
     assert node.sent() == off
     assert not node.drive._wire.is_open
     assert Cause(node.drive.read().cause) is Cause.DRIVE_LOST
@@ -216,15 +217,15 @@ def test_a_bus_that_fails_while_it_ends_is_closed_all_the_same(node, monkeypatch
         ({"status": 0x23}, Cause.DRIVE_STATE, 0x02),
         ({"mode": 1}, Cause.DRIVE_STATE, 0x02),
         ({"status": FAULT}, Cause.DRIVE_FAULT, 0x02),
-        ({"heartbeat": 0x7F}, Cause.DRIVE_STATE, 0x0F),  # it still obeys: the guard's ramp
+        ({"heartbeat": 0x7F}, Cause.DRIVE_STATE, 0x02),  # it hears no command: by SDO
+        ({"heartbeat": 0x04}, Cause.DRIVE_STATE, 0x02),
         ({"heartbeat": 0}, Cause.DRIVE_FAULT, 0x00),  # it restarted
     ],
 )
 def test_a_drive_that_is_not_in_operation_is_not_commanded_into_it(node, report, cause, control):
     assert node.tick() == (Cause.NONE, pytest.approx(0.5, abs=1e-5), (0x0F, 0.5))
     found, sent, command = node.tick(**report)
-    assert (found, command[0]) == (cause, control)
-    assert sent == (pytest.approx(0.5, abs=1e-5) if control == 0x0F else 0.0)
+    assert (found, command[0], sent) == (cause, control, 0.0)
     assert node.tick()[0] is cause  # the first is kept
     assert node.tick()[2][0] == control
 
@@ -276,7 +277,7 @@ def test_after_a_pause_in_which_the_drive_stops_itself_it_is_told_to_stop(node, 
         node.drive.read()
     node.clock.time_s += 0.051 if answers else 0.001
     assert node.drive.write(0.5) == 0.0
-    assert node.commands() == [(0x02, 0.0)]
+    assert set(node.commands()) == {(0x02, 0.0)}
     node.report()
     cause = Cause.DRIVE_STATE if answers else Cause.DRIVE_LOST
     assert Cause(node.drive.read().cause) is cause
@@ -344,3 +345,31 @@ def test_one_answer_more_than_questions_is_a_drive_that_is_lost(node):
     node.report(asked=False)
     assert Cause(node.drive.read().cause) is Cause.DRIVE_LOST
     assert node.drive.counts["unplaced"] == 2
+
+
+@pytest.mark.parametrize("network_state", [PRE_OPERATIONAL, STOPPED])
+def test_a_node_that_hears_no_command_is_stopped_by_sdo_until_it_says_that_it_is(
+    node, network_state
+):
+    """`lost_s` is 0.03 s: the stop is sent again, or what it did is read, after a quarter of it."""
+    node.tick()
+    first = node.quiet_tick(network_state)
+    opened = [("network", b"\x80\x01")] if network_state == STOPPED else []
+    assert first[: len(opened) + 1] == [*opened, STOP_BY_SDO]  # in the same tick
+    sent = [frame for _ in range(20) for frame in node.quiet_tick(network_state)]
+    said = [f for f in sent if f in (STOP_BY_SDO, STATE_BY_SDO, *opened)]
+    assert said == ([STATE_BY_SDO, *opened, STOP_BY_SDO] * 3)[: len(said)]
+    assert len(said) > 4
+    assert node.drive.powered
+    node.send(0x581, b"\x4b\x41\x60\x00\x40\x02\x00\x00")  # switch-on disabled
+    node.quiet_tick(network_state)
+    assert not node.drive.powered
+
+
+def test_the_stop_is_not_repeated_to_a_drive_that_answers(node):
+    node.tick()
+    node.drive.stop()
+    node.sent()
+    for _ in range(20):
+        node.report(status=QUICK_STOP)
+        assert not {STOP_BY_SDO, STATE_BY_SDO} & set(node.quiet_tick())

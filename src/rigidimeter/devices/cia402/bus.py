@@ -29,6 +29,7 @@ from rigidimeter.devices.cia402.state_words import (
     BOOTED,
     OPERATIONAL,
     PROFILE_VELOCITY,
+    STOPPED,
     SYNC_ID,
     Control,
     Nmt,
@@ -47,8 +48,8 @@ from rigidimeter.devices.cia402.state_words import (
 COMMUNICATION = (0x81, 0x82)
 """The upper bytes of the error codes of a node that misses frames (CiA 301)."""
 
-DEVICE_TYPE = 0x1000
-"""An object that every node has."""
+DEVICE_TYPE, STATUSWORD = 0x1000, 0x6041
+STOPS = (Control.QUICK_STOP, Control.DISABLE_VOLTAGE)
 
 QUIET_S = 0.01
 LONGEST_DRAIN_S = 0.5
@@ -75,6 +76,8 @@ class NodeBus:
         self._room: select.poll | None = None  # says whether something can be sent
         self._open = False  # the last SYNC is not answered
         self._probing = False  # an SDO read was sent because of that, and is not answered
+        self._repeats_s = math.inf  # when a stop is sent again, or what it did is asked for
+        self._asks_state = False
         self._position: int | None = None
         self._velocity: int | None = None
         self._beaten_s = -math.inf
@@ -199,12 +202,30 @@ class NodeBus:
         if now_s - self._beaten_s >= self._settings.heartbeat_s:
             self._send(self._heartbeat)
             self._beaten_s = now_s
+        if control in STOPS and now_s > self._repeats_s and (late or self._probing):
+            self._repeat_by_sdo(control)
         return sent
 
     def send_both_ways(self, control: Control) -> None:
-        """Send a controlword in the command frame and as an SDO write, which needs no mapping."""
+        """Send a controlword in the command frame and by SDO; neither is waited for.
+
+        A node that is not operational takes no command frames and does not answer SYNC, but takes
+        SDOs; one that is stopped takes neither, and is made pre-operational first. While SYNC
+        remains unanswered, `ask` goes on to read the statusword and to send the stop, in turns.
+        """
+        self._asks_state = False
+        self._repeat_by_sdo(control)
         self.ask(control, 0)
-        self._send_sdo(sdo_write_bytes(0x6040, 0, control, 2))
+
+    def _repeat_by_sdo(self, control: Control) -> None:
+        self._repeats_s = self._now() + self._settings.lost_s / 4
+        if self._asks_state:
+            self._send_sdo(sdo_read_bytes(STATUSWORD, 0))
+        else:
+            if self.network_state == STOPPED:
+                self.network(Nmt.PRE_OPERATIONAL)
+            self._send_sdo(sdo_write_bytes(0x6040, 0, control, 2))
+        self._asks_state = not self._asks_state
 
     def receive(self, wait_s: float = 0.0) -> bool:
         """Process one frame, waiting for it up to `wait_s`; return whether there was one."""
@@ -329,6 +350,8 @@ class NodeBus:
             self._probing = False
             self.counts["lost"] += self._open
             self._close_question()
+        elif answer.object == STATUSWORD and answer.value is not None:
+            self.statusword = answer.value & 0xFFFF
         return True
 
     def _take_heartbeat(self, data: bytearray) -> bool:

@@ -195,8 +195,11 @@ class Cia402Drive:
             wire.counts["backlog"] += 1
         now_s = self._now()
         found = self._find_cause(now_s)
-        if found in (Cause.DRIVE_FAULT, Cause.DRIVE_STATE) and wire.left_operation:
-            # Repeating "enable operation" would restart a drive that stopped by itself.
+        if found in (Cause.DRIVE_FAULT, Cause.DRIVE_STATE) and (
+            wire.left_operation or wire.network_state != OPERATIONAL
+        ):
+            # Repeating "enable operation" would restart a drive that stopped by itself, and a node
+            # that is not operational does not hear the guard's ramp.
             self._halt(Control.QUICK_STOP)
         self._cause = self._cause or found
         self._check_watchdog(now_s)
@@ -259,15 +262,13 @@ class Cia402Drive:
 
     def stop(self) -> None:
         """Brake along the drive's quick-stop ramp; only `enable` starts it again."""
-        if self._wire.is_open and self._control is not Control.DISABLE_VOLTAGE:
-            self._halt(Control.QUICK_STOP)
-            self._wire.send_both_ways(Control.QUICK_STOP)
+        if self._wire.is_open:
+            self._halt(Control.QUICK_STOP, again=True)
 
     def disable(self) -> None:
         """Remove the power at once."""
         if self._wire.is_open:
-            self._halt(Control.DISABLE_VOLTAGE)
-            self._wire.send_both_ways(Control.DISABLE_VOLTAGE)
+            self._halt(Control.DISABLE_VOLTAGE, again=True)
 
     def close(self) -> None:
         """Remove the power, make the drive pre-operational, close the bus."""
@@ -279,12 +280,17 @@ class Cia402Drive:
         finally:
             self._wire.close()
 
-    def _halt(self, control: Control) -> None:
-        # Power that was removed is not restored for a quick stop.
-        if self._control not in (control, Control.DISABLE_VOLTAGE):
+    def _halt(self, control: Control, again: bool = False) -> None:
+        self._sent = 0
+        if self._control is not control:
+            # Power that was removed is not restored for a quick stop.
+            if self._control is Control.DISABLE_VOLTAGE:
+                return
             self._control = control
             self._settled_s = self._now() + self._settings.lost_s
-        self._sent = 0
+        elif not again:
+            return
+        self._wire.send_both_ways(control)
 
     def _require_configured(self) -> None:
         self._configured = self._configured and not self._wire.booted

@@ -27,7 +27,7 @@ PROFILE_VELOCITY = 3
 """The mode of operation, 0x6060 and 0x6061."""
 
 SYNC_ID = 0x080
-BOOTED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x05, 0x7F
+BOOTED, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x04, 0x05, 0x7F
 """NMT states in a node's heartbeat."""
 
 TICK_FRAMES = (6, 0, 7, 4)
