@@ -17,6 +17,7 @@ from types import SimpleNamespace
 import can
 import pytest
 from tests.wire.cia402_wire import emulated_arm
+from tests.wire.durand_axis import DurandAxis
 from tests.wire.slcan_adapter import Manners, adapter
 
 from rigidimeter.devices.cia402.drive import Cia402Drive
@@ -38,13 +39,13 @@ LATE = Manners(late_every=100, late_s=(TICK_S, 50 * TICK_S))
 SYNC = can.Message(arbitration_id=0x080, is_extended_id=False)
 
 
-def ticks(always=ALWAYS["acknowledges"], enabled=None, other=None, for_s=1.0):
+def ticks(stack, always=ALWAYS["acknowledges"], enabled=None, other=None, for_s=1.0):
     """Return the cause of the end, the counts, and every sample's age by stamp and in truth.
 
     The adapter may change its manners once the drive is enabled. `other` is sent by another master.
     """
     channel = f"slcan {next(_channels)}"
-    emulator = Cia402Emulator(emulated_arm(), interface="virtual", channel=channel)
+    emulator = stack(emulated_arm(), interface="virtual", channel=channel)
     second = can.Bus(interface="virtual", channel=channel)
     began_s = time.monotonic()
     emulator._servo.measured = lambda: (round((time.monotonic() - began_s) * COUNTS_PER_S), 0)
@@ -90,17 +91,22 @@ def assert_no_old_sample_is_new(ages):
         assert by_stamp_s < 2 * LOST_S + 0.1
 
 
+@pytest.fixture(params=[Cia402Emulator, DurandAxis])
+def stack(request):
+    return request.param
+
+
 @pytest.mark.parametrize("always", ALWAYS.values(), ids=ALWAYS)
 def test_a_measurement_is_as_old_as_it_says_however_late_it_comes(always):
-    cause, counts, ages = ticks(always)
+    cause, counts, ages = ticks(Cia402Emulator, always)
     assert_no_old_sample_is_new(ages)
     assert cause is Cause.NONE
     assert counts["received"] > 30
     assert counts["lost"] == counts["unplaced"] == counts["damaged"] == 0
 
 
-def test_a_lost_answer_is_counted_and_the_next_one_is_placed():
-    cause, counts, ages = ticks(enabled=LOSES)
+def test_a_lost_answer_is_counted_and_the_next_one_is_placed(stack):
+    cause, counts, ages = ticks(stack, enabled=LOSES)
     assert_no_old_sample_is_new(ages)
     assert cause is Cause.NONE
     assert counts["lost"] >= 1
@@ -108,14 +114,14 @@ def test_a_lost_answer_is_counted_and_the_next_one_is_placed():
     assert ages[-1][0] < LOST_S
 
 
-def test_frames_that_overtake_others_are_a_drive_that_is_lost():
-    cause, _, ages = ticks(enabled=LATE, for_s=5.0)
+def test_frames_that_overtake_others_are_a_drive_that_is_lost(stack):
+    cause, _, ages = ticks(stack, enabled=LATE, for_s=5.0)
     assert_no_old_sample_is_new(ages)
     assert cause is Cause.DRIVE_LOST
 
 
-def test_a_second_master_on_the_bus_is_a_drive_that_is_lost():
-    cause, counts, ages = ticks(other=SYNC, for_s=5.0)
+def test_a_second_master_on_the_bus_is_a_drive_that_is_lost(stack):
+    cause, counts, ages = ticks(stack, other=SYNC, for_s=5.0)
     assert_no_old_sample_is_new(ages)
     assert cause is Cause.DRIVE_LOST
     assert 50 <= len(ages) < 50 + LOST_S / TICK_S
