@@ -373,3 +373,19 @@ def test_the_stop_is_not_repeated_to_a_drive_that_answers(node):
     for _ in range(20):
         node.report(status=QUICK_STOP)
         assert not {STOP_BY_SDO, STATE_BY_SDO} & set(node.quiet_tick())
+
+
+@pytest.mark.parametrize("found", ["a pause", "pre-operational", "a fall"])
+def test_who_only_reads_sends_nothing(node, found):
+    """The trial of the drive's own watchdog is silence: the driver must not be what stops it."""
+    node.tick()
+    node.sent()
+    node.clock.time_s += 0.06
+    node.report(
+        status=0x23 if found == "a fall" else IN_OPERATION,
+        heartbeat=PRE_OPERATIONAL if found == "pre-operational" else OPERATIONAL,
+    )
+    assert Cause(node.drive.read().cause) is not Cause.NONE
+    assert node.sent() == []
+    assert node.drive.write(0.5) == 0.0
+    assert node.sent()[0] == STOP_BY_SDO

@@ -77,6 +77,7 @@ class Cia402Drive:
             self._stops_itself_s = min(self._stops_itself_s, settings.command_deadline_s)
         self._configured = False
         self._control = Control.DISABLE_VOLTAGE
+        self._halted = False  # `control` is not sent yet
         self._sent = 0
         self._settled_s = -math.inf
         self._cause = Cause.NONE
@@ -180,7 +181,7 @@ class Cia402Drive:
         except BaseException:  # also when interrupted: the drive may have power by now
             self.disable()
             raise
-        self._control = Control.ENABLE_OPERATION
+        self._control, self._halted = Control.ENABLE_OPERATION, False
         self._sent = 0
         wire.emergency, wire.left_operation = 0, False
         wire.heard_s, wire.network_state = self._now(), OPERATIONAL
@@ -256,19 +257,24 @@ class Cia402Drive:
             most = self._settings.max_velocity_rad_s
             wanted = max(-most, min(most, velocity_rad_s)) * self._scale.units_per_rad_s
             target = max(-(2**31), min(2**31 - 1, round(wanted)))
-        if self._wire.is_open and self._wire.ask(self._control, target):
-            self._sent = target
+        if self._wire.is_open:
+            if self._halted:
+                self._send_halt()
+            elif self._wire.ask(self._control, target):
+                self._sent = target
         return self._sent / self._scale.units_per_rad_s
 
     def stop(self) -> None:
         """Brake along the drive's quick-stop ramp; only `enable` starts it again."""
-        if self._wire.is_open:
-            self._halt(Control.QUICK_STOP, again=True)
+        if self._wire.is_open and self._control is not Control.DISABLE_VOLTAGE:
+            self._halt(Control.QUICK_STOP)
+            self._send_halt()
 
     def disable(self) -> None:
         """Remove the power at once."""
         if self._wire.is_open:
-            self._halt(Control.DISABLE_VOLTAGE, again=True)
+            self._halt(Control.DISABLE_VOLTAGE)
+            self._send_halt()
 
     def close(self) -> None:
         """Remove the power, make the drive pre-operational, close the bus."""
@@ -280,17 +286,18 @@ class Cia402Drive:
         finally:
             self._wire.close()
 
-    def _halt(self, control: Control, again: bool = False) -> None:
-        self._sent = 0
-        if self._control is not control:
-            # Power that was removed is not restored for a quick stop.
-            if self._control is Control.DISABLE_VOLTAGE:
-                return
+    def _halt(self, control: Control) -> None:
+        """Halt with the next `write`: a program that is silent must not be the one that stops."""
+        # Power that was removed is not restored for a quick stop.
+        if self._control not in (control, Control.DISABLE_VOLTAGE):
             self._control = control
+            self._halted = True
             self._settled_s = self._now() + self._settings.lost_s
-        elif not again:
-            return
-        self._wire.send_both_ways(control)
+        self._sent = 0
+
+    def _send_halt(self) -> None:
+        self._wire.send_both_ways(self._control)
+        self._halted = False
 
     def _require_configured(self) -> None:
         self._configured = self._configured and not self._wire.booted
