@@ -8,14 +8,23 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 
 import can
 import pytest
-from tests.wire.cia402_wire import GROUP, emulated_arm, free_port, wait_until
+from tests.wire.cia402_wire import GROUP, emulated_arm, free_port
 from tests.wire.durand_axis import DurandAxis
+from tests.wire.trial_setup import settings, setup
 
+from rigidimeter.commissioning import Operator
+from rigidimeter.commissioning.stopping import watchdog_checks
 from rigidimeter.devices.cia402.drive import Cia402Drive
+from rigidimeter.devices.conformance import DriveFixture, OtherEnd
+from rigidimeter.devices.conformance.drive_checks import drive_stops_by_itself
+from rigidimeter.devices.conformance.fixture import ConformanceError
+from rigidimeter.devices.rigfile import load_rig
 from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
+from rigidimeter.emulation.rdt.rdt_emulator import RdtEmulator
 from rigidimeter.guard import Cause
 
 STACKS = {"canopen": Cia402Emulator, "durand": DurandAxis}
@@ -109,24 +118,52 @@ def test_a_stop_or_the_end_reaches_a_node_before_its_heartbeat_told_its_state(mo
     assert not node.state()["power"]
 
 
-def test_what_is_not_watched_does_not_stop():
-    """A heartbeat watchdog that reads back as written, and does nothing: only a trial shows it."""
+@pytest.mark.parametrize("watches", [True, False], ids=["watches", "says that it watches"])
+def test_only_a_trial_shows_whether_a_watchdog_that_reads_back_as_written_stops_the_drive(
+    watches, tmp_path
+):
+    arm = emulated_arm()
     where = {"interface": "udp_multicast", "channel": GROUP, "port": free_port()}
-    node = DurandAxis(emulated_arm(), watches=False, **where)
-    settings = Cia402Drive.Settings(drive_watchdog_s=0.1, lost_s=0.2, **where)
-    drive = Cia402Drive(settings, time.monotonic)
+    node = DurandAxis(arm, watches=watches, **where)
+    with RdtEmulator(arm) as sensor:
+        path = tmp_path / "RIG.toml"
+        path.write_text(
+            'name = "second stack"\n[torque_sensor]\ndriver = "ati-rdt"\n'
+            f'address = "{sensor.address}"\nport = {sensor.port}\nhttp_port = {sensor.http_port}\n'
+            f'[drive]\ndriver = "cia402"\ninterface = "udp_multicast"\nchannel = "{GROUP}"\n'
+            f"port = {where['port']}\nlost_s = 0.2\ndrive_watchdog_s = 0.3\n"
+        )
+        asked = Operator(ask=lambda _: True, present=False)
+        tried = setup(load_rig(path), settings(250.0), asked)
+        try:
+            tried.rig.connect()
+            facts = tried.rig.configure()["drive"]
+            assert facts["values"]["heartbeat watchdog (0x1016:01)"] == 127 << 16 | 300
+            found = {check.name: check for check in watchdog_checks(tried, facts["watchdog_s"])}
+        finally:
+            tried.rig.close()
+            node.close()
+    assert found["watchdog"].outcome == ("passed" if watches else "failed"), found
+    if not watches:
+        assert found["watchdog"].value > 0.5
+        assert "keeps moving when the computer stops" in found["watchdog"].remedy
+
+
+def test_conformance_does_not_believe_a_drive_that_says_that_it_watches():
+    where = {"interface": "udp_multicast", "channel": GROUP, "port": free_port()}
+    arm = emulated_arm()
+    node = DurandAxis(arm, watches=False, **where)
+    values = Cia402Drive.Settings(drive_watchdog_s=0.1, lost_s=0.2, **where)
+    fixture = DriveFixture(
+        lambda: Cia402Drive(values, time.monotonic),
+        other_end=OtherEnd(lambda: bool(node.state()["power"]), lambda: arm.motion()[1]),
+        tick_s=TICK_S,
+        settle_s=0.3,
+    )
     try:
-        drive.connect()
-        facts = drive.configure()
-        assert facts.watchdog_s == 0.1
-        assert facts.values["heartbeat watchdog (0x1016:01)"] == 127 << 16 | 100
-        assert facts.values["command deadline in ms (0x1400:05)"] == "absent"
-        drive.enable()
-        go_on(drive, for_s=0.2)
-        time.sleep(0.5)
-        assert node.state()["velocity_rad_s"] == pytest.approx(SPEED_RAD_S, abs=0.02)
-        drive.stop()
-        assert wait_until(lambda: not node.state()["power"])
+        with pytest.raises(ConformanceError, match=r"at rest 0\.1 s after the last command"):
+            drive_stops_by_itself(fixture)
+        with pytest.raises(ConformanceError, match="nothing proves that the drive stops"):
+            drive_stops_by_itself(replace(fixture, other_end=None))
     finally:
-        drive.close()
         node.close()
