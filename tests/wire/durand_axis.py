@@ -45,16 +45,30 @@ MEASURED = (0x6041, 0x6061, 0x6064, 0x606C)
 
 
 class _Timers(durand.scheduler.AbstractScheduler):
-    lock = None
+    def __init__(self) -> None:
+        self._lock, self._ended = threading.RLock(), False
+
+    @property
+    def lock(self) -> Any:
+        return self._lock
 
     def add(self, delay: float, callback: Any, args: Any = (), kwargs: Any = None) -> Any:
-        timer = threading.Timer(delay, callback, args, kwargs)
+        def due() -> None:
+            with self._lock:
+                if not self._ended:
+                    callback(*args, **kwargs or {})
+
+        timer = threading.Timer(delay, due)
         timer.daemon = True
         timer.start()
         return timer
 
     def cancel(self, entry: Any) -> None:
         entry.cancel()
+
+    def end(self) -> None:
+        with self._lock:
+            self._ended = True
 
 
 class DurandAxis:
@@ -63,7 +77,8 @@ class DurandAxis:
     def __init__(
         self, arm: EmulatedArm, *, watches: bool = True, node_id: int = 1, **bus: Any
     ) -> None:
-        durand.scheduler.set_scheduler(_Timers())
+        self._timers = _Timers()
+        durand.scheduler.set_scheduler(self._timers)
         self._arm, self._watches, self._beaten_s = arm, watches, None
         self._lock = threading.RLock()
         self._bus = can.Bus(ignore_config=True, **bus)
@@ -102,7 +117,7 @@ class DurandAxis:
         self._network.send = lambda *_: None
 
     def close(self) -> None:
-        self._objects.write(0x1017, 0, 0)
+        self._timers.end()
         self._ended.set()
         self._watch.join()
         self._network.stop()

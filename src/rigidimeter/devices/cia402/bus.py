@@ -48,7 +48,9 @@ from rigidimeter.devices.cia402.state_words import (
 COMMUNICATION = (0x81, 0x82)
 """The upper bytes of the error codes of a node that misses frames (CiA 301)."""
 
-DEVICE_TYPE, STATUSWORD = 0x1000, 0x6041
+DEVICE_TYPE = 0x1000
+"""An object that every node has."""
+
 STOPS = (Control.QUICK_STOP, Control.DISABLE_VOLTAGE)
 
 QUIET_S = 0.01
@@ -70,6 +72,7 @@ class NodeBus:
     def __init__(self, settings: Cia402Settings, now: Now, who: str) -> None:
         self._settings, self._now, self._who = settings, now, who
         self._ids = frames(settings.node_id)
+        self._statusword = settings.axis(0x6041)
         self._can: Any = None
         self._bus: Any = None
         self._ready: select.poll | None = None  # says whether something has come
@@ -220,11 +223,11 @@ class NodeBus:
     def _repeat_by_sdo(self, control: Control) -> None:
         self._repeats_s = self._now() + self._settings.lost_s / 4
         if self._asks_state:
-            self._send_sdo(sdo_read_bytes(STATUSWORD, 0))
+            self._send_sdo(sdo_read_bytes(*self._statusword))
         else:
             if self.network_state == STOPPED:
                 self.network(Nmt.PRE_OPERATIONAL)
-            self._send_sdo(sdo_write_bytes(0x6040, 0, control, 2))
+            self._send_sdo(sdo_write_bytes(*self._settings.axis(0x6040), control, 2))
         self._asks_state = not self._asks_state
 
     def receive(self, wait_s: float = 0.0) -> bool:
@@ -350,7 +353,7 @@ class NodeBus:
             self._probing = False
             self.counts["lost"] += self._open
             self._close_question()
-        elif answer.object == STATUSWORD and answer.value is not None:
+        elif answer.object == self._statusword[0] and answer.value is not None:
             self.statusword = answer.value & 0xFFFF
         return True
 

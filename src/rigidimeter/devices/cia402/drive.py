@@ -21,9 +21,12 @@ from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, Now
 from rigidimeter.devices.cia402.bus import NodeBus
 from rigidimeter.devices.cia402.power_up_sequence import FAULTS, power_up, reset_fault
 from rigidimeter.devices.cia402.setup import (
-    DISPLAYED_MODE,
+    BRAKING,
+    CONTROLWORD,
     IDENTITY,
+    TARGET,
     Cia402Settings,
+    displayed_mode,
     get,
     objects,
     put,
@@ -44,9 +47,6 @@ from rigidimeter.guard import Cause
 
 MOST_FRAMES_A_READ = 400
 """A full bus at 1 Mbit/s brings 18 frames a ms, which is 364 in a tick of 20 ms."""
-
-BRAKING = (0x6084, 0x6085)
-"""Profile and quick-stop deceleration."""
 
 
 class Cia402Drive:
@@ -72,6 +72,7 @@ class Cia402Drive:
         self._wire = NodeBus(settings, now, self._who)
         self._scale = scale(settings)
         self._objects = objects(settings)
+        self._readable = (*self._objects, displayed_mode(settings))
         self._stops_itself_s = settings.drive_watchdog_s - settings.heartbeat_s
         if settings.command_deadline_s > 0:
             self._stops_itself_s = min(self._stops_itself_s, settings.command_deadline_s)
@@ -121,7 +122,7 @@ class Cia402Drive:
             identity = {entry.name: get(sdo, entry, who) for entry in IDENTITY}
             firmware, name = text(sdo, 0x100A, who), text(sdo, 0x1008, who)
             absent = [entry for entry in self._objects if not put(sdo, entry, who)]
-            found = read_back(sdo, (*self._objects, DISPLAYED_MODE), who)
+            found = read_back(sdo, self._readable, who)
         self._wire.network(Nmt.START)
         self._configured = True
         watchdogs = [settings.drive_watchdog_s]
@@ -130,7 +131,7 @@ class Cia402Drive:
         values: dict[str, str | float | int] = {"firmware (0x100A)": firmware, **found}
         values.update({entry.label: "absent" for entry in absent})
         values.update({k: value for k, value in identity.items() if value is not None})
-        ramps = [found[entry.label] for entry in self._objects if entry.index in BRAKING]
+        ramps = [found[entry.label] for entry in self._objects if entry.name in BRAKING]
         values["braking_rad_s2"] = min(ramps) / self._scale.units_per_rad_s2
         return DeviceFacts(
             model=name or f"vendor {identity['vendor']}, product {identity['product']}",
@@ -169,9 +170,9 @@ class Cia402Drive:
         try:
             with wire.sdo_client() as sdo:
                 for entry in self._objects:
-                    if entry.index in (0x6040, 0x60FF):
+                    if entry.name in (CONTROLWORD, TARGET):
                         put(sdo, entry, self._who)
-                read_back(sdo, (*self._objects, DISPLAYED_MODE), self._who)
+                read_back(sdo, self._readable, self._who)
             wire.network(Nmt.START)
             wire.drain()
             self._require_configured()
