@@ -389,3 +389,13 @@ def test_who_only_reads_sends_nothing(node, found):
     assert node.sent() == []
     assert node.drive.write(0.5) == 0.0
     assert node.sent()[0] == STOP_BY_SDO
+
+
+def test_a_node_that_misses_our_frames_is_a_fault_while_it_is_enabled_only(node):
+    missed = struct.pack("<HB5x", 0x8130, 0x11)
+    node.tick()
+    node.drive.disable()
+    node.send(0x081, missed)
+    assert node.tick(status=DISABLED)[0] is Cause.NONE
+    node.drive._control = Control.ENABLE_OPERATION
+    assert node.tick()[0] is Cause.DRIVE_FAULT
