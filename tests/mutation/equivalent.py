@@ -51,8 +51,8 @@ EQUIVALENT: dict[str, str] = {
     SIGN + "whitened: 0.0 → -0.001 #2": OF_NOTHING,
     SIGN + "solved_for: 0 → 1": SQUARE,
     SIGN + "solved_for: 0 → -1": SQUARE,
-    CAN + "_check_watchdog: now_s - min(wire.sync_s, wire.asked_s) > self._stops_itself_s → "
-    "now_s - min(wire.sync_s, wire.asked_s) >= self._stops_itself_s": MOMENT,
+    CAN + "_check_watchdog: now_s - min(wire.told_s, wire.asked_s) > self._stops_itself_s → "
+    "now_s - min(wire.told_s, wire.asked_s) >= self._stops_itself_s": MOMENT,
     CAN + "_find_cause: now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s → "
     "now_s - wire.heard_s >= settings.heartbeat_s + settings.lost_s": MOMENT,
     CAN + "_find_cause: now_s > self._settled_s → now_s >= self._settled_s": MOMENT,

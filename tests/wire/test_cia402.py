@@ -208,16 +208,12 @@ def test_a_neighbour_on_the_bus_is_left_alone(wire):
     neighbour = Cia402Emulator(emulated_arm(), interface="virtual", channel=wire.channel, node_id=2)
     try:
         patient = {"drive_watchdog_s": 3.0, "command_deadline_s": 2.0}
-        first, second = wire.ready(**patient), wire.ready(node_id=2, master_id=126, **patient)
-        end_s = time.monotonic() + 0.4
-        while time.monotonic() < end_s:
-            for drive, velocity in ((first, 0.4), (second, -0.8)):
-                sample = drive.read()
-                assert sample.cause == Cause.NONE
-                drive.write(velocity)
-            time.sleep(0.003)
+        second = wire.ready(node_id=2, master_id=126, **patient)
+        second.write(-0.8)
+        first = wire.ready()
+        assert run_loop(first, 0.4, for_s=0.4).cause == Cause.NONE
         assert first.read().velocity_rad_s == pytest.approx(0.4, abs=0.01)
-        assert second.read().velocity_rad_s == pytest.approx(-0.8, abs=0.01)
+        assert neighbour.state()["velocity_rad_s"] == pytest.approx(-0.8, abs=0.01)
         first.disable()
         assert wait_until(lambda: not wire.emulator.state()["power"])
         assert neighbour.state()["power"]

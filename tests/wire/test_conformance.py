@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.wire.cia402_wire import GROUP, free_port
+from tests.wire.durand_axis import DurandAxis
 
 from rigidimeter.devices.ascii.drive import AsciiDrive
 from rigidimeter.devices.ati.analogue import AtiAnalogue
@@ -136,11 +138,33 @@ def cia402() -> Iterator[DriveFixture]:
         emulator.close()
 
 
+@contextmanager
+def cia402_on_another_stack() -> Iterator[DriveFixture]:
+    arm = EmulatedArm(JOINT)
+    where = {"interface": "udp_multicast", "channel": GROUP, "port": free_port()}
+    node = DurandAxis(arm, **where)
+    settings = Cia402Drive.Settings(
+        drive_watchdog_s=0.3, lost_s=0.12, max_velocity_rad_s=3.0, **where
+    )
+    try:
+        yield DriveFixture(
+            lambda: Cia402Drive(settings, time.monotonic),
+            time.monotonic,
+            node.die,
+            OtherEnd(lambda: bool(node.state()["power"]), lambda: arm.motion()[1]),
+            tick_s=0.005,
+            settle_s=0.3,
+        )
+    finally:
+        node.close()
+
+
 SENSORS = {"ati-analogue": analogue, "ati-rdt": rdt}
 DRIVES = {
     "ascii-moves": lambda: ascii_fixture("moves"),
     "ascii-velocity": lambda: ascii_fixture("velocity"),
     "cia402": cia402,
+    "cia402-durand": cia402_on_another_stack,
 }
 
 

@@ -45,7 +45,8 @@ REMEDIES: dict[Cause, str] = {
     "controller.damping_nm_s_rad or controller.inertia_kg_m2 (`rigidimeter design`)",
     Cause.DRIVE_FAULT: _DRIVE,
     Cause.DRIVE_STATE: _DRIVE,
-    Cause.DRIVE_LOST: "check the drive's power and connection, then `rigidimeter check`",
+    Cause.DRIVE_LOST: "check the drive's power and connection, and that no other master is on its "
+    "bus, then `rigidimeter check`",
     Cause.EMERGENCY_STOP: "see to the subject, release the button, and continue the session with "
     "`rigidimeter run --resume`",
     Cause.OPERATOR_HALT: "see to the subject, and continue the session with "

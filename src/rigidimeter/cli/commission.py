@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 
 
 def commission(
-    rig: Annotated[Path, typer.Option("--rig", metavar="RIG.toml", help="The rig file.")],
+    rig: Annotated[
+        Path | None, typer.Option("--rig", metavar="RIG.toml", help="The rig file.")
+    ] = None,
     settings: SettingsOption = None,
     signed_by: Annotated[
         str,
@@ -66,6 +68,15 @@ def commission(
             "--out", metavar="FILE", help="The record. Default: a file next to the rig file."
         ),
     ] = None,
+    eds: Annotated[
+        Path | None,
+        typer.Option(
+            "--eds",
+            metavar="FILE",
+            help="Only compare a CANopen drive's EDS with what the rig file writes, or with the "
+            "driver's defaults without one; nothing is connected.",
+        ),
+    ] = None,
 ) -> None:
     """Check a rig with nobody in it, and write the record that `run` requires.
 
@@ -78,6 +89,7 @@ def commission(
     For example:
       rigidimeter commission --rig RIG.toml --signed-by "A. Weber"
       rigidimeter commission --rig RIG.toml --settings study.toml --known-torque-nm 2
+      rigidimeter commission --eds drive.eds
     """
     from datetime import UTC, datetime
 
@@ -88,6 +100,11 @@ def commission(
     from rigidimeter.settings import load_settings
     from rigidimeter.version import __version__
 
+    if eds is not None:
+        _compare_eds(eds, rig)
+        return
+    if rig is None:
+        raise UserError("name the rig file with --rig RIG.toml, or a drive's EDS with --eds FILE")
     rigfile, chosen = load_rig(rig), load_settings(settings)
     path = out or record_path(rig)
     keep_inputs((path,), (rig, settings) if settings is not None else (rig,))
@@ -122,6 +139,25 @@ def commission(
         f"Valid for {what}, its devices and this controller, for "
         f"{chosen.commissioning.validity_days:g} days."
     )
+
+
+def _compare_eds(eds: Path, rig: Path | None) -> None:
+    from rigidimeter.devices.cia402.eds import fits
+    from rigidimeter.devices.cia402.setup import Cia402Settings
+    from rigidimeter.devices.rigfile import load_rig
+
+    chosen: object = Cia402Settings()
+    if rig is not None:
+        _, chosen = load_rig(rig).devices["drive"]
+    if not isinstance(chosen, Cia402Settings):
+        raise UserError(f'{rig}: its drive has no EDS; --eds is for driver = "cia402"')
+    found = fits(eds, chosen)
+    rows = [("ok" if row.fits else "FAIL", row.label, row.found, row.needed) for row in found]
+    show([Table(("", "object", "the drive", "the driver"), rows, "=<<<", indent=0)])
+    wrong = [row.label for row in found if not row.fits]
+    if wrong:
+        raise UserError(f"{eds}: does not fit: {', '.join(wrong)}")
+    echo("Every object fits. What the drive does with them only commissioning shows.")
 
 
 @contextlib.contextmanager

@@ -98,7 +98,7 @@ _SENTENCES = {
     "limit allows, as in an unstable contact",
     Cause.DRIVE_FAULT: "the drive reported a fault",
     Cause.DRIVE_STATE: "the drive left the state or the mode it was put in",
-    Cause.DRIVE_LOST: "the drive no longer answered",
+    Cause.DRIVE_LOST: "the drive no longer answered, or answered what was not asked",
     Cause.EMERGENCY_STOP: "the emergency stop was pressed",
     Cause.OPERATOR_HALT: "the operator halted the rig",
     Cause.DEADLINES_MISSED: "the loop missed ticks too often in a row",

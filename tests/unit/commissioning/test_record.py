@@ -113,6 +113,20 @@ def test_something_else_is_refused(rigfile: RigFile, text: str) -> None:
         check(rigfile)
 
 
+@pytest.mark.parametrize("outcome", ["failed", "not possible here", "not tried", None])
+def test_a_record_without_the_trial_of_the_watchdog_is_refused(
+    rigfile: RigFile, record: CommissioningRecord, outcome: str | None
+) -> None:
+    """That the drive reads its watchdog back as written does not make up for it."""
+    tried = {check.name: check for check in record.checks}
+    assert tried["watchdog configured"].passed
+    tried["watchdog"] = replace(tried["watchdog"], outcome=outcome or "")
+    kept = tuple(check for check in tried.values() if check.outcome)
+    write_record(record_path(rigfile.path), replace(record, checks=kept))
+    with pytest.raises(UserError, match="watchdog"):
+        check(rigfile)
+
+
 def test_another_rig_file_is_refused(rigfile: RigFile, record: CommissioningRecord) -> None:
     with pytest.raises(UserError, match="is for another content of"):
         check(replace(rigfile, digest="abd"))

@@ -19,6 +19,8 @@ from rigidimeter.devices.cia402.state_words import (
     frame_bits,
     frames,
     position_of,
+    sdo_answer,
+    sdo_read_bytes,
     sdo_write_bytes,
     state_of,
     velocity_of,
@@ -101,8 +103,16 @@ def test_an_expedited_write_is_as_cia_301_writes_it():
     assert sdo_write_bytes(0x1016, 1, 0x007F0064, 4) == bytes.fromhex("23 1610 01 64007F00")
 
 
+def test_an_sdo_answer_is_read_as_cia_301_writes_it():
+    assert sdo_read_bytes(0x6041, 0) == bytes.fromhex("40 4160 00 00000000")
+    assert sdo_answer(bytes.fromhex("4B 4160 00 37060000")) == (0x6041, 0x0637)
+    assert sdo_answer(bytes.fromhex("60 4060 00 00000000")) == (0x6040, None)  # written
+    assert sdo_answer(bytes.fromhex("80 4160 00 00000206")) == (0x6041, None)  # aborted
+    assert sdo_answer(bytes(7)) is None
+
+
 def test_identifiers_are_those_of_the_predefined_connection_set():
-    assert frames(5) == (0x205, 0x185, 0x285, 0x085, 0x705, 0x605)
+    assert frames(5) == (0x205, 0x185, 0x285, 0x085, 0x705, 0x605, 0x585)
 
 
 def test_the_longest_frame_is_135_bit_times():

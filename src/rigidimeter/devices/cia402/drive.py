@@ -1,14 +1,15 @@
 """A CiA 402 servo over CANopen in profile-velocity mode.
 
-Before the loop, SDO transfers write the settings and read them back. The loop uses neither SDOs nor
-threads: each `write` sends a SYNC and the command, the drive answers every SYNC with its state,
-position and velocity, and the next `read` receives them. `write` also sends the heartbeat that
-keeps the drive enabled. If the loop hangs, the heartbeat ends with it, and the drive stops by
+Before the loop, SDO transfers write the settings and read them back. The loop waits for no SDO and
+has no threads: each `write` sends a SYNC and the command, the drive answers every SYNC with its
+state, position and velocity, and the next `read` receives them. `write` also sends the heartbeat
+that keeps the drive enabled. If the loop hangs, the heartbeat ends with it, and the drive stops by
 itself: by its heartbeat watchdog (0x1016), and sooner by its command deadline (0x1400:05) if it has
 one.
 
-A measurement is taken at the SYNC, so its time is that at which the last SYNC was sent. This is
-correct as long as the drive answers within a tick.
+A measurement is taken at the SYNC, so its time is that at which this SYNC was sent; see `bus` for
+how the two are matched. Where no measurement belongs to a SYNC for `lost_s`, or frames come that no
+SYNC of ours asked for, the drive counts as lost.
 """
 
 from __future__ import annotations
@@ -20,9 +21,12 @@ from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, Now
 from rigidimeter.devices.cia402.bus import NodeBus
 from rigidimeter.devices.cia402.power_up_sequence import FAULTS, power_up, reset_fault
 from rigidimeter.devices.cia402.setup import (
-    DISPLAYED_MODE,
+    BRAKING,
+    CONTROLWORD,
     IDENTITY,
+    TARGET,
     Cia402Settings,
+    displayed_mode,
     get,
     objects,
     put,
@@ -41,9 +45,8 @@ from rigidimeter.devices.cia402.state_words import (
 )
 from rigidimeter.guard import Cause
 
-MOST_FRAMES_A_READ = 64
-BRAKING = (0x6084, 0x6085)
-"""Profile and quick-stop deceleration."""
+MOST_FRAMES_A_READ = 400
+"""A full bus at 1 Mbit/s brings 18 frames a ms, which is 364 in a tick of 20 ms."""
 
 
 class Cia402Drive:
@@ -69,11 +72,13 @@ class Cia402Drive:
         self._wire = NodeBus(settings, now, self._who)
         self._scale = scale(settings)
         self._objects = objects(settings)
+        self._readable = (*self._objects, displayed_mode(settings))
         self._stops_itself_s = settings.drive_watchdog_s - settings.heartbeat_s
         if settings.command_deadline_s > 0:
             self._stops_itself_s = min(self._stops_itself_s, settings.command_deadline_s)
         self._configured = False
         self._control = Control.DISABLE_VOLTAGE
+        self._halted = False  # `control` is not sent yet
         self._sent = 0
         self._settled_s = -math.inf
         self._cause = Cause.NONE
@@ -81,7 +86,7 @@ class Cia402Drive:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Measurements received or lost, frames damaged or unsent, reads that hit their limit."""
+        """Measurements received or lost; frames damaged, unsent, unplaced; reads at their limit."""
         return self._wire.counts
 
     @property
@@ -117,7 +122,7 @@ class Cia402Drive:
             identity = {entry.name: get(sdo, entry, who) for entry in IDENTITY}
             firmware, name = text(sdo, 0x100A, who), text(sdo, 0x1008, who)
             absent = [entry for entry in self._objects if not put(sdo, entry, who)]
-            found = read_back(sdo, (*self._objects, DISPLAYED_MODE), who)
+            found = read_back(sdo, self._readable, who)
         self._wire.network(Nmt.START)
         self._configured = True
         watchdogs = [settings.drive_watchdog_s]
@@ -126,7 +131,7 @@ class Cia402Drive:
         values: dict[str, str | float | int] = {"firmware (0x100A)": firmware, **found}
         values.update({entry.label: "absent" for entry in absent})
         values.update({k: value for k, value in identity.items() if value is not None})
-        ramps = [found[entry.label] for entry in self._objects if entry.index in BRAKING]
+        ramps = [found[entry.label] for entry in self._objects if entry.name in BRAKING]
         values["braking_rad_s2"] = min(ramps) / self._scale.units_per_rad_s2
         return DeviceFacts(
             model=name or f"vendor {identity['vendor']}, product {identity['product']}",
@@ -165,9 +170,9 @@ class Cia402Drive:
         try:
             with wire.sdo_client() as sdo:
                 for entry in self._objects:
-                    if entry.index in (0x6040, 0x60FF):
+                    if entry.name in (CONTROLWORD, TARGET):
                         put(sdo, entry, self._who)
-                read_back(sdo, (*self._objects, DISPLAYED_MODE), self._who)
+                read_back(sdo, self._readable, self._who)
             wire.network(Nmt.START)
             wire.drain()
             self._require_configured()
@@ -177,7 +182,7 @@ class Cia402Drive:
         except BaseException:  # also when interrupted: the drive may have power by now
             self.disable()
             raise
-        self._control = Control.ENABLE_OPERATION
+        self._control, self._halted = Control.ENABLE_OPERATION, False
         self._sent = 0
         wire.emergency, wire.left_operation = 0, False
         wire.heard_s, wire.network_state = self._now(), OPERATIONAL
@@ -192,8 +197,11 @@ class Cia402Drive:
             wire.counts["backlog"] += 1
         now_s = self._now()
         found = self._find_cause(now_s)
-        if found in (Cause.DRIVE_FAULT, Cause.DRIVE_STATE) and wire.left_operation:
-            # Repeating "enable operation" would restart a drive that stopped by itself.
+        if found in (Cause.DRIVE_FAULT, Cause.DRIVE_STATE) and (
+            wire.left_operation or wire.network_state != OPERATIONAL
+        ):
+            # Repeating "enable operation" would restart a drive that stopped by itself, and a node
+            # that is not operational does not hear the guard's ramp.
             self._halt(Control.QUICK_STOP)
         self._cause = self._cause or found
         self._check_watchdog(now_s)
@@ -202,7 +210,7 @@ class Cia402Drive:
             self._sample = MotionSample(
                 (position - self._settings.zero_counts) / self._scale.counts_per_rad,
                 velocity / self._scale.units_per_rad_s,
-                wire.sync_s,
+                wire.measured_s,
                 wire.sequence,
                 wire.raw,
             )
@@ -215,7 +223,7 @@ class Cia402Drive:
         if self._control is not Control.ENABLE_OPERATION:
             return
         wire = self._wire
-        if now_s - min(wire.sync_s, wire.asked_s) > self._stops_itself_s:
+        if now_s - min(wire.told_s, wire.asked_s) > self._stops_itself_s:
             answered = wire.asked_s == math.inf
             self._cause = self._cause or (Cause.DRIVE_STATE if answered else Cause.DRIVE_LOST)
             self._halt(Control.QUICK_STOP)
@@ -231,7 +239,7 @@ class Cia402Drive:
         if self._control is Control.ENABLE_OPERATION:
             if wire.left_operation or wire.network_state != OPERATIONAL:
                 return Cause.DRIVE_STATE
-            if now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s:
+            if wire.unplaced or now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s:
                 return Cause.DRIVE_LOST
         elif wire.state is State.OPERATION_ENABLED and now_s > self._settled_s:
             return Cause.DRIVE_STATE
@@ -250,21 +258,24 @@ class Cia402Drive:
             most = self._settings.max_velocity_rad_s
             wanted = max(-most, min(most, velocity_rad_s)) * self._scale.units_per_rad_s
             target = max(-(2**31), min(2**31 - 1, round(wanted)))
-        if self._wire.is_open and self._wire.ask(self._control, target):
-            self._sent = target
+        if self._wire.is_open:
+            if self._halted:
+                self._send_halt()
+            elif self._wire.ask(self._control, target):
+                self._sent = target
         return self._sent / self._scale.units_per_rad_s
 
     def stop(self) -> None:
         """Brake along the drive's quick-stop ramp; only `enable` starts it again."""
         if self._wire.is_open and self._control is not Control.DISABLE_VOLTAGE:
             self._halt(Control.QUICK_STOP)
-            self._wire.send_both_ways(Control.QUICK_STOP)
+            self._send_halt()
 
     def disable(self) -> None:
         """Remove the power at once."""
         if self._wire.is_open:
             self._halt(Control.DISABLE_VOLTAGE)
-            self._wire.send_both_ways(Control.DISABLE_VOLTAGE)
+            self._send_halt()
 
     def close(self) -> None:
         """Remove the power, make the drive pre-operational, close the bus."""
@@ -277,11 +288,17 @@ class Cia402Drive:
             self._wire.close()
 
     def _halt(self, control: Control) -> None:
+        """Halt with the next `write`: a program that is silent must not be the one that stops."""
         # Power that was removed is not restored for a quick stop.
         if self._control not in (control, Control.DISABLE_VOLTAGE):
             self._control = control
+            self._halted = True
             self._settled_s = self._now() + self._settings.lost_s
         self._sent = 0
+
+    def _send_halt(self) -> None:
+        self._wire.send_both_ways(self._control)
+        self._halted = False
 
     def _require_configured(self) -> None:
         self._configured = self._configured and not self._wire.booted

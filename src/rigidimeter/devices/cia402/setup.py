@@ -8,6 +8,9 @@ Angle, velocity and acceleration are those of the joint; the drive counts at its
 
 `sign` −1 reverses position and velocity. Every object is written and read back. Enabling reads all
 of them again, because a drive that restarted in between has lost them, including its watchdog.
+
+A drive of several axes has each object of the profile (0x6000 to 0x67FF) once an axis: by CiA 402
+at `axis_offset` = 0x800, 0x1000, … more, in some drives at the sub-index `axis_subindex`.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ import math
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -28,8 +32,11 @@ from rigidimeter.settings.section import Section, quantity
 INVALID = 1 << 31
 NO_REMOTE_REQUEST = 1 << 30
 
-NOT_THERE = (0x06020000, 0x06090011)
-"""The abort codes of an index and of a subindex that do not exist."""
+NOT_THERE = {
+    0x06020000: "the drive has no such object",
+    0x06090011: "the drive has no such sub-index",
+}
+"""What the abort codes of an index and of a subindex that do not exist mean."""
 
 SECOND_ANSWER_S = 0.05
 """A node answers within some ms; the second of two has the bus as soon as the first has sent."""
@@ -40,8 +47,9 @@ class Cia402Settings(Section):
 
     `interface` and `channel` are those of python-can; some interfaces number their channels.
     `bitrate` is that of the bus; with socketcan the operating system sets it, and here it only
-    limits the loop rate. `port` is used by udp_multicast alone. `command_deadline_s` 0 means no
-    command deadline; a drive without one still has its heartbeat watchdog.
+    limits the loop rate. `port` is used by udp_multicast alone. `axis_offset` and `axis_subindex`
+    are those of the axis, 0 for a drive of one. `command_deadline_s` 0 means no command deadline; a
+    drive without one still has its heartbeat watchdog.
 
     The default decelerations are above the default `guard.acceleration_limit_deg_s2`, since the
     guard relies on a drive that brakes at least that fast; commissioning compares the two.
@@ -57,6 +65,8 @@ class Cia402Settings(Section):
     port: int = quantity(43113, "1", 1, 65535)
     node_id: int = quantity(1, "1", 1, 127)
     master_id: int = quantity(127, "1", 1, 127)
+    axis_offset: Literal[0, 0x800, 0x1000, 0x1800, 0x2000, 0x2800, 0x3000, 0x3800] = 0
+    axis_subindex: int = quantity(0, "1", 0, 254)
     counts_per_rev: float = quantity(8192.0, "counts/rev", 1.0, 2.0**31)
     velocity_units_per_rev_s: float = quantity(8192.0, "unit/(rev/s)", 1e-3, 2.0**31)
     acceleration_units_per_rev_s2: float = quantity(8192.0, "unit/(rev/s²)", 1e-3, 2.0**31)
@@ -75,6 +85,10 @@ class Cia402Settings(Section):
     lost_s: float = quantity(0.02, "s", 0.001, 1.0)
     sdo_timeout_s: float = quantity(0.3, "s", 0.01, 5.0)
     enable_timeout_s: float = quantity(2.0, "s", 0.05, 30.0)
+
+    def axis(self, index: int) -> tuple[int, int]:
+        """Return index and sub-index at which the axis has an object of the profile."""
+        return index + self.axis_offset, self.axis_subindex
 
     @property
     def emulated(self) -> bool:
@@ -138,8 +152,8 @@ def scale(settings: Cia402Settings) -> Scale:
 class Object:
     """One entry of the drive's object dictionary, and the value it must have.
 
-    `optional` entries are skipped if the drive does not have them; bits outside `mask` belong to
-    the drive.
+    `optional` entries are skipped if the drive does not have them; `fixed` ones may refuse to be
+    written if they read back as they must be; bits outside `mask` belong to the drive.
     """
 
     name: str
@@ -149,6 +163,7 @@ class Object:
     value: int
     signed: bool = False
     optional: bool = False
+    fixed: bool = False
     mask: int = -1
 
     @property
@@ -157,7 +172,8 @@ class Object:
         return f"{self.name} (0x{self.index:04X}:{self.subindex:02X})"
 
 
-DISPLAYED_MODE = Object("mode of operation display", 0x6061, 0, 1, PROFILE_VELOCITY, signed=True)
+CONTROLWORD, TARGET = "controlword", "target velocity"
+BRAKING = ("profile deceleration", "quick-stop deceleration")
 
 IDENTITY = tuple(
     Object(name, 0x1018, k, 4, 0, optional=k > 1)
@@ -175,33 +191,46 @@ def objects(settings: Cia402Settings) -> tuple[Object, ...]:
     def acceleration(rad_s2: float) -> int:
         return max(1, round(rad_s2 * units.units_per_rad_s2))
 
+    def of_axis(name: str, index: int, size: int, value: int, **more: bool) -> Object:
+        return Object(name, *settings.axis(index), size, value, **more)
+
+    most = math.ceil(settings.max_velocity_rad_s * abs(units.units_per_rad_s))
     return (
-        Object("controlword", 0x6040, 0, 2, 0),
-        Object("mode of operation", 0x6060, 0, 1, PROFILE_VELOCITY, signed=True),
-        Object("target velocity", 0x60FF, 0, 4, 0, signed=True),
-        Object(
-            "max profile velocity",
-            0x607F,
-            0,
-            4,
-            math.ceil(settings.max_velocity_rad_s * abs(units.units_per_rad_s)),
-        ),
-        Object("profile acceleration", 0x6083, 0, 4, acceleration(settings.acceleration_rad_s2)),
-        Object("profile deceleration", 0x6084, 0, 4, acceleration(settings.deceleration_rad_s2)),
-        Object("quick-stop deceleration", 0x6085, 0, 4, acceleration(settings.quick_stop_rad_s2)),
-        Object("quick-stop option", 0x605A, 0, 2, settings.quick_stop_option, signed=True),
-        Object("abort-connection option", 0x6007, 0, 2, settings.abort_option, signed=True),
+        of_axis(CONTROLWORD, 0x6040, 2, 0),
+        of_axis("mode of operation", 0x6060, 1, PROFILE_VELOCITY, signed=True),
+        of_axis(TARGET, 0x60FF, 4, 0, signed=True),
+        # The drive's own limit is a second one: `write` sends nothing above it.
+        of_axis("max profile velocity", 0x607F, 4, most, optional=True),
+        of_axis("profile acceleration", 0x6083, 4, acceleration(settings.acceleration_rad_s2)),
+        of_axis(BRAKING[0], 0x6084, 4, acceleration(settings.deceleration_rad_s2)),
+        of_axis(BRAKING[1], 0x6085, 4, acceleration(settings.quick_stop_rad_s2)),
+        of_axis("quick-stop option", 0x605A, 2, settings.quick_stop_option, signed=True),
+        of_axis("abort-connection option", 0x6007, 2, settings.abort_option, signed=True),
         Object("drive's heartbeat in ms", 0x1017, 0, 2, round(settings.heartbeat_s * 1e3)),
         Object("heartbeat watchdog", 0x1016, 1, 4, settings.master_id << 16 | watchdog_ms),
-        *_messages(ids, round(settings.command_deadline_s * 1e3)),
+        *_messages(settings, ids, round(settings.command_deadline_s * 1e3)),
     )
 
 
-def _messages(ids: Frames, deadline_ms: int) -> tuple[Object, ...]:
+def displayed_mode(settings: Cia402Settings) -> Object:
+    """Return the mode that the drive reports; read, never written."""
+    address = settings.axis(0x6061)
+    return Object("mode of operation display", *address, 1, PROFILE_VELOCITY, signed=True)
+
+
+def _messages(settings: Cia402Settings, ids: Frames, deadline_ms: int) -> tuple[Object, ...]:
     """Return the PDO mapping: one command frame, two answers to every SYNC, and no others."""
-    command = ((0x6040, 16), (0x60FF, 32))
-    position = ((0x6041, 16), (0x6061, 8), (0x6064, 32))
-    velocity = ((0x606C, 32),)
+
+    def mapped(*entries: tuple[int, int]) -> tuple[int, ...]:
+        return tuple(
+            index << 16 | subindex << 8 | bits
+            for of_profile, bits in entries
+            for index, subindex in (settings.axis(of_profile),)
+        )
+
+    command = mapped((0x6040, 16), (0x60FF, 32))
+    position = mapped((0x6041, 16), (0x6061, 8), (0x6064, 32))
+    velocity = mapped((0x606C, 32))
     deadline = Object("command deadline in ms", 0x1400, 5, 2, deadline_ms, optional=True)
     return (
         # A command takes effect when it arrives (255), a measurement is taken at every SYNC (1).
@@ -210,7 +239,14 @@ def _messages(ids: Frames, deadline_ms: int) -> tuple[Object, ...]:
         *_message("velocity frame", 0x1801, ids.velocity, 1, velocity),
         *(
             Object(
-                "unused frame", index, 1, 4, INVALID | id_, optional=True, mask=~NO_REMOTE_REQUEST
+                "unused frame",
+                index,
+                1,
+                4,
+                INVALID | id_,
+                optional=True,
+                fixed=True,
+                mask=~NO_REMOTE_REQUEST,
             )
             for index, id_ in (
                 (0x1401, ids.command + 0x100),
@@ -228,21 +264,19 @@ def _message(
     index: int,
     id_: int,
     transmission: int,
-    entries: tuple[tuple[int, int], ...],
+    entries: tuple[int, ...],
     more: tuple[Object, ...] = (),
 ) -> tuple[Object, ...]:
     """Return the steps in which CiA 301 allows a mapping to change: off, emptied, filled, on."""
-    identifier = Object(f"{name}'s identifier", index, 1, 4, id_, mask=~NO_REMOTE_REQUEST)
-    count = Object(f"{name}'s number of entries", index + 0x200, 0, 1, len(entries))
+    fixed = partial(Object, fixed=True)
+    identifier = fixed(f"{name}'s identifier", index, 1, 4, id_, mask=~NO_REMOTE_REQUEST)
+    count = fixed(f"{name}'s number of entries", index + 0x200, 0, 1, len(entries))
     return (
         replace(identifier, value=INVALID | id_),
-        Object(f"{name}'s transmission type", index, 2, 1, transmission),
+        fixed(f"{name}'s transmission type", index, 2, 1, transmission),
         *more,
         replace(count, value=0),
-        *(
-            Object(f"{name}'s entry {k}", index + 0x200, k, 4, what << 16 | bits)
-            for k, (what, bits) in enumerate(entries, 1)
-        ),
+        *(fixed(f"{name}'s entry {k}", index + 0x200, k, 4, e) for k, e in enumerate(entries, 1)),
         count,
         identifier,
     )
@@ -271,11 +305,15 @@ def put(sdo: Any, entry: Object, who: str) -> bool:
     try:
         sdo.download(entry.index, entry.subindex, data)
     except library("canopen").SdoAbortedError as error:
-        if entry.optional and error.code in NOT_THERE:
+        missing = NOT_THERE.get(error.code)
+        if entry.optional and missing:
             return False
+        if entry.fixed and not missing:
+            return True  # `read_back` says whether it is as it must be
+        why = missing or "the settings must name a value the drive takes"
         raise DeviceError(
             f"{who}: {entry.label} = {entry.value} was refused with abort code 0x{error.code:08X}; "
-            "the settings must name a value the drive takes"
+            f"{why}"
         ) from None
     except _silence() as error:
         raise _no_answer(entry, who, error) from None
@@ -296,8 +334,8 @@ def get(sdo: Any, entry: Object, who: str) -> int | None:
         if entry.optional and error.code in NOT_THERE:
             return None
         raise DeviceError(
-            f"{who}: {entry.label} cannot be read, abort code 0x{error.code:08X}; the drive must "
-            "have this object"
+            f"{who}: {entry.label} cannot be read, abort code 0x{error.code:08X}; "
+            f"{NOT_THERE.get(error.code, 'the drive must have this object')}"
         ) from None
     except _silence() as error:
         raise _no_answer(entry, who, error) from None

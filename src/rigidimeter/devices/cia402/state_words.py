@@ -27,7 +27,7 @@ PROFILE_VELOCITY = 3
 """The mode of operation, 0x6060 and 0x6061."""
 
 SYNC_ID = 0x080
-BOOTED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x05, 0x7F
+BOOTED, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x04, 0x05, 0x7F
 """NMT states in a node's heartbeat."""
 
 TICK_FRAMES = (6, 0, 7, 4)
@@ -138,6 +138,7 @@ class Frames(NamedTuple):
     emergency: int
     heartbeat: int
     sdo_request: int
+    sdo_answer: int
 
 
 def frames(node_id: int) -> Frames:
@@ -149,6 +150,7 @@ def frames(node_id: int) -> Frames:
         emergency=0x080 + node_id,
         heartbeat=0x700 + node_id,
         sdo_request=0x600 + node_id,
+        sdo_answer=0x580 + node_id,
     )
 
 
@@ -156,6 +158,7 @@ _COMMAND = struct.Struct("<Hi")
 _POSITION = struct.Struct("<Hbi")
 _VELOCITY = struct.Struct("<i")
 _EMERGENCY = struct.Struct("<HB")
+_SDO = struct.Struct("<BHBI")
 
 
 def command_bytes(control: int, target: int) -> bytes:
@@ -186,11 +189,28 @@ def emergency(data: bytes | bytearray) -> Emergency | None:
 
 
 def sdo_write_bytes(index: int, subindex: int, value: int, size: int) -> bytes:
-    """Return the data of an expedited SDO write; the answer is not waited for."""
-    head = 0x23 | (4 - size) << 2
-    return struct.pack("<BHB", head, index, subindex) + value.to_bytes(size, "little").ljust(
-        4, b"\0"
-    )
+    """Return the data of an expedited SDO write."""
+    return _SDO.pack(0x23 | (4 - size) << 2, index, subindex, value)
+
+
+def sdo_read_bytes(index: int, subindex: int) -> bytes:
+    """Return the data of an SDO read."""
+    return _SDO.pack(0x40, index, subindex, 0)
+
+
+class SdoAnswer(NamedTuple):
+    """Index of the object of an SDO answer, and its value if one was read."""
+
+    object: int
+    value: int | None
+
+
+def sdo_answer(data: bytes | bytearray) -> SdoAnswer | None:
+    """Return the content of an SDO answer, None if it is damaged."""
+    if len(data) != 8:
+        return None
+    head, index, _, value = _SDO.unpack(data)
+    return SdoAnswer(index, value if head & 0xE2 == 0x42 else None)
 
 
 def frame_bits(data_bytes: int) -> int:

@@ -75,7 +75,7 @@ class DriveFixture:
     Parameters
     ----------
     other_end : OtherEnd, optional
-        Without it, the motion of the motor is not checked.
+        Without it, the motion of the motor is not checked, and a drive with a watchdog fails.
     speed_rad_s, tolerance : float
         A test velocity, and the relative difference allowed between it and what is sent.
     """

@@ -202,7 +202,7 @@ class Cia402Emulator:
 
     def _on_sdo_request(self, _identifier: int, data: bytearray, _time: float) -> None:
         with self._lock:
-            if "die" in self._servo.wrong:
+            if "die" in self._servo.wrong or self._node.nmt.state == "STOPPED":
                 return
             if "slow answers" in self._servo.wrong:
                 self._later.append(
