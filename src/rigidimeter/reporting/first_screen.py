@@ -92,7 +92,7 @@ def tested_words(result: StudyResult) -> str:
 
 def _strip_row(one: Conclusion, to: float, other: str) -> StripRow:
     d, measure = one.difference, one.comparison.measure
-    factor, unit = scaled(max(abs(d.reference), abs(d.other)), measure.unit.removeprefix("1"))
+    factor, unit = scaled(max(abs(d.reference), abs(d.other)), measure.unit)
     estimate, low, high = (factor * size for size in (d.estimate, d.low, d.high))
     percent, percent_low, percent_high = d.percent
     words = f"{other} {difference_words(d, measure.unit)}"
@@ -130,7 +130,7 @@ def _strip_row(one: Conclusion, to: float, other: str) -> StripRow:
 
 def difference_words(d: Difference, unit: str) -> str:
     """Return ``lower by 0.27 N·m/rad, 15 %, 95 % interval 0.1 to 0.4 lower``."""
-    factor, in_unit = scaled(max(abs(d.reference), abs(d.other)), unit.removeprefix("1"))
+    factor, in_unit = scaled(max(abs(d.reference), abs(d.other)), unit)
     if math.isnan(d.estimate):
         return "unknown"
     size = f"{number(abs(factor * d.estimate), DIGITS)} {in_unit}".strip()

@@ -35,9 +35,8 @@ def _intervals_text(settings: EstimationSettings) -> str:
 
 
 _POOLED_TEXT = (
-    f"From {ENOUGH_EPOCHS} epochs on they come from the scatter between epochs; with fewer, the "
-    "joint is taken for one that does not change, and where epochs differ by more than their own "
-    "intervals these are too narrow"
+    f"From {ENOUGH_EPOCHS} epochs on they come from the scatter between epochs; with fewer, each "
+    "is the wider of that and what the residual gives"
 )
 
 IV = Method(

@@ -20,7 +20,7 @@ from rigidimeter.reporting.contents import (
     paragraph,
 )
 from rigidimeter.reporting.epoch_marks import Mark, mark_of
-from rigidimeter.reporting.numbers import axis_unit, condition_name, number
+from rigidimeter.reporting.numbers import axis_unit, condition_name, number, plural
 from rigidimeter.reporting.style import (
     GREY,
     condition_colours,
@@ -83,7 +83,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         n_days = len({(one.median.subject, one.median.day) for one in found})
         yield Figure(
             f"days_{c.measure.name}",
-            f"{c.measure.title}: {count} included epochs of {n_days} days.",
+            f"{c.measure.title}: {plural(count, 'included epoch')} of {plural(n_days, 'day')}.",
             f"{c.measure.title} by day. {words} ({c.measure.unit}).",
             partial(_in_unit, c, found, order),
             marks=_marks(c),
