@@ -46,6 +46,7 @@ class StripRow(NamedTuple):
     interval: str
     percent: str
     percent_interval: str
+    simulated: str
     p: str
     p_holm: str
     verdict: str
@@ -109,8 +110,9 @@ def _strip_row(one: Conclusion, to: float, other: str) -> StripRow:
         number(factor * d.other, DIGITS),
         _sided(estimate),
         _sided_interval(low, high),
-        "" if math.isnan(percent) else f"{number(abs(percent), 2)}{_PERCENT} {d.side}",
+        _percent(d),
         "" if math.isnan(percent_low) else _sided_interval(percent_low, percent_high, 2, _PERCENT),
+        "" if one.simulated is None else _simulated(one.simulated, factor),
         p_value(d.p),
         "" if math.isnan(one.p) else p_value(one.p),
         one.verdict,
@@ -140,6 +142,18 @@ def difference_words(d: Difference, unit: str) -> str:
     if not math.isnan(d.low):
         text += f", 95 % interval {_sided_interval(factor * d.low, factor * d.high)}"
     return text
+
+
+def _percent(d: Difference) -> str:
+    """Return a difference in per cent of the reference, in words for the other."""
+    percent = d.percent[0]
+    return "" if math.isnan(percent) else f"{number(abs(percent), 2)}{_PERCENT} {d.side}"
+
+
+def _simulated(d: Difference, factor: float) -> str:
+    if not d.estimate:
+        return d.side
+    return _percent(d) or _sided(factor * d.estimate)
 
 
 def _sided(size: float, digits: int = DIGITS) -> str:

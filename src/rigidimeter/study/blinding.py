@@ -122,6 +122,7 @@ def _condition(name: str, table: ConditionTable | None) -> Condition:
         table.pulse_width_us,
         table.electrodes,
         table.wash_in_min,
+        table.simulated.model_dump(exclude_none=True),
     )
 
 

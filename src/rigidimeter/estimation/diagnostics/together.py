@@ -231,7 +231,8 @@ def lack_of_fit(
         most,
         f"from {worst.low_hz:.3g} to {worst.high_hz:.3g} Hz "
         f"{in_full(100 * worst.share, limit=most)} % of the torque's response to the "
-        f"perturbation is not J, B and K (at most {most:g} %; by chance p = {worst.p:.1g}){_in_half_the_band(observed)}: friction, a reflex, a soft cuff or a "
+        f"perturbation is not J, B and K (at most {most:g} %; by chance p = {worst.p:.1g})"
+        f"{_in_half_the_band(observed)}: friction, a reflex, a soft cuff or a "
         "lag of a channel is taken for the joint",
         "lower the upper edge of the band (--band-hz) and see whether J and B change; look at the "
         "coupling; `rigidimeter model --compare` tries terms for it",
