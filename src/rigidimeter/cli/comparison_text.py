@@ -50,13 +50,13 @@ def comparison_blocks(found: StudyResult) -> Iterator[Block]:
 
 def _first_screen(found: StudyResult) -> Iterator[Block]:
     """Yield what the first screen of the report shows."""
-    from rigidimeter.reporting.first_screen import LIGHTS, gravest_words, light_words
+    from rigidimeter.reporting.first_screen import LIGHTS, light_words, main_finding
     from rigidimeter.study import traffic_light
 
     light = traffic_light(found)
     if light is not None:
         words = f"Data quality: {LIGHTS[light.level][1]}. {light_words(light)} "
-        yield words + gravest_words(light)
+        yield words + main_finding(light)
     if rows := list(short_table(found)):
         yield from ("", *rows)
 
@@ -98,9 +98,11 @@ def _epochs(found: StudyResult) -> Iterator[Block]:
             s = c.summaries[name]
             excluded = f"{c.excluded[name]}" if c.measure.counted == "epochs" else ""
             quartiles = f"{s.q1:.4g} to {s.q3:.4g}"
-            groups.append((name, f"{s.n}", excluded, f"{s.median:.4g}", quartiles))
+            sd = number_text(s.sd_percent, ".2g")
+            groups.append((name, f"{s.n}", excluded, f"{s.median:.4g}", quartiles, sd))
     yield Heading("Each condition")
-    yield Table(("condition", "n", "excluded", "median", "quartiles"), groups, "<>>>=")
+    of = ("condition", "n", "excluded", "median", "quartiles", "SD, %\nof mean")
+    yield Table(of, groups, "<>>>=>")
     yield ""
     tested = [(c, c.test) for c in found.comparisons if c.test is not None]
     if tested:

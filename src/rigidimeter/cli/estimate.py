@@ -77,7 +77,7 @@ def estimate_blocks(result: StudyResult) -> list[Block]:
 
     parts: list[Sequence[Block]] = [[Heading(verdict(result).lead)]]
     parts += [part(result.analysis) for part in (_method, _delays, _fits, _fixed_inertia)]
-    parts.append(_together(result) or _pooled(result.analysis))
+    parts.append(_together(result) or _pooled(result))
     parts += [_findings(result.analysis), _scores(result.analysis)]
     return [block for part in parts if part for block in (*part, "")][:-1]
 
@@ -95,12 +95,18 @@ def _together(result: StudyResult) -> list[Block]:
             ends = f"{factor * one.low:.5g} to {factor * one.high:.5g}", f"±{one.percent:.2g} %"
         needed = "" if one.epochs_needed is None else f"{one.epochs_needed}"
         rows.append(
-            (f"{one.measure.title}, {unit}", f"{factor * one.value:.5g}", *ends, f"{one.n}", needed)
+            (
+                *(f"{one.measure.title}, {unit}", f"{factor * one.value:.5g}", *ends),
+                *(number_text(one.sd_percent, ".2g"), f"{one.n}", needed),
+            )
         )
     if not rows:
         return []
-    headings = ("", "estimate", "95 % interval", "", "epochs", f"needed for\n±{WANTED_PERCENT:g} %")
-    return [Heading("All epochs together"), Table(headings, rows, "<>=>>>")]
+    headings = (
+        *("", "estimate", "95 % interval", "", "SD between\nepochs, %", "epochs"),
+        f"needed for\n±{WANTED_PERCENT:g} %",
+    )
+    return [Heading("All epochs together"), Table(headings, rows, "<>=>>>>")]
 
 
 def _method(analysis: Analysis) -> list[Block]:
@@ -149,8 +155,13 @@ def _fixed_inertia(analysis: Analysis) -> list[Block]:
     ]
 
 
-def _pooled(analysis: Analysis) -> list[Block]:
+def _pooled(result: StudyResult) -> list[Block]:
     from rigidimeter.records import PARAMETERS
+
+    def sd(condition: str, measure: str) -> str:
+        c = result.comparison(measure)
+        known = None if c is None else c.summaries.get(condition)
+        return "" if known is None else number_text(known.sd_percent, ".2g")
 
     rows = [
         (
@@ -159,12 +170,13 @@ def _pooled(analysis: Analysis) -> list[Block]:
             number_text(fit.value[i], ".5g"),
             "" if math.isnan(fit.low[i]) else f"[{fit.low[i]:.5g}, {fit.high[i]:.5g}]",
             parameter.unit,
+            sd(fit.condition, parameter.name),
         )
-        for fit in analysis.pooled
+        for fit in result.analysis.pooled
         for i, parameter in enumerate(PARAMETERS)
     ]
-    headings = ("condition", "", "estimate", "95 % interval", "unit")
-    return [Heading("All epochs together"), Table(headings, rows, "<<>>=")] if rows else []
+    headings = ("condition", "", "estimate", "95 % interval", "unit", "SD between\nepochs, %")
+    return [Heading("All epochs together"), Table(headings, rows, "<<>>=>")] if rows else []
 
 
 def _findings(analysis: Analysis) -> list[Block]:

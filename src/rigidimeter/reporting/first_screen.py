@@ -62,6 +62,7 @@ class PrecisionRow(NamedTuple):
     value: str
     interval: str
     percent: str
+    sd: str
     epochs: int
     needed: str
     plot: Markup
@@ -203,6 +204,7 @@ def _precision_row(one: Precision, to: float) -> PrecisionRow:
         number(factor * one.value, digits),
         f"{low} to {high}" if known else "not known from one epoch",
         percent,
+        "" if math.isnan(one.sd_percent) else f"{number(one.sd_percent, 2)}{_PERCENT}",
         one.n,
         "" if one.epochs_needed is None else str(one.epochs_needed),
         interval_plot(
@@ -248,14 +250,14 @@ def light_words(light: TrafficLight) -> str:
     return f"{text}{more}."
 
 
-def gravest_words(light: TrafficLight) -> str:
-    """Return the name of the gravest doubt and where it is; what was found, if it is no check."""
+def main_finding(light: TrafficLight) -> str:
+    """Return the name of the main finding and where it is; what was found, if it is no check."""
     if not light.doubt:
         text = light.text or "No check casts doubt on an epoch"
         return f"{text[:1].upper()}{text[1:].removesuffix('.')}."
     name = light.doubt.replace("_", " ")
     where = f"{light.doubt_epochs} of them" if light.doubt_epochs else "all epochs together"
-    return f"Gravest doubt: {name}, in {where}."
+    return f"Main finding: {name}, in {where}."
 
 
 def advice(result: StudyResult, light: TrafficLight | None) -> list[str]:
