@@ -38,8 +38,10 @@ def summarise(values: ArrayLike) -> Summary:
         return Summary(0, float("nan"), float("nan"), float("nan"))
     q1, median, q3 = np.quantile(sample, [0.25, 0.5, 0.75])
     mean = float(np.mean(sample))
-    known = sample.size > 1 and mean > 0
-    sd_percent = 100.0 * float(np.std(sample, ddof=1)) / mean if known else float("nan")
+    sd_percent = float("nan")
+    if sample.size > 1 and mean > 0:
+        with np.errstate(over="ignore"):
+            sd_percent = 100.0 * float(np.std(sample / mean, ddof=1))
     return Summary(int(sample.size), float(median), float(q1), float(q3), sd_percent)
 
 

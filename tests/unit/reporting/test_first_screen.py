@@ -205,8 +205,9 @@ def test_the_terminal_has_the_precision_of_one_condition(make_analysis) -> None:
         factor = 1e3 if "10⁻³" in line[0] else 1.0
         values = [factor * one.value, factor * one.low, factor * one.high, one.percent]
         assert_shows(" ".join(line[1:4]), values, 2)
-        assert line[4:] == (f"{one.n}", f"{one.epochs_needed}")
+        assert_shows(line[4], [one.sd_percent], 2)
+        assert line[5:] == (f"{one.n}", f"{one.epochs_needed}")
     one_epoch = compare_analysis(make_analysis({"DBS": 1}), resamples=0)
     rows = cells_below(estimate_blocks(one_epoch), "All epochs together")
     (work,) = (row for row in rows if "Work" in row[0])
-    assert work[2:] == ("not known from one epoch", "", "1", "")
+    assert work[2:] == ("not known from one epoch", "", "–", "1", "")
