@@ -37,8 +37,8 @@ def push_harmless(case: Case, look: Look) -> str:
     del look
     if case.uses_perturbation and case.method is not None:
         return (
-            f"{case.method.name} uses the motion that the perturbation causes alone, so J, B and K "
-            "are not biased by it; it is in their intervals"
+            f"{case.method.name} uses the motion that the perturbation causes alone, so torque "
+            "that something but the robot adds does not bias J, B and K; it is in their intervals"
         )
     share = case.loop_bias_percent
     if share is not None and share <= case.settings.loop_bias_most_percent:

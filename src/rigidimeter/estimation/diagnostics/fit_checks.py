@@ -215,16 +215,16 @@ def _of_least_squares(case: Case, look: Look) -> str:
 
 
 def _by_chance(case: Case, look: Look) -> str:
-    """Return why one epoch is no proof: `lack_of_fit` tests all of them at a stricter level.
+    """Return why a single epoch is no proof; empty where torque of the subject biases the estimate.
 
-    What the perturbation causes beyond J, B and K biases every method, so nothing is claimed of J,
-    B and K. Only where torque of the subject biases them anyway is it a doubt of its own.
+    What the perturbation causes beyond J, B and K biases every method, so nothing is claimed of
+    them.
     """
     if not push_harmless(case, look):
         return ""
     return (
-        "the model may lack something that the perturbation causes, but one epoch in 20 shows as "
-        "much by chance; `lack_of_fit` tests all epochs together"
+        "the model lacks something that the perturbation causes, unless this is the one epoch in "
+        "20 that passes the limit by chance; lack_of_fit tests all epochs together"
     )
 
 
