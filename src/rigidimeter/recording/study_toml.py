@@ -28,7 +28,7 @@ def _text(default: Any, least: int = 1, most: int = 200) -> Any:
 
 
 class SimulatedTable(Section):
-    """``[conditions.NAME.simulated]``: medians of a virtual condition, by the measures' names."""
+    """``[simulated.NAME]``: medians of a virtual condition, by the measures' names."""
 
     inertia_kg_m2: float | None = _optional("kg·m²", 0.0, 1e3)
     damping_nm_s_rad: float | None = _optional("N·m·s/rad", 0.0, 1e4)
@@ -48,7 +48,6 @@ class ConditionTable(Section):
     pulse_width_us: float | None = _optional("µs", 0.0, 10000.0)
     electrodes: str = _text("", 0)
     wash_in_min: float | None = _optional("min", 0.0, 100000.0)
-    simulated: SimulatedTable = SimulatedTable()
 
     @model_validator(mode="after")
     def _one_amplitude(self) -> Self:
@@ -125,6 +124,7 @@ class StudyToml(Section):
     key: str = _text("key.csv")
     mapping: str | None = Field(None, min_length=1, max_length=200)
     conditions: dict[str, ConditionTable] = Field(default_factory=dict)
+    simulated: dict[str, SimulatedTable] = Field(default_factory=dict)
     rating: RatingTable = RatingTable()
     subjects: dict[str, SubjectTable] = Field(default_factory=dict)
     archive: ArchiveTable = ArchiveTable()

@@ -134,7 +134,7 @@ def _study_toml(design: StudyDesign, seed: int) -> str:
     ]
     for condition in design.conditions:
         lines += ["", f"[conditions.{condition.name}]", *_stimulation(condition)]
-        lines += ["", f"[conditions.{condition.name}.simulated]"]
+        lines += ["", f"[simulated.{condition.name}]"]
         lines += [f"{name} = {value:.6g}" for name, value in _medians(design, condition).items()]
     lines += ["", "[rating]", f"scale = [{low:.1f}, {high:.1f}]", f"step = {design.rating_step:g}"]
     return "\n".join(lines) + "\n"

@@ -73,7 +73,7 @@ def test_the_tables_name_every_session(folder: Path) -> None:
     study = tomllib.loads((folder / "study.toml").read_text(encoding="utf-8"))
     assert study["schema"] == "rigidimeter.study/1"
     assert (study["reference"], study["other"]) == ("OFF", "DBS")
-    simulated = {name: one["simulated"] for name, one in study["conditions"].items()}
+    simulated = study["simulated"]
     assert study["conditions"]["DBS"] == {
         "title": "stimulation on",
         "frequency_hz": 130.0,
@@ -81,7 +81,6 @@ def test_the_tables_name_every_session(folder: Path) -> None:
         "pulse_width_us": 60.0,
         "wash_in_min": 15.0,
         "electrodes": "bipolar",
-        "simulated": simulated["DBS"],
     }
     assert [simulated[name]["stiffness_nm_rad"] for name in ("OFF", "DBS")] == [1.751, 1.44]
     assert [simulated[name]["damping_nm_s_rad"] for name in ("OFF", "DBS")] == [0.1368, 0.119]
