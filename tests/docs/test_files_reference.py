@@ -109,7 +109,7 @@ def test_the_keys_of_the_comparisons_are_documented(tmp_path: Path) -> None:
         assert list(row) == list(documented)
     for row in document["conclusion"]:
         assert list(row) == list(table(FILES, "Each conclusion"))
-    groups = set(re.findall(r"`([a-z0-9]+)`", documented["groups"]))
+    groups = set(re.findall(r"`([a-z0-9_]+)`", documented["groups"]))
     assert groups == set(tested[0]["groups"]["OFF"])
     assert f"`{document['schema']}`" in FILES.read_text("utf-8")
 

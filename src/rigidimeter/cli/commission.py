@@ -135,10 +135,8 @@ def commission(
         echo(f"Not tried: {', '.join(found.not_tried)}.")
     show(sign_blocks(chosen, found.checks))
     what = "this emulated rig, with nobody in it" if found.emulated else "this rig"
-    echo(
-        f"Valid for {what}, its devices and this controller, for "
-        f"{chosen.commissioning.validity_days:g} days."
-    )
+    days = chosen.commissioning.validity_days
+    echo(f"Valid for {what}, its devices and this controller, for {days:g} day{'s' * (days != 1)}.")
 
 
 def _compare_eds(eds: Path, rig: Path | None) -> None:

@@ -51,47 +51,40 @@ def comparison_blocks(found: StudyResult) -> Iterator[Block]:
 
 def _first_screen(found: StudyResult) -> Iterator[Block]:
     """Yield what the first screen of the report shows."""
-    from rigidimeter.reporting.first_screen import (
-        LIGHTS,
-        gravest_words,
-        light_words,
-    )
+    from rigidimeter.reporting.first_screen import LIGHTS, light_words, main_finding
     from rigidimeter.study import traffic_light
 
     light = traffic_light(found)
     if light is not None:
         words = f"Data quality: {LIGHTS[light.level][1]}. {light_words(light)} "
-        yield words + gravest_words(light)
+        yield words + main_finding(light)
     for pair in (found, *found.further_pairs):
-        yield from _in_short(pair)
+        if rows := list(short_table(pair)):
+            yield from ("", *rows)
 
 
-def _in_short(found: StudyResult) -> Iterator[Block]:
+def short_table(found: StudyResult) -> Iterator[Block]:
+    """Yield what was found of each measure; of a virtual study beside what was simulated."""
     from rigidimeter.reporting.first_screen import strip, tested_words
 
     rows = strip(found)
     if not rows:
         return
+    virtual = any(row.simulated for row in rows)
     cells: list[Sequence[str] | str] = []
     for row in rows:
         cells.append(f"{', '.join(filter(None, (row.title, row.unit)))}: {row.verdict}")
-        cells.append(
-            (
-                *(row.reference, row.other, row.difference, row.percent, row.interval),
-                row.p,
-                row.p_holm,
-            )
-        )
+        size = (row.difference, row.percent, row.interval)
+        if virtual:
+            percent = (row.percent, row.percent_interval)
+            of_found, interval = percent if row.percent else (row.difference, row.interval)
+            size = (of_found, row.simulated or "–", interval)
+        cells.append((row.reference, row.other, *size, row.p, row.p_holm))
     headings = (
-        found.reference,
-        found.other,
-        f"{found.other} is",
-        "",
-        "95 % interval",
-        "p",
-        "by Holm",
+        *(found.reference, found.other, f"{found.other} is", "simulated" if virtual else ""),
+        *("95 % interval", "p", "by Holm"),
     )
-    yield from ("", Heading(f"In short: {tested_words(found)}"), Table(headings, cells, ">>==<>>"))
+    yield from (Heading(f"In short: {tested_words(found)}"), Table(headings, cells, ">>==<>>"))
 
 
 def _epochs(found: StudyResult) -> Iterator[Block]:
@@ -106,9 +99,11 @@ def _epochs(found: StudyResult) -> Iterator[Block]:
             s = c.summaries[name]
             excluded = f"{c.excluded[name]}" if c.measure.counted == "epochs" else ""
             quartiles = f"{s.q1:.4g} to {s.q3:.4g}"
-            groups.append((name, f"{s.n}", excluded, f"{s.median:.4g}", quartiles))
+            sd = number_text(s.sd_percent, ".2g")
+            groups.append((name, f"{s.n}", excluded, f"{s.median:.4g}", quartiles, sd))
     yield Heading("Each condition")
-    yield Table(("condition", "n", "excluded", "median", "quartiles"), groups, "<>>>=")
+    of = ("condition", "n", "excluded", "median", "quartiles", "SD, %\nof mean")
+    yield Table(of, groups, "<>>>=>")
     for pair in (found, *found.further_pairs):
         yield ""
         yield from _rank_tests(pair)

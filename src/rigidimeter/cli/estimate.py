@@ -96,12 +96,18 @@ def _together(result: StudyResult) -> list[Block]:
             ends = f"{factor * one.low:.5g} to {factor * one.high:.5g}", f"±{one.percent:.2g} %"
         needed = "" if one.epochs_needed is None else f"{one.epochs_needed}"
         rows.append(
-            (f"{one.measure.title}, {unit}", f"{factor * one.value:.5g}", *ends, f"{one.n}", needed)
+            (
+                *(f"{one.measure.title}, {unit}", f"{factor * one.value:.5g}", *ends),
+                *(number_text(one.sd_percent, ".2g"), f"{one.n}", needed),
+            )
         )
     if not rows:
         return []
-    headings = ("", "estimate", "95 % interval", "", "epochs", f"needed for\n±{WANTED_PERCENT:g} %")
-    return [Heading("All epochs together"), Table(headings, rows, "<>=>>>")]
+    headings = (
+        *("", "estimate", "95 % interval", "", "SD between\nepochs, %", "epochs"),
+        f"needed for\n±{WANTED_PERCENT:g} %",
+    )
+    return [Heading("All epochs together"), Table(headings, rows, "<>=>>>>")]
 
 
 def _method(analysis: Analysis) -> list[Block]:
@@ -154,6 +160,11 @@ def _pooled(result: StudyResult) -> list[Block]:
     from rigidimeter.records import PARAMETERS
     from rigidimeter.study import split_pooled
 
+    def sd(condition: str, measure: str) -> str:
+        c = result.comparison(measure)
+        known = None if c is None else c.summaries.get(condition)
+        return "" if known is None else number_text(known.sd_percent, ".2g")
+
     of_each, overall = split_pooled(result.analysis)
     fits = [of_each[name] for name in result.condition_names if name in of_each]
     rows = [
@@ -163,12 +174,13 @@ def _pooled(result: StudyResult) -> list[Block]:
             number_text(fit.value[i], ".5g"),
             "" if math.isnan(fit.low[i]) else f"[{fit.low[i]:.5g}, {fit.high[i]:.5g}]",
             parameter.unit,
+            sd(fit.condition, parameter.name),
         )
         for fit in (*fits, *([] if overall is None else [overall]))
         for i, parameter in enumerate(PARAMETERS)
     ]
-    headings = ("condition", "", "estimate", "95 % interval", "unit")
-    return [Heading("All epochs together"), Table(headings, rows, "<<>>=")] if rows else []
+    headings = ("condition", "", "estimate", "95 % interval", "unit", "SD between\nepochs, %")
+    return [Heading("All epochs together"), Table(headings, rows, "<<>>=>")] if rows else []
 
 
 def _findings(analysis: Analysis) -> list[Block]:

@@ -139,6 +139,10 @@ def simulate(
 
 def demo(
     out: NewStudyOption = Path("demo-study"),
+    days: Annotated[
+        int,
+        typer.Option("--days", metavar="N", min=2, max=100, help="Days, each with OFF and DBS."),
+    ] = 8,
     prbs_epochs: Annotated[
         int,
         typer.Option(
@@ -148,7 +152,7 @@ def demo(
             max=500,
             help="PRBS epochs for each condition and day.",
         ),
-    ] = 10,
+    ] = 5,
     sinusoid_epochs: Annotated[
         int,
         typer.Option(
@@ -158,33 +162,37 @@ def demo(
             max=500,
             help="Sinusoidal epochs for each condition and day.",
         ),
-    ] = 8,
+    ] = 3,
     seed: StudySeedOption = 2023,
 ) -> None:
-    """Make a virtual study folder of two days, compare its conditions, and write its report.
+    """Make a virtual study folder, compare its conditions, and write its report.
 
-    Each day has PRBS and sinusoidal epochs in OFF and DBS on the virtual rig, 40 and 32 in all, and
-    ratings. The same as study simulate, compare and report, for a smaller study. An earlier demo in
-    the same folder is moved aside, not overwritten.
+    Each day has PRBS and sinusoidal epochs of 10 s in OFF and DBS on the virtual rig, 80 and 48 in
+    all, and ratings. The same as study simulate, compare and report, for a smaller study. What was
+    simulated is shown beside what was found. An earlier demo in the same folder is moved aside, not
+    overwritten.
 
     \b
     For example:
       rigidimeter demo
-      rigidimeter demo --out small --prbs-epochs 3 --sinusoid-epochs 3
+      rigidimeter demo --out small --days 3 --prbs-epochs 3
     """
+    from rigidimeter.cli.comparison_text import short_table
     from rigidimeter.cli.report import write_page
-    from rigidimeter.virtual.study_design import two_day_design
+    from rigidimeter.cli.terminal_tables import show
+    from rigidimeter.virtual.study_design import SHORT_EPOCH_S, short_design
 
     start_s = time.monotonic()
     _move_aside(out)
     echo(
-        f"A virtual subject, 2 days, OFF and DBS: {4 * prbs_epochs} PRBS and "
-        f"{4 * sinusoid_epochs} sinusoidal epochs of 20 s with their rests"
+        f"A virtual subject, {days} days, OFF and DBS: {2 * days * prbs_epochs} PRBS and "
+        f"{2 * days * sinusoid_epochs} sinusoidal epochs of {SHORT_EPOCH_S:g} s with their rests"
     )
-    _simulated(out, two_day_design(prbs_epochs, sinusoid_epochs), seed)
+    _simulated(out, short_design(days, prbs_epochs, sinusoid_epochs), seed)
     found = analyse_study_folder(out, Recordings([out]))
     try:
         page = write_page(found.result, out / "report")
+        show([*short_table(found.result), ""])
         echo(f"Done in {time.monotonic() - start_s:.0f} s. Open the report in a browser:")
         echo(str(page.resolve()))
     finally:

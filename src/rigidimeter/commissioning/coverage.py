@@ -110,17 +110,16 @@ def check_record(
         raise UserError(f"{path}: {record.objection}")
     days = settings.commissioning.validity_days
     days = min(days, record.covered.get("validity_days", days))
+    valid = f"a record holds for {days:g} day{'s' * (days != 1)}"
     today = now_utc or datetime.now(UTC)
     age = today - datetime.fromisoformat(record.made_utc)
     if age < timedelta(days=-1):
         raise UserError(
-            f"{path}: is of {record.made_utc[:10]}, which is still to come, and a record holds for "
-            f"{days:g} days from then; set the computer's clock right, or {again}"
+            f"{path}: is of {record.made_utc[:10]}, which is still to come, and {valid} "
+            f"from then; set the computer's clock right, or {again}"
         )
     if age > timedelta(days=days):
-        raise UserError(
-            f"{path}: is of {record.made_utc[:10]}, and a record holds for {days:g} days; {again}"
-        )
+        raise UserError(f"{path}: is of {record.made_utc[:10]}, and {valid}; {again}")
     _same_controller(path, record.covered, plain_values(covered(settings)))
     return record
 

@@ -22,6 +22,7 @@ that does not change, so its scatter shows how large that is.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -142,7 +143,7 @@ def between_epochs(
         settings.levels.varying_between_epochs,
         large[0].percent,
         most,
-        "; ".join(_sentence(one) for one in large)
+        "; ".join(_sentence(one, most) for one in large)
         + f" (at most {most:g} %): the pooled estimate is a mean over a joint that was not the "
         "same in all epochs",
         "look at the epochs in order; state the scatter between them beside the mean",
@@ -162,7 +163,7 @@ def _quantiles() -> tuple[Array, Array]:
     return known, np.asarray(special.stdtrit(known, 0.975))
 
 
-def _sentence(one: Scatter) -> str:
+def _sentence(one: Scatter, most: float) -> str:
     _, symbol, unit, _ = PARAMETERS[one.parameter]
     low, high = int(np.argmin(one.drawn)), int(np.argmax(one.drawn))
     trend_percent, trend_p = one.trend()
@@ -174,14 +175,36 @@ def _sentence(one: Scatter) -> str:
     )
     return (
         f"{symbol} goes from {one.drawn[low]:.3g} {unit} in the {_ordinal(low)} epoch to "
-        f"{one.drawn[high]:.3g} {unit} in the {_ordinal(high)}, a range of {one.percent:.0f} % of "
-        f"the mean, SD {one.sd:.2g} {unit} beyond the errors, by chance {p_text(one.p)}, {trend}"
+        f"{one.drawn[high]:.3g} {unit} in the {_ordinal(high)}, a range of "
+        f"{in_full(one.percent, '.0f', limit=most)} % of the mean, SD {one.sd:.2g} {unit} "
+        f"beyond the errors, by chance {p_text(one.p)}, {trend}"
     )
 
 
 def p_text(p: float) -> str:
     """Return a probability as text, a small one as a limit: no assumption is as good as that."""
     return f"p = {p:.2g}" if p >= LEAST_P else f"p < {LEAST_P:g}"
+
+
+def in_full(value: float, spec: str = ".2g", *, limit: float = math.nan) -> str:
+    """Return a number rounded as `spec` says, without a power of ten for a large one.
+
+    With more digits where it would read as the limit that is shown beside it, and is not.
+
+    Examples
+    --------
+    >>> in_full(104.2), in_full(7.36), in_full(-290.0, "+.2g"), in_full(2e-9)
+    ('104', '7.4', '-290', '2e-09')
+    >>> in_full(15.2, limit=15.0), in_full(99.98, ".0f", limit=100.0), in_full(15.0, limit=15.0)
+    ('15.2', '99.98', '15')
+    """
+    text = format(value, spec)
+    for digits in range(3, 18):  # 17 tell any two numbers apart
+        if value == limit or not math.isclose(float(text), limit, rel_tol=1e-14):
+            break
+        text = format(value, f".{digits}g")
+    whole = "e+" in text and abs(value) < 1e6
+    return format(value, f"{'+' if '+' in spec else ''}.0f") if whole else text
 
 
 def _ordinal(index: int) -> str:

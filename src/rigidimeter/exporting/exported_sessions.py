@@ -196,7 +196,7 @@ def _by_source(epochs: Iterable[Epoch]) -> dict[str, list[Epoch]]:
 
 def _stimulation(condition: Condition) -> dict[str, Any]:
     facts = {name: value for name, value in asdict(condition).items() if value not in (None, "")}
-    facts.pop("name")
+    del facts["name"], facts["simulated"]
     unit = facts.pop("amplitude_unit", "")
     if "amplitude" in facts:
         facts[f"amplitude_{unit.lower()}"] = facts.pop("amplitude")

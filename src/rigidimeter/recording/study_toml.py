@@ -27,6 +27,17 @@ def _text(default: Any, least: int = 1, most: int = 200) -> Any:
     return Field(default, min_length=least, max_length=most)
 
 
+class SimulatedTable(Section):
+    """``[simulated.NAME]``: medians of a virtual condition, by the measures' names."""
+
+    inertia_kg_m2: float | None = _optional("kg·m²", 0.0, 1e3)
+    damping_nm_s_rad: float | None = _optional("N·m·s/rad", 0.0, 1e4)
+    stiffness_nm_rad: float | None = _optional("N·m/rad", 0.0, 1e5)
+    impulse_nm_s: float | None = _optional("N·m·s", 0.0, 1e5)
+    work_j: float | None = _optional("J", 0.0, 1e5)
+    rating: float | None = _optional("points", -1e3, 1e3)
+
+
 class ConditionTable(Section):
     """``[conditions.NAME]``: how people call it, and the stimulation if there is one."""
 
@@ -113,6 +124,7 @@ class StudyToml(Section):
     key: str = _text("key.csv")
     mapping: str | None = Field(None, min_length=1, max_length=200)
     conditions: dict[str, ConditionTable] = Field(default_factory=dict)
+    simulated: dict[str, SimulatedTable] = Field(default_factory=dict)
     rating: RatingTable = RatingTable()
     subjects: dict[str, SubjectTable] = Field(default_factory=dict)
     archive: ArchiveTable = ArchiveTable()

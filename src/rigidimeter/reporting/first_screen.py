@@ -46,6 +46,7 @@ class StripRow(NamedTuple):
     interval: str
     percent: str
     percent_interval: str
+    simulated: str
     p: str
     p_holm: str
     verdict: str
@@ -61,6 +62,7 @@ class PrecisionRow(NamedTuple):
     value: str
     interval: str
     percent: str
+    sd: str
     epochs: int
     needed: str
     plot: Markup
@@ -92,7 +94,7 @@ def tested_words(result: StudyResult) -> str:
 
 def _strip_row(one: Conclusion, to: float, other: str) -> StripRow:
     d, measure = one.difference, one.comparison.measure
-    factor, unit = scaled(max(abs(d.reference), abs(d.other)), measure.unit.removeprefix("1"))
+    factor, unit = scaled(max(abs(d.reference), abs(d.other)), measure.unit)
     estimate, low, high = (factor * size for size in (d.estimate, d.low, d.high))
     percent, percent_low, percent_high = d.percent
     words = f"{other} {difference_words(d, measure.unit)}"
@@ -109,8 +111,9 @@ def _strip_row(one: Conclusion, to: float, other: str) -> StripRow:
         number(factor * d.other, DIGITS),
         _sided(estimate),
         _sided_interval(low, high),
-        "" if math.isnan(percent) else f"{number(abs(percent), 2)}{_PERCENT} {d.side}",
+        _percent(d),
         "" if math.isnan(percent_low) else _sided_interval(percent_low, percent_high, 2, _PERCENT),
+        "" if one.simulated is None else _simulated(one.simulated, factor),
         p_value(d.p),
         "" if math.isnan(one.p) else p_value(one.p),
         one.verdict,
@@ -130,7 +133,7 @@ def _strip_row(one: Conclusion, to: float, other: str) -> StripRow:
 
 def difference_words(d: Difference, unit: str) -> str:
     """Return ``lower by 0.27 N·m/rad, 15 %, 95 % interval 0.1 to 0.4 lower``."""
-    factor, in_unit = scaled(max(abs(d.reference), abs(d.other)), unit.removeprefix("1"))
+    factor, in_unit = scaled(max(abs(d.reference), abs(d.other)), unit)
     if math.isnan(d.estimate):
         return "unknown"
     size = f"{number(abs(factor * d.estimate), DIGITS)} {in_unit}".strip()
@@ -140,6 +143,18 @@ def difference_words(d: Difference, unit: str) -> str:
     if not math.isnan(d.low):
         text += f", 95 % interval {_sided_interval(factor * d.low, factor * d.high)}"
     return text
+
+
+def _percent(d: Difference) -> str:
+    """Return a difference in per cent of the reference, in words for the other."""
+    percent = d.percent[0]
+    return "" if math.isnan(percent) else f"{number(abs(percent), 2)}{_PERCENT} {d.side}"
+
+
+def _simulated(d: Difference, factor: float) -> str:
+    if not d.estimate:
+        return d.side
+    return _percent(d) or _sided(factor * d.estimate)
 
 
 def _sided(size: float, digits: int = DIGITS) -> str:
@@ -189,6 +204,7 @@ def _precision_row(one: Precision, to: float) -> PrecisionRow:
         number(factor * one.value, digits),
         f"{low} to {high}" if known else "not known from one epoch",
         percent,
+        "" if math.isnan(one.sd_percent) else f"{number(one.sd_percent, 2)}{_PERCENT}",
         one.n,
         "" if one.epochs_needed is None else str(one.epochs_needed),
         interval_plot(
@@ -234,14 +250,14 @@ def light_words(light: TrafficLight) -> str:
     return f"{text}{more}."
 
 
-def gravest_words(light: TrafficLight) -> str:
-    """Return the name of the gravest doubt and where it is; what was found, if it is no check."""
+def main_finding(light: TrafficLight) -> str:
+    """Return the name of the main finding and where it is; what was found, if it is no check."""
     if not light.doubt:
         text = light.text or "No check casts doubt on an epoch"
         return f"{text[:1].upper()}{text[1:].removesuffix('.')}."
     name = light.doubt.replace("_", " ")
     where = f"{light.doubt_epochs} of them" if light.doubt_epochs else "all epochs together"
-    return f"Gravest doubt: {name}, in {where}."
+    return f"Main finding: {name}, in {where}."
 
 
 def advice(result: StudyResult, light: TrafficLight | None) -> list[str]:

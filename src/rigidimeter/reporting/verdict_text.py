@@ -140,8 +140,8 @@ def _with_size(members: Iterable[Conclusion]) -> list[str]:
     """Return measures as ``stiffness K by 0.27 N·m/rad, 15 % (p = 0.003)``."""
     found = []
     for one in members:
-        d, unit = one.difference, one.comparison.measure.unit
-        size = amount(abs(d.estimate), unit if unit != "1" else "", 2)
+        d = one.difference
+        size = amount(abs(d.estimate), one.comparison.measure.unit, 2)
         if not math.isnan(d.percent[0]):
             size += f", {number(abs(d.percent[0]), 2)}\N{NO-BREAK SPACE}%"
         found.append(f"{_lower_first(one.comparison)} by {size} ({_p(one.p)})")

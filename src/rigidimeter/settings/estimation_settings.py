@@ -102,7 +102,7 @@ class DiagnosticLevels(Section):
     varying_with_time: Level = "doubt"
     varying_with_angle: Level = "doubt"
     varying_with_phase: Level = "doubt"
-    varying_between_epochs: Level = "doubt"
+    varying_between_epochs: Level = "note"
     saturation: Level = "exclude"
     frozen: Level = "exclude"
     left_out: Level = "note"

@@ -1,4 +1,4 @@
-"""A sample, checked; its median and quartiles."""
+"""A sample, checked; its median, quartiles and scatter."""
 
 from __future__ import annotations
 
@@ -10,16 +10,21 @@ from numpy.typing import ArrayLike, NDArray
 
 @dataclass(frozen=True)
 class Summary:
-    """Count, median and quartiles (NaN when the sample is empty)."""
+    """Count, median and quartiles (NaN when the sample is empty), and scatter.
+
+    `sd_percent` is the standard deviation in % of the mean; NaN with fewer than two values, or a
+    mean that is not positive.
+    """
 
     n: int
     median: float
     q1: float
     q3: float
+    sd_percent: float = float("nan")
 
 
 def summarise(values: ArrayLike) -> Summary:
-    """Return count, median and quartiles of a one-dimensional sample.
+    """Return count, median, quartiles and scatter of a one-dimensional sample.
 
     Quartiles interpolate linearly between order statistics (R's type 7, numpy's default).
 
@@ -32,7 +37,12 @@ def summarise(values: ArrayLike) -> Summary:
     if sample.size == 0:
         return Summary(0, float("nan"), float("nan"), float("nan"))
     q1, median, q3 = np.quantile(sample, [0.25, 0.5, 0.75])
-    return Summary(int(sample.size), float(median), float(q1), float(q3))
+    mean = float(np.mean(sample))
+    sd_percent = float("nan")
+    if sample.size > 1 and mean > 0:
+        with np.errstate(over="ignore"):
+            sd_percent = 100.0 * float(np.std(sample / mean, ddof=1))
+    return Summary(int(sample.size), float(median), float(q1), float(q3), sd_percent)
 
 
 def checked_sample(name: str, values: ArrayLike, *, fewest: int = 1) -> NDArray[np.float64]:

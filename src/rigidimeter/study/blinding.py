@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rigidimeter.recording.study_folder import StudyFolder
 from rigidimeter.recording.study_toml import ConditionTable
@@ -100,7 +100,11 @@ def naming(read: StudyFolder) -> tuple[Naming, list[Notice]]:
             Naming(defined, known, {}, True, (first, second), tuple(map(Condition, known))),
             notices,
         )
-    conditions = tuple(_condition(name, table) for name, table in tables.items())
+    simulated = {name: one.model_dump(exclude_none=True) for name, one in about.simulated.items()}
+    conditions = tuple(
+        replace(_condition(name, table), simulated=simulated.get(name, {}))
+        for name, table in tables.items()
+    )
     notices += _same_stimulation(read, conditions)
     return (
         Naming(defined, defined, codes, False, (about.reference, about.other), conditions),

@@ -14,7 +14,7 @@ TEST = "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected"
 
 _TESTED = tuple(field.name for field in fields(RankSum))
 _SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
-_QUARTILES = ("median", "q1", "q3")
+_SUMMARY = ("median", "q1", "q3", "sd_percent")
 
 
 @dataclass(frozen=True)
@@ -143,10 +143,10 @@ def comparison_rows(comparisons: Iterable[Comparison]) -> list[dict[str, Any]]:
         row: dict[str, Any] = dict(_names(c))
         for side, name in zip(("reference", "other"), (c.reference, c.other), strict=True):
             known = name in c.pair
-            numbers = asdict(c.summaries[name]) if known else dict.fromkeys(("n", *_QUARTILES))
+            numbers = asdict(c.summaries[name]) if known else dict.fromkeys(("n", *_SUMMARY))
             row[f"n_{side}"] = numbers["n"]
             row[f"excluded_{side}"] = c.excluded[name] if known else None
-            row |= {f"{quartile}_{side}": numbers[quartile] for quartile in _QUARTILES}
+            row |= {f"{key}_{side}": numbers[key] for key in _SUMMARY}
         row |= _tested(c) | {"remark": c.remark}
         if c.days is not None:
             days = _days(c)

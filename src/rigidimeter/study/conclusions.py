@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from rigidimeter.statistics import holm
 from rigidimeter.study.compared import Comparison, measure_names
-from rigidimeter.study.differences import Difference
+from rigidimeter.study.differences import Difference, simulated_difference
 from rigidimeter.study.objections import hidden, negligible, objections, untested
 from rigidimeter.study.results import StudyResult
 from rigidimeter.study.tested import LEVEL, Basis, basis_of, tested, too_few
@@ -36,6 +36,8 @@ class Conclusion:
         A clause; empty where the test is the whole reason.
     difference : Difference
         Of the test, with both values.
+    simulated : Difference or None
+        What a virtual study simulated.
     """
 
     comparison: Comparison
@@ -43,6 +45,7 @@ class Conclusion:
     difference: Difference
     p: float = math.nan
     reason: str = ""
+    simulated: Difference | None = None
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,8 @@ def conclude(result: StudyResult) -> Conclusions | None:
         else:
             few = c.days.few if c.days is not None and basis == "days" else ""
             verdict, reason = "no difference shown", hidden(c, result) or few
-        found.append(Conclusion(c, verdict, test.difference, p, reason))
+        simulated = simulated_difference(c, result.conditions)
+        found.append(Conclusion(c, verdict, test.difference, p, reason, simulated))
     ordered = tuple(sorted(found, key=lambda one: one.comparison.measure.place))
     return Conclusions(basis, ordered, with_p)
 
@@ -124,8 +128,18 @@ def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
             "p_holm": one.p,
             "tested_by": concluded.basis,
             "reason": one.reason,
+            **({} if one.simulated is None else _simulated_row(one.simulated)),
         }
         for concluded in map(conclude, (result, *result.further_pairs))
         if concluded is not None
         for one in concluded.each
     ]
+
+
+def _simulated_row(found: Difference) -> dict[str, float]:
+    return {
+        "simulated_reference": found.reference,
+        "simulated_other": found.other,
+        "simulated_estimate": found.estimate,
+        "simulated_percent": found.percent[0],
+    }

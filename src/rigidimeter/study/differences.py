@@ -16,6 +16,7 @@ from typing import Any, Literal
 from rigidimeter.statistics import DayDifference
 from rigidimeter.study.compared import Comparison
 from rigidimeter.study.measures import Observation
+from rigidimeter.study.results import Condition
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,15 @@ def by_values(c: Comparison) -> Difference:
         return Difference("median", first, second, first - second)
     t = c.test
     return Difference("median", first, second, t.shift, t.shift_low, t.shift_high, t.p)
+
+
+def simulated_difference(c: Comparison, conditions: Iterable[Condition]) -> Difference | None:
+    """Return the medians that a virtual study simulated; None where none was simulated."""
+    known = {one.name: one.simulated.get(c.measure.name) for one in conditions}
+    first, second = (known.get(name) for name in c.pair)
+    if first is None or second is None:
+        return None
+    return Difference("median", first, second, first - second, ratio=c.measure.origin != "ratings")
 
 
 def _mean_of_units(observations: Iterable[Observation]) -> float:

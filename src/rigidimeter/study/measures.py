@@ -66,7 +66,7 @@ MEASURES = (
 )
 """Inertia is from the first stage; damping and stiffness are from the second, at fixed inertia."""
 
-RATING = Measure("rating", "Examiners' rating", "1", "ratings")
+RATING = Measure("rating", "Examiners' rating", "points", "ratings")
 """Scores less the offsets of their examiners."""
 
 

@@ -19,6 +19,7 @@ from scipy.stats import norm
 from scipy.stats import t as t_distribution
 
 from rigidimeter.records import PARAMETERS, Analysis, Fit
+from rigidimeter.statistics import summarise
 from rigidimeter.study.compared import measure_names
 from rigidimeter.study.comparison import split_pooled
 from rigidimeter.study.conclusions import conclude
@@ -44,6 +45,8 @@ class Precision:
         epochs, with an interval from their scatter.
     se : float
         The standard error of `value`.
+    sd_percent : float
+        Standard deviation between the epochs, in % of their mean; NaN of one epoch.
     """
 
     measure: Measure
@@ -52,6 +55,7 @@ class Precision:
     low: float
     high: float
     se: float
+    sd_percent: float
 
     @property
     def percent(self) -> float:
@@ -76,6 +80,7 @@ class Precision:
             "high": self.high,
             "se": self.se,
             "half_width_percent": self.percent,
+            "sd_percent": self.sd_percent,
             "epochs_for_5_percent": self.epochs_needed,
         }
 
@@ -119,29 +124,25 @@ def _of_epochs(analysis: Analysis, condition: str) -> tuple[Precision, ...]:
     symbols = {parameter.name: k for k, parameter in enumerate(PARAMETERS)}
     found = []
     for measure in sorted(MEASURES, key=lambda one: one.place):
-        if measure.name in symbols:
-            if fit is not None and fit.outcome.included:
-                found.append(_of_fit(measure, fit, symbols[measure.name], max(len(counting), 1)))
-                continue
-            values = [getattr(one, measure.name) for one in counting]
-        else:
-            values = [
-                getattr(one, measure.name)
-                for one in measure.results(analysis)
-                if one.outcome.included
-            ]
-        if values:
+        of_fits = measure.name in symbols
+        results = counting if of_fits else measure.results(analysis)
+        values = [getattr(one, measure.name) for one in results if one.outcome.included]
+        if of_fits and fit is not None and fit.outcome.included:
+            found.append(_of_fit(measure, fit, symbols[measure.name], values))
+        elif values:
             found.append(_of_values(measure, values))
     return tuple(found)
 
 
-def _of_fit(measure: Measure, fit: Fit, k: int, n: int) -> Precision:
+def _of_fit(measure: Measure, fit: Fit, k: int, values: Sequence[float]) -> Precision:
     value, low, high, se = (float(own[k]) for own in (fit.value, fit.low, fit.high, fit.se))
-    return Precision(measure, n, value, low, high, se)
+    sd_percent = summarise(values).sd_percent
+    return Precision(measure, max(len(values), 1), value, low, high, se, sd_percent)
 
 
 def _of_values(measure: Measure, values: Sequence[float]) -> Precision:
     n, mean = len(values), float(np.mean(values))
     se = float(np.std(values, ddof=1)) / math.sqrt(n) if n > 1 else math.nan
     half = float(t_distribution.ppf(0.975, n - 1)) * se if n > 1 else math.nan
-    return Precision(measure, n, mean, mean - half, mean + half, se)
+    sd_percent = summarise(values).sd_percent
+    return Precision(measure, n, mean, mean - half, mean + half, se, sd_percent)

@@ -39,7 +39,8 @@ class EffectPair:
 class Condition:
     """One condition of a study: its name, and the stimulation if there is one.
 
-    What was not written down is None or empty.
+    What was not written down is None or empty. `simulated` are the medians of a virtual condition,
+    by the names of the measures.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Condition:
     pulse_width_us: float | None = None
     electrodes: str = ""
     wash_in_min: float | None = None
+    simulated: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -128,6 +128,7 @@ def _conditions(result: StudyResult) -> Iterator[dict[str, Any]]:
         mine = [each for each in result.sessions if each.condition == condition.name]
         days = len({(each.subject, each.day) for each in mine})
         about = asdict(condition)
+        del about["simulated"]  # the conclusions have it beside each estimate
         if result.blinded:
             about = dict.fromkeys(about) | {"name": condition.name}
         yield about | {"days": days, "sessions": len(mine)}

@@ -1,4 +1,4 @@
-"""How far the data can be trusted: a traffic light, the epochs that are sound, the gravest doubt.
+"""How far the data can be trusted: a traffic light, the epochs that are sound, the main finding.
 
 An epoch is sound if it counts and no check casts doubt on it. What doubts all epochs together
 counts too, but for checks that make no difference between conditions where two are compared.
@@ -31,8 +31,8 @@ class TrafficLight:
         Epochs recorded; of them those that are sound, that do not count, and that count in spite
         of a doubt.
     doubt, doubt_epochs : str, int
-        The check with the gravest doubt, and how many epochs it doubts: 0 if only all of them
-        together. Empty without a doubt, or where a reason in `text` is no check.
+        The check that casts doubt on most epochs, and how many epochs it doubts: 0 if only all of
+        them together. Empty without a doubt, or where a reason in `text` is no check.
     text, remedy : str
         What was found, and what to do about it.
     """
@@ -64,7 +64,7 @@ def traffic_light(result: StudyResult) -> TrafficLight | None:
     doubted = {
         (fit.source, fit.epoch) for fit in analysis.fits if fit.outcome.included and fit.doubts
     }
-    found = sorted(doubts(analysis), key=lambda one: _harmless(one, result))
+    found = [one for one in doubts(analysis) if not _harmless(one, result)]
     gravest = found[0] if found else None
     finding = None if gravest is None else _first(gravest.check, result)
     concluded = conclude(result)
@@ -77,7 +77,7 @@ def traffic_light(result: StudyResult) -> TrafficLight | None:
     if impossible:
         text = "J is not greater than zero in some epochs, which is impossible"
     share = len(counting - doubted) / len(recorded)
-    together = gravest is not None and not gravest.epochs and not _harmless(gravest, result)
+    together = gravest is not None and not gravest.epochs
     level: Level = "good"
     if share < POOR_SHARE or impossible:
         level = "poor"

@@ -23,6 +23,7 @@ def _misfit(analysis: Analysis) -> tuple[Notice, ...]:
         Notice("warning", f"{fit.condition or 'all epochs'}: {finding.text}; {finding.remedy}")
         for fit in analysis.pooled
         for finding in fit.findings
+        if finding.level != "note"
     )
 
 

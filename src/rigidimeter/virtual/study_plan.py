@@ -121,25 +121,25 @@ def draw_ratings(
     design: StudyDesign, joints: Sequence[JointDynamics], rng: np.random.Generator
 ) -> list[dict[str, float]]:
     """Return the examiners' scores of each joint; see `study_design` for how they are made."""
-    nominal = design.conditions[0]
     biases = design.examiner_sd * rng.standard_normal(len(design.examiners))
     lowest, highest = design.rating_scale
     found = []
     for joint in joints:
-        rigidity = 0.5 * (
-            math.log(joint.damping_nm_s_rad / nominal.damping_nm_s_rad)
-            + math.log(joint.stiffness_nm_rad / nominal.stiffness_nm_rad)
-        )
-        felt = (
-            design.rating_level
-            + design.rating_gain * rigidity
-            + biases
-            + design.rating_noise_sd * rng.standard_normal(biases.size)
-        )
+        noise = design.rating_noise_sd * rng.standard_normal(biases.size)
+        felt = felt_rigidity(design, joint) + biases + noise
         steps = np.round((felt - lowest) / design.rating_step)
         scores = np.clip(lowest + design.rating_step * steps, lowest, highest)
         found.append(dict(zip(design.examiners, scores.tolist(), strict=True)))
     return found
+
+
+def felt_rigidity(design: StudyDesign, joint: JointDynamics) -> float:
+    """Return the score that a joint has without an examiner's offset, noise, steps and ends."""
+    nominal = design.conditions[0]
+    return design.rating_level + design.rating_gain * 0.5 * (
+        math.log(joint.damping_nm_s_rad / nominal.damping_nm_s_rad)
+        + math.log(joint.stiffness_nm_rad / nominal.stiffness_nm_rad)
+    )
 
 
 def day_factors(design: StudyDesign, seed: int, day: int) -> tuple[float, ...]:

@@ -7,10 +7,11 @@ last: a folder that has one is complete. What was written is removed when it is 
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import closing, suppress
-from dataclasses import fields
+from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
 
@@ -18,8 +19,10 @@ from rigidimeter.documents import csv_text, write_text
 from rigidimeter.errors import UserError
 from rigidimeter.parallel import each
 from rigidimeter.recording.study_toml import STUDY_SCHEMA
+from rigidimeter.settings import SinusoidSettings
+from rigidimeter.units import rad_from_deg
 from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
-from rigidimeter.virtual.study_plan import DayPlan, plan_study
+from rigidimeter.virtual.study_plan import DayPlan, day_joint, felt_rigidity, plan_study
 from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s
 
 Progress = Callable[[float], None]
@@ -131,23 +134,42 @@ def _study_toml(design: StudyDesign, seed: int) -> str:
     ]
     for condition in design.conditions:
         lines += ["", f"[conditions.{condition.name}]", *_stimulation(condition)]
+        lines += ["", f"[simulated.{condition.name}]"]
+        lines += [f"{name} = {value:.6g}" for name, value in _medians(design, condition).items()]
     lines += ["", "[rating]", f"scale = [{low:.1f}, {high:.1f}]", f"step = {design.rating_step:g}"]
     return "\n".join(lines) + "\n"
 
 
+def _medians(design: StudyDesign, condition: ConditionDesign) -> dict[str, float]:
+    """Return what each measure of a condition is at its median joint.
+
+    Of a movement A sin ωt with impedance Z = K − J ω² + i B ω the impulse of a cycle is 4 A |Z|/ω
+    and its work π B ω A².
+    """
+    joint = day_joint(design, condition, (1.0, 1.0, 1.0))
+    J, B, K = joint.parameters
+    sinusoid = SinusoidSettings.model_validate(design.settings.get("sinusoid", {}))
+    amplitude_rad = rad_from_deg(sinusoid.amplitude_deg)
+    omega = 2.0 * math.pi * sinusoid.frequency_hz
+    return {
+        **asdict(joint),
+        "impulse_nm_s": 4.0 * amplitude_rad * math.hypot(K - J * omega**2, B * omega) / omega,
+        "work_j": math.pi * B * omega * amplitude_rad**2,
+        "rating": felt_rigidity(design, joint),
+    }
+
+
 def _assumed(design: StudyDesign) -> list[tuple[str, object]]:
-    apart = ("name", "title", "subject", "conditions", "settings", "first_date")
+    apart = ("name", "title", "subject", "conditions", "settings", "first_date", "inertia_kg_m2")
     found: list[tuple[str, object]] = [
         (field.name, getattr(design, field.name))
         for field in fields(design)
         if field.name not in apart
     ]
-    for condition in design.conditions:
-        found += [
-            (f"{condition.name}.{name}", getattr(condition, name))
-            for name in ("damping_nm_s_rad", "stiffness_nm_rad", "voluntary_sd_nm")
-        ]
-    return found
+    return found + [
+        (f"{condition.name}.voluntary_sd_nm", condition.voluntary_sd_nm)
+        for condition in design.conditions
+    ]
 
 
 def _stimulation(condition: ConditionDesign) -> list[str]:

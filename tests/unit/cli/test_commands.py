@@ -4,6 +4,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from functools import partial
+from html import unescape
 
 import numpy as np
 import pytest
@@ -12,9 +13,10 @@ from tests.unit.virtual.tiny import SHORT
 from rigidimeter.cli.estimate import estimate_blocks
 from rigidimeter.cli.study import _simulated
 from rigidimeter.cli.terminal_tables import text_lines
+from rigidimeter.documents import read_json
 from rigidimeter.records import Analysis, Fit, Outcome, Score
 from rigidimeter.study import compare_analysis
-from rigidimeter.virtual.study_design import two_day_design
+from rigidimeter.virtual.study_design import short_design
 
 
 def test_help_names_every_command_and_gives_examples(rigidimeter):
@@ -291,9 +293,9 @@ def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(
     rigidimeter, tmp_path, monkeypatch, no_figures
 ):
     def short(*epochs):
-        return replace(two_day_design(*epochs), settings=SHORT)
+        return replace(short_design(*epochs), settings=SHORT)
 
-    monkeypatch.setattr("rigidimeter.virtual.study_design.two_day_design", short)
+    monkeypatch.setattr("rigidimeter.virtual.study_design.short_design", short)
     # Other processes take longer to start than this study to run; test_folder has them.
     monkeypatch.setattr("rigidimeter.cli.study._simulated", partial(_simulated, processes=1))
     other = tmp_path / "thesis"
@@ -306,9 +308,25 @@ def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(
     assert (other / "chapter.txt").read_text() == "years of work"
     earlier = tmp_path / "demo"
     (earlier / "sessions").mkdir(parents=True)
-    ran = rigidimeter("demo", "--out", earlier, "--prbs-epochs", 2, "--sinusoid-epochs", 2)
+    small = ("--days", 2, "--prbs-epochs", 2, "--sinusoid-epochs", 2)
+    ran = rigidimeter("demo", "--out", earlier, *small)
     assert ran.status == 0, ran.err
     assert ran.out.strip().endswith("report.html")
+    # What was simulated stands beside what was found, and a joint that is not the same in every
+    # epoch is no warning.
+    assert "warning" not in ran.err
+    assert "No check casts doubt on an epoch" in (earlier / "report/report.html").read_text()
+    rows = read_json(earlier / "analysis/comparison.json")["conclusion"]
+    simulated = {row["measure"]: row["simulated_percent"] for row in rows}
+    assert simulated["stiffness_nm_rad"] == pytest.approx(100 * (1 - 1.44 / 1.751))
+    assert simulated["damping_nm_s_rad"] == pytest.approx(100 * (1 - 0.119 / 0.1368))
+    assert simulated["inertia_kg_m2"] == 0.0
+    for text in (ran.out, unescape((earlier / "report/report.html").read_text())):
+        shown = " ".join(text.replace("\N{NO-BREAK SPACE}", " ").split())
+        assert "simulated" in shown.lower()
+        assert "18 % lower" in shown
+        assert "13 % lower" in shown
+        assert "the same" in shown
     assert (earlier / "analysis" / "comparison.json").is_file()
     assert (tmp_path / "demo-1" / "sessions").is_dir()
 

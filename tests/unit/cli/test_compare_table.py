@@ -50,7 +50,7 @@ def test_one_column_is_the_rank_sum_test(compared, tmp_path) -> None:
     for key in ("z", "p", "r", "shift", "shift_low", "shift_high"):
         assert row[key] == getattr(test, key)
     assert set(row["groups"]) == {"OFF", "DBS"}
-    assert set(row["groups"]["OFF"]) == {"n", "median", "q1", "q3", "excluded"}
+    assert set(row["groups"]["OFF"]) == {"n", "median", "q1", "q3", "sd_percent", "excluded"}
     assert row["groups"]["DBS"]["median"] == np.median(y)
     assert row["rank_biserial"] == pytest.approx(rank_biserial(x, y))
     assert row["r_low"] < row["r"] < row["r_high"]

@@ -168,6 +168,8 @@ def test_a_record_grows_old(
     else:
         with pytest.raises(UserError, match="holds for 180 days"):
             check(rigfile)
+        with pytest.raises(UserError, match=r"holds for 1 day[ ;]"):
+            check(rigfile, settings=parse_settings({"commissioning": {"validity_days": 1.0}}))
 
 
 @pytest.mark.parametrize(

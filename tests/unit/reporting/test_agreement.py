@@ -113,17 +113,20 @@ def test_comparisons_over_epochs(study, json, folder: Path, page: ParsedPage) ->
         assert_same(row, test)
         for side, name in (("reference", "OFF"), ("other", "DBS")):
             group = c["groups"][name]
-            assert_same(row, {f"{key}_{side}": group[key] for key in ("median", "q1", "q3")})
-        assert_shows(cells[5], [c["shift"], c["shift_low"], c["shift_high"]], 3)
-        assert_shows(cells[6], [c["z"]], 3)
-        assert_shows(cells[7], [c["r"]], 2)
-        assert_shows(cells[8], [c["p"], c["p_holm"]], 2)
-        for cell, name in ((cells[2], "OFF"), (cells[4], "DBS")):
+            summary = ("median", "q1", "q3", "sd_percent")
+            assert_same(row, {f"{key}_{side}": group[key] for key in summary})
+        assert_shows(cells[7], [c["shift"], c["shift_low"], c["shift_high"]], 3)
+        assert_shows(cells[8], [c["z"]], 3)
+        assert_shows(cells[9], [c["r"]], 2)
+        assert_shows(cells[10], [c["p"], c["p_holm"]], 2)
+        for (cell, sd), name in ((cells[2:4], "OFF"), (cells[5:7], "DBS")):
             assert_shows(cell, [c["groups"][name][key] for key in ("median", "q1", "q3")], 3)
+            assert_shows(sd, [c["groups"][name]["sd_percent"]], 2)
         for name, terminal in zip(("OFF", "DBS"), conditions[2 * place :], strict=False):
             group = c["groups"][name]
             assert terminal[0] == name
-            assert_shows(" ".join(terminal[3:]), [group[key] for key in ("median", "q1", "q3")], 4)
+            assert_shows(" ".join(terminal[3:5]), [group[k] for k in ("median", "q1", "q3")], 4)
+            assert_shows(terminal[5], [group["sd_percent"]], 2)
         title, shift, ends, z, p, p_holm, r = tests[place]
         assert title == c["title"]
         assert_shows(f"{shift} {ends}", [c["shift"], c["shift_low"], c["shift_high"]], 4)

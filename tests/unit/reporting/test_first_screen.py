@@ -19,8 +19,8 @@ from rigidimeter.reporting import first_screen
 from rigidimeter.reporting import page as page_module
 from rigidimeter.reporting.first_screen import (
     difference_words,
-    gravest_words,
     light_words,
+    main_finding,
     strip,
 )
 from rigidimeter.reporting.interval_plot import interval_plot, reach
@@ -131,13 +131,13 @@ def test_the_light_is_words(study: StudyResult) -> None:
     light = traffic_light(study)
     assert light is not None
     assert light_words(light) == "46 of 49 epochs are sound (3 are excluded)."
-    assert gravest_words(light) == "No check casts doubt on an epoch."
+    assert main_finding(light) == "No check casts doubt on an epoch."
     worse = replace(light, doubt="voluntary_torque", doubt_epochs=7, doubted=7, sound=39)
     assert light_words(worse) == (
         "39 of 49 epochs are sound (checks cast doubt on 7, 3 are excluded)."
     )
-    assert gravest_words(worse) == "Gravest doubt: voluntary torque, in 7 of them."
-    assert gravest_words(replace(light, text="all days came later")) == "All days came later."
+    assert main_finding(worse) == "Main finding: voluntary torque, in 7 of them."
+    assert main_finding(replace(light, text="all days came later")) == "All days came later."
 
 
 def test_a_difference_that_is_unknown_has_no_picture(study: StudyResult) -> None:
@@ -205,8 +205,9 @@ def test_the_terminal_has_the_precision_of_one_condition(make_analysis) -> None:
         factor = 1e3 if "10⁻³" in line[0] else 1.0
         values = [factor * one.value, factor * one.low, factor * one.high, one.percent]
         assert_shows(" ".join(line[1:4]), values, 2)
-        assert line[4:] == (f"{one.n}", f"{one.epochs_needed}")
+        assert_shows(line[4], [one.sd_percent], 2)
+        assert line[5:] == (f"{one.n}", f"{one.epochs_needed}")
     one_epoch = compare_analysis(make_analysis({"DBS": 1}), resamples=0)
     rows = cells_below(estimate_blocks(one_epoch), "All epochs together")
     (work,) = (row for row in rows if "Work" in row[0])
-    assert work[2:] == ("not known from one epoch", "", "1", "")
+    assert work[2:] == ("not known from one epoch", "", "–", "1", "")

@@ -213,7 +213,7 @@ def test_page_tells_what_the_estimates_know(page: Page, study: StudyResult) -> N
     for fit in (*analysis.fits, *analysis.fixed_inertia, *analysis.pooled):
         assert interval(fit.stiffness_nm_rad_low, fit.stiffness_nm_rad_high) in text
     assert "(all)" in text
-    assert "From 10 epochs on they come from the scatter between epochs; with fewer, the" in text
+    assert "with fewer, each is the wider of that and what the residual gives" in text
     assert "Intervals are made from the power of the residual at each frequency" in text
     assert "Torque over angle" not in text  # needs a perturbation that repeats
 

@@ -48,9 +48,10 @@ def test_the_comparison_has_epochs_and_days_of_every_measure(
         quartiles = interval(summary.q1, summary.q3, 3)
         assert row[2] == f"{number(summary.median, 3)} {quartiles}"
         shift = interval(test.shift_low, test.shift_high, 3)
-        assert row[5] == f"{number(test.shift, 3)} {shift}"
-        assert row[6:8] == [number(test.z, 3), number(test.r, 2)]
-        assert row[8] == f"{p_value(test.p)} ({p_value(c.p_holm)})"
+        assert row[3] == number(summary.sd_percent, 2)
+        assert row[7] == f"{number(test.shift, 3)} {shift}"
+        assert row[8:10] == [number(test.z, 3), number(test.r, 2)]
+        assert row[10] == f"{p_value(test.p)} ({p_value(c.p_holm)})"
         assert by_days[1] == f"{number(day.estimate)} {interval(day.low, day.high)}"
         assert by_days[2:5] == [str(day.n_days_x), str(day.n_days_y), number(day.df)]
         assert by_days[5] == f"{p_value(day.p)} ({p_value(c.days_p_holm)})"

@@ -2,16 +2,26 @@ import math
 
 import pytest
 
-from rigidimeter.statistics import Summary, summarise
+from rigidimeter.statistics import summarise
 
 
 def test_quartiles_are_those_of_r_type_7() -> None:
     # R: quantile(c(1, 2, 4, 8), c(.25, .5, .75)) is 1.75, 3, 5.
-    assert summarise([8.0, 1.0, 4.0, 2.0]) == Summary(n=4, median=3.0, q1=1.75, q3=5.0)
+    found = summarise([8.0, 1.0, 4.0, 2.0])
+    assert (found.n, found.median, found.q1, found.q3) == (4, 3.0, 1.75, 5.0)
+
+
+def test_the_scatter_is_in_per_cent_of_the_mean() -> None:
+    # (8, 1, 4, 2): mean 3.75, sum of squares about it 28.75, so SD √(28.75/3) = 3.0957.
+    assert summarise([8.0, 1.0, 4.0, 2.0]).sd_percent == pytest.approx(82.552, abs=1e-3)
+    assert summarise([5.0, 5.0]).sd_percent == 0.0
+    for unknown in ([5.0], [-1.0, 0.5]):
+        assert math.isnan(summarise(unknown).sd_percent)
 
 
 def test_one_value_is_its_own_quartiles() -> None:
-    assert summarise([0.3]) == Summary(n=1, median=0.3, q1=0.3, q3=0.3)
+    found = summarise([0.3])
+    assert (found.n, found.median, found.q1, found.q3) == (1, 0.3, 0.3, 0.3)
 
 
 def test_an_empty_sample_has_no_numbers() -> None:

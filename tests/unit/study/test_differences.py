@@ -166,7 +166,7 @@ class TestTrafficLight:
         pooled = replace(study.analysis.fits[-1], condition="OFF", findings=(finding,))
         made = replace(study, analysis=replace(study.analysis, pooled=(pooled,)))
         light = traffic_light(made)
-        assert (light.level, light.doubt, light.doubt_epochs) == ("good", finding.name, 0)
+        assert (light.level, light.doubt, light.text) == ("good", "", "")
         alone = replace(made, other="", comparisons=())
         assert traffic_light(alone).level == "caution"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -72,6 +73,7 @@ def test_the_tables_name_every_session(folder: Path) -> None:
     study = tomllib.loads((folder / "study.toml").read_text(encoding="utf-8"))
     assert study["schema"] == "rigidimeter.study/1"
     assert (study["reference"], study["other"]) == ("OFF", "DBS")
+    simulated = study["simulated"]
     assert study["conditions"]["DBS"] == {
         "title": "stimulation on",
         "frequency_hz": 130.0,
@@ -80,6 +82,17 @@ def test_the_tables_name_every_session(folder: Path) -> None:
         "wash_in_min": 15.0,
         "electrodes": "bipolar",
     }
+    assert [simulated[name]["stiffness_nm_rad"] for name in ("OFF", "DBS")] == [1.751, 1.44]
+    assert [simulated[name]["damping_nm_s_rad"] for name in ("OFF", "DBS")] == [0.1368, 0.119]
+    assert simulated["OFF"]["inertia_kg_m2"] == simulated["DBS"]["inertia_kg_m2"] == 0.0045
+    # 20 deg at 1 Hz: π B ω A² and 4 A |K − J ω² + i B ω| / ω; a third of a point by 2 · ½ ln(…).
+    A, omega = math.radians(20.0), 2 * math.pi
+    impedance = complex(1.44 - 0.0045 * omega**2, 0.119 * omega)
+    assert simulated["DBS"]["work_j"] == pytest.approx(math.pi * 0.119 * omega * A**2, rel=1e-5)
+    expected = 4 * A * abs(impedance) / omega
+    assert simulated["DBS"]["impulse_nm_s"] == pytest.approx(expected, rel=1e-5)
+    fall = math.log(0.119 / 0.1368) + math.log(1.44 / 1.751)
+    assert simulated["DBS"]["rating"] == pytest.approx(2.0 + fall, rel=1e-5)
     assert study["rating"] == {"scale": [0.0, 3.0], "step": 0.5}
     sessions = rows_of(folder / study["sessions"])
     assert [(row["day"], row["condition"]) for row in sessions] == [

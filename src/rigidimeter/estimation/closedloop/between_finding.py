@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigidimeter.estimation.between_epochs import in_full
 from rigidimeter.records import Epoch, Finding
 from rigidimeter.settings import DiagnosticsSettings
 
@@ -28,13 +29,14 @@ def doubt_of(
         return (Finding("between_samples", level, np.nan, most, text, remedy),)
     if percent <= most:
         return ()
+    shown = in_full(percent, limit=most)
     text = (
-        f"drives that explain the velocity equally well give {name} up to {percent:.2g} % "
+        f"drives that explain the velocity equally well give {name} up to {shown} % "
         f"away (at most {most:g} %): the samples do not show how the joint moved between them"
     )
     if not drive_known:
         text = (
-            f"at the samples of the torque the drive of the settings makes {name} {percent:.2g} % "
+            f"at the samples of the torque the drive of the settings makes {name} {shown} % "
             f"wrong (at most {most:g} %), and without velocity and command that is not corrected"
         )
     return (Finding("between_samples", level, percent, most, text, REMEDY),)

@@ -27,9 +27,8 @@ _INTERVALS_TEXT = (
 )
 
 _POOLED_TEXT = (
-    f"From {ENOUGH_EPOCHS} epochs on they come from the scatter between epochs; with fewer, the "
-    "joint is taken for one that does not change, and where epochs differ by more than their own "
-    "intervals these are too narrow"
+    f"From {ENOUGH_EPOCHS} epochs on they come from the scatter between epochs; with fewer, each "
+    "is the wider of that and what the residual gives"
 )
 
 IV = Method(

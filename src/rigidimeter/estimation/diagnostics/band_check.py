@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigidimeter.estimation.between_epochs import p_text
+from rigidimeter.estimation.between_epochs import in_full, p_text
 from rigidimeter.estimation.closedloop.band_sensitivity import BandChange
 from rigidimeter.estimation.diagnostics.check_record import half_widths
 from rigidimeter.estimation.signals import Array
@@ -98,7 +98,7 @@ def band_finding(
     way = "more" if change[band, parameter] * fit.value[parameter] > 0 else "less"
     text = (
         f"from {found.low_hz:.3g} to {found.high_hz:.3g} Hz {about.symbol} is "
-        f"{percent[band, parameter]:.2g} ± "
+        f"{in_full(float(percent[band, parameter]), limit=most)} ± "
         f"{100 * found.change_se[parameter] / abs(fit.value[parameter]):.2g} % {way} than from "
         f"{own.low_hz:.3g} to {own.high_hz:.3g} Hz (at most {most:g} %; by chance "
         f"{p_text(float(p[band, parameter]))}), {of_half[band, parameter]:.2g} times half its "

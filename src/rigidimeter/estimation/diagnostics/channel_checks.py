@@ -14,12 +14,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rigidimeter.estimation.bad_stretches import FITTED, longest_repetition, share_at_extremes
+from rigidimeter.estimation.between_epochs import in_full
 from rigidimeter.estimation.diagnostics.check_record import (
     Case,
     Check,
     Look,
     at_most,
-    in_full,
 )
 from rigidimeter.estimation.stretches import left_out_s
 from rigidimeter.records import LOST_SAMPLES, Channel, Epoch, LeftOut, Ticks
@@ -34,7 +34,8 @@ def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     left_out = _left_out(epoch, "saturation")
     if left_out:
         value = 100.0 * _seconds(left_out) / _length_s(epoch)
-        fact = f"{_channels(left_out)} in {in_full(value)} % of the time (at most {most:g} %)"
+        share = in_full(value, limit=most)
+        fact = f"{_channels(left_out)} in {share} % of the time (at most {most:g} %)"
         return Look(value, most, True, fact)
     shares = {c.name: 100.0 * share_at_extremes(epoch, c, settings) for c in _fitted(epoch)}
     worst = max(shares, key=lambda name: shares[name])
@@ -42,7 +43,8 @@ def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     return at_most(
         value,
         most,
-        f"{worst} repeats its extreme values in {in_full(value)} % of samples (at most {most:g} %)",
+        f"{worst} repeats its extreme values in {in_full(value, limit=most)} % of samples (at most "
+        f"{most:g} %)",
     )
 
 
@@ -58,7 +60,8 @@ def frozen(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
         worst = max(found, key=lambda name: found[name][0])
         (value, start_s), what = found[worst], f"{worst} repeats one value"
     when = f", from {start_s:.4g} s" if value > 0 else ""
-    return at_most(value, most, f"{what} for {value:.2g} s (at most {most:g} s){when}")
+    fact = f"{what} for {in_full(value, limit=most)} s (at most {most:g} s){when}"
+    return at_most(value, most, fact)
 
 
 def left_out(epoch: Epoch) -> Look:
@@ -83,7 +86,7 @@ def lost_samples(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     stop_s = max(float(torque_s[-1]), *(stretch.stop_s for stretch in found))
     value = 100.0 * lost_s / (stop_s - start_s)
     reasons = "; ".join(stretch.reason for stretch in found[:MOST_SHOWN])
-    share = f"{in_full(value)} % of the epoch (at most {most:g} %)"
+    share = f"{in_full(value, limit=most)} % of the epoch (at most {most:g} %)"
     return Look(value, most, True, f"samples of {lost_s:.3g} s are lost, {share}: {reasons}")
 
 
@@ -159,7 +162,9 @@ def guard_limited(ticks: Ticks, settings: DiagnosticsSettings) -> Look:
     value = 100.0 * ticks.limited / ticks.ran
     most = settings.limited_most_percent
     return at_most(
-        value, most, f"the guard changed {in_full(value)} % of the commands (at most {most:g} %)"
+        value,
+        most,
+        f"the guard changed {in_full(value, limit=most)} % of the commands (at most {most:g} %)",
     )
 
 
@@ -171,7 +176,7 @@ def position_limit(angle: Channel, limit_rad: float, settings: DiagnosticsSettin
         value,
         most,
         (
-            f"the joint came to {value:.0f} % of the position limit of "
+            f"the joint came to {in_full(value, '.0f', limit=most)} % of the position limit of "
             f"{math.degrees(limit_rad):.3g} deg (at most {most:g} %)"
         ),
     )

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from rigidimeter.dynamics import Loop
+from rigidimeter.estimation.between_epochs import in_full
 from rigidimeter.estimation.method_record import Method
 from rigidimeter.estimation.prepared import PreparedEpoch
 from rigidimeter.estimation.signals import Array, Signals
@@ -35,8 +36,8 @@ def push_harmless(case: Case, look: Look) -> str:
     del look
     if case.uses_perturbation and case.method is not None:
         return (
-            f"{case.method.name} uses the motion that the perturbation causes alone, so J, B and K "
-            "are not biased by it; it is in their intervals"
+            f"{case.method.name} uses the motion that the perturbation causes alone, so torque "
+            "that something but the robot adds does not bias J, B and K; it is in their intervals"
         )
     share = case.loop_bias_percent
     if share is not None and share <= case.settings.loop_bias_most_percent:
@@ -229,19 +230,6 @@ def at_most(value: float, most: float, fact: str, meaning: str = "") -> Look:
 def at_least(value: float, least: float, fact: str, meaning: str = "") -> Look:
     """Return a look that fails below a threshold, or if the value is not a number."""
     return Look(value, least, not value >= least, fact, meaning)
-
-
-def in_full(value: float, spec: str = ".2g") -> str:
-    """Return a number rounded as `spec` says, without a power of ten for a large one.
-
-    Examples
-    --------
-    >>> in_full(104.2), in_full(7.36), in_full(-290.0, "+.2g"), in_full(2e-9)
-    ('104', '7.4', '-290', '2e-09')
-    """
-    text = format(value, spec)
-    whole = "e+" in text and abs(value) < 1e6
-    return format(value, f"{'+' if '+' in spec else ''}.0f") if whole else text
 
 
 def reconstructed_torque_nm(signals: Signals, parameters: Array) -> Array:

@@ -23,6 +23,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from rigidimeter.estimation.between_epochs import in_full
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look, at_least
 from rigidimeter.estimation.diagnostics.excitation_checks import perturbation_nm
 from rigidimeter.estimation.signals import Array, Signals, motion_channels, sampled, values_at
@@ -53,8 +54,8 @@ def static_torque(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings)
     return at_least(
         value,
         least,
-        f"{value:.2g} % of the torque's variance is not a function of the angle (at least "
-        f"{least:g} %)",
+        f"{in_full(value, limit=least)} % of the torque's variance is not a function of the angle "
+        f"(at least {least:g} %)",
     )
 
 
@@ -86,8 +87,8 @@ def computed_torque(epoch: Epoch, settings: DiagnosticsSettings) -> Look | None:
     return at_least(
         value,
         least,
-        f"{value:.2g} % of the torque's SD is not a sum of samples of {origin} (at least "
-        f"{least:g} %)",
+        f"{in_full(value, limit=least)} % of the torque's SD is not a sum of samples of {origin} "
+        f"(at least {least:g} %)",
         f"the torque was computed from {origin}, or simulated without noise",
     )
 

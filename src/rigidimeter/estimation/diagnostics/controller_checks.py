@@ -16,12 +16,12 @@ from dataclasses import replace
 import numpy as np
 
 from rigidimeter.dynamics import JointDynamics, Loop, spectral_radius
+from rigidimeter.estimation.between_epochs import in_full
 from rigidimeter.estimation.diagnostics.check_record import (
     Case,
     Check,
     Look,
     at_most,
-    in_full,
     push_harmless,
 )
 from rigidimeter.estimation.diagnostics.controller_used import (
@@ -55,8 +55,8 @@ def controller_misfit(prepared: PreparedEpoch, loop: Loop) -> Look | None:
         most,
         (
             f"from perturbation and torque the controller of the settings makes a velocity command "
-            f"that differs from the recorded one by {in_full(value)} % (at most {most:g} %) and is "
-            f"{factor:.2g} times as large"
+            f"that differs from the recorded one by {in_full(value, limit=most)} % (at most "
+            f"{most:g} %) and is {factor:.2g} times as large"
         ),
     )
     shown = _controller_shown(prepared, loop) if look.failed else None

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft, signal
 
+from rigidimeter.estimation.between_epochs import in_full
 from rigidimeter.estimation.diagnostics.check_record import (
     Check,
     Look,
@@ -58,7 +59,8 @@ def conditioning(signals: Signals, settings: DiagnosticsSettings) -> Look:
     return at_most(
         value,
         most,
-        f"the condition number of the motion is {value:.3g} (at most {most:g})",
+        f"the condition number of the motion is {in_full(value, '.3g', limit=most)} "
+        f"(at most {most:g})",
         meaning=(
             f"this epoch cannot distinguish {PARAMETERS[first].symbol} from "
             f"{PARAMETERS[second].symbol}, because {MIDDLE_PERCENT:g} % of the velocity's power "
@@ -81,8 +83,8 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
         value,
         least,
         (
-            f"the coherence of perturbation and {weaker} has a median of {value:.2f} in the band "
-            f"(at least {least:g})"
+            f"the coherence of perturbation and {weaker} has a median of "
+            f"{in_full(value, '.2f', limit=least)} in the band (at least {least:g})"
         ),
         meaning=(
             f"only {100 * value:.0f} % of the {weaker}'s power follows the perturbation; the rest "
@@ -123,8 +125,8 @@ def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) ->
         value,
         least,
         (
-            f"{value:.0f} % of the {weaker}'s power lies in the band, {low:g} to {high:.3g} Hz (at "
-            f"least {least:g} %)"
+            f"{in_full(value, '.0f', limit=least)} % of the {weaker}'s power lies in the band, "
+            f"{low:g} to {high:.3g} Hz (at least {least:g} %)"
         ),
     )
 
@@ -137,8 +139,8 @@ def imposed_sinusoid(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
         value,
         most,
         shares.single(most / 100.0),
-        f"the strongest line holds {value:.0f} % of the angle's variance (at most {most:g} %) and "
-        f"{100 * shares.velocity:.0f} % of the velocity's",
+        f"the strongest line holds {in_full(value, '.0f', limit=most)} % of the angle's "
+        f"variance (at most {most:g} %) and {100 * shares.velocity:.0f} % of the velocity's",
     )
 
 

@@ -14,12 +14,12 @@ from dataclasses import replace
 import numpy as np
 from scipy import fft
 
+from rigidimeter.estimation.between_epochs import in_full
 from rigidimeter.estimation.closedloop.between_finding import REMEDY
 from rigidimeter.estimation.diagnostics.check_record import (
     Case,
     Check,
     Look,
-    in_full,
 )
 from rigidimeter.estimation.diagnostics.omitted_bias import moved, moved_by_linear
 from rigidimeter.estimation.prepared import PreparedEpoch
@@ -102,7 +102,8 @@ def missing_term(case: Case) -> Look | None:
         value,
         100.0,
         True,
-        f"{named}{together}, {in_full(value, '.3g')} % of half their intervals (at most 100 %)",
+        f"{named}{together}, {in_full(value, '.3g', limit=100.0)} % of half their intervals "
+        "(at most 100 %)",
         meaning=_of_drive(case, found.terms),
         remedy=f"include it: rigidimeter model --terms {asked}",
     )
@@ -164,8 +165,8 @@ def _linear(case: Case, beyond: BeyondLinear, term: LinearTerm) -> Look:
         True,
         f"{what} (it explains {100 * term.share:.0f} % of what J, B and K leave to a linear "
         f"filter; p = {term.p:.1g}, below {CHANCE:g}); included, it changes "
-        f"{_changes(case, added)}, {in_full(value, '.3g')} % of half their intervals (at most "
-        "100 %)",
+        f"{_changes(case, added)}, {in_full(value, '.3g', limit=100.0)} % of half their intervals "
+        "(at most 100 %)",
         remedy=remedy,
     )
 

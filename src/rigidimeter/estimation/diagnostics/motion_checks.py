@@ -16,18 +16,19 @@ from the angle alone and from the velocity alone; the torque says which of them 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from rigidimeter.estimation.bandlimited import bandlimited_signals, zero_phase_band
+from rigidimeter.estimation.between_epochs import in_full
 from rigidimeter.estimation.diagnostics.check_record import (
     Case,
     Check,
     Look,
     at_most,
-    in_full,
 )
 from rigidimeter.estimation.least_squares import fit_inertia_damping_stiffness
 from rigidimeter.estimation.signals import (
@@ -85,12 +86,13 @@ def velocity_fit(epoch: Epoch) -> tuple[float, float]:
 def velocity_scale(fitted: tuple[float, float], settings: DiagnosticsSettings) -> Look:
     """Return by how much the velocity's scale is off, in %."""
     value, most = 100.0 * abs(fitted[0] - 1.0), settings.velocity_scale_most_percent
+    end = 1.0 + math.copysign(most / 100.0, fitted[0] - 1.0)
     return at_most(
         value,
         most,
         (
-            f"angle_rad changes {fitted[0]:.3g} times as much as velocity_rad_s says (within "
-            f"{most:g} % of 1)"
+            f"angle_rad changes {in_full(fitted[0], '.3g', limit=end)} times as much as "
+            f"velocity_rad_s says (within {most:g} % of 1)"
         ),
     )
 
@@ -103,7 +105,7 @@ def velocity_delay(fitted: tuple[float, float], settings: DiagnosticsSettings) -
         value,
         most,
         not abs(value) <= most,
-        f"velocity_rad_s lags angle_rad by {value:.2g} ms (at most {most:g} ms)",
+        f"velocity_rad_s lags angle_rad by {in_full(value, limit=most)} ms (at most {most:g} ms)",
     )
 
 
@@ -140,7 +142,7 @@ def velocity_shape(
     most = settings.velocity_shape_most_percent
     fact = (
         f"from {band[0]:g} to {band[1]:.3g} Hz velocity_rad_s and the derivative of angle_rad "
-        f"differ in shape by {in_full(value)} % of its rms (at most {most:g} %)"
+        f"differ in shape by {in_full(value, limit=most)} % of its rms (at most {most:g} %)"
     )
     if value <= most:
         return Look(value, most, False, fact)

@@ -14,13 +14,13 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rigidimeter.estimation.bandlimited import zero_phase_band
+from rigidimeter.estimation.between_epochs import in_full
 from rigidimeter.estimation.diagnostics.check_record import (
     Case,
     Check,
     Look,
     at_most,
     half_widths,
-    in_full,
     push_harmless,
 )
 from rigidimeter.estimation.power_lines import lines_inside, power_lines
@@ -48,8 +48,8 @@ def voluntary_torque(voluntary_nm: Array, signals: Signals, settings: Diagnostic
         most,
         (
             f"the torque beyond J, B and K has an SD of {np.std(voluntary_nm):.3g} N·m; its power "
-            f"from {low:g} to {high:g} Hz, {power:.2g} N²m², is {in_full(value)} % of the torque's "
-            f"variance (at most {most:g} %)"
+            f"from {low:g} to {high:g} Hz, {power:.2g} N²m², is {in_full(value, limit=most)} % of "
+            f"the torque's variance (at most {most:g} %)"
         ),
     )
 
@@ -93,8 +93,9 @@ def active_movement(voluntary_nm: Array, signals: Signals, settings: Diagnostics
         value,
         most,
         (
-            f"the torque beyond J, B and K passes {above_nm:.2g} N·m in {value:.0f} % of the "
-            f"seconds (at most {most:g} %)" + (f", from {when}{more}" if when else "")
+            f"the torque beyond J, B and K passes {above_nm:.2g} N·m in "
+            f"{in_full(value, '.0f', limit=most)} % of the seconds (at most {most:g} %)"
+            + (f", from {when}{more}" if when else "")
         ),
     )
 
@@ -115,7 +116,7 @@ def loop_bias(fit: Fit, unbiased: Array, settings: DiagnosticsSettings) -> Look:
         most,
         (
             f"torque beyond J, B and K, which the loop turns into motion, moves {of_each}, at most "
-            f"{in_full(value)} % of half their intervals (at most {most:g} %)"
+            f"{in_full(value, limit=most)} % of half their intervals (at most {most:g} %)"
         ),
     )
 
@@ -147,7 +148,7 @@ def emg_activity(emg: Channel, settings: DiagnosticsSettings) -> Look:
         most,
         (
             f"the EMG stands above {factor:g} times its baseline of {1e6 * baseline:.3g} µV in "
-            f"{value:.0f} % of the time (at most {most:g} %)"
+            f"{in_full(value, '.0f', limit=most)} % of the time (at most {most:g} %)"
         ),
     )
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimeter.estimation.between_epochs import in_full
 from rigidimeter.estimation.closedloop.band_sensitivity import BandChange, Member, band_changes
 from rigidimeter.estimation.closedloop.lack_of_fit import (
     Answer,
@@ -228,9 +229,10 @@ def lack_of_fit(
         settings.levels.lack_of_fit,
         100 * worst.share,
         most,
-        f"from {worst.low_hz:.3g} to {worst.high_hz:.3g} Hz {100 * worst.share:.2g} % of the "
-        f"torque's response to the perturbation is not J, B and K (at most {most:g} %; by chance "
-        f"p = {worst.p:.1g}){_in_half_the_band(observed)}: friction, a reflex, a soft cuff or a "
+        f"from {worst.low_hz:.3g} to {worst.high_hz:.3g} Hz "
+        f"{in_full(100 * worst.share, limit=most)} % of the torque's response to the "
+        f"perturbation is not J, B and K (at most {most:g} %; by chance p = {worst.p:.1g})"
+        f"{_in_half_the_band(observed)}: friction, a reflex, a soft cuff or a "
         "lag of a channel is taken for the joint",
         "lower the upper edge of the band (--band-hz) and see whether J and B change; look at the "
         "coupling; `rigidimeter model --compare` tries terms for it",

@@ -14,11 +14,11 @@ import math
 
 import numpy as np
 
+from rigidimeter.estimation.between_epochs import in_full
 from rigidimeter.estimation.diagnostics.check_record import (
     Case,
     Check,
     Look,
-    in_full,
     push_harmless,
     reconstructed_torque_nm,
 )
@@ -59,8 +59,9 @@ def tremor(voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings)
         most,
         not (value <= most or stands_out < STANDS_OUT),
         f"the torque beyond J, B and K has a line at {centre_hz:.2g} Hz of "
-        f"{math.sqrt(2.0 * running[at]):.2g} N·m (amplitude), {in_full(value)} % of the torque's "
-        f"variance (at most {most:g} %) and {stands_out:.2g} times what lies beside it",
+        f"{math.sqrt(2.0 * running[at]):.2g} N·m (amplitude), {in_full(value, limit=most)} % of "
+        f"the torque's variance (at most {most:g} %) and {stands_out:.2g} times what lies "
+        "beside it",
     )
 
 

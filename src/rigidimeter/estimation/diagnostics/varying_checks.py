@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from rigidimeter.estimation.between_epochs import p_text
+from rigidimeter.estimation.between_epochs import in_full, p_text
 from rigidimeter.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.estimation.diagnostics.missing_term import terms_found
 from rigidimeter.estimation.diagnostics.varying_lines import varying_lines
@@ -31,7 +31,7 @@ def varying_look(name: str, found: Variation, settings: DiagnosticsSettings) -> 
         fact = f"no change of J, B or K with {WITH[name]} is beyond chance ({p})"
         return Look(0.0, most, False, fact)
     large = [change for change in changes if change.percent > most]
-    text = "; ".join(_sentence(change) for change in large or changes[:1])
+    text = "; ".join(_sentence(change, most) for change in large or changes[:1])
     return Look(
         changes[0].percent,
         most,
@@ -40,12 +40,12 @@ def varying_look(name: str, found: Variation, settings: DiagnosticsSettings) -> 
     )
 
 
-def _sentence(change: Change) -> str:
+def _sentence(change: Change, most: float) -> str:
     _, symbol, unit, _ = PARAMETERS[change.parameter]
     return (
         f"{symbol} goes from {change.low:.3g} ± {change.low_half:.2g} {unit} {change.low_at} to "
         f"{change.high:.3g} ± {change.high_half:.2g} {unit} {change.high_at}, a range of "
-        f"{change.percent:.0f} % of the mean, by chance {p_text(change.p)}"
+        f"{in_full(change.percent, '.0f', limit=most)} % of the mean, by chance {p_text(change.p)}"
     )
 
 

@@ -24,7 +24,8 @@ _EPOCHS_NOTE = Markup(
     "All differences are {pair}. Two-sided Wilcoxon rank-sum test, asymptotic (normal "
     "approximation), with tie and continuity correction; <i>r</i> = <i>z</i>/√N, where 0.1 is "
     "called small, 0.3 medium and 0.5 large. Shift: the Hodges–Lehmann estimate, the median of "
-    "all differences, with the interval of the same test. In brackets: <i>p</i> "
+    "all differences, with the interval of the same test. SD: between all epochs of the condition, "
+    "in % of their mean. In brackets: <i>p</i> "
     "adjusted for all measures by Holm’s method."
 )
 _DAYS_NOTE = Markup(
@@ -98,6 +99,7 @@ def _epochs(result: StudyResult, table: str) -> Iterator[Block]:
                 digits=3,
                 group=name,
             ),
+            Column(f"sd_percent_{side}", "SD (%)", digits=2, group=name),
         ]
     columns += [
         Column("shift", f"Shift [{percent} interval]", ends=("shift_low", "shift_high"), digits=3),
@@ -154,6 +156,7 @@ def _all_epochs(result: StudyResult) -> Iterator[Block]:
             Column("median", "Median"),
             Column("q1", "Lower quartile"),
             Column("q3", "Upper quartile"),
+            Column("sd_percent", "SD (% of the mean)", digits=2),
         )
     rows = result_table(result, "summaries")
     yield Table("summaries", "Medians and quartiles by condition", columns, rows)

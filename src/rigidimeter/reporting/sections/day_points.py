@@ -19,7 +19,7 @@ from rigidimeter.reporting.contents import (
     from_study_folder,
     paragraph,
 )
-from rigidimeter.reporting.numbers import axis_unit, condition_name, number
+from rigidimeter.reporting.numbers import axis_unit, condition_name, number, plural
 from rigidimeter.reporting.style import (
     GREY,
     condition_colours,
@@ -82,7 +82,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         n_days = len({(one.median.subject, one.median.day) for one in found})
         yield Figure(
             f"days_{c.measure.name}",
-            f"{c.measure.title}: {count} included epochs of {n_days} days.",
+            f"{c.measure.title}: {plural(count, 'included epoch')} of {plural(n_days, 'day')}.",
             f"{c.measure.title} by day. {words} ({c.measure.unit}).",
             partial(_in_unit, c, found, order),
             marks=_marks(c),

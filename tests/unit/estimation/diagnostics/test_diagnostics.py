@@ -174,6 +174,16 @@ def test_the_guard_and_the_position_limit_are_counted(sound):
     assert passed(position_limit(angle, 0.7, SETTINGS))
 
 
+def test_a_value_beyond_its_limit_does_not_read_as_the_limit():
+    most, least = SETTINGS.position_most_percent, SETTINGS.r_squared_least
+    assert (most, least) == (98.0, 0.3)
+    near = Channel("angle_rad", T, np.full(T.size, 0.49021))
+    assert_failed(position_limit(near, 0.5, SETTINGS), "98.04 % of the position", "(at most 98 %)")
+    low = fit_checks.r_squared(0.2996, SETTINGS)
+    assert (low.failed, low.fact) == (True, "R² is 0.2996 (at least 0.3)")
+    assert fit_checks.r_squared(0.3, SETTINGS).fact == "R² is 0.3 (at least 0.3)"
+
+
 def test_negative_parameters_are_named_with_what_is_likely():
     assert passed(negative_parameters(TRUTH))
     one = negative_parameters((0.0045, -0.1, 1.7))

@@ -30,7 +30,7 @@ def test_what_the_subject_does_is_a_note_where_the_perturbation_is_the_instrumen
     by_iv = found("iv", {"voluntary_sd_nm": 0.2})
     assert by_iv.keys() >= {"voluntary_torque", "active_movement", "coherence"}
     assert {finding.level for finding in by_iv.values()} == {"note"}
-    assert "are not biased by it" in by_iv["voluntary_torque"].text
+    assert "does not bias J, B and K" in by_iv["voluntary_torque"].text
 
 
 def test_it_is_a_doubt_for_least_squares_where_the_bias_is_more_than_the_interval():

@@ -61,6 +61,14 @@ def test_a_term_is_named_and_its_bias_told(method, term):
         assert abs(corrected[i]) < max(0.4 * abs(error[i]), 0.06), "JBK"[i]
 
 
+def test_what_follows_the_perturbation_is_not_said_to_leave_the_estimate_unbiased():
+    """A reflex of both directions: K of `iv` is more than twice the joint's own."""
+    fit, truth, found = fitted("iv", JOINTS["reflex: the torque holds a reflex of both directions"])
+    assert fit.value[2] > 2 * truth[2]
+    assert "bias" not in found["residual_perturbation"].text
+    assert "lack_of_fit tests all epochs" in found["residual_perturbation"].text
+
+
 @pytest.mark.parametrize("method", ["iv", "bandlimited"])
 @pytest.mark.parametrize("subject", [{}, {"voluntary_nm": 0.2}, {"tremor_nm": 0.3}])
 def test_no_term_is_missing_in_a_joint_of_j_b_and_k(method, subject):
