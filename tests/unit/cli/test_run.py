@@ -60,7 +60,8 @@ def seen(monkeypatch):
         target(SimpleNamespace())
 
     monkeypatch.setattr(RigFile, "build", build)
-    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: None)
+    commissioned = SimpleNamespace(rig_name="rig", numbers={})
+    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: commissioned)
     monkeypatch.setattr("rigidimeter.commissioning.require_daily_check", lambda *_, **__: CHECKED)
     monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", supervise)
     return seen
@@ -136,7 +137,8 @@ def test_a_rig_that_was_not_checked_today_is_refused_with_the_command_to_type(
     tmp_path, monkeypatch, rigidimeter
 ):
     monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
-    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: None)
+    commissioned = SimpleNamespace(rig_name="rig", numbers={})
+    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: commissioned)
     rig, protocol = tmp_path / "rig.toml", tmp_path / "protocol.toml"
     rig.write_text(RIG)
     protocol.write_text("seed = 2\n")
@@ -151,7 +153,8 @@ def test_a_rig_that_another_uses_is_refused_before_any_process_starts(
     tmp_path, monkeypatch, rigidimeter
 ):
     monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
-    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: None)
+    commissioned = SimpleNamespace(rig_name="rig", numbers={})
+    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: commissioned)
     monkeypatch.setattr("rigidimeter.commissioning.require_daily_check", lambda *_, **__: CHECKED)
     rig, copy = tmp_path / "rig.toml", tmp_path / "copy.toml"
     rig.write_text(RIG)

@@ -274,7 +274,7 @@ def test_scores_of_every_epoch(study, json, folder: Path, page: ParsedPage) -> N
         values = [score[name] for name in ("impulse_nm_s", "work_j", "n_cycles", "frequency_hz")]
         for column, value in zip(columns, values, strict=True):
             assert_shows(cells[column], [value], 4)
-        assert_shows(" ".join(line[2:]), values[:2], 5)
+        assert_shows(" ".join(line[2:]), values[:3], 5)
 
 
 def test_pooled_estimates(study, json, folder: Path, page: ParsedPage) -> None:
