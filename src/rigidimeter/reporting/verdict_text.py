@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 from rigidimeter.reporting.numbers import (
     amount,
     condition_name,
-    interval,
     number,
     p_value,
     plural,
@@ -20,13 +19,9 @@ from rigidimeter.study import (
     Comparison,
     Conclusion,
     Conclusions,
-    Dependence,
-    SensitivityRow,
     StudyResult,
     conclude,
-    dependences,
     doubt_sentence,
-    leader,
     precisions,
 )
 
@@ -64,8 +59,6 @@ def verdict(result: StudyResult) -> Verdict:
             further = conclude(pair)
             rest += [] if further is None else _sentences(pair, further)
         rest += _tested(concluded)
-        if concluded.of("lower", "higher"):
-            rest += _largest(result)
     lead += _left_out(result)
     return Verdict(prefix + lead, (*rest, *doubt_sentence(result.analysis)))
 
@@ -172,111 +165,3 @@ def _p(p: float) -> str:
 def _lower_first(c: Comparison) -> str:
     """Return the title of a measure as it is written within a sentence."""
     return within(c.measure.title)
-
-
-def _largest(result: StudyResult) -> list[str]:
-    found = leader(result)
-    if found is None:
-        return []
-    titles = [_lower_first(c) for c in found.first]
-    size = f"rank-biserial correlation {number(found.size, 2)}"
-    if len(titles) > 1:
-        return [f"The largest effects, of equal size, are those of {series(titles)} ({size})."]
-    effects = found.first[0].effects
-    if effects is not None:
-        size += f", r\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}{number(effects.r, 2)}"
-    parts = [f"The largest effect is that of {titles[0]} ({size})"]
-    alone = len(found.level) > 1 and not (found.ahead or found.unknown)
-    for members, text in (
-        (found.ahead, "it is significantly larger than that of {}"),
-        (found.level, "it is not significantly larger than that of {}"),
-        (found.unknown, "its difference from that of {} could not be tested"),
-    ):
-        if members:
-            others = "any other" if alone else series([_lower_first(c) for c in members])
-            parts.append(text.format(others))
-    return [f"{'; '.join(parts)}."]
-
-
-def dependence_sentences(result: StudyResult) -> list[str]:
-    """Return for each measure whether its conclusion depends on the method."""
-    reference, other = condition_name(result.reference), condition_name(result.other)
-    return [_dependence(found, reference, other) for found in dependences(result)]
-
-
-def _dependence(found: Dependence, reference: str, other: str) -> str:
-    title = found.rows[0].measure.title
-    if not found.lower and not found.higher:
-        return f"{title}: no method shows a difference."
-    if found.lower and found.higher:
-        text = (
-            f"{title}: the sign depends on the method. {_names(found.lower, found)} "
-            f"{_verb(found.lower)} {other} lower than {reference}, "
-            f"{_names(found.higher, found)} higher"
-        )
-        return text + (f", {_names(found.none, found)} neither." if found.none else ".")
-    if not found.none:
-        return f"{title}: every method shows the difference. {_reason(found)}".rstrip()
-    shown = found.lower or found.higher
-    text = (
-        f"{title}: {_names(shown, found)} {_verb(shown)} a difference, "
-        f"{_names(found.none, found)} {'do' if _several(found.none) else 'does'} not."
-    )
-    return f"{text} {_reason(found)}".rstrip()
-
-
-def _several(rows: Sequence[SensitivityRow]) -> bool:
-    return len({row.method for row in rows}) > 1
-
-
-def _verb(rows: Sequence[SensitivityRow]) -> str:
-    return "show" if _several(rows) else "shows"
-
-
-def _names(rows: Sequence[SensitivityRow], found: Dependence) -> str:
-    """Return the methods, with J fixed or free where only one of both is meant."""
-    ways: dict[str, list[str]] = {}
-    for row in rows:
-        ways.setdefault(row.method, []).append(row.inertia)
-    named = []
-    for method, own in ways.items():
-        every = {row.inertia for row in found.rows if row.method == method}
-        named.append(f"“{method}”" + (f" (J {own[0]})" if len(own) < len(every) else ""))
-    return series(named)
-
-
-def _reason(found: Dependence) -> str:
-    """Return what may explain that methods disagree."""
-    if found.reason == "least squares alone":
-        return (
-            "The subject’s own torque biases least squares; it can hide a difference as well as "
-            "make one."
-        )
-    one = found.standard
-    if one is None:
-        return ""
-    ends = interval(one.shift_low, one.shift_high, 3)
-    about = _names(found.about, found)
-    if found.reason == "size":
-        (far,) = found.about
-        return (
-            f"The size depends on the method: {number(far.shift, 3)} {far.measure.unit} by {about} "
-            f"is outside the interval of “{one.method}”, {number(one.shift, 3)} {ends}."
-        )
-    if found.reason == "alike":
-        return (
-            f"All shifts are within the interval of “{one.method}”, {ends}: they differ more in p "
-            "than in size."
-        )
-    if found.reason == "imprecise":
-        return (
-            f"The interval of “{one.method}”, {ends}, also contains the shift of {about}: lack of "
-            "precision could be the reason."
-        )
-    text = f"The interval of “{one.method}”, {ends}, does not contain that shift."
-    if found.reason == "not voluntary":
-        return f"{text} Voluntary torque would bias {about} too, so it is not the likely reason."
-    return (
-        f"{text} Voluntary torque would explain this: it biases least squares but not the "
-        "instrumental-variable estimate."
-    )

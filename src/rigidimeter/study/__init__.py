@@ -15,10 +15,8 @@ from rigidimeter.study.comparison import (
     split_pooled,
 )
 from rigidimeter.study.conclusions import Conclusion, Conclusions, conclude, conclusion_rows
-from rigidimeter.study.dependence import Dependence, dependences
 from rigidimeter.study.differences import Difference
 from rigidimeter.study.doubted_epochs import doubt_sentence
-from rigidimeter.study.leading_effect import leader
 from rigidimeter.study.measures import RATING, Measure, Observation, conditions
 from rigidimeter.study.provenance import provenance
 from rigidimeter.study.rating_relation import Relation, agreement, relations
@@ -37,6 +35,7 @@ from rigidimeter.study.results import (
     SessionEntry,
     StudyResult,
 )
+from rigidimeter.study.sensitivity import method_caveats
 from rigidimeter.study.study_analysis import analyse_study, estimate_study, read_study
 from rigidimeter.study.tables import comparison_document, result_table, result_tables, table_csv
 from rigidimeter.study.traffic_light import TrafficLight, traffic_light

@@ -15,6 +15,7 @@ from rigidimeter.study.compared import Comparison, measure_names
 from rigidimeter.study.differences import Difference, simulated_difference
 from rigidimeter.study.objections import hidden, negligible, objections, untested
 from rigidimeter.study.results import StudyResult
+from rigidimeter.study.sensitivity import method_caveats
 from rigidimeter.study.tested import LEVEL, Basis, basis_of, tested, too_few
 
 Verdict = Literal["lower", "higher", "no difference shown", "not supported", "cannot be decided"]
@@ -118,6 +119,7 @@ def conclude(result: StudyResult) -> Conclusions | None:
 
 def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
     """Return the conclusions as rows of a document."""
+    caveats = method_caveats(result.sensitivity)
     return [
         {
             **measure_names(one.comparison.measure),
@@ -128,6 +130,7 @@ def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
             "p_holm": one.p,
             "tested_by": concluded.basis,
             "reason": one.reason,
+            "caveat": caveats.get(one.comparison.measure.name, ""),
             **({} if one.simulated is None else _simulated_row(one.simulated)),
         }
         for concluded in map(conclude, (result, *result.further_pairs))

@@ -12,6 +12,7 @@ from rigidimeter.study.compared import Comparison
 from rigidimeter.study.comparison import FEWEST_FOR_TEST, day_test, observed, rank_test
 from rigidimeter.study.measures import MEASURES, Measure
 from rigidimeter.study.results import SensitivityRow, SessionEntry
+from rigidimeter.study.tested import LEVEL
 
 _INERTIA, _DAMPING, _STIFFNESS = MEASURES[:3]
 _STAGES: Mapping[Measure, tuple[Literal["fixed", "free"], ...]] = {
@@ -99,3 +100,20 @@ def _row(
         p_day=p_day,
         chosen=chosen,
     )
+
+
+def method_caveats(rows: Sequence[SensitivityRow]) -> dict[str, str]:
+    """Return for each measure, by name, how its conclusion depends on the method; empty if not.
+
+    A method shows a difference where p by days, or else p over epochs, is below the level.
+    """
+    signs: dict[str, set[int]] = {}
+    for row in rows:
+        p = row.p if math.isnan(row.p_day) else row.p_day
+        shown = int(math.copysign(1, row.shift)) if p < LEVEL and row.shift else 0
+        signs.setdefault(row.measure.name, set()).add(shown)
+    return {
+        name: "the sign of the difference depends on the method" if {1, -1} <= found
+        else "not every method shows a difference" if len(found) > 1 else ""
+        for name, found in signs.items()
+    }  # fmt: skip

@@ -25,8 +25,7 @@ from rigidimeter.reporting.contents import (
 )
 from rigidimeter.reporting.numbers import axis_unit, condition_name, interval, number
 from rigidimeter.reporting.style import GREY, INK, drawable, styled, wrapped
-from rigidimeter.reporting.verdict_text import dependence_sentences
-from rigidimeter.study import Measure, SensitivityRow, StudyResult, result_table
+from rigidimeter.study import Measure, SensitivityRow, StudyResult, method_caveats, result_table
 
 _OTHER = "#0072B2"
 MOST_BESIDE = 3
@@ -51,8 +50,10 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         partial(sensitivity, found, shift),
         "tall",
     )
-    if sentences := dependence_sentences(result):
-        yield bullets(sentences)
+    titles = {row.measure.name: row.measure.title for row in found}
+    caveats = [f"{titles[name]}: {text}." for name, text in method_caveats(found).items() if text]
+    if caveats:
+        yield bullets(caveats)
         yield paragraph(
             "A difference counts as shown if p of the test by days is below 0.05, not adjusted; "
             "where days could not be tested, if p over epochs is.",
