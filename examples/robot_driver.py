@@ -257,7 +257,7 @@ class RobotDrive(_Part):
 
 
 if __name__ == "__main__":
-    from rigidimeter.devices.conformance import (
+    from rigidimeter.testing.conformance import (
         DRIVE_CHECKS,
         SENSOR_CHECKS,
         DriveFixture,

@@ -33,11 +33,11 @@ from rigidimeter.devices.base import DeviceError
 from rigidimeter.devices.cia402.drive import Cia402Drive
 from rigidimeter.devices.composed import ComposedRig
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation.ascii_emulator import AsciiEmulator
-from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
-from rigidimeter.emulation.emulated_arm import EmulatedArm
-from rigidimeter.emulation.rdt.rdt_emulator import RdtEmulator
 from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.testing.ascii_emulator import AsciiEmulator
+from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
+from rigidimeter.testing.emulated_arm import EmulatedArm
+from rigidimeter.testing.rdt.rdt_emulator import RdtEmulator
 
 CANOPEN, ASCII = "rdt_canopen", "rdt_ascii"
 WIRES = (CANOPEN, ASCII)

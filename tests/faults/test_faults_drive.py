@@ -27,8 +27,8 @@ from tests.faults.trials import (
 
 from rigidimeter.acquisition.run_states import Command
 from rigidimeter.devices.base import DeviceError
-from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
 from rigidimeter.guard import Cause, guard_limits
+from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
 
 HORIZON_S = 0.1
 """Of the serial drive: its moves end by themselves after that."""

@@ -8,9 +8,9 @@ import pytest
 
 from rigidimeter.devices.ascii.drive import AsciiDrive
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation.ascii_emulator import AsciiEmulator
-from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.guard import Cause
+from rigidimeter.testing.ascii_emulator import AsciiEmulator
+from rigidimeter.testing.emulated_arm import EmulatedArm
 
 COUNTS_PER_TURN = 360_000.0
 TICK_S = 0.02

@@ -12,8 +12,8 @@ import pytest
 from rigidimeter.devices.base import MotionSample
 from rigidimeter.devices.cia402.drive import Cia402Drive, Cia402Settings
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation import EmulatedArm
-from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
+from rigidimeter.testing import EmulatedArm
+from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
 
 # Wide enough for a machine that is busy with other things; the drive's own limits are measured.
 SLACK = {

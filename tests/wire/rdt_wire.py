@@ -6,9 +6,9 @@ import pytest
 
 from rigidimeter.devices.ati.rdt import AtiRdt
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation.emulated_arm import EmulatedArm
-from rigidimeter.emulation.rdt.rdt_emulator import RdtEmulator
 from rigidimeter.guard import Cause
+from rigidimeter.testing.emulated_arm import EmulatedArm
+from rigidimeter.testing.rdt.rdt_emulator import RdtEmulator
 
 ANGLE_RAD = 0.3
 STIFFNESS_NM_RAD = 2.0

@@ -22,8 +22,8 @@ from tests.wire.ascii_wire import (
 
 from rigidimeter.devices.ascii.drive import AsciiDrive
 from rigidimeter.devices.base import DeviceError
-from rigidimeter.emulation.ascii_emulator import MISBEHAVIOURS
 from rigidimeter.guard import Cause
+from rigidimeter.testing.ascii_emulator import MISBEHAVIOURS
 
 __all__ = ["wire"]
 

@@ -11,8 +11,8 @@ import pytest
 from tests.wire.cia402_wire import SLACK, emulated_arm, run_loop, wait_until, wire
 
 from rigidimeter.devices.base import DeviceError
-from rigidimeter.emulation.cia402.cia402_emulator import MISBEHAVIOURS, Cia402Emulator
 from rigidimeter.guard import Cause
+from rigidimeter.testing.cia402.cia402_emulator import MISBEHAVIOURS, Cia402Emulator
 
 __all__ = ["wire"]
 
@@ -252,7 +252,7 @@ def test_frames_that_make_no_sense_are_counted(wire):
 def test_the_emulator_is_a_drive_to_the_profile_that_others_wrote(wire):
     from canopen.objectdictionary import ObjectDictionary
 
-    from rigidimeter.emulation.cia402.object_dictionary import dictionary
+    from rigidimeter.testing.cia402.object_dictionary import dictionary
 
     emulator = wire.emulator
     bus = can.Bus(interface="virtual", channel=wire.channel)

@@ -15,13 +15,13 @@ from tests.wire.cia402_wire import GROUP, SLACK, emulated_arm, free_port, run_lo
 
 from rigidimeter.devices.cia402.drive import Cia402Drive, Cia402Settings
 from rigidimeter.devices.cia402.state_words import State, state_of
-from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
 from rigidimeter.guard import Cause
+from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
 
 EMULATOR = """
 import sys
-from rigidimeter.emulation import EmulatedArm
-from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
+from rigidimeter.testing import EmulatedArm
+from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
 from rigidimeter.dynamics.joint import JointDynamics
 
 arm = EmulatedArm(JointDynamics(0.08, 0.5, 10.0))

@@ -17,20 +17,20 @@ from rigidimeter.devices.ascii.drive import AsciiDrive
 from rigidimeter.devices.ati.analogue import AtiAnalogue
 from rigidimeter.devices.ati.rdt import AtiRdt
 from rigidimeter.devices.cia402.drive import Cia402Drive
-from rigidimeter.devices.conformance import (
+from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.testing.ascii_emulator import AsciiEmulator
+from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
+from rigidimeter.testing.conformance import (
     DRIVE_CHECKS,
     SENSOR_CHECKS,
     DriveFixture,
     OtherEnd,
     SensorFixture,
 )
-from rigidimeter.devices.conformance.fixture import ConformanceError
-from rigidimeter.devices.conformance.sensor_checks import sensor_samples_flow
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation.ascii_emulator import AsciiEmulator
-from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
-from rigidimeter.emulation.emulated_arm import EmulatedArm
-from rigidimeter.emulation.rdt.rdt_emulator import RdtEmulator
+from rigidimeter.testing.conformance.fixture import ConformanceError
+from rigidimeter.testing.conformance.sensor_checks import sensor_samples_flow
+from rigidimeter.testing.emulated_arm import EmulatedArm
+from rigidimeter.testing.rdt.rdt_emulator import RdtEmulator
 
 JOINT = JointDynamics(0.08, 0.5, 2.0)
 CHANNEL = count()

@@ -29,8 +29,8 @@ from rigidimeter.acquisition import ControlLoop, follow
 from rigidimeter.acquisition.control_modes import hold
 from rigidimeter.acquisition.tick import skip_passed_ticks
 from rigidimeter.devices.enable_line import SerialEnableLine
-from rigidimeter.emulation.cia402.servo import UNITS_PER_RAD
 from rigidimeter.guard import Cause
+from rigidimeter.testing.cia402.servo import UNITS_PER_RAD
 
 SPEED_RAD_S = 0.5
 MARK = 0x7E5

@@ -19,13 +19,13 @@ from tests.wire.trial_setup import settings, setup
 from rigidimeter.commissioning import Operator
 from rigidimeter.commissioning.stopping import watchdog_checks
 from rigidimeter.devices.cia402.drive import Cia402Drive
-from rigidimeter.devices.conformance import DriveFixture, OtherEnd
-from rigidimeter.devices.conformance.drive_checks import drive_stops_by_itself
-from rigidimeter.devices.conformance.fixture import ConformanceError
 from rigidimeter.devices.rigfile import load_rig
-from rigidimeter.emulation.cia402.cia402_emulator import Cia402Emulator
-from rigidimeter.emulation.rdt.rdt_emulator import RdtEmulator
 from rigidimeter.guard import Cause
+from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
+from rigidimeter.testing.conformance import DriveFixture, OtherEnd
+from rigidimeter.testing.conformance.drive_checks import drive_stops_by_itself
+from rigidimeter.testing.conformance.fixture import ConformanceError
+from rigidimeter.testing.rdt.rdt_emulator import RdtEmulator
 
 STACKS = {"canopen": Cia402Emulator, "durand": DurandAxis}
 TICK_S, HEARTBEAT_S = 0.004, 0.02

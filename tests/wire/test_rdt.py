@@ -17,8 +17,8 @@ from tests.wire.rdt_wire import (
     watch,
 )
 
-from rigidimeter.emulation.rdt.rdt_emulator import MISBEHAVIOURS, RdtEmulator
 from rigidimeter.guard import Cause
+from rigidimeter.testing.rdt.rdt_emulator import MISBEHAVIOURS, RdtEmulator
 
 __all__ = ["arm", "emulator", "sensor", "sensor_of"]
 

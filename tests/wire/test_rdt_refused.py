@@ -6,8 +6,8 @@ import pytest
 from tests.wire.rdt_wire import arm, emulator, sensor, sensor_of
 
 from rigidimeter.devices.base import DeviceError
-from rigidimeter.emulation.rdt.rdt_emulator import RdtEmulator
 from rigidimeter.guard import Cause
+from rigidimeter.testing.rdt.rdt_emulator import RdtEmulator
 
 __all__ = ["arm", "emulator", "sensor", "sensor_of"]
 

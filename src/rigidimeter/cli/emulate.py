@@ -49,7 +49,7 @@ def emulate(
       rigidimeter emulate --drive ascii --joint 0.0045 0.14 1.75 --rig-out RIG.toml
     """
     from rigidimeter.dynamics.joint import JointDynamics
-    from rigidimeter.emulation.emulated_rig import EmulatedRig, serve
+    from rigidimeter.testing.emulated_rig import EmulatedRig, serve
 
     if drive not in ("cia402", "ascii"):
         raise UserError(f"--drive {drive}: must be cia402 or ascii")

@@ -18,10 +18,10 @@ from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, Tor
 from rigidimeter.devices.composed import ComposedRig
 from rigidimeter.devices.rigfile import RigFile
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation.emulated_arm import EmulatedArm
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings, parse_settings
 from rigidimeter.settings.commissioning_settings import CommissioningSettings
+from rigidimeter.testing.emulated_arm import EmulatedArm
 
 RATE_HZ = 100.0
 QUICK = CommissioningSettings(idle_s=1.0, swings=1, steps_s=1.2, known_torque_s=1.0)

@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 
 from rigidimeter.devices.base import MotionSample, VelocityDrive
-from rigidimeter.devices.conformance.fixture import (
+from rigidimeter.guard import Cause
+from rigidimeter.testing.conformance.fixture import (
     DriveFixture,
     check_counts,
     check_facts,
@@ -19,7 +20,6 @@ from rigidimeter.devices.conformance.fixture import (
     require_error,
     wait_for,
 )
-from rigidimeter.guard import Cause
 
 DRIVE_COUNTS = ("received", "lost", "damaged")
 POWER_OFF_S = 0.1

@@ -35,13 +35,13 @@ from typing import Any, Literal
 
 from rigidimeter.documents import plain_values
 from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.emulation import ascii_emulator
-from rigidimeter.emulation.cia402 import cia402_emulator as cia402
-from rigidimeter.emulation.cia402 import servo
-from rigidimeter.emulation.emulated_arm import EmulatedArm
-from rigidimeter.emulation.rdt import rdt_emulator as rdt
-from rigidimeter.emulation.rdt import rdt_records
 from rigidimeter.errors import UserError
+from rigidimeter.testing import ascii_emulator
+from rigidimeter.testing.cia402 import cia402_emulator as cia402
+from rigidimeter.testing.cia402 import servo
+from rigidimeter.testing.emulated_arm import EmulatedArm
+from rigidimeter.testing.rdt import rdt_emulator as rdt
+from rigidimeter.testing.rdt import rdt_records
 
 MULTICAST_GROUP = "239.74.163.2"
 """Of the emulated CAN bus; each rig uses its own port."""

@@ -23,8 +23,8 @@ import tty
 from collections import deque
 from typing import Any
 
-from rigidimeter.emulation.emulated_arm import EmulatedArm
-from rigidimeter.emulation.trapezoid import Ramps, Trapezoid
+from rigidimeter.testing.emulated_arm import EmulatedArm
+from rigidimeter.testing.trapezoid import Ramps, Trapezoid
 
 MISBEHAVIOURS = {
     "silent": "sends no replies",

@@ -18,14 +18,15 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from rigidimeter.emulation.cia402.object_dictionary import (
+from rigidimeter.errors import UserError
+from rigidimeter.testing.cia402.object_dictionary import (
     COMMAND_MESSAGES,
     INVALID,
     MEASUREMENT_MESSAGES,
     PROFILE_VELOCITY,
     dictionary,
 )
-from rigidimeter.emulation.cia402.servo import (
+from rigidimeter.testing.cia402.servo import (
     DEFAULTS,
     GENERIC_ERROR,
     MISBEHAVIOURS,
@@ -35,8 +36,7 @@ from rigidimeter.emulation.cia402.servo import (
     Servo,
     statusword,
 )
-from rigidimeter.emulation.emulated_arm import EmulatedArm
-from rigidimeter.errors import UserError
+from rigidimeter.testing.emulated_arm import EmulatedArm
 
 WATCH_S = 0.001
 HEARTBEAT_LOST, COMMAND_LOST = 0x8130, 0x8250

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from http.server import BaseHTTPRequestHandler
 
-from rigidimeter.emulation.rdt.rdt_records import (
+from rigidimeter.testing.rdt.rdt_records import (
     COUNTS_PER_UNIT,
     SUPPLY_LOW,
     Faults,

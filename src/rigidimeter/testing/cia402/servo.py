@@ -14,7 +14,7 @@ import time
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
-from rigidimeter.emulation.emulated_arm import EmulatedArm
+from rigidimeter.testing.emulated_arm import EmulatedArm
 
 MISBEHAVIOURS = {
     "fault": "brakes, reports a fault (value: its code) and cannot be reset",

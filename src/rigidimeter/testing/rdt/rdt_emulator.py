@@ -20,8 +20,8 @@ import time
 from collections import deque
 from typing import Self
 
-from rigidimeter.emulation.emulated_arm import EmulatedArm
-from rigidimeter.emulation.rdt.rdt_records import (
+from rigidimeter.testing.emulated_arm import EmulatedArm
+from rigidimeter.testing.rdt.rdt_records import (
     MISBEHAVIOURS,
     ONCE,
     RECORD,
@@ -30,7 +30,7 @@ from rigidimeter.emulation.rdt.rdt_records import (
     RecordSource,
     fault_value,
 )
-from rigidimeter.emulation.rdt.rdt_web_page import (
+from rigidimeter.testing.rdt.rdt_web_page import (
     PageFacts,
     PageServer,
     page_text,

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 
 from rigidimeter.devices.base import TorqueSample, TorqueSensor
-from rigidimeter.devices.conformance.fixture import (
+from rigidimeter.guard import Cause
+from rigidimeter.testing.conformance.fixture import (
     SensorFixture,
     check_counts,
     check_facts,
@@ -18,7 +19,6 @@ from rigidimeter.devices.conformance.fixture import (
     require_error,
     wait_for,
 )
-from rigidimeter.guard import Cause
 
 SENSOR_COUNTS = ("received", "lost", "repeated", "reordered", "damaged")
 

@@ -6,7 +6,7 @@ import random
 import struct
 from collections import deque
 
-from rigidimeter.emulation.emulated_arm import EmulatedArm
+from rigidimeter.testing.emulated_arm import EmulatedArm
 
 RECORD = struct.Struct(">IIIiiiiii")
 SAMPLE_RATE_HZ = 7000.0

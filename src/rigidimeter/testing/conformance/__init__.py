@@ -12,13 +12,13 @@ With pytest, parametrise over `DRIVE_CHECKS` or `SENSOR_CHECKS`. The checks ener
 move it, at up to `DriveFixture.speed_rad_s`: never run them with a person at the rig.
 """
 
-from rigidimeter.devices.conformance.drive_checks import DRIVE_CHECKS
-from rigidimeter.devices.conformance.fixture import (
+from rigidimeter.testing.conformance.drive_checks import DRIVE_CHECKS
+from rigidimeter.testing.conformance.fixture import (
     DriveFixture,
     OtherEnd,
     SensorFixture,
 )
-from rigidimeter.devices.conformance.sensor_checks import SENSOR_CHECKS
+from rigidimeter.testing.conformance.sensor_checks import SENSOR_CHECKS
 
 __all__ = [
     "DRIVE_CHECKS",
