@@ -25,12 +25,8 @@ from rigidimeter.recording import (
     session_settings,
 )
 from rigidimeter.recording.blinded import NO_CODE, codes_of
-from rigidimeter.recording.exported_session import (
-    EXPORT_SCHEMA,
-    ExportedSession,
-    Stream,
-    extent,
-)
+from rigidimeter.recording.exported_session import EXPORT_SCHEMA, ExportedSession, extent
+from rigidimeter.recording.formats.clocked_table import Stream
 from rigidimeter.recording.sample_log import SAMPLE_UNITS
 from rigidimeter.recording.session_files import read_session_files
 from rigidimeter.recording.study_toml import SubjectTable
@@ -265,7 +261,8 @@ def _event(event: Mapping[str, Any], described: Described) -> dict[str, Any]:
 
 
 def _epoch(epoch: Epoch) -> dict[str, Any]:
-    begins = min(channel.time_s[0] for channel in epoch.channels.values())
+    # A reading that the first tick found is older than the epoch.
+    begins = max(channel.time_s[0] for channel in epoch.channels.values())
     ends = max(channel.time_s[-1] for channel in epoch.channels.values())
     return {
         "label": epoch.label,

@@ -15,7 +15,8 @@ import pyarrow.parquet
 
 from rigidimeter.documents import csv_text, write_json, write_text
 from rigidimeter.exporting.document_tables import document_tables
-from rigidimeter.recording.exported_session import DOCUMENT, ExportedSession, Stream
+from rigidimeter.recording.exported_session import DOCUMENT, ExportedSession
+from rigidimeter.recording.formats.clocked_table import Stream
 
 
 def write_csv(session: ExportedSession, folder: Path) -> None:

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.documents import json_text
-from rigidimeter.recording.exported_session import ROUNDING_S, ExportedSession, Stream
+from rigidimeter.recording.exported_session import ExportedSession
+from rigidimeter.recording.formats.clocked_table import ROUNDING_S, Stream
 from rigidimeter.recording.markers import marker_of
 
 _FILE_HEADER, _STREAM_HEADER, _SAMPLES, _CLOCK_OFFSET, _BOUNDARY, _STREAM_FOOTER = range(1, 7)

@@ -12,17 +12,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
+from rigidimeter.recording.formats.clocked_table import ROUNDING_S, Stream
 from rigidimeter.records import CHANNEL_UNITS, Channel, Epoch, LeftOut, Motion, Notice, Outcome
 from rigidimeter.settings import Settings, parse_settings
 
 EXPORT_SCHEMA = "rigidimeter.export/1"
 DOCUMENT = "session.json"
 """The name of the document in formats that are folders."""
-ROUNDING_S = 1e-9
-"""A format may hold a first stamp and a rate in place of even stamps."""
 
 _TYPES: Mapping[str, type] = {
     "virtual": bool,
@@ -30,32 +28,6 @@ _TYPES: Mapping[str, type] = {
     "epochs": list,
     "streams": dict,
 }
-
-
-@dataclass(frozen=True)
-class Stream:
-    """Signals that were sampled together.
-
-    Attributes
-    ----------
-    name : str
-        Such as ``torque``, ``motion`` or ``control``.
-    time_s : array, shape (n,)
-        When each sample was taken, in s since the session's start.
-    columns : mapping of str to array, shape (n,)
-        By name, with the unit in it.
-    """
-
-    name: str
-    time_s: NDArray[np.float64]
-    columns: Mapping[str, NDArray[Any]]
-
-    @property
-    def rate_hz(self) -> float:
-        """The mean sampling rate; NaN below two samples."""
-        if self.time_s.size < 2:
-            return float("nan")
-        return (self.time_s.size - 1) / float(self.time_s[-1] - self.time_s[0])
 
 
 @dataclass(frozen=True)

@@ -109,9 +109,7 @@ def test_tables_of_a_study(fitted_study: Path, tmp_path: Path) -> None:
         events = file.events["session_events"].to_dataframe()
         assert events["event"].tolist()[0] == "session_started"
         document = json.loads(file.scratch["rigidimeter_document"].data)
-    places = document.pop("nwb_series")
     assert document == session.about
-    assert places["torque.torque_nm"] == "acquisition/TorqueMeasured"
 
 
 def test_estimates_with_intervals(exported, file_of_session: Path) -> None:

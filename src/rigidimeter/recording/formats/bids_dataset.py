@@ -18,11 +18,11 @@ from rigidimeter.documents.bounds import RECORDING_BYTES, TABLE_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.exported_session import (
     ExportedSession,
-    Stream,
     checked_document,
     epochs_of_export,
     exported_settings,
 )
+from rigidimeter.recording.formats.clocked_table import Stream
 from rigidimeter.records import Epoch, Notice
 from rigidimeter.settings import Settings
 

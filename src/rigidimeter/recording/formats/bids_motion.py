@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from rigidimeter.documents import read_json
 from rigidimeter.errors import UserError
-from rigidimeter.recording.exported_session import Stream
 from rigidimeter.recording.formats.bids_dataset import motion_columns, tsv_rows
-from rigidimeter.recording.formats.clocked_table import even_clock, table_of_streams, unique
+from rigidimeter.recording.formats.clocked_table import Stream, even_clock, table_of_streams, unique
 from rigidimeter.recording.formats.stored_arrays import check_count
 from rigidimeter.recording.formats.table import Table
 

@@ -10,17 +10,49 @@ import functools
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.exported_session import Stream
+from rigidimeter.recording.channels.choice import LABELS
 from rigidimeter.recording.formats.columns import numbers
 from rigidimeter.recording.formats.stored_arrays import Columns
 from rigidimeter.recording.formats.table import Table, printable
 
 TIME = "time_s"
+EXCLUDED = "excluded"
+"""The column of a table of intervals that says which of them do not count."""
+ROUNDING_S = 1e-9
+"""A file may hold a first stamp and a rate in place of even stamps."""
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Signals that were sampled together.
+
+    Attributes
+    ----------
+    name : str
+        Such as ``torque``, ``motion`` or ``control``.
+    time_s : array, shape (n,)
+        When each sample was taken, in s.
+    columns : mapping of str to array, shape (n,)
+        By name.
+    """
+
+    name: str
+    time_s: NDArray[np.float64]
+    columns: Mapping[str, NDArray[Any]]
+
+    @property
+    def rate_hz(self) -> float:
+        """The mean sampling rate; NaN below two samples."""
+        if self.time_s.size < 2:
+            return float("nan")
+        return (self.time_s.size - 1) / float(self.time_s[-1] - self.time_s[0])
 
 
 def table_of_streams(
@@ -92,6 +124,36 @@ def table_of_pairs(table: Table) -> Table:
         streams.append(Stream(name, stamps[here], {name: values[here]}))
         units.append({name: table.units.get(name, "")})
     return table_of_streams(table.source, streams, units)
+
+
+def with_intervals(
+    table: Table,
+    starts_s: Sequence[float] | NDArray[np.float64],
+    stops_s: Sequence[float] | NDArray[np.float64],
+    labels: Mapping[str, Sequence[str]],
+) -> Table:
+    """Return a table whose rows from a start to its stop have labels; the others have none.
+
+    Parameters
+    ----------
+    table : Table
+        With a clock (`TIME`).
+    starts_s, stops_s : sequence of float
+        Of each interval, on that clock.
+    labels : mapping of str to sequence of str
+        By column (`LABELS`), one for each interval; and `EXCLUDED`: intervals for which it is true
+        have no labels.
+    """
+    time_s = table.columns[TIME]
+    counts = [text.lower() not in ("true", "1") for text in labels.get(EXCLUDED, ())]
+    columns = {name: np.full(time_s.size, "", dtype=object) for name in labels if name in LABELS}
+    for k, (start_s, stop_s) in enumerate(zip(starts_s, stops_s, strict=True)):
+        rows = slice(*np.searchsorted(time_s, (start_s - ROUNDING_S, stop_s + ROUNDING_S)))
+        for name, column in columns.items():
+            # A rest may share its first sample with the epoch before it.
+            if labels[name][k] and (not counts or counts[k]):
+                column[rows] = labels[name][k]
+    return replace(table, columns={**table.columns, **columns})
 
 
 def unique(names: Iterable[str], but: Sequence[str] = (TIME,)) -> list[str]:

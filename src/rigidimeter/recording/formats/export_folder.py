@@ -16,11 +16,11 @@ from rigidimeter.recording.exported_session import (
     DOCUMENT,
     EXPORT_SCHEMA,
     ExportedSession,
-    Stream,
     checked_document,
     epochs_of_export,
     exported_settings,
 )
+from rigidimeter.recording.formats.clocked_table import Stream
 from rigidimeter.records import Epoch, Notice
 from rigidimeter.settings import Settings
 

@@ -16,8 +16,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.choice import LABELS
 from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.channels.unit_text import factor
-from rigidimeter.recording.exported_session import Stream
-from rigidimeter.recording.formats.clocked_table import even_clock, table_of_streams, unique
+from rigidimeter.recording.formats.clocked_table import Stream, even_clock, table_of_streams, unique
 from rigidimeter.recording.formats.mat_fields import (
     NAMES,
     UNITS,

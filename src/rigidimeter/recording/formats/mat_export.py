@@ -13,11 +13,11 @@ from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.recording.exported_session import (
     EXPORT_SCHEMA,
     ExportedSession,
-    Stream,
     checked_document,
     epochs_of_export,
     exported_settings,
 )
+from rigidimeter.recording.formats.clocked_table import Stream
 from rigidimeter.recording.formats.mat_check import check_mat5
 from rigidimeter.recording.formats.stored_arrays import Expansion
 from rigidimeter.records import Epoch, Notice

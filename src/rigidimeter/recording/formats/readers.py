@@ -35,7 +35,7 @@ from rigidimeter.recording.formats.mat_export import (
 from rigidimeter.recording.formats.mat_file import read_mat
 from rigidimeter.recording.formats.neurophysiology_file import SUFFIXES, read_neurophysiology
 from rigidimeter.recording.formats.npz_file import read_npz
-from rigidimeter.recording.formats.nwb_file import nwb_settings, read_nwb
+from rigidimeter.recording.formats.nwb_file import read_nwb
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.spreadsheet import read_spreadsheet
 from rigidimeter.recording.formats.stored_arrays import Columns
@@ -144,7 +144,6 @@ READERS: list[Reader] = [
         "NWB file",
         (".nwb",),
         read_nwb,
-        settings=nwb_settings,
         made_by="a program that writes NWB",
         extra="nwb",
     ),

@@ -21,12 +21,11 @@ from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.exported_session import (
     ExportedSession,
-    Stream,
     checked_document,
     epochs_of_export,
     exported_settings,
 )
-from rigidimeter.recording.formats.clocked_table import table_of_streams, unique
+from rigidimeter.recording.formats.clocked_table import Stream, table_of_streams, unique
 from rigidimeter.recording.formats.lsl_recording import (
     SAMPLES_TYPE,
     epochs_of_samples,
