@@ -20,7 +20,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.choice import LABELS
 from rigidimeter.recording.formats.columns import numbers
 from rigidimeter.recording.formats.stored_arrays import Columns
-from rigidimeter.recording.formats.table import Table, printable
+from rigidimeter.recording.formats.table import Table, label_text, printable
 
 TIME = "time_s"
 EXCLUDED = "excluded"
@@ -150,9 +150,10 @@ def with_intervals(
     for k, (start_s, stop_s) in enumerate(zip(starts_s, stops_s, strict=True)):
         rows = slice(*np.searchsorted(time_s, (start_s - ROUNDING_S, stop_s + ROUNDING_S)))
         for name, column in columns.items():
+            text = label_text(labels[name][k])
             # A rest may share its first sample with the epoch before it.
-            if labels[name][k] and (not counts or counts[k]):
-                column[rows] = labels[name][k]
+            if text and (not counts or counts[k]):
+                column[rows] = text
     return replace(table, columns={**table.columns, **columns})
 
 

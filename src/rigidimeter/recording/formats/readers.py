@@ -17,7 +17,6 @@ from rigidimeter.documents import open_regular, visible
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.arrow_file import read_arrow
-from rigidimeter.recording.formats.bids_dataset import bids_settings, is_bids, read_bids
 from rigidimeter.recording.formats.bids_motion import is_bids_motion, read_bids_motion
 from rigidimeter.recording.formats.biopac_file import read_biopac
 from rigidimeter.recording.formats.c3d_file import read_c3d
@@ -101,7 +100,6 @@ READERS: list[Reader] = [
         sniff=is_export_folder,
         settings=export_folder_settings,
     ),
-    Reader("exported BIDS data set", (), read_bids, sniff=is_bids, settings=bids_settings),
     Reader(
         "BIDS motion recording",
         (".tsv",),

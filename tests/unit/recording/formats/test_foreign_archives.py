@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +45,26 @@ def test_several_recordings_of_a_data_set_are_named(tmp_path: Path) -> None:
         (place / path.name.replace("task-elbow", "task-rest")).write_bytes(path.read_bytes())
     with pytest.raises(UserError, match=r"has 2 motion recordings .*task-rest"):
         read(tmp_path / "set")
+
+
+def test_events_with_a_column_epoch_are_the_epochs_of_a_folder(tmp_path: Path) -> None:
+    """1 to 4 s counts, 5 to 8 s does not; a button press says of no epoch that it is one."""
+    write_bids_motion(tmp_path / "set", [TORQUE, ANGLE], latency=True)
+    shutil.copytree(tmp_path / "set" / "sub-01", tmp_path / "set" / "sub-02")
+    events = tmp_path / "set" / "sub-02" / "motion" / "sub-01_task-elbow_events.tsv"
+    rows = ["onset\tduration\tepoch\tcondition\texcluded", "1\t3\tA\tOFF\tfalse"]
+    rows += ["2\t0\tn/a\tn/a\tn/a", "5\t3\tB\tOFF\ttrue"]
+    events.write_text("\n".join(rows) + "\n")
+    (epoch,) = read(tmp_path / "set" / "sub-02").epochs
+    assert (epoch.label, epoch.condition) == ("A", "OFF")
+    torque = epoch.channels["torque_nm"]
+    assert (torque.time_s[0], torque.time_s[-1]) == (1.0, 4.0)
+    events.write_text("onset\tduration\n1\t0\n")
+    (epoch,) = read(tmp_path / "set" / "sub-02").epochs
+    assert len(epoch.channels["torque_nm"]) == 1899
+    events.write_text("onset\tduration\tepoch\nsoon\t3\tA\n")
+    with pytest.raises(UserError, match=r"events\.tsv: an event has no number as onset"):
+        read(tmp_path / "set" / "sub-02")
 
 
 def test_a_data_set_without_a_rate_is_refused(tmp_path: Path) -> None:
