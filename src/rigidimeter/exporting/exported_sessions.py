@@ -300,7 +300,7 @@ def _estimates(analysis: Analysis, source: str, name: str) -> dict[str, Any]:
 def _recorded_streams(samples: Mapping[str, NDArray[Any]]) -> tuple[Stream, ...]:
     """Return the samples of a session by clock; a held reading repeats its stamp and goes once."""
     streams = []
-    taken = {"time_s"}
+    taken = {"time_s", "epoch"}  # its number, which every format says in its own way
     for name, (stamp, columns) in _CLOCKS.items():
         stamps = samples[stamp]
         fresh = np.concatenate(([True], np.diff(stamps) > 0))[: stamps.size]

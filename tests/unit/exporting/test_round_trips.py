@@ -38,7 +38,9 @@ def read_back(recording: Recording, to: str, place: Path) -> Recording:
     out = place / NAMES.get(to, to)
     sessions = sessions_of_recording(recording, None, subject="S1", day="1")
     export_sessions(sessions, to, out)
-    return read(out, settings=recording.settings)
+    tables = [out / f"{name}.{to}" for name in ("torque", "motion", "control")]
+    joined = to in ("csv", "parquet")
+    return read(tables if joined else out, join=joined, settings=recording.settings)
 
 
 def in_common(*channels: Channel) -> list[Channel]:

@@ -48,7 +48,7 @@ def test_every_sample_of_a_session_is_given(session_folder, exported) -> None:
         stamps = np.unique(samples[f"{name}_time_s"])
         np.testing.assert_array_equal(stream.time_s, stamps)
     given = {name for stream in exported.streams for name in stream.columns}
-    assert {*samples} - given == {"time_s", "torque_time_s", "motion_time_s"}
+    assert {*samples} - given == {"time_s", "torque_time_s", "motion_time_s", "epoch"}
 
 
 def test_what_is_known_travels_along(exported) -> None:

@@ -1,7 +1,7 @@
 """Signals with clocks of their own as one table.
 
 Each clock has rows of its own, in the order of time; in the rows of other clocks a column is empty.
-So every channel keeps its own stamps.
+So every channel keeps its own stamps. Labels hold in the rows between.
 """
 
 from __future__ import annotations
@@ -60,6 +60,8 @@ def table_of_streams(
 ) -> Table:
     """Return streams as a table; a name that two have gets that of its stream before it.
 
+    Labels of epochs are those of the first stream that has them.
+
     Parameters
     ----------
     source : str
@@ -88,21 +90,29 @@ def table_of_streams(
                 "recording needs a time of its own for each sample"
             )
     time_s = np.unique(np.concatenate([stream.time_s for stream, _ in used]))
-    given = [column for stream, _ in used for column in stream.columns]
+    labelled = {
+        label: k for label in LABELS for k in range(len(used))[::-1] if label in used[k][0].columns
+    }
+    given = [column for stream, _ in used for column in stream.columns if column not in LABELS]
     names = iter(
         unique(
             column if given.count(column) == 1 else f"{stream.name}.{column}"
             for stream, _ in used
             for column in stream.columns
+            if column not in LABELS
         )
     )
     columns = {TIME: lambda: time_s}
     known: dict[str, str] = {TIME: "s"}
-    for stream, stated in used:
+    for k, (stream, stated) in enumerate(used):
         rows = np.searchsorted(time_s, stream.time_s)
         for column, values in stream.columns.items():
-            name = next(names)
-            columns[name] = functools.partial(_spread, values, rows, time_s.size)
+            if labelled.get(column, k) != k:
+                continue
+            name = column if column in LABELS else next(names)
+            columns[name] = functools.partial(
+                spread, values, rows, time_s.size, fill=column in LABELS
+            )
             if stated.get(column):
                 known[name] = stated[column]
     return Table(source, Columns(columns), units=known)
@@ -191,7 +201,23 @@ def even_clock(start_s: float, rate_hz: float, count: int) -> NDArray[np.float64
     return start_s + np.arange(count) / rate_hz
 
 
-def _spread(values: NDArray[np.float64], rows: NDArray[np.intp], count: int) -> NDArray[np.float64]:
-    column = np.full(count, np.nan)
-    column[rows] = values
-    return column
+def spread(column: NDArray[Any], rows: NDArray[np.intp], size: int, *, fill: bool) -> NDArray[Any]:
+    """Put a column into the rows of its own clock.
+
+    Parameters
+    ----------
+    column : array, shape (n,)
+    rows : array of int, shape (n,)
+        Where the table has them.
+    size : int
+        The rows of the table.
+    fill : bool
+        Whether a value holds in the rows between, too, as a label does.
+    """
+    if fill:
+        before = np.searchsorted(rows, np.arange(size), side="right") - 1
+        return column[np.clip(before, 0, None)]
+    text = column.dtype == object
+    found = np.full(size, "" if text else np.nan, dtype=object if text else np.float64)
+    found[rows] = column
+    return found

@@ -20,17 +20,7 @@ from rigidimeter.recording.formats.arrow_file import read_arrow
 from rigidimeter.recording.formats.bids_motion import is_bids_motion, read_bids_motion
 from rigidimeter.recording.formats.biopac_file import read_biopac
 from rigidimeter.recording.formats.c3d_file import read_c3d
-from rigidimeter.recording.formats.export_folder import (
-    export_folder_settings,
-    is_export_folder,
-    read_export_folder,
-)
 from rigidimeter.recording.formats.hdf5_file import read_hdf5
-from rigidimeter.recording.formats.mat_export import (
-    is_mat_export,
-    mat_export_settings,
-    read_mat_export,
-)
 from rigidimeter.recording.formats.mat_file import read_mat
 from rigidimeter.recording.formats.neurophysiology_file import SUFFIXES, read_neurophysiology
 from rigidimeter.recording.formats.npz_file import read_npz
@@ -94,13 +84,6 @@ class Reader:
 READERS: list[Reader] = [
     Reader("session folder", (), read_session, sniff=is_session, settings=session_settings),
     Reader(
-        "exported folder",
-        (),
-        read_export_folder,
-        sniff=is_export_folder,
-        settings=export_folder_settings,
-    ),
-    Reader(
         "BIDS motion recording",
         (".tsv",),
         read_bids_motion,
@@ -122,14 +105,6 @@ READERS: list[Reader] = [
         of_text=True,
     ),
     Reader("NumPy archive", (".npz",), read_npz, made_by="numpy.savez"),
-    Reader(
-        "exported MATLAB file",
-        (".mat",),
-        read_mat_export,
-        sniff=is_mat_export,
-        settings=mat_export_settings,
-        made_by="rigidimeter export",
-    ),
     Reader(
         "MATLAB file",
         (".mat",),
