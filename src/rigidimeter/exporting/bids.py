@@ -24,8 +24,8 @@ import pyarrow.csv
 
 from rigidimeter.documents import as_written, write_json, write_text
 from rigidimeter.exporting.document_tables import document_tables, exclusion_reasons
+from rigidimeter.exporting.exported_sessions import ExportedSession
 from rigidimeter.exporting.names import entities, joined, label
-from rigidimeter.recording.exported_session import ExportedSession
 from rigidimeter.recording.formats.clocked_table import Stream
 
 BIDS_VERSION = "1.10.0"

@@ -25,7 +25,6 @@ from rigidimeter.recording import (
     session_settings,
 )
 from rigidimeter.recording.blinded import NO_CODE, codes_of
-from rigidimeter.recording.exported_session import EXPORT_SCHEMA, ExportedSession, extent
 from rigidimeter.recording.formats.clocked_table import Stream
 from rigidimeter.recording.sample_log import SAMPLE_UNITS
 from rigidimeter.recording.session_files import read_session_files
@@ -61,6 +60,22 @@ _STREAM_OF = {
     "emg_v": "emg",
 }
 _TELLS_CONDITION = ("true_joint",)
+EXPORT_SCHEMA = "rigidimeter.export/1"
+
+
+@dataclass(frozen=True)
+class ExportedSession:
+    """All that is given away of one session.
+
+    Attributes
+    ----------
+    about : mapping
+        The document (`rigidimeter.export/1`, see docs/reference/files.md).
+    streams : tuple of Stream
+    """
+
+    about: Mapping[str, Any]
+    streams: tuple[Stream, ...]
 
 
 @dataclass(frozen=True)
@@ -275,7 +290,6 @@ def _epoch(epoch: Epoch) -> dict[str, Any]:
         "motion": None if epoch.motion is None else asdict(epoch.motion),
         "excitation_hz": epoch.excitation_hz,
         "left_out": [each._asdict() for each in epoch.left_out],
-        "channels": {name: extent(channel) for name, channel in epoch.channels.items()},
     }
 
 

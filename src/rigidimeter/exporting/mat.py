@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.documents import json_text
 from rigidimeter.exporting.document_tables import columns_of, document_tables, sample_labels
-from rigidimeter.recording.exported_session import ExportedSession
+from rigidimeter.exporting.exported_sessions import ExportedSession
 
 _SHOWN = ("software", "virtual", "subject", "day", "condition", "part", "source")
 

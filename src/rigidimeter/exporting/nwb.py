@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidimeter.documents import json_text
+from rigidimeter.exporting.exported_sessions import ExportedSession
 from rigidimeter.exporting.names import label, subject_label
 from rigidimeter.exporting.nwb_tables import add_events, add_stimulation, add_tables, add_trials
-from rigidimeter.recording.exported_session import ExportedSession
 from rigidimeter.recording.formats.clocked_table import ROUNDING_S, Stream
 
 if TYPE_CHECKING:

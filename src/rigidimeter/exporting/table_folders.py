@@ -16,8 +16,10 @@ import pyarrow.parquet
 
 from rigidimeter.documents import csv_text, write_json, write_text
 from rigidimeter.exporting.document_tables import document_tables, sample_labels
-from rigidimeter.recording.exported_session import DOCUMENT, ExportedSession
+from rigidimeter.exporting.exported_sessions import ExportedSession
 from rigidimeter.recording.formats.clocked_table import Stream
+
+DOCUMENT = "session.json"
 
 
 def write_csv(session: ExportedSession, folder: Path) -> None:

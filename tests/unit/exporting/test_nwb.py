@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 from tests.unit.exporting.conftest import with_jitter
 
-from rigidimeter.exporting import export_sessions, sessions_of_recording, sessions_of_study
+from rigidimeter.exporting import (
+    ExportedSession,
+    export_sessions,
+    sessions_of_recording,
+    sessions_of_study,
+)
 from rigidimeter.recording import read
-from rigidimeter.recording.exported_session import ExportedSession
 from rigidimeter.study import read_study
 
 pynwb = pytest.importorskip("pynwb", reason="pip install 'rigidimeter[nwb]'")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from tests.known_joint import angle_rad, torque_nm
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read
+from rigidimeter.recording.formats.xdf_check import BOUNDARY
 
 TORQUE_S, ANGLE_S = np.arange(2000) / 200.0, np.arange(950) / 100.0
 TORQUE = Signal("Torque", "Nm", torque_nm(TORQUE_S))
@@ -82,3 +84,22 @@ def test_clock_offsets_of_an_xdf_file_are_applied(tmp_path: Path) -> None:
     angle = epoch.channels["angle_rad"]
     np.testing.assert_allclose(angle.time_s, ANGLE_S, atol=1e-6)
     np.testing.assert_allclose(angle.values, angle_rad(ANGLE_S), rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("at", "written", "said"),
+    [
+        (struct.pack("<BI", 4, 2000), b"\x04\xff\xff\xff\x7f", "holds 2147483647 samples"),
+        (b"XDF:\x04", b"XDF:\x04\xff\xff\xff\x7f", "damaged length"),
+    ],
+)
+def test_a_damaged_count_or_length_of_xdf_is_refused(tmp_path, at, written, said) -> None:
+    """Before anybody makes room for it."""
+    path = tmp_path / "r.xdf"
+    write_xdf(path, [TORQUE, ANGLE])
+    data = bytearray(path.read_bytes())
+    place = data.index(at)
+    data[place : place + len(written)] = written
+    path.write_bytes(data + struct.pack("<BIH", 4, 18, 5) + BOUNDARY)
+    with pytest.raises(UserError, match=said):
+        read(path)
