@@ -184,14 +184,21 @@ def _of_sessions() -> Iterator[Case]:
         "session: of version 1", "session folders of version 1",
         lambda folder: as_version_1(record(folder / "session", "OFF", 5)), [estimated("session")],
     )  # fmt: skip
-    for form, path in (("nwb", "s.nwb"), ("bids", "bids"), ("mat", "s.mat")):
+    exported = lambda folder: record(folder / "session", "OFF", 5)  # noqa: E731
+    yield Case(
+        "session: not exported", "what exports are compared with", exported, [estimated("session")]
+    )
+    tables = [f"tables/{name}.parquet" for name in ("torque", "motion", "control")]
+    for form, path, files, said in (
+        ("nwb", "s.nwb", ["s.nwb"], {}),
+        ("bids", "bids", ["bids"], {}),
+        ("mat", "s.mat", ["s.mat"], {}),
+        ("parquet", "tables", tables, {"join": True}),
+    ):
+        export = ["export", "session", "--to", form, "--out", path, "--subject", "S1", "--day", "1"]
         yield Case(
-            f"session: through {form}", f"export to {form} and back",
-            lambda folder: record(folder / "session", "OFF", 5),
-            [
-                ["export", "session", "--to", form, "--out", path, "--subject", "S1", "--day", "1"],
-                estimated(path),
-            ],
+            f"session: through {form}", f"export to {form} and back", exported,
+            [export, estimated(*files, **said)],
         )  # fmt: skip
     yield Case(
         "session: one mapping for many", "inspect, mapping files", CORPUS["volts"].write,

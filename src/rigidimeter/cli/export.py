@@ -17,7 +17,7 @@ from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.recording.exported_session import ExportedSession
+    from rigidimeter.exporting import ExportedSession
 
 
 @reads_recordings

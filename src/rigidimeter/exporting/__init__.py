@@ -1,10 +1,15 @@
 """Sessions and studies in the formats that archives and other programs take."""
 
-from rigidimeter.exporting.exported_sessions import sessions_of_recording, sessions_of_study
+from rigidimeter.exporting.exported_sessions import (
+    ExportedSession,
+    sessions_of_recording,
+    sessions_of_study,
+)
 from rigidimeter.exporting.formats import FORMATS, Format, export_sessions, format_named
 
 __all__ = [
     "FORMATS",
+    "ExportedSession",
     "Format",
     "export_sessions",
     "format_named",

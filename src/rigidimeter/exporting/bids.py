@@ -24,8 +24,9 @@ import pyarrow.csv
 
 from rigidimeter.documents import as_written, write_json, write_text
 from rigidimeter.exporting.document_tables import document_tables, exclusion_reasons
+from rigidimeter.exporting.exported_sessions import ExportedSession
 from rigidimeter.exporting.names import entities, joined, label
-from rigidimeter.recording.exported_session import ExportedSession, Stream
+from rigidimeter.recording.formats.clocked_table import Stream
 
 BIDS_VERSION = "1.10.0"
 TASK = "rigidity"
@@ -87,6 +88,7 @@ _EVENTS = {
         "Description": "What the robot did.",
         "Levels": {"prbs": "torque perturbation", "sinusoid": "imposed sinusoidal motion"},
     },
+    "task": {"Description": "As trial_type."},
     "condition": {"Description": "Condition, or its code where the study is blinded."},
     "epoch": {"Description": "Label of the epoch."},
     "excluded": {"Description": "Whether the epoch does not count."},
@@ -215,6 +217,7 @@ def _write_events(about: Mapping[str, Any], stem: Path) -> None:
                 "onset": epoch["start_s"],
                 "duration": epoch["stop_s"] - epoch["start_s"],
                 "trial_type": epoch["task"],
+                "task": epoch["task"],
                 "condition": epoch["condition"],
                 "epoch": epoch["label"],
                 "excluded": str(epoch["label"] in reasons).lower(),

@@ -6,6 +6,11 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from numpy.typing import NDArray
+
+from rigidimeter.documents import as_written
+from rigidimeter.recording.formats.clocked_table import EXCLUDED, TIME, Stream, with_intervals
+from rigidimeter.recording.formats.table import Table
 from rigidimeter.records import FIT_NUMBERS, PARAMETERS
 
 Row = dict[str, Any]
@@ -44,6 +49,21 @@ def exclusion_reasons(about: Mapping[str, Any]) -> dict[str, str]:
         for name, each in found
         if each["outcome"] != "included"
     }
+
+
+def sample_labels(stream: Stream, about: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """Return epoch, condition and task of each sample of a stream, as texts, shape (n,).
+
+    They are empty in rests and in epochs that do not count.
+    """
+    epochs, reasons = about["epochs"], exclusion_reasons(about)
+    names = {"epoch": "label", "condition": "condition", "task": "task"}
+    labels = {name: [as_written(each[key] or "") for each in epochs] for name, key in names.items()}
+    labels[EXCLUDED] = [str(each["label"] in reasons) for each in epochs]
+    table = Table("", {TIME: stream.time_s})
+    starts_s, stops_s = ([each[key] for each in epochs] for key in ("start_s", "stop_s"))
+    columns = with_intervals(table, starts_s, stops_s, labels).columns
+    return {name: columns[name] for name in names}
 
 
 def columns_of(rows: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:

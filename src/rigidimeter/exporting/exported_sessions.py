@@ -25,12 +25,7 @@ from rigidimeter.recording import (
     session_settings,
 )
 from rigidimeter.recording.blinded import NO_CODE, codes_of
-from rigidimeter.recording.exported_session import (
-    EXPORT_SCHEMA,
-    ExportedSession,
-    Stream,
-    extent,
-)
+from rigidimeter.recording.formats.clocked_table import Stream
 from rigidimeter.recording.sample_log import SAMPLE_UNITS
 from rigidimeter.recording.session_files import read_session_files
 from rigidimeter.recording.study_toml import SubjectTable
@@ -65,6 +60,22 @@ _STREAM_OF = {
     "emg_v": "emg",
 }
 _TELLS_CONDITION = ("true_joint",)
+EXPORT_SCHEMA = "rigidimeter.export/1"
+
+
+@dataclass(frozen=True)
+class ExportedSession:
+    """All that is given away of one session.
+
+    Attributes
+    ----------
+    about : mapping
+        The document (`rigidimeter.export/1`, see docs/reference/files.md).
+    streams : tuple of Stream
+    """
+
+    about: Mapping[str, Any]
+    streams: tuple[Stream, ...]
 
 
 @dataclass(frozen=True)
@@ -265,7 +276,8 @@ def _event(event: Mapping[str, Any], described: Described) -> dict[str, Any]:
 
 
 def _epoch(epoch: Epoch) -> dict[str, Any]:
-    begins = min(channel.time_s[0] for channel in epoch.channels.values())
+    # A reading that the first tick found is older than the epoch.
+    begins = max(channel.time_s[0] for channel in epoch.channels.values())
     ends = max(channel.time_s[-1] for channel in epoch.channels.values())
     return {
         "label": epoch.label,
@@ -279,7 +291,6 @@ def _epoch(epoch: Epoch) -> dict[str, Any]:
         "excitation_hz": epoch.excitation_hz,
         "left_out": [each._asdict() for each in epoch.left_out],
         "ticks": None if epoch.ticks is None else epoch.ticks._asdict(),
-        "channels": {name: extent(channel) for name, channel in epoch.channels.items()},
     }
 
 
@@ -304,7 +315,7 @@ def _estimates(analysis: Analysis, source: str, name: str) -> dict[str, Any]:
 def _recorded_streams(samples: Mapping[str, NDArray[Any]]) -> tuple[Stream, ...]:
     """Return the samples of a session by clock; a held reading repeats its stamp and goes once."""
     streams = []
-    taken = {"time_s"}
+    taken = {"time_s", "epoch"}  # its number, which every format says in its own way
     for name, (stamp, columns) in _CLOCKS.items():
         stamps = samples[stamp]
         fresh = np.concatenate(([True], np.diff(stamps) > 0))[: stamps.size]

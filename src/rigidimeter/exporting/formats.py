@@ -13,12 +13,11 @@ from pathlib import Path
 
 from rigidimeter.errors import UserError
 from rigidimeter.exporting.bids import write_bids
+from rigidimeter.exporting.exported_sessions import ExportedSession
 from rigidimeter.exporting.mat import write_mat
 from rigidimeter.exporting.names import stems
 from rigidimeter.exporting.nwb import write_nwb
 from rigidimeter.exporting.table_folders import write_csv, write_parquet
-from rigidimeter.exporting.xdf import write_xdf
-from rigidimeter.recording.exported_session import ExportedSession
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,6 @@ class Format:
 FORMATS: list[Format] = [
     Format("nwb", "Neurodata Without Borders", write_nwb, ".nwb", extra="nwb"),
     Format("bids", "BIDS data set, motion", write_all=write_bids),
-    Format("xdf", "XDF of Lab Streaming Layer", write_xdf, ".xdf"),
     Format("parquet", "Apache Parquet", write_parquet),
     Format("csv", "CSV tables", write_csv),
     Format("mat", "MATLAB file, version 5", write_mat, ".mat"),

@@ -10,8 +10,8 @@ import scipy.io
 from numpy.typing import NDArray
 
 from rigidimeter.documents import json_text
-from rigidimeter.exporting.document_tables import columns_of, document_tables
-from rigidimeter.recording.exported_session import ExportedSession
+from rigidimeter.exporting.document_tables import columns_of, document_tables, sample_labels
+from rigidimeter.exporting.exported_sessions import ExportedSession
 
 _SHOWN = ("software", "virtual", "subject", "day", "condition", "part", "source")
 
@@ -19,11 +19,17 @@ _SHOWN = ("software", "virtual", "subject", "day", "condition", "part", "source"
 def write_mat(session: ExportedSession, path: Path) -> None:
     """Write one session; `torque.time_s` and `torque.torque_nm` are columns of one length.
 
+    `torque.epoch`, `condition` and `task` have a row of letters for each sample, as for `cellstr`.
     The character array `document` is the whole document as JSON, for `jsondecode`.
     """
     about = session.about
     values: dict[str, Any] = {
-        stream.name: {"time_s": stream.time_s, **stream.columns} for stream in session.streams
+        stream.name: {
+            "time_s": stream.time_s,
+            **stream.columns,
+            **{name: texts.astype(str) for name, texts in sample_labels(stream, about).items()},
+        }
+        for stream in session.streams
     }
     for name, rows in document_tables(about).items():
         values[name] = {key: _cells(cells) for key, cells in columns_of(rows).items()}

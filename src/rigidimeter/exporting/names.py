@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.exported_session import ExportedSession
+from rigidimeter.exporting.exported_sessions import ExportedSession
 
 
 def label(text: str, otherwise: str) -> str:

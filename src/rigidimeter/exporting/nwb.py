@@ -23,9 +23,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidimeter.documents import json_text
+from rigidimeter.exporting.exported_sessions import ExportedSession
 from rigidimeter.exporting.names import label, subject_label
 from rigidimeter.exporting.nwb_tables import add_events, add_stimulation, add_tables, add_trials
-from rigidimeter.recording.exported_session import ROUNDING_S, ExportedSession, Stream
+from rigidimeter.recording.formats.clocked_table import ROUNDING_S, Stream
 
 if TYPE_CHECKING:
     from pynwb import NWBFile, TimeSeries
@@ -71,19 +72,18 @@ def write_nwb(session: ExportedSession, path: Path) -> None:
     from pynwb import NWBHDF5IO
 
     file = _file(session.about)
-    places = _add_streams(file, session)
+    _add_streams(file, session)
     add_trials(file, session.about)
     add_stimulation(file, session.about)
     add_events(file, session.about)
     add_tables(file, session.about)
-    document = {**session.about, "nwb_series": places}
     file.add_scratch(
         json_text(session.about["settings"]["controller"]),
         name="controller_settings",
         description="Settings of the admittance controller, JSON, units in the names.",
     )
     file.add_scratch(
-        json_text(document),
+        json_text(session.about),
         name="rigidimeter_document",
         description=f"All that is known of the session, JSON, {session.about['schema']}.",
     )
@@ -146,10 +146,8 @@ def _surname_first(author: str) -> str:
     return author if "," in author or not given else f"{surname}, {given}"
 
 
-def _add_streams(file: NWBFile, session: ExportedSession) -> dict[str, str]:
-    """Add every column; return by `stream.column` where it stands in the file."""
+def _add_streams(file: NWBFile, session: ExportedSession) -> None:
     joint = label(session.about["joint"].title(), "Joint")
-    places = {}
     status = None
     for stream in session.streams:
         first: TimeSeries | None = None
@@ -171,8 +169,6 @@ def _add_streams(file: NWBFile, session: ExportedSession) -> dict[str, str]:
                         "recording", "Counts and status words of the loop and its devices."
                     )
                 status.add(series)
-            places[f"{stream.name}.{column}"] = f"{place}/{name}"
-    return places
 
 
 def _series(

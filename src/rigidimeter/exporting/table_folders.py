@@ -1,6 +1,7 @@
 """Folders of tables: a CSV or Parquet file for each clock, others for epochs and estimates.
 
-`session.json` holds the whole document.
+Each sample has the labels of its epoch, so that a program finds them in any of the tables.
+`session.json` holds the document.
 """
 
 from __future__ import annotations
@@ -14,13 +15,16 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from rigidimeter.documents import csv_text, write_json, write_text
-from rigidimeter.exporting.document_tables import document_tables
-from rigidimeter.recording.exported_session import DOCUMENT, ExportedSession, Stream
+from rigidimeter.exporting.document_tables import document_tables, sample_labels
+from rigidimeter.exporting.exported_sessions import ExportedSession
+from rigidimeter.recording.formats.clocked_table import Stream
+
+DOCUMENT = "session.json"
 
 
 def write_csv(session: ExportedSession, folder: Path) -> None:
     """Write a folder of CSV tables; a number that is missing is an empty cell."""
-    options = pa.csv.WriteOptions(quoting_style="none")
+    options = pa.csv.WriteOptions(quoting_style="needed")
 
     def write(table: pa.Table, path: Path) -> None:
         pa.csv.write_csv(table, path, write_options=options)
@@ -41,20 +45,22 @@ def _write(
 ) -> None:
     folder.mkdir()
     for stream in session.streams:
-        write(stream_table(stream, session.about["units"]), folder / f"{stream.name}{suffix}")
+        write(_stream_table(stream, session.about), folder / f"{stream.name}{suffix}")
     for name, rows in document_tables(session.about).items():
         columns = list(dict.fromkeys(key for row in rows for key in row))
         write_text(folder / f"{name}.csv", csv_text(columns, rows))
     write_json(folder / DOCUMENT, session.about)
 
 
-def stream_table(stream: Stream, units: Mapping[str, Any]) -> pa.Table:
-    """Return a stream as an Arrow table; a missing number is null, a unit metadata of its field."""
-    columns = {"time_s": stream.time_s, **stream.columns}
-    known = {"time_s": "s", **units}
+def _stream_table(stream: Stream, about: Mapping[str, Any]) -> pa.Table:
+    """Return a stream as an Arrow table; what is missing is null, a unit metadata of its field."""
+    known = {"time_s": "s", **about["units"]}
     fields, arrays = [], []
-    for name, values in columns.items():
-        array = pa.array(values, from_pandas=True)
-        fields.append(pa.field(name, array.type, metadata={"unit": str(known.get(name, "1"))}))
-        arrays.append(array)
+    for name, values in {"time_s": stream.time_s, **stream.columns}.items():
+        arrays.append(pa.array(values, from_pandas=True))
+        unit = {"unit": str(known.get(name, "1"))}
+        fields.append(pa.field(name, arrays[-1].type, metadata=unit))
+    for name, texts in sample_labels(stream, about).items():
+        arrays.append(pa.array(texts, pa.string(), mask=texts == ""))
+        fields.append(pa.field(name, pa.string()))
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))

@@ -1,17 +1,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.small_study import record
 
-from rigidimeter.exporting import sessions_of_recording
+from rigidimeter.exporting import ExportedSession, sessions_of_recording
 from rigidimeter.recording import read
-from rigidimeter.recording.exported_session import ExportedSession
-from rigidimeter.records import Epoch
 from rigidimeter.study import estimate
 
 
@@ -26,19 +23,6 @@ def exported(session_folder: Path) -> ExportedSession:
     recording = read(session_folder)
     (session,) = sessions_of_recording(recording, estimate(recording), subject="S1", day="day 1")
     return session
-
-
-def assert_same_epochs(found: Sequence[Epoch], expected: Sequence[Epoch]) -> None:
-    """Hold epochs equal to the bit in all but where they come from."""
-    assert len(found) == len(expected)
-    for one, other in zip(found, expected, strict=True):
-        assert list(one.channels) == list(other.channels)
-        for name, channel in one.channels.items():
-            np.testing.assert_array_equal(channel.time_s, other.channels[name].time_s)
-            np.testing.assert_array_equal(channel.values, other.channels[name].values)
-        for field in dataclasses.fields(Epoch):
-            if field.name not in ("channels", "source"):
-                assert getattr(one, field.name) == getattr(other, field.name), field.name
 
 
 def with_jitter(session: ExportedSession, seed: int = 1) -> ExportedSession:

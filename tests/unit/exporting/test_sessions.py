@@ -2,40 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.unit.exporting.conftest import assert_same_epochs
 
 from rigidimeter.documents import json_text
 from rigidimeter.exporting import sessions_of_recording, sessions_of_study
 from rigidimeter.recording import read
-from rigidimeter.recording.exported_session import (
-    ExportedSession,
-    checked_document,
-    epochs_of_export,
-    exported_settings,
-)
 from rigidimeter.recording.session_files import read_session_files
+from rigidimeter.settings import parse_settings
 from rigidimeter.study import estimate_study, read_study
-
-
-def stored(session: ExportedSession) -> ExportedSession:
-    """Return a session whose document went through a file."""
-    about = checked_document(json.loads(json_text(session.about)), "session.json")
-    return ExportedSession(about, session.streams)
-
-
-def test_the_epochs_and_settings_come_back(session_folder, exported) -> None:
-    again = stored(exported)
-    epochs, notices = epochs_of_export(again, "there")
-    recording = read(session_folder)
-    assert notices == []
-    assert_same_epochs(epochs, recording.epochs)
-    assert exported_settings(again.about, "there") == recording.settings
 
 
 def test_every_sample_of_a_session_is_given(session_folder, exported) -> None:
@@ -48,7 +26,7 @@ def test_every_sample_of_a_session_is_given(session_folder, exported) -> None:
         stamps = np.unique(samples[f"{name}_time_s"])
         np.testing.assert_array_equal(stream.time_s, stamps)
     given = {name for stream in exported.streams for name in stream.columns}
-    assert {*samples} - given == {"time_s", "torque_time_s", "motion_time_s"}
+    assert {*samples} - given == {"time_s", "torque_time_s", "motion_time_s", "epoch"}
 
 
 def test_what_is_known_travels_along(exported) -> None:
@@ -64,17 +42,6 @@ def test_what_is_known_travels_along(exported) -> None:
     assert about["units"]["torque_nm"] == "N·m"
 
 
-def test_samples_that_are_gone_are_said(exported) -> None:
-    torque, *others = exported.streams
-    shorter = type(torque)(
-        torque.name, torque.time_s[:-2000], {n: v[:-2000] for n, v in torque.columns.items()}
-    )
-    epochs, notices = epochs_of_export(ExportedSession(exported.about, (shorter, *others)), "there")
-    assert [epoch.label for epoch in epochs] == []
-    assert [notice.level for notice in notices] == ["error", "error"]
-    assert "torque_nm has" in notices[0].text
-
-
 def test_a_file_of_two_clocks_keeps_both(tmp_path: Path) -> None:
     """Torque at 100 Hz and angle at 50 Hz, in rows of their own."""
     rows = ["time_s,torque_nm,angle_rad,epoch,condition"]
@@ -88,9 +55,9 @@ def test_a_file_of_two_clocks_keeps_both(tmp_path: Path) -> None:
     assert [stream.name for stream in session.streams] == ["torque", "motion"]
     assert session.about["virtual"] is False
     assert session.about["condition"] == "DBS"
-    epochs, notices = epochs_of_export(stored(session), str(path))
-    assert notices == []
-    assert_same_epochs(epochs, recording.epochs)
+    assert [epoch["label"] for epoch in session.about["epochs"]] == ["1", "2"]
+    torque, motion = session.streams
+    assert (torque.time_s.size, motion.time_s.size) == (400, 200)
 
 
 @pytest.fixture(scope="module")
@@ -138,6 +105,6 @@ def test_a_blinded_study_gives_nothing_that_tells_the_condition(study: Path) -> 
         assert "OFF" not in text
         assert "DBS" not in text
         assert "true_joint" not in text
-        epochs, _ = epochs_of_export(stored(session), "there")
-        assert {epoch.condition for epoch in epochs} == {session.about["condition"]}
-        exported_settings(session.about, "there")  # complete without what was taken out
+        conditions = {epoch["condition"] for epoch in session.about["epochs"]}
+        assert conditions == {session.about["condition"]}
+        parse_settings(session.about["settings"])  # complete without what was taken out

@@ -12,8 +12,7 @@ import pyarrow.parquet
 import pytest
 import scipy.io
 
-from rigidimeter.exporting import export_sessions
-from rigidimeter.recording.exported_session import ExportedSession
+from rigidimeter.exporting import ExportedSession, export_sessions
 
 
 @pytest.mark.parametrize("to", ["csv", "parquet"])

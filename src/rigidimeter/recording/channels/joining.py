@@ -17,6 +17,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.choice import LABELS, MOTION, choose
 from rigidimeter.recording.channels.clock_offset import Offset, find_offset
 from rigidimeter.recording.channels.readings import options_text
+from rigidimeter.recording.formats.clocked_table import spread
 from rigidimeter.recording.formats.columns import numbers, own_rate, own_rates, time_stamps
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.table import Table
@@ -136,24 +137,13 @@ def _union(parts: Sequence[_Part]) -> Table:
             if name == part.time_column or column.size != here.size:
                 continue
             free = name if name not in columns else f"{name} ({part.table.source})"
-            columns[free] = _spread(column[here], at, time_s.size, fill=name in LABELS)
+            columns[free] = spread(column[here], at, time_s.size, fill=name in LABELS)
             if name in part.table.units:
                 units[free] = part.table.units[name]
         labels = (n for n in part.table.scalars if n in LABELS)
         scalars |= {name: part.table.scalars[name] for name in labels}
     source = " + ".join(part.table.source for part in parts)
     return Table(source, columns, scalars, units=units)
-
-
-def _spread(column: NDArray[Any], at: NDArray[np.intp], size: int, *, fill: bool) -> NDArray[Any]:
-    """Put a column into the rows of its own clock; a label also holds in the rows between."""
-    if fill:
-        nearest = np.searchsorted(at, np.arange(size), side="right") - 1
-        return column[np.clip(nearest, 0, None)]
-    text = column.dtype == object
-    spread = np.full(size, "" if text else np.nan, dtype=object if text else np.float64)
-    spread[at] = column
-    return spread
 
 
 def _found(parts: Sequence[_Part], options: ReadOptions) -> Offset:

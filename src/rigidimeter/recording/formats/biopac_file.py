@@ -11,8 +11,7 @@ import numpy as np
 
 from rigidimeter.documents import open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
-from rigidimeter.recording.exported_session import Stream
-from rigidimeter.recording.formats.clocked_table import even_clock, table_of_streams
+from rigidimeter.recording.formats.clocked_table import Stream, even_clock, table_of_streams
 from rigidimeter.recording.formats.stored_arrays import Expansion, check_count, silent
 from rigidimeter.recording.formats.table import Table
 

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from rigidimeter.documents import open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
-from rigidimeter.recording.exported_session import Stream
-from rigidimeter.recording.formats.clocked_table import even_clock, table_of_streams, unique
+from rigidimeter.recording.formats.clocked_table import Stream, even_clock, table_of_streams, unique
 from rigidimeter.recording.formats.stored_arrays import check_count, silent
 from rigidimeter.recording.formats.table import Table
 

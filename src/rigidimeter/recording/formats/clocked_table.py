@@ -1,7 +1,7 @@
 """Signals with clocks of their own as one table.
 
 Each clock has rows of its own, in the order of time; in the rows of other clocks a column is empty.
-So every channel keeps its own stamps.
+So every channel keeps its own stamps. Labels hold in the rows between.
 """
 
 from __future__ import annotations
@@ -10,23 +10,57 @@ import functools
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.exported_session import Stream
+from rigidimeter.recording.channels.choice import LABELS
 from rigidimeter.recording.formats.columns import numbers
 from rigidimeter.recording.formats.stored_arrays import Columns
-from rigidimeter.recording.formats.table import Table, printable
+from rigidimeter.recording.formats.table import Table, label_text, printable
 
 TIME = "time_s"
+EXCLUDED = "excluded"
+"""The column of a table of intervals that says which of them do not count."""
+ROUNDING_S = 1e-9
+"""A file may hold a first stamp and a rate in place of even stamps."""
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Signals that were sampled together.
+
+    Attributes
+    ----------
+    name : str
+        Such as ``torque``, ``motion`` or ``control``.
+    time_s : array, shape (n,)
+        When each sample was taken, in s.
+    columns : mapping of str to array, shape (n,)
+        By name.
+    """
+
+    name: str
+    time_s: NDArray[np.float64]
+    columns: Mapping[str, NDArray[Any]]
+
+    @property
+    def rate_hz(self) -> float:
+        """The mean sampling rate; NaN below two samples."""
+        if self.time_s.size < 2:
+            return float("nan")
+        return (self.time_s.size - 1) / float(self.time_s[-1] - self.time_s[0])
 
 
 def table_of_streams(
     source: str, streams: Sequence[Stream], units: Sequence[Mapping[str, str]] = ()
 ) -> Table:
     """Return streams as a table; a name that two have gets that of its stream before it.
+
+    Labels of epochs are those of the first stream that has them.
 
     Parameters
     ----------
@@ -56,21 +90,29 @@ def table_of_streams(
                 "recording needs a time of its own for each sample"
             )
     time_s = np.unique(np.concatenate([stream.time_s for stream, _ in used]))
-    given = [column for stream, _ in used for column in stream.columns]
+    labelled = {
+        label: k for label in LABELS for k in range(len(used))[::-1] if label in used[k][0].columns
+    }
+    given = [column for stream, _ in used for column in stream.columns if column not in LABELS]
     names = iter(
         unique(
             column if given.count(column) == 1 else f"{stream.name}.{column}"
             for stream, _ in used
             for column in stream.columns
+            if column not in LABELS
         )
     )
     columns = {TIME: lambda: time_s}
     known: dict[str, str] = {TIME: "s"}
-    for stream, stated in used:
+    for k, (stream, stated) in enumerate(used):
         rows = np.searchsorted(time_s, stream.time_s)
         for column, values in stream.columns.items():
-            name = next(names)
-            columns[name] = functools.partial(_spread, values, rows, time_s.size)
+            if labelled.get(column, k) != k:
+                continue
+            name = column if column in LABELS else next(names)
+            columns[name] = functools.partial(
+                spread, values, rows, time_s.size, fill=column in LABELS
+            )
             if stated.get(column):
                 known[name] = stated[column]
     return Table(source, Columns(columns), units=known)
@@ -92,6 +134,37 @@ def table_of_pairs(table: Table) -> Table:
         streams.append(Stream(name, stamps[here], {name: values[here]}))
         units.append({name: table.units.get(name, "")})
     return table_of_streams(table.source, streams, units)
+
+
+def with_intervals(
+    table: Table,
+    starts_s: Sequence[float] | NDArray[np.float64],
+    stops_s: Sequence[float] | NDArray[np.float64],
+    labels: Mapping[str, Sequence[str]],
+) -> Table:
+    """Return a table whose rows from a start to its stop have labels; the others have none.
+
+    Parameters
+    ----------
+    table : Table
+        With a clock (`TIME`).
+    starts_s, stops_s : sequence of float
+        Of each interval, on that clock.
+    labels : mapping of str to sequence of str
+        By column (`LABELS`), one for each interval; and `EXCLUDED`: intervals for which it is true
+        have no labels.
+    """
+    time_s = table.columns[TIME]
+    counts = [text.lower() not in ("true", "1") for text in labels.get(EXCLUDED, ())]
+    columns = {name: np.full(time_s.size, "", dtype=object) for name in labels if name in LABELS}
+    for k, (start_s, stop_s) in enumerate(zip(starts_s, stops_s, strict=True)):
+        rows = slice(*np.searchsorted(time_s, (start_s - ROUNDING_S, stop_s + ROUNDING_S)))
+        for name, column in columns.items():
+            text = label_text(labels[name][k])
+            # A rest may share its first sample with the epoch before it.
+            if text and (not counts or counts[k]):
+                column[rows] = text
+    return replace(table, columns={**table.columns, **columns})
 
 
 def unique(names: Iterable[str], but: Sequence[str] = (TIME,)) -> list[str]:
@@ -128,7 +201,23 @@ def even_clock(start_s: float, rate_hz: float, count: int) -> NDArray[np.float64
     return start_s + np.arange(count) / rate_hz
 
 
-def _spread(values: NDArray[np.float64], rows: NDArray[np.intp], count: int) -> NDArray[np.float64]:
-    column = np.full(count, np.nan)
-    column[rows] = values
-    return column
+def spread(column: NDArray[Any], rows: NDArray[np.intp], size: int, *, fill: bool) -> NDArray[Any]:
+    """Put a column into the rows of its own clock.
+
+    Parameters
+    ----------
+    column : array, shape (n,)
+    rows : array of int, shape (n,)
+        Where the table has them.
+    size : int
+        The rows of the table.
+    fill : bool
+        Whether a value holds in the rows between, too, as a label does.
+    """
+    if fill:
+        before = np.searchsorted(rows, np.arange(size), side="right") - 1
+        return column[np.clip(before, 0, None)]
+    text = column.dtype == object
+    found = np.full(size, "" if text else np.nan, dtype=object if text else np.float64)
+    found[rows] = column
+    return found

@@ -16,8 +16,7 @@ from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.choice import LABELS
 from rigidimeter.recording.channels.headers import read_header
 from rigidimeter.recording.channels.unit_text import factor
-from rigidimeter.recording.exported_session import Stream
-from rigidimeter.recording.formats.clocked_table import even_clock, table_of_streams, unique
+from rigidimeter.recording.formats.clocked_table import Stream, even_clock, table_of_streams, unique
 from rigidimeter.recording.formats.mat_fields import (
     NAMES,
     UNITS,
@@ -44,7 +43,7 @@ _SAME = 0.01
 
 
 def table_of_variables(source: str, entries: Mapping[str, Stored]) -> Table:
-    """Return the variables of a file as a table: its channels, or else its arrays as they are.
+    """Return the variables of a file as a table: its channels or clocks, or its arrays as they are.
 
     Parameters
     ----------
@@ -64,7 +63,8 @@ def table_of_variables(source: str, entries: Mapping[str, Stored]) -> Table:
             found[place] = channels
     channels = [channel for each in found.values() for channel in each]
     if not channels or _is_recording(sorted_arrays(entries)[0]):
-        return table_of_arrays(source, entries)
+        clocks = _clocks(entries)
+        return table_of_streams(source, clocks) if clocks else table_of_arrays(source, entries)
     bare = all(channel.time_s is None for channel in channels)
     rest = {
         name: entry
@@ -87,6 +87,30 @@ def table_of_variables(source: str, entries: Mapping[str, Stored]) -> Table:
     )
     table = table_of_streams(source, streams, units)
     return replace(table, scalars=scalars, others={**others, **beside})
+
+
+def _clocks(entries: Mapping[str, Stored]) -> list[Stream]:
+    """Return structures with a column of the time each, and columns of as many samples beside it.
+
+    There are none unless there are several, with different columns: structures with the same are
+    trials.
+    """
+    groups: dict[str, dict[str, Stored]] = {}
+    for name, entry in entries.items():
+        place, _, field = name.rpartition(".")
+        groups.setdefault(place, {})[field] = entry
+    found = []
+    for place, fields in groups.items():
+        times = [name for name in fields if read_header(name).kind == "time"]
+        size_s = factor(read_header(times[0]).unit, "time_s") if len(times) == 1 else None
+        if not place or not size_s or fields[times[0]].size < 2:
+            continue
+        time = fields.pop(times[0])
+        columns, _, _ = sorted_arrays(fields)
+        beside = {name: read() for name, read in columns.items() if fields[name].size == time.size}
+        found.append(Stream(place, numbers(time).reshape(-1) * size_s, beside))
+    names = [name for stream in found for name in stream.columns if name not in LABELS]
+    return found if len(found) > 1 and len(set(names)) == len(names) else []
 
 
 def _channels(source: str, groups: Mapping[str, Fields], place: str) -> list[Channel]:

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.errors import UserError
-from rigidimeter.recording.exported_session import Stream
-from rigidimeter.recording.formats.clocked_table import TIME, table_of_streams, unique
+from rigidimeter.recording.formats.clocked_table import TIME, Stream, table_of_streams, unique
 from rigidimeter.recording.formats.mat_channels import table_of_variables
 from rigidimeter.recording.formats.mat_check import check_mat5
 from rigidimeter.recording.formats.stored_arrays import Expansion, Stored, silent

@@ -17,25 +17,14 @@ from rigidimeter.documents import open_regular, visible
 from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.formats.arrow_file import read_arrow
-from rigidimeter.recording.formats.bids_dataset import bids_settings, is_bids, read_bids
 from rigidimeter.recording.formats.bids_motion import is_bids_motion, read_bids_motion
 from rigidimeter.recording.formats.biopac_file import read_biopac
 from rigidimeter.recording.formats.c3d_file import read_c3d
-from rigidimeter.recording.formats.export_folder import (
-    export_folder_settings,
-    is_export_folder,
-    read_export_folder,
-)
 from rigidimeter.recording.formats.hdf5_file import read_hdf5
-from rigidimeter.recording.formats.mat_export import (
-    is_mat_export,
-    mat_export_settings,
-    read_mat_export,
-)
 from rigidimeter.recording.formats.mat_file import read_mat
 from rigidimeter.recording.formats.neurophysiology_file import SUFFIXES, read_neurophysiology
 from rigidimeter.recording.formats.npz_file import read_npz
-from rigidimeter.recording.formats.nwb_file import nwb_settings, read_nwb
+from rigidimeter.recording.formats.nwb_file import read_nwb
 from rigidimeter.recording.formats.read_options import ReadOptions
 from rigidimeter.recording.formats.spreadsheet import read_spreadsheet
 from rigidimeter.recording.formats.stored_arrays import Columns
@@ -95,14 +84,6 @@ class Reader:
 READERS: list[Reader] = [
     Reader("session folder", (), read_session, sniff=is_session, settings=session_settings),
     Reader(
-        "exported folder",
-        (),
-        read_export_folder,
-        sniff=is_export_folder,
-        settings=export_folder_settings,
-    ),
-    Reader("exported BIDS data set", (), read_bids, sniff=is_bids, settings=bids_settings),
-    Reader(
         "BIDS motion recording",
         (".tsv",),
         read_bids_motion,
@@ -125,14 +106,6 @@ READERS: list[Reader] = [
     ),
     Reader("NumPy archive", (".npz",), read_npz, made_by="numpy.savez"),
     Reader(
-        "exported MATLAB file",
-        (".mat",),
-        read_mat_export,
-        sniff=is_mat_export,
-        settings=mat_export_settings,
-        made_by="rigidimeter export",
-    ),
-    Reader(
         "MATLAB file",
         (".mat",),
         read_mat,
@@ -144,7 +117,6 @@ READERS: list[Reader] = [
         "NWB file",
         (".nwb",),
         read_nwb,
-        settings=nwb_settings,
         made_by="a program that writes NWB",
         extra="nwb",
     ),

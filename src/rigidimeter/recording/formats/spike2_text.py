@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.documents.bounds import COLUMNS
 from rigidimeter.errors import UserError
-from rigidimeter.recording.exported_session import Stream
-from rigidimeter.recording.formats.clocked_table import table_of_streams
+from rigidimeter.recording.formats.clocked_table import Stream, table_of_streams
 from rigidimeter.recording.formats.table import Table, printable
 
 FIRST = b'"INFORMATION"'

@@ -24,8 +24,7 @@ from rigidimeter.documents.bounds import RECORDING_BYTES
 from rigidimeter.errors import UserError
 from rigidimeter.recording.channels.conversion import conversion
 from rigidimeter.recording.channels.headers import read_header
-from rigidimeter.recording.exported_session import Stream
-from rigidimeter.recording.formats.clocked_table import even_clock, table_of_streams, unique
+from rigidimeter.recording.formats.clocked_table import Stream, even_clock, table_of_streams, unique
 from rigidimeter.recording.formats.stored_arrays import Expansion, check_count
 from rigidimeter.recording.formats.table import Table
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.documents.bounds import COLUMNS
 from rigidimeter.errors import UserError
-from rigidimeter.recording.exported_session import Stream
-from rigidimeter.recording.formats.clocked_table import table_of_streams, unique
+from rigidimeter.recording.formats.clocked_table import Stream, table_of_streams, unique
 from rigidimeter.recording.formats.table import Table, printable
 from rigidimeter.recording.formats.text_head import cells_of
 

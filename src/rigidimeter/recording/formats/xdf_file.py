@@ -1,13 +1,13 @@
 """XDF, the files of Lab Streaming Layer, read by pyxdf: a stream for each clock.
 
-Three kinds are told apart: what `rigidimeter export` wrote, a recording of the streams that
-`rigidimeter run` sends, and any other. Clock offsets are applied, and stamps of streams with a
-nominal rate are straightened, as pyxdf does.
+A recording of the streams that `rigidimeter run` sends gives the session's epochs, any other a
+table. Clock offsets are applied, and stamps of streams with a nominal rate are straightened, as
+pyxdf does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -16,17 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.documents import open_regular, parse_json
+from rigidimeter.documents import open_regular
 from rigidimeter.documents.bounds import RECORDING_BYTES
-from rigidimeter.errors import UserError
-from rigidimeter.recording.exported_session import (
-    ExportedSession,
-    Stream,
-    checked_document,
-    epochs_of_export,
-    exported_settings,
-)
-from rigidimeter.recording.formats.clocked_table import table_of_streams, unique
+from rigidimeter.recording.formats.clocked_table import Stream, table_of_streams, unique
 from rigidimeter.recording.formats.lsl_recording import (
     SAMPLES_TYPE,
     epochs_of_samples,
@@ -37,9 +29,6 @@ from rigidimeter.recording.formats.table import Table
 from rigidimeter.recording.formats.xdf_check import check_xdf
 from rigidimeter.records import Epoch, Notice
 from rigidimeter.settings import Settings
-
-_DOCUMENT = "rigidimeter document"
-_PREFIX = "rigidimeter "
 
 
 @dataclass(frozen=True)
@@ -73,20 +62,6 @@ def read_xdf(path: Path) -> Table | tuple[list[Epoch], list[Notice]]:
         Whatever pyxdf raises on a damaged file.
     """
     streams = _streams(path)
-    about = _document(path, streams)
-    if about is not None:
-        own = [
-            stream for stream in streams if stream.name.startswith(_PREFIX) and not stream.of_text
-        ]
-        exported = tuple(
-            Stream(each.name.removeprefix(_PREFIX), each.time_s, _columns(each)) for each in own
-        )
-        return epochs_of_export(ExportedSession(about, exported), str(path))
-    if any(stream.name.startswith(_PREFIX) for stream in streams):
-        raise UserError(
-            f"{path}: is an export of a session whose end is missing, and its document with it; "
-            "export the session again"
-        )
     sent = next((stream for stream in streams if stream.kind == SAMPLES_TYPE), None)
     if sent is not None:
         markers = [
@@ -105,11 +80,7 @@ def read_xdf(path: Path) -> Table | tuple[list[Epoch], list[Notice]]:
 
 def xdf_settings(path: Path) -> Settings | None:
     """Return the settings with which a session of ours was recorded; None of any other file."""
-    streams = _streams(path)
-    about = _document(path, streams)
-    if about is not None:
-        return exported_settings(about, str(path))
-    sent = next((stream for stream in streams if stream.kind == SAMPLES_TYPE), None)
+    sent = next((stream for stream in _streams(path) if stream.kind == SAMPLES_TYPE), None)
     return None if sent is None else settings_of_samples(sent.described, str(path))
 
 
@@ -120,11 +91,7 @@ def _streams(path: Path) -> list[XdfStream]:
         check_xdf(file, path.stat().st_size)
     # Of damage `check_xdf` has said what is to be said; a stream of one stamp brings a warning.
     with silent("pyxdf.pyxdf"):
-        ours = any(each["name"] == _DOCUMENT for each in pyxdf.resolve_streams(str(path)))
-        # Stamps of an exported session are those of its devices, on one clock.
-        found, _ = pyxdf.load_xdf(
-            str(path), synchronize_clocks=not ours, dejitter_timestamps=not ours
-        )
+        found, _ = pyxdf.load_xdf(str(path))
     return [_stream(each) for each in found]
 
 
@@ -160,11 +127,3 @@ def _columns(stream: XdfStream) -> dict[str, NDArray[np.float64]]:
         label: np.asarray(stream.values[:, k], dtype=np.float64)
         for k, label in enumerate(_labels(stream))
     }
-
-
-def _document(path: Path, streams: Sequence[XdfStream]) -> dict[str, Any] | None:
-    found = next((stream for stream in streams if stream.name == _DOCUMENT), None)
-    if found is None or not len(found.values):
-        return None
-    text = str(found.values[0][0])
-    return checked_document(parse_json(text.encode(), f"{path}: its document"), str(path))

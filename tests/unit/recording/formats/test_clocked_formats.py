@@ -14,8 +14,7 @@ from tests.known_joint import angle_rad, torque_nm
 
 from rigidimeter.errors import UserError
 from rigidimeter.recording import read
-from rigidimeter.recording.exported_session import Stream
-from rigidimeter.recording.formats.clocked_table import table_of_streams
+from rigidimeter.recording.formats.clocked_table import Stream, table_of_streams
 
 TORQUE_S = np.arange(2000) / 200.0
 ANGLE_S = 0.0013 + np.arange(1000) / 100.0

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.small_study import record
-from tests.unit.exporting.conftest import assert_same_epochs
 
 from rigidimeter.documents import json_text
 from rigidimeter.errors import UserError
@@ -16,6 +17,7 @@ from rigidimeter.recording import read
 from rigidimeter.recording.formats.lsl_recording import epochs_of_samples, settings_of_samples
 from rigidimeter.recording.markers import marker_of
 from rigidimeter.recording.session_files import read_session_files
+from rigidimeter.records import Epoch
 from rigidimeter.settings import dump_settings
 
 
@@ -35,6 +37,19 @@ def received(session: Path) -> dict[str, Any]:
     settings = json_text(dump_settings(read(session).settings))
     facts = {"settings": [settings], "virtual": ["true"], "session_id": ["x"]}
     return {"columns": columns, "markers": markers, "described": {"rigidimeter": [facts]}}
+
+
+def assert_same_epochs(found: Sequence[Epoch], expected: Sequence[Epoch]) -> None:
+    """Hold epochs equal to the bit in all but where they come from."""
+    assert len(found) == len(expected)
+    for one, other in zip(found, expected, strict=True):
+        assert list(one.channels) == list(other.channels)
+        for name, channel in one.channels.items():
+            np.testing.assert_array_equal(channel.time_s, other.channels[name].time_s)
+            np.testing.assert_array_equal(channel.values, other.channels[name].values)
+        for field in dataclasses.fields(Epoch):
+            if field.name not in ("channels", "source"):
+                assert getattr(one, field.name) == getattr(other, field.name), field.name
 
 
 def test_the_epochs_are_those_of_the_folder(session: Path, received) -> None:

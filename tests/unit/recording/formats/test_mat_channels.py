@@ -147,3 +147,17 @@ def test_a_matrix_keeps_the_time_beside_it(tmp_path):
     assert set(found.columns) == {"t", "Torque", "Angle"}
     assert found.scalars["condition"] == "OFF"
     np.testing.assert_array_equal(found.columns["t"], T)
+
+
+def test_structures_with_a_time_each_are_clocks(tmp_path):
+    """The label of the first clock holds for the samples of the second; trials are no clocks."""
+    trial = np.array(["1", "1", "", "2"])
+    torque = {"time_s": np.arange(4.0), "Moment_Nm": np.ones(4), "epoch": trial}
+    angle = {"t_ms": np.array([500.0, 1500.0, 3500.0]), "angle_deg": np.arange(3.0)}
+    found = table(tmp_path / "r.mat", {"force": torque, "motion": angle})
+    np.testing.assert_array_equal(stamps(found, "Moment_Nm"), [0, 1, 2, 3])
+    np.testing.assert_array_equal(stamps(found, "angle_deg"), [0.5, 1.5, 3.5])
+    assert [text.strip() for text in found.columns["epoch"]] == ["1", "1", "1", "1", "", "2", "2"]
+    trials = table(tmp_path / "t.mat", {"one": torque, "two": torque})
+    assert "two.Moment_Nm" in trials.columns
+    assert "two.time_s" in trials.columns
