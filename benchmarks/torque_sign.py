@@ -11,7 +11,7 @@ where the two arms are apart, the motion is wrong. Each row is of `MOMENTS_S` an
 The second is of a small joint on a computer that stands still now and then, at random moments: what
 becomes of a wrong sign, and whether a right one is called wrong. The third prints what bounds all
 that: which ratio S/N of the perturbation's answer to all other torque a window needs
-(`commissioning.turned_sign`), and which one it has while the sign is right.
+(`commissioning.wrong_sign`), and which one it has while the sign is right.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
@@ -29,7 +29,10 @@ import scipy
 from numpy.typing import NDArray
 
 from benchmarks.false_alarms import RATES, SIZES
-from rigidimeter.commissioning.turned_sign import turned_epoch
+from rigidimeter.acquisition import Clock, ControlLoop, SimulatedClock, perturb
+from rigidimeter.devices import SimulatedRig
+from rigidimeter.devices.base import Reading
+from rigidimeter.experiment import prbs_nm
 from rigidimeter.guard import Cause, torque_answer
 from rigidimeter.guard.torque_sign import BEFORE, INSTRUMENTS, PASSES, explained, table, whitened
 from rigidimeter.settings import Settings, parse_settings
@@ -66,6 +69,50 @@ GAPS = ((0.0, 0.0), (1.0, 0.039), (5.0, 0.039), (20.0, 0.039), (5.0, 0.2))
 """How many times a second the computer stands still, and for how long at most."""
 
 LATE_SUBJECTS = ("relaxed, no torque of its own", "relaxed, 0.05 N·m (SD)", "1 N·m (SD)")
+
+
+class TurnedRig(SimulatedRig):
+    """The simulated rig whose torque has the wrong sign from one of its ticks on."""
+
+    turned_at = math.inf
+
+    def read(self, elapsed_ticks: int = 1) -> Reading:
+        """Return the reading, its torque perhaps turned."""
+        reading = super().read(elapsed_ticks)
+        if self._tick > self.turned_at:
+            return reading._replace(torque_nm=-reading.torque_nm)
+        return reading
+
+
+class TurnedEpoch(NamedTuple):
+    """What ended an epoch, when, and the angle at each tick."""
+
+    cause: Cause
+    ended_s: float
+    angle_deg: NDArray[np.float64]
+
+
+def turned_epoch(
+    settings: Settings,
+    condition: str,
+    seed: int,
+    turned_s: float,
+    longest_s: float,
+    clock: Clock | None = None,
+) -> TurnedEpoch:
+    """Run one PRBS epoch from rest on the virtual rig, its torque turned from `turned_s` on.
+
+    No tick is late unless the clock is.
+    """
+    rate_hz = settings.rig.tick_rate_hz
+    rig = TurnedRig(settings.rig, settings.subject[condition], np.random.default_rng(seed))
+    rig.turned_at = turned_s * rate_hz
+    angles: list[float] = []
+    clock = clock or SimulatedClock()
+    loop = ControlLoop(settings, rig, clock, lambda s: angles.append(s.angle_rad))
+    rig.enable()
+    perturb(loop, 0, prbs_nm(settings.prbs, rate_hz)[: round(longest_s * rate_hz)].tolist())
+    return TurnedEpoch(loop.cause, loop.tick / rate_hz, np.degrees(angles))
 
 
 def made(

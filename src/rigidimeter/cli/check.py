@@ -172,12 +172,12 @@ def _check(
 
 def _say_checked(found: DailyRecord, settings: Settings, what: str) -> None:
     """Show the checks; a rig that is not fit ends the program with status 1."""
-    from rigidimeter.cli.sign_text import sign_blocks
+    from rigidimeter.commissioning import sign_words
 
     show([table(found.checks)])
     if found.objection:
         raise UserError(f"{what}: not fit for a person today: {found.objection}")
-    show(sign_blocks(settings, found.checks))
+    show([sign_words(settings, found.checks)])
 
 
 def _zero(rigfile: RigFile, settings: Settings, asked: Operator) -> None:

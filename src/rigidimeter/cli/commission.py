@@ -93,9 +93,8 @@ def commission(
     """
     from datetime import UTC, datetime
 
-    from rigidimeter.cli.sign_text import sign_blocks
     from rigidimeter.commissioning import commission as try_rig
-    from rigidimeter.commissioning import record_path, write_record
+    from rigidimeter.commissioning import record_path, sign_words, write_record
     from rigidimeter.devices.rigfile import load_rig
     from rigidimeter.settings import load_settings
     from rigidimeter.version import __version__
@@ -133,7 +132,7 @@ def commission(
         raise UserError(f"{rig}: not fit for a person: {found.objection}")
     if found.not_tried:
         echo(f"Not tried: {', '.join(found.not_tried)}.")
-    show(sign_blocks(chosen, found.checks))
+    show([sign_words(chosen, found.checks)])
     what = "this emulated rig, with nobody in it" if found.emulated else "this rig"
     days = chosen.commissioning.validity_days
     echo(f"Valid for {what}, its devices and this controller, for {days:g} day{'s' * (days != 1)}.")

@@ -107,7 +107,7 @@ def run(
     realtime = Realtime(priority=priority, cpu=cpu, attended=attended)
     with terminal_view(sys.stdin if attended else None, sys.stdout, shown) as console:
         ended = run_planned(planned, out, rig, realtime, console)
-    for remark in (*console.remarks, *ended.remarks):
+    for remark in ended.remarks:
         echo(remark, err=True)
     try:
         _conclude(ended, out, rig, nwb=planned.settings.sharing.nwb_at_close)

@@ -18,12 +18,6 @@ from rigidimeter.commissioning.daily_record import (
     write_daily,
 )
 from rigidimeter.commissioning.sequence import commission
-from rigidimeter.commissioning.static_tests import measured_noise_nm
 from rigidimeter.commissioning.trial import Operator, Setup, Timebase
-from rigidimeter.commissioning.turned_sign import (
-    Search,
-    TurnedEpochs,
-    perturbed_conditions,
-    search_for_turned_sign,
-)
+from rigidimeter.commissioning.wrong_sign import sign_words
 from rigidimeter.commissioning.zero_check import ZeroFound, zero_check

@@ -33,11 +33,6 @@ class LimitDistance:
     beyond: str
 
     @property
-    def left(self) -> float:
-        """What is left to the limit, in its unit; negative beyond it."""
-        return self.limit - self.value
-
-    @property
     def part(self) -> float:
         """The value as a part of the limit: 1 at the limit."""
         return self.value / self.limit
@@ -46,11 +41,6 @@ class LimitDistance:
     def text(self) -> str:
         """The value and the limit, as ``14.6 of 40 deg``."""
         return f"{self._rounded(self.value)} of {self.limit:g} {self.unit}"
-
-    @property
-    def left_text(self) -> str:
-        """What is left, as ``25.4 deg left``; empty where that is not known."""
-        return f"{self._rounded(self.left)} {self.unit} left" if math.isfinite(self.left) else ""
 
     def _rounded(self, value: float) -> str:
         """Return a value with the digits that tell a hundredth of the limit."""

@@ -28,25 +28,29 @@ HELP = (
     "h halt (power off), e emergency stop, set NAME VALUE, save to FOLDER (if the disk is full); "
     "each with Enter"
 )
-EVERY_S = 1.0
 
 
 def status_line(facts: Facts) -> str:
-    """Return what the operator reads, in one line."""
+    """Return what the operator reads, in one line, what matters most first."""
+    limits = next(lamp for lamp in facts.lamps if lamp.name == "limits")
+    watch = [lamp for lamp in facts.lamps if lamp.level >= Level.WATCH]
     parts = [
         f"{facts.time_s:8.1f} s",
         facts.epoch.text if facts.epoch is not None else facts.state_words,
-        f"{facts.angle_deg:+6.1f} deg",
-        f"{facts.torque_nm:+6.2f} N·m",
     ]
+    if facts.stop_words:
+        parts.append(facts.stop_words)
+    if watch:
+        parts.append(" ".join(f"{lamp.level.sign} {lamp.name}" for lamp in watch))
+    if limits.level > Level.UNKNOWN:
+        parts.append(limits.words)
     if facts.countdown_words:
-        parts.insert(2, f"{facts.countdown_words}: {facts.countdown_s:.0f} s left")
+        parts.append(f"{facts.countdown_words}: {facts.countdown_s:.0f} s left")
+    parts += [f"{facts.angle_deg:+6.1f} deg", f"{facts.torque_nm:+6.2f} N·m"]
     known = [value.text for value in facts.live if value.settled]
     if known:
         parts.append(f"{facts.live_words}, live: {', '.join(known)}")
-    parts += [f"{lamp.name}: {lamp.words}" for lamp in facts.lamps if lamp.level >= Level.WATCH]
-    if facts.stop_words:
-        parts.append(facts.stop_words)
+    parts += [f"{lamp.name}: {lamp.words}" for lamp in watch if lamp is not limits]
     return " | ".join(parts)
 
 
@@ -57,19 +61,19 @@ class LineView:
     ----------
     keyboard : file or None
         Lines are read from it as they come; None for nobody.
-    screen : file
+    screen : file or None
+        None where nothing is shown.
     plan : SessionPlan
     now : callable
         Monotonic seconds.
     """
 
-    remarks: tuple[str, ...] = ()
-    """None: what other processes print can be read."""
+    every_s = 1.0
 
     def __init__(
         self,
         keyboard: IO[str] | None,
-        screen: IO[str],
+        screen: IO[str] | None,
         plan: SessionPlan,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -78,7 +82,7 @@ class LineView:
         self._observer: Observer | None = None
         self._shown_s = -math.inf
         self._typed = b""
-        self._troubles: dict[Role, str] = {}
+        self._told: tuple[str, ...] = ()
         if keyboard is not None:
             self._say(HELP)
 
@@ -89,16 +93,18 @@ class LineView:
         if self._observer is None:
             self._observer = Observer(self._plan, shared)
         facts = self._observer.look()
-        for role in (Role.RECORDER, Role.ESTIMATOR):
-            note = status.note(role) if status.condition(role) is Condition.TROUBLE else ""
-            if note and self._troubles.get(role) != note:
-                self._say(note)
-            self._troubles[role] = note
-        if self._now() - self._shown_s < EVERY_S:
-            return
-        if math.isfinite(facts.angle_deg):
+        notes = [
+            status.note(role)
+            for role in (Role.RECORDER, Role.ESTIMATOR)
+            if status.condition(role) is Condition.TROUBLE
+        ]
+        told = tuple(filter(None, (facts.stop_words, *self._observer.cautions, *notes)))
+        for text in told:
+            if text not in self._told:
+                self._say(text)
+        self._told = told
+        if self._now() - self._shown_s >= self.every_s and self._show(facts):
             self._shown_s = self._now()
-            self._say(status_line(facts))
 
     def _listen(self, status: SharedStatus) -> None:
         if self._keyboard is None:
@@ -118,8 +124,7 @@ class LineView:
 
     def _obey(self, text: str, status: SharedStatus) -> None:
         if text[:1].lower() == "e":
-            status.raise_flag(Flag.EMERGENCY_STOP)
-            self._say("emergency stop")
+            self._stop(status)
             return
         if text.lower().startswith("save to "):
             self._say(save_to(text[len("save to ") :].strip(), status))
@@ -132,6 +137,13 @@ class LineView:
         if order is None:
             self._say(HELP)
             return
+        self._post(order, status)
+
+    def _stop(self, status: SharedStatus) -> None:
+        status.raise_flag(Flag.EMERGENCY_STOP)
+        self._say("emergency stop")
+
+    def _post(self, order: Order, status: SharedStatus) -> None:
         try:
             status.post(order)
         except ValueError as error:
@@ -139,7 +151,13 @@ class LineView:
             return
         self._say(f"ordered: {order.command.name.lower().replace('_', ' ')}")
 
+    def _show(self, facts: Facts) -> bool:
+        """Show the status; return whether there is one."""
+        if math.isfinite(facts.angle_deg):
+            self._say(status_line(facts))
+        return math.isfinite(facts.angle_deg)
+
     def _say(self, text: str) -> None:
-        if select.select([], [self._screen.fileno()], [], 0.0)[1]:
+        if self._screen is not None and select.select([], [self._screen.fileno()], [], 0.0)[1]:
             self._screen.write(text + "\n")
             self._screen.flush()

@@ -71,9 +71,9 @@ class Observer:
         )
 
     @property
-    def remarks(self) -> tuple[str, ...]:
-        """What the operator should know after the session too."""
-        return (*self.progress.remarks, *filter(None, self._cautions.values()))
+    def cautions(self) -> tuple[str, ...]:
+        """What is wrong with the torque of each epoch that has ended."""
+        return tuple(filter(None, self._cautions.values()))
 
     def _caution(self) -> str:
         """Return what is wrong with the torque of the last epoch that ended, by its estimate."""

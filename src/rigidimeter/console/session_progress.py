@@ -45,8 +45,6 @@ class Progress:
     started_s : float
         When it began.
     ended : tuple of EndedEpoch
-    remarks : tuple of str
-        What the loop's process was refused, and which checks of the rig were never made.
     zeroed : bool
         Whether the torque sensor was zeroed.
     alone_kg_m2 : float
@@ -63,7 +61,6 @@ class Progress:
     running: bool = False
     started_s: float = 0.0
     ended: tuple[EndedEpoch, ...] = ()
-    remarks: tuple[str, ...] = ()
     zeroed: bool = False
     alone_kg_m2: float = 0.0
     stop: str = ""
@@ -87,11 +84,6 @@ def progress_after(progress: Progress, event: Mapping[str, Any]) -> Progress:
         return replace(progress, zeroed=not event["refused"])
     if kind == "daily_check":
         return replace(progress, alone_kg_m2=event.get("inertia_kg_m2", 0.0))
-    if kind == "loop_prepared":
-        return replace(progress, remarks=(*progress.remarks, *event["refused"]))
-    if kind == "not_commissioned":
-        never = f"Not tried when the rig was commissioned: {', '.join(event['checks'])}."
-        return replace(progress, remarks=(*progress.remarks, never))
     if kind == "guard_latched":
         return replace(progress, stop=event["sentence"])
     if kind == "session_ended":

@@ -1,4 +1,4 @@
-"""A terminal as a screen and single keys, which nobody ever waits for.
+"""A terminal that shows a line in place and gives single keys, and nobody ever waits for it.
 
 The output is opened anew, so that not waiting for it changes nothing for the other programs that
 have the same terminal. A frame that the terminal takes only in part is finished before the next one
@@ -15,12 +15,9 @@ import tty
 from contextlib import suppress
 from typing import IO
 
-ENTER = b"\x1b[?1049h\x1b[?25l\x1b[2J"
-LEAVE = b"\x1b[0m\x1b[?25h\x1b[?1049l"
-"""The terminal's other screen, without a cursor, and back."""
-
+LEAVE = b"\x1b[0m\n"
 LEAVE_S = 0.5
-"""For so long it is tried to leave the other screen on a terminal that takes no output."""
+"""For so long it is tried to end the line on a terminal that takes no output."""
 
 
 def discard_typed(keyboard: IO[str]) -> None:
@@ -31,7 +28,7 @@ def discard_typed(keyboard: IO[str]) -> None:
 
 
 class Tty:
-    """The terminal of two descriptors, from `enter` to `leave`.
+    """The terminal of two descriptors, used with `with`.
 
     Parameters
     ----------
@@ -45,13 +42,12 @@ class Tty:
         self._before = termios.tcgetattr(keys)
         self._pending = b""
 
-    def enter(self) -> None:
-        """Take keys one by one, unseen, and show the other screen; Ctrl-C stays a signal."""
+    def __enter__(self) -> Tty:
+        """Take keys one by one, unseen; Ctrl-C stays a signal."""
         tty.setcbreak(self._keys, termios.TCSANOW)
-        self._pending = ENTER
-        self._flush()
+        return self
 
-    def leave(self) -> None:
+    def __exit__(self, *_: object) -> None:
         """Give the terminal back as it was; what was typed and not read goes to nobody."""
         try:
             # A sequence that was torn off ends with the next one.
@@ -67,21 +63,17 @@ class Tty:
         finally:
             os.close(self._screen)
 
-    def size(self) -> tuple[int, int]:
-        """Return width and height in cells; 80 by 24 where the terminal does not say."""
-        try:
-            width, height = os.get_terminal_size(self._screen)
-        except OSError:
-            width, height = 0, 0
-        return (width or 80, height or 24)
+    def width(self) -> int:
+        """Return the width in cells; 80 where the terminal does not say."""
+        with suppress(OSError):
+            return os.get_terminal_size(self._screen).columns or 80
+        return 80
 
-    def show(self, frame: bytes) -> bool:
-        """Show a frame; return False if it was dropped."""
-        if not self._flush():
-            return False
-        self._pending = frame
-        self._flush()
-        return True
+    def show(self, frame: bytes) -> None:
+        """Show a frame; it is dropped while the one before is not out."""
+        if self._flush():
+            self._pending = frame
+            self._flush()
 
     def typed(self) -> bytes | None:
         """Return the bytes that were typed since the last call, None if nobody can type more."""

@@ -135,13 +135,13 @@ def test_how_it_ended_is_said():
 
 def test_distances_are_in_the_units_of_the_limits():
     angle, speed, torque, power, energy = limit_distances(SETTINGS.guard, QUIET, 4.5)
-    assert (angle.value, angle.left, angle.part) == pytest.approx((10.0, 30.0, 0.25))
+    assert (angle.value, angle.part) == pytest.approx((10.0, 0.25))
     assert (speed.unit, speed.part) == ("deg/s", pytest.approx(0.25))
-    assert (torque.left, power.left) == pytest.approx((9.0, 19.2))
+    assert (torque.value, power.value) == pytest.approx((1.0, 0.8))
     assert (energy.near, torque.near) == (True, False)
     assert energy.part == pytest.approx(0.9)
-    assert (angle.text, angle.left_text) == ("10.0 of 40 deg", "30.0 deg left")
-    assert (energy.text, energy.left_text) == ("4.50 of 5 J", "0.50 J left")
+    assert angle.text == "10.0 of 40 deg"
+    assert energy.text == "4.50 of 5 J"
     assert limit_distances(SETTINGS.guard, QUIET, 2e-6)[-1].text == "0.00 of 5 J"
 
 

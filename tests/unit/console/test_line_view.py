@@ -65,7 +65,7 @@ def test_a_parameter_is_set_by_its_name():
 def test_the_status_says_where_the_run_is_and_why_it_stands():
     progress = told(started(1, "1"))
     loop = LoopStatus(State.RUNNING, 5, 1, time_s=12.25, angle_rad=0.1, until_s=20.0)
-    recent = RecentSamples(10, -1.5)
+    recent = RecentSamples(10, -1.5, torque_age_s=1e-3, motion_age_s=1e-3)
 
     def line(loop, history=()):
         return status_line(facts(PLAN, progress, loop, history, recent))
@@ -79,7 +79,11 @@ def test_the_status_says_where_the_run_is_and_why_it_stands():
     wild = LiveEstimate(5, 0, 0, 1, 0.0, 0.2, 0.4701, 0.1, -341.779, 99.0, 75761.14, 9e3, 0.2)
     assert "live" not in line(loop, [wild])
     stopped = loop._replace(epoch=-1, missed_ticks=4, cause=int(Cause.STALLED))
-    assert line(stopped).endswith(f"stopped: {Cause.STALLED.sentence}")
+    assert line(stopped).split(" | ")[2] == f"stopped: {Cause.STALLED.sentence}"
+    near = RecentSamples(10, -1.5, 0.2, 0.5, 1.0, 18.0)
+    words = status_line(facts(PLAN, progress, loop, (), near)).split(" | ")
+    assert words[2:4] == ["▲ limits ■ sensor ■ drive", "power 18.0 of 20 W (90 %)"]
+    assert words[-1] == "drive: no angle that is a number"
 
 
 class Desk:

@@ -169,9 +169,9 @@ def test_a_torque_that_was_wrong_through_an_epoch_is_named_at_its_end(wrong, wor
     assert (result.outcome, result.epochs_good) == ("success", 3)
     cautions = [(time_s, text) for time_s, level, text in seen if level is Level.WATCH]
     assert bool(cautions) is bool(words)
-    assert [text for text in observer.remarks if words not in text] == []
+    assert [text for text in observer.cautions if words not in text] == []
     if words:
         (epoch,) = wrong
         assert EPOCH_S * epoch < cautions[0][0] <= (EPOCH_S + 1.0) * epoch + 1.0
         assert words in cautions[0][1]
-        assert words in observer.remarks[0]
+        assert words in observer.cautions[0]

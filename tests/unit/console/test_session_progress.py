@@ -92,15 +92,6 @@ def test_why_the_guard_latched_is_kept():
     assert told({"event": "guard_latched", "sentence": "too fast"}).stop == "too fast"
 
 
-def test_what_was_refused_is_kept():
-    progress = told(
-        {"event": "loop_prepared", "refused": ["no memory"]},
-        {"event": "not_commissioned", "checks": ["stop", "sign"]},
-    )
-    never = "Not tried when the rig was commissioned: stop, sign."
-    assert progress.remarks == ("no memory", never)
-
-
 def test_other_events_change_nothing():
     progress = told(started(1, "1"))
     assert progress_after(progress, {"event": "order", "command": "pause"}) is progress

@@ -1,30 +1,33 @@
-"""The full screen of the operator: facts, and orders by single keys.
+"""A line of status that is overwritten in place, and orders by single keys: on a terminal.
 
 What stops never asks. Only what sets the arm going asks for the key a second time: resume, in a
 pause. Whoever presses a key that means nothing, means that something is wrong: the session pauses.
-What takes more than a key is typed after a colon; nothing else is an order meanwhile but Ctrl-C.
+What takes more than a key is typed after a colon; then the space bar stops at once if nothing is
+typed yet or it is pressed twice, and so does an e that would begin the text.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import time
-from collections import deque
 from collections.abc import Callable
-from types import TracebackType
 
-from rigidimeter.acquisition.processes.session_memory import SessionMemory
+from rich.cells import cell_len, set_cell_size
+
 from rigidimeter.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.acquisition.processes.status_values import Flag
 from rigidimeter.acquisition.run_states import Command, Order, State
 from rigidimeter.console.facts import Facts
-from rigidimeter.console.observer import Observer
+from rigidimeter.console.line_view import LineView, status_line
 from rigidimeter.console.orders import KEYS, post_typed
-from rigidimeter.console.screen_text import painted, screen_lines
 from rigidimeter.console.session_plan import SessionPlan
 from rigidimeter.console.tty import Tty
 
-EVERY_S = 0.2
+KEYS_HELP = (
+    "SPACE or e: EMERGENCY STOP, h: halt (power off), other keys: pause now; p pause after this "
+    "epoch, n pause now, r resume, s stop after this epoch, a abort, : set, note, save to"
+)
 AGAIN_S = 5.0
 """For so long a key that asks for itself again waits."""
 
@@ -35,8 +38,8 @@ _SEQUENCE = re.compile(r"\x1b[\[O][0-?]*[ -/]*[@-~]?")
 """Arrows, function keys, a mouse wheel: no order, and no sign of a hurry."""
 
 
-class ScreenView:
-    """Shows the facts and posts orders; to be used with `with`, and called often.
+class KeyView(LineView):
+    """Shows the status and posts orders; to be called often, while `tty` is entered.
 
     Parameters
     ----------
@@ -46,53 +49,18 @@ class ScreenView:
         Monotonic seconds.
     """
 
+    every_s = 0.2
+
     def __init__(
         self, tty: Tty, plan: SessionPlan, now: Callable[[], float] = time.monotonic
     ) -> None:
-        self._tty, self._plan, self._now = tty, plan, now
-        self._observer: Observer | None = None
-        self._facts: Facts | None = None
-        self._shown_s = -1e9
-        self._size = (0, 0)
-        self._messages: deque[str] = deque(maxlen=20)
+        super().__init__(None, None, plan, now)
+        self._tty = tty
+        self._state: State | None = None
         self._prompt: str | None = None
         self._key_s = self._asked_s = -1e9
         self._there = True
-
-    def __enter__(self) -> ScreenView:
-        self._tty.enter()
-        return self
-
-    def __exit__(
-        self, _: type[BaseException] | None, __: BaseException | None, ___: TracebackType | None
-    ) -> None:
-        self._tty.leave()
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What other processes printed where this screen covered it."""
-        return self._observer.remarks if self._observer is not None else ()
-
-    @property
-    def messages(self) -> tuple[str, ...]:
-        """What was said to the operator, the newest last."""
-        return tuple(self._messages)
-
-    def __call__(self, shared: SessionMemory) -> None:
-        """Look at keyboard and session once."""
-        self._listen(shared.status)
-        if self._observer is None:
-            self._observer = Observer(self._plan, shared)
-        now_s, size = self._now(), self._tty.size()
-        if now_s - self._shown_s < EVERY_S and size == self._size:
-            return
-        self._shown_s, self._size = now_s, size
-        self._facts = self._observer.look()
-        folder = shared.status.folder()
-        rig = "virtual rig" if self._plan.virtual else "rig"
-        title = f"{rig}, into {folder}" if folder is not None else rig
-        lines = screen_lines(self._facts, title, self.messages, self._prompt, *size)
-        self._tty.show(painted(lines, size[0]))
+        self._say(KEYS_HELP)
 
     def _listen(self, status: SharedStatus) -> None:
         if not self._there:
@@ -108,16 +76,21 @@ class ScreenView:
         text = _SEQUENCE.sub("", typed.decode(errors="replace"))
         if text:
             self._key_s = self._now()
+            self._shown_s = -1e9  # what is typed is shown at once
         for key in text:
             if self._prompt is not None:
                 self._type(key, status)
             else:
-                self._obey(key, status)
+                self._press(key.lower(), status)
 
     def _type(self, key: str, status: SharedStatus) -> None:
         """Take a key of what is typed after a colon."""
         assert self._prompt is not None
-        if key in "\r\n":
+        stops = key in " eE" if not self._prompt else key == " " == self._prompt[-1]
+        if stops:
+            self._prompt = None
+            self._press(" ", status)
+        elif key in "\r\n":
             line, self._prompt = self._prompt.strip(), None
             if line:
                 self._say(post_typed(line, status))
@@ -128,40 +101,49 @@ class ScreenView:
         elif key.isprintable():
             self._prompt += key
 
-    def _obey(self, key: str, status: SharedStatus) -> None:
+    def _press(self, key: str, status: SharedStatus) -> None:
         """Do what a key orders."""
-        key = key.lower()
         if key in " e":
-            status.raise_flag(Flag.EMERGENCY_STOP)
-            self._say("emergency stop")
+            self._stop(status)
             return
         if key == ":":
             self._prompt = ""
             return
         if key in "\r\n":  # who is used to Enter after a letter
             return
-        command = KEYS.get(key, Command.PAUSE_NOW)
         if key not in KEYS:
             self._say(f"{key!r} is no order: pausing now")
+        command = KEYS.get(key, Command.PAUSE_NOW)
         if command is Command.RESUME and self._must_ask():
             return
         self._asked_s = -1e9
-        try:
-            status.post(Order(command))
-        except ValueError as error:
-            self._say(str(error))
-            return
-        self._say(f"ordered: {command.name.lower().replace('_', ' ')}")
+        self._post(Order(command), status)
 
     def _must_ask(self) -> bool:
         """Whether a resume is to be asked for again: in a pause it sets the arm going."""
-        running = self._facts is not None and self._facts.state is State.RUNNING
-        if running or self._now() - self._asked_s <= AGAIN_S:
+        if self._state is State.RUNNING or self._now() - self._asked_s <= AGAIN_S:
             return False
         self._asked_s = self._now()
         self._say("press r again within 5 s: the arm will move")
         return True
 
+    def _show(self, facts: Facts) -> bool:
+        self._state = facts.state
+        begun = math.isfinite(facts.angle_deg)
+        line = status_line(facts).strip() if begun else facts.state_words
+        if self._prompt is not None:
+            line = f": {self._prompt}_   Enter does it, Esc leaves, SPACE SPACE: EMERGENCY STOP"
+        line, cells = clean(line), max(self._tty.width() - 1, 1)  # the last column may wrap
+        if cell_len(line) > cells:
+            line = set_cell_size(line, cells - 1) + "…"
+        self._tty.show(f"\r\x1b[K{line}".encode())
+        return True
+
     def _say(self, text: str) -> None:
-        self._messages.append(text)
-        self._shown_s = -1e9  # with the next frame, which comes at once
+        self._tty.show(f"\r\x1b[K{clean(text)}\n".encode())
+        self._shown_s = -1e9  # the line of status follows at once
+
+
+def clean(text: str) -> str:
+    """Return a text without characters that would steer the terminal."""
+    return "".join(c if c.isprintable() else "?" for c in text)

@@ -1,26 +1,25 @@
-"""How a torque sensor of the wrong sign is found in simulated epochs."""
+"""Up to which own torque a wrong sign is found, by the equation and in simulated epochs."""
 
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.torque_sign import turned_epoch
 from tests.unit.acquisition.exact_rig import LateClock
 
-from rigidimeter.commissioning import turned_sign
-from rigidimeter.commissioning.turned_sign import (
-    EPOCHS,
-    LONGEST_S,
-    perturbed_conditions,
-    search_for_turned_sign,
-    turned_epoch,
-    turned_epochs,
-)
+from rigidimeter.commissioning import sign_words, wrong_sign
+from rigidimeter.commissioning.checks import below
+from rigidimeter.commissioning.static_tests import NOISE
+from rigidimeter.commissioning.wrong_sign import hiding_torque_nm
+from rigidimeter.dynamics import Loop, median_joint
 from rigidimeter.experiment import prbs_nm
 from rigidimeter.guard import Cause
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.guard.torque_sign import most_left
+from rigidimeter.settings import Settings, SubjectSettings, parse_settings
 
 
 def chosen(amplitude_nm: float = 1.0, noise_nm: float = 0.005, **subject: float) -> Settings:
@@ -43,15 +42,69 @@ def chosen(amplitude_nm: float = 1.0, noise_nm: float = 0.005, **subject: float)
     )
 
 
-def test_only_the_ratio_of_torques_matters_while_no_limit_is_reached() -> None:
-    """The loop is linear: twice the perturbation, own torque and noise move it twice as far."""
-    once = turned_epochs(chosen(0.1, 0.0005), "OFF", 0.004)
-    twice = turned_epochs(chosen(0.2, 0.0010), "OFF", 0.008)
-    assert once.all_found
-    assert twice.found_s == once.found_s
-    assert twice.farthest_deg == pytest.approx(2.0 * once.farthest_deg, rel=1e-6)
-    assert (twice.condition, twice.own_torque_nm, twice.amplitude_nm) == ("OFF", 0.008, 0.2)
-    assert once.epochs == EPOCHS
+ELBOW = {
+    "controller": {"inertia_kg_m2": 0.15, "damping_nm_s_rad": 3.0},
+    "subject": {
+        "OFF": {"inertia_kg_m2": 0.07, "damping_nm_s_rad": 0.5, "stiffness_nm_rad": 5.0},
+        "DBS": {},
+    },
+}
+
+
+def test_twice_the_perturbation_hides_twice_the_own_torque() -> None:
+    """S grows as a² and N as σ² where the sensor has no noise, while the same windows are full."""
+    once, twice = (
+        hiding_torque_nm(chosen(amplitude_nm, 0.0), "OFF") for amplitude_nm in (0.1, 0.2)
+    )
+    assert twice == pytest.approx(2.0 * once, rel=1e-6)
+
+
+def test_an_answer_with_the_colour_of_the_noise_has_their_ratio(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With Φ_sub = S/a² of a torque of 1 N·m, R = (a/σ)² whatever whitens it, and σ is known."""
+    settings = chosen(0.5, 0.0, stiffness_nm_rad=0.0, inertia_kg_m2=1e-9)
+    controller = settings.controller.model_copy(update={"inertia_kg_m2": 1e-6})
+    settings = settings.model_copy(update={"controller": controller})
+    chip_s = 1.0 / settings.prbs.clock_hz
+
+    def alike(subject: SubjectSettings, frequency_hz: Any, tick_rate_hz: float) -> Any:
+        loop = Loop(settings.controller, settings.rig).at_frequency(frequency_hz)
+        z = loop.gain(median_joint(subject).parameters) / loop.forward * loop.admittance
+        held = chip_s * np.sinc(frequency_hz * chip_s) ** 2
+        return subject.voluntary_sd_nm**2 * np.abs(z) ** 2 * held
+
+    monkeypatch.setattr(wrong_sign, "subject_density", alike)
+    monkeypatch.setattr(wrong_sign, "_at_limit_s", lambda *_: math.inf)
+    free = 96 - 4 - 2 * 4
+    needed = free / 96 * (1.0 / most_left(96, 4).at_once - 1.0)
+    assert hiding_torque_nm(settings, "OFF") == pytest.approx(0.5 / math.sqrt(16.0 * needed))
+
+
+@pytest.mark.parametrize(("size", "amplitude_nm"), [({}, 1.0), ({}, 2.0), (ELBOW, 2.0)])
+def test_up_to_it_the_sign_is_found_and_well_above_it_is_not(
+    size: dict[str, Any], amplitude_nm: float
+) -> None:
+    settings = chosen(amplitude_nm)
+    settings = parse_settings({**settings.model_dump(exclude_unset=True), **size})
+    own_nm = hiding_torque_nm(settings, "OFF")
+    assert own_nm > 0.0
+    assert found(settings, own_nm) == 10
+    assert found(settings, 8.0 * own_nm) <= 2
+
+
+def found(settings: Settings, own_nm: float) -> int:
+    """Return in how many of 10 simulated epochs with so much own torque the sign is found."""
+    subject = settings.subject["OFF"].model_copy(update={"voluntary_sd_nm": own_nm})
+    settings = settings.model_copy(update={"subject": {"OFF": subject}})
+    ends = [turned_epoch(settings, "OFF", seed, 0.0, 4.0).cause for seed in range(10)]
+    return ends.count(Cause.TORQUE_SIGN)
+
+
+def test_an_arm_that_is_at_its_limit_before_a_window_is_full_hides_the_sign() -> None:
+    settings = chosen(1.0, **ELBOW["subject"]["OFF"])  # as stiff as the small one's controller
+    assert hiding_torque_nm(settings, "OFF") == 0.0
+    assert found(settings, 0.0) < 10
 
 
 def test_the_arm_goes_away_as_the_admittance_less_the_joint() -> None:
@@ -86,47 +139,13 @@ def test_a_sign_in_order_is_never_found_and_one_that_turns_is_found_after_it() -
     assert turned.angle_deg[:n] == pytest.approx(right.angle_deg[:n], abs=0.0)
 
 
-def test_a_noise_that_was_measured_takes_the_place_of_the_settings(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(turned_sign, "LARGER", ())
-    settings = chosen()
-    assert search_for_turned_sign(settings).tried[0].all_found
-    noisy = search_for_turned_sign(settings, 0.5)
-    assert len(noisy.tried) == 1  # nothing more is tried of what is hidden already
-    assert not noisy.tried[0].all_found
-    assert noisy.tried[0].ended_s == search_for_turned_sign(chosen(noise_nm=0.5)).tried[0].ended_s
-
-
-def test_more_and_more_own_torque_is_tried_until_one_hides_the_sign() -> None:
-    found = search_for_turned_sign(chosen(voluntary_sd_nm=0.02))
-    own = [epochs.own_torque_nm for epochs in found.tried]
-    assert own == [0.0, 0.02, 0.05, 0.1, 0.2][: len(own)]
-    assert all(epochs.all_found for epochs in found.tried[:-1])
-    assert not found.tried[-1].all_found
-    medians = [sorted(epochs.found_s)[EPOCHS // 2] for epochs in found.tried[:-1]]
-    assert medians == sorted(medians)  # it takes the longer
-
-
-@pytest.mark.parametrize("enough", [2.0, 3.0, 5.0])
-def test_a_larger_perturbation_is_named_only_if_the_sign_is_then_always_found(
-    monkeypatch: pytest.MonkeyPatch, enough: float
-) -> None:
-    asked: list[tuple[float, float]] = []
-
-    def epochs(settings: Settings, condition: str, own_nm: float) -> Any:
-        amplitude = settings.prbs.amplitude_nm
-        asked.append((amplitude, own_nm))
-        cause = Cause.TORQUE_SIGN if own_nm < 0.1 or amplitude >= enough else Cause.NONE
-        return turned_sign.TurnedEpochs(condition, own_nm, amplitude, 1.0, {cause: [LONGEST_S]})
-
-    monkeypatch.setattr(turned_sign, "turned_epochs", epochs)
-    settings = chosen()
-    guard = settings.guard.model_copy(update={"torque_limit_nm": 3.5})
-    found = search_for_turned_sign(settings.model_copy(update={"guard": guard}))
-    assert asked[:3] == [(1.0, 0.0), (1.0, 0.05), (1.0, 0.1)]
-    assert asked[3:] == [(2.0, 0.1), (3.0, 0.1)][: 1 if enough == 2.0 else 2]
-    assert (found.larger.amplitude_nm if found.larger else 5.0) == enough
+def test_what_protects_is_said_with_the_noise_that_was_measured() -> None:
+    words = sign_words(chosen(), ())
+    assert f"own (SD): OFF {hiding_torque_nm(chosen(), 'OFF'):.2g} N·m. Above that, and in" in words
+    assert "an imposed sinusoid, the daily check alone protects: repeat `rigidimeter ch" in words
+    noisy = sign_words(chosen(), [below(NOISE, 0.5, "N·m", 0.1, "")])
+    assert "OFF perhaps none at all" in noisy
+    assert sign_words(chosen(), [below(NOISE, math.inf, "N·m", 0.1, "")]) == words
 
 
 def test_conditions_are_those_that_are_perturbed() -> None:
@@ -139,7 +158,14 @@ def test_conditions_are_those_that_are_perturbed() -> None:
     settings = parse_settings(
         {"protocol": {"blocks": blocks}, "subject": {name: {} for name in ("ON", "OFF", "DBS")}}
     )
-    assert perturbed_conditions(settings) == ["DBS", "OFF"]
+    assert re.findall("[A-Z]+ (?=[0-9])", sign_words(settings, ())) == ["DBS ", "OFF "]
+
+
+def test_a_protocol_without_perturbation_is_said_to_show_no_sign() -> None:
+    settings = parse_settings({"protocol": {"blocks": [{"task": "sinusoid"}]}})
+    words = sign_words(settings, ())
+    assert words.startswith("This protocol has no torque perturbation: the guard cannot find a ")
+    assert "rigidimeter check" in words
 
 
 def late_epoch(rate_hz: float, own_nm: float, seed: int, turned_s: float) -> tuple[Cause, float]:

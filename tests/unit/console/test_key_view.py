@@ -1,10 +1,9 @@
-"""The full screen on a pseudo-terminal: keys, sizes, a terminal that takes nothing, the end."""
+"""Line and keys on a pseudo-terminal: orders, widths, a terminal that takes nothing, the end."""
 
 import fcntl
 import json
 import os
 import pty
-import re
 import select
 import struct
 import termios
@@ -17,9 +16,10 @@ from rigidimeter.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.acquisition.processes.status_values import Condition, Flag, LoopStatus, Role
 from rigidimeter.acquisition.run_states import NOTHING, Command, Order, State
 from rigidimeter.console import SessionPlan, discard_typed, terminal_view
+from rigidimeter.console.key_view import KeyView
 from rigidimeter.console.line_view import LineView
-from rigidimeter.console.screen_view import ScreenView
-from rigidimeter.console.tty import ENTER, LEAVE, Tty
+from rigidimeter.console.tty import LEAVE, Tty
+from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
 
 PLAN = SessionPlan(Settings(), EPOCHS, virtual=True)
@@ -32,15 +32,17 @@ class Person:
     def __init__(self) -> None:
         self.far, self.near = pty.openpty()
         os.set_blocking(self.far, False)
-        self.resize(80, 24)
+        self.resize(80)
         self.shared = SessionMemory.create(100.0, 1.0)
         self.status = self.shared.status
         self.now_s = 100.0
         self.before = termios.tcgetattr(self.near)
-        self.view = ScreenView(Tty(self.near, self.near), PLAN, lambda: self.now_s)
+        self.tty = Tty(self.near, self.near)
+        self.tty.__enter__()
+        self.view = KeyView(self.tty, PLAN, lambda: self.now_s)
 
-    def resize(self, width: int, height: int) -> None:
-        fcntl.ioctl(self.near, termios.TIOCSWINSZ, struct.pack("HHHH", height, width, 0, 0))
+    def resize(self, width: int) -> None:
+        fcntl.ioctl(self.near, termios.TIOCSWINSZ, struct.pack("HHHH", 24, width, 0, 0))
 
     def press(self, keys: bytes) -> None:
         os.write(self.far, keys)
@@ -58,10 +60,10 @@ class Person:
         return seen
 
     def reads(self) -> list[str]:
-        """Return the lines of the last frame."""
+        """Return what stands on the terminal: lines that stay, and the one in place."""
         self.look()
-        frame = self.sees().rpartition(b"\x1b[H")[2]
-        return re.sub(rb"\x1b\[[?0-9;]*[a-zA-Z]|\r", b"", frame).decode().split("\n")
+        rows = self.sees().decode().replace("\r\n", "\n").split("\n")
+        return [row.rpartition("\r\x1b[K")[2].strip() for row in rows]
 
     def orders(self) -> list[Command]:
         found = []
@@ -79,51 +81,82 @@ class Person:
 @pytest.fixture
 def person():
     person = Person()
-    person.view.__enter__()
     person.status.show_loop(RUNNING)
     person.look()
     yield person
     person.close()
 
 
-def test_the_facts_of_a_running_session_are_on_80_by_24(person):
+def test_the_status_is_overwritten_in_place_with_the_nearest_limit(person):
     for event in (started(1, "1"), ended(1), started(2, "2")):
         assert person.shared.events.push(0, event)
+    person.resize(200)
+    person.status.show_loop(RUNNING._replace(energy_j=3.0))
+    lines = [person.reads()[-1] for _ in range(3)]
+    assert lines[-1].startswith(
+        "30.0 s | epoch 2 of 3: OFF, sinusoid | energy 3.00 of 5 J (60 %) | epoch: 15 s left"
+    )
+    assert b"\n" not in person.sees()
+
+
+def test_keys_are_named_at_the_start():
+    person = Person()
+    assert person.reads()[0].startswith("SPACE or e: EMERGENCY STOP, h: halt")
+    person.close()
+
+
+@pytest.mark.parametrize("width", [200, 40, 20, 1])
+def test_whatever_the_width_the_line_is_one_line(person, width):
+    person.sees()
+    person.resize(width)
+    (line,) = person.reads()
+    assert len(line) <= max(width - 1, 1)
+
+
+def test_why_it_stands_stays_above_the_line_once_and_in_full(person):
+    person.sees()
+    held = RUNNING._replace(state=State.PAUSED, cause=int(Cause.TORQUE_HIGH))
+    person.status.show_loop(held)
+    person.look()
+    person.look()
     lines = person.reads()
-    assert len(lines) <= 24
-    assert all(len(line) < 80 for line in lines)
-    assert lines[1] == "epoch 2 of 3: OFF, sinusoid"
-    assert lines[2] == "EPOCH RUNS   epoch: 15 s left   session: 1 min 05 s left"
-    assert lines[3] == "OFF: 1 good, 0 bad, 1 left   DBS: 0 good, 0 bad, 1 left"
-    text = "\n".join(lines)
-    for name in ("angle", "energy", "limits", "sensor", "drive", "lateness", "recorder", "disk"):
-        assert re.search(rf"^[○●▲■] {name} ", text, re.M)
-    assert lines[-1].startswith("SPACE or e: EMERGENCY STOP")
-    assert "…" not in lines[-2]
-
-
-@pytest.mark.parametrize(("width", "height"), [(40, 10), (20, 3), (200, 60), (1, 1)])
-def test_whatever_the_size_nothing_is_wider_or_higher(person, width, height):
-    person.resize(width, height)
-    lines = person.reads()
-    assert len(lines) <= height
-    assert all(len(line) <= max(width - 1, 1) for line in lines)
-    if width >= 20:
-        assert lines[-1].startswith("SPACE or e")
-
-
-def test_a_new_size_is_drawn_at_once(person):
-    person.reads()
-    person.resize(100, 30)
-    person.view(person.shared)  # no time has passed
-    assert b"EMERGENCY" in person.sees()
+    assert [line for line in lines if line == f"held: {Cause.TORQUE_HIGH.sentence}"] == lines[:-1]
+    assert "held by the guard" in lines[-1]
 
 
 @pytest.mark.parametrize("key", [b"e", b"E", b" "])
-def test_an_emergency_stop_never_asks(person, key):
+@pytest.mark.parametrize("before", [b"", b":", b":no\x1b", b"\x1b[A", b"x"])
+def test_an_emergency_stop_never_asks(person, before, key):
+    person.press(before)
+    person.orders()
     person.press(key)
     assert person.status.flag(Flag.EMERGENCY_STOP)
     assert person.orders() == []
+    person.press(b"p")  # and keys are orders
+    assert person.orders() == [Command.PAUSE]
+
+
+def test_the_space_bar_stops_while_a_text_is_typed_too(person):
+    person.press(b":set perturbation_scale 0.5 ")
+    assert not person.status.flag(Flag.EMERGENCY_STOP)
+    person.press(b" ")
+    assert person.status.flag(Flag.EMERGENCY_STOP)
+    assert person.orders() == []
+
+
+@pytest.mark.parametrize("state", [State.PAUSED, State.STOPPING, State.FAULTED])
+def test_an_emergency_stop_needs_no_running_loop(person, state):
+    person.status.show_loop(RUNNING._replace(state=state))
+    person.press(b"r")  # in a pause, asks for r again
+    person.press(b"e")
+    assert person.status.flag(Flag.EMERGENCY_STOP)
+
+
+def test_an_emergency_stop_works_before_the_first_tick():
+    person = Person()
+    person.press(b"e")
+    assert person.status.flag(Flag.EMERGENCY_STOP)
+    person.close()
 
 
 @pytest.mark.parametrize(
@@ -162,7 +195,7 @@ def test_what_sets_the_arm_going_asks_for_its_key_again(person):
 
 def test_what_takes_more_than_a_key_is_typed_after_a_colon(person):
     person.press(b":set perturbation_scale 0.x\x7f5")
-    assert ": set perturbation_scale 0.5_" in person.reads()[-2]
+    assert person.reads()[-1].startswith(": set perturbation_scale 0.5_")
     assert not person.status.flag(Flag.EMERGENCY_STOP)
     person.press(b"\r")
     assert person.status.take() == Order(Command.CHANGE, "perturbation_scale", 0.5)
@@ -201,14 +234,13 @@ def test_a_terminal_that_takes_nothing_holds_nobody_up(person):
     os.write(person.far, b"p")
     person.look()
     assert person.orders() == [Command.PAUSE]
-    # When it takes output again, the frame that was begun is finished before the next.
+    # When it takes output again, the line that was begun is finished before the next.
     seen = person.sees()
     for _ in range(3):
         person.look()
         seen += person.sees()
-    for frame in seen.split(b"\x1b[H")[1:]:
-        assert frame.endswith(b"\x1b[J")
-        assert frame.count(b"EMERGENCY STOP") == 1
+    lines = {line for line in seen.split(b"\r\x1b[K") if b"30.0 s" in line}
+    assert len(lines) == 1
 
 
 def test_at_the_end_the_terminal_is_as_it_was_and_nothing_typed_is_left(person):
@@ -218,9 +250,9 @@ def test_at_the_end_the_terminal_is_as_it_was_and_nothing_typed_is_left(person):
     assert during[3] & termios.ISIG  # Ctrl-C stays a signal
     os.write(person.far, b"rm -rf half an order\n")
     time.sleep(0.05)
-    person.view.__exit__(None, None, None)
+    person.tty.__exit__()
     assert termios.tcgetattr(person.near) == person.before
-    assert person.sees().endswith(LEAVE)
+    assert person.sees().endswith(LEAVE.replace(b"\n", b"\r\n"))
     assert not select.select([person.near], [], [], 0.1)[0]
     assert os.get_blocking(person.near)
 
@@ -229,7 +261,7 @@ def test_the_end_does_not_wait_for_a_terminal_that_takes_nothing(person):
     for _ in range(50):
         person.look()
     begin_s = time.monotonic()
-    person.view.__exit__(None, None, None)
+    person.tty.__exit__()
     assert time.monotonic() - begin_s < 5.0
     assert termios.tcgetattr(person.near) == person.before
 
@@ -237,33 +269,25 @@ def test_the_end_does_not_wait_for_a_terminal_that_takes_nothing(person):
 def test_what_a_note_or_a_name_holds_does_not_steer_the_terminal(person):
     person.status.set_condition(Role.RECORDER, Condition.TROUBLE, "full \x1b[2J\x07 disk")
     person.look()
-    frame = person.sees().rpartition(b"\x1b[H")[2]
-    assert b"\x1b[2J" not in frame
-    assert b"full ?[2J? disk" in frame
+    seen = person.sees()
+    assert b"\x1b[2J" not in seen
+    assert b"full ?[2J? disk" in seen
 
 
-def test_it_begins_with_the_other_screen():
-    far, near = pty.openpty()
-    with ScreenView(Tty(near, near), PLAN):
-        assert os.read(far, 100) == ENTER
-    os.close(far)
-    os.close(near)
-
-
-@pytest.mark.parametrize("ended", [Tty.leave, None])
-def test_what_was_typed_and_not_read_goes_to_nobody(ended):
+@pytest.mark.parametrize("after", [False, True])
+def test_what_was_typed_and_not_read_goes_to_nobody(after):
     far, near = pty.openpty()
     with os.fdopen(os.dup(near)) as keyboard:
         screen = Tty(near, near)
-        screen.enter()
-        if ended is None:
-            screen.leave()
+        screen.__enter__()
+        if after:
+            screen.__exit__()
         os.write(far, b"half an order\n")
         assert select.select([near], [], [], 10.0)[0]
-        if ended is None:
+        if after:
             discard_typed(keyboard)
         else:
-            ended(screen)
+            screen.__exit__()
     assert not select.select([near], [], [], 0)[0]
     os.close(far)
     os.close(near)
@@ -277,12 +301,12 @@ def test_without_a_terminal_there_are_lines(tmp_path, monkeypatch):
         with keyboard, screen:
             monkeypatch.setenv("TERM", "xterm")
             with terminal_view(keyboard, file, PLAN) as view:
-                assert isinstance(view, LineView)
+                assert type(view) is LineView
             with terminal_view(None, screen, PLAN) as view:
-                assert isinstance(view, LineView)
+                assert type(view) is LineView
             with terminal_view(keyboard, screen, PLAN) as view:
-                assert isinstance(view, ScreenView)
+                assert isinstance(view, KeyView)
             monkeypatch.setenv("TERM", "dumb")
             with terminal_view(keyboard, screen, PLAN) as view:
-                assert isinstance(view, LineView)
+                assert type(view) is LineView
     os.close(far)
