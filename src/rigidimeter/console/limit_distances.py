@@ -22,15 +22,12 @@ class LimitDistance:
     name, unit : str
     value, limit : float
         In `unit`; NaN where the value is not known.
-    beyond : str
-        What the guard does at the limit.
     """
 
     name: str
     unit: str
     value: float
     limit: float
-    beyond: str
 
     @property
     def part(self) -> float:
@@ -65,23 +62,14 @@ def limit_distances(
     energy_j : float
         What the guard counts as going to and fro within a second.
     """
-    holds, stops = "the rig holds still", "the rig stops"
     return (
         LimitDistance(
-            "angle",
-            "deg",
-            deg_from_rad(recent.largest_angle_rad),
-            guard.position_limit_deg,
-            "the arm is braked; held there for 1 s, the rig holds still",
+            "angle", "deg", deg_from_rad(recent.largest_angle_rad), guard.position_limit_deg
         ),
         LimitDistance(
-            "speed",
-            "deg/s",
-            deg_from_rad(recent.largest_velocity_rad_s),
-            guard.speed_limit_deg_s,
-            "the command is cut to it; a joint a quarter faster stops the rig",
+            "speed", "deg/s", deg_from_rad(recent.largest_velocity_rad_s), guard.speed_limit_deg_s
         ),
-        LimitDistance("torque", "N·m", recent.largest_torque_nm, guard.torque_limit_nm, holds),
-        LimitDistance("power", "W", recent.largest_power_w, guard.power_limit_w, holds),
-        LimitDistance("energy", "J", energy_j, guard.energy_limit_j, stops),
+        LimitDistance("torque", "N·m", recent.largest_torque_nm, guard.torque_limit_nm),
+        LimitDistance("power", "W", recent.largest_power_w, guard.power_limit_w),
+        LimitDistance("energy", "J", energy_j, guard.energy_limit_j),
     )

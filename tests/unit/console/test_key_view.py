@@ -18,6 +18,7 @@ from rigidimeter.acquisition.run_states import NOTHING, Command, Order, State
 from rigidimeter.console import SessionPlan, discard_typed, terminal_view
 from rigidimeter.console.key_view import KeyView
 from rigidimeter.console.line_view import LineView
+from rigidimeter.console.observer import Observer
 from rigidimeter.console.tty import LEAVE, Tty
 from rigidimeter.guard import Cause
 from rigidimeter.settings import Settings
@@ -122,6 +123,14 @@ def test_why_it_stands_stays_above_the_line_once_and_in_full(person):
     lines = person.reads()
     assert [line for line in lines if line == f"held: {Cause.TORQUE_HIGH.sentence}"] == lines[:-1]
     assert "held by the guard" in lines[-1]
+
+
+def test_a_torque_that_does_not_fit_is_printed_once_and_stays(person, monkeypatch):
+    person.sees()
+    caution = "epoch 1: J 0.001 kg·m² is less than the rig's alone"
+    monkeypatch.setattr(Observer, "cautions", property(lambda _: (caution,)))
+    person.look()
+    assert person.reads()[:-1] == [caution]
 
 
 @pytest.mark.parametrize("key", [b"e", b"E", b" "])
