@@ -276,9 +276,9 @@ def _event(event: Mapping[str, Any], described: Described) -> dict[str, Any]:
 
 
 def _epoch(epoch: Epoch) -> dict[str, Any]:
-    # A reading that the first tick found is older than the epoch.
+    # What all channels have: a reading that the first tick found is older than the epoch.
     begins = max(channel.time_s[0] for channel in epoch.channels.values())
-    ends = max(channel.time_s[-1] for channel in epoch.channels.values())
+    ends = min(channel.time_s[-1] for channel in epoch.channels.values())
     return {
         "label": epoch.label,
         "task": epoch.task,

@@ -66,12 +66,15 @@ def test_epochs_and_estimates(recording: Recording, tmp_path: Path, to: str) -> 
             np.testing.assert_allclose(ours.time_s, theirs.time_s, rtol=0, atol=1e-9)
             np.testing.assert_array_equal(ours.values, theirs.values)
             assert len(ours) >= max(len(whole), len(one.channels[name])) - 3
-    fits, expected = estimate(found).fits, estimate(recording).fits
-    assert len(fits) == len(expected)
-    for fit, right in zip(fits, expected, strict=True):
+    back, folder = estimate(found), estimate(recording)
+    for fit, right in zip(back.fits, folder.fits, strict=True):
         for parameter in (each.name for each in PARAMETERS):
             difference = getattr(fit, parameter) - getattr(right, parameter)
             assert abs(difference) <= 0.1 * getattr(right, f"{parameter}_se")
+    for score, right in zip(back.scores, folder.scores, strict=True):
+        # The motion's frequency and start are found from it, not read.
+        assert score.impulse_nm_s == pytest.approx(right.impulse_nm_s, rel=0.02)
+        assert score.work_j == pytest.approx(right.work_j, rel=0.02)
 
 
 @pytest.mark.parametrize("to", [form.name for form in FORMATS])
