@@ -196,6 +196,22 @@ LABORATORY: Mapping[str, Dialect] = {
             ANGLE_RAD),
         refused="say --rate-hz",
     ),
+    "averaged after the rate of the head": Dialect(
+        "r.csv",
+        csv("# Sampling rate: 1000 Hz, averaged over 5 samples\ntorque [Nm],angle [rad]", M,
+            ANGLE_RAD),
+        refused="say --rate-hz",
+    ),
+    "two rates in the head": Dialect(
+        "r.csv",
+        csv("# Sample rate: 1000 Hz\n# Stored rate: 200 Hz\ntorque [Nm],angle [rad]", M, ANGLE_RAD),
+        refused="say --rate-hz",
+    ),
+    "decimated from another rate": Dialect(
+        "r.csv",
+        csv("# Sampling rate: 200 Hz (decimated from 1000 Hz)\ntorque [Nm],angle [rad]", M,
+            ANGLE_RAD),
+    ),
     "decimated, beside a time": Dialect(
         "r.csv",
         csv("# Sampling rate: 1000 Hz\n# downsampled by 5\nt [s],torque [Nm],angle [deg]", T, M, D),

@@ -59,8 +59,8 @@ def extend_study(
     known : sequence of str, optional
         Names of conditions; any other may be a code. Those of the session's settings by default.
     refused : list of str, optional
-        Takes the sentences about sessions of a condition that an edited `study.toml` does not know;
-        by default they are among those that are returned.
+        Takes the sentences about sessions without a subject, or of a condition that an edited
+        `study.toml` does not know; by default they are among those that are returned.
 
     Returns
     -------
@@ -87,8 +87,8 @@ def extend_study(
                 f"{folder}: lies outside the study folder {study}; copy or link it there to add it"
             )
             continue
-        kept_out = said if refused is None else refused
-        said += _added(study, table, Path(path), subject, known, kept_out, asked=asked)
+        kept_out, told = (said, asked) if refused is None else (refused, True)
+        said += _added(study, table, Path(path), subject, known, kept_out, asked=told)
     return said
 
 
@@ -120,7 +120,9 @@ def _added(
     session = recorded_session(path.as_posix(), manifest, events)
     session = replace(session, subject=session.subject or subject)
     if not session.subject:
-        return [f"{path}: does not say its subject; name it with --subject"] if asked else []
+        if asked:
+            refused.append(f"{path}: does not say its subject; name it with --subject")
+        return []
     if not session.conditions:
         return [f"{path}: no epoch was begun in it, so it is not in the study"] if asked else []
     before = table_rows(table, "sessions")

@@ -130,6 +130,22 @@ def test_a_file_that_is_no_eds_is_refused_in_one_sentence(tmp_path, text):
         commission(eds=path)
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252"])
+def test_an_eds_in_any_usual_encoding_is_read(tmp_path, capfd, encoding):
+    path = eds(tmp_path)
+    path.write_text("[FileInfo]\nCreatedBy=Müller\n\n" + path.read_text(), encoding=encoding)
+    assert wrong(path) == {}
+    assert capfd.readouterr().err == ""
+
+
+def test_an_eds_that_is_not_there_is_no_damaged_one(tmp_path):
+    with pytest.raises(
+        UserError, match=r"none\.eds: (there is no such file|cannot be read)"
+    ) as told:
+        wrong(tmp_path / "none.eds")
+    assert "as an EDS" not in str(told.value)
+
+
 def test_a_rig_file_or_an_eds_is_needed():
     with pytest.raises(UserError, match=r"--rig RIG\.toml, or a drive's EDS with --eds FILE"):
         commission()

@@ -150,6 +150,14 @@ def test_what_does_not_belong_is_not_added(tmp_path, changes, said):
     assert len(cells(tmp_path, "sessions")) == 1
 
 
+def test_a_session_without_a_subject_is_named_and_fails(tmp_path, rigidimeter):
+    record(tmp_path / "a", "OFF", subject="")
+    ran = rigidimeter("study", "add", tmp_path)
+    assert ran.status == 1
+    assert "a: does not say its subject; name it with --subject" in ran.err
+    assert rigidimeter("study", "add", tmp_path, "--subject", "S01").status == 0
+
+
 def test_a_session_elsewhere_and_one_without_epochs(tmp_path):
     study = tmp_path / "study"
     (outside,) = extend_study(study, [record(tmp_path / "a", "OFF")])
@@ -189,7 +197,7 @@ def test_a_part_is_a_number_that_is_free(tmp_path):
 
 def test_the_command_adds_sessions_and_a_table_without_a_column_is_refused(rigidimeter, tmp_path):
     record(tmp_path / "sessions/a", "OFF", subject="")
-    assert "nothing is new" in rigidimeter("study", "add", tmp_path).out
+    assert "name it with --subject" in rigidimeter("study", "add", tmp_path).err
     ran = rigidimeter("study", "add", tmp_path, "--subject", "S02")
     assert "sessions/a: is in sessions.csv, subject S02, day 2026-03-01" in ran.out
     table = tmp_path / "sessions.csv"

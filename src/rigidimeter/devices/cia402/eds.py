@@ -6,6 +6,8 @@ commissioning tries that.
 
 from __future__ import annotations
 
+import io
+import logging
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +20,8 @@ from rigidimeter.devices.cia402.setup import (
     library,
     objects,
 )
+from rigidimeter.documents import read_bytes
+from rigidimeter.documents.bounds import TABLE_BYTES
 from rigidimeter.errors import UserError
 
 
@@ -39,11 +43,19 @@ def fits(path: Path, settings: Cia402Settings) -> list[Fit]:
         If the file cannot be read.
     """
     library("canopen")
+    reader = library("canopen.objectdictionary.eds")
+    reader.logger.setLevel(logging.ERROR)  # what is missing is told below
+    content = read_bytes(path, TABLE_BYTES)
     try:
-        described = library("canopen.objectdictionary.eds").import_eds(str(path), settings.node_id)
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("cp1252", "replace")
+    try:
+        described = reader.import_eds(io.StringIO(text), settings.node_id)
     except Exception as error:  # configparser's, and whatever a wrong value makes of it
+        reason = " ".join(str(error).split())
         raise UserError(
-            f"{path}: cannot be read as an EDS ({error}); it must be the drive's own, with a "
+            f"{path}: cannot be read as an EDS ({reason}); it must be the drive's own, with a "
             "section for each object, such as [6040]"
         ) from None
     if 0x1000 not in described:

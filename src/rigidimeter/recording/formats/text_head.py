@@ -36,11 +36,20 @@ _INTERVAL = re.compile(
     r"(?i)(?<![^\W_])(?:dt|abtastzeit|(?:sampl|abtast|bemonster)\w*[\s_-]*(?:interval|period)\w*"
     rf"|abtastintervall)(?![^\W_])\D*?{_AMOUNT}\s*(ms|msec|s|sec|us|µs)(?![^\W_/])(?!\s*/)"
 )
+_ANY_RATE = re.compile(rf"(?i)\brate\b[^\d\n]*?{_AMOUNT}\s*(k?)Hz")
 _DECIMATED = re.compile(
-    r"(?i)(?:decimat|d[ée]cim[ée]|decimeer|dezimier|diezm|(?:down|sub|sous|unter)[\s-]?(?:sampl|abtast"
-    r"|[ée]chant)|\bevery\s+\d+(?:nd|rd|th)\b)(?!\w*[\s:=]*(?:1|no|none|off)\b(?![.,]\d))"
+    r"(?i)(?:decimat|d[ée]cim[ée]|decimeer|dezimier|diezm|(?:down|re|sub|sous|unter)[\s-]?(?:sampl"
+    r"|abtast|[ée]chant)|\bthinned|\baverag|\bevery\s+\d+(?:nd|rd|th)\b)"
+    r"(?!\w*[\s:=]*(?:1|no|none|off)\b(?![.,:]\d))"
 )
 """Says that rows were left out, so that a rate beside it may be that of all rows."""
+_PLAIN = re.compile(
+    r"(?i)\w*(?:decimat|sampl)\w*\s+from\s+[\d.,]+\s*k?Hz|\bnot\s+\w*(?:decimat|sampl)\w*"
+    r"|\b\d+[\s-]*bits?\b"
+)
+"""What beside a rate leaves no doubt of it."""
+_NUMBER_BESIDE = re.compile(r"[^;|\t\n]*?\d")
+"""A second number in the clause of a rate may say how many of its rows there are."""
 
 
 @dataclass(frozen=True)
@@ -224,26 +233,33 @@ def _named(
 def stated_rate(lines: Sequence[str]) -> dict[str, float | str]:
     """Return the sampling rate that lines before the rows state, if they state one.
 
-    Where they also say that rows were left out, it is the text of those lines.
+    Where they state another number or another rate beside it, or say that rows were left out, it is
+    the text of those lines.
     """
-    found, told = set(), list[str]()
-    for line in lines:
-        pairs = [*_RATE.findall(line), *((n, kilo) for kilo, n in _RATE_BEHIND.findall(line))]
-        rates = {_amount(number) * (1000.0 if kilo else 1.0) for number, kilo in pairs}
-        rates |= {
-            1.0 / (_amount(number) * (factor(unit, "time_s") or 1.0))
-            for number, unit in _INTERVAL.findall(line)
-            if _amount(number)
-        }
+    found, others, told = set[float](), set[float](), list[str]()
+    doubtful = False
+    for stated in lines:
+        line = _PLAIN.sub("", stated)
+        matches = [*_RATE.finditer(line), *_RATE_BEHIND.finditer(line), *_INTERVAL.finditer(line)]
+        rates = {rate for match in matches if (rate := _rate_hz(match))}
+        others |= {rate for match in _ANY_RATE.finditer(line) if (rate := _rate_hz(match))}
+        beside = any(_NUMBER_BESIDE.match(line, match.end()) for match in matches)
+        left_out = _DECIMATED.search(line) is not None
         found |= rates
-        told += [line.strip()] if rates or _DECIMATED.search(line) else []
-    if found and any(map(_DECIMATED.search, told)):
+        doubtful |= beside or left_out
+        told += [stated.strip()] if rates or left_out or _ANY_RATE.search(line) else []
+    if found and (doubtful or others - found):
         return {"rate_hz": "; ".join(dict.fromkeys(told))}
     return {"rate_hz": found.pop()} if len(found) == 1 else {}
 
 
-def _amount(text: str) -> float:
-    return float(text.replace(",", "."))
+def _rate_hz(match: re.Match[str]) -> float | None:
+    """Return the rate that a number and a unit state: kHz or Hz, or of an interval its inverse."""
+    number, unit = sorted(match.groups(), key=lambda text: not text[:1].isdigit())
+    amount = float(number.replace(",", "."))
+    if match.re is _INTERVAL:
+        return 1.0 / (amount * (factor(unit, "time_s") or 1.0)) if amount else None
+    return amount * (1000.0 if unit else 1.0)
 
 
 def _run_of_rows(lines: Sequence[str], delimiter: str) -> int:
