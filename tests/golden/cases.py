@@ -17,6 +17,8 @@ from tests.small_study import build, record
 from tests.version_1 import as_version_1
 
 ROOT = Path(__file__).parents[2]
+SPREAD = ROOT / "examples" / "settings" / "study.toml"
+"""Joints that differ from epoch to epoch."""
 RATINGS = ROOT / "tests" / "reference" / "mixed" / "scores.csv"
 
 FILES: Mapping[str, tuple[str, Mapping[str, object]]] = {
@@ -290,7 +292,7 @@ def _of_plans() -> Iterator[Case]:
     wanted = ("--detect", "damping=20%", "--detect", "stiffness=0.3")
     yield Case(
         "design: the paper's rig", "design: stability, standard errors, epochs needed", nothing,
-        [["design", *wanted, "--json", ANSWER]],
+        [["design", "--settings", SPREAD, *wanted, "--json", ANSWER]],
     )  # fmt: skip
     yield Case(
         "design: searched", "design --optimise, --multisine", nothing,
