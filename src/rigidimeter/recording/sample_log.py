@@ -90,7 +90,7 @@ _INTEGERS = {
 SCHEMA = pa.schema(
     [pa.field(name, _INTEGERS.get(name, pa.float64()), nullable=False) for name in Sample._fields]
 )
-DTYPES = [np.dtype(field.type.to_pandas_dtype()) for field in SCHEMA]
+DTYPES = [np.dtype(str(kind)) for kind in SCHEMA.types]
 
 
 def sample_dtypes() -> dict[str, np.dtype[Any]]:
