@@ -283,11 +283,17 @@ class AtiRdt:
         )
 
     def _count(self, stated_hz: float) -> None:
-        """Refuse a stream of another rate than the page states: its stamps would be wrong."""
+        """Refuse a stream of another rate than the page states: its stamps would be wrong.
+
+        It is counted anew after `COUNTED_S`, so that one stall of this computer is no other rate.
+        """
+        until_s = self._now() + GIVE_UP_S
         began_s, first = self._now(), self._stream.sequence
         passed_s = rate_hz = 0.0
         while passed_s < COUNTED_S or abs(rate_hz / stated_hz - 1.0) > RATE_TOLERANCE:
-            if not self._wait(began_s + GIVE_UP_S):
+            if passed_s >= COUNTED_S:
+                began_s, first = self._now(), self._stream.sequence
+            if not self._wait(until_s):
                 raise DeviceError(
                     f"{self._device}: its page states {stated_hz:.4g} records/s and it sends "
                     f"{rate_hz:.4g}; set the RDT output rate on the sensor's Communications page, "
