@@ -82,6 +82,7 @@ FINDINGS = {
     "drive PI 50 Hz with load": ("iv", "bandlimited"),
     "slow position loop 40/s": ("iv",),
     "controller twice the settings": ("iv",),
+    "2 % of ticks late, 1 ms": ("iv",),
 }
 """Scenarios of the independent simulator, and the methods that are asked."""
 CUBIC = "cubic stiffness 40 N·m/rad³"

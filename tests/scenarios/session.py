@@ -39,6 +39,7 @@ def write_session(
     begins_s, first_tick = REST_S, 0
     for number, epoch in enumerate(epochs):
         columns = _columns(epoch, latency_s)
+        columns["lateness_s"] = _lateness_s(columns["time_s"], 1.0 / settings.rig.tick_rate_hz)
         ticks = columns["time_s"].size
         for name in ("time_s", "torque_time_s", "motion_time_s"):
             columns[name] = columns[name] + begins_s
@@ -76,6 +77,15 @@ def _columns(epoch: Epoch, latency_s: float) -> dict[str, NDArray[Any]]:
         "velocity_command_rad_s": command.values,
     }
     return {name: values[known] for name, values in columns.items()}
+
+
+def _lateness_s(ran_s: NDArray[np.float64], tick_s: float) -> NDArray[np.float64]:
+    """Return how late each tick ran; those that were due meanwhile were missed."""
+    late_s, due_s = np.zeros(ran_s.size), ran_s[0]
+    for k, at_s in enumerate(ran_s):
+        late_s[k] = max(at_s - due_s, 0.0)
+        due_s += (np.floor(late_s[k] / tick_s + 1e-6) + 1) * tick_s
+    return late_s
 
 
 def _newest(channel: Channel, until_s: NDArray[np.float64]) -> tuple[Any, Any]:

@@ -30,11 +30,11 @@ SMALLEST = {
     "lack_of_fit": "--recordings 1",
     "model_terms": "--epochs 1 --only relaxed",
     "null_studies": "--studies 1 --processes 1",
-    "same_numbers": "--group design",
     "scenarios.__main__": "--only relaxed --recordings 1 --methods bandlimited",
     "size": "",
     "tick": "--repeats 1",
     "torque_sign": "--epochs 1 --sizes small",
+    "trips": "design",
     "untrue": "",
     "verdicts": "run {folder}/studies --studies 1 --seconds 0.01\ntable {folder}/studies",
 }
