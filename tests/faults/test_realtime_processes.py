@@ -122,7 +122,7 @@ def test_the_disk_is_full_for_a_while(session):
     size = (run.folder / "samples.arrows").stat().st_size + 3001
     resource.prlimit(recorder, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
     wait_for(lambda: (run.folder / "samples.arrows").stat().st_size > size - 30000)
-    time.sleep(0.5)  # less than what stops the arm
+    time.sleep(1.0)  # several writes, and less than what stops the arm
     written = read_samples(run.folder / "samples.arrows")["tick"].size
     assert written < 1300
     unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)

@@ -40,12 +40,28 @@ def test_labview_without_a_column_of_time_has_a_rate(tmp_path):
         ("Sampling rate: 1 kHz", 1000.0), ("fs = 200 Hz", 200.0), ("Abtastzeit: 2,5 ms", 400.0),
         ("Sampling frequency (Hz): 250", 250.0), ("Bemonsteringsfrequentie;200 Hz", 200.0),
         ("sampling_interval = 0.01 s", 100.0), ("dt 500 us", 2000.0), ("Sampling time: 20 s", 0.0),
-        ("Sampled for 20 s by A", 0.0), ("Sampling rate: 200 Hz, of EMG sampled at 2000 Hz", 0.0),
+        ("Sampled for 20 s by A", 0.0), ("Sampling rate: 200 Hz; gain 5", 200.0),
+        ("Sampling rate: 200 Hz, 16 bits", 200.0), ("200 Hz, not decimated", 0.0),
         ("offs 20 Hz", 0.0), ("sample 5 s/division", 0.0), ("dt 0 s", 0.0), ("width 3 s", 0.0),
     ],
 )  # fmt: skip
 def test_a_rate_that_a_line_states(line, rate_hz):
     assert stated_rate([line]).get("rate_hz", 0.0) == pytest.approx(rate_hz)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["Sampling rate: 200 Hz, of EMG sampled at 2000 Hz"],
+        ["Sampling rate: 1000 Hz (resampled to 200 Hz)"],
+        ["Sampling rate: 1000 Hz, reduction 5:1"],
+        ["Sampling rate: 1 kHz, saved every 5 ms"],
+        ["Sample rate: 1000 Hz", "Stored rate: 200 Hz"],
+        ["Sampling rate: 1000 Hz", "subsampled 1:5"],
+    ],
+)
+def test_a_rate_beside_another_number_is_asked_about(lines):
+    assert stated_rate(lines) == {"rate_hz": "; ".join(lines)}
 
 
 def test_a_row_of_text_between_rows_is_not_a_footer(tmp_path):
