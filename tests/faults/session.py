@@ -93,7 +93,15 @@ def run_loop(settings: Settings, rig_path: Path, side: LoopSide) -> None:
         rig.connect()
         rig.configure()
         side.ready()
-        run_session(protocol, settings, rig, clock, side.sink, supervision=side.supervision)
+        run_session(
+            protocol,
+            settings,
+            rig,
+            clock,
+            side.sink,
+            supervision=side.supervision,
+            state_changed=side.sink.state_changed,  # as `run` does: the recorder waits for the end
+        )
     finally:
         rig.close()
 

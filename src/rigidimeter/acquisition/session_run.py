@@ -36,9 +36,6 @@ BRAKE_S = 0.1
 WATCHED_S = 1.0
 """For so long the joint is watched once its power is off."""
 
-WATCHED_STOPPED_S = 0.2
-"""The same where the guard stopped the rig: the recorder does not wait longer for the end."""
-
 
 @dataclass(frozen=True)
 class SessionResult:
@@ -335,10 +332,9 @@ def _after_power(session: _Session) -> str:
     """
     loop, rig = session.run.loop, session.rig
     settle_s, most_rad = loop.agreement.settle_s, loop.agreement.hold_rad
-    watched_s = WATCHED_STOPPED_S if session.run.is_in(State.FAULTED) else WATCHED_S
     work_j = moved_rad = 0.0
     began_rad = before_rad = math.nan
-    for k in range(1, round(watched_s * loop.rate_hz) + 1):
+    for k in range(1, round(WATCHED_S * loop.rate_hz) + 1):
         loop.clock.wait_until((loop.tick + k) / loop.rate_hz)
         reading = rig.read()
         rig.write(0.0)  # a drive may speak only when it is spoken to
@@ -350,7 +346,7 @@ def _after_power(session: _Session) -> str:
         work_j += reading.torque_nm * (angle_rad - before_rad)
         moved_rad, before_rad = max(moved_rad, abs(angle_rad - began_rad)), angle_rad
     if rig.powered:
-        why = f"{watched_s:g} s after it was told to switch its power off the drive has not said so"
+        why = f"{WATCHED_S:g} s after it was told to switch its power off the drive has not said so"
     elif moved_rad > most_rad and work_j > 0.0:
         why = f"the drive moved the joint by {deg_from_rad(moved_rad):.1f} deg with its power off"
     else:

@@ -157,11 +157,11 @@ def test_a_drive_that_does_not_say_that_its_power_is_off_keeps_hands_off():
     rig = ExactRig(interval_s=1.0 / RATE_HZ, inertia_kg_m2=HAND_KG_M2)
     rig.powered = True
     ran = session(rig=rig)
-    words = "s after it was told to switch its power off the drive has not said so: keep hands "
+    words = "1 s after it was told to switch its power off the drive has not said so: keep hands "
     assert ran.result.outcome == "fail"
-    assert ran.result.reason.startswith(f"1 {words}")
+    assert ran.result.reason.startswith(words)
     rig = ExactRig(interval_s=1.0 / RATE_HZ, inertia_kg_m2=HAND_KG_M2)
     rig.powered = True
     ran = session(Desk({20: Cause.EMERGENCY_STOP}), rig=rig)  # the first reason stays first
     assert ran.result.reason.startswith("the guard stopped the rig: the emergency stop")
-    assert f"; 0.2 {words}" in ran.result.reason
+    assert f"; {words}" in ran.result.reason
