@@ -88,7 +88,7 @@ def tested_words(result: StudyResult) -> str:
     what = "medians" if centres == {"median"} else f"means of {concluded.units}"
     text = f"{what}; p and intervals by the test of {concluded.units}"
     if concluded.tested > 1:
-        text += " for each measure alone; the conclusion follows p in brackets, adjusted for all"
+        text += " for each measure alone; the conclusion follows Holm's p"
     return text
 
 

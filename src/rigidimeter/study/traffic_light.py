@@ -31,7 +31,7 @@ class TrafficLight:
         Epochs recorded; of them those that are sound, that do not count, and that count in spite
         of a doubt.
     doubt, doubt_epochs : str, int
-        The check that casts doubt on most epochs, and how many epochs it doubts: 0 if only all of
+        The check that flags most epochs, and how many it flags: 0 if only all of
         them together. Empty without a doubt, or where a reason in `text` is no check.
     text, remedy : str
         What was found, and what to do about it.

@@ -47,10 +47,10 @@ def study() -> StudyResult:
 
 def test_it_is_said_which_p_the_conclusion_follows(study: StudyResult) -> None:
     """An interval can exclude zero where p adjusted for all measures shows no difference."""
-    says = "the conclusion follows p in brackets, adjusted for all"
+    says = "the conclusion follows Holm's p"
     assert says in first_screen.tested_words(study)
     alone = replace(study, comparisons=study.comparisons[:1])
-    assert "in brackets" not in first_screen.tested_words(alone)
+    assert says not in first_screen.tested_words(alone)
 
 
 @pytest.mark.parametrize(
