@@ -19,9 +19,9 @@ from tests.known_joint import angle_rad, torque_nm
 
 from benchmarks import batch, checks_cost, estimation, online
 from benchmarks.paired import REPEATS, Row, in_ms, paired
-from rigidimeter.recording import ReadOptions, read_recording
-from rigidimeter.settings import parse_settings
-from rigidimeter.virtual.virtual_session import run_virtual_session
+from rigidimeter.analysis.reading import ReadOptions, read_recording
+from rigidimeter.core.settings import parse_settings
+from rigidimeter.virtual import run_virtual_session
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "benchmarks.md"
 END = "<!-- measured: end -->"

@@ -23,15 +23,15 @@ from typing import Any
 import numpy as np
 
 from benchmarks.known_joint import TRUTH, array, sessions, settings_with
-from rigidimeter.estimation import estimate_delays, fit_epochs
-from rigidimeter.estimation.closedloop.linear_problems import least_squares_start
-from rigidimeter.estimation.closedloop.perturbation_methods import CLOSED_LOOP
-from rigidimeter.estimation.closedloop.refine import fit_pooled
-from rigidimeter.estimation.prepared import PreparedEpoch, Source, prepare
-from rigidimeter.experiment import prbs_nm, predicted_precision
-from rigidimeter.records import Channel, Epoch, Fit
-from rigidimeter.settings import USABLE_FRACTION_OF_RATE, Settings
-from rigidimeter.virtual.study_design import PAPER_RATES
+from rigidimeter.analysis.estimation import estimate_delays, fit_epochs
+from rigidimeter.analysis.estimation.closedloop.linear_problems import least_squares_start
+from rigidimeter.analysis.estimation.closedloop.perturbation_methods import CLOSED_LOOP
+from rigidimeter.analysis.estimation.closedloop.refine import fit_pooled
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch, Source, prepare
+from rigidimeter.core.records import Channel, Epoch, Fit
+from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, Settings
+from rigidimeter.planning import prbs_nm, predicted_precision
+from rigidimeter.virtual import PAPER_RATES
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "accuracy.md"
 

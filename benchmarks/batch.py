@@ -20,15 +20,28 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from benchmarks.paired import REPEATS, Row, in_ms, paired
-from rigidimeter.acquisition import ControlLoop, SimulatedClock, perturb
-from rigidimeter.control import BiquadState, admittance_step, biquad_step
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.dynamics import DriveState, arm_torque_nm, drive_step
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.experiment import prbs_nm
-from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.virtual.batch import Bench, bench, draw_inputs, epoch_generator, simulate_chunks
-from rigidimeter.virtual.batch.batch_run import empty_rows, run_row
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.model import (
+    BiquadState,
+    DriveState,
+    JointDynamics,
+    admittance_step,
+    arm_torque_nm,
+    biquad_step,
+    drive_step,
+)
+from rigidimeter.planning import prbs_nm
+from rigidimeter.rig.acquisition import ControlLoop, SimulatedClock, perturb
+from rigidimeter.rig.devices import SimulatedRig
+from rigidimeter.virtual.batch import (
+    Bench,
+    bench,
+    draw_inputs,
+    empty_rows,
+    epoch_generator,
+    run_row,
+    simulate_chunks,
+)
 
 Matrices = tuple[NDArray[np.float64], ...]
 

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from tests.scenarios.drive_rig import STRUCTURES, TRUTH, DriveRig, run
 
-from rigidimeter.settings import parse_settings
-from rigidimeter.study import estimate
+from rigidimeter.analysis.study import estimate
+from rigidimeter.core.settings import parse_settings
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "between-samples.md"
 RATES_HZ = (100.0, 200.0, 333.0, 500.0, 1000.0, 2000.0)

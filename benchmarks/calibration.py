@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import f as f_distribution
 from scipy.stats import kstest, norm
 
-from rigidimeter.statistics import (
+from rigidimeter.analysis.statistics import (
     TwoGroups,
     compare_effects,
     difference,

@@ -22,12 +22,12 @@ from pathlib import Path
 from unittest import mock
 
 from benchmarks.paired import REPEATS, Row, in_ms, paired
-from rigidimeter.estimation.diagnostics import CHECKS, Check
-from rigidimeter.estimation.diagnostics.together import Together
-from rigidimeter.recording import ReadOptions, read_recording
-from rigidimeter.records import Epoch, Fit
-from rigidimeter.settings import parse_settings
-from rigidimeter.study import analysis
+from rigidimeter.analysis.estimation.diagnostics import CHECKS, Check
+from rigidimeter.analysis.estimation.diagnostics.together import Together
+from rigidimeter.analysis.reading import ReadOptions, read_recording
+from rigidimeter.analysis.study import analysis
+from rigidimeter.core.records import Epoch, Fit
+from rigidimeter.core.settings import parse_settings
 from rigidimeter.virtual.batch import simulate_epochs
 
 VOLUNTARY = {"subject": {"OFF": {"voluntary_sd_nm": 0.1}}}
@@ -37,7 +37,7 @@ ANKLE = ReadOptions(
     epoch_length_s=20.0,
 )
 OUTSIDE = ("checked", "checked_together", "between_epochs")
-"""What `study.analysis` calls beside the estimate."""
+"""What `analysis.study.analysis` calls beside the estimate."""
 
 
 def inputs(count: int) -> dict[str, list[Epoch]]:

@@ -39,8 +39,8 @@ from tests.console.opened import Console, open_page
 from benchmarks.console_gaps import gaps
 from benchmarks.console_lateness import lateness
 from benchmarks.console_running import memory, renderers, renew
-from rigidimeter.guard import Cause
-from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.core.session import read_samples
+from rigidimeter.rig.guard import Cause
 
 RATE_HZ = 1000.0
 

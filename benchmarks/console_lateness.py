@@ -31,16 +31,13 @@ from tests.browser import open_browser
 
 from benchmarks import console_running
 from benchmarks.console_gaps import gaps
-from rigidimeter.acquisition.processes.loop_process import Realtime
-from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.run_states import Command, Order
 from rigidimeter.cli.planned_session import PlannedSession, new_session, run_planned
-from rigidimeter.console import SessionPlan
-from rigidimeter.console.page.desk import Desk, Place, RunningSession
-from rigidimeter.console.page.server import PageServer
-from rigidimeter.console.page.work import Work
-from rigidimeter.recording.sample_reading import read_samples
-from rigidimeter.settings import load_settings
+from rigidimeter.core.session import read_samples
+from rigidimeter.core.settings import load_settings
+from rigidimeter.rig.acquisition import Command, Order
+from rigidimeter.rig.acquisition.processes import Realtime, SessionMemory
+from rigidimeter.rig.console import SessionPlan
+from rigidimeter.rig.console.page import Desk, PageServer, Place, RunningSession, Work
 
 SETTLES_S = 1.0
 """So much of the beginning of a window does not count: the page draws what it has missed."""

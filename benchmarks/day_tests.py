@@ -23,8 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 
-from rigidimeter.statistics import difference, fit_mixed, nested
-from rigidimeter.statistics.day_levels import Epochs, test_by_levels
+from rigidimeter.analysis.statistics import Epochs, difference, fit_mixed, nested, test_by_levels
 
 Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Array]

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.paired import REPEATS, Row, in_ms, paired
-from rigidimeter.estimation import fit_epoch, fit_epochs
-from rigidimeter.settings import Settings
+from rigidimeter.analysis.estimation import fit_epoch, fit_epochs
+from rigidimeter.core.settings import Settings
 from rigidimeter.virtual.batch import simulate_epochs
 
 

@@ -2,11 +2,10 @@
 
 PRBS epochs of every kind of subject run on the compiled batch, with two sizes of joint, at 1000
 ticks/s with the torque sensor at 1000 and at the paper's 100 samples/s, and at 100 and 50 ticks/s.
-What is recorded then passes
-`guard.consistency`, compiled with what it calls from their own sources. Epochs start from rest, so
-each one also is a beginning. A cause of the guard's own limits (torque, power, energy, a second at
-the position limit) that ends an epoch early is counted apart: it is no false alarm. `not following`
-is the guard's own too, and counts as one.
+What is recorded then passes `rig.guard.consistency`, compiled with what it calls from their own
+sources. Epochs start from rest, so each one also is a beginning. A cause of the guard's own limits
+(torque, power, energy, a second at the position limit) that ends an epoch early is counted apart:
+it is no false alarm. `not following` is the guard's own too, and counts as one.
 
     kind       the subject
     relaxed    a voluntary torque of 0.05 N·m (SD)
@@ -33,7 +32,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.guard import (
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.rig.guard import (
     Cause,
     ConsistencyLimits,
     ConsistencyState,
@@ -46,9 +46,7 @@ from rigidimeter.guard import (
     torque_sign,
     watch,
 )
-from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.virtual.batch import Batch, simulate_chunks
-from rigidimeter.virtual.batch.compiled_steps import numbers, with_helpers
+from rigidimeter.virtual.batch import Batch, numbers, simulate_chunks, with_helpers
 
 SIZES: dict[str, dict[str, Any]] = {
     "small": {

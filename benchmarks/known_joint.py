@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.records import Epoch, Fit
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.core.records import Epoch, Fit
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.model import JointDynamics
 from rigidimeter.virtual.batch import simulate_chunks
 
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")

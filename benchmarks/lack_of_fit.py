@@ -20,13 +20,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.estimation import method_named
-from rigidimeter.estimation.diagnostics.band_check import band_finding
-from rigidimeter.estimation.diagnostics.together import in_bands, lack_of_fit, misfits
-from rigidimeter.estimation.prepared import prepare
-from rigidimeter.records import Channel, Epoch
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.analysis.estimation import method_named
+from rigidimeter.analysis.estimation.diagnostics.band_check import band_finding
+from rigidimeter.analysis.estimation.diagnostics.together import in_bands, lack_of_fit, misfits
+from rigidimeter.analysis.estimation.prepared import prepare
+from rigidimeter.core.records import Channel, Epoch
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.model import JointDynamics
 from rigidimeter.virtual.batch import simulate_chunks
 
 JOINT = JointDynamics(0.0045, 0.1368, 1.751)

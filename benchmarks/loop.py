@@ -26,17 +26,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigidimeter.acquisition.clock import DeadlineClock
-from rigidimeter.acquisition.processes.loop_process import LoopSide, Realtime
-from rigidimeter.acquisition.processes.recorder import Recording
-from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.supervise import Ended, supervise
-from rigidimeter.acquisition.run_states import Command, Order
-from rigidimeter.acquisition.session_run import run_session
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.experiment import plan
-from rigidimeter.recording.sample_reading import read_samples
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.core.session import read_samples
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.planning import plan
+from rigidimeter.rig.acquisition import Command, DeadlineClock, Order, run_session
+from rigidimeter.rig.acquisition.processes import (
+    Ended,
+    LoopSide,
+    Realtime,
+    Recording,
+    SessionMemory,
+    supervise,
+)
+from rigidimeter.rig.devices import SimulatedRig
 
 PRIORITY = 80
 SHARES = (0.5, 0.99, 0.999)

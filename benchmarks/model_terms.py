@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from tests.scenarios.recordings import measured_alone
 from tests.scenarios.scenario import Scenario, scenario
 
-from rigidimeter.estimation.epoch_models import model_epoch
-from rigidimeter.estimation.prepared import prepare
-from rigidimeter.estimation.terms import candidates
-from rigidimeter.records import Channel, Epoch
+from rigidimeter.analysis.estimation.epoch_models import model_epoch
+from rigidimeter.analysis.estimation.prepared import prepare
+from rigidimeter.analysis.estimation.terms import candidates
+from rigidimeter.core.records import Channel, Epoch
 
 Array = NDArray[np.float64]
 TERMS = "inertia,damping,stiffness,reflex,cubic,directional-damping,coulomb"

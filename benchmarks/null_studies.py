@@ -42,21 +42,35 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.dynamics import SubjectTorque, draw_joint
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.estimation import score_epoch
-from rigidimeter.estimation.closedloop.closed_loop_fit import fit_closed_loop
-from rigidimeter.estimation.closedloop.perturbation_methods import CLOSED_LOOP
-from rigidimeter.estimation.prepared import prepare
-from rigidimeter.estimation.scores import angular_impulse_nm_s, loop_area_j, scoring_cycles
-from rigidimeter.paper.score_rows import imposed_epoch
-from rigidimeter.parallel import each
-from rigidimeter.records import Epoch
-from rigidimeter.settings import Settings, SubjectSettings, parse_settings
-from rigidimeter.statistics import day_difference, difference, exact_ranksum, fit_mixed, ranksum
+from rigidimeter.analysis.estimation import score_epoch
+from rigidimeter.analysis.estimation.closedloop.closed_loop_fit import fit_closed_loop
+from rigidimeter.analysis.estimation.closedloop.perturbation_methods import CLOSED_LOOP
+from rigidimeter.analysis.estimation.prepared import prepare
+from rigidimeter.analysis.estimation.scores import angular_impulse_nm_s, loop_area_j, scoring_cycles
+from rigidimeter.analysis.statistics import (
+    day_difference,
+    difference,
+    exact_ranksum,
+    fit_mixed,
+    ranksum,
+)
+from rigidimeter.core.executor import each
+from rigidimeter.core.records import Epoch
+from rigidimeter.core.settings import Settings, SubjectSettings, parse_settings
+from rigidimeter.model import JointDynamics, SubjectTorque, draw_joint
+from rigidimeter.paper import imposed_epoch
+from rigidimeter.virtual import (
+    NULL,
+    PAPER,
+    PAPER_RATES,
+    DayPlan,
+    StudyDesign,
+    day_factors,
+    day_joint,
+    draw_ratings,
+    plan_study,
+)
 from rigidimeter.virtual.batch import simulate_epochs
-from rigidimeter.virtual.study_design import NULL, PAPER, PAPER_RATES, StudyDesign
-from rigidimeter.virtual.study_plan import DayPlan, day_factors, day_joint, draw_ratings, plan_study
 
 Array = NDArray[np.float64]
 

@@ -12,12 +12,8 @@ from collections.abc import Callable, MutableSequence, Sequence
 import numpy as np
 
 from benchmarks.paired import Row
-from rigidimeter.estimation.online import (
-    STATE_SIZE,
-    online_design,
-    online_step,
-)
-from rigidimeter.settings import OnlineSettings
+from rigidimeter.core.settings import OnlineSettings
+from rigidimeter.model import STATE_SIZE, online_design, online_step
 
 REPEATS = 7
 SAMPLES = 20_000

@@ -1,7 +1,7 @@
 """How large the package is, room by room, and where it is hard to read.
 
-A room is a package or a module right under `src/rigidimeter`. Code lines are lines without blanks,
-comments and docstrings.
+A room is a package of `core`, `analysis` or `rig`, or another island as a whole. Code lines are
+lines without blanks, comments and docstrings.
 
     python -m benchmarks.size
     python -m benchmarks.size --against main    # beside another revision: before -> after
@@ -29,6 +29,8 @@ LONG = 350
 """Lines of a module from which it is listed."""
 COMPLEX = 15
 """Cyclomatic complexity above which a function is listed."""
+ISLANDS = ("core", "analysis", "rig")
+"""Those that have rooms."""
 EVERYWHERE = {"__init__.py"}
 """Names that every package has."""
 NO_CODE = {
@@ -50,8 +52,10 @@ class Module(NamedTuple):
 
     @property
     def room(self) -> str:
-        """The package or module right under the root."""
-        return self.path.parts[0].removesuffix(".py")
+        """The room of an island that has rooms, else the island."""
+        island, *rest = self.path.parts
+        depth = 2 if island in ISLANDS and len(rest) > 1 else 1
+        return ".".join(self.path.parts[:depth]).removesuffix(".py")
 
     def __str__(self) -> str:
         return f"{self.path} {self.code} ({self.total})"

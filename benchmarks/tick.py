@@ -27,16 +27,13 @@ import numpy as np
 from scipy import stats
 
 from benchmarks.loop import PRIORITY, patient, virtual_session
-from rigidimeter.acquisition import SimulatedClock, perturb, rest, tick
-from rigidimeter.acquisition.processes.loop_process import LoopSide, Realtime
-from rigidimeter.acquisition.processes.recorder import Recording
-from rigidimeter.acquisition.processes.supervise import supervise
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.experiment import prbs_nm
-from rigidimeter.guard.agreement import consistency_limits
-from rigidimeter.guard.consistency import consistency_state
-from rigidimeter.recording.sample_reading import read_samples
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.core.session import read_samples
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.planning import prbs_nm
+from rigidimeter.rig.acquisition import SimulatedClock, perturb, rest, tick
+from rigidimeter.rig.acquisition.processes import LoopSide, Realtime, Recording, supervise
+from rigidimeter.rig.devices import SimulatedRig
+from rigidimeter.rig.guard import consistency_limits, consistency_state
 
 RATE_HZ = 1000.0
 WINDOW_TICKS = 2000

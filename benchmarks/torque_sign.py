@@ -11,7 +11,7 @@ where the two arms are apart, the motion is wrong. Each row is of `MOMENTS_S` an
 The second is of a small joint on a computer that stands still now and then, at random moments: what
 becomes of a wrong sign, and whether a right one is called wrong. The third prints what bounds all
 that: which ratio S/N of the perturbation's answer to all other torque a window needs
-(`commissioning.wrong_sign`), and which one it has while the sign is right.
+(`rig.commissioning.wrong_sign`), and which one it has while the sign is right.
 """
 
 from __future__ import annotations
@@ -29,13 +29,21 @@ import scipy
 from numpy.typing import NDArray
 
 from benchmarks.false_alarms import RATES, SIZES
-from rigidimeter.acquisition import Clock, ControlLoop, SimulatedClock, perturb
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.devices.base import Reading
-from rigidimeter.experiment import prbs_nm
-from rigidimeter.guard import Cause, torque_answer
-from rigidimeter.guard.torque_sign import BEFORE, INSTRUMENTS, PASSES, explained, table, whitened
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.planning import prbs_nm
+from rigidimeter.rig.acquisition import Clock, ControlLoop, SimulatedClock, perturb
+from rigidimeter.rig.devices import SimulatedRig
+from rigidimeter.rig.devices.base import Reading
+from rigidimeter.rig.guard import (
+    BEFORE,
+    INSTRUMENTS,
+    PASSES,
+    Cause,
+    explained,
+    table,
+    torque_answer,
+    whitened,
+)
 
 MOMENTS_S = (0.0, 1.0, 1.37, 2.05, 3.13)
 """When the sign turns; at 0 it was wrong from the start."""

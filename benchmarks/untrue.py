@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from benchmarks.false_alarms import RATES
 from benchmarks.torque_sign import SUBJECTS, made
-from rigidimeter.acquisition import ControlLoop, SimulatedClock, perturb
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.devices.base import Reading
-from rigidimeter.experiment import prbs_nm
-from rigidimeter.guard import Cause
-from rigidimeter.settings import Settings
+from rigidimeter.core.settings import Settings
+from rigidimeter.planning import prbs_nm
+from rigidimeter.rig.acquisition import ControlLoop, SimulatedClock, perturb
+from rigidimeter.rig.devices import SimulatedRig
+from rigidimeter.rig.devices.base import Reading
+from rigidimeter.rig.guard import Cause
 
 AT_S, LONGEST_S = 1.0, 5.0
 SEEDS = 2

@@ -35,8 +35,8 @@ import numpy as np
 from tests.traps.recorded_studies import ALL, AT_REST, MOTION, Session, write_study
 
 import rigidimeter as rm
-from rigidimeter.study import conclude
-from rigidimeter.study.tested import LEVEL
+from rigidimeter.analysis.study import conclude
+from rigidimeter.analysis.study.tested import LEVEL
 
 DAYS = 4
 LOWER = 0.85

@@ -17,10 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfilt, sosfiltfilt
 
-from rigidimeter.estimation import Signals, fit_inertia_damping_stiffness
-from rigidimeter.estimation.signals import kinematics, motion_channels, spline, uniform_grid
-from rigidimeter.recording import read_session, session_settings
-from rigidimeter.records import Epoch
+from rigidimeter.analysis.estimation import Signals, fit_inertia_damping_stiffness
+from rigidimeter.analysis.estimation.signals import (
+    kinematics,
+    motion_channels,
+    spline,
+    uniform_grid,
+)
+from rigidimeter.core.records import Epoch
+from rigidimeter.core.session import read_session, session_settings
 
 Array = NDArray[np.float64]
 Filter = Callable[[Array], Array]

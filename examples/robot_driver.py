@@ -22,9 +22,9 @@ from collections.abc import Mapping
 from multiprocessing.sharedctypes import RawArray
 from typing import Any, ClassVar
 
-from rigidimeter.devices.base import DeviceError, DeviceFacts, MotionSample, Now, TorqueSample
-from rigidimeter.guard import Cause
-from rigidimeter.settings.section import Section, quantity
+from rigidimeter.core.settings import Section, quantity
+from rigidimeter.rig.devices.base import DeviceError, DeviceFacts, MotionSample, Now, TorqueSample
+from rigidimeter.rig.guard import Cause
 
 START_S, LOST_S, HOLDS_S = 10.0, 0.05, 0.05
 """For the process to start; a sample so old is of a robot that is lost; a command so old ends."""
@@ -257,7 +257,7 @@ class RobotDrive(_Part):
 
 
 if __name__ == "__main__":
-    from rigidimeter.testing.conformance import (
+    from rigidimeter.testing import (
         DRIVE_CHECKS,
         SENSOR_CHECKS,
         DriveFixture,

@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
-TIMED = ["tests/console", "tests/faults", "tests/wire", "tests/unit/acquisition"]
+TIMED = ["tests/console", "tests/docs", "tests/faults", "tests/wire", "tests/unit/rig/acquisition"]
 """The folders that hold tests marked `realtime`."""
 
 

@@ -21,7 +21,7 @@ import typer.testing
 from tests.lateness import PRESENT, LatenessProbe, run_beside_probe, unjudged
 
 from rigidimeter.cli.main import main
-from rigidimeter.settings import parse_settings
+from rigidimeter.core.settings import parse_settings
 
 pytest_plugins = ["pytester", "tests.browser", "tests.small_study"]
 
@@ -53,7 +53,7 @@ def simulated_sessions(tmp_path_factory: pytest.TempPathFactory) -> Callable[...
     def run(values: dict[str, Any], name: str) -> Path:
         key = json.dumps([values, name])
         # Not before: the process that starts the others would wait for it, and never use it.
-        from rigidimeter.virtual.virtual_session import run_virtual_session
+        from rigidimeter.virtual import run_virtual_session
 
         if key not in done:
             done[key] = folder / str(len(done))
@@ -101,7 +101,9 @@ typer.main.get_command = typer.testing._get_command = functools.cache(typer.main
 @pytest.fixture
 def rigidimeter(monkeypatch, capsys) -> Callable[..., Ran]:
     """Run a command line in this process and return its status and what it printed."""
-    monkeypatch.setattr("rigidimeter.extensions._loaded", {})  # of --load: a batch depends on it
+    monkeypatch.setattr(
+        "rigidimeter.core.extensions._loaded", {}
+    )  # of --load: a batch depends on it
 
     def run(*arguments: object) -> Ran:
         monkeypatch.setattr(sys, "argv", ["rigidimeter", *map(str, arguments)])
@@ -119,7 +121,7 @@ def rigidimeter(monkeypatch, capsys) -> Callable[..., Ran]:
 @pytest.fixture
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the figures of a report, which take most of its time, where words are read."""
-    monkeypatch.setattr("rigidimeter.reporting.page.svg_text", lambda *_: "<svg/>")
+    monkeypatch.setattr("rigidimeter.analysis.report.page.svg_text", lambda *_: "<svg/>")
 
 
 REALTIME = {

@@ -31,8 +31,8 @@ from tests.fuzz_damage import NUMBERS, mutated, strange
 from tests.fuzz_inputs import CALLS, OPTIONS, TARGETS, Archive, columns, write_csv
 
 from rigidimeter.cli.main import main as rigidimeter
-from rigidimeter.documents import read_bytes, visible
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import read_bytes, visible
 
 MEMORY_BYTES = 2**30
 TIME_S = 30.0

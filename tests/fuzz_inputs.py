@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 from tests.fuzz_files import FILES
 from tests.version_1 import as_version_1
 
-from rigidimeter.devices.rigfile import load_rig
-from rigidimeter.recording.resume import rest_of
-from rigidimeter.settings import parse_settings
-from rigidimeter.virtual.virtual_session import run_virtual_session
+from rigidimeter.core.session import rest_of
+from rigidimeter.core.settings import parse_settings
+from rigidimeter.rig.devices import load_rig
+from rigidimeter.virtual import run_virtual_session
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def _study(folder: Path) -> None:
 
 def _estimates(folder: Path) -> None:
     from rigidimeter import estimate, read
-    from rigidimeter.recording.estimate_files import write_estimates_json
+    from rigidimeter.analysis.reading.estimate_files import write_estimates_json
 
     paths = [folder / f"{condition}.npz" for condition in ("OFF", "DBS")]
     for seed, path in enumerate(paths):

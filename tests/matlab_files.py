@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rigidimeter.recording.formats.mat_objects import mat_io
+from rigidimeter.analysis.reading.formats.mat_objects import mat_io
 
 
 def table(columns: Mapping[str, np.ndarray], units: Sequence[str]) -> object:

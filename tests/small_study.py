@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from rigidimeter.settings import parse_settings
+from rigidimeter.core.settings import parse_settings
 
 TOML = """\
 schema = "rigidimeter.study/1"
@@ -76,7 +76,7 @@ def tiny(condition: str, seed: int, *, task: str = "prbs", epochs: int = 2, **ta
 
 def record(folder: Path, condition: str, seed: int, **changes) -> Path:
     """Record a session of a few seconds."""
-    from rigidimeter.virtual.virtual_session import run_virtual_session  # not with this plugin
+    from rigidimeter.virtual import run_virtual_session
 
     run_virtual_session(tiny(condition, seed, **changes), folder)
     return folder

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from rigidimeter.recording.sample_log import SCHEMA
-from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.core.session import SCHEMA, read_samples
 
 OLD = ("checksum", "session_id")
 BATCH = 100

@@ -11,9 +11,9 @@ import numpy as np
 from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.recordings import measured_alone
 
-from rigidimeter.parallel import each
-from rigidimeter.records import Fit
-from rigidimeter.study.analysis import Preparation, analyse_prepared
+from rigidimeter.analysis.study.analysis import Preparation, analyse_prepared
+from rigidimeter.core.executor import each
+from rigidimeter.core.records import Fit
 
 EPOCHS = 4
 METHODS = {"iv": "iv", "bandlimited": "bandlimited", "blind": "bandlimited"}

@@ -22,15 +22,15 @@ from functools import wraps
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rigidimeter.version import __version__
+from rigidimeter.core.version import __version__
 
 if TYPE_CHECKING:
-    from rigidimeter.archives import batch
-    from rigidimeter.estimation import identify
-    from rigidimeter.experiment import design
-    from rigidimeter.recording import read
-    from rigidimeter.reporting import report
-    from rigidimeter.study import compare, estimate
+    from rigidimeter.analysis.batch import batch
+    from rigidimeter.analysis.estimation import identify
+    from rigidimeter.analysis.reading import read
+    from rigidimeter.analysis.report import report
+    from rigidimeter.analysis.study import compare, estimate
+    from rigidimeter.planning import design
     from rigidimeter.virtual import simulate
 
 __all__ = [
@@ -46,14 +46,14 @@ __all__ = [
 ]
 
 _ROOMS = {
-    "identify": "rigidimeter.estimation",
-    "read": "rigidimeter.recording",
-    "estimate": "rigidimeter.study",
-    "compare": "rigidimeter.study",
+    "identify": "rigidimeter.analysis.estimation",
+    "read": "rigidimeter.analysis.reading",
+    "estimate": "rigidimeter.analysis.study",
+    "compare": "rigidimeter.analysis.study",
     "simulate": "rigidimeter.virtual",
-    "design": "rigidimeter.experiment",
-    "report": "rigidimeter.reporting",
-    "batch": "rigidimeter.archives",
+    "design": "rigidimeter.planning",
+    "report": "rigidimeter.analysis.report",
+    "batch": "rigidimeter.analysis.batch",
 }
 
 
@@ -69,7 +69,7 @@ def _for_python(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return the function with messages that name arguments, not options of the command line."""
     from dataclasses import replace
 
-    from rigidimeter.errors import UserError, arguments_named
+    from rigidimeter.core.errors import UserError, arguments_named
 
     @wraps(function)
     def called(*values: Any, **named: Any) -> Any:

@@ -20,9 +20,8 @@ from tests.console.operator_day import (
     study_report,
 )
 
-from rigidimeter.recording.sample_reading import read_samples
-from rigidimeter.recording.session_folder import read_manifest
-from rigidimeter.recording.study_folder import read_study_folder
+from rigidimeter.core.session import read_manifest, read_samples
+from rigidimeter.core.study_files import read_study_folder
 
 PROTOCOL = """
 rig = {{tick_rate_hz = 250.0, torque = {{rate_hz = 250.0}}, motion = {{rate_hz = 250.0}}}}

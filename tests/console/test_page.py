@@ -13,10 +13,8 @@ import numpy as np
 import pytest
 from tests.console.opened import assert_reached_by_tab, fill, open_page, start, wait_for
 
-from rigidimeter.recording import SessionWriter
-from rigidimeter.recording.sample_reading import read_samples
-from rigidimeter.recording.session_folder import read_manifest
-from rigidimeter.settings import Settings
+from rigidimeter.core.session import SessionWriter, read_manifest, read_samples
+from rigidimeter.core.settings import Settings
 
 MARKUP = "<img src=x onerror=alert(1)>"
 RUNS = "document.getElementById('state').textContent === 'epoch runs'"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from rigidimeter.estimation.diagnostics import CHECKS
-from rigidimeter.settings import DiagnosticLevels, DiagnosticsSettings
+from rigidimeter.analysis.estimation.diagnostics import CHECKS
+from rigidimeter.core.settings import DiagnosticLevels, DiagnosticsSettings
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "reference" / "diagnostics.md"

@@ -15,13 +15,13 @@ from tests.docs.markdown import ALL_BLOCKS, DOCUMENTS, ROOT, Block, blocks, tabl
 from typer.testing import CliRunner
 
 from rigidimeter import __version__
+from rigidimeter.analysis.reading.channels.choice import LABELS
+from rigidimeter.analysis.reading.channels.mapping_file import MAPPING_SCHEMA, read_mapping
 from rigidimeter.cli.main import app
-from rigidimeter.errors import UserError
-from rigidimeter.recording.channels.choice import LABELS
-from rigidimeter.recording.channels.mapping_file import MAPPING_SCHEMA, read_mapping
-from rigidimeter.recording.study_toml import read_study_toml
-from rigidimeter.records import CHANNEL_UNITS
-from rigidimeter.settings import load_settings, parse_settings
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.records import CHANNEL_UNITS
+from rigidimeter.core.settings import load_settings, parse_settings
+from rigidimeter.core.study_files import read_study_toml
 
 RUN = CliRunner()
 EXAMPLES = sorted((ROOT / "examples").rglob("*.toml"))

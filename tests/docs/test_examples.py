@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from rigidimeter.acquisition.clock import DeadlineClock
 from rigidimeter.cli.main import app
-from rigidimeter.devices.rigfile import load_rig
-from rigidimeter.guard import Cause
+from rigidimeter.rig.acquisition import DeadlineClock
+from rigidimeter.rig.devices import load_rig
+from rigidimeter.rig.guard import Cause
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

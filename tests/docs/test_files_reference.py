@@ -12,21 +12,14 @@ from tests.docs.markdown import ROOT, table
 from tests.known_joint import angle_rad, torque_nm
 from typer.testing import CliRunner
 
-from rigidimeter.archives.epoch_table import columns as batch_columns
+from rigidimeter.analysis.batch import columns as batch_columns
+from rigidimeter.analysis.reading import ReadOptions, estimates_document, read_recording
 from rigidimeter.cli.main import app
-from rigidimeter.errors import UserError
-from rigidimeter.recording import (
-    ReadOptions,
-    SessionWriter,
-    estimates_document,
-    read_manifest,
-    read_recording,
-)
-from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_log import SAMPLE_UNITS
-from rigidimeter.recording.study_toml import STUDY_SCHEMA
-from rigidimeter.records import Analysis, Delay, Finding, Fit, Outcome, Score
-from rigidimeter.settings import Settings
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.records import Analysis, Delay, Finding, Fit, Outcome, Score
+from rigidimeter.core.session import SAMPLE_UNITS, SessionWriter, read_events, read_manifest
+from rigidimeter.core.settings import Settings
+from rigidimeter.core.study_files import STUDY_SCHEMA
 
 FILES = ROOT / "docs" / "reference" / "files.md"
 RECORDING = ROOT / "docs" / "how-to" / "read-your-recording.md"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rigidimeter.estimation import METHODS
+from rigidimeter.analysis.estimation import METHODS
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "reference" / "methods.md"
@@ -31,5 +31,5 @@ def test_every_module_that_the_page_names_exists() -> None:
     for name in set(named) - settings:
         full = name if name.startswith("rigidimeter.") else f"rigidimeter.{name}"
         if name.startswith("closedloop."):
-            full = f"rigidimeter.estimation.{name}"
+            full = f"rigidimeter.analysis.estimation.{name}"
         assert importlib.util.find_spec(full) is not None, name

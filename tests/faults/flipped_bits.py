@@ -21,11 +21,10 @@ from pathlib import Path
 import numpy as np
 from tests.version_1 import as_version_1
 
-from rigidimeter.errors import UserError
-from rigidimeter.recording import read_session, recover
-from rigidimeter.recording.sample_reading import Samples, scan_samples
-from rigidimeter.settings import parse_settings
-from rigidimeter.virtual.virtual_session import run_virtual_session
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.session import Samples, read_session, recover, scan_samples
+from rigidimeter.core.settings import parse_settings
+from rigidimeter.virtual import run_virtual_session
 
 FILES = ("samples.arrows", "events.jsonl", "manifest.json")
 BATCH = 100

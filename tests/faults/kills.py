@@ -43,9 +43,8 @@ from tests.faults.session import VIRTUAL, settings_for
 from tests.faults.written_ring import Ring
 from tests.wire.rig_process import RigProcess
 
-from rigidimeter.guard import Cause
-from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.core.session import read_events, read_samples
+from rigidimeter.rig.guard import Cause
 
 ROOT = Path(__file__).parents[2]
 SIGNALS = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM, signal.SIGQUIT)

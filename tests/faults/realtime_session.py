@@ -15,14 +15,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.acquisition.clock import DeadlineClock
-from rigidimeter.acquisition.processes.recorder import Patience, Recording
-from rigidimeter.acquisition.processes.status_values import Condition, Role
-from rigidimeter.acquisition.processes.supervise import Realtime, supervise
-from rigidimeter.acquisition.run_states import Command
-from rigidimeter.guard import Cause
-from rigidimeter.recording.sample_log import Sample
-from rigidimeter.settings import parse_settings
+from rigidimeter.core.session import Sample
+from rigidimeter.core.settings import parse_settings
+from rigidimeter.rig.acquisition import Command, DeadlineClock
+from rigidimeter.rig.acquisition.processes import (
+    Condition,
+    Patience,
+    Realtime,
+    Recording,
+    Role,
+    supervise,
+)
+from rigidimeter.rig.guard import Cause
 
 RATE_HZ = 500
 PR_SET_PDEATHSIG = 1  # of prctl(2)

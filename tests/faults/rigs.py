@@ -25,19 +25,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from tests.faults.spoiled_rig import SpoiledRig
 
-from rigidimeter.acquisition.clock import DeadlineClock, SimulatedClock
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.devices.ascii.drive import AsciiDrive
-from rigidimeter.devices.ati.rdt import AtiRdt
-from rigidimeter.devices.base import DeviceError
-from rigidimeter.devices.cia402.drive import Cia402Drive
-from rigidimeter.devices.composed import ComposedRig
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.testing.ascii_emulator import AsciiEmulator
-from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
-from rigidimeter.testing.emulated_arm import EmulatedArm
-from rigidimeter.testing.rdt.rdt_emulator import RdtEmulator
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.model import JointDynamics
+from rigidimeter.rig.acquisition import DeadlineClock, SimulatedClock
+from rigidimeter.rig.devices import AsciiDrive, AtiRdt, Cia402Drive, ComposedRig, SimulatedRig
+from rigidimeter.rig.devices.base import DeviceError
+from rigidimeter.testing import AsciiEmulator, Cia402Emulator, EmulatedArm, RdtEmulator
 
 CANOPEN, ASCII = "rdt_canopen", "rdt_ascii"
 WIRES = (CANOPEN, ASCII)

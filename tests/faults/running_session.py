@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.core.session import read_events, read_samples
 
 SCRIPT = Path(__file__).with_name("realtime_session.py")
 HANGS_S = 120.0

@@ -18,18 +18,21 @@ from typing import Any
 
 import numpy as np
 
-from rigidimeter.acquisition.clock import DeadlineClock
-from rigidimeter.acquisition.processes.loop_process import LoopSide, Realtime
-from rigidimeter.acquisition.processes.recorder import Patience, Recording
-from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.status_values import Condition, Role
-from rigidimeter.acquisition.processes.supervise import supervise
-from rigidimeter.acquisition.session_run import run_session
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.devices.base import Rig
-from rigidimeter.devices.rigfile import load_rig
-from rigidimeter.experiment import plan
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.planning import plan
+from rigidimeter.rig.acquisition import DeadlineClock, run_session
+from rigidimeter.rig.acquisition.processes import (
+    Condition,
+    LoopSide,
+    Patience,
+    Realtime,
+    Recording,
+    Role,
+    SessionMemory,
+    supervise,
+)
+from rigidimeter.rig.devices import SimulatedRig, load_rig
+from rigidimeter.rig.devices.base import Rig
 
 RATE_HZ = {"cia402": 500.0, "ascii": 50.0, "virtual": 500.0}
 SPEED_DEG_S = {"cia402": 126.0, "ascii": 38.0, "virtual": 126.0}

@@ -6,8 +6,8 @@ import math
 from collections import deque
 from typing import Any
 
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.devices.base import DeviceError
+from rigidimeter.rig.devices import SimulatedRig
+from rigidimeter.rig.devices.base import DeviceError
 
 
 class SpoiledRig:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rigidimeter.errors import UserError
-from rigidimeter.recording.formats.read_options import ReadOptions
-from rigidimeter.recording.formats.readers import read_recording
+from rigidimeter.analysis.reading.formats.read_options import ReadOptions
+from rigidimeter.analysis.reading.formats.readers import read_recording
+from rigidimeter.core.errors import UserError
 
 HEAD = b"time_s,torque_nm,angle_rad\n"
 ROWS = b"".join(b"%.2f,%d,0.1\n" % (k / 100, k % 7) for k in range(50))

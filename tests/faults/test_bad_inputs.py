@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.model import JointDynamics
 
 RATE_HZ, N = 200.0, 4000
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 from tests.faults.running_session import fill
-from tests.unit.archives.conftest import write_recording
+from tests.unit.analysis.batch.conftest import write_recording
 
 import rigidimeter as rm
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 
 def test_a_batch_goes_on_when_there_is_room_again(small_disk, tmp_path):

@@ -10,17 +10,22 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rigidimeter.documents import read_json, read_toml
-from rigidimeter.documents.bounds import CELLS, COLUMNS, DIGITS, NESTING, TABLE_ROWS
-from rigidimeter.errors import UserError
-from rigidimeter.recording.formats.read_options import ReadOptions
-from rigidimeter.recording.formats.readers import read_recording, recorded_settings
-from rigidimeter.recording.formats.text_table import read_text_table
-from rigidimeter.recording.resume import rest_of
-from rigidimeter.recording.session_folder import SessionWriter
-from rigidimeter.settings import parse_settings
-from rigidimeter.statistics import fit_mixed
-from rigidimeter.statistics.bootstrap import bootstrap
+from rigidimeter.analysis.reading.formats.read_options import ReadOptions
+from rigidimeter.analysis.reading.formats.readers import read_recording, recorded_settings
+from rigidimeter.analysis.statistics import bootstrap, fit_mixed
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import (
+    CELLS,
+    COLUMNS,
+    DIGITS,
+    NESTING,
+    TABLE_ROWS,
+    read_json,
+    read_text_table,
+    read_toml,
+)
+from rigidimeter.core.session import SessionWriter, rest_of
+from rigidimeter.core.settings import parse_settings
 
 HEAD = b"time_s,torque_nm,angle_rad\n"
 
@@ -216,7 +221,7 @@ def test_a_matlab_matrix_of_bytes_that_become_doubles(tmp_path):
 
 
 def test_a_matlab_file_of_many_cells(tmp_path, monkeypatch):
-    monkeypatch.setattr("rigidimeter.recording.formats.mat_check.CELLS", CELLS // 100)
+    monkeypatch.setattr("rigidimeter.analysis.reading.formats.mat_check.CELLS", CELLS // 100)
     path = tmp_path / "r.mat"
     empty = b"\x0e\0\0\0\0\0\0\0"
     flags = b"\x06\0\0\0\x08\0\0\0\x01\0\0\0\0\0\0\0"

@@ -7,7 +7,7 @@ import pytest
 from tests.faults.rigs import ASCII, CANOPEN, RIGS, Wrong, bench
 from tests.faults.trials import assert_came_to_rest, assert_recorded, run
 
-from rigidimeter.guard import Cause
+from rigidimeter.rig.guard import Cause
 
 AGREE_S = 0.5
 """How long a wrong motion may last, unless it is shorter than `AGREE_DEG`."""

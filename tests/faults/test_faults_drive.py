@@ -25,10 +25,10 @@ from tests.faults.trials import (
     run,
 )
 
-from rigidimeter.acquisition.run_states import Command
-from rigidimeter.devices.base import DeviceError
-from rigidimeter.guard import Cause, guard_limits
-from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
+from rigidimeter.rig.acquisition import Command
+from rigidimeter.rig.devices.base import DeviceError
+from rigidimeter.rig.guard import Cause, guard_limits
+from rigidimeter.testing import Cia402Emulator
 
 HORIZON_S = 0.1
 """Of the serial drive: its moves end by themselves after that."""

@@ -4,11 +4,9 @@ import pytest
 from tests.faults.rigs import RIGS, bench
 from tests.faults.trials import assert_stopped, run
 
-from rigidimeter.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.acquisition.processes.sink import SharedSupervision
-from rigidimeter.acquisition.processes.status_values import Role
-from rigidimeter.acquisition.run_states import NOTHING
-from rigidimeter.guard import Cause
+from rigidimeter.rig.acquisition import NOTHING
+from rigidimeter.rig.acquisition.processes import Role, SessionMemory, SharedSupervision
+from rigidimeter.rig.guard import Cause
 
 
 class SharedDesk:

@@ -10,10 +10,10 @@ import pytest
 from tests.faults.rigs import ASCII, RIGS, Wrong, bench
 from tests.faults.trials import AT_S, Desk, assert_came_to_rest, assert_stopped, assert_whole, run
 
-from rigidimeter.acquisition.run_states import Command, Order
-from rigidimeter.devices.base import DeviceError
-from rigidimeter.guard import Cause, Reaction
-from rigidimeter.units import rad_from_deg
+from rigidimeter.core.units import rad_from_deg
+from rigidimeter.rig.acquisition import Command, Order
+from rigidimeter.rig.devices.base import DeviceError
+from rigidimeter.rig.guard import Cause, Reaction
 
 
 @pytest.mark.parametrize("rig", RIGS)

@@ -7,9 +7,9 @@ import pytest
 from tests.faults.rigs import ASCII, RIGS, Wrong, bench
 from tests.faults.trials import Desk, assert_stopped, run
 
-from rigidimeter.acquisition.run_states import Command
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.guard import Cause, Reaction
+from rigidimeter.model import JointDynamics
+from rigidimeter.rig.acquisition import Command
+from rigidimeter.rig.guard import Cause, Reaction
 
 
 def push(made, torque_nm):

@@ -24,8 +24,8 @@ from tests.faults.session import CONSOLE_LOST_S, PATIENCE, RATE_HZ, RECORDER_LOS
 from tests.lateness import PRESENT
 from tests.wire.rig_process import RigProcess
 
-from rigidimeter.guard import Cause
-from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.core.session import read_samples
+from rigidimeter.rig.guard import Cause
 
 ROOT = Path(__file__).parents[2]
 RIG = {"cia402": "rdt_canopen", "ascii": "rdt_ascii"}

@@ -7,11 +7,11 @@ import pytest
 from tests.faults.rigs import ASCII, CANOPEN, RIGS, WIRES, Wrong, bench
 from tests.faults.trials import AT_S, assert_stopped, run
 
-from rigidimeter.devices.ati.rdt import AtiRdt
-from rigidimeter.devices.base import DeviceError
-from rigidimeter.errors import UserError
-from rigidimeter.guard import Cause
-from rigidimeter.settings import parse_settings
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import parse_settings
+from rigidimeter.rig.devices import AtiRdt
+from rigidimeter.rig.devices.base import DeviceError
+from rigidimeter.rig.guard import Cause
 
 NOT_FINITE = {
     "torque NaN": (Wrong("", "torque is", math.nan), Cause.TORQUE_NOT_FINITE),
@@ -40,7 +40,7 @@ def test_fault_01_not_a_number(rig, case, tmp_path, monkeypatch, measured):
             perturbation = np.ones(round(made.rate_hz))
             perturbation[round(AT_S * made.rate_hz)] = math.nan
             monkeypatch.setattr(
-                "rigidimeter.acquisition.session_run.prbs_nm", lambda *_: perturbation
+                "rigidimeter.rig.acquisition.session_run.prbs_nm", lambda *_: perturbation
             )
             trial, cause = run(made, tmp_path / "s", task="prbs"), Cause.COMMAND_NOT_FINITE
             assert np.isnan(trial.samples["velocity_request_rad_s"][trial.first])

@@ -8,7 +8,7 @@ import pytest
 from tests.faults.rigs import ASCII, RIGS, WIRES, Wrong, bench
 from tests.faults.trials import Desk, assert_stopped, assert_whole, run
 
-from rigidimeter.guard import Cause
+from rigidimeter.rig.guard import Cause
 
 
 def late_from_now(made, seconds, ticks=1):

@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.core.session import read_samples
 
 QUICK = """
 [rig]

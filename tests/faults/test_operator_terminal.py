@@ -12,7 +12,7 @@ import termios
 import time
 from pathlib import Path
 
-from rigidimeter.console.tty import LEAVE
+from rigidimeter.rig.console import LEAVE
 
 SETTINGS = """
 [loop]

@@ -10,9 +10,8 @@ import time
 import pytest
 from tests.faults.running_session import Session, alive, memory, wait_for
 
-from rigidimeter.acquisition.processes.end_signals import HELD_BACK, held_back
-from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.core.session import read_events, read_samples
+from rigidimeter.rig.acquisition.processes import HELD_BACK, held_back
 
 
 @pytest.fixture

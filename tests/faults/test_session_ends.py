@@ -12,14 +12,16 @@ import pytest
 from tests.faults.running_session import Session, alive, fill, memory, wait_for
 from tests.faults.written_ring import Ring
 
-from rigidimeter.acquisition.processes.left_memory import complete_left
-from rigidimeter.acquisition.processes.recorder import Patience
-from rigidimeter.acquisition.processes.shared_status import SharedStatus
-from rigidimeter.acquisition.processes.status_values import Condition, Role
-from rigidimeter.errors import UserError
-from rigidimeter.guard import Cause
-from rigidimeter.recording.event_log import read_events
-from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.session import read_events, read_samples
+from rigidimeter.rig.acquisition.processes import (
+    Condition,
+    Patience,
+    Role,
+    SharedStatus,
+    complete_left,
+)
+from rigidimeter.rig.guard import Cause
 
 
 def ignoring():

@@ -20,12 +20,10 @@ import numpy as np
 from tests.faults.rigs import ASCII, SLACK_S, Bench, Wrong
 from tests.lateness import PRESENT
 
-from rigidimeter.acquisition.run_states import NOTHING, Order
-from rigidimeter.acquisition.session_run import run_session
-from rigidimeter.experiment import plan
-from rigidimeter.guard import Cause, Reaction
-from rigidimeter.recording import SessionWriter
-from rigidimeter.recording.sample_reading import read_samples
+from rigidimeter.core.session import SessionWriter, read_samples
+from rigidimeter.planning import plan
+from rigidimeter.rig.acquisition import NOTHING, Order, run_session
+from rigidimeter.rig.guard import Cause, Reaction
 
 AT_S = 0.25
 """A fault comes when the imposed motion is fastest, half a period after its start."""

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.acquisition.processes.ring import ROW
-from rigidimeter.acquisition.processes.shared_memory import WHERE
+from rigidimeter.rig.acquisition.processes import ROW, WHERE
 
 WRITTEN_WORD = 8  # of a ring's header
 HEADER_BYTES = 512

@@ -14,7 +14,7 @@ from tests.golden.cases import CASES
 from tests.golden.page import PAGE, page_of
 from tests.golden.table import differences, read, text_of
 
-from rigidimeter.settings import DiagnosticLevels
+from rigidimeter.core.settings import DiagnosticLevels
 
 ANSWERS = read(Path(__file__).with_name("answers.txt"))
 

@@ -64,8 +64,8 @@ EQUIVALENT: dict[str, str] = {
     "self._settings.horizon_s → now_s - self._commanded_s >= self._settings.horizon_s": MOMENT,
     "ascii/drive.py AsciiDrive._try: self._line is None or not self._speaking → "
     "not self._speaking": "nothing is spoken to without a port",
-    "tracking.py minimum_jerk: elapsed_s >= duration_s → elapsed_s > duration_s": "at its end the "
-    "polynomial and its derivative are 0, too",
+    "controller.py minimum_jerk: elapsed_s >= duration_s → elapsed_s > duration_s": "at its end "
+    "the polynomial and its derivative are 0, too",
     "step.py guard_step: 1 → 0": "elapsed_ticks if not given: none counts as one",
     NEAR + "speed * speed / (2.0 * limits.acceleration_rad_s2) → "
     "speed * speed * (2.0 * limits.acceleration_rad_s2)": SLOWER,
@@ -106,12 +106,12 @@ EQUIVALENT: dict[str, str] = {
     "sent as it was allowed is the guard's velocity already",
     "tick.py run_tick: loop.limit_time_s <= due_s → loop.limit_time_s < due_s": "a later tick is "
     "due later",
-    "stop_account.py : if TYPE_CHECKING: ... → if False: ...": "it is never true where it runs",
-    "stop_account.py _stalled: if math.isfinite(latched.measured): ... → if True: ...": "of a "
+    "stop_report.py : if TYPE_CHECKING: ... → if False: ...": "it is never true where it runs",
+    "stop_report.py _stalled: if math.isfinite(latched.measured): ... → if True: ...": "of a "
     "number and NaN after it the number is the larger",
     "ramp.py ramp_to_rest: 0 → 1": RAMP,
     "ramp.py ramp_to_rest: 0 → -1": RAMP,
-    "sink.py SharedSupervision.__init__: 3 → 4": "one look at both clocks more",
+    "ring_writer.py SharedSupervision.__init__: 3 → 4": "one look at both clocks more",
     "tick.py run_tick: 0 → 1": RAMP,
     "tick.py run_tick: 0 → -1": RAMP,
 }

@@ -29,25 +29,25 @@ class HandMade(NamedTuple):
         return Mutant(path, f"{self.file}: {where} ({self.effect})", source)
 
 
-TICK, RAMP = "acquisition/tick.py", "acquisition/ramp.py"
-MODES = "acquisition/control_modes.py"
-SESSION = "acquisition/session_run.py"
-ZEROING = "acquisition/zeroing.py"
-RUN = "acquisition/controller_run.py"
-STATES = "acquisition/run_states.py"
-SINK = "acquisition/processes/sink.py"
+TICK, RAMP = "rig/acquisition/tick.py", "rig/acquisition/ramp.py"
+MODES = "rig/acquisition/control_modes.py"
+SESSION = "rig/acquisition/session_run.py"
+ZEROING = "rig/acquisition/zeroing.py"
+RUN = "rig/acquisition/controller_run.py"
+STATES = "rig/acquisition/run_states.py"
+SINK = "rig/acquisition/processes/ring_writer.py"
 SIGNALS, DISK, LOOP, RECORDER, RECORDS, CONSOLE = (
-    f"acquisition/processes/{name}.py"
+    f"rig/acquisition/processes/{name}.py"
     for name in (
         *("end_signals", "full_disk", "loop_process", "recorder", "recorder_process"),
-        "supervise",
+        "supervisor",
     )
 )
-PAGE, PAGES_DESK = "console/page/live_socket.py", "console/page/desk.py"
-STEP, WATCH, LIMITS = "guard/step.py", "guard/watch.py", "guard/limits.py"
-AGREEMENT = "guard/agreement.py"
-CONSISTENCY, ANSWER = "guard/consistency.py", "guard/torque_answer.py"
-ADMITTANCE, FILTER, TRACKING = "control/admittance.py", "control/filters.py", "control/tracking.py"
+PAGE, PAGES_DESK = "rig/console/page/live_socket.py", "rig/console/page/desk.py"
+STEP, WATCH, LIMITS = "rig/guard/step.py", "rig/guard/watch.py", "rig/guard/limits.py"
+AGREEMENT = "rig/guard/agreement.py"
+CONSISTENCY, ANSWER = "rig/guard/consistency.py", "rig/guard/torque_answer.py"
+CONTROLLER = "model/controller.py"
 
 HAND_MADE = tuple(
     HandMade(*fault)
@@ -239,13 +239,13 @@ HAND_MADE = tuple(
             "an old reading is held against the present target",
         ),
         (
-            ADMITTANCE,
+            CONTROLLER,
             "(perturbation_nm - torque_nm)",
             "(perturbation_nm + torque_nm)",
             "the drive pushes back against the subject: unstable",
         ),
-        (FILTER, "b2 * value - a2 * output", "b2 * value", "a filter that is none"),
-        (TRACKING, "(target_rad - angle_rad)", "(angle_rad - target_rad)", "runs away"),
+        (CONTROLLER, "b2 * value - a2 * output", "b2 * value", "a filter that is none"),
+        (CONTROLLER, "(target_rad - angle_rad)", "(angle_rad - target_rad)", "runs away"),
         # The session
         (ZEROING, "abs(bias_nm) > limits.bias_limit_nm", "False", "zeroed under load"),
         (

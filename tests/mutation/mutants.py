@@ -18,18 +18,18 @@ __all__ = ["PACKAGE", "Mutant", "mutants", "title", "unchanged"]
 PACKAGE = Path(__file__).parents[2] / "src/rigidimeter"
 
 STOP_PATHS = {
-    PACKAGE / "devices/cia402/drive.py": (
+    PACKAGE / "rig/devices/cia402/drive.py": (
         *("Cia402Drive._check_watchdog", "Cia402Drive._find_cause", "Cia402Drive._halt"),
         *("Cia402Drive.stop", "Cia402Drive.disable", "Cia402Drive.close"),
     ),
-    PACKAGE / "devices/ascii/drive.py": (
+    PACKAGE / "rig/devices/ascii/drive.py": (
         *("AsciiDrive._check_horizon", "AsciiDrive._try"),
         *("AsciiDrive.stop", "AsciiDrive.disable", "AsciiDrive.close"),
     ),
-    PACKAGE / "devices/composed.py": (
+    PACKAGE / "rig/devices/composed.py": (
         *("ComposedRig.stop", "ComposedRig.disable", "ComposedRig.close"),
     ),
-    PACKAGE / "devices/enable_line.py": (
+    PACKAGE / "rig/devices/enable_line.py": (
         *("SerialEnableLine.close_contact", "SerialEnableLine.open_contact"),
         "SerialEnableLine.close",
     ),

@@ -28,66 +28,83 @@ NAME = PACKAGE.name
 UNIT = "tests/unit"
 
 _RUN = tuple(
-    f"acquisition/test_{name}.py"
+    f"rig/acquisition/test_{name}.py"
     for name in (
         *("tick", "late_ticks", "ramp", "modes", "session_run", "session_end", "zeroing"),
-        *("controller_run", "orders", "loop_and_session", "stop_account"),
+        *("controller_run", "orders", "loop_and_session", "stop_report"),
     )
 )
-_STEP = tuple(f"guard/test_{name}.py" for name in ("step", "position_limit", "following"))
+_STEP = tuple(f"rig/guard/test_{name}.py" for name in ("step", "position_limit", "following"))
 TESTS = {
-    "control/admittance.py": ("control/test_admittance.py",),
-    "control/filters.py": ("control/test_filters.py",),
-    "control/tracking.py": ("control/test_tracking.py",),
-    "guard/causes.py": ("guard/test_causes.py",),
-    "guard/agreement.py": ("guard/test_agreement_memories.py", "guard/test_consistency.py"),
-    "guard/consistency.py": (
-        *("guard/test_rest.py", "guard/test_late_means.py", "guard/test_consistency.py"),
+    "model/controller.py": (
+        *("model/test_admittance.py", "model/test_filters.py", "model/test_tracking.py"),
     ),
-    "guard/limits.py": ("guard/test_limits.py",),
-    "guard/step.py": _STEP,
-    "guard/torque_answer.py": (
-        *("guard/test_answer_window.py", "guard/test_torque_answer.py"),
-        "guard/test_consistency.py",
+    "rig/guard/causes.py": ("rig/guard/test_causes.py",),
+    "rig/guard/agreement.py": (
+        "rig/guard/test_agreement_memories.py",
+        "rig/guard/test_consistency.py",
     ),
-    "guard/torque_sign.py": (
-        *("guard/test_torque_sign.py", "guard/test_sign_edges.py", "guard/test_torque_answer.py"),
+    "rig/guard/consistency.py": (
+        *(
+            "rig/guard/test_rest.py",
+            "rig/guard/test_late_means.py",
+            "rig/guard/test_consistency.py",
+        ),
     ),
-    "guard/watch.py": ("guard/test_watch.py", *_STEP),
-    "acquisition/control_modes.py": ("acquisition/test_modes.py", *_RUN),
-    "acquisition/controller_run.py": ("acquisition/test_controller_run.py", *_RUN),
-    "acquisition/ramp.py": _RUN,
-    "acquisition/run_states.py": ("acquisition/test_states.py", "acquisition/test_session_run.py"),
-    "acquisition/session_run.py": ("acquisition/test_session_run.py", *_RUN),
-    "acquisition/zeroing.py": ("acquisition/test_zeroing.py", "acquisition/test_session_run.py"),
-    "acquisition/supervision.py": (
-        *("acquisition/test_session_run.py", "acquisition/test_stop_account.py"),
+    "rig/guard/limits.py": ("rig/guard/test_limits.py",),
+    "rig/guard/step.py": _STEP,
+    "rig/guard/torque_answer.py": (
+        *("rig/guard/test_answer_window.py", "rig/guard/test_torque_answer.py"),
+        "rig/guard/test_consistency.py",
     ),
-    "acquisition/tick.py": _RUN,
-    "acquisition/stop_account.py": (
-        *("acquisition/test_stop_numbers.py", "acquisition/test_stop_account.py"),
+    "rig/guard/torque_sign.py": (
+        *(
+            "rig/guard/test_torque_sign.py",
+            "rig/guard/test_sign_edges.py",
+            "rig/guard/test_torque_answer.py",
+        ),
     ),
-    "acquisition/stop_remedies.py": ("acquisition/test_stop_account.py",),
-    "acquisition/processes/sink.py": (
-        *("acquisition/test_sink.py", "acquisition/test_shared_status.py"),
+    "rig/guard/watch.py": ("rig/guard/test_watch.py", *_STEP),
+    "rig/acquisition/control_modes.py": ("rig/acquisition/test_modes.py", *_RUN),
+    "rig/acquisition/controller_run.py": ("rig/acquisition/test_controller_run.py", *_RUN),
+    "rig/acquisition/ramp.py": _RUN,
+    "rig/acquisition/run_states.py": (
+        "rig/acquisition/test_states.py",
+        "rig/acquisition/test_session_run.py",
     ),
-    "devices/ascii/drive.py": ("devices/test_serial_stop_paths.py",),
-    "devices/cia402/drive.py": ("devices/test_stop_paths.py",),
-    "devices/composed.py": ("devices/test_composed.py",),
-    "devices/enable_line.py": ("devices/test_enable_line.py",),
+    "rig/acquisition/session_run.py": ("rig/acquisition/test_session_run.py", *_RUN),
+    "rig/acquisition/zeroing.py": (
+        "rig/acquisition/test_zeroing.py",
+        "rig/acquisition/test_session_run.py",
+    ),
+    "rig/acquisition/supervision.py": (
+        *("rig/acquisition/test_session_run.py", "rig/acquisition/test_stop_report.py"),
+    ),
+    "rig/acquisition/tick.py": _RUN,
+    "rig/acquisition/stop_report.py": (
+        *("rig/acquisition/test_stop_numbers.py", "rig/acquisition/test_stop_report.py"),
+    ),
+    "rig/acquisition/stop_remedies.py": ("rig/acquisition/test_stop_report.py",),
+    "rig/acquisition/processes/ring_writer.py": (
+        *("rig/acquisition/test_ring_writer.py", "rig/acquisition/test_shared_status.py"),
+    ),
+    "rig/devices/ascii/drive.py": ("rig/devices/test_serial_stop_paths.py",),
+    "rig/devices/cia402/drive.py": ("rig/devices/test_stop_paths.py",),
+    "rig/devices/composed.py": ("rig/devices/test_composed.py",),
+    "rig/devices/enable_line.py": ("rig/devices/test_enable_line.py",),
 }
 """Of each module, below `tests/unit`."""
 
-_WATCHED = ("acquisition/test_watched_processes.py",)
+_WATCHED = ("rig/acquisition/test_watched_processes.py",)
 BY_HAND = {
-    "acquisition/processes/end_signals.py": ("acquisition/test_signals.py",),
-    "acquisition/processes/full_disk.py": ("acquisition/test_ring_recovery.py",),
-    "acquisition/processes/loop_process.py": _WATCHED,
-    "acquisition/processes/recorder.py": ("acquisition/test_ring_recovery.py",),
-    "acquisition/processes/recorder_process.py": _WATCHED,
-    "acquisition/processes/supervise.py": _WATCHED,
-    "console/page/desk.py": ("console/page/test_presence.py",),
-    "console/page/live_socket.py": ("console/page/test_live_socket.py",),
+    "rig/acquisition/processes/end_signals.py": ("rig/acquisition/test_signals.py",),
+    "rig/acquisition/processes/full_disk.py": ("rig/acquisition/test_ring_recovery.py",),
+    "rig/acquisition/processes/loop_process.py": _WATCHED,
+    "rig/acquisition/processes/recorder.py": ("rig/acquisition/test_ring_recovery.py",),
+    "rig/acquisition/processes/recorder_process.py": _WATCHED,
+    "rig/acquisition/processes/supervisor.py": _WATCHED,
+    "rig/console/page/desk.py": ("rig/console/page/test_presence.py",),
+    "rig/console/page/live_socket.py": ("rig/console/page/test_live_socket.py",),
 }
 """The same of modules in which only the faults made by hand are looked for."""
 

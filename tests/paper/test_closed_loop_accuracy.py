@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from rigidimeter.estimation import epoch_signals, fit_inertia_damping_stiffness
-from rigidimeter.recording import read_session
-from rigidimeter.settings import EstimationSettings, parse_settings
+from rigidimeter.analysis.estimation import epoch_signals, fit_inertia_damping_stiffness
+from rigidimeter.core.session import read_session
+from rigidimeter.core.settings import EstimationSettings, parse_settings
+from rigidimeter.virtual import PAPER_RATES
 from rigidimeter.virtual.batch import simulate_epochs
-from rigidimeter.virtual.study_design import PAPER_RATES
 
 TRUTH = np.array([0.0045, 0.1368, 1.751])
 EPOCHS = 12

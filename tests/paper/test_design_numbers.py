@@ -5,9 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from rigidimeter.dynamics import loop_margins, loop_stability
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.experiment import (
+from rigidimeter.core.settings import (
+    ControllerSettings,
+    GuardSettings,
+    PrbsSettings,
+    ScoreSettings,
+    SinusoidSettings,
+    parse_settings,
+)
+from rigidimeter.model import JointDynamics, loop_margins, loop_stability
+from rigidimeter.planning import (
     APPENDIX_A,
     check_band,
     corners,
@@ -18,14 +25,6 @@ from rigidimeter.experiment import (
     predicted_precision,
     sinusoid,
     time_constant_s,
-)
-from rigidimeter.settings import (
-    ControllerSettings,
-    GuardSettings,
-    PrbsSettings,
-    ScoreSettings,
-    SinusoidSettings,
-    parse_settings,
 )
 
 MEDIAN_JOINT = JointDynamics(0.0045, 0.1368, 1.751)  # Sec. 3.4

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from tests.unit.virtual.tiny import tiny
 
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.errors import UserError
+from rigidimeter.analysis.report.numbers import number
+from rigidimeter.core.errors import UserError
+from rigidimeter.model import JointDynamics
 from rigidimeter.paper import (
     AGREES,
     DIFFERS,
@@ -22,20 +23,25 @@ from rigidimeter.paper import (
     Check,
     Context,
     Row,
+    cycles_counted,
+    drawn,
+    highpass_errors_percent,
     ledger_text,
     make_rows,
+    n_from,
+    noise_runs,
+    p_from,
+    position_sd_deg,
     printed,
+    r_from,
     render_page,
+    scaled,
+    scored,
+    voluntary_errors_percent,
+    work_change_percent,
+    work_closed_form_j,
     write_ledger,
 )
-from rigidimeter.paper.controller import position_sd_deg
-from rigidimeter.paper.highpass import highpass_errors_percent
-from rigidimeter.paper.paper_page import drawn
-from rigidimeter.paper.printed_effects import n_from, p_from, r_from
-from rigidimeter.paper.protocol_rows import cycles_counted
-from rigidimeter.paper.score_rows import scaled, scored, work_change_percent, work_closed_form_j
-from rigidimeter.paper.simulated_epochs import noise_runs, voluntary_errors_percent
-from rigidimeter.reporting.numbers import number
 
 HEAVY = {  # made of simulations
     "sec-1-voluntary-ols", "sec-1-voluntary-iv", "sec-3.4-mean", "sec-3.4-mean-iv", "sec-3.4-sd",

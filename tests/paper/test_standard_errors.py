@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rigidimeter.estimation import fit_epoch
-from rigidimeter.recording import read_session
-from rigidimeter.settings import Settings
-from rigidimeter.virtual.study_design import PAPER_RATES
+from rigidimeter.analysis.estimation import fit_epoch
+from rigidimeter.core.session import read_session
+from rigidimeter.core.settings import Settings
+from rigidimeter.virtual import PAPER_RATES
 
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 

@@ -7,8 +7,17 @@ from dataclasses import replace
 
 import pytest
 
-from rigidimeter.paper import AGREES, DIFFERS, UNPUBLISHED, Check, Row
-from rigidimeter.paper.comparison_table import bounded, near, rounded, within_percent
+from rigidimeter.paper import (
+    AGREES,
+    DIFFERS,
+    UNPUBLISHED,
+    Check,
+    Row,
+    bounded,
+    near,
+    rounded,
+    within_percent,
+)
 
 
 def row_with(*checks: Check, **changes: object) -> Row:

@@ -8,24 +8,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.experiment import (
-    check_band,
-    corners,
-    demand,
-    plan,
-    power_spectrum,
-    prbs_levels,
-    prbs_nm,
-    sinusoid,
-)
-from rigidimeter.experiment.perturbation_band import line_spacing_hz, plateau_n2m2_hz
-from rigidimeter.settings import (
+from rigidimeter.core.settings import (
     BlockSettings,
     GuardSettings,
     PrbsSettings,
     ProtocolSettings,
     SinusoidSettings,
+)
+from rigidimeter.model import JointDynamics
+from rigidimeter.planning import (
+    check_band,
+    corners,
+    demand,
+    line_spacing_hz,
+    plan,
+    plateau_n2m2_hz,
+    power_spectrum,
+    prbs_levels,
+    prbs_nm,
+    sinusoid,
 )
 
 bits = st.integers(3, 12)

@@ -7,8 +7,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigidimeter.dynamics import DriveState, drive, drive_step
-from rigidimeter.guard import (
+from rigidimeter.model import DriveState, drive, drive_step
+from rigidimeter.rig.guard import (
     REACTIONS,
     Cause,
     GuardLimits,

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidimeter.dynamics import DriveModel
-from rigidimeter.dynamics.linear_loop import Loop
-from rigidimeter.estimation.closedloop.observation import loop_of
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.analysis.estimation.closedloop.observation import loop_of
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.model import DriveModel, Loop
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rigidimeter.estimation import fit_epochs
-from rigidimeter.experiment import (
+from rigidimeter.analysis.estimation import fit_epochs
+from rigidimeter.analysis.statistics import ranksum
+from rigidimeter.core.records import Epoch, Fit
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.planning import (
     PARAMETERS,
     Precision,
     Wanted,
@@ -14,11 +17,8 @@ from rigidimeter.experiment import (
     prbs_nm,
     predicted_precision,
 )
-from rigidimeter.records import Epoch, Fit
-from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.statistics import ranksum
+from rigidimeter.virtual import PAPER_RATES
 from rigidimeter.virtual.batch import simulate_chunks
-from rigidimeter.virtual.study_design import PAPER_RATES
 
 SESSION = 25
 """Epochs that are fitted together."""

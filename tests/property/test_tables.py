@@ -9,11 +9,11 @@ import scipy.io
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigidimeter.errors import UserError
-from rigidimeter.recording.formats.read_options import ReadOptions
-from rigidimeter.recording.formats.readers import read_table
-from rigidimeter.recording.formats.table import Table
-from rigidimeter.recording.formats.table_epochs import epochs_from_table
+from rigidimeter.analysis.reading.formats.read_options import ReadOptions
+from rigidimeter.analysis.reading.formats.readers import read_table
+from rigidimeter.analysis.reading.formats.table import Table
+from rigidimeter.analysis.reading.formats.table_epochs import epochs_from_table
+from rigidimeter.core.errors import UserError
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 sizes = st.integers(2, 12)

@@ -6,15 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.estimation import epoch_signals, fit_inertia_damping_stiffness, method_named
-from rigidimeter.estimation.diagnostics import Case, checked, diagnose
-from rigidimeter.estimation.prepared import prepare
-from rigidimeter.estimation.terms import fit_terms, wideband_signals
-from rigidimeter.estimation.uncertainty import hac_covariance
-from rigidimeter.recording.formats.read_options import ReadOptions
-from rigidimeter.recording.formats.readers import read_recording
-from rigidimeter.records import Channel
-from rigidimeter.settings import Settings
+from rigidimeter.analysis.estimation import (
+    epoch_signals,
+    fit_inertia_damping_stiffness,
+    method_named,
+)
+from rigidimeter.analysis.estimation.diagnostics import Case, checked, diagnose
+from rigidimeter.analysis.estimation.prepared import prepare
+from rigidimeter.analysis.estimation.terms import fit_terms, wideband_signals
+from rigidimeter.analysis.estimation.uncertainty import hac_covariance
+from rigidimeter.analysis.reading.formats.read_options import ReadOptions
+from rigidimeter.analysis.reading.formats.readers import read_recording
+from rigidimeter.core.records import Channel
+from rigidimeter.core.settings import Settings
 
 SETTINGS = Settings()
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import scipy.io
 
+from rigidimeter.analysis.reading import ReadOptions, read_recording
 from rigidimeter.cli.main import main
-from rigidimeter.errors import UserError
-from rigidimeter.recording import ReadOptions, read_recording
+from rigidimeter.core.errors import UserError
 
 PUBLISHED = {"inertia_kg_m2": 0.0175, "damping_nm_s_rad": 1.25, "stiffness_nm_rad": 103.0}
 """Least squares on the whole recording, at 100 samples/s (shared data, README)."""

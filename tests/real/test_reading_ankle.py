@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rigidimeter.recording.formats.read_options import ReadOptions
-from rigidimeter.recording.formats.readers import read_recording
+from rigidimeter.analysis.reading.formats.read_options import ReadOptions
+from rigidimeter.analysis.reading.formats.readers import read_recording
 
 OPTIONS = ReadOptions(
     columns={"angle_rad": "position_rad", "torque_nm": "torque_Nm"},

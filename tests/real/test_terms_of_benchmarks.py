@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rigidimeter.estimation.terms import compare_models, fit_terms, wideband_from_angle
+from rigidimeter.analysis.estimation.terms import compare_models, fit_terms, wideband_from_angle
 
 ANKLE_BAND_HZ = (0.0, 40.0)
 JBK = "inertia,damping,stiffness,offset"

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.estimation import fit_epochs
-from rigidimeter.estimation.diagnostics import checked
-from rigidimeter.estimation.prepared import prepare
-from rigidimeter.recording.formats.read_options import ReadOptions
-from rigidimeter.recording.formats.readers import read_recording
-from rigidimeter.records import Channel
-from rigidimeter.settings import Settings
+from rigidimeter.analysis.estimation import fit_epochs
+from rigidimeter.analysis.estimation.diagnostics import checked
+from rigidimeter.analysis.estimation.prepared import prepare
+from rigidimeter.analysis.reading.formats.read_options import ReadOptions
+from rigidimeter.analysis.reading.formats.readers import read_recording
+from rigidimeter.core.records import Channel
+from rigidimeter.core.settings import Settings
 
 OPTIONS = ReadOptions(
     columns={"angle_rad": "position_rad", "torque_nm": "torque_Nm"},

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.statistics import (
+from rigidimeter.analysis.statistics import (
     Mixed,
     difference,
     fit_mixed,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rigidimeter.statistics import RankSum, ranksum
+from rigidimeter.analysis.statistics import RankSum, ranksum
 
 SHARED = Path(os.environ.get("RIGIDIMETER_SHARED", Path(__file__).parents[3] / "shared"))
 UNIROOT_TOLERANCE = 1e-4

@@ -1,4 +1,4 @@
-"""Drives of several structures in continuous time, independent of `rigidimeter.dynamics`.
+"""Drives of several structures in continuous time, independent of `rigidimeter.model`.
 
 Runge–Kutta of fourth order at 20 kHz. At every tick torque and motion are sampled, and
 `edge_s` later the new command reaches the drive and is held. With J_m the inertia of the motor and
@@ -21,7 +21,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import butter
 
-from rigidimeter.records import Channel, Epoch
+from rigidimeter.core.records import Channel, Epoch
 
 Array = NDArray[np.float64]
 

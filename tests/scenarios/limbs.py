@@ -10,8 +10,8 @@ from tests.scenarios.recordings import Setup
 from tests.scenarios.sensors import Sensor
 from tests.scenarios.subject import Subject
 
-from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.units import rad_from_deg
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.core.units import rad_from_deg
 
 
 class Limb(NamedTuple):

@@ -1,7 +1,7 @@
 """What the independent simulator knows of joint, drive and torque path: numbers, no behaviour.
 
 Every field is a number, so that compiled code takes the records as they are. Zero leaves a term
-out. Nothing here or in `motion` comes from `rigidimeter.dynamics`: the estimation is measured with
+out. Nothing here or in `motion` comes from `rigidimeter.model`: the estimation is measured with
 equations that it does not hold itself.
 """
 

@@ -13,7 +13,7 @@ from tests.scenarios.plant import Controller, Drive, Joint, TorquePath
 from tests.scenarios.sensors import Sensor, kept, newest, recorded, stamp_errors_s, taken
 from tests.scenarios.subject import Subject, courses
 
-from rigidimeter.records import Channel, Epoch, Ticks
+from rigidimeter.core.records import Channel, Epoch, Ticks
 
 Array = NDArray[np.float64]
 MEASURED = ("torque_nm", "angle_rad", "velocity_rad_s")

@@ -11,7 +11,7 @@ import numpy as np
 from tests.scenarios.limbs import LIMBS, settings_of, setup_of
 from tests.scenarios.recordings import Setup, Simulated, simulate
 
-from rigidimeter.settings import Settings, changed_settings
+from rigidimeter.core.settings import Settings, changed_settings
 
 
 @dataclass(frozen=True)

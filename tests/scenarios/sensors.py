@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tests.scenarios.motion import FINE_HZ
 
-from rigidimeter.records import Channel
+from rigidimeter.core.records import Channel
 
 Array = NDArray[np.float64]
 Steps = NDArray[np.int64]

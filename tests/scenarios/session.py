@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.recording import SessionWriter
-from rigidimeter.recording.sample_log import sample_dtypes
-from rigidimeter.records import Channel, Epoch
-from rigidimeter.settings import Settings
+from rigidimeter.core.records import Channel, Epoch
+from rigidimeter.core.session import SessionWriter, sample_dtypes
+from rigidimeter.core.settings import Settings
 
 REST_S = 2.0
 """Between two epochs; nothing is written of it."""

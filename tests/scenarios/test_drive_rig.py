@@ -9,10 +9,10 @@ import pytest
 from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.drive_rig import TRUTH, DriveRig, run
 
-from rigidimeter.records import Epoch
-from rigidimeter.settings import parse_settings
-from rigidimeter.study import Preparation, estimate
-from rigidimeter.study.analysis import analyse_prepared
+from rigidimeter.analysis.study import Preparation, estimate
+from rigidimeter.analysis.study.analysis import analyse_prepared
+from rigidimeter.core.records import Epoch
+from rigidimeter.core.settings import parse_settings
 
 MOST = np.array([0.02, 0.01, 0.005])
 

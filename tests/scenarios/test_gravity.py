@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from tests.scenarios.catalogue import SCENARIOS
 
-from rigidimeter.settings import changed_settings
-from rigidimeter.study import estimate
+from rigidimeter.analysis.study import estimate
+from rigidimeter.core.settings import changed_settings
 
 
 def test_the_note_gives_the_stiffness_without_the_slope_of_the_weight():

@@ -12,8 +12,8 @@ from tests.scenarios.plant import VELOCITY_PI, Controller, Drive, TorquePath
 from tests.scenarios.recordings import simulate
 from tests.scenarios.scenario import scenario
 
-from rigidimeter.dynamics import JointDynamics
-from rigidimeter.settings import parse_settings
+from rigidimeter.core.settings import parse_settings
+from rigidimeter.model import JointDynamics
 from rigidimeter.virtual.batch import simulate_epochs
 
 ELBOW = LIMBS["animal elbow"].joint

@@ -19,7 +19,7 @@ from tests.scenarios.limbs import LIMBS, setup_of
 from tests.scenarios.recordings import Setup, simulate
 from tests.scenarios.subject import Subject
 
-from rigidimeter.records import Epoch
+from rigidimeter.core.records import Epoch
 
 RATE_HZ = 250.0
 DURATION_S = 12.0

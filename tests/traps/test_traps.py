@@ -22,8 +22,8 @@ from tests.traps.recorded_studies import (
 )
 
 import rigidimeter as rm
-from rigidimeter.reporting.verdict_text import verdict
-from rigidimeter.study import StudyResult, comparison_document
+from rigidimeter.analysis.report.verdict_text import verdict
+from rigidimeter.analysis.study import StudyResult, comparison_document
 
 OFF, DBS = Session("1", "OFF"), Session("1", "DBS")
 NAMES = ("OFF", "DBS")

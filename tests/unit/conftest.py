@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition import ControlLoop, SimulatedClock, perturb
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.recording.sample_log import Sample
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.core.session import Sample
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.rig.acquisition import ControlLoop, SimulatedClock, perturb
+from rigidimeter.rig.devices import SimulatedRig
 
 IDEAL_TORQUE = {"noise_sd_nm": 0.0, "resolution_nm": 0.0}
 IDEAL_MOTION = {

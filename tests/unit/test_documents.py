@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigidimeter.documents import (
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import (
     csv_text,
     json_line,
     json_text,
@@ -23,7 +24,6 @@ from rigidimeter.documents import (
     write_json,
     write_text,
 )
-from rigidimeter.errors import UserError
 
 
 @given(values=st.lists(st.floats(allow_nan=False, allow_infinity=False)))

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from rigidimeter.errors import UserError
-from rigidimeter.parallel import each
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.executor import each
 
 
 def squared(number: int) -> int:

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.recording import write_estimates_csv
-from rigidimeter.records import (
+from rigidimeter.analysis.reading import write_estimates_csv
+from rigidimeter.core.records import (
     PARAMETER_VECTORS,
     PARAMETERS,
     Analysis,

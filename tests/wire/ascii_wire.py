@@ -6,11 +6,10 @@ import time
 
 import pytest
 
-from rigidimeter.devices.ascii.drive import AsciiDrive
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.guard import Cause
-from rigidimeter.testing.ascii_emulator import AsciiEmulator
-from rigidimeter.testing.emulated_arm import EmulatedArm
+from rigidimeter.model import JointDynamics
+from rigidimeter.rig.devices import AsciiDrive
+from rigidimeter.rig.guard import Cause
+from rigidimeter.testing import AsciiEmulator, EmulatedArm
 
 COUNTS_PER_TURN = 360_000.0
 TICK_S = 0.02

@@ -9,11 +9,10 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from rigidimeter.devices.base import MotionSample
-from rigidimeter.devices.cia402.drive import Cia402Drive, Cia402Settings
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.testing import EmulatedArm
-from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
+from rigidimeter.model import JointDynamics
+from rigidimeter.rig.devices import Cia402Drive, Cia402Settings
+from rigidimeter.rig.devices.base import MotionSample
+from rigidimeter.testing import Cia402Emulator, EmulatedArm
 
 # Wide enough for a machine that is busy with other things; the drive's own limits are measured.
 SLACK = {

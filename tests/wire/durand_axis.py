@@ -21,8 +21,7 @@ from durand.node import MinimalNode
 from durand.object_dictionary import Record, Variable
 from durand.services.nmt import StateEnum
 
-from rigidimeter.testing import EmulatedArm
-from rigidimeter.testing.cia402.servo import POWERED, Servo, statusword
+from rigidimeter.testing import POWERED, EmulatedArm, Servo, statusword
 
 logging.getLogger("durand").setLevel(logging.CRITICAL)
 

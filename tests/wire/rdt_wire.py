@@ -4,11 +4,10 @@ import time
 
 import pytest
 
-from rigidimeter.devices.ati.rdt import AtiRdt
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.guard import Cause
-from rigidimeter.testing.emulated_arm import EmulatedArm
-from rigidimeter.testing.rdt.rdt_emulator import RdtEmulator
+from rigidimeter.model import JointDynamics
+from rigidimeter.rig.devices import AtiRdt
+from rigidimeter.rig.guard import Cause
+from rigidimeter.testing import EmulatedArm, RdtEmulator
 
 ANGLE_RAD = 0.3
 STIFFNESS_NM_RAD = 2.0

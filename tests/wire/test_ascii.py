@@ -20,10 +20,10 @@ from tests.wire.ascii_wire import (
     wire,
 )
 
-from rigidimeter.devices.ascii.drive import AsciiDrive
-from rigidimeter.devices.base import DeviceError
-from rigidimeter.guard import Cause
-from rigidimeter.testing.ascii_emulator import MISBEHAVIOURS
+from rigidimeter.rig.devices import AsciiDrive
+from rigidimeter.rig.devices.base import DeviceError
+from rigidimeter.rig.guard import Cause
+from rigidimeter.testing import ASCII_MISBEHAVIOURS
 
 __all__ = ["wire"]
 
@@ -197,7 +197,7 @@ def test_every_misbehaviour_has_a_test():
         )
         for mark in (getattr(case, "values", case)[0] for case in test.pytestmark[0].args[1])
     }
-    assert tested | {"stale_target"} == set(MISBEHAVIOURS)
+    assert tested | {"stale_target"} == set(ASCII_MISBEHAVIOURS)
 
 
 def test_a_stale_target_that_does_not_go_is_refused_before_power(wire):
@@ -275,7 +275,7 @@ def test_commands_keep_up_with_the_rate_the_facts_state(wire, baud, record_prope
 
 SCRIPT = """
 import sys, time
-from rigidimeter.devices.ascii.drive import AsciiDrive
+from rigidimeter.rig.devices.ascii.drive import AsciiDrive
 settings = AsciiDrive.Settings(
     port=sys.argv[1], counts_per_turn=float(sys.argv[2]), horizon_s=float(sys.argv[3]),
     deceleration_deg_s2=float(sys.argv[4]), lost_s=0.5)

@@ -10,9 +10,9 @@ import canopen
 import pytest
 from tests.wire.cia402_wire import SLACK, emulated_arm, run_loop, wait_until, wire
 
-from rigidimeter.devices.base import DeviceError
-from rigidimeter.guard import Cause
-from rigidimeter.testing.cia402.cia402_emulator import MISBEHAVIOURS, Cia402Emulator
+from rigidimeter.rig.devices.base import DeviceError
+from rigidimeter.rig.guard import Cause
+from rigidimeter.testing import CIA402_MISBEHAVIOURS, Cia402Emulator
 
 __all__ = ["wire"]
 
@@ -108,7 +108,7 @@ PASSED_ON = {
 
 
 def test_every_misbehaviour_has_its_test():
-    assert set(MISBEHAVIOURS) == {*CAUSES, *REFUSED, *PASSED_ON, "ignores quick stop"}
+    assert set(CIA402_MISBEHAVIOURS) == {*CAUSES, *REFUSED, *PASSED_ON, "ignores quick stop"}
 
 
 @pytest.mark.parametrize("name", CAUSES)
@@ -252,7 +252,7 @@ def test_frames_that_make_no_sense_are_counted(wire):
 def test_the_emulator_is_a_drive_to_the_profile_that_others_wrote(wire):
     from canopen.objectdictionary import ObjectDictionary
 
-    from rigidimeter.testing.cia402.object_dictionary import dictionary
+    from rigidimeter.testing import dictionary
 
     emulator = wire.emulator
     bus = can.Bus(interface="virtual", channel=wire.channel)

@@ -13,16 +13,15 @@ import pytest
 from tests.lateness import ordinary_priority, same_priority
 from tests.wire.cia402_wire import GROUP, SLACK, emulated_arm, free_port, run_loop, wait_until
 
-from rigidimeter.devices.cia402.drive import Cia402Drive, Cia402Settings
-from rigidimeter.devices.cia402.state_words import State, state_of
-from rigidimeter.guard import Cause
-from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
+from rigidimeter.rig.devices import Cia402Drive, Cia402Settings, State, state_of
+from rigidimeter.rig.guard import Cause
+from rigidimeter.testing import Cia402Emulator
 
 EMULATOR = """
 import sys
 from rigidimeter.testing import EmulatedArm
 from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
-from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.model.joint import JointDynamics
 
 arm = EmulatedArm(JointDynamics(0.08, 0.5, 10.0))
 channel, port = sys.argv[1], int(sys.argv[2])
@@ -35,7 +34,7 @@ emulator.close()
 """
 DRIVER = """
 import sys, time
-from rigidimeter.devices.cia402.drive import Cia402Drive, Cia402Settings
+from rigidimeter.rig.devices.cia402.drive import Cia402Drive, Cia402Settings
 
 drive = Cia402Drive(
     Cia402Settings(

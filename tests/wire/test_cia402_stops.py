@@ -8,8 +8,8 @@ import can
 import pytest
 from tests.wire.cia402_wire import SLACK, run_loop, wait_until, wire
 
-from rigidimeter.devices.base import DeviceError
-from rigidimeter.guard import Cause
+from rigidimeter.rig.devices.base import DeviceError
+from rigidimeter.rig.guard import Cause
 
 __all__ = ["wire"]
 

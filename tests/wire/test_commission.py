@@ -13,8 +13,11 @@ import pytest
 from tests.wire.rig_process import RigProcess
 from tests.wire.trial_setup import settings, setup
 
-from rigidimeter.acquisition.clock import DeadlineClock
-from rigidimeter.commissioning import (
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import CommissioningSettings, Settings
+from rigidimeter.rig.acquisition import DeadlineClock
+from rigidimeter.rig.commissioning import (
+    A_PERSON_TELLS,
     CommissioningRecord,
     Operator,
     check_record,
@@ -23,11 +26,7 @@ from rigidimeter.commissioning import (
     record_path,
     write_record,
 )
-from rigidimeter.commissioning.commissioning_record import A_PERSON_TELLS
-from rigidimeter.devices.rigfile import load_rig
-from rigidimeter.errors import UserError
-from rigidimeter.settings import Settings
-from rigidimeter.settings.commissioning_settings import CommissioningSettings
+from rigidimeter.rig.devices import load_rig
 
 pytest.importorskip("can")
 pytest.importorskip("canopen")
@@ -186,7 +185,7 @@ def test_a_dead_sensor_is_caught_and_the_record_says_so(
 
     # What it asks of the system would last for the tests after it.
     monkeypatch.setattr(
-        "rigidimeter.acquisition.processes.realtime_scheduling.prepare_loop_process",
+        "rigidimeter.rig.acquisition.processes.prepare_loop_process",
         lambda: SimpleNamespace(),
     )
     can_bench.misbehave("torque", "silent")

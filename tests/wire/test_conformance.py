@@ -13,24 +13,21 @@ import pytest
 from tests.wire.cia402_wire import GROUP, free_port
 from tests.wire.durand_axis import DurandAxis
 
-from rigidimeter.devices.ascii.drive import AsciiDrive
-from rigidimeter.devices.ati.analogue import AtiAnalogue
-from rigidimeter.devices.ati.rdt import AtiRdt
-from rigidimeter.devices.cia402.drive import Cia402Drive
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.testing.ascii_emulator import AsciiEmulator
-from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
-from rigidimeter.testing.conformance import (
+from rigidimeter.model import JointDynamics
+from rigidimeter.rig.devices import AsciiDrive, AtiAnalogue, AtiRdt, Cia402Drive
+from rigidimeter.testing import (
     DRIVE_CHECKS,
     SENSOR_CHECKS,
+    AsciiEmulator,
+    Cia402Emulator,
+    ConformanceError,
     DriveFixture,
+    EmulatedArm,
     OtherEnd,
+    RdtEmulator,
     SensorFixture,
+    sensor_samples_flow,
 )
-from rigidimeter.testing.conformance.fixture import ConformanceError
-from rigidimeter.testing.conformance.sensor_checks import sensor_samples_flow
-from rigidimeter.testing.emulated_arm import EmulatedArm
-from rigidimeter.testing.rdt.rdt_emulator import RdtEmulator
 
 JOINT = JointDynamics(0.08, 0.5, 2.0)
 CHANNEL = count()

@@ -11,9 +11,8 @@ import pytest
 from tests.wire.rig_process import RigProcess
 from tests.wire.trial_setup import settings, setup
 
-from rigidimeter.commissioning import Compared, DailyRecord, Operator, daily_check
-from rigidimeter.commissioning.daily_record import Reference
-from rigidimeter.devices.rigfile import load_rig
+from rigidimeter.rig.commissioning import Compared, DailyRecord, Operator, Reference, daily_check
+from rigidimeter.rig.devices import load_rig
 
 pytest.importorskip("can")
 pytest.importorskip("canopen")

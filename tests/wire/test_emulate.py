@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from tests.wire.rig_process import RigProcess
 
-from rigidimeter.devices.rigfile import load_rig
+from rigidimeter.rig.devices import load_rig
 
 pytest.importorskip("serial")
 

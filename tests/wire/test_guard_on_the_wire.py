@@ -25,12 +25,10 @@ import pytest
 from tests.faults.rigs import ASCII, CANOPEN, WIRES, bench
 from tests.faults.trials import Desk, run
 
-from rigidimeter.acquisition import ControlLoop, follow
-from rigidimeter.acquisition.control_modes import hold
-from rigidimeter.acquisition.tick import skip_passed_ticks
-from rigidimeter.devices.enable_line import SerialEnableLine
-from rigidimeter.guard import Cause
-from rigidimeter.testing.cia402.servo import UNITS_PER_RAD
+from rigidimeter.rig.acquisition import ControlLoop, follow, hold, skip_passed_ticks
+from rigidimeter.rig.devices import SerialEnableLine
+from rigidimeter.rig.guard import Cause
+from rigidimeter.testing import UNITS_PER_RAD
 
 SPEED_RAD_S = 0.5
 MARK = 0x7E5

@@ -16,16 +16,17 @@ from tests.wire.cia402_wire import GROUP, emulated_arm, free_port
 from tests.wire.durand_axis import DurandAxis
 from tests.wire.trial_setup import settings, setup
 
-from rigidimeter.commissioning import Operator
-from rigidimeter.commissioning.stopping import watchdog_checks
-from rigidimeter.devices.cia402.drive import Cia402Drive
-from rigidimeter.devices.rigfile import load_rig
-from rigidimeter.guard import Cause
-from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
-from rigidimeter.testing.conformance import DriveFixture, OtherEnd
-from rigidimeter.testing.conformance.drive_checks import drive_stops_by_itself
-from rigidimeter.testing.conformance.fixture import ConformanceError
-from rigidimeter.testing.rdt.rdt_emulator import RdtEmulator
+from rigidimeter.rig.commissioning import Operator, watchdog_checks
+from rigidimeter.rig.devices import Cia402Drive, load_rig
+from rigidimeter.rig.guard import Cause
+from rigidimeter.testing import (
+    Cia402Emulator,
+    ConformanceError,
+    DriveFixture,
+    OtherEnd,
+    RdtEmulator,
+    drive_stops_by_itself,
+)
 
 STACKS = {"canopen": Cia402Emulator, "durand": DurandAxis}
 TICK_S, HEARTBEAT_S = 0.004, 0.02

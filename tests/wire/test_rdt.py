@@ -17,8 +17,8 @@ from tests.wire.rdt_wire import (
     watch,
 )
 
-from rigidimeter.guard import Cause
-from rigidimeter.testing.rdt.rdt_emulator import MISBEHAVIOURS, RdtEmulator
+from rigidimeter.rig.guard import Cause
+from rigidimeter.testing import RDT_MISBEHAVIOURS, RdtEmulator
 
 __all__ = ["arm", "emulator", "sensor", "sensor_of"]
 
@@ -271,8 +271,8 @@ def test_the_sequence_wraps_around_without_loss(arm, sensor_of):
 def test_every_misbehaviour_is_tried():
     elsewhere = {"changed_units", "changed_calibration", "changed_bias"}
     pages = {"unknown_units", "rdt_disabled", "page_status", "page_rate", "deaf"}
-    http = {name for name in MISBEHAVIOURS if name.startswith("http_")}
-    assert {name for name, *_ in RUNNING} | elsewhere | pages | http == set(MISBEHAVIOURS)
+    http = {name for name in RDT_MISBEHAVIOURS if name.startswith("http_")}
+    assert {name for name, *_ in RUNNING} | elsewhere | pages | http == set(RDT_MISBEHAVIOURS)
 
 
 WITHHOLDS = {"silent", "deaf", "backlog", "restart", "frozen_record"}
@@ -281,7 +281,7 @@ WITHHOLDS |= {"delay", "lag", "pauses", "bursts"}
 
 
 def test_everything_at_once_stops_and_the_emulator_lives_on(emulator, sensor):
-    for name in MISBEHAVIOURS:
+    for name in RDT_MISBEHAVIOURS:
         if name not in WITHHOLDS:
             emulator.misbehave(name, None if name.startswith("http") else 3)
     assert first_cause(sensor)[0] in (Cause.TORQUE_STATUS, Cause.TORQUE_SATURATED)

@@ -7,7 +7,7 @@ import time
 import pytest
 from tests.wire.rdt_wire import NOISE_NM, TORQUE_NM, arm, emulator, sensor_of
 
-from rigidimeter.testing.rdt.rdt_emulator import RdtEmulator
+from rigidimeter.testing import RdtEmulator
 
 __all__ = ["arm", "emulator", "sensor_of"]
 

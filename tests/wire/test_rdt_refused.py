@@ -5,9 +5,9 @@ import time
 import pytest
 from tests.wire.rdt_wire import arm, emulator, sensor, sensor_of
 
-from rigidimeter.devices.base import DeviceError
-from rigidimeter.guard import Cause
-from rigidimeter.testing.rdt.rdt_emulator import RdtEmulator
+from rigidimeter.rig.devices.base import DeviceError
+from rigidimeter.rig.guard import Cause
+from rigidimeter.testing import RdtEmulator
 
 __all__ = ["arm", "emulator", "sensor", "sensor_of"]
 

@@ -20,9 +20,9 @@ from tests.wire.cia402_wire import emulated_arm
 from tests.wire.durand_axis import DurandAxis
 from tests.wire.slcan_adapter import Manners, adapter
 
-from rigidimeter.devices.cia402.drive import Cia402Drive
-from rigidimeter.guard import Cause
-from rigidimeter.testing.cia402.cia402_emulator import Cia402Emulator
+from rigidimeter.rig.devices import Cia402Drive
+from rigidimeter.rig.guard import Cause
+from rigidimeter.testing import Cia402Emulator
 
 TICK_S, LOST_S = 0.004, 0.2
 COUNTS_PER_S = 1e5

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from rigidimeter.acquisition.clock import DeadlineClock
-from rigidimeter.commissioning import Operator, Setup, Timebase
-from rigidimeter.devices.rigfile import RigFile
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.rig.acquisition import DeadlineClock
+from rigidimeter.rig.commissioning import Operator, Setup, Timebase
+from rigidimeter.rig.devices import RigFile
 
 
 def settings(rate_hz: float, **tables: Any) -> Settings:

@@ -11,7 +11,7 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 _SHOWN = 20
 
@@ -51,7 +51,7 @@ def batch(
       rigidimeter batch 'archive/**/*.csv' --mapping lab.toml --out results.csv
       rigidimeter batch study --out results.parquet --scheduler tcp://host:8786
     """
-    from rigidimeter.archives import batch as run_batch
+    from rigidimeter.analysis.batch import batch as run_batch
     from rigidimeter.cli.progress import Meter
 
     _refuse(recordings)

@@ -15,12 +15,12 @@ from rigidimeter.cli.operator_answers import operator
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.terminal_tables import show
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.commissioning import DailyRecord, Operator, ZeroFound
-    from rigidimeter.devices.rigfile import RigFile
-    from rigidimeter.settings import Settings
+    from rigidimeter.core.settings import Settings
+    from rigidimeter.rig.commissioning import DailyRecord, Operator, ZeroFound
+    from rigidimeter.rig.devices import RigFile
 
 
 def check(
@@ -81,8 +81,8 @@ def check(
       rigidimeter check RIG.toml --zero
     """
     from rigidimeter.cli.virtual_check import virtual_check, virtual_zero
-    from rigidimeter.devices.rigfile import load_rig
-    from rigidimeter.settings import load_settings
+    from rigidimeter.core.settings import load_settings
+    from rigidimeter.rig.devices import load_rig
 
     rigfile, chosen = None if rig is None else load_rig(rig), load_settings(settings)
     if known_inertia is not None and not (math.isfinite(known_inertia) and known_inertia > 0):
@@ -137,7 +137,8 @@ def _check(
     """Check a rig and write the record; return both."""
     from datetime import UTC, datetime
 
-    from rigidimeter.commissioning import (
+    from rigidimeter.core.version import __version__
+    from rigidimeter.rig.commissioning import (
         Compared,
         check_record,
         daily_check,
@@ -145,7 +146,6 @@ def _check(
         read_daily,
         write_daily,
     )
-    from rigidimeter.version import __version__
 
     rig = rigfile.path
     path = daily_path(rig)
@@ -172,7 +172,7 @@ def _check(
 
 def _say_checked(found: DailyRecord, settings: Settings, what: str) -> None:
     """Show the checks; a rig that is not fit ends the program with status 1."""
-    from rigidimeter.commissioning import sign_words
+    from rigidimeter.rig.commissioning import sign_words
 
     show([table(found.checks)])
     if found.objection:
@@ -181,7 +181,7 @@ def _say_checked(found: DailyRecord, settings: Settings, what: str) -> None:
 
 
 def _zero(rigfile: RigFile, settings: Settings, asked: Operator) -> None:
-    from rigidimeter.commissioning import daily_path, zero_check
+    from rigidimeter.rig.commissioning import daily_path, zero_check
 
     path = daily_path(rigfile.path)
     with claimed(rigfile, settings, path, "do it again", asked) as setup:

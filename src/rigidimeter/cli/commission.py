@@ -19,12 +19,12 @@ from rigidimeter.cli.operator_answers import operator
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.terminal_tables import Table, show
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.commissioning import Check, Operator, Setup
-    from rigidimeter.devices.rigfile import RigFile
-    from rigidimeter.settings import Settings
+    from rigidimeter.core.settings import Settings
+    from rigidimeter.rig.commissioning import Check, Operator, Setup
+    from rigidimeter.rig.devices import RigFile
 
 
 def commission(
@@ -93,11 +93,11 @@ def commission(
     """
     from datetime import UTC, datetime
 
-    from rigidimeter.commissioning import commission as try_rig
-    from rigidimeter.commissioning import record_path, sign_words, write_record
-    from rigidimeter.devices.rigfile import load_rig
-    from rigidimeter.settings import load_settings
-    from rigidimeter.version import __version__
+    from rigidimeter.core.settings import load_settings
+    from rigidimeter.core.version import __version__
+    from rigidimeter.rig.commissioning import commission as try_rig
+    from rigidimeter.rig.commissioning import record_path, sign_words, write_record
+    from rigidimeter.rig.devices import load_rig
 
     if eds is not None:
         _compare_eds(eds, rig)
@@ -139,9 +139,7 @@ def commission(
 
 
 def _compare_eds(eds: Path, rig: Path | None) -> None:
-    from rigidimeter.devices.cia402.eds import fits
-    from rigidimeter.devices.cia402.setup import Cia402Settings
-    from rigidimeter.devices.rigfile import load_rig
+    from rigidimeter.rig.devices import Cia402Settings, fits, load_rig
 
     chosen: object = Cia402Settings()
     if rig is not None:
@@ -169,9 +167,9 @@ def claimed(
 
     An interrupt says that `record` was not written, and to do it `again`.
     """
-    from rigidimeter.acquisition.clock import DeadlineClock
-    from rigidimeter.acquisition.processes.realtime_scheduling import prepare_loop_process
-    from rigidimeter.commissioning import Setup, Timebase
+    from rigidimeter.rig.acquisition import DeadlineClock
+    from rigidimeter.rig.acquisition.processes import prepare_loop_process
+    from rigidimeter.rig.commissioning import Setup, Timebase
 
     for line in str(prepare_loop_process()).splitlines():
         echo(line, err=True)

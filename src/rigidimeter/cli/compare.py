@@ -21,10 +21,10 @@ from rigidimeter.cli.options import CsvOption, JsonOption, KeyOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import show
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.study import StudyResult
+    from rigidimeter.analysis.study import StudyResult
 
 
 @reads_recordings
@@ -100,7 +100,7 @@ def compare(
       rigidimeter compare estimates.json --reference OFF --other DBS --csv table.csv
       rigidimeter compare ratings.csv --value score --by condition --json comparison.json
     """
-    from rigidimeter import study as studies
+    from rigidimeter.analysis import study as studies
     from rigidimeter.cli.progress import Meter
 
     outputs = (json_out, csv_out)
@@ -150,8 +150,8 @@ def compare(
 def _write(
     found: StudyResult, json_out: Path | None, csv_out: Path | None, place: str = ""
 ) -> None:
-    from rigidimeter.documents import write_json, write_text
-    from rigidimeter.study import comparison_document, result_table, table_csv
+    from rigidimeter.analysis.study import comparison_document, result_table, table_csv
+    from rigidimeter.core.files import write_json, write_text
 
     if json_out is not None:
         write_json(json_out, comparison_document(found, place))

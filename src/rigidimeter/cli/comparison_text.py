@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, number_text
 
 if TYPE_CHECKING:
-    from rigidimeter.study import RatingsFound, StudyResult
+    from rigidimeter.analysis.study import RatingsFound, StudyResult
 
 BY = {
     "protocol": "by the protocol",
@@ -26,7 +26,7 @@ UNBOUNDED = (
 
 def comparison_blocks(found: StudyResult) -> Iterator[Block]:
     """Yield everything that was concluded, the verdict first."""
-    from rigidimeter.reporting.verdict_text import verdict
+    from rigidimeter.analysis.report.verdict_text import verdict
 
     said = verdict(found)
     yield Heading(said.lead)
@@ -51,8 +51,8 @@ def comparison_blocks(found: StudyResult) -> Iterator[Block]:
 
 def _first_screen(found: StudyResult) -> Iterator[Block]:
     """Yield what the first screen of the report shows."""
-    from rigidimeter.reporting.first_screen import LIGHTS, light_words, main_finding
-    from rigidimeter.study import traffic_light
+    from rigidimeter.analysis.report.first_screen import LIGHTS, light_words, main_finding
+    from rigidimeter.analysis.study import traffic_light
 
     light = traffic_light(found)
     if light is not None:
@@ -65,7 +65,7 @@ def _first_screen(found: StudyResult) -> Iterator[Block]:
 
 def short_table(found: StudyResult) -> Iterator[Block]:
     """Yield what was found of each measure; of a virtual study beside what was simulated."""
-    from rigidimeter.reporting.first_screen import strip, tested_words
+    from rigidimeter.analysis.report.first_screen import strip, tested_words
 
     rows = strip(found)
     if not rows:
@@ -110,7 +110,7 @@ def _epochs(found: StudyResult) -> Iterator[Block]:
 
 
 def _rank_tests(found: StudyResult) -> Iterator[Block]:
-    from rigidimeter.study import TEST
+    from rigidimeter.analysis.study import TEST
 
     tested = [(c, c.test) for c in found.comparisons if c.test is not None]
     if tested:

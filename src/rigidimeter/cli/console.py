@@ -15,13 +15,12 @@ import typer
 
 from rigidimeter.cli.options import CpuOption, PriorityOption, RigOption
 from rigidimeter.cli.output import echo
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.acquisition.processes.loop_process import Realtime
-    from rigidimeter.acquisition.processes.supervise import Ended
     from rigidimeter.cli.planned_session import PlannedSession
-    from rigidimeter.console.page.desk import Desk, StartRequest
+    from rigidimeter.rig.acquisition.processes import Ended, Realtime
+    from rigidimeter.rig.console.page import Desk, StartRequest
 
 SHOWN_S = 3.0
 
@@ -63,11 +62,9 @@ def console(
       rigidimeter console
       rigidimeter console protocol.toml --rig rig.toml --out study
     """
-    from rigidimeter.acquisition.processes.left_memory import complete_left
-    from rigidimeter.acquisition.processes.loop_process import Realtime
-    from rigidimeter.console.page.desk import Desk, Place
-    from rigidimeter.console.page.kept_study import extended
-    from rigidimeter.settings import load_settings
+    from rigidimeter.core.settings import load_settings
+    from rigidimeter.rig.acquisition.processes import Realtime, complete_left
+    from rigidimeter.rig.console.page import Desk, Place, extended
 
     for line in complete_left():
         echo(line, err=True)
@@ -98,7 +95,7 @@ def run_on_page(
     UserError
         If the program was told to end before.
     """
-    from rigidimeter.console.page.desk import Desk, Place
+    from rigidimeter.rig.console.page import Desk, Place
 
     require_page()
     out = out.absolute()
@@ -119,8 +116,7 @@ def run_on_page(
 def serving(desk: Desk, host: str, port: int, token: str) -> Iterator[None]:
     """Serve the page meanwhile."""
     from rigidimeter.cli.rig_steps import rig_steps
-    from rigidimeter.console.page.server import PageServer
-    from rigidimeter.console.page.work import Work
+    from rigidimeter.rig.console.page import PageServer, Work
 
     server = PageServer(desk, Work(partial(rig_steps, desk.place.rig)), host, port, token)
     server.start()
@@ -139,9 +135,8 @@ def lead_session(desk: Desk, request: StartRequest, realtime: Realtime) -> Ended
         run_planned,
         write_nwb_beside,
     )
-    from rigidimeter.console.page.button_words import in_buttons, next_buttons
-    from rigidimeter.console.page.kept_study import extended
-    from rigidimeter.recording.resume import count_epochs, rest_of
+    from rigidimeter.core.session import count_epochs, rest_of
+    from rigidimeter.rig.console.page import extended, in_buttons, next_buttons
 
     folder, rig = desk.place.root / request.folder, desk.place.rig
     try:
@@ -174,8 +169,8 @@ def lead_session(desk: Desk, request: StartRequest, realtime: Realtime) -> Ended
 def _planned(desk: Desk, request: StartRequest) -> PlannedSession:
     """Return what is to be run, in which a silent page is lost sooner than a silent terminal."""
     from rigidimeter.cli.planned_session import new_session, rest_of_session
-    from rigidimeter.console.page.presence import SILENT_S
-    from rigidimeter.settings import changed_settings
+    from rigidimeter.core.settings import changed_settings
+    from rigidimeter.rig.console.page import SILENT_S
 
     if request.settings is None:
         virtual = desk.place.rig is None

@@ -94,10 +94,10 @@ def design(
     """
     from rigidimeter.cli.design_text import design_blocks
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.documents import write_json
-    from rigidimeter.dynamics import refuse_unstable
-    from rigidimeter.experiment import Forearm, check_criterion, design_document
-    from rigidimeter.experiment import design as compute
+    from rigidimeter.core.files import write_json
+    from rigidimeter.model import refuse_unstable
+    from rigidimeter.planning import Forearm, check_criterion, design_document
+    from rigidimeter.planning import design as compute
 
     keep_inputs((json_out,), [settings] if settings is not None else [])
     check_criterion(criterion)
@@ -116,7 +116,7 @@ def design(
         )
     show(design_blocks(designed, power, alpha))
     if out is not None:
-        from rigidimeter.reporting.design_folder import write_design_folder
+        from rigidimeter.analysis.report.design_folder import write_design_folder
 
         echo(f"\nWritten to {out}: {', '.join(write_design_folder(out, designed))}")
     if json_out is not None:

@@ -6,8 +6,9 @@ import math
 from collections.abc import Iterator
 
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
-from rigidimeter.dynamics import Margins
-from rigidimeter.experiment import (
+from rigidimeter.core.units import deg_from_rad, rad_from_deg
+from rigidimeter.model import Margins
+from rigidimeter.planning import (
     Candidate,
     Design,
     Detection,
@@ -17,7 +18,6 @@ from rigidimeter.experiment import (
     prbs_toml,
     time_constant_s,
 )
-from rigidimeter.units import deg_from_rad, rad_from_deg
 
 _SHOWN = 8
 _HEADS = ("J\nkg·m²", "B\nN·m·s/rad", "K\nN·m/rad")

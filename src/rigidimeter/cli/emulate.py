@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigidimeter.cli.output import echo
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 
 def emulate(
@@ -48,8 +48,8 @@ def emulate(
       rigidimeter emulate --rig-out RIG.toml
       rigidimeter emulate --drive ascii --joint 0.0045 0.14 1.75 --rig-out RIG.toml
     """
-    from rigidimeter.dynamics.joint import JointDynamics
-    from rigidimeter.testing.emulated_rig import EmulatedRig, serve
+    from rigidimeter.model import JointDynamics
+    from rigidimeter.testing import EmulatedRig, serve
 
     if drive not in ("cia402", "ascii"):
         raise UserError(f"--drive {drive}: must be cia402 or ascii")
@@ -81,7 +81,7 @@ def emulate(
 
 def _check_target(rig_out: Path) -> None:
     """Refuse to overwrite anything but a rig file of an emulated rig."""
-    from rigidimeter.devices.rigfile import load_rig
+    from rigidimeter.rig.devices import load_rig
 
     if not rig_out.parent.is_dir():
         raise UserError(f"--rig-out {rig_out}: there is no folder {rig_out.parent}; make it first")

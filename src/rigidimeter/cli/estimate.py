@@ -16,9 +16,9 @@ from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, number_text, show, with_error
 
 if TYPE_CHECKING:
-    from rigidimeter.records import Analysis, Fit, Score
-    from rigidimeter.settings import ScoreSettings
-    from rigidimeter.study import StudyResult
+    from rigidimeter.analysis.study import StudyResult
+    from rigidimeter.core.records import Analysis, Fit, Score
+    from rigidimeter.core.settings import ScoreSettings
 
 _DIGITS = ("#.5g", "#.4g", "#.4g")
 
@@ -51,9 +51,9 @@ def estimate(
       rigidimeter estimate ankle.npz --column angle_rad=position_rad \\
           --column torque_nm=torque_Nm --rate-hz 1000 --reaction --epoch-length-s 20
     """
-    from rigidimeter.recording import write_estimates_csv, write_estimates_json
-    from rigidimeter.study import recording_result
-    from rigidimeter.study.subject_torque_table import check_name, write_subject_torque
+    from rigidimeter.analysis.reading import write_estimates_csv, write_estimates_json
+    from rigidimeter.analysis.study import recording_result
+    from rigidimeter.analysis.study.subject_torque_table import check_name, write_subject_torque
 
     keep_inputs((json_out, csv_out, subject_torque_out), recordings.paths)
     if subject_torque_out is not None:
@@ -74,7 +74,7 @@ def estimate(
 
 def estimate_blocks(result: StudyResult) -> list[Block]:
     """Return the verdict and everything that was estimated, with an empty line between parts."""
-    from rigidimeter.reporting.verdict_text import verdict
+    from rigidimeter.analysis.report.verdict_text import verdict
 
     parts: list[Sequence[Block]] = [[Heading(verdict(result).lead)]]
     parts += [part(result.analysis) for part in (_method, _delays, _fits, _fixed_inertia)]
@@ -85,8 +85,8 @@ def estimate_blocks(result: StudyResult) -> list[Block]:
 
 def _together(result: StudyResult) -> list[Block]:
     """Return of one condition what the first screen of a report shows."""
-    from rigidimeter.reporting.numbers import scaled
-    from rigidimeter.study import WANTED_PERCENT, precisions
+    from rigidimeter.analysis.report.numbers import scaled
+    from rigidimeter.analysis.study import WANTED_PERCENT, precisions
 
     rows = []
     for one in precisions(result):
@@ -143,7 +143,7 @@ def _fits(analysis: Analysis) -> list[Block]:
 
 
 def _fixed_inertia(analysis: Analysis) -> list[Block]:
-    from rigidimeter.reporting.numbers import amount
+    from rigidimeter.analysis.report.numbers import amount
 
     if not analysis.fits:
         return []
@@ -157,8 +157,8 @@ def _fixed_inertia(analysis: Analysis) -> list[Block]:
 
 
 def _pooled(result: StudyResult) -> list[Block]:
-    from rigidimeter.records import PARAMETERS
-    from rigidimeter.study import split_pooled
+    from rigidimeter.analysis.study import split_pooled
+    from rigidimeter.core.records import PARAMETERS
 
     def sd(condition: str, measure: str) -> str:
         c = result.comparison(measure)
@@ -203,8 +203,8 @@ def _fit_table(fits: Sequence[Fit], checked: Sequence[Fit], first: int = 0) -> T
 
     `first` is the first of J, B and K that is shown.
     """
-    from rigidimeter.records import PARAMETERS
-    from rigidimeter.reporting.numbers import scaled
+    from rigidimeter.analysis.report.numbers import scaled
+    from rigidimeter.core.records import PARAMETERS
 
     shown = range(first, len(PARAMETERS))
     scales = {

@@ -14,10 +14,10 @@ from rigidimeter.cli.inputs import analyse_recordings, say, say_analysed, study_
 from rigidimeter.cli.options import KeyOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.exporting import ExportedSession
+    from rigidimeter.analysis.export import ExportedSession
 
 
 @reads_recordings
@@ -71,8 +71,8 @@ def export(
       rigidimeter export demo-study --to mat --out matlab
       rigidimeter export elbow.csv --epoch-length-s 20 --to mat --out elbow.mat --subject S1
     """
+    from rigidimeter.analysis.export import export_sessions, format_named
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.exporting import export_sessions, format_named
 
     format_named(to)
     if any((folder / "manifest.json").exists() for folder in (out, *out.resolve().parents)):
@@ -106,7 +106,7 @@ def export(
 def _of_recordings(
     recordings: Recordings, said: Mapping[str, str], *, estimates: bool
 ) -> tuple[list[ExportedSession], int]:
-    from rigidimeter.exporting import sessions_of_recording
+    from rigidimeter.analysis.export import sessions_of_recording
 
     analysis = None
     if estimates:
@@ -131,10 +131,10 @@ def _of_recordings(
 def _of_study(
     folder: Path, recordings: Recordings, key: Path | None, *, estimates: bool
 ) -> tuple[list[ExportedSession], int]:
+    from rigidimeter.analysis.export import sessions_of_study
+    from rigidimeter.analysis.study import estimate_study, read_study
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.exporting import sessions_of_study
-    from rigidimeter.settings import load_settings
-    from rigidimeter.study import estimate_study, read_study
+    from rigidimeter.core.settings import load_settings
 
     chosen = load_settings(recordings.settings) if recordings.settings is not None else None
     with Meter("read", 1.0) as meter:

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.recording import Recording
-    from rigidimeter.recording.study_folder import StudyFolder
-    from rigidimeter.records import Analysis, Fit, Notice, Score
-    from rigidimeter.study import StudyResult
+    from rigidimeter.analysis.reading import Recording
+    from rigidimeter.analysis.study import StudyResult
+    from rigidimeter.core.records import Analysis, Fit, Notice, Score
+    from rigidimeter.core.study_files import StudyFolder
 
 _OF_STUDIES_TOO = ("paths", "method", "band_hz", "controller", "settings")
 """Fields of `Recordings` that do not say how to read a single recording."""
@@ -32,9 +32,9 @@ def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysis]:
     UserError
         If there is no such method, an option is wrong, or no input can be read.
     """
+    from rigidimeter.analysis.estimation import method_names, no_such_method
+    from rigidimeter.analysis.study import estimate
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.estimation import method_names, no_such_method
-    from rigidimeter.study import estimate
 
     read = recordings.read()
     say(read.notices)
@@ -52,7 +52,7 @@ def say_analysed(read: Recording, analysis: Analysis) -> int:
     int
         The exit status: 1 if an input was bad or an epoch failed, else 0.
     """
-    from rigidimeter.study import analysis_warnings
+    from rigidimeter.analysis.study import analysis_warnings
 
     say(analysis_warnings(analysis))
     failed = _say_failed(analysis)
@@ -129,8 +129,7 @@ def study_of(recordings: Recordings, key: Path | None) -> Path | None:
     UserError
         If a study folder is named beside other inputs, or an option does not go with what is named.
     """
-    from rigidimeter.recording.study_folder import is_study
-    from rigidimeter.recording.study_toml import STUDY_FILE
+    from rigidimeter.core.study_files import STUDY_FILE, is_study
 
     studies = [path for path in recordings.paths if is_study(path)]
     if not studies:
@@ -156,7 +155,7 @@ def study_of(recordings: Recordings, key: Path | None) -> Path | None:
 
 def study_files(folder: Path, key: Path | None) -> tuple[Path, ...]:
     """Return the study's own files, which no other output may be written over."""
-    from rigidimeter.recording.study_folder import read_study_folder
+    from rigidimeter.core.study_files import read_study_folder
 
     tables = read_study_folder(folder, key).files.values()
     return folder, *tables, *(folder / "analysis").glob("*")
@@ -178,9 +177,9 @@ def analyse_study_folder(
     UserError
         If there is nothing to analyse.
     """
+    from rigidimeter.analysis.study import analyse_study, keep, read_study
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.settings import load_settings
-    from rigidimeter.study import analyse_study, keep, read_study
+    from rigidimeter.core.settings import load_settings
 
     chosen = load_settings(recordings.settings) if recordings.settings is not None else None
     with Meter("read", 1.0) as meter:
@@ -208,7 +207,7 @@ def _with_provenance(
     result: StudyResult, folder: StudyFolder, digests: Mapping[str, str]
 ) -> StudyResult:
     """Return a result with where it comes from: the tables and the sessions that count."""
-    from rigidimeter.study import provenance
+    from rigidimeter.analysis.study import provenance
 
     sessions = (folder.folder / session.path for session in result.sessions)
     tables = (path for name, path in folder.files.items() if name != "key")

@@ -11,11 +11,11 @@ from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Table, show
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.recording.channels.inspection import Inspection
-    from rigidimeter.recording.formats import ReadOptions
+    from rigidimeter.analysis.reading.channels.inspection import Inspection
+    from rigidimeter.analysis.reading.formats import ReadOptions
 
 
 @reads_recordings
@@ -63,12 +63,16 @@ def _inspect(
     paths: list[Path], recordings: Recordings, write_mapping: Path | None, plot: Path | None
 ) -> int:
     """Inspect one file, or the files of one recording; return the exit status."""
-    from rigidimeter.documents.writing import write_text
-    from rigidimeter.recording.channels.inspection import command_for, inspect_table, option_words
-    from rigidimeter.recording.channels.joining import join_tables, joined_options
-    from rigidimeter.recording.channels.mapping_file import mapping_text
-    from rigidimeter.recording.formats import Table, read_content, read_table, reader_of
-    from rigidimeter.recording.recording import read_options
+    from rigidimeter.analysis.reading.channels.inspection import (
+        command_for,
+        inspect_table,
+        option_words,
+    )
+    from rigidimeter.analysis.reading.channels.joining import join_tables, joined_options
+    from rigidimeter.analysis.reading.channels.mapping_file import mapping_text
+    from rigidimeter.analysis.reading.formats import Table, read_content, read_table, reader_of
+    from rigidimeter.analysis.reading.recording import read_options
+    from rigidimeter.core.files import write_text
 
     options = given = read_options(**recordings.of_files())
     name = " + ".join(map(str, paths))
@@ -99,7 +103,7 @@ def _inspect(
     if write_mapping is not None:
         write_text(write_mapping, mapping_text(found.options))
     if plot is not None:
-        from rigidimeter.reporting.inspected_columns import draw_columns
+        from rigidimeter.analysis.report.inspected_columns import draw_columns
 
         draw_columns(found, plot)
     return int(bool(found.proposal.unsaid))
@@ -120,7 +124,7 @@ def _joining_words(recordings: Recordings, given: ReadOptions) -> list[str]:
 
 
 def _show(found: Inspection) -> None:
-    from rigidimeter.recording.channels.inspection import column_rows, remarks
+    from rigidimeter.analysis.reading.channels.inspection import column_rows, remarks
 
     headings, *rows = column_rows(found)
     show([Table(headings, rows, "<<>>>><<"), *(f" {text}" for text in remarks(found))])

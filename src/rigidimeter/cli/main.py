@@ -36,9 +36,9 @@ from rigidimeter.cli.reproduce import reproduce
 from rigidimeter.cli.run import recover, run
 from rigidimeter.cli.simulate import simulate
 from rigidimeter.cli.study import demo, study
-from rigidimeter.errors import UserError
-from rigidimeter.extensions import load_file
-from rigidimeter.version import __version__
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.extensions import load_file
+from rigidimeter.core.version import __version__
 
 _INTERRUPTED = 130
 

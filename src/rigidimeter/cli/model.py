@@ -13,11 +13,11 @@ from rigidimeter.cli.options import JsonOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, show, with_error
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.estimation.terms import Comparison, ModelRow
-    from rigidimeter.study.torque_models import ModelledEpoch
+    from rigidimeter.analysis.estimation.terms import Comparison, ModelRow
+    from rigidimeter.analysis.study.torque_models import ModelledEpoch
 
 USUAL = "inertia,damping,stiffness"
 COMPARED = f"{USUAL},reflex,cubic,directional-damping,coulomb"
@@ -59,10 +59,10 @@ def model(
           --reaction --terms inertia,damping,stiffness,reflex --compare
       rigidimeter model elbow.csv --terms inertia,damping,stiffness,offset,coulomb --band-hz 0 20
     """
+    from rigidimeter.analysis.estimation.terms import candidates, parse_terms
+    from rigidimeter.analysis.study.torque_models import model_document, model_recording
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.documents import write_json
-    from rigidimeter.estimation.terms import candidates, parse_terms
-    from rigidimeter.study.torque_models import model_document, model_recording
+    from rigidimeter.core.files import write_json
 
     if recordings.method not in ("auto", "bandlimited"):
         raise UserError(

@@ -15,7 +15,7 @@ import typer
 from rigidimeter.cli.output import echo
 
 if TYPE_CHECKING:
-    from rigidimeter.commissioning import Operator
+    from rigidimeter.rig.commissioning import Operator
 
 
 def operator(
@@ -33,12 +33,12 @@ def operator(
         Whether everything is consented to in advance, with nobody present.
     piped : bool
         Whether another program asks somebody: each question is a line that begins with
-        `console.page.work.QUESTION`, its answer the line ``yes`` or anything else. When that
+        `rig.console.QUESTION`, its answer the line ``yes`` or anything else. When that
         program is gone the check is ended as by SIGTERM.
     known_torque_nm, known_angle_deg : float, optional
         As an `Operator` has them.
     """
-    from rigidimeter.commissioning import Operator
+    from rigidimeter.rig.commissioning import Operator
 
     ask: Callable[[str], bool] = _ask
     if yes:
@@ -69,7 +69,7 @@ class _Piped:
         threading.Thread(target=self._listen, name="answers", daemon=True).start()
 
     def ask(self, question: str) -> bool:
-        from rigidimeter.console.page.work import QUESTION
+        from rigidimeter.rig.console import QUESTION
 
         echo(f"{QUESTION}{question}", err=True)
         return self._answers.get() == "yes"

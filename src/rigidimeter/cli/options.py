@@ -30,11 +30,11 @@ class RegistryCommand(TyperCommand):
         """Fill in what there is to choose from; only here, because it imports all of it."""
         for parameter in self.params:
             if isinstance(parameter, TyperArgument) and parameter.name == "paths":
-                from rigidimeter.recording.formats import formats_text
+                from rigidimeter.analysis.reading.formats import formats_text
 
                 parameter.help = f"What to read: {formats_text()}."
             if isinstance(parameter, TyperOption) and "--method" in parameter.opts:
-                from rigidimeter.estimation import METHODS
+                from rigidimeter.analysis.estimation import METHODS
 
                 known = ", ".join(f"{method.name} ({method.title})" for method in METHODS)
                 parameter.help = (
@@ -42,12 +42,12 @@ class RegistryCommand(TyperCommand):
                     f"{known}."
                 )
             if isinstance(parameter, TyperOption) and "--to" in parameter.opts:
-                from rigidimeter.exporting import FORMATS
+                from rigidimeter.analysis.export import FORMATS
 
                 known = ", ".join(f"{each.name} ({each.title})" for each in FORMATS)
                 parameter.help = f"The format: {known}."
             if isinstance(parameter, TyperOption) and "--terms" in parameter.opts:
-                from rigidimeter.estimation.terms import term_names
+                from rigidimeter.analysis.estimation.terms import term_names
 
                 parameter.help = (
                     f"Terms of the torque: {', '.join(term_names())} (+ or - after a reflex: the "

@@ -21,7 +21,7 @@ def echo(text: str = "", *, err: bool = False) -> None:
     change what is read there, and a line feed would break a message in two. On a terminal a message
     is broken between words, elsewhere it stays one line.
     """
-    from rigidimeter.documents.escaping import visible
+    from rigidimeter.core.files import visible
 
     shown = visible(text, lines=not err)
     if err and sys.stderr.isatty():
@@ -46,7 +46,7 @@ class VisibleErrors(TyperGroup):
 
 @contextmanager
 def _visible() -> Iterator[None]:
-    from rigidimeter.documents.escaping import visible
+    from rigidimeter.core.files import visible
 
     try:
         yield

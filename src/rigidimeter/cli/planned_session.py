@@ -11,15 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigidimeter.cli.output import echo
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.acquisition.processes.loop_process import Realtime
-    from rigidimeter.acquisition.processes.session_memory import SessionMemory
-    from rigidimeter.acquisition.processes.supervise import Ended
-    from rigidimeter.console import SessionPlan
-    from rigidimeter.experiment import Protocol
-    from rigidimeter.settings import Settings
+    from rigidimeter.core.session import Protocol
+    from rigidimeter.core.settings import Settings
+    from rigidimeter.rig.acquisition.processes import Ended, Realtime, SessionMemory
+    from rigidimeter.rig.console import SessionPlan
 
 Console = Callable[["SessionMemory"], object]
 
@@ -51,15 +49,15 @@ class PlannedSession:
 
     def shown(self, *, virtual: bool) -> SessionPlan:
         """Return the plan as consoles take it, with the codes of a blinded session."""
-        from rigidimeter.console import SessionPlan
-        from rigidimeter.recording.blinded import codes_of
+        from rigidimeter.core.session import codes_of
+        from rigidimeter.rig.console import SessionPlan
 
         codes = codes_of(self.about)
         return SessionPlan(self.settings, self.protocol.epochs, self.done, codes, virtual)
 
     def blinded(self) -> PlannedSession:
         """Return the session with codes for its conditions, which one that has them keeps."""
-        from rigidimeter.recording.blinded import drawn_codes
+        from rigidimeter.core.session import drawn_codes
 
         if self.about.get("codes"):
             return self
@@ -72,7 +70,7 @@ def new_session(
     settings: Settings, about: Mapping[str, Any], source: Path | None
 ) -> PlannedSession:
     """Return a new session of these settings."""
-    from rigidimeter.experiment import plan
+    from rigidimeter.planning import plan
 
     planned = plan(settings.protocol, settings.prbs, settings.sinusoid, settings.seed)
     return PlannedSession(settings, planned, about=about, source=source)
@@ -88,8 +86,7 @@ def rest_of_session(
     UserError
         If nothing is left, or it was recorded on another kind of rig.
     """
-    from rigidimeter.experiment import Protocol
-    from rigidimeter.recording.resume import again, rest_of
+    from rigidimeter.core.session import Protocol, again, rest_of
 
     rest = rest_of(resume) if epoch is None else again(resume, epoch)
     if left:
@@ -125,8 +122,8 @@ def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
     """
     if rig is None:
         return planned
-    from rigidimeter.commissioning import as_measured, check_record, require_daily_check
-    from rigidimeter.devices.rigfile import load_rig
+    from rigidimeter.rig.commissioning import as_measured, check_record, require_daily_check
+    from rigidimeter.rig.devices import load_rig
 
     rigfile, settings = load_rig(rig), planned.settings
     commissioned = check_record(rigfile, None, settings)
@@ -144,9 +141,8 @@ def run_planned(
     operator_seen_ns: Callable[[], int] | None = None,
 ) -> Ended:
     """Run a session that was checked, to its end."""
-    from rigidimeter.acquisition.processes.recorder import Recording
-    from rigidimeter.acquisition.processes.supervise import supervise
     from rigidimeter.cli.realtime_rig import run_loop
+    from rigidimeter.rig.acquisition.processes import Recording, supervise
 
     home_rad = planned.continues.get("origin_rad") if rig is not None else None
     recording = Recording(
@@ -192,9 +188,9 @@ def write_nwb_beside(folder: Path) -> str:
     A blinded session is written with its codes. The session is recorded whatever becomes of this,
     so a failure is a sentence.
     """
-    from rigidimeter.exporting import export_sessions, sessions_of_recording
-    from rigidimeter.recording import read, read_manifest
-    from rigidimeter.recording.blinded import codes_of, with_codes
+    from rigidimeter.analysis.export import export_sessions, sessions_of_recording
+    from rigidimeter.analysis.reading import read, with_codes
+    from rigidimeter.core.session import codes_of, read_manifest
 
     out = folder.with_name(f"{folder.name}.nwb")
     try:

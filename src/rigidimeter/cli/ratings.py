@@ -12,10 +12,10 @@ import typer
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, show
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.study import RatingsFound
+    from rigidimeter.analysis.study import RatingsFound
 
 
 def ratings(
@@ -78,13 +78,11 @@ def ratings(
       rigidimeter ratings ratings.csv --score updrs --examiner rater --scale 0 4 --step 1
       rigidimeter ratings ratings.csv --random subject/day --contrast OFF DBS
     """
-    from rigidimeter.documents import write_json
-    from rigidimeter.recording.formats import read_text_table
-    from rigidimeter.recording.study_folder import is_study
-    from rigidimeter.recording.study_tables import table_path
-    from rigidimeter.records import Notice
-    from rigidimeter.study.ratings_found import ratings_document
-    from rigidimeter.study.ratings_model import model_ratings
+    from rigidimeter.analysis.study.ratings_found import ratings_document
+    from rigidimeter.analysis.study.ratings_model import model_ratings
+    from rigidimeter.core.files import read_text_table, write_json
+    from rigidimeter.core.records import Notice
+    from rigidimeter.core.study_files import is_study, table_path
 
     if is_study(table):
         path = table_path(table, "ratings")

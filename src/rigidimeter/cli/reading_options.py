@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_type_hints
 import typer
 
 from rigidimeter.cli.options import SettingsOption
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.recording import Recording
-    from rigidimeter.records import Task
-    from rigidimeter.settings import Settings
+    from rigidimeter.analysis.reading import Recording
+    from rigidimeter.core.records import Task
+    from rigidimeter.core.settings import Settings
 
 
 @dataclass(frozen=True)
@@ -196,9 +196,8 @@ class Recordings:
         UserError
             If an option is wrong, or not one input can be read.
         """
+        from rigidimeter.analysis.reading import read, with_codes
         from rigidimeter.cli.progress import Meter
-        from rigidimeter.recording import read
-        from rigidimeter.recording.blinded import with_codes
 
         with Meter("read", 1.0) as meter:
             recording = read(
@@ -253,7 +252,7 @@ class Recordings:
         UserError
             If a value is out of its range.
         """
-        from rigidimeter.settings import changed_settings
+        from rigidimeter.core.settings import changed_settings
 
         for option, change in self._changes():
             settings = changed_settings(settings, change, option)
@@ -267,7 +266,7 @@ class Recordings:
         UserError
             If a value is out of its range.
         """
-        from rigidimeter.settings import Settings
+        from rigidimeter.core.settings import Settings
 
         self.adjust(Settings())
         return {table: values for _, change in self._changes() for table, values in change.items()}

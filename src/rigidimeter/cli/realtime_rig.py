@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 from rigidimeter.cli.output import echo
 
 if TYPE_CHECKING:
-    from rigidimeter.acquisition.clock import DeadlineClock
-    from rigidimeter.acquisition.processes.loop_process import LoopSide
-    from rigidimeter.devices.base import Rig
-    from rigidimeter.experiment import PlannedEpoch, Protocol
-    from rigidimeter.settings import Settings
+    from rigidimeter.core.session import PlannedEpoch, Protocol
+    from rigidimeter.core.settings import Settings
+    from rigidimeter.rig.acquisition import DeadlineClock
+    from rigidimeter.rig.acquisition.processes import LoopSide
+    from rigidimeter.rig.devices.base import Rig
 
 HOME_TOLERANCE_RAD = 0.05
 """A session is continued from where it began, within 3 deg."""
@@ -40,7 +40,7 @@ def run_loop(
     side : LoopSide
         Rings, shared status and what prepares the process.
     """
-    from rigidimeter.acquisition.clock import DeadlineClock
+    from rigidimeter.rig.acquisition import DeadlineClock
 
     clock = DeadlineClock()
     if rig_path is None:
@@ -48,9 +48,8 @@ def run_loop(
         _run(settings, protocol, rig, new_joint, clock, side, lambda _: ())
         return
     # What is slow to load is loaded before the sensor's samples flow.
-    from rigidimeter.commissioning import check_record, require_daily_check
-    from rigidimeter.devices.composed import Home
-    from rigidimeter.devices.rigfile import load_rig
+    from rigidimeter.rig.commissioning import check_record, require_daily_check
+    from rigidimeter.rig.devices import Home, load_rig
 
     rigfile = load_rig(rig_path)
     home = Home(home_rad, HOME_TOLERANCE_RAD) if home_rad is not None else None
@@ -76,7 +75,7 @@ def _run(
     approve: Callable[[Mapping[str, Any]], Sequence[str]],
 ) -> None:
     """Set up the rig and run; `approve` refuses it or says which checks were never made."""
-    from rigidimeter.acquisition.session_run import run_session
+    from rigidimeter.rig.acquisition import run_session
 
     try:
         rig.connect()
@@ -110,7 +109,7 @@ def _virtual(
 ) -> tuple[Rig, Callable[[PlannedEpoch], Mapping[str, Any]]]:
     import numpy as np
 
-    from rigidimeter.devices import SimulatedRig
+    from rigidimeter.rig.devices import SimulatedRig
 
     first = settings.subject[protocol.epochs[0].condition]
     rig = SimulatedRig(settings.rig, first, np.random.default_rng(settings.seed))

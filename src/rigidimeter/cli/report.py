@@ -21,10 +21,10 @@ from rigidimeter.cli.options import KeyOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Heading, show
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.study import StudyResult
+    from rigidimeter.analysis.study import StudyResult
 
 
 @reads_recordings
@@ -52,8 +52,8 @@ def report(
       rigidimeter report study --out study/report
       rigidimeter report ankle.csv --reaction --epoch-length-s 20 --out report
     """
-    from rigidimeter.recording import is_session
-    from rigidimeter.study import recording_result
+    from rigidimeter.analysis.study import recording_result
+    from rigidimeter.core.session import is_session
 
     if any(is_session(folder) for folder in (out, *out.resolve().parents)):
         raise UserError(
@@ -90,10 +90,10 @@ def can_be_made(out: Path) -> None:
 
 def write_page(result: StudyResult, out: Path, title: str | None = None) -> Path:
     """Write the report of a result with progress, and show its verdict; return the page's path."""
-    from rigidimeter import reporting
+    from rigidimeter.analysis import report as reporting
+    from rigidimeter.analysis.reading import write_estimates_json
+    from rigidimeter.analysis.report.verdict_text import verdict
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.recording import write_estimates_json
-    from rigidimeter.reporting.verdict_text import verdict
 
     with Meter("report", 1.0) as meter:
         page = reporting.report(result, out, title, progress=meter.reach)

@@ -9,7 +9,7 @@ import typer
 
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.terminal_tables import Heading, Table, show
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 
 def reproduce(

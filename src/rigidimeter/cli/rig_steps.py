@@ -10,12 +10,12 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.commissioning import CommissioningRecord, DailyRecord
-    from rigidimeter.console.page.rig_steps import RigStep
-    from rigidimeter.settings import Settings
+    from rigidimeter.core.settings import Settings
+    from rigidimeter.rig.commissioning import CommissioningRecord, DailyRecord
+    from rigidimeter.rig.console.page import RigStep
 
 COMMISSIONED, CHECKED, ZEROED = (
     "Commissioning record",
@@ -36,11 +36,11 @@ def rig_steps(
 
     Examples
     --------
-    >>> from rigidimeter.settings import Settings
+    >>> from rigidimeter.core.settings import Settings
     >>> [step.state for step in rig_steps(None, Settings())]
     ['not needed', 'not needed', 'optional']
     """
-    from rigidimeter.console.page.rig_steps import RigStep
+    from rigidimeter.rig.console.page import RigStep
 
     zero = RigStep(ZEROED, "optional", BY_ITSELF, action="zero", required=False)
     if rig is None:
@@ -56,7 +56,7 @@ def rig_steps(
 def _records(
     rig: Path, settings: Settings, source: Path | None, now_utc: datetime | None
 ) -> tuple[RigStep, ...]:
-    from rigidimeter.commissioning import (
+    from rigidimeter.rig.commissioning import (
         check_record,
         daily_path,
         read_daily,
@@ -64,8 +64,8 @@ def _records(
         record_path,
         require_daily_check,
     )
-    from rigidimeter.console.page.rig_steps import RigStep
-    from rigidimeter.devices.rigfile import load_rig
+    from rigidimeter.rig.console.page import RigStep
+    from rigidimeter.rig.devices import load_rig
 
     try:
         rigfile = load_rig(rig)

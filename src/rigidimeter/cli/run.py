@@ -17,11 +17,11 @@ from rigidimeter.cli.options import (
     SeedOption,
 )
 from rigidimeter.cli.output import echo
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.acquisition.processes.supervise import Ended
     from rigidimeter.cli.planned_session import PlannedSession
+    from rigidimeter.rig.acquisition.processes import Ended
 
 
 def run(
@@ -80,10 +80,9 @@ def run(
       rigidimeter run protocol.toml --rig rig.toml --out session
       rigidimeter run --resume session --rig rig.toml --out session-2
     """
-    from rigidimeter.acquisition.processes.left_memory import complete_left
-    from rigidimeter.acquisition.processes.loop_process import Realtime
     from rigidimeter.cli.planned_session import checked_rig, require_packages, run_planned
-    from rigidimeter.console import discard_typed, terminal_view
+    from rigidimeter.rig.acquisition.processes import Realtime, complete_left
+    from rigidimeter.rig.console import discard_typed, terminal_view
 
     for line in complete_left():
         echo(line, err=True)
@@ -119,10 +118,8 @@ def run(
 def _conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
     """Say how the session ended; a session that is not whole ends the program with status 1."""
     from rigidimeter.cli.planned_session import write_nwb_beside
-    from rigidimeter.console import new_folder, next_steps
-    from rigidimeter.recording import read_manifest
-    from rigidimeter.recording.blinded import codes_of
-    from rigidimeter.recording.resume import count_epochs, require_all, rest_of
+    from rigidimeter.core.session import codes_of, count_epochs, read_manifest, require_all, rest_of
+    from rigidimeter.rig.console import new_folder, next_steps
 
     folder = ended.folder if ended.folder != out.absolute() else out
     good, of = count_epochs(folder)
@@ -153,7 +150,7 @@ def _planned(
 ) -> PlannedSession:
     """Return what is to be run: a new session, or the rest of one."""
     from rigidimeter.cli.planned_session import new_session, rest_of_session
-    from rigidimeter.settings import changed_settings, load_settings
+    from rigidimeter.core.settings import changed_settings, load_settings
 
     if resume is None:
         settings = load_settings(path)
@@ -170,9 +167,8 @@ def _planned(
 
 def _offer(out: Path) -> None:
     """Say how to continue if the folder holds a session that was interrupted."""
-    from rigidimeter.console import new_folder, resume_command
-    from rigidimeter.recording import is_session
-    from rigidimeter.recording.resume import rest_of
+    from rigidimeter.core.session import is_session, rest_of
+    from rigidimeter.rig.console import new_folder, resume_command
 
     if not is_session(out):
         return
@@ -208,8 +204,8 @@ def recover(
       rigidimeter recover session
       rigidimeter recover session --reason "power cut"
     """
-    from rigidimeter.acquisition.processes.left_memory import complete_left
-    from rigidimeter.recording import recover as close_session
+    from rigidimeter.core.session import recover as close_session
+    from rigidimeter.rig.acquisition.processes import complete_left
 
     for line in complete_left(session, reason):
         echo(line, err=True)

@@ -8,7 +8,7 @@ import typer
 
 from rigidimeter.cli.options import NewSessionOption, SeedOption, SettingsOption
 from rigidimeter.cli.output import echo
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 
 def simulate(
@@ -54,11 +54,10 @@ def simulate(
       rigidimeter simulate --out session --task prbs --condition DBS --epochs 12 --paper-rates
     """
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.experiment import too_few_cycles
-    from rigidimeter.recording.resume import count_epochs, require_all
-    from rigidimeter.settings import changed_settings, load_settings
-    from rigidimeter.virtual.study_design import PAPER_RATES
-    from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s
+    from rigidimeter.core.session import count_epochs, require_all
+    from rigidimeter.core.settings import changed_settings, load_settings
+    from rigidimeter.planning import too_few_cycles
+    from rigidimeter.virtual import PAPER_RATES, run_virtual_session, session_length_s
 
     if task not in (None, "prbs", "sinusoid"):
         raise UserError(f"--task {task}: must be prbs or sinusoid")

@@ -12,11 +12,10 @@ from rigidimeter.cli.inputs import analyse_study_folder
 from rigidimeter.cli.options import NewStudyOption, StudySeedOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings
-from rigidimeter.errors import UserError, refused
+from rigidimeter.core.errors import UserError, refused
 
 if TYPE_CHECKING:
-    from rigidimeter.virtual.study_design import StudyDesign
-    from rigidimeter.virtual.study_plan import DayPlan
+    from rigidimeter.virtual import DayPlan, StudyDesign
 
 study = typer.Typer(
     name="study",
@@ -41,7 +40,7 @@ def new(
       rigidimeter compare study
       rigidimeter report study --out study/report
     """
-    from rigidimeter.study.new_folder import write_new_study
+    from rigidimeter.core.study_files import write_new_study
 
     write_new_study(folder, title)
     echo(f"{folder}: write your sessions into {folder / 'sessions.csv'}")
@@ -80,7 +79,7 @@ def add(
       rigidimeter study add study study/monday --subject S01
       rigidimeter report study --out study/report
     """
-    from rigidimeter.study.extended_folder import extend_study
+    from rigidimeter.core.study_files import extend_study
 
     refused: list[str] = []
     said = extend_study(folder, sessions or None, subject=subject, refused=refused)
@@ -121,7 +120,7 @@ def simulate(
       rigidimeter compare study
       rigidimeter study simulate --out pushing --design pushing --seed 7
     """
-    from rigidimeter.virtual.study_design import DESIGNS
+    from rigidimeter.virtual import DESIGNS
 
     if design not in DESIGNS:
         raise UserError(f"--design {design}: there is no such design; known: {', '.join(DESIGNS)}")
@@ -180,7 +179,7 @@ def demo(
     from rigidimeter.cli.comparison_text import short_table
     from rigidimeter.cli.report import write_page
     from rigidimeter.cli.terminal_tables import show
-    from rigidimeter.virtual.study_design import SHORT_EPOCH_S, short_design
+    from rigidimeter.virtual import SHORT_EPOCH_S, short_design
 
     start_s = time.monotonic()
     _move_aside(out)
@@ -203,8 +202,7 @@ def demo(
 def _simulated(out: Path, design: StudyDesign, seed: int, processes: int = 2) -> list[DayPlan]:
     """Write a virtual study with progress; return its sessions."""
     from rigidimeter.cli.progress import Meter
-    from rigidimeter.virtual.study_plan import plan_study
-    from rigidimeter.virtual.virtual_study import study_length_s, write_virtual_study
+    from rigidimeter.virtual import plan_study, study_length_s, write_virtual_study
 
     with Meter("simulate", study_length_s(plan_study(design, seed))) as meter:
         return write_virtual_study(out, design, seed, processes=processes, progress=meter.reach)

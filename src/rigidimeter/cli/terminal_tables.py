@@ -113,7 +113,7 @@ def paragraph(text: str, width: int) -> list[str]:
     >>> paragraph("  K is 1.75 N·m/rad", 13)
     ['  K is 1.75', '    N·m/rad']
     """
-    from rigidimeter.documents.escaping import visible
+    from rigidimeter.core.files import visible
 
     indent = text[: len(text) - len(text.lstrip(" "))]
     return textwrap.wrap(
@@ -188,7 +188,7 @@ def _least_width(table: Table) -> int:
 def _cell(text: str) -> Text:
     from rich.text import Text
 
-    from rigidimeter.documents.escaping import visible
+    from rigidimeter.core.files import visible
 
     return Text(visible(text, lines=True))
 

@@ -7,14 +7,14 @@ from datetime import UTC, datetime
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
-from rigidimeter.units import rad_from_deg
-from rigidimeter.version import __version__
+from rigidimeter.core.units import rad_from_deg
+from rigidimeter.core.version import __version__
 
 if TYPE_CHECKING:
-    from rigidimeter.commissioning import DailyRecord, Operator, Setup, ZeroFound
-    from rigidimeter.devices.base import Reading, Rig
-    from rigidimeter.devices.rigfile import RigFile
-    from rigidimeter.settings import Settings
+    from rigidimeter.core.settings import Settings
+    from rigidimeter.rig.commissioning import DailyRecord, Operator, Setup, ZeroFound
+    from rigidimeter.rig.devices import RigFile
+    from rigidimeter.rig.devices.base import Reading, Rig
 
 NAME = "virtual rig"
 
@@ -25,7 +25,7 @@ class _VirtualRig:
     def __init__(self, settings: Settings) -> None:
         import numpy as np
 
-        from rigidimeter.devices import SimulatedRig
+        from rigidimeter.rig.devices import SimulatedRig
 
         first = next(iter(settings.subject.values()))
         passive = first.model_copy(update={"voluntary_sd_nm": 0.0, "tremor_amplitude_nm": 0.0})
@@ -44,7 +44,7 @@ class _VirtualRig:
 
     def configure(self) -> Mapping[str, Any]:
         """Return facts of a drive that brakes and stops by itself as the settings need."""
-        from rigidimeter.commissioning.static_tests import BRAKING
+        from rigidimeter.rig.commissioning import BRAKING
 
         guard, watchdog_s = self._settings.guard, 2.0 * self._settings.loop.stall_s
         values = {BRAKING: rad_from_deg(guard.acceleration_limit_deg_s2)}
@@ -54,7 +54,7 @@ class _VirtualRig:
 
 def virtual_setup(settings: Settings, operator: Operator) -> Setup:
     """Return the virtual rig as one that is to be tried."""
-    from rigidimeter.commissioning import Setup, Timebase
+    from rigidimeter.rig.commissioning import Setup, Timebase
 
     rig = _VirtualRig(settings)
     time = Timebase(rig.now_s, lambda deadline_s: deadline_s)
@@ -63,14 +63,14 @@ def virtual_setup(settings: Settings, operator: Operator) -> Setup:
 
 def virtual_zero(settings: Settings, operator: Operator) -> ZeroFound:
     """Return zero and noise of the virtual torque sensor."""
-    from rigidimeter.commissioning import zero_check
+    from rigidimeter.rig.commissioning import zero_check
 
     return zero_check(virtual_setup(settings, operator))
 
 
 def virtual_check(settings: Settings, operator: Operator) -> DailyRecord:
     """Return the daily check of the virtual rig; it is commissioned by what its settings say."""
-    from rigidimeter.commissioning import CommissioningRecord, Compared, daily_check
+    from rigidimeter.rig.commissioning import CommissioningRecord, Compared, daily_check
 
     torque, motion = settings.rig.torque, settings.rig.motion
     behind_s = (torque.latency_s - torque.stamp_latency_s) - (

@@ -1,8 +1,32 @@
 """The paper's equations, figures, tables and statements, recomputed by the product."""
 
-from rigidimeter.paper.comparison_table import AGREES, DIFFERS, UNPUBLISHED, VERDICTS, Check, Row
+from rigidimeter.paper.comparison_table import (
+    AGREES,
+    DIFFERS,
+    UNPUBLISHED,
+    VERDICTS,
+    Check,
+    Row,
+    bounded,
+    near,
+    rounded,
+    within_percent,
+)
 from rigidimeter.paper.context import Context
-from rigidimeter.paper.paper_page import ledger_text, render_page, tally, write_ledger
+from rigidimeter.paper.controller import position_sd_deg
+from rigidimeter.paper.highpass import highpass_errors_percent
+from rigidimeter.paper.paper_page import drawn, ledger_text, render_page, tally, write_ledger
+from rigidimeter.paper.printed import COUNTS
+from rigidimeter.paper.printed_effects import n_from, p_from, r_from
+from rigidimeter.paper.protocol_rows import cycles_counted
 from rigidimeter.paper.rows import MAKERS, SECTIONS, chosen, make_rows
+from rigidimeter.paper.score_rows import (
+    imposed_epoch,
+    scaled,
+    scored,
+    work_change_percent,
+    work_closed_form_j,
+)
+from rigidimeter.paper.simulated_epochs import noise_runs, voluntary_errors_percent
 
 __all__ = ["Context", "make_rows"]

@@ -5,14 +5,20 @@ from __future__ import annotations
 import math
 from functools import partial
 
-from rigidimeter.experiment import APPENDIX_A, Corner, Forearm, corners
-from rigidimeter.experiment.joint_bandwidth import CONTROLLER_INERTIA_KG_M2, ROBOT_INERTIA_KG_M2
+from rigidimeter.analysis.report.contents import Figure
+from rigidimeter.analysis.report.numbers import number
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Row, near, rounded, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.paper_figures import arm_bode
-from rigidimeter.reporting.contents import Figure
-from rigidimeter.reporting.numbers import number
+from rigidimeter.planning import (
+    APPENDIX_A,
+    CONTROLLER_INERTIA_KG_M2,
+    ROBOT_INERTIA_KG_M2,
+    Corner,
+    Forearm,
+    corners,
+)
 
 BANDWIDTH_PERCENT = 5.0
 """How far a bandwidth may be from a printed one."""

@@ -16,8 +16,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-from rigidimeter.reporting.contents import Figure
-from rigidimeter.reporting.numbers import number
+from rigidimeter.analysis.report.contents import Figure
+from rigidimeter.analysis.report.numbers import number
 
 Verdict: TypeAlias = Literal["agrees", "differs", "cannot be computed from what was published"]
 

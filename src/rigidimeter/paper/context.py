@@ -12,16 +12,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rigidimeter.documents import read_json, write_json
-from rigidimeter.errors import UserError
-from rigidimeter.settings import Settings
-from rigidimeter.study import StudyResult, compare_measures, estimate, read_study
-from rigidimeter.study.comparison import day_tests, gathered
-from rigidimeter.study.ratings_model import rated
-from rigidimeter.version import __version__
-from rigidimeter.virtual.study_design import PAPER, StudyDesign
-from rigidimeter.virtual.study_plan import plan_study
-from rigidimeter.virtual.virtual_study import study_length_s, write_virtual_study
+from rigidimeter.analysis.study import StudyResult, compare_measures, estimate, read_study
+from rigidimeter.analysis.study.comparison import day_tests, gathered
+from rigidimeter.analysis.study.ratings_model import rated
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import read_json, write_json
+from rigidimeter.core.settings import Settings
+from rigidimeter.core.version import __version__
+from rigidimeter.virtual import PAPER, StudyDesign, plan_study, study_length_s, write_virtual_study
 
 DEFAULT_SEED = 2023
 

@@ -15,20 +15,20 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rigidimeter.dynamics import (
+from rigidimeter.analysis.report.numbers import number
+from rigidimeter.core.settings import ControllerSettings, PrbsSettings, Settings
+from rigidimeter.core.units import deg_from_rad, per_rad_from_per_deg
+from rigidimeter.model import (
     JointDynamics,
     Loop,
     arm_response,
     closed_loop_motion,
     loop_margins,
 )
-from rigidimeter.experiment import ideal_response, prbs_nm
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Row, bounded, within_percent
 from rigidimeter.paper.context import Context
-from rigidimeter.reporting.numbers import number
-from rigidimeter.settings import ControllerSettings, PrbsSettings, Settings
-from rigidimeter.units import deg_from_rad, per_rad_from_per_deg
+from rigidimeter.planning import ideal_response, prbs_nm
 
 CLOCKS_HZ = (20.0, 22.6)
 """Clocks of a 7-bit sequence that reach 10 Hz: by the band of Sec. 2.4.3, and by half power."""

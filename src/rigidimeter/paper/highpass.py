@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from rigidimeter.estimation import Signals, fit_inertia_damping_stiffness
-from rigidimeter.experiment import ideal_response, prbs_nm
+from rigidimeter.analysis.estimation import Signals, fit_inertia_damping_stiffness
+from rigidimeter.core.settings import Settings
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Check, Row, bounded
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.controller import READINGS
 from rigidimeter.paper.simulated_epochs import Triple, errors_percent, signed
-from rigidimeter.settings import Settings
+from rigidimeter.planning import ideal_response, prbs_nm
 
 FILTERS = ("causal", "zero phase")
 """The paper does not say which way its filter runs, nor its order; second order here."""

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.reporting.style import GREY, note, plain_ticks, styled
+from rigidimeter.analysis.report.style import GREY, note, plain_ticks, styled
+from rigidimeter.model import JointDynamics
 
 _BODE = (("#222222", "-"), ("#0072B2", (0, (1, 1.5))), ("#D55E00", "--"), ("#009E73", "-."))
 """Colour and dashes of each arm."""

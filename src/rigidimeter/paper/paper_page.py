@@ -10,13 +10,13 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from rigidimeter.documents import json_text, write_text
+from rigidimeter.analysis.report.numbers import number
+from rigidimeter.analysis.report.page import data_uri, shown_text
+from rigidimeter.analysis.report.style import svg_text
+from rigidimeter.core.files import json_text, write_text
+from rigidimeter.core.version import __version__
 from rigidimeter.paper.comparison_table import AGREES, DIFFERS, UNPUBLISHED, VERDICTS, Row, Verdict
 from rigidimeter.paper.rows import SECTIONS
-from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.page import data_uri, shown_text
-from rigidimeter.reporting.style import svg_text
-from rigidimeter.version import __version__
 
 _SHORT = {AGREES: "agrees", DIFFERS: "differs", UNPUBLISHED: "unpublished"}
 """As names of CSS classes."""
@@ -45,7 +45,10 @@ def drawn(rows: Sequence[Row], progress: Callable[[str], None] = lambda _: None)
 
 def render_page(rows: Sequence[Row], svg: Mapping[str, str], seed: int) -> str:
     """Return the page as text, with its style inside, and the figures that `svg` has by name."""
-    own, report = resources.files("rigidimeter.paper"), resources.files("rigidimeter.reporting")
+    own, report = (
+        resources.files("rigidimeter.paper"),
+        resources.files("rigidimeter.analysis.report"),
+    )
     environment = jinja2.Environment(
         autoescape=True,
         finalize=shown_text,

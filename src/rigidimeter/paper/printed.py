@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.model import JointDynamics
 
 CONTROLLER_INERTIA, CONTROLLER_DAMPING = 0.0008, 0.028
 """J_c and B_c: per degree in Sec. 2.4.2, per radian in App. A."""
@@ -27,7 +27,7 @@ APP_A_INERTIA_TOTAL = 0.0052
 APP_A_ELBOW_DAMPING = 0.06
 APP_A_CONTROLLER_DAMPING = 0.028
 APP_A_DAMPING_TOTAL = 0.0088
-"""App. A: inertia in kg·m², damping in N·m·s/rad; more of it in `experiment.joint_bandwidth`."""
+"""App. A: inertia in kg·m², damping in N·m·s/rad; more of it in `planning.joint_bandwidth`."""
 
 EQUATION_8 = JointDynamics(0.0026, 0.044, 0.75)
 """App. A: "the transfer function with the largest bandwidth"."""

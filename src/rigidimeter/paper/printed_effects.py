@@ -14,12 +14,12 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.stats import norm
 
+from rigidimeter.analysis.report.numbers import number, p_value
+from rigidimeter.analysis.statistics import compare_published, effect_from_p, joint_test
+from rigidimeter.analysis.study import RatingsFound
 from rigidimeter.paper.comparison_table import Check, Row, bounded, rounded, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.printed import COUNTS, MEASURED, Measured
-from rigidimeter.reporting.numbers import number, p_value
-from rigidimeter.statistics import compare_published, effect_from_p, joint_test
-from rigidimeter.study import RatingsFound
 
 P_PERCENT = 5.0
 """How far two prints of one p may be apart."""

@@ -12,17 +12,17 @@ from functools import partial
 
 import numpy as np
 
-from rigidimeter.estimation import scoring_cycles
-from rigidimeter.experiment import check_band, plan, power_spectrum, prbs_nm
+from rigidimeter.analysis.estimation import scoring_cycles
+from rigidimeter.analysis.report.contents import Figure
+from rigidimeter.analysis.report.numbers import number
+from rigidimeter.analysis.report.sections.perturbation_figure import perturbation, spectrum
+from rigidimeter.core.records import Channel
+from rigidimeter.core.settings import BlockSettings
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Row, bounded, near, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.score_rows import imposed_epoch
-from rigidimeter.records import Channel
-from rigidimeter.reporting.contents import Figure
-from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.sections.perturbation_figure import perturbation, spectrum
-from rigidimeter.settings import BlockSettings
+from rigidimeter.planning import check_band, plan, power_spectrum, prbs_nm
 
 _CYCLES = 8
 _DAYS = {"OFF": 9, "DBS": 4}

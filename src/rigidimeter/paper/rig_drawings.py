@@ -15,15 +15,20 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Arc, Circle, FancyBboxPatch, Polygon, Rectangle
 from scipy.constants import g
 
-from rigidimeter.control import admittance, admittance_step, biquad_step, butterworth_lowpass
-from rigidimeter.control.filters import BiquadState
-from rigidimeter.experiment import Forearm
+from rigidimeter.analysis.report.contents import Figure
+from rigidimeter.analysis.report.numbers import number
+from rigidimeter.analysis.report.style import GREY, styled
+from rigidimeter.model import (
+    BiquadState,
+    admittance,
+    admittance_step,
+    biquad_step,
+    butterworth_lowpass,
+)
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Row, bounded, within_percent
 from rigidimeter.paper.context import Context
-from rigidimeter.reporting.contents import Figure
-from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.style import GREY, styled
+from rigidimeter.planning import Forearm
 
 _TILT_DEG = 5.0
 """An axis that is mounted by eye is within this of the vertical."""

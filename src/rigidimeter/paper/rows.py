@@ -9,7 +9,7 @@ from functools import partial
 from importlib import resources
 from typing import Any
 
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 from rigidimeter.paper import appendix, controller, highpass, rig_drawings, score_rows
 from rigidimeter.paper import printed_effects as effects
 from rigidimeter.paper import protocol_rows as protocol

@@ -22,20 +22,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.estimation import Cycles, score_epoch, scoring_cycles
-from rigidimeter.estimation.scores import loop_area_j
-from rigidimeter.experiment import sinusoid
+from rigidimeter.analysis.estimation import Cycles, score_epoch, scoring_cycles
+from rigidimeter.analysis.estimation.scores import loop_area_j
+from rigidimeter.analysis.report.contents import Figure
+from rigidimeter.analysis.report.numbers import number
+from rigidimeter.analysis.report.sections.torque_angle_loop import loop, loop_limits
+from rigidimeter.analysis.report.style import GREY
+from rigidimeter.core.records import Channel, Epoch, Motion, Score
+from rigidimeter.core.settings import Settings
+from rigidimeter.core.units import rad_from_deg
+from rigidimeter.model import JointDynamics
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Row, bounded, within_percent
 from rigidimeter.paper.context import Context
-from rigidimeter.records import Channel, Epoch, Motion, Score
-from rigidimeter.reporting.contents import Figure
-from rigidimeter.reporting.numbers import number
-from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits
-from rigidimeter.reporting.style import GREY
-from rigidimeter.settings import Settings
-from rigidimeter.units import rad_from_deg
+from rigidimeter.planning import sinusoid
 
 SCORE_PERCENT = 0.5
 """How far a score may be from its closed form; the band-pass remembers the start of the motion."""

@@ -11,14 +11,14 @@ from functools import partial
 
 import numpy as np
 
+from rigidimeter.analysis.report.contents import Figure
+from rigidimeter.analysis.report.numbers import number
+from rigidimeter.core.settings import Settings
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Check, Row, bounded
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.paper_figures import Curves, sensitivity
 from rigidimeter.paper.score_rows import scaled, scored, work_change_percent, work_closed_form_j
-from rigidimeter.reporting.contents import Figure
-from rigidimeter.reporting.numbers import number
-from rigidimeter.settings import Settings
 
 PERCENTS = (25.0, 50.0, 100.0, 150.0, 175.0)
 """Values of one parameter in percent of the median, as in Fig. 6; 100 is the median itself."""

@@ -17,16 +17,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigidimeter.estimation import fit_epochs
-from rigidimeter.experiment import prbs_nm, predicted_precision
+from rigidimeter.analysis.estimation import fit_epochs
+from rigidimeter.analysis.report.numbers import number
+from rigidimeter.core.records import Fit
+from rigidimeter.core.settings import Settings, SubjectSettings, parse_settings
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Check, Row, bounded, near, within_percent
 from rigidimeter.paper.context import Context
-from rigidimeter.records import Fit
-from rigidimeter.reporting.numbers import number
-from rigidimeter.settings import Settings, SubjectSettings, parse_settings
+from rigidimeter.planning import prbs_nm, predicted_precision
+from rigidimeter.virtual import PAPER_RATES
 from rigidimeter.virtual.batch import simulate_epochs
-from rigidimeter.virtual.study_design import PAPER_RATES
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]

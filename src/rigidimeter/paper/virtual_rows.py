@@ -11,26 +11,26 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.dynamics import ClosedLoopMotion, JointDynamics, closed_loop_motion
-from rigidimeter.estimation import Signals, epoch_signals, scoring_cycles
-from rigidimeter.estimation.bandlimited import zero_phase_band
-from rigidimeter.paper.comparison_table import Row
-from rigidimeter.paper.context import Context
-from rigidimeter.paper.paper_figures import torque_traces
-from rigidimeter.paper.printed_effects import ratings_of
-from rigidimeter.reporting.contents import Figure
-from rigidimeter.reporting.numbers import number, p_value
-from rigidimeter.reporting.sections.distribution import distribution
-from rigidimeter.reporting.sections.torque_angle_loop import loop, loop_limits
-from rigidimeter.reporting.style import condition_colours
-from rigidimeter.statistics import difference, fit_mixed, summarise
-from rigidimeter.study import Comparison
-from rigidimeter.study.examples import (
+from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles
+from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
+from rigidimeter.analysis.report.contents import Figure
+from rigidimeter.analysis.report.numbers import number, p_value
+from rigidimeter.analysis.report.sections.distribution import distribution
+from rigidimeter.analysis.report.sections.torque_angle_loop import loop, loop_limits
+from rigidimeter.analysis.report.style import condition_colours
+from rigidimeter.analysis.statistics import difference, fit_mixed, summarise
+from rigidimeter.analysis.study import Comparison
+from rigidimeter.analysis.study.examples import (
     analysed_epoch,
     representative_fits,
     representative_scores,
 )
-from rigidimeter.study.rating_table import groupings
+from rigidimeter.analysis.study.rating_table import groupings
+from rigidimeter.model import ClosedLoopMotion, JointDynamics, closed_loop_motion
+from rigidimeter.paper.comparison_table import Row
+from rigidimeter.paper.context import Context
+from rigidimeter.paper.paper_figures import torque_traces
+from rigidimeter.paper.printed_effects import ratings_of
 
 Array = NDArray[np.float64]
 

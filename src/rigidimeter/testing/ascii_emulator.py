@@ -26,7 +26,7 @@ from typing import Any
 from rigidimeter.testing.emulated_arm import EmulatedArm
 from rigidimeter.testing.trapezoid import Ramps, Trapezoid
 
-MISBEHAVIOURS = {
+ASCII_MISBEHAVIOURS = {
     "silent": "sends no replies",
     "error_replies": "refuses every request with this code",
     "garbage": "replies with characters that are not a reply",
@@ -101,9 +101,9 @@ class AsciiEmulator:
     # -- for tests and operators ----------------------------------------------------------------
 
     def misbehave(self, name: str, value: float = 1) -> None:
-        """Start a misbehaviour of `MISBEHAVIOURS`."""
-        if name not in MISBEHAVIOURS:
-            raise ValueError(f"misbehaviour is {name!r}; one of {', '.join(MISBEHAVIOURS)}")
+        """Start a misbehaviour of `ASCII_MISBEHAVIOURS`."""
+        if name not in ASCII_MISBEHAVIOURS:
+            raise ValueError(f"misbehaviour is {name!r}; one of {', '.join(ASCII_MISBEHAVIOURS)}")
         with self._lock:
             if name == "fault":
                 self._registers[0xA4] |= 1 << int(value)

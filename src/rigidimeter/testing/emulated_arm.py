@@ -2,7 +2,7 @@
 
 Emulators are read at any time, not at fixed ticks. At each call the state is advanced exactly to
 the present time, under the command in force since the last call. The equations are those of
-`rigidimeter.dynamics.velocity_drive` and `joint`.
+`rigidimeter.model.velocity_drive` and `joint`.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigidimeter.dynamics import DriveState, arm_torque_nm, drive, drive_step
-from rigidimeter.dynamics.joint import JointDynamics
+from rigidimeter.model import DriveState, JointDynamics, arm_torque_nm, drive, drive_step
 
 LONGEST_STEP_S = 0.5
 DAMPING_RATIO = 0.7071

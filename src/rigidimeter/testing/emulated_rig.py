@@ -33,9 +33,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from rigidimeter.documents import plain_values
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import plain_values
+from rigidimeter.model import JointDynamics
 from rigidimeter.testing import ascii_emulator
 from rigidimeter.testing.cia402 import cia402_emulator as cia402
 from rigidimeter.testing.cia402 import servo
@@ -218,8 +218,12 @@ class EmulatedRig:
 
     def _misbehaviours(self, role: str) -> Mapping[str, str]:
         if role == "torque":
-            return rdt_records.MISBEHAVIOURS
-        return servo.MISBEHAVIOURS if self._kind == "cia402" else ascii_emulator.MISBEHAVIOURS
+            return rdt_records.RDT_MISBEHAVIOURS
+        return (
+            servo.CIA402_MISBEHAVIOURS
+            if self._kind == "cia402"
+            else ascii_emulator.ASCII_MISBEHAVIOURS
+        )
 
     def _tell_drive(self, name: str, value: float | None) -> None:
         # Emergency codes, modes and bits are whole numbers.

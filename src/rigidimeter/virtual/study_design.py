@@ -31,7 +31,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from rigidimeter.settings import Settings, SubjectSettings
+from rigidimeter.core.settings import Settings, SubjectSettings
 
 PAPER_RATES: Mapping[str, Any] = {
     "torque": {"rate_hz": 100.0},

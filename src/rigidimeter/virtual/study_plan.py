@@ -13,8 +13,8 @@ from datetime import date, timedelta
 
 import numpy as np
 
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.settings import Settings, parse_settings
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.model import JointDynamics
 from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
 
 _DAY, _SESSION, _EXAMINERS = 1, 2, 3

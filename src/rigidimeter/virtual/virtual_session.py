@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from rigidimeter.acquisition import DeadlineClock, SimulatedClock
-from rigidimeter.acquisition.session_run import SessionResult, run_session
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.errors import UserError
-from rigidimeter.experiment import PlannedEpoch, plan
-from rigidimeter.recording import Recording, SessionWriter, read
-from rigidimeter.settings import Settings, settings_from
+from rigidimeter.analysis.reading import Recording, read
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.session import PlannedEpoch, SessionWriter
+from rigidimeter.core.settings import Settings, settings_from
+from rigidimeter.planning import plan
+from rigidimeter.rig.acquisition import DeadlineClock, SessionResult, SimulatedClock, run_session
+from rigidimeter.rig.devices import SimulatedRig
 
 
 def session_length_s(settings: Settings) -> float:

@@ -15,12 +15,12 @@ from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
 
-from rigidimeter.documents import csv_text, write_text
-from rigidimeter.errors import UserError
-from rigidimeter.parallel import each
-from rigidimeter.recording.study_toml import STUDY_SCHEMA
-from rigidimeter.settings import SinusoidSettings
-from rigidimeter.units import rad_from_deg
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.executor import each
+from rigidimeter.core.files import csv_text, write_text
+from rigidimeter.core.settings import SinusoidSettings
+from rigidimeter.core.study_files import STUDY_SCHEMA
+from rigidimeter.core.units import rad_from_deg
 from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
 from rigidimeter.virtual.study_plan import DayPlan, day_joint, felt_rigidity, plan_study
 from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s

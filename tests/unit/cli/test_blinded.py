@@ -9,14 +9,13 @@ import tomllib
 
 import pytest
 
+from rigidimeter.analysis.reading import read
 from rigidimeter.cli.planned_session import PlannedSession, write_nwb_beside
-from rigidimeter.documents import json_text, text_bytes
-from rigidimeter.experiment import plan
-from rigidimeter.recording import read
-from rigidimeter.recording.blinded import codes_of, drawn_codes
-from rigidimeter.recording.checksum import ZEROS, with_checksum
-from rigidimeter.settings import parse_settings
-from rigidimeter.virtual.virtual_session import run_virtual_session
+from rigidimeter.core.files import json_text, text_bytes
+from rigidimeter.core.session import ZEROS, codes_of, drawn_codes, with_checksum
+from rigidimeter.core.settings import parse_settings
+from rigidimeter.planning import plan
+from rigidimeter.virtual import run_virtual_session
 
 PROTOCOL = """
 prbs.duration_s = 12.0

@@ -51,7 +51,7 @@ def test_the_rig_is_commissioned_first(rig, rigidimeter):
 
 
 def test_a_damaged_reference_is_given_up_knowingly(rig, rigidimeter, monkeypatch):
-    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: None)
+    monkeypatch.setattr("rigidimeter.rig.commissioning.check_record", lambda *_: None)
     rig.with_name("RIG.checked.json").write_text("{}")
     ran = rigidimeter("check", rig, "--yes")
     assert ran.status == 1

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from tests.unit.virtual.tiny import SHORT
 
+from rigidimeter.analysis.study import compare_analysis
 from rigidimeter.cli.estimate import estimate_blocks
 from rigidimeter.cli.study import _simulated
 from rigidimeter.cli.terminal_tables import text_lines
-from rigidimeter.documents import read_json
-from rigidimeter.records import Analysis, Fit, Outcome, Score
-from rigidimeter.study import compare_analysis
-from rigidimeter.virtual.study_design import short_design
+from rigidimeter.core.files import read_json
+from rigidimeter.core.records import Analysis, Fit, Outcome, Score
+from rigidimeter.virtual import short_design
 
 
 def test_help_names_every_command_and_gives_examples(rigidimeter):
@@ -295,7 +295,7 @@ def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(
     def short(*epochs):
         return replace(short_design(*epochs), settings=SHORT)
 
-    monkeypatch.setattr("rigidimeter.virtual.study_design.short_design", short)
+    monkeypatch.setattr("rigidimeter.virtual.short_design", short)
     # Other processes take longer to start than this study to run; test_folder has them.
     monkeypatch.setattr("rigidimeter.cli.study._simulated", partial(_simulated, processes=1))
     other = tmp_path / "thesis"

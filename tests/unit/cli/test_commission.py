@@ -9,7 +9,7 @@ import pytest
 
 from rigidimeter.cli.commission import _check_known, interrupted_once
 from rigidimeter.cli.emulate import _check_target
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 HARDWARE = """
 [torque_sensor]

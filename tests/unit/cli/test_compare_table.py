@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.statistics import holm, rank_biserial, ranksum
+from rigidimeter.analysis.statistics import holm, rank_biserial, ranksum
 
 
 def table(path: Path, m: int = 20, n: int = 12) -> tuple[Path, dict[str, np.ndarray]]:

@@ -12,10 +12,9 @@ import typer
 from typer.testing import CliRunner
 
 from rigidimeter.cli.design import design
-from rigidimeter.errors import UserError
-from rigidimeter.experiment import PARAMETERS, multisine_nm, prbs_nm, sinusoid
-from rigidimeter.experiment.design_document import SCHEMA
-from rigidimeter.settings import Settings, load_settings
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import Settings, load_settings
+from rigidimeter.planning import PARAMETERS, SCHEMA, multisine_nm, prbs_nm, sinusoid
 
 app = typer.Typer()
 app.command()(design)

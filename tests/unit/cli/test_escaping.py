@@ -10,11 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigidimeter.analysis.report.page import shown_text
+from rigidimeter.analysis.report.style import svg_text
 from rigidimeter.cli.output import echo
-from rigidimeter.documents import as_read, as_written, csv_text, visible
-from rigidimeter.recording.formats import read_text_table
-from rigidimeter.reporting.page import shown_text
-from rigidimeter.reporting.style import svg_text
+from rigidimeter.core.files import as_read, as_written, csv_text, read_text_table, visible
 
 RED = "\x1b[31m=1+1"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from tests.small_study import record
 
-from rigidimeter.exporting import FORMATS, Format
+from rigidimeter.analysis.export import FORMATS, Format
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_a_missing_library_is_named_with_its_command(
         raise ImportError("no module named other")
 
     monkeypatch.setattr(
-        "rigidimeter.exporting.formats.FORMATS",
+        "rigidimeter.analysis.export.formats.FORMATS",
         [*FORMATS, Format("other", "other", write, ".oth", extra="other")],
     )
     out = tmp_path / "a.oth"

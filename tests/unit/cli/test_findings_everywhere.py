@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import rigidimeter as rm
-from rigidimeter.records import Channel
-from rigidimeter.study import Preparation
-from rigidimeter.study.analysis import analyse_prepared
+from rigidimeter.analysis.study import Preparation
+from rigidimeter.analysis.study.analysis import analyse_prepared
+from rigidimeter.core.records import Channel
 
 PUSHING = {"OFF": {"voluntary_sd_nm": 0.2}}
 

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from rigidimeter.errors import UserError
-from rigidimeter.recording import read
-from rigidimeter.recording.leave_out import parse_left_out
-from rigidimeter.records import LeftOut
+from rigidimeter.analysis.reading import read
+from rigidimeter.analysis.reading.leave_out import parse_left_out
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.records import LeftOut
 
 
 def write(path, start_s=0.0, push_nm=0.0):

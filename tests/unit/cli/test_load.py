@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigidimeter.estimation import METHODS
-from rigidimeter.estimation.diagnostics import CHECKS
-from rigidimeter.estimation.terms import TERMS
+from rigidimeter.analysis.estimation import METHODS
+from rigidimeter.analysis.estimation.diagnostics import CHECKS
+from rigidimeter.analysis.estimation.terms import TERMS
 
 ROOT = Path(__file__).parents[3]
 HOW_TO = ROOT / "docs" / "how-to" / "add-an-estimator.md"

@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rigidimeter.analysis.reading import read
+from rigidimeter.analysis.study import Preparation, compare
+from rigidimeter.analysis.study.analysis import analyse_prepared, estimate
 from rigidimeter.cli.progress import LEAST_SHARE, Meter
-from rigidimeter.experiment import design
-from rigidimeter.recording import read
-from rigidimeter.records import Epoch
-from rigidimeter.settings import Settings, parse_settings
-from rigidimeter.study import Preparation, compare
-from rigidimeter.study.analysis import analyse_prepared, estimate
+from rigidimeter.core.records import Epoch
+from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.planning import design
 from rigidimeter.virtual.batch import simulate_epochs
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rigidimeter.statistics import difference, fit_mixed
+from rigidimeter.analysis.statistics import difference, fit_mixed
 
 SCORES = [2.0, 1.5, 2.5, 2.0, 2.5, 3.0, 1.5, 2.0, 2.0, 1.0, 1.5, 2.0, 1.0, 2.0, 1.5]
 CONDITIONS = ["OFF"] * 9 + ["DBS"] * 6

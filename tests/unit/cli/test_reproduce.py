@@ -10,7 +10,7 @@ import typer
 from typer.testing import CliRunner
 
 from rigidimeter.cli.reproduce import reproduce
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 
 app = typer.Typer()
 app.command()(reproduce)

@@ -12,22 +12,23 @@ import pytest
 
 from rigidimeter.cli.planned_session import checked_rig, new_session
 from rigidimeter.cli.rig_steps import CHECKED, COMMISSIONED, rig_steps
-from rigidimeter.commissioning import (
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import Settings
+from rigidimeter.rig.commissioning import (
+    A_PERSON_TELLS,
+    DAILY_MUST_PASS,
+    MUST_PASS,
     Check,
     CommissioningRecord,
     DailyRecord,
+    covered,
     daily_path,
     record_path,
     write_daily,
     write_record,
 )
-from rigidimeter.commissioning.commissioning_record import A_PERSON_TELLS, MUST_PASS
-from rigidimeter.commissioning.coverage import covered
-from rigidimeter.commissioning.daily_record import MUST_PASS as DAILY_MUST_PASS
-from rigidimeter.console.page.rig_steps import refusal
-from rigidimeter.devices.rigfile import RigFile
-from rigidimeter.errors import UserError
-from rigidimeter.settings import Settings
+from rigidimeter.rig.console.page import refusal
+from rigidimeter.rig.devices import RigFile
 
 NOW = datetime.now(UTC).replace(microsecond=0)
 SETTINGS = Settings()
@@ -42,7 +43,7 @@ def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A rig of hardware that is commissioned with a person and checked."""
     path = tmp_path / "RIG.toml"
     monkeypatch.setattr(
-        "rigidimeter.devices.rigfile.load_rig", lambda path: RigFile(path, "rig", {}, "abc")
+        "rigidimeter.rig.devices.load_rig", lambda path: RigFile(path, "rig", {}, "abc")
     )
     monkeypatch.setattr(RigFile, "claim", lambda _: SimpleNamespace(close=lambda: None))
     commissioned = CommissioningRecord(
@@ -74,14 +75,14 @@ def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def commission_again(rig: Path, **changes: Any) -> None:
-    from rigidimeter.commissioning import read_record
+    from rigidimeter.rig.commissioning import read_record
 
     path = record_path(rig)
     write_record(path, replace(read_record(path), **changes))
 
 
 def check_again(rig: Path, **changes: Any) -> None:
-    from rigidimeter.commissioning import read_daily
+    from rigidimeter.rig.commissioning import read_daily
 
     path = daily_path(rig)
     write_daily(path, replace(read_daily(path), **changes))

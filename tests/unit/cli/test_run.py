@@ -8,16 +8,15 @@ from types import SimpleNamespace
 
 import pytest
 
-from rigidimeter.acquisition.processes.loop_process import Realtime
 from rigidimeter.cli.console import lead_session
 from rigidimeter.cli.realtime_rig import HOME_TOLERANCE_RAD
-from rigidimeter.console.page.desk import Desk, Place, StartRequest
-from rigidimeter.devices.composed import Home
-from rigidimeter.devices.rigfile import RigFile, load_rig
-from rigidimeter.errors import UserError
-from rigidimeter.experiment import plan
-from rigidimeter.recording import SessionWriter
-from rigidimeter.settings import parse_settings
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.session import SessionWriter
+from rigidimeter.core.settings import parse_settings
+from rigidimeter.planning import plan
+from rigidimeter.rig.acquisition.processes import Realtime
+from rigidimeter.rig.console.page import Desk, Place, StartRequest
+from rigidimeter.rig.devices import Home, RigFile, load_rig
 
 RIG = """
 home_deg = 10.0
@@ -43,7 +42,7 @@ def _own_locks(tmp_path_factory, monkeypatch):
     """The rigs of these tests are not those of another run of them on this machine."""
     folder = tmp_path_factory.mktemp("locks")
     folder.chmod(0o1777)
-    monkeypatch.setattr("rigidimeter.devices.rig_lock.FOLDERS", (folder,))
+    monkeypatch.setattr("rigidimeter.rig.devices.rig_lock.FOLDERS", (folder,))
 
 
 @pytest.fixture
@@ -61,9 +60,11 @@ def seen(monkeypatch):
 
     monkeypatch.setattr(RigFile, "build", build)
     commissioned = SimpleNamespace(rig_name="rig", numbers={})
-    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: commissioned)
-    monkeypatch.setattr("rigidimeter.commissioning.require_daily_check", lambda *_, **__: CHECKED)
-    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", supervise)
+    monkeypatch.setattr("rigidimeter.rig.commissioning.check_record", lambda *_: commissioned)
+    monkeypatch.setattr(
+        "rigidimeter.rig.commissioning.require_daily_check", lambda *_, **__: CHECKED
+    )
+    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", supervise)
     return seen
 
 
@@ -112,9 +113,7 @@ def test_a_run_ends_with_1_where_a_planned_epoch_has_no_success(
         writer.event("epoch_ended", epoch=epoch.number, **ended)
     writer.close(1.0, "success", "")
     result = SimpleNamespace(folder=tmp_path / "s", outcome="success", reason="", remarks=())
-    monkeypatch.setattr(
-        "rigidimeter.acquisition.processes.supervise.supervise", lambda *_, **__: result
-    )
+    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", lambda *_, **__: result)
     ran = rigidimeter("run", "--out", tmp_path / "new", "--unattended")
     assert ran.status == status
     assert f"{2 - status} of 2 epochs ended with success" in ran.out
@@ -124,7 +123,7 @@ def test_a_run_ends_with_1_where_a_planned_epoch_has_no_success(
 def test_a_rig_without_a_record_is_refused_before_any_process_starts(
     tmp_path, monkeypatch, rigidimeter
 ):
-    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
+    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", None)
     rig = tmp_path / "rig.toml"
     rig.write_text(RIG)
     result = rigidimeter("run", "--rig", rig, "--out", tmp_path / "s")
@@ -136,9 +135,9 @@ def test_a_rig_without_a_record_is_refused_before_any_process_starts(
 def test_a_rig_that_was_not_checked_today_is_refused_with_the_command_to_type(
     tmp_path, monkeypatch, rigidimeter
 ):
-    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
+    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", None)
     commissioned = SimpleNamespace(rig_name="rig", numbers={})
-    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: commissioned)
+    monkeypatch.setattr("rigidimeter.rig.commissioning.check_record", lambda *_: commissioned)
     rig, protocol = tmp_path / "rig.toml", tmp_path / "protocol.toml"
     rig.write_text(RIG)
     protocol.write_text("seed = 2\n")
@@ -152,10 +151,12 @@ def test_a_rig_that_was_not_checked_today_is_refused_with_the_command_to_type(
 def test_a_rig_that_another_uses_is_refused_before_any_process_starts(
     tmp_path, monkeypatch, rigidimeter
 ):
-    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
+    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", None)
     commissioned = SimpleNamespace(rig_name="rig", numbers={})
-    monkeypatch.setattr("rigidimeter.commissioning.check_record", lambda *_: commissioned)
-    monkeypatch.setattr("rigidimeter.commissioning.require_daily_check", lambda *_, **__: CHECKED)
+    monkeypatch.setattr("rigidimeter.rig.commissioning.check_record", lambda *_: commissioned)
+    monkeypatch.setattr(
+        "rigidimeter.rig.commissioning.require_daily_check", lambda *_, **__: CHECKED
+    )
     rig, copy = tmp_path / "rig.toml", tmp_path / "copy.toml"
     rig.write_text(RIG)
     copy.write_text(f'name = "a copy"\n{RIG}')
@@ -167,7 +168,7 @@ def test_a_rig_that_another_uses_is_refused_before_any_process_starts(
 
 
 def test_a_session_that_still_runs_is_not_gone_on_with(tmp_path, monkeypatch, rigidimeter):
-    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", None)
+    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", None)
     settings = parse_settings({})
     epochs = plan(settings.protocol, settings.prbs, settings.sinusoid, 1).epochs
     planned = [asdict(epoch) for epoch in epochs]
@@ -192,7 +193,7 @@ def test_a_session_on_the_page_runs_only_while_the_page_is_there(tmp_path, monke
         told.update(options)
         raise UserError("that is enough")
 
-    monkeypatch.setattr("rigidimeter.acquisition.processes.supervise.supervise", supervise)
+    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", supervise)
     settings = parse_settings({})
     desk = Desk(Place(tmp_path, settings, "the defaults"))
     assert lead_session(desk, StartRequest("s", settings), Realtime()) is None

@@ -9,8 +9,8 @@ import pytest
 from tests.small_study import record
 
 from rigidimeter.cli.planned_session import require_packages, write_nwb_beside
-from rigidimeter.errors import UserError
-from rigidimeter.settings import parse_settings
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import parse_settings
 
 
 @pytest.mark.parametrize(("key", "extra"), [("lsl", "lsl"), ("nwb_at_close", "nwb")])

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigidimeter.testing.cia402.servo import Phase, after_control, statusword
+from rigidimeter.testing import Phase, after_control, statusword
 
 OFF, READY, ON = Phase.SWITCH_ON_DISABLED, Phase.READY, Phase.SWITCHED_ON
 RUN, STOP, FAULT = Phase.OPERATION_ENABLED, Phase.QUICK_STOP_ACTIVE, Phase.FAULT

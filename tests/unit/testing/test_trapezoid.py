@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigidimeter.testing.trapezoid import Ramps, Trapezoid
+from rigidimeter.testing import Ramps, Trapezoid
 
 STEP_S = 0.0005
 RAMPS = Ramps(up=2000.0, down=1000.0)

@@ -11,12 +11,10 @@ from pathlib import Path
 import pytest
 from tests.unit.virtual.tiny import SHORT, tiny
 
-from rigidimeter.errors import UserError
-from rigidimeter.recording import read_session, session_settings
-from rigidimeter.study import compare_analysis, estimate
-from rigidimeter.virtual.study_design import PAPER, PUSHING
-from rigidimeter.virtual.study_plan import plan_study
-from rigidimeter.virtual.virtual_study import study_length_s, write_virtual_study
+from rigidimeter.analysis.study import compare_analysis, estimate
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.session import read_session, session_settings
+from rigidimeter.virtual import PAPER, PUSHING, plan_study, study_length_s, write_virtual_study
 
 
 def bytes_of(folder: Path) -> dict[str, bytes]:

@@ -8,11 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.paper import Context
-from rigidimeter.paper.printed import COUNTS
-from rigidimeter.virtual.study_design import DESIGNS, NULL, PAPER, PUSHING
-from rigidimeter.virtual.study_plan import draw_ratings, plan_study, spread_evenly
+from rigidimeter.model import JointDynamics
+from rigidimeter.paper import COUNTS, Context
+from rigidimeter.virtual import (
+    DESIGNS,
+    NULL,
+    PAPER,
+    PUSHING,
+    draw_ratings,
+    plan_study,
+    spread_evenly,
+)
 
 
 @pytest.mark.parametrize("name", list(DESIGNS))

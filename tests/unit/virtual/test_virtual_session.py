@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from tests.small_study import tiny
 
-from rigidimeter.recording import read
+from rigidimeter.analysis.reading import read
 from rigidimeter.virtual import simulate
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rigidimeter.virtual.study_design import PAPER, StudyDesign
+from rigidimeter.virtual import PAPER, StudyDesign
 
 SHORT = {
     **PAPER.settings,

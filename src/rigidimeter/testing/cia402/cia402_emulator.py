@@ -18,7 +18,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from rigidimeter.errors import UserError
+from rigidimeter.core.errors import UserError
 from rigidimeter.testing.cia402.object_dictionary import (
     COMMAND_MESSAGES,
     INVALID,
@@ -27,9 +27,9 @@ from rigidimeter.testing.cia402.object_dictionary import (
     dictionary,
 )
 from rigidimeter.testing.cia402.servo import (
+    CIA402_MISBEHAVIOURS,
     DEFAULTS,
     GENERIC_ERROR,
-    MISBEHAVIOURS,
     POWERED,
     UNITS_PER_RAD,
     Phase,
@@ -99,9 +99,9 @@ class Cia402Emulator:
         self._watch.start()
 
     def misbehave(self, name: str, value: Any = None) -> None:
-        """Start the misbehaviour of this name in `MISBEHAVIOURS`."""
-        if name not in MISBEHAVIOURS:
-            raise ValueError(f"{name!r} is none of {', '.join(MISBEHAVIOURS)}")
+        """Start the misbehaviour of this name in `CIA402_MISBEHAVIOURS`."""
+        if name not in CIA402_MISBEHAVIOURS:
+            raise ValueError(f"{name!r} is none of {', '.join(CIA402_MISBEHAVIOURS)}")
         with self._lock:
             self.note(f"misbehaves: {name}")
             self._servo.wrong[name] = DEFAULTS.get(name) if value is None else value

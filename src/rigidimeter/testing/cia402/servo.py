@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Protocol
 
 from rigidimeter.testing.emulated_arm import EmulatedArm
 
-MISBEHAVIOURS = {
+CIA402_MISBEHAVIOURS = {
     "fault": "brakes, reports a fault (value: its code) and cannot be reset",
     "emergency": "sends an emergency message (value: its code) but keeps moving",
     "leave operation": "removes its own power, as if its hardware enable opened",

@@ -8,8 +8,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 
-from rigidimeter.devices.base import MotionSample, VelocityDrive
-from rigidimeter.guard import Cause
+from rigidimeter.rig.devices.base import MotionSample, VelocityDrive
+from rigidimeter.rig.guard import Cause
 from rigidimeter.testing.conformance.fixture import (
     DriveFixture,
     check_counts,

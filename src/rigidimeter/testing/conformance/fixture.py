@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from rigidimeter.devices.base import (
+from rigidimeter.rig.devices.base import (
     DeviceError,
     DeviceFacts,
     MotionSample,
@@ -16,13 +16,13 @@ from rigidimeter.devices.base import (
     TorqueSensor,
     VelocityDrive,
 )
-from rigidimeter.guard import Cause
+from rigidimeter.rig.guard import Cause
 
 MANY_READS = 100
 
 
 class ConformanceError(AssertionError):
-    """A driver violates a requirement of `devices.base`."""
+    """A driver violates a requirement of `rig.devices.base`."""
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 
-from rigidimeter.devices.base import TorqueSample, TorqueSensor
-from rigidimeter.guard import Cause
+from rigidimeter.rig.devices.base import TorqueSample, TorqueSensor
+from rigidimeter.rig.guard import Cause
 from rigidimeter.testing.conformance.fixture import (
     SensorFixture,
     check_counts,

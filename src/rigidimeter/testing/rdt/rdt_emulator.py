@@ -22,8 +22,8 @@ from typing import Self
 
 from rigidimeter.testing.emulated_arm import EmulatedArm
 from rigidimeter.testing.rdt.rdt_records import (
-    MISBEHAVIOURS,
     ONCE,
+    RDT_MISBEHAVIOURS,
     RECORD,
     SAMPLE_RATE_HZ,
     Faults,
@@ -153,12 +153,12 @@ class RdtEmulator:
         Parameters
         ----------
         name : str
-            A key of `MISBEHAVIOURS`.
+            A key of `RDT_MISBEHAVIOURS`.
         value : float, optional
             The `value` in its description.
         """
-        if name not in MISBEHAVIOURS:
-            raise ValueError(f"{name!r} is no misbehaviour; known: {', '.join(MISBEHAVIOURS)}")
+        if name not in RDT_MISBEHAVIOURS:
+            raise ValueError(f"{name!r} is no misbehaviour; known: {', '.join(RDT_MISBEHAVIOURS)}")
         with self._lock:  # replaced, never changed, so readers need no lock
             self._faults = {**self._faults, name: value}
 

@@ -18,7 +18,7 @@ COUNTS_PER_UNIT = 1e6
 NOISE_COUNTS = 500.0
 """SD of the noise on the five axes that do not measure the arm."""
 
-MISBEHAVIOURS = {
+RDT_MISBEHAVIOURS = {
     "silent": "No more records are sent.",
     "deaf": "Requests to start are ignored.",
     "frozen_sequence": "The RDT sequence stays the same; the values change.",

@@ -20,17 +20,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.control import Admittance, Biquad, BiquadState, admittance_step, biquad_step
-from rigidimeter.dynamics import (
+from rigidimeter.model import (
+    Admittance,
+    Biquad,
+    BiquadState,
     Drive,
     DriveState,
+    admittance_step,
     arm_torque_nm,
     between,
+    biquad_step,
     drive_step,
     moment,
     quantised,
 )
-from rigidimeter.guard import GuardLimits, GuardState, Limited, guard_step
+from rigidimeter.rig.guard import GuardLimits, GuardState, Limited, guard_step
 
 NOW, BEFORE = -1, -2
 """In `Sampling.part`: taken at this tick, at the tick before; else a row of `parts`."""
@@ -113,7 +117,7 @@ def run_epoch(
     ticks : int
         How many entries of each column were written.
     cause : int
-        A `guard.Cause` value.
+        A `rig.guard.Cause` value.
     limit_time_s : float
         When the position limit first held the command back; NaN if it never did.
     limited_ticks : int

@@ -13,27 +13,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.control import admittance, butterworth_lowpass
-from rigidimeter.dynamics import (
-    BLOCK_TICKS,
-    SAME_TIME_S,
-    Drive,
-    SubjectTorque,
-    draw_joint,
-    drive,
-    rig_streams,
-    sample_time_blocks_s,
-)
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.guard import guard_limits
-from rigidimeter.records import readonly
-from rigidimeter.settings import (
+from rigidimeter.core.records import readonly
+from rigidimeter.core.settings import (
     MotionSensorSettings,
     Settings,
     SubjectSettings,
     TorqueSensorSettings,
 )
-from rigidimeter.units import rad_from_deg
+from rigidimeter.core.units import rad_from_deg
+from rigidimeter.model import (
+    BLOCK_TICKS,
+    SAME_TIME_S,
+    Drive,
+    JointDynamics,
+    SubjectTorque,
+    admittance,
+    butterworth_lowpass,
+    draw_joint,
+    drive,
+    rig_streams,
+    sample_time_blocks_s,
+)
+from rigidimeter.rig.guard import guard_limits
 from rigidimeter.virtual.batch.batch_epoch import BEFORE, NOW, Coefficients, Sampling
 from rigidimeter.virtual.batch.compiled_steps import compiled
 

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigidimeter.control import BiquadState
-from rigidimeter.dynamics import DriveState
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.guard import Cause, guard_state, why_ended
-from rigidimeter.records import Channel, Epoch, Outcome, readonly
-from rigidimeter.settings import Settings
+from rigidimeter.core.records import Channel, Epoch, Outcome, readonly
+from rigidimeter.core.settings import Settings
+from rigidimeter.model import BiquadState, DriveState, JointDynamics
+from rigidimeter.rig.guard import Cause, guard_state, why_ended
 from rigidimeter.virtual.batch.batch_epoch import Columns, Joint
 from rigidimeter.virtual.batch.batch_rig import Bench, EpochInputs
 from rigidimeter.virtual.batch.compiled_steps import compiled
@@ -45,9 +43,9 @@ class Batch:
     velocity_request_rad_s, velocity_command_rad_s : array
         What the controller asked for and what the guard let pass.
     limited : array of int8
-        `guard.Limited` values.
+        `rig.guard.Limited` values.
     ticks, cause, limited_ticks : array of int, shape (epochs,)
-        Entries of the epoch, `guard.Cause` value, commands that the guard changed.
+        Entries of the epoch, `rig.guard.Cause` value, commands that the guard changed.
     limit_time_s : array, shape (epochs,)
         When the position limit first held the command back; NaN if it never did.
     """

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.errors import UserError
-from rigidimeter.experiment import prbs_nm
-from rigidimeter.settings import Settings, SubjectSettings
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import Settings, SubjectSettings
+from rigidimeter.model import JointDynamics
+from rigidimeter.planning import prbs_nm
 from rigidimeter.virtual.batch.batch_rig import bench, draw_inputs
 from rigidimeter.virtual.batch.batch_run import (
     Batch,

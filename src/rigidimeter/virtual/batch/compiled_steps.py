@@ -24,10 +24,17 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from rigidimeter.control import admittance_step, biquad_step
-from rigidimeter.dynamics import arm_torque_nm, between, drive_step, moment, quantised
-from rigidimeter.errors import UserError
-from rigidimeter.guard import Cause, step, watch
+from rigidimeter.core.errors import UserError
+from rigidimeter.model import (
+    admittance_step,
+    arm_torque_nm,
+    between,
+    biquad_step,
+    drive_step,
+    moment,
+    quantised,
+)
+from rigidimeter.rig.guard import Cause, step, watch
 from rigidimeter.virtual.batch import batch_epoch as epoch
 
 

@@ -10,11 +10,11 @@ import numba
 import numpy as np
 import pytest
 
-from rigidimeter.dynamics.joint import JointDynamics
-from rigidimeter.errors import UserError
-from rigidimeter.estimation import fit_epoch
-from rigidimeter.guard import Cause
-from rigidimeter.settings import Settings, SubjectSettings, parse_settings
+from rigidimeter.analysis.estimation import fit_epoch
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import Settings, SubjectSettings, parse_settings
+from rigidimeter.model import JointDynamics
+from rigidimeter.rig.guard import Cause
 from rigidimeter.virtual.batch import (
     bench,
     draw_inputs,
@@ -228,10 +228,10 @@ def test_one_form_is_compiled_for_all_settings():
 def test_the_kept_code_follows_the_source_of_every_step(tmp_path, monkeypatch):
     before = compiled._digest()
     changed = tmp_path / "guard.py"
-    source = sys.modules["rigidimeter.guard.step"].__file__
+    source = sys.modules["rigidimeter.rig.guard.step"].__file__
     with open(source, "rb") as file:
         changed.write_bytes(file.read() + b"\n")
-    monkeypatch.setattr(sys.modules["rigidimeter.guard.step"], "__file__", str(changed))
+    monkeypatch.setattr(sys.modules["rigidimeter.rig.guard.step"], "__file__", str(changed))
     assert compiled._digest() != before
 
 

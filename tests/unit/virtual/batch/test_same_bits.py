@@ -8,15 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.acquisition import ControlLoop, SimulatedClock, perturb
-from rigidimeter.control import BiquadState
-from rigidimeter.devices import SimulatedRig
-from rigidimeter.dynamics import DriveState
-from rigidimeter.experiment import prbs_nm
-from rigidimeter.guard import Cause, Limited, guard_state
-from rigidimeter.recording import read_session
-from rigidimeter.recording.sample_log import Sample
-from rigidimeter.settings import Settings, SubjectSettings, parse_settings
+from rigidimeter.core.session import Sample, read_session
+from rigidimeter.core.settings import Settings, SubjectSettings, parse_settings
+from rigidimeter.model import BiquadState, DriveState
+from rigidimeter.planning import prbs_nm
+from rigidimeter.rig.acquisition import ControlLoop, SimulatedClock, perturb
+from rigidimeter.rig.devices import SimulatedRig
+from rigidimeter.rig.guard import Cause, Limited, guard_state
 from rigidimeter.virtual.batch import batch_epoch as plain
 from rigidimeter.virtual.batch import (
     bench,

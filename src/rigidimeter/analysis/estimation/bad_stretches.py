@@ -1,0 +1,179 @@
+"""Stretches in which a sensor hung or was at the end of its range.
+
+A sensor at the end of its range repeats its extreme value; one that hangs repeats whatever it had.
+A living signal does neither for long: it has noise. But a joint that is told to rest is at rest:
+where command and perturbation are zero, a repeated value is what Eq. 3 gives, M = K θ. And a joint
+that is told to go on at one velocity has that velocity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.analysis.estimation.stretches import bridged, sound, too_little, used_s
+from rigidimeter.core.records import Channel, Epoch, LeftOut
+from rigidimeter.core.settings import DiagnosticsSettings, Settings
+
+FITTED = ("torque_nm", "angle_rad", "velocity_rad_s")
+CAUSES = ("velocity_command_rad_s", "perturbation_nm")
+FEWEST_AT_EXTREME = 3
+"""An extreme reached by chance is not repeated three times in a row."""
+
+ZERO = 1e-6
+"""A command below this share of its largest value is none."""
+
+NEAR = 0.1
+"""A velocity no further than this share of the largest command from what it is told obeys it."""
+
+
+def without_bad_stretches(epoch: Epoch, settings: Settings) -> Epoch:
+    """Return the epoch with its bad stretches left out and everything left out bridged.
+
+    They stay in where their check is not set to ``exclude``, and where too little would be left:
+    then the check speaks of the whole epoch.
+    """
+    epoch = bridged(epoch)
+    diagnostics, levels = settings.diagnostics, settings.diagnostics.levels
+    if not any(len(channel) for channel in _fitted(epoch)):
+        return epoch
+    found: list[LeftOut] = []
+    if levels.frozen == "exclude":
+        found += frozen_stretches(epoch, diagnostics)
+    if levels.saturation == "exclude":
+        found += saturated_stretches(epoch, diagnostics)
+    if not found:
+        return epoch
+    without = replace(epoch, left_out=(*epoch.left_out, *sorted(found)))
+    trim_s = settings.estimation.trim_s
+    (before_s, _), (left_s, _) = used_s(epoch, trim_s), used_s(without, trim_s)
+    taken_percent = 100.0 * (before_s - left_s) / before_s if before_s > 0 else 100.0
+    if taken_percent > diagnostics.left_out_most_percent or too_little(
+        without, settings.estimation
+    ):
+        return epoch
+    return bridged(without)
+
+
+def frozen_stretches(epoch: Epoch, settings: DiagnosticsSettings) -> list[LeftOut]:
+    """Return where a channel repeats one value for longer than `frozen_most_s`."""
+    return [
+        LeftOut(start_s, stop_s, f"{channel.name} repeats one value", "frozen")
+        for channel in _fitted(epoch)
+        for start_s, stop_s in zip(*_repetitions(epoch, channel, settings), strict=True)
+        if stop_s - start_s > settings.frozen_most_s
+    ]
+
+
+def longest_repetition(
+    epoch: Epoch, channel: Channel, settings: DiagnosticsSettings
+) -> tuple[float, float]:
+    """Return how long the longest repetition of one value lasts, and when it begins, in s."""
+    starts_s, stops_s = _repetitions(epoch, channel, settings)
+    if starts_s.size == 0:
+        return 0.0, float(channel.time_s[0])
+    longest = int(np.argmax(stops_s - starts_s))
+    return float(stops_s[longest] - starts_s[longest]), float(starts_s[longest])
+
+
+def saturated_stretches(epoch: Epoch, settings: DiagnosticsSettings) -> list[LeftOut]:
+    """Return where a channel that was at the end of its range too often was there."""
+    found = []
+    for channel in _fitted(epoch):
+        rows, starts, stops = _at_extremes(epoch, channel, settings)
+        if 100.0 * rows / len(channel) <= settings.saturated_most_percent:
+            continue
+        text = f"{channel.name} repeats an extreme value"
+        spans = zip(channel.time_s[starts], channel.time_s[stops], strict=True)
+        found += [LeftOut(float(one), float(two), text, "saturation") for one, two in spans]
+    return found
+
+
+def share_at_extremes(epoch: Epoch, channel: Channel, settings: DiagnosticsSettings) -> float:
+    """Return in which share of its samples a channel repeats an extreme value."""
+    return _at_extremes(epoch, channel, settings)[0] / len(channel)
+
+
+def _at_extremes(
+    epoch: Epoch, channel: Channel, settings: DiagnosticsSettings
+) -> tuple[int, NDArray[np.int64], NDArray[np.int64]]:
+    """Return how many samples repeat an extreme, and the first and last row of each such run."""
+    starts, stops = _runs(channel.values)
+    level = channel.values[starts]
+    kept = (stops - starts >= FEWEST_AT_EXTREME - 1) & _in_use(epoch, channel, starts, stops)
+    kept &= (level == np.max(level)) | (level == np.min(level))
+    for run in np.flatnonzero(kept):
+        kept[run] = not _as_told(epoch, channel, starts[run], stops[run], settings.frozen_most_s)
+    return int(np.sum((stops - starts + 1)[kept])), starts[kept], stops[kept]
+
+
+def _repetitions(
+    epoch: Epoch, channel: Channel, settings: DiagnosticsSettings
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return from when to when, in s, a channel repeats a value that nobody told it to keep."""
+    starts, stops = _runs(channel.values)
+    most_s = settings.frozen_most_s
+    kept = (stops > starts) & _in_use(epoch, channel, starts, stops)
+    long = kept & (channel.time_s[stops] - channel.time_s[starts] > most_s)
+    for run in np.flatnonzero(long):
+        kept[run] = not _as_told(epoch, channel, starts[run], stops[run], most_s)
+    return channel.time_s[starts[kept]], channel.time_s[stops[kept]]
+
+
+def _runs(values: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return first and last rows of the stretches of equal values."""
+    changes = np.flatnonzero(np.diff(values) != 0)
+    return np.concatenate(([0], changes + 1)), np.concatenate((changes, [values.size - 1]))
+
+
+def _in_use(
+    epoch: Epoch, channel: Channel, starts: NDArray[np.int64], stops: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Return which runs do not lie in what is left out already."""
+    if not epoch.left_out:
+        return np.ones(starts.size, dtype=np.bool_)
+    kept = np.asarray(sound(epoch, channel.time_s), dtype=np.int64)
+    before = np.concatenate(([0], np.cumsum(kept)))
+    return np.asarray(before[stops + 1] > before[starts])
+
+
+def _as_told(epoch: Epoch, channel: Channel, start: int, stop: int, within_s: float) -> bool:
+    """Return whether the command is why a channel repeats a value, except for `within_s` of it.
+
+    The motion begins and ends later than its command, by the delay of the drive.
+    """
+    if CAUSES[0] not in epoch.channels:
+        return False
+    start_s, stop_s = float(channel.time_s[start]), float(channel.time_s[stop])
+    moving_most_s = min(within_s, 0.5 * (stop_s - start_s))
+    command = epoch.channels[CAUSES[0]]
+    causes = [epoch.channels[name] for name in CAUSES if name in epoch.channels]
+    if all(_keeps(cause, start_s, stop_s, 0.0, moving_most_s) for cause in causes):
+        return True
+    inside = command.values[(command.time_s >= start_s) & (command.time_s <= stop_s)]
+    if channel.name != "velocity_rad_s" or inside.size == 0:
+        return False
+    told, largest = float(np.median(inside)), float(np.max(np.abs(command.values)))
+    obeyed = abs(channel.values[start] - told) <= NEAR * largest and abs(told) > NEAR * largest
+    return obeyed and _keeps(command, start_s, stop_s, told, moving_most_s)
+
+
+def _keeps(
+    cause: Channel, start_s: float, stop_s: float, level: float, other_most_s: float
+) -> bool:
+    """Return whether a cause has a level in a stretch, except for a time."""
+    inside = (cause.time_s >= start_s) & (cause.time_s <= stop_s)
+    if not np.any(inside):
+        return False
+    other = np.abs(cause.values[inside] - level) > ZERO * float(np.max(np.abs(cause.values)))
+    return float(np.count_nonzero(other)) / cause.mean_rate_hz <= other_most_s
+
+
+def _fitted(epoch: Epoch) -> list[Channel]:
+    return [
+        epoch.channels[name]
+        for name in FITTED
+        if name in epoch.channels and len(epoch.channels[name])
+    ]

@@ -1,0 +1,107 @@
+"""What the error of two clocks' offset, or of a delay, adds to the intervals of J, B and K.
+
+Torque whose stamps are late by δ against those of the motion has, at each frequency ω,
+
+    (K − J ω² + i ω B) (1 − i ω δ) = K − (J − B δ) ω² + i ω (B − K δ + J δ ω²)      to first order
+
+so that J is wrong by −B δ and B by −K δ + J δ ω², of which the band and the method decide what
+remains. It is therefore found by fitting again with the torque moved by the standard error of the
+offset forth and back, and added in quadrature. So it is for the error of a delay that was estimated
+and taken out. All epochs of a source have the same error: it does not become smaller by pooling
+them, but by pooling sources.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy import stats
+
+from rigidimeter.analysis.estimation.method_record import FitEpochs
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimation.signals import Array
+from rigidimeter.core.records import Delay, Fit
+
+_QUANTILE = float(stats.norm.ppf(0.975))
+
+
+def with_clock_error(
+    fit: FitEpochs,
+    epochs: Sequence[PreparedEpoch],
+    inertia_kg_m2: float | None,
+    found: tuple[list[Fit], list[Fit]],
+    delays: Sequence[Delay] = (),
+) -> tuple[list[Fit], list[Fit]]:
+    """Return fits whose errors and intervals contain that of the clocks of torque and motion.
+
+    Parameters
+    ----------
+    fit : callable
+        Of the method that made them.
+    epochs : sequence of PreparedEpoch
+    inertia_kg_m2 : float or None
+        As the fits were made.
+    found : (list of Fit, list of Fit)
+        Of each epoch, and pooled.
+    delays : sequence of Delay
+        Where one was corrected, its standard error counts: of two clocks, in place of the offset's.
+    """
+    corrected = {delay.source: delay.delay_s_se for delay in delays if delay.corrected}
+    sources = [one.epoch.source for one in epochs]
+    errors_s = [corrected.get(one.epoch.source, one.epoch.clock_error_s) for one in epochs]
+    if not any(errors_s):
+        return found
+    early, late = (
+        fit(
+            [
+                one.moved(sign * error_s) if error_s else one
+                for one, error_s in zip(epochs, errors_s, strict=True)
+            ],
+            inertia_kg_m2,
+            lambda _: None,
+            False,
+        )[0]
+        for sign in (1.0, -1.0)
+    )
+    alone, pooled = found
+    changes = [(one.value - other.value) / 2 for one, other in zip(early, late, strict=True)]
+    return (
+        [_widened(one, [change]) for one, change in zip(alone, changes, strict=True)],
+        [_widened(one, _changes_of_sources(one, alone, changes, sources)) for one in pooled],
+    )
+
+
+def _changes_of_sources(
+    pooled: Fit, alone: Sequence[Fit], changes: Sequence[Array], sources: Sequence[str]
+) -> list[Array]:
+    """Return what the error of each source changes in a pooled fit.
+
+    A pooled fit is nearly the mean of its epochs, each weighted by the inverse of its covariance.
+    """
+    total = np.zeros((3, 3))
+    weighted: dict[str, Array] = {}
+    for one, change, source in zip(alone, changes, sources, strict=True):
+        free = one.se > 0  # an inertia that is held has no error
+        known = np.all(np.isfinite(one.covariance)) and np.all(np.isfinite(change))
+        if pooled.condition in ("", one.condition) and one.outcome.included and known:
+            weight = np.zeros((3, 3))
+            weight[np.ix_(free, free)] = np.linalg.pinv(one.covariance[np.ix_(free, free)])
+            total += weight
+            weighted[source] = weighted.get(source, np.zeros(3)) + weight @ change
+    return [np.linalg.pinv(total) @ one for one in weighted.values()]
+
+
+def _widened(fit: Fit, changes: Sequence[Array]) -> Fit:
+    """Return a fit with changes of one standard error each, which are independent, added."""
+    if not changes or not np.all(np.isfinite(changes)):
+        return fit
+    together = np.sqrt(np.sum(np.square(changes), axis=0))
+    return replace(
+        fit,
+        se=np.hypot(fit.se, together),
+        low=fit.value - np.hypot(fit.value - fit.low, _QUANTILE * together),
+        high=fit.value + np.hypot(fit.high - fit.value, _QUANTILE * together),
+        covariance=fit.covariance + sum(np.outer(change, change) for change in changes),
+    )

@@ -1,0 +1,85 @@
+"""Whether J, B and K hang on what the drive did between the samples, where nothing was measured.
+
+The drive is known by how it explains the velocity at its samples. Drives that explain it as well
+give other parameters where the samples are too few to tell them apart. The largest change is δ;
+where it is more than a tenth of the parameter, what the drive tells is itself in doubt, its sign
+included, and δ is at least twice what it changes. δ is added to both ends of the interval,
+
+    low = p̂ − t s − δ        high = p̂ + t s + δ
+
+with s the standard error and t Student's quantile; pooled epochs share the drive, so δ does not
+fall with their number. Where δ is more than a share of the parameter, the estimate is doubted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigidimeter.analysis.estimation.closedloop.between_finding import doubt_of
+from rigidimeter.analysis.estimation.closedloop.linear_problems import Problem
+from rigidimeter.analysis.estimation.closedloop.observation import Observation
+from rigidimeter.analysis.estimation.signals import Array
+from rigidimeter.core.records import Epoch, Finding
+from rigidimeter.core.settings import DiagnosticsSettings
+
+UNSETTLED = 0.1
+"""A parameter that another drive changes by more than this share hangs on the drive."""
+
+
+def moved_elsewhere(problems: Sequence[Problem], powers: Sequence[Array], values: Array) -> Array:
+    """Return δ, shape (p,).
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+    powers : sequence of array, shape (m,)
+        Of the noise at the lines.
+    values : array, shape (p,)
+        The solution of the problems.
+    """
+    moved = [one.observation.otherwise if one.observation else () for one in problems]
+    p, count = values.size, max(map(len, moved))
+    if not count:
+        return np.zeros(p)
+    grams, moments = np.zeros((count, p, p)), np.zeros((count, p))
+    for problem, power, more in zip(problems, powers, moved, strict=True):
+        weighted, held = (problem.instruments / power[:, None]).conj().T, len(problem.held)
+        grams += (weighted @ problem.regressors).real
+        moments += (weighted @ problem.target).real
+        if len(more):
+            added = (weighted @ more).real
+            grams[: len(more)] += added[:, :, held:]
+            moments[: len(more)] -= added[:, :, :held] @ np.array(problem.held)
+    size = np.sqrt(np.abs(np.diagonal(grams, axis1=1, axis2=2)))
+    scaled = np.linalg.pinv(grams / (size[:, :, None] * size[:, None, :]))
+    found = (scaled @ (moments / size)[:, :, None])[:, :, 0] / size
+    without, *others = np.abs(found - values)
+    most = np.max(others, axis=0)
+    return np.asarray(
+        np.where(most > UNSETTLED * np.abs(values), np.maximum(most, 2 * without), most)
+    )
+
+
+def between_samples(
+    epoch: Epoch,
+    observation: Observation,
+    values: Array,
+    between: Array,
+    settings: DiagnosticsSettings,
+) -> tuple[Finding, ...]:
+    """Return the finding `between_samples` of a fit; none where it hangs on nothing unknown.
+
+    Parameters
+    ----------
+    epoch : Epoch
+    observation : Observation
+    values, between : array, shape (p,)
+        The parameters, J first unless it was held, and how far they may be elsewhere.
+    settings : DiagnosticsSettings
+    """
+    share = 100.0 * between / np.abs(values)
+    worst = int(np.argmax(share))
+    name = "JBK"[len("JBK") - values.size :][worst]
+    return doubt_of(epoch, name, float(share[worst]), observation.drive_known, settings)

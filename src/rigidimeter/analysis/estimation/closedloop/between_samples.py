@@ -1,0 +1,199 @@
+"""What the torque sees of the motion between the samples of the motion.
+
+Torque sampled at a time δ after the ticks holds the acceleration of that time. The samples of the
+velocity give another one at the line ω: their derivative, free of all that sampling folds. For
+commands held from tick to tick both follow from the drive H (`DriveModel.transfer`), and so does
+what a low-pass F in the torque sensor makes of them. With z = e^(jωT) and * the z-transform of
+what is sampled, the torque sees beyond F times what the samples give
+
+    [(F s H)* − F jω H*] C,   [(F H)* − F H*] C,   [(F H/s)* − F (H/s)*] C
+
+of the command C. What moves the arm besides the command, such as friction in the drive, does not
+keep step with the ticks, and its samples are taken as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.analysis.estimation.closedloop.drive_motion import DrivenAt, driven, since_ticks
+from rigidimeter.analysis.estimation.signals import Array, motion_channels
+from rigidimeter.core.records import Channel, Epoch
+from rigidimeter.core.settings import EstimationSettings, RigSettings
+from rigidimeter.model import EVEN, ArmMotion, DriveModel, lowpass
+
+Complex = NDArray[np.complex128]
+
+
+INEXACT = 0.005
+"""No drive is quite linear and constant: what it tells of the motion between the samples is taken
+to be this share of itself uncertain. That matters where the torque saw little of the acceleration,
+and J is that little divided by a small share."""
+
+SCATTERED = 5.0
+"""Stamps keep step with the ticks if their mean direction is so many standard errors long."""
+
+LOW = 0.01
+"""In rad a tick: slow enough that what sampling does no longer depends on it."""
+
+
+class TorqueFilter(NamedTuple):
+    """A Butterworth low-pass between the torque and its samples."""
+
+    cutoff_hz: float
+    order: int
+
+
+def torque_filter_of(settings: EstimationSettings) -> TorqueFilter | None:
+    """Return the low-pass that the settings name; None for none."""
+    cutoff_hz = settings.torque_lowpass_hz
+    return TorqueFilter(cutoff_hz, settings.torque_lowpass_order) if cutoff_hz else None
+
+
+def behind(drive: DriveModel, torque_filter: TorqueFilter | None) -> DriveModel:
+    """Return the drive as the torque sensor sees its motion."""
+    return drive if torque_filter is None else drive.smoothed(*torque_filter)
+
+
+def filtered(torque_filter: TorqueFilter | None, omega_rad_s: Array) -> Complex:
+    """Return F at the lines, shape (m, 1)."""
+    if torque_filter is None:
+        return np.ones((omega_rad_s.size, 1), dtype=np.complex128)
+    return lowpass(np.asarray(1j * omega_rad_s), *torque_filter)[:, None]
+
+
+def seen_beyond_samples(
+    drive: DriveModel,
+    torque_filter: TorqueFilter | None,
+    omega_rad_s: Array,
+    interval_s: float,
+    after_s: float,
+) -> Complex:
+    """Return what stands before C above, shape (m, 3).
+
+    Parameters
+    ----------
+    drive : DriveModel
+    torque_filter : TorqueFilter or None
+    omega_rad_s : array, shape (m,)
+    interval_s : float
+        Of the ticks.
+    after_s : float
+        How long after each tick torque and motion were sampled.
+    """
+    z = np.exp(1j * omega_rad_s * interval_s)
+    seen = motion = drive.transfer(z, interval_s, after_s)
+    if torque_filter is not None:
+        seen = behind(drive, torque_filter).transfer(z, interval_s, after_s)
+    sampled = np.stack([1j * omega_rad_s * motion[1], motion[1], motion[2]])
+    return np.asarray(seen.T - filtered(torque_filter, omega_rad_s) * sampled.T)
+
+
+def without_driven(epoch: Epoch, driven_at: DrivenAt) -> Epoch:
+    """Return the epoch with what its motion sensors saw beyond the motion that the command causes.
+
+    Each at its own stamps.
+    """
+    rest = dict(epoch.channels)
+    for channel in motion_channels(epoch):
+        caused = driven_at(channel.time_s)
+        seen = caused.angle_rad if channel.name == "angle_rad" else caused.velocity_rad_s
+        rest[channel.name] = Channel(channel.name, channel.time_s, channel.values - seen)
+    return replace(epoch, channels=rest)
+
+
+def driven_behind(
+    driven_at: DrivenAt, torque_filter: TorqueFilter | None, torque: Channel
+) -> ArmMotion:
+    """Return the motion that the command causes, as the torque sensor sees it at its stamps."""
+    if torque_filter is None:
+        return driven_at(torque.time_s)
+    return driven(behind(driven_at.drive, torque_filter), driven_at.command, torque.time_s)
+
+
+def accelerations_seen(
+    drives: Sequence[DriveModel],
+    torque_filter: TorqueFilter | None,
+    interval_s: float,
+    times_s: Array,
+) -> Array:
+    """Return the acceleration at the torque's samples as a share of its mean, at low frequency.
+
+    Parameters
+    ----------
+    drives : sequence of DriveModel
+    torque_filter : TorqueFilter or None
+    interval_s : float
+        Of the ticks.
+    times_s : array
+        After the ticks, at which the torque was sampled; the mean over them is returned.
+
+    Returns
+    -------
+    array
+        For each drive.
+    """
+    omega = np.array([LOW / interval_s])
+    z = np.exp(1j * omega * interval_s)
+    turn = np.exp(-1j * omega * np.mean(times_s)) / filtered(torque_filter, omega)[:, 0]
+    found = []
+    for drive in drives:
+        _, velocity, _ = drive.transfer(z, interval_s)
+        sensed = behind(drive, torque_filter)
+        seen = np.mean([sensed.transfer(z, interval_s, s)[0] for s in times_s.tolist()], axis=0)
+        found.append((seen * turn / (1j * omega * velocity)).real.item())
+    return np.array(found)
+
+
+def acceleration_late_s(drive: DriveModel, interval_s: float) -> float:
+    """Return how late the acceleration at the ticks is against the slope of the velocity there.
+
+    Before its edge a command has not come yet, so the acceleration A at the ticks is that of the
+    command before. At low frequency A/(jω V) is a gain and a delay; the delay of a drive of second
+    order that is slow against the ticks is ζ ω₀ T²/6.
+    """
+    omega = np.array([LOW / interval_s])
+    acceleration, velocity, _ = drive.transfer(np.exp(1j * omega * interval_s), interval_s)
+    return float(-np.angle(acceleration / (1j * omega * velocity)).item() / omega.item())
+
+
+def acceleration_by_settings(rig: RigSettings, torque_filter: TorqueFilter | None) -> float:
+    """Return that share for the drive and the ticks that the settings name, at the ticks."""
+    drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
+    seen = accelerations_seen([drive], torque_filter, 1.0 / rig.tick_rate_hz, np.zeros(1))
+    return float(seen[0])
+
+
+def phases_s(command: Channel, time_s: Array) -> Array:
+    """Return after how long since a tick samples were taken: one time, or ten that stand for all.
+
+    Samples that do not keep step with the ticks see the acceleration at many times.
+    """
+    _, after_s = since_ticks(command, time_s, 0.0)
+    if np.ptp(after_s) * command.mean_rate_hz < 2 * EVEN:
+        return np.asarray(np.mean(after_s, keepdims=True))
+    return np.quantile(after_s, np.linspace(0.05, 0.95, 10))
+
+
+def step_kept_s(command: Channel, time_s: Array) -> float | None:
+    """Return the time after the ticks that stamps scatter about; None if they do not scatter so.
+
+    Then it is not known whether the samples came unevenly, or evenly and the stamps do not say so.
+    """
+    interval_s = 1.0 / command.mean_rate_hz
+    _, after_s = since_ticks(command, time_s, 0.0)
+    turns = np.exp(2j * np.pi * after_s / interval_s)
+    mean = complex(np.mean(turns))
+    if abs(mean) > 1.0 - EVEN**2 or abs(mean) < SCATTERED / np.sqrt(time_s.size):
+        return None
+    return float(np.angle(mean) / (2 * np.pi) % 1.0) * interval_s
+
+
+def in_step(tick: NDArray[np.intp], after_s: Array, interval_s: float) -> bool:
+    """Return whether samples (`since_ticks`) were taken once a tick, as long after each."""
+    return bool(np.all(np.diff(tick) == 1)) and float(np.ptp(after_s)) < 2 * EVEN * interval_s

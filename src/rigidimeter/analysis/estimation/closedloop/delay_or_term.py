@@ -1,0 +1,198 @@
+"""Whether a delay of the torque explains what J, B and K leave, or a term that they lack.
+
+Friction, a stretch reflex and a soft cuff turn the torque against the motion as a delay does. Each
+is put in the place of the delay, as one more column T beside J, B and K:
+
+    friction    sgn θ'
+    reflex      θ', max(θ', 0) or max(−θ', 0), later by 30, 45 or 60 ms
+    soft cuff   Z θ / (1 + Z/k), with Z = K + iωB − ω²J, for a cuff of k N·m/rad: at some k, and to
+                the first order in 1/k about each
+
+Both models are fitted by instrumental variables to one half of the lines, in groups of neighbours,
+and judged by what they leave of the others; S is the smooth power of that. The sum of the
+differences of |left|²/S, over the root of the sum of their squares, is about standard normal where
+both explain as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
+from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST, Problem
+from rigidimeter.analysis.estimation.closedloop.observation import Observation, observe
+from rigidimeter.analysis.estimation.closedloop.spectral_lines import Complex, Grid
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimation.signals import Array, velocity_at
+
+REFLEX_DELAYS_S = (0.03, 0.045, 0.06)
+CUFF_RATIOS = (5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0)
+"""Stiffness of a cuff over that of the joint."""
+
+GROUP_LINES = 8
+
+CLEAR = 3.0
+"""A delay that is not better than a term by this many standard deviations is not told from it."""
+
+
+class Rival(NamedTuple):
+    """A term in the place of the delay, and by how many standard deviations it is better."""
+
+    name: str
+    better_by: float
+
+
+def likeliest_term(
+    epochs: Sequence[PreparedEpoch], moved: Sequence[PreparedEpoch], values: Array
+) -> Rival:
+    """Return the term that rivals the delay most.
+
+    Parameters
+    ----------
+    epochs, moved : sequences of PreparedEpoch
+        As recorded, and with their torque earlier by the delay.
+    values : array, shape (3,)
+        J, B and K with the delay.
+    """
+    J, B, K = np.maximum(values, LEAST).tolist()
+    with_delay = [_of_joint(epoch.once(observe), (J, B, K)) for epoch in moved]
+    plain = [_of_joint(epoch.once(observe), (J, B, K)) for epoch in epochs]
+    without = np.maximum(_solved(plain), LEAST)
+    rivals = [
+        dict(_rivals(epoch, problem, (J, B, K), without))
+        for epoch, problem in zip(epochs, plain, strict=True)
+    ]
+    found = [
+        Rival(name.split(",")[0], _better([own[name] for own in rivals], with_delay))
+        for name in rivals[0]
+    ]
+    return max(found, key=lambda rival: rival.better_by)
+
+
+def _of_joint(observation: Observation, joint: tuple[float, float, float]) -> Problem:
+    assert observation.excitation is not None  # `observe` gives it
+    instruments = observation.excitation.motion_lines(joint)
+    return Problem(instruments, observation.lines.motion, observation.lines.torque_nm)
+
+
+def _rivals(
+    prepared: PreparedEpoch,
+    plain: Problem,
+    joint: tuple[float, float, float],
+    without_delay: Array,
+) -> Iterator[tuple[str, Problem]]:
+    """Yield the problem with each term, from the simulated and from the measured motion.
+
+    `without_delay` are J, B and K of the fit without delay or term.
+    """
+    observation = prepared.once(observe)
+    assert observation.excitation is not None
+    grid = observation.lines.grid
+    omega = grid.omega_rad_s
+    measured = velocity_at(prepared.epoch, grid.time_s) * grid.window
+    both = observation.excitation.windowed_motion(joint)[1], measured
+    rubbing = _pair(grid, *(grid.window * np.sign(velocity) for velocity in both))
+    yield "friction", _beside(plain, rubbing)
+    for side, sign in (("+", 1.0), ("-", -1.0), ("both", 0.0)):
+        stretch = _pair(grid, *(v if sign == 0.0 else np.maximum(sign * v, 0.0) for v in both))
+        for delay_s in REFLEX_DELAYS_S:
+            late = np.exp(-1j * omega * delay_s)
+            yield (
+                f"a reflex,{side},{delay_s}",
+                _beside(plain, (stretch[0] * late, stretch[1] * late)),
+            )
+    J, B, K = without_delay.tolist()
+    impedance = K + 1j * omega * B - omega**2 * J
+    for ratio in CUFF_RATIOS:
+        soft = (1.0 / (1.0 + impedance / (ratio * K)))[:, None]
+        through = Problem(plain.instruments * soft, plain.regressors * soft, plain.target)
+        softer = -(impedance**2 * soft[:, 0] ** 2)
+        column = (plain.instruments[:, 2] * softer, plain.regressors[:, 2] * softer)
+        yield f"a soft cuff,{ratio}", _beside(through, column)
+
+
+def _beside(problem: Problem, column: tuple[Complex, Complex]) -> Problem:
+    """Return the problem with one more column."""
+    return Problem(
+        np.column_stack([problem.instruments, column[0]]),
+        np.column_stack([problem.regressors, column[1]]),
+        problem.target,
+    )
+
+
+def _pair(grid: Grid, simulated: Array, measured: Array) -> tuple[Complex, Complex]:
+    """Return the lines of two signals that went through the window."""
+
+    def lines(windowed: Array) -> Complex:
+        mean = float(np.add.reduce(windowed * grid.window)) / grid.energy
+        return np.asarray(fft.rfft(windowed)[grid.line] - mean * grid.window_lines)
+
+    return lines(simulated), lines(measured)
+
+
+def _better(first: Sequence[Problem], second: Sequence[Problem]) -> float:
+    """Return by how many standard deviations the first explains more of lines it has not seen."""
+    left = [_left_out(first), _left_out(second)]
+    gain, power = 0.0, 0.0
+    for one, other in zip(*left, strict=True):
+        m = min(one.size, other.size)
+        smoother = Smoother.over(np.arange(m), GROUP_LINES, 0.1)
+        difference = (other[:m] - one[:m]) / smoother(0.5 * (one[:m] + other[:m]))
+        gain += float(np.sum(difference))
+        power += float(np.sum(difference**2))
+    return gain / float(np.sqrt(power)) if power > 0 else 0.0
+
+
+def _left_out(problems: Sequence[Problem]) -> list[Array]:
+    """Return |left|² at each line by the fit to the other half of the lines, of each epoch."""
+    left = [np.zeros(problem.target.size) for problem in problems]
+    weights = [_weight(problem) for problem in problems]
+    for half in (0, 1):
+        used = [_half(problem) == half for problem in problems]
+        solution = _solved(
+            [_part(problem, rows) for problem, rows in zip(problems, used, strict=True)],
+            [weight[rows] for weight, rows in zip(weights, used, strict=True)],
+        )
+        for own, problem, rows in zip(left, problems, used, strict=True):
+            residual = problem.target[~rows] - problem.regressors[~rows] @ solution
+            own[~rows] = np.abs(residual) ** 2
+    return left
+
+
+def _solved(problems: Sequence[Problem], weights: Sequence[Array] | None = None) -> Array:
+    """Return the parameters by instrumental variables."""
+    p = problems[0].regressors.shape[1]
+    gram, moment = np.zeros((p, p)), np.zeros(p)
+    for place, problem in enumerate(problems):
+        weight = weights[place] if weights is not None else _weight(problem)
+        weighted = problem.instruments * weight[:, None]
+        gram += (weighted.conj().T @ problem.regressors).real
+        moment += (weighted.conj().T @ problem.target).real
+    scale = np.sqrt(np.maximum(np.abs(np.diag(gram)), np.finfo(np.float64).tiny))
+    solution = np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale
+    return np.asarray(solution, dtype=np.float64)
+
+
+def _part(problem: Problem, rows: NDArray[np.bool_]) -> Problem:
+    return Problem(problem.instruments[rows], problem.regressors[rows], problem.target[rows])
+
+
+def _half(problem: Problem) -> NDArray[np.intp]:
+    return np.asarray(np.arange(problem.target.size) // GROUP_LINES % 2)
+
+
+def _weight(problem: Problem) -> Array:
+    """Return one over the smooth power of what J, B and K leave at every line."""
+    motion = problem.regressors[:, :3]
+    instruments = problem.instruments[:, :3]
+    scale = np.sqrt(np.sum(np.abs(motion) ** 2, axis=0))
+    gram = (instruments.conj().T @ motion).real / np.outer(scale, scale)
+    values = np.linalg.lstsq(gram, (instruments.conj().T @ problem.target).real / scale)[0] / scale
+    power = np.abs(problem.target - motion @ values) ** 2
+    smooth = Smoother.over(np.arange(power.size), GROUP_LINES, 0.1)(power)
+    return np.asarray(1.0 / smooth)

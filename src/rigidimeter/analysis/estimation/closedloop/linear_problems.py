@@ -1,0 +1,125 @@
+"""The linear problem that each method of the closed loop solves at given J, B and K.
+
+With instruments Z, regressors Φ and target Y at the lines of an epoch, the estimate is
+
+    p = (Σ Re(Z^H Φ / S))⁻¹ Σ Re(Z^H Y / S)
+
+with S the power of the noise (`refine`). The methods differ in Z alone.
+
+Instrumental variables (``iv``). A subject who pushes moves the joint through the loop, so the
+motion carries the push that is also in the torque, and least squares takes it for the joint's own:
+it drifts toward −(J_c, B_c, 0). The perturbation carries nothing of the subject. Z is the motion
+that the perturbation *alone* causes, simulated through controller and joint (`excitation`), so the
+estimate is consistent whatever the subject did; a wrong controller makes Z weaker, not wrong, and
+where its loop would be unstable Z is made without feedback. Z depends on the parameters and S on
+the residual: both are iterated (refined instrumental variables, Young and Jakeman 1979; for joints
+Westwick and Perreault 2011). With Z and S right the estimate is as precise as maximum likelihood
+from the same response to the perturbation.
+
+The lines of a periodic perturbation (``spectral``). The same at the excited lines alone; the lines
+between them hold nothing but noise and set S.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.analysis.estimation.closedloop.excitation import Excitation
+from rigidimeter.analysis.estimation.closedloop.observation import Observation
+from rigidimeter.analysis.estimation.signals import Array
+
+Complex = NDArray[np.complex128]
+
+LEAST = np.array([1e-5, 1e-3, 1e-2])
+"""Smallest J, B and K that a response is simulated with, so that the simulated loop is stable."""
+
+T = TypeVar("T")
+
+
+class Problem(NamedTuple):
+    """The linear problem of one epoch at given parameters.
+
+    `instruments` and `regressors` have shape (m, p), `target` (m,). `observation` says how the
+    motion might be otherwise, and `held` are the values of the first parameters, which are held.
+    """
+
+    instruments: Complex
+    regressors: Complex
+    target: Complex
+    observation: Observation | None = None
+    held: tuple[float, ...] = ()
+
+
+Linearise = Callable[[Sequence[Observation], Array], list[Problem]]
+
+
+def direct(observations: Sequence[Observation], values: Array) -> list[Problem]:
+    """Return the problems of least squares: the measured motion is its own instrument."""
+    del values  # they do not depend on the parameters
+    everything = [observation.lines for observation in observations]
+    return [Problem(lines.motion, lines.motion, lines.torque_nm) for lines in everything]
+
+
+def instrumental(observations: Sequence[Observation], values: Array) -> list[Problem]:
+    """Return the problems with instruments simulated at the given J, B and K."""
+    J, B, K = np.maximum(values, LEAST).tolist()
+    made = _of_each(observations, lambda excitation: excitation.motion_lines((J, B, K)))
+    return [
+        Problem(instruments, observation.lines.motion, observation.lines.torque_nm, observation)
+        for observation, instruments in zip(observations, made, strict=True)
+    ]
+
+
+def periodic(observations: Sequence[Observation], values: Array) -> list[Problem]:
+    """Return the problems of the excited lines: the others have no weight but show the noise."""
+    return [
+        problem._replace(instruments=problem.instruments * observation.excited[:, None])
+        for observation, problem in zip(
+            observations, instrumental(observations, values), strict=True
+        )
+    ]
+
+
+def holding(linearise: Linearise, inertia_kg_m2: float) -> Linearise:
+    """Return the problems of B and K alone (Eq. 7)."""
+
+    def held(observations: Sequence[Observation], values: Array) -> list[Problem]:
+        full = linearise(observations, np.concatenate(([inertia_kg_m2], values)))
+        return [
+            Problem(
+                problem.instruments[:, 1:],
+                problem.regressors[:, 1:],
+                problem.target - inertia_kg_m2 * problem.regressors[:, 0],
+                problem.observation,
+                (inertia_kg_m2,),
+            )
+            for problem in full
+        ]
+
+    return held
+
+
+def least_squares_start(observations: Sequence[Observation]) -> Array:
+    """Return where to begin: least squares, kept where the loop can be simulated; shape (3,)."""
+    gram, moment = np.zeros((3, 3)), np.zeros(3)
+    for problem in direct(observations, np.empty(0)):
+        gram += (problem.regressors.conj().T @ problem.regressors).real
+        moment += (problem.regressors.conj().T @ problem.target).real
+    scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(np.float64).tiny))
+    values = np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale
+    return np.asarray(np.maximum(values, 10 * LEAST), dtype=np.float64)
+
+
+def _of_each(observations: Sequence[Observation], simulate: Callable[[Excitation], T]) -> list[T]:
+    """Return what each epoch's perturbation causes; epochs that share it are simulated once."""
+    made: dict[int, T] = {}
+    for observation in observations:
+        excitation = observation.excitation
+        assert excitation is not None  # without it an epoch is not observed for these methods
+        if id(excitation) not in made:
+            made[id(excitation)] = simulate(excitation)
+    return [made[id(observation.excitation)] for observation in observations]

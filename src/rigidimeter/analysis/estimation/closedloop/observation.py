@@ -1,0 +1,351 @@
+"""One epoch as the methods of the closed loop see it: its lines, and what perturbed it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from rigidimeter.analysis.estimation.bandlimited import band_hz
+from rigidimeter.analysis.estimation.closedloop.between_samples import (
+    INEXACT,
+    acceleration_by_settings,
+    phases_s,
+    seen_beyond_samples,
+    step_kept_s,
+    torque_filter_of,
+)
+from rigidimeter.analysis.estimation.closedloop.drive_fit import FoundDrive
+from rigidimeter.analysis.estimation.closedloop.drive_friction import half_of_friction
+from rigidimeter.analysis.estimation.closedloop.drive_motion import since_ticks
+from rigidimeter.analysis.estimation.closedloop.epoch_motion import EpochMotion
+from rigidimeter.analysis.estimation.closedloop.excitation import Excitation, excitation
+from rigidimeter.analysis.estimation.closedloop.spectral_lines import (
+    Grid,
+    Lines,
+    epoch_grid,
+    epoch_lines,
+)
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimation.signals import motion_channels
+from rigidimeter.analysis.estimation.stretches import longest_part
+from rigidimeter.core.records import Channel, Epoch
+from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, Settings
+from rigidimeter.model import DriveModel, Loop
+
+Complex = NDArray[np.complex128]
+
+WIDER = 0.5, 1.4
+"""Lines are also kept of a band whose edges are these times those of the fit."""
+
+REPEATS = 0.999
+"""The correlation of a perturbation with itself one period later, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """One epoch, ready.
+
+    Attributes
+    ----------
+    lines : Lines
+    perturbation : Channel
+        At every tick.
+    excitation : Excitation or None
+        The loop that the epoch ran in; None where the perturbation is not known.
+    excited : array of bool, shape (m,)
+        The lines at which a periodic perturbation has power; all where it is not periodic.
+    drive_known : bool
+    wider : Lines or None
+        Those of a wider band, for `band_sensitivity`.
+    make_otherwise : callable
+        Returns `otherwise`.
+    """
+
+    lines: Lines
+    perturbation: Channel
+    excitation: Excitation | None
+    excited: NDArray[np.bool_]
+    drive_known: bool = False
+    wider: Lines | None = None
+    make_otherwise: Callable[[], Sequence[Complex]] = tuple
+
+    @cached_property
+    def otherwise(self) -> Complex:
+        """What would add to the motion at the lines, shape (k, m, 3).
+
+        If the samples were taken as they are, and then with other drives that explain the velocity
+        as well; where the drive is unknown, with that of the settings.
+        """
+        changes = self.make_otherwise()
+        return np.stack(changes) if changes else np.empty((0, *self.lines.motion.shape))
+
+
+def closed_loop_obstacle(epoch: Epoch) -> str:
+    """Return why the methods of the closed loop cannot be used, or an empty text."""
+    perturbation = epoch.channels.get("perturbation_nm")
+    if perturbation is None:
+        return "perturbation_nm was not recorded"
+    if len(perturbation) < 2 or not np.all(np.isfinite(perturbation.values)):
+        return "perturbation_nm holds no samples or numbers that are not finite"
+    if float(np.ptp(perturbation.values)) == 0.0:
+        return "perturbation_nm is constant"
+    torque = epoch.channels.get("torque_nm")
+    if torque is not None and np.array_equal(torque.values, perturbation.values):
+        return "perturbation_nm holds the same numbers as torque_nm"
+    return ""
+
+
+def observe(prepared: PreparedEpoch, motion: EpochMotion | None = None) -> Observation:
+    """Return an epoch at all lines of the band.
+
+    Parameters
+    ----------
+    prepared : PreparedEpoch
+    motion : EpochMotion, optional
+        That of the epoch, where it was made already.
+
+    Raises
+    ------
+    ValueError
+        If the epoch cannot be used; the text says why.
+    """
+    perturbation = _perturbation(prepared)
+    grid = _grid(prepared, None)
+    wider = _grid(prepared, None, WIDER)
+    everywhere = np.ones(grid.line.size, dtype=np.bool_)
+    return _observed(prepared, perturbation, grid, everywhere, wider, motion)
+
+
+def observe_periods(prepared: PreparedEpoch) -> Observation:
+    """Return whole periods of an epoch, so that the perturbation is in some of the lines alone.
+
+    Raises
+    ------
+    ValueError
+        If the epoch cannot be used, or does not hold two whole periods; the text says why.
+    """
+    # A window with a hole would spread the excited lines over those between them.
+    part = replace(prepared, epoch=longest_part(prepared.epoch))
+    perturbation = _perturbation(part)
+    known = _during(perturbation, part.epoch.channels["torque_nm"])
+    periods = 0
+
+    def samples(available: int, rate_hz: float) -> int:
+        nonlocal periods
+        periods, count = whole_periods(known, rate_hz, available)
+        return count
+
+    grid = _grid(part, samples)
+    return _observed(part, perturbation, grid, grid.line % periods == 0)
+
+
+def observe_motion(prepared: PreparedEpoch, motion: EpochMotion | None = None) -> Observation:
+    """Return an epoch whose perturbation is not known, in the band of least squares.
+
+    `motion` is as for `observe`.
+    """
+    epoch, estimation = prepared.epoch, prepared.settings.estimation
+    grid = epoch_grid(epoch, band_hz(epoch, estimation), estimation.trim_s)
+    everywhere = np.ones(grid.line.size, dtype=np.bool_)
+    # The drive is followed as least squares follows it, or what it does looks like a delay.
+    motion = motion_of(prepared) if motion is None else motion
+    lines = epoch_lines(epoch, grid, motion, torque_filter_of(estimation))
+    return Observation(lines, epoch.channels["torque_nm"], None, everywhere)
+
+
+def motion_of(prepared: PreparedEpoch) -> EpochMotion:
+    """Return the motion of an epoch, with the drive that its source shows."""
+    command = prepared.epoch.channels.get("velocity_command_rad_s")
+    found = prepared.source.drive if command is not None else None
+    return EpochMotion(prepared.epoch, None if found is None else found.model)
+
+
+def period_s(perturbation: Channel) -> float | None:
+    """Return the shortest period of a perturbation; None if it does not repeat within the epoch."""
+    values = perturbation.values - np.mean(perturbation.values)
+    n = values.size
+    length = fft.next_fast_len(2 * n, real=True)
+    spectrum = fft.rfft(values, length)
+    products = fft.irfft(np.abs(spectrum) ** 2, length)[: n // 2 + 1]
+    power = np.concatenate(([0.0], np.cumsum(values**2)))
+    lag = np.arange(products.size)
+    scale = np.sqrt((power[n] - power[lag]) * power[n - lag])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = products / scale
+    low = np.flatnonzero(correlation < 0.5)
+    if low.size == 0:
+        return None
+    again = np.flatnonzero(correlation[low[0] :] > REPEATS)
+    if again.size == 0:
+        return None
+    # The best of the neighbours: a period need not be a whole number of ticks.
+    first = low[0] + again[0]
+    near = slice(first, min(first + 3, products.size))
+    return float(first + np.argmax(correlation[near])) / perturbation.mean_rate_hz
+
+
+def whole_periods(perturbation: Channel, grid_rate_hz: float, samples: int) -> tuple[int, int]:
+    """Return how many whole periods an epoch holds, and how many samples they are.
+
+    Raises
+    ------
+    ValueError
+        If the epoch does not hold two whole periods.
+    """
+    period = period_s(perturbation)
+    periods = 0 if period is None else int(samples / grid_rate_hz / period + 1e-6)
+    if period is None or periods < 2:
+        long_s = samples / grid_rate_hz
+        shown = (
+            f"no period of the perturbation is twice in the {long_s:.3g} s in a row"
+            if period is None
+            else f"the perturbation repeats every {period:.3g} s, and of the {2 * period:.3g} s of "
+            f"two periods there are {long_s:.3g} s in a row"
+        )
+        raise ValueError(
+            f"{shown} that can be used; the spectral method needs two whole periods with nothing "
+            "left out between; use --method iv, which needs none and allows for what is left out"
+        )
+    return periods, round(periods * period * grid_rate_hz)
+
+
+def _perturbation(prepared: PreparedEpoch) -> Channel:
+    obstacle = prepared.obstacle or closed_loop_obstacle(prepared.epoch)
+    if obstacle:
+        raise ValueError(obstacle)
+    return _even(prepared.epoch.channels["perturbation_nm"])
+
+
+def _during(perturbation: Channel, torque: Channel) -> Channel:
+    """Return the perturbation while the torque was sampled: elsewhere it may not be known."""
+    early, late = np.searchsorted(perturbation.time_s, torque.time_s[[0, -1]])
+    rows = slice(int(early), int(late) + 1)
+    return Channel(perturbation.name, perturbation.time_s[rows], perturbation.values[rows])
+
+
+def _even(perturbation: Channel) -> Channel:
+    """Return the perturbation at every tick: the last level is held where ticks are missing."""
+    spacing = np.diff(perturbation.time_s)
+    interval_s = float(np.median(spacing))
+    if float(np.ptp(spacing)) < 0.5 * interval_s:
+        return perturbation
+    count = int((perturbation.time_s[-1] - perturbation.time_s[0]) / interval_s + 0.5) + 1
+    time_s = perturbation.time_s[0] + interval_s * np.arange(count)
+    last = np.searchsorted(perturbation.time_s, time_s + 0.5 * interval_s, side="right") - 1
+    return Channel(perturbation.name, time_s, perturbation.values[np.maximum(last, 0)])
+
+
+def _grid(
+    prepared: PreparedEpoch,
+    samples: Callable[[int, float], int] | None,
+    factors: tuple[float, float] = (1.0, 1.0),
+) -> Grid:
+    """Return the grid in the band, its edges times these factors as far as the rate allows."""
+    epoch, estimation = prepared.epoch, prepared.settings.estimation
+    torque = epoch.channels["torque_nm"]
+    limiting = [torque] if prepared.source.drive else [torque, *motion_channels(epoch)]
+    slowest = min(channel.rate_hz for channel in limiting)
+    low, high = estimation.band_low_hz, estimation.band_high_closed_loop_hz
+    band = factors[0] * low, min(factors[1] * high, USABLE_FRACTION_OF_RATE * slowest)
+    return epoch_grid(epoch, band, estimation.trim_s, samples)
+
+
+def _observed(
+    prepared: PreparedEpoch,
+    perturbation: Channel,
+    grid: Grid,
+    excited: NDArray[np.bool_],
+    wider: Grid | None = None,
+    motion: EpochMotion | None = None,
+) -> Observation:
+    epoch = prepared.epoch
+    found = prepared.source.drive
+    drive = found.model if found is not None else None
+    loop = loop_of(prepared.settings, epoch.channels["torque_nm"].rate_hz, drive)
+    key = (
+        hashlib.sha256(perturbation.values.tobytes()).digest(),
+        loop,
+        round((grid.time_s[0] - perturbation.time_s[0]) * 1e9),
+        grid.time_s.size,
+        round(1e6 * grid.rate_hz),
+        int(grid.line[0]),
+        int(grid.line[-1]),
+        prepared.epoch.left_out,
+    )
+    made = prepared.source.once(key, lambda: excitation(perturbation, loop, grid))
+    torque_filter = torque_filter_of(prepared.settings.estimation)
+    motion = motion_of(prepared) if motion is None else motion
+    everything = epoch_lines(epoch, wider or grid, motion, torque_filter)
+    rubbing = half_of_friction(epoch, everything.grid, found, torque_filter)
+    by_friction = replace(everything, motion=rubbing).on(grid).motion
+    everything = replace(everything, motion=everything.motion + rubbing)
+    lines = everything.on(grid)
+    return Observation(
+        lines,
+        perturbation,
+        made,
+        excited,
+        drive is not None,
+        everything if wider is not None else None,
+        partial(_otherwise, epoch, prepared.settings, found, lines, by_friction),
+    )
+
+
+def _otherwise(
+    epoch: Epoch,
+    settings: Settings,
+    found: FoundDrive | None,
+    lines: Lines,
+    by_friction: Complex,
+) -> list[Complex]:
+    """Return what would add to the motion without a drive, and with others.
+
+    One that tells a little less, the rivals, samples that kept step with the ticks where it may be
+    the stamps that did not, and half of what friction in the drive does between the samples.
+    """
+    grid, command = lines.grid, epoch.channels.get("velocity_command_rad_s")
+    torque_filter = torque_filter_of(settings.estimation)
+    if found is None or command is None:
+        seen_share = acceleration_by_settings(settings.rig, torque_filter)
+        change = lines.motion * np.array([seen_share - 1.0, 0.0, 0.0])
+        return [np.zeros_like(change), change]
+    stamps_s, interval_s = epoch.channels["torque_nm"].time_s, 1.0 / command.mean_rate_hz
+    tick, after = since_ticks(command, grid.time_s, 0.0)
+    mean_s = float(np.mean(after))
+
+    def seen(drive: DriveModel, after_s: float = mean_s) -> Complex:
+        return seen_beyond_samples(drive, torque_filter, grid.omega_rad_s, interval_s, after_s)
+
+    ours = seen(found.model)
+    changes = [-ours, -INEXACT * ours, *(seen(drive) - ours for drive in found.rivals)]
+    kept_s = step_kept_s(command, stamps_s)
+    if kept_s is not None:
+        there = [seen(found.model, after_s) for after_s in phases_s(command, stamps_s).tolist()]
+        changes.append(seen(found.model, kept_s) - np.mean(there, axis=0))
+    sent = grid.transform(command.values[tick])[:, None]
+    moved = [np.asarray(change * sent) for change in changes]
+    return [*moved, by_friction] if found.fitted.rubbing else moved
+
+
+def loop_of(settings: Settings, torque_rate_hz: float, drive: DriveModel | None) -> Loop:
+    """Return the loop that settings describe, with the drive that a recording shows.
+
+    Instruments made from a wrong loop are weaker, not wrong: whatever they are, they follow from
+    the perturbation alone.
+    """
+    rig, estimation = settings.rig, settings.estimation
+    # To the digits that stamps are good for, so that epochs of one rig have equal loops.
+    torque = rig.torque.model_copy(update={"rate_hz": float(f"{torque_rate_hz:.4g}")})
+    return Loop(
+        settings.controller,
+        rig.model_copy(update={"torque": torque}),
+        drive,
+        estimation.torque_lowpass_hz,
+        estimation.torque_lowpass_order,
+    )

@@ -1,0 +1,153 @@
+"""Whether the controller of the settings can be the one that moved the joint.
+
+Where the command was recorded it is held against what that controller makes of perturbation and
+torque (`controller_used`); and a loop that would be unstable with the joint that was estimated
+cannot have moved it.
+
+Neither biases a method whose instruments are made from the perturbation: whatever the controller,
+they follow from the perturbation alone. Least squares is biased by the loop that really was, so the
+bias that `loop_bias` tells is computed with the controller that the recording shows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rigidimeter.analysis.estimation.between_epochs import in_full
+from rigidimeter.analysis.estimation.diagnostics.check_record import (
+    Case,
+    Check,
+    Look,
+    at_most,
+    push_harmless,
+)
+from rigidimeter.analysis.estimation.diagnostics.controller_used import (
+    command_made,
+    loop_shown,
+    misfit_of_settings,
+)
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimation.signals import Array
+from rigidimeter.core.settings import ControllerSettings, Settings
+from rigidimeter.core.units import per_rad_from_per_deg
+from rigidimeter.model import JointDynamics, Loop, spectral_radius
+
+REMEDY = (
+    "give the values that were used, per radian: --controller J_C B_C, or in the settings "
+    "[controller] inertia_kg_m2 and damping_nm_s_rad"
+)
+
+PER_DEGREE_WITHIN = 1.5
+"""Values that are wrong by 57.3, within this factor, were given per degree."""
+
+
+def controller_misfit(prepared: PreparedEpoch, loop: Loop) -> Look | None:
+    """Return how far the command is from what the controller makes of perturbation and torque."""
+    misfit = prepared.once(misfit_of_settings)
+    if misfit is None or np.isnan(misfit[0]):
+        return None
+    value, factor = misfit
+    most = prepared.settings.diagnostics.controller_misfit_most_percent
+    look = at_most(
+        value,
+        most,
+        (
+            f"from perturbation and torque the controller of the settings makes a velocity command "
+            f"that differs from the recorded one by {in_full(value, limit=most)} % (at most "
+            f"{most:g} %) and is {factor:.2g} times as large"
+        ),
+    )
+    shown = _controller_shown(prepared, loop) if look.failed else None
+    return look if shown is None else look._replace(remedy=_remedy(loop.controller, shown))
+
+
+def controller_used(prepared: PreparedEpoch) -> Loop:
+    """Return the loop with the controller that the recording shows.
+
+    That is the one of the settings unless another makes the recorded command and it does not.
+    """
+    loop, channels = loop_shown(prepared), prepared.epoch.channels
+    if not all(name in channels for name in ("velocity_command_rad_s", "perturbation_nm")):
+        return loop
+    misfit = prepared.once(misfit_of_settings)
+    most = prepared.settings.diagnostics.controller_misfit_most_percent
+    shown = _controller_shown(prepared, loop) if misfit and misfit[0] > most else None
+    return loop if shown is None else replace(loop, controller=shown)
+
+
+def _controller_shown(prepared: PreparedEpoch, loop: Loop) -> ControllerSettings | None:
+    """Return the controller that makes the recorded command, if there is one."""
+    made = command_made(prepared.epoch, loop)
+    shown = made.shown(loop.controller) if made is not None else None
+    most = prepared.settings.diagnostics.controller_misfit_most_percent
+    return None if made is None or shown is None or made.misfit(shown)[0] > most else shown
+
+
+def unstable_loop(parameters: Array, loop: Loop) -> Look | None:
+    """Return the growth per second of the loop of the settings with the joint that was found."""
+    if not np.all(parameters >= 0):
+        return None  # no such joint
+    settings = Settings().model_copy(update={"controller": loop.controller, "rig": loop.rig})
+    radius = spectral_radius(settings, JointDynamics(*parameters.tolist()))
+    value = float(np.log(max(radius, 1e-12))) * loop.rig.tick_rate_hz
+    return at_most(
+        value,
+        0.0,
+        f"with the controller of the settings and this joint the loop's slowest motion changes by "
+        f"a factor of e^({value:.2g}) a second (at most 1)",
+    )
+
+
+def _remedy(given: ControllerSettings, shown: ControllerSettings) -> str:
+    """Return what to give in place of the controller of the settings."""
+    J, B = shown.inertia_kg_m2, shown.damping_nm_s_rad
+    per_deg = per_rad_from_per_deg(1.0)
+    factors = np.array([J / given.inertia_kg_m2, B / max(given.damping_nm_s_rad, 1e-12)])
+    why = ""
+    for wrong, text in (
+        (per_deg, "; those of the settings are per degree, as it seems"),
+        (1.0 / per_deg, "; those of the settings were multiplied by 57.3, as it seems"),
+    ):
+        if np.all(np.abs(np.log(factors / wrong)) < np.log(PER_DEGREE_WITHIN)):
+            why = text
+    return f"{REMEDY}; the recording shows {J:.3g} kg·m² and {B:.3g} N·m·s/rad{why}"
+
+
+def _harmless(case: Case, look: Look) -> str:
+    """Return why a wrong controller does not bias the estimate; empty where it does."""
+    if case.uses_perturbation and case.method is not None:
+        return f"{case.method.name} is less precise with it, not biased"
+    # Of a loop that is not known the bias cannot be told.
+    return push_harmless(case, look) if look.remedy else ""
+
+
+def _loop_harmless(case: Case, look: Look) -> str:
+    if case.uses_perturbation and case.method is not None:
+        return (
+            f"{case.method.name} takes the motion that the perturbation would cause without "
+            "feedback, so it is less precise, not biased"
+        )
+    return push_harmless(case, look)
+
+
+CONTROLLER_CHECKS = (
+    Check(
+        "controller_misfit",
+        ("velocity_command_rad_s", "perturbation_nm"),
+        lambda c: controller_misfit(c.prepared, c.loop) if c.prepared and c.loop else None,
+        "what is computed of the loop is that of another one",
+        REMEDY,
+        of_fit=False,
+        harmless=_harmless,
+    ),
+    Check(
+        "unstable_loop",
+        ("perturbation_nm",),
+        lambda c: unstable_loop(c.parameters, c.loop) if c.loop is not None else None,
+        "the joint or the controller was another one",
+        REMEDY,
+        harmless=_loop_harmless,
+    ),
+)

@@ -1,0 +1,134 @@
+"""Every check, and what those find that an epoch allows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigidimeter.analysis.estimation.bandlimited import bandlimited_signals
+from rigidimeter.analysis.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
+from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look
+from rigidimeter.analysis.estimation.diagnostics.computed_torque_checks import (
+    COMPUTED_TORQUE_CHECKS,
+    STATIC_TORQUE_CHECKS,
+)
+from rigidimeter.analysis.estimation.diagnostics.controller_checks import (
+    CONTROLLER_CHECKS,
+    controller_used,
+)
+from rigidimeter.analysis.estimation.diagnostics.controller_used import loop_shown
+from rigidimeter.analysis.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
+from rigidimeter.analysis.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
+from rigidimeter.analysis.estimation.diagnostics.missing_term import MISSING_TERM_CHECKS
+from rigidimeter.analysis.estimation.diagnostics.motion_checks import MOTION_CHECKS
+from rigidimeter.analysis.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
+from rigidimeter.analysis.estimation.diagnostics.tremor_check import TREMOR_CHECKS
+from rigidimeter.analysis.estimation.diagnostics.varying_checks import VARYING_CHECKS
+from rigidimeter.analysis.estimation.least_squares_bias import compensated
+from rigidimeter.analysis.estimation.methods import method_named
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimation.signals import Array
+from rigidimeter.core.records import Finding, Fit, Outcome
+from rigidimeter.core.units import rad_from_deg
+
+CHECKS: list[Check] = [
+    *COMPUTED_TORQUE_CHECKS,
+    *CHANNEL_CHECKS,
+    *MOTION_CHECKS,
+    *EXCITATION_CHECKS,
+    *STATIC_TORQUE_CHECKS,
+    *RESIDUAL_CHECKS,
+    *MISSING_TERM_CHECKS,
+    *MOVEMENT_CHECKS,
+    *TREMOR_CHECKS,
+    *VARYING_CHECKS,
+    *PARAMETER_CHECKS,
+    *CONTROLLER_CHECKS,
+]
+"""Every check of an epoch. Code from outside the package may append its own."""
+
+
+def diagnose(
+    case: Case,
+    seen: Mapping[str, Look | None] | None = None,
+    checks: Sequence[Check] = CHECKS,
+) -> tuple[Finding, ...]:
+    """Run the checks for which there is something to look at; passed ones are among the findings.
+
+    What several epochs show together is found by `together.checked_together` and, for
+    `varying_between_epochs`, where they are fitted together.
+
+    Parameters
+    ----------
+    case : Case
+    seen : mapping of str to Look, optional
+        What the checks of the epoch alone have seen already, by name.
+    checks : sequence of Check
+    """
+    seen = seen or {}
+    found = []
+    for check in checks:
+        look = seen[check.name] if check.name in seen else check.looks(case)
+        if look is not None:
+            reason = check.harmless(case, look) if look.failed else ""
+            found.append(check.finding(look, case.settings, reason))
+    return tuple(found)
+
+
+def checked(prepared: PreparedEpoch, fit: Fit, *, exclusions_alone: bool = False) -> Fit:
+    """Return the fit with what the checks found, excluded if one of them says so.
+
+    Parameters
+    ----------
+    prepared : PreparedEpoch
+    fit : Fit
+    exclusions_alone : bool
+        Run those checks alone that may exclude the epoch.
+    """
+    if fit.n_samples == 0 or prepared.obstacle:
+        return fit  # the fit has said why
+    method = method_named(fit.method)
+    by_loop = None if method.uses_perturbation else prepared.once(unbiased)
+    case = replace(_case(prepared, fit.value), fit=fit, method=method, unbiased=by_loop)
+    checks = [c for c in CHECKS if not exclusions_alone or c.level(case.settings) == "exclude"]
+    findings = diagnose(case, prepared.once(_seen_without_fit), checks)
+    failed = [finding for finding in findings if finding.remedy]
+    grave = [finding for finding in failed if finding.level == "exclude"]
+    outcome = fit.outcome
+    if grave and outcome.included:
+        outcome = Outcome("excluded", f"{grave[0].text}; {grave[0].remedy}")
+    return replace(fit, outcome=outcome, findings=(*fit.findings, *failed))
+
+
+def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
+    epoch, settings = prepared.epoch, prepared.settings
+    from_session = epoch.excitation_hz is not None
+    limit_rad = rad_from_deg(settings.guard.position_limit_deg) if from_session else None
+    signals = prepared.signals(bandlimited_signals)
+    return Case(
+        epoch,
+        signals,
+        parameters,
+        settings.diagnostics,
+        position_limit_rad=limit_rad,
+        loop=loop_shown(prepared),
+        prepared=prepared,
+    )
+
+
+def unbiased(prepared: PreparedEpoch) -> Array:
+    """Return J, B and K by least squares without the bias of the loop; NaN where it is too large.
+
+    The loop is the one that the settings describe, with drive and controller that the recording
+    shows.
+    """
+    found = compensated(prepared.signals(bandlimited_signals), controller_used(prepared))
+    return np.full(3, np.nan) if found is None else found
+
+
+def _seen_without_fit(prepared: PreparedEpoch) -> dict[str, Look | None]:
+    """Return what the checks see that do not look at J, B and K."""
+    case = _case(prepared, np.full(3, np.nan))
+    return {check.name: check.looks(case) for check in CHECKS if not check.of_fit}

@@ -1,0 +1,217 @@
+"""Whether the joint moved in a way that can tell J, B and K apart.
+
+Acceleration and angle of a motion at a single frequency ω are in proportion, θ'' = −ω² θ, so J and
+K trade against each other; of a drift, or of a push in one direction, velocity and angle
+are alike too. What the regressors have in common shows in the singular values of the columns scaled
+to unit length: their ratio is 1 where nothing, and infinite where everything is shared.
+
+Coherence is the share of a signal's power, line by line, that follows the perturbation linearly.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy import fft, signal
+
+from rigidimeter.analysis.estimation.between_epochs import in_full
+from rigidimeter.analysis.estimation.diagnostics.check_record import (
+    Check,
+    Look,
+    at_least,
+    at_most,
+    push_harmless,
+)
+from rigidimeter.analysis.estimation.power_lines import lines_inside, power_lines
+from rigidimeter.analysis.estimation.scores import line_shares
+from rigidimeter.analysis.estimation.signals import Array, Signals, values_at, velocity_at
+from rigidimeter.core.records import PARAMETERS, Channel, Epoch
+from rigidimeter.core.settings import DiagnosticsSettings
+
+MIDDLE_PERCENT = 90.0
+TAPERED_LINES = 1.5
+"""The equivalent noise bandwidth of Hann's window, in lines."""
+
+SEGMENTS = 8
+"""Stretches, half overlapping, over which a coherence is averaged: 4 s each in an epoch of 18 s.
+
+Signals that have nothing to do with each other then still show about 0.2.
+"""
+
+
+def conditioning(signals: Signals, settings: DiagnosticsSettings) -> Look:
+    """Return whether the regressors can be told apart, and if not which two and because of what."""
+    solution, most = signals.solution, settings.condition_number_most
+    if not np.all(solution.lengths > 0):
+        return Look(
+            math.inf,
+            most,
+            True,
+            f"the condition number of the motion is infinite (at most {most:g})",
+            "the joint did not move",
+        )
+    value = solution.condition_number
+    # The weakest direction adds and subtracts what cannot be told apart.
+    first, second = sorted(np.argsort(np.abs(solution.right[-1]))[-2:])
+    low_hz, high_hz = _middle_hz(signals)
+    return at_most(
+        value,
+        most,
+        f"the condition number of the motion is {in_full(value, '.3g', limit=most)} "
+        f"(at most {most:g})",
+        meaning=(
+            f"this epoch cannot distinguish {PARAMETERS[first].symbol} from "
+            f"{PARAMETERS[second].symbol}, because {MIDDLE_PERCENT:g} % of the velocity's power "
+            f"lies between {low_hz:.2g} and {high_hz:.2g} Hz"
+        ),
+    )
+
+
+def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Look:
+    """Return how far torque and velocity follow the perturbation, by Welch's method.
+
+    The value is the median over the lines of the band, for the weaker of the two.
+    """
+    cause = perturbation_nm(epoch.channels["perturbation_nm"], signals.time_s)
+    shared = _coherence(cause, np.stack([signals.torque_nm, signals.velocity_rad_s]), signals)
+    values = dict(zip(("torque", "velocity"), np.median(shared, axis=1).tolist(), strict=True))
+    weaker = min(values, key=lambda name: values[name])
+    value, least = values[weaker], settings.coherence_least
+    return at_least(
+        value,
+        least,
+        (
+            f"the coherence of perturbation and {weaker} has a median of "
+            f"{in_full(value, '.2f', limit=least)} in the band (at least {least:g})"
+        ),
+        meaning=(
+            f"only {100 * value:.0f} % of the {weaker}'s power follows the perturbation; the rest "
+            "is torque that something but the robot adds, noise, or a joint that is not linear"
+        ),
+    )
+
+
+def _coherence(cause: Array, effects: Array, signals: Signals) -> Array:
+    """Return the coherence of a cause with each effect at the lines of the band, shape (2, m).
+
+    As `scipy.signal.coherence` has it with segments that overlap by half, but every spectrum once.
+    """
+    length = fft.prev_fast_len(max(2 * signals.time_s.size // (SEGMENTS + 1), 8), real=True)
+    frequency = fft.rfftfreq(length, 1.0 / signals.rate_hz)
+    inside = lines_inside(frequency, signals.band_hz)
+    whole = np.concatenate([cause[None], effects])
+    parts = sliding_window_view(whole, length, axis=1)[:, :: length - length // 2]
+    parts = parts - np.mean(parts, axis=2, keepdims=True)
+    spectra = fft.rfft(parts * signal.windows.hann(length, sym=False))[:, :, inside]
+    power = np.mean(np.abs(spectra) ** 2, axis=1)
+    together = np.mean(spectra[0].conj() * spectra[1:], axis=1)
+    return np.asarray(np.abs(together) ** 2 / (power[0] * power[1:]))
+
+
+def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Look:
+    """Return how much of the recorded torque and velocity lies in the band of the fit."""
+    torque = values_at(epoch.channels["torque_nm"], signals.time_s)
+    velocity = velocity_at(epoch, signals.time_s)
+    shares = {
+        "torque": _share(torque, signals.rate_hz, signals.band_hz),
+        "velocity": _share(velocity, signals.rate_hz, signals.band_hz),
+    }
+    weaker = min(shares, key=lambda name: shares[name])
+    value, least = 100.0 * shares[weaker], settings.band_share_least_percent
+    low, high = signals.band_hz
+    return at_least(
+        value,
+        least,
+        (
+            f"{in_full(value, '.0f', limit=least)} % of the {weaker}'s power lies in the band, "
+            f"{low:g} to {high:.3g} Hz (at least {least:g} %)"
+        ),
+    )
+
+
+def imposed_sinusoid(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
+    """Return whether the motion is a single sinusoid, which no fit of three parameters can use."""
+    shares, most = line_shares(epoch), settings.single_frequency_most_percent
+    value = 100.0 * shares.angle
+    return Look(
+        value,
+        most,
+        shares.single(most / 100.0),
+        f"the strongest line holds {in_full(value, '.0f', limit=most)} % of the angle's "
+        f"variance (at most {most:g} %) and {100 * shares.velocity:.0f} % of the velocity's",
+    )
+
+
+def perturbation_nm(channel: Channel, time_s: Array) -> Array:
+    """Return the perturbation at the given times, held from one tick to the next."""
+    # A tick of rounding must not turn a value into the one before.
+    index = np.searchsorted(channel.time_s, time_s + 1e-9, side="right") - 1
+    return channel.values[np.maximum(index, 0)]
+
+
+def _share(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> float:
+    """Return the share of the power of a signal about its mean that lies in a band.
+
+    The first line of a perturbation may lie less than a line above the lower edge: what the taper
+    does not tell from the band is not outside it.
+    """
+    frequency, power = power_lines(values, rate_hz, tapered=True)
+    reach_hz = TAPERED_LINES / 2 * float(frequency[1])
+    total = float(np.sum(power[1:]))
+    low_hz, high_hz = band_hz
+    inside = lines_inside(frequency, (low_hz - reach_hz, high_hz + reach_hz))
+    return float(np.sum(power[inside])) / total if total > 0 else 0.0
+
+
+def _middle_hz(signals: Signals) -> tuple[float, float]:
+    """Return between which frequencies the middle of the velocity's power lies."""
+    frequency, power = power_lines(signals.velocity_rad_s, signals.rate_hz, tapered=True)
+    running = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
+    outside = (1.0 - MIDDLE_PERCENT / 100.0) / 2.0
+    low, high = np.searchsorted(running, [outside, 1.0 - outside])
+    return float(frequency[low]), float(frequency[min(high, frequency.size - 1)])
+
+
+EXCITATION_CHECKS = (
+    Check(
+        "conditioning",
+        (),
+        lambda c: conditioning(c.signals, c.settings),
+        "the motion cannot distinguish J, B and K",
+        "use a perturbation with more frequencies, or hold J at the median of other epochs",
+        of_fit=False,
+    ),
+    Check(
+        "imposed_sinusoid",
+        (),
+        lambda c: imposed_sinusoid(c.epoch, c.settings),
+        "the motion is a sinusoid, in which J and K are one number, K − J ω²",
+        "score it as an imposed sinusoid (--task sinusoid), or use a PRBS",
+        of_fit=False,
+    ),
+    Check(
+        "band_share",
+        (),
+        lambda c: band_share(c.epoch, c.signals, c.settings),
+        "most of what was measured is drift below or noise above what is fitted",
+        (
+            "look for drift of the sensor and for slow pushes; check the rate and the unit of the "
+            "time; set estimation.band_low_hz and band_high_hz to what was perturbed"
+        ),
+        of_fit=False,
+    ),
+    Check(
+        "coherence",
+        ("perturbation_nm",),
+        lambda c: coherence(c.epoch, c.signals, c.settings),
+        (
+            "the rest is torque that something but the robot adds, noise, or a joint that is not "
+            "linear"
+        ),
+        "perturb more strongly, pool epochs by iv, or repeat while the robot alone moves it",
+        of_fit=False,
+        harmless=push_harmless,
+    ),
+)

@@ -1,0 +1,303 @@
+"""Whether the fit explains the torque, and whether a joint can have these numbers.
+
+A residual that is white within the band carries nothing more to be explained, and textbook standard
+errors hold for it. One that still follows the perturbation says that the model lacks something: a
+delay between the channels, a reflex, a joint that is not linear.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy import fft
+from scipy.special import digamma
+
+from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
+from rigidimeter.analysis.estimation.between_epochs import in_full
+from rigidimeter.analysis.estimation.diagnostics.check_record import (
+    Case,
+    Check,
+    Look,
+    at_least,
+    push_harmless,
+)
+from rigidimeter.analysis.estimation.diagnostics.excitation_checks import perturbation_nm
+from rigidimeter.analysis.estimation.power_lines import lines_inside, power_lines
+from rigidimeter.analysis.estimation.signals import Array, Signals
+from rigidimeter.analysis.estimation.terms.explained import explained
+from rigidimeter.core.records import Epoch
+from rigidimeter.core.settings import DiagnosticsSettings
+from rigidimeter.core.units import rad_from_deg
+
+LINES_TOGETHER = 8
+LONGEST_LAG_S = 1.0
+
+
+def residual_whiteness(residual_nm: Array, signals: Signals, settings: DiagnosticsSettings) -> Look:
+    """Return the spectral flatness of the residual within the band: 1 for white.
+
+    The geometric over the arithmetic mean of the power, lines taken eight together; their mean
+    logarithm is that of white noise less ln 8 − ψ(8), which is made up for.
+    """
+    frequency, power = power_lines(residual_nm, signals.rate_hz)
+    power = power[lines_inside(frequency, signals.band_hz)]
+    groups = max(power.size // LINES_TOGETHER, 1)
+    means = power[: groups * LINES_TOGETHER].reshape(groups, -1).mean(axis=1)
+    value, least = math.nan, settings.residual_flatness_least
+    if np.all(means > 0):
+        made_up = math.log(LINES_TOGETHER) - float(digamma(LINES_TOGETHER))
+        value = min(float(np.exp(np.mean(np.log(means)) + made_up) / np.mean(means)), 1.0)
+    return at_least(
+        value,
+        least,
+        f"the residual's spectral flatness in the band is "
+        f"{in_full(value, '.2f', limit=least)} (at least {least:g})",
+    )
+
+
+def residual_perturbation(
+    epoch: Epoch, residual_nm: Array, signals: Signals, settings: DiagnosticsSettings
+) -> Look:
+    """Return how much of the torque follows the perturbation and is yet not explained.
+
+    The largest correlation of residual and perturbation, at any lag up to 1 s either way, times the
+    residual's share of the torque: in % of the torque's standard deviation. A correlation that two
+    independent signals of these spectra reach in one of 20 epochs is none.
+    """
+    cause = perturbation_nm(epoch.channels["perturbation_nm"], signals.time_s)
+    if signals.band_hz[0] > 0:
+        cause = zero_phase_band(cause, signals.rate_hz, signals.band_hz)
+    cause, residual = cause - cause.mean(), residual_nm - residual_nm.mean()
+    size = float(np.linalg.norm(cause) * np.linalg.norm(residual))
+    lag = min(round(LONGEST_LAG_S * signals.rate_hz), residual.size - 1)
+    # As many zeros as lags, so that no end meets the other.
+    length = fft.next_fast_len(residual.size + lag, real=True)
+    both = fft.rfft(residual, length) * fft.rfft(cause, length).conj()
+    together = fft.irfft(both, length) / (size or math.inf)
+    near = together[np.arange(-lag, lag + 1)]
+    at = int(np.argmax(np.abs(near)))
+    delay_s = (at - lag) / signals.rate_hz
+    r = float(abs(near[at]))
+    chance = _chance_correlation(residual, cause, signals.rate_hz, lag)
+    sd = float(np.std(signals.torque_nm))
+    value = 100.0 * r * float(np.std(residual)) / sd if sd > 0 else math.nan
+    most = settings.residual_perturbation_most_percent
+    return Look(
+        value,
+        most,
+        not (value <= most or r <= chance),
+        (
+            f"what is left over follows the perturbation by {in_full(value, limit=most)} % of the "
+            f"torque's SD (at most {most:g} %; correlation {r:.2f} at a lag of {delay_s:.2g} s, "
+            f"by chance up to {chance:.2f})"
+        ),
+    )
+
+
+def _chance_correlation(a: Array, b: Array, rate_hz: float, lag: int) -> float:
+    """Return what the largest of the correlations up to a lag stays below by chance, 19 in 20.
+
+    Independent signals correlate with variance Σ P_a P_b / (Σ P_a Σ P_b) over all lines (Bartlett
+    1935). As the lag runs, a Gaussian correlation of rms frequency ν passes ±u standard deviations
+    2 ν T exp(−u²/2) times on average (Rice 1944), which is set to 1/20.
+    """
+    n = fft.prev_fast_len(a.size)  # a transform of any number may take many times as long
+    power_a, power_b = np.abs(fft.rfft(a[:n])) ** 2, np.abs(fft.rfft(b[:n])) ** 2
+    power = power_a * power_b
+    total = float(np.sum(power_a) * np.sum(power_b))
+    if total == 0.0:
+        return 0.0
+    # One-sided sums hold half of each: ½ remains.
+    deviation = math.sqrt(0.5 * float(np.sum(power)) / total)
+    frequency = fft.rfftfreq(n, 1.0 / rate_hz)
+    rms_hz = math.sqrt(float(np.sum(frequency**2 * power)) / float(np.sum(power)))
+    crossings = max(2.0 * rms_hz * 2.0 * lag / rate_hz, 0.1)
+    return deviation * math.sqrt(2.0 * math.log(crossings / 0.05))
+
+
+def held_out_vaf(signals: Signals, settings: DiagnosticsSettings) -> Look:
+    """Return how much of the second half's torque the parameters of the first half explain."""
+    half, torque = signals.time_s.size // 2, signals.torque_nm
+    rows = np.column_stack([signals.motion, torque])[:half]
+    upper = np.asarray(np.linalg.qr(rows, mode="r"))
+    left = torque[half:] - signals.motion[half:] @ explained(upper[:, :-1], upper[:, -1]).values
+    variance, least = float(np.var(torque[half:])), settings.held_out_vaf_least_percent
+    value = 100.0 * (1.0 - float(np.var(left)) / variance) if variance > 0 else math.nan
+    return at_least(
+        value,
+        least,
+        (
+            f"the first half's J, B and K explain {in_full(value, '.1f', limit=least)} % of the "
+            f"second half's torque (at least {least:g} %)"
+        ),
+    )
+
+
+def r_squared(value: float, settings: DiagnosticsSettings) -> Look:
+    """Return the share of the torque that J, B and K explain."""
+    least = settings.r_squared_least
+    return at_least(value, least, f"R² is {in_full(value, limit=least)} (at least {least:g})")
+
+
+def negative_parameters(parameters: Array, high: Array | None = None) -> Look:
+    """Return how many of J, B and K are not above zero (none may be).
+
+    `high` are the upper ends of their intervals: a sign that noise may have made says nothing.
+    """
+    wrong = [name for name, value in zip("JBK", parameters, strict=True) if not value > 0]
+    if not wrong:
+        return Look(0.0, 0.0, False, "J, B and K are above zero")
+    verb = "is" if len(wrong) == 1 else "are"
+    fact = f"{' and '.join(wrong)} {verb} not above zero (0 of 3 may be)"
+    if len(wrong) < len(parameters):
+        return Look(float(len(wrong)), 0.0, True, fact)
+    if high is not None and np.any(np.asarray(high) > 0):
+        meaning = "not all of their intervals lie below zero, so the torque says little of a joint"
+        return Look(float(len(wrong)), 0.0, True, fact, meaning, "check which column is the torque")
+    meaning = "the torque has the sign of the joint's reaction"
+    return Look(float(len(wrong)), 0.0, True, fact, meaning, "say --reaction")
+
+
+def implausible_parameters(parameters: Array, settings: DiagnosticsSettings) -> Look:
+    """Return by what factor the worst of J, B and K is outside its range; at most 1 is inside.
+
+    Only sizes are looked at; signs are another check's business.
+    """
+    J, B, K = parameters
+    least = settings.inertia_least_kg_m2
+    factors = {
+        f"J = {J:.3g} kg·m² is large": abs(J) / settings.inertia_most_kg_m2,
+        f"J = {J:.3g} kg·m² is small": least / abs(J) if J != 0 else math.inf,
+        f"B = {B:.3g} N·m·s/rad is large": abs(B) / settings.damping_most_nm_s_rad,
+        f"K = {K:.3g} N·m/rad is large": abs(K) / settings.stiffness_most_nm_rad,
+    }
+    worst = max(factors, key=lambda text: factors[text])
+    value = factors[worst]
+    failed = not value <= 1.0
+    return Look(
+        value,
+        1.0,
+        failed,
+        (
+            f"{worst}, {value:.3g} times the end of its range (at most 1)"
+            if failed
+            else "J, B and K are within the ranges of joints"
+        ),
+    )
+
+
+def gravity(
+    angle_rad: Array, stiffness_nm_rad: float, settings: DiagnosticsSettings
+) -> Look | None:
+    """Return K without the slope of the limb's weight; None where that is not in the settings.
+
+    A limb at the angle θ from hanging straight down takes the torque m g l sin θ, whose slope
+    m g l cos θ is in K.
+    """
+    if settings.gravity_nm == 0.0:
+        return None
+    hanging_rad = rad_from_deg(settings.gravity_angle_deg)
+    slope = settings.gravity_nm * float(np.mean(np.cos(hanging_rad + angle_rad)))
+    without = stiffness_nm_rad - slope
+    return Look(
+        without,
+        stiffness_nm_rad,
+        True,
+        f"K of {stiffness_nm_rad:.4g} N·m/rad includes {slope:.4g} of the weight (m g l "
+        f"cos θ); without it K is {without:.4g}",
+    )
+
+
+def _of_least_squares(case: Case, look: Look) -> str:
+    """Return why little of the torque does not bias an instrument; least squares it may."""
+    return push_harmless(case, look) if case.uses_perturbation else ""
+
+
+def _by_chance(case: Case, look: Look) -> str:
+    """Return why a single epoch is no proof; empty where torque of the subject biases the estimate.
+
+    What the perturbation causes beyond J, B and K biases every method, so nothing is claimed of
+    them.
+    """
+    if not push_harmless(case, look):
+        return ""
+    return (
+        "the model lacks something that the perturbation causes, unless this is the one epoch in "
+        "20 that passes the limit by chance; lack_of_fit tests all epochs together"
+    )
+
+
+RESIDUAL_CHECKS = (
+    Check(
+        "residual_whiteness",
+        (),
+        lambda c: residual_whiteness(-c.voluntary_nm, c.signals, c.settings),
+        (
+            "the residual is coloured, by torque that something but the robot adds or by what the "
+            "model lacks, and standard errors for white noise are too small"
+        ),
+        "use the intervals for coloured residuals; see the residual's spectrum",
+        harmless=push_harmless,
+    ),
+    Check(
+        "residual_perturbation",
+        ("perturbation_nm",),
+        lambda c: residual_perturbation(c.epoch, -c.voluntary_nm, c.signals, c.settings),
+        "the model lacks something that the perturbation causes",
+        (
+            "look for a delay between torque and motion, for a reflex, for stiffness that changes "
+            "with the angle; torque that something but the robot adds biases least squares in this "
+            "way too"
+        ),
+        harmless=_by_chance,
+    ),
+    Check(
+        "held_out_vaf",
+        (),
+        lambda c: held_out_vaf(c.signals, c.settings),
+        "the fit does not foresee torque that it has not seen",
+        "look for torque from elsewhere than the robot, and for a change during the epoch",
+        of_fit=False,
+        harmless=push_harmless,
+    ),
+)
+
+PARAMETER_CHECKS = (
+    Check(
+        "gravity",
+        ("angle_rad",),
+        lambda c: gravity(c.epoch.channels["angle_rad"].values, c.parameters[2], c.settings),
+        "the weight is no stiffness of the joint itself",
+        "state which of the two is given",
+    ),
+    Check(
+        "r_squared",
+        (),
+        lambda c: r_squared(c.fit.r_squared, c.settings) if c.fit is not None else None,
+        "most of the torque is not J, B and K, and least squares puts a part of it into them",
+        "look for torque from elsewhere than the robot; record the perturbation and use iv",
+        harmless=_of_least_squares,
+    ),
+    Check(
+        "negative_parameters",
+        (),
+        lambda c: negative_parameters(c.parameters, None if c.fit is None else c.fit.high),
+        (
+            "something but the robot may have pushed, or the channels are delayed relative to each "
+            "other"
+        ),
+        "check the stamps of torque and motion, and see the torque beyond J, B and K",
+    ),
+    Check(
+        "implausible_parameters",
+        (),
+        lambda c: implausible_parameters(c.parameters, c.settings),
+        "a joint of a person or an animal is not like that; a machine's axis may be",
+        (
+            "check the units of torque (N·m) and angle (rad, not degrees) and the time (s); for an "
+            "axis that is so, set the ends of the ranges: inertia_least_kg_m2, inertia_most_kg_m2, "
+            "damping_most_nm_s_rad and stiffness_most_nm_rad in [diagnostics]"
+        ),
+    ),
+)

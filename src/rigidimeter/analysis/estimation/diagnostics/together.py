@@ -1,0 +1,282 @@
+"""What the epochs of a condition show together: lack of fit, other bands, bias of their pool.
+
+The lack of fit and the sensitivity to the band are matters of the joint, not of an epoch, so each
+epoch of the condition carries what was found. They are tested at the J, B and K that the
+perturbation gives, for every method: at those of least squares the subject's own torque would show
+in the residual as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimeter.analysis.estimation.between_epochs import in_full
+from rigidimeter.analysis.estimation.closedloop.band_sensitivity import (
+    BandChange,
+    Member,
+    band_changes,
+)
+from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
+    Answer,
+    Misfit,
+    periodic,
+    proportional,
+    repeated,
+    same_sequence,
+)
+from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
+from rigidimeter.analysis.estimation.closedloop.observation import (
+    Observation,
+    closed_loop_obstacle,
+    observe,
+    observe_periods,
+)
+from rigidimeter.analysis.estimation.closedloop.spectral_lines import Complex
+from rigidimeter.analysis.estimation.diagnostics.band_check import band_estimates, band_finding
+from rigidimeter.analysis.estimation.diagnostics.diagnose import CHECKS, unbiased
+from rigidimeter.analysis.estimation.diagnostics.movement_checks import loop_bias
+from rigidimeter.analysis.estimation.method_record import Method
+from rigidimeter.analysis.estimation.methods import method_named
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimation.signals import Array
+from rigidimeter.core.records import BandEstimate, Finding, Fit
+from rigidimeter.core.settings import DiagnosticsSettings
+
+CHANCE = 1e-4
+"""Probability, over all parts of all tests of a condition, below which it is not noise."""
+
+
+class Together(NamedTuple):
+    """Fits, and fits to all epochs of a condition, with what epochs show together; other bands."""
+
+    fits: list[Fit]
+    pooled: list[Fit]
+    sensitivity: list[BandEstimate]
+
+
+class Observed(NamedTuple):
+    """An epoch with the J, B and K that the perturbation gives, and what it causes at them.
+
+    `caused_wider` is at the lines of the wider band, `fitted` says which of them are the fit's.
+    """
+
+    observation: Observation
+    values: Array
+    caused_wider: Complex
+    fitted: slice
+
+    @property
+    def caused(self) -> Complex:
+        """The motion that the perturbation causes, at the lines of the fit."""
+        return self.caused_wider[self.fitted]
+
+    @property
+    def answer(self) -> Answer:
+        """What the lack of fit is tested with."""
+        lines = self.observation.lines
+        residual = lines.torque_nm - lines.motion @ self.values
+        return Answer(lines.grid, self.caused @ np.maximum(self.values, LEAST), residual)
+
+
+def checked_together(
+    prepared: Sequence[PreparedEpoch],
+    fits: Sequence[Fit],
+    pooled: Sequence[Fit],
+    estimator: Method,
+) -> Together:
+    """Return the fits, and the pooled fits, with what the epochs of each condition show together.
+
+    Parameters
+    ----------
+    prepared, fits : sequences
+        In parallel; those fits that do not count are not looked at.
+    pooled : sequence of Fit
+        Of the conditions, and of all of them.
+    estimator : Method
+        That made them.
+    """
+    counting = [(p, f) for p, f in zip(prepared, fits, strict=True) if f.outcome.included]
+    of_condition: dict[str, list[Finding]] = {}
+    changes: dict[str, list[BandChange]] = {}
+    sensitivity: list[BandEstimate] = []
+    for condition in dict.fromkeys(fit.condition for _, fit in counting):
+        members = [(p, f) for p, f in counting if f.condition == condition]
+        observed, tests = misfits(members, estimator)
+        settings = members[0][0].settings.diagnostics
+        of_condition[condition] = lack_of_fit(tests, observed, settings)
+        values, changes[condition] = in_bands(observed)
+        whole = [f for f in pooled if f.condition == condition and estimator.uses_perturbation]
+        sensitivity += band_estimates(
+            condition, whole[0] if whole else None, values, changes[condition]
+        )
+
+    def shared(fit: Fit) -> list[Finding]:
+        if fit.condition not in of_condition:
+            return []
+        settings = counting[0][0].settings.diagnostics
+        bands = band_finding(fit, changes[fit.condition], settings)
+        return [*of_condition[fit.condition], *bands]
+
+    return Together(
+        [_with(fit, shared(fit)) if fit.outcome.included else fit for fit in fits],
+        [_with(fit, [*shared(fit), *_pooled_bias(fit, counting, estimator)]) for fit in pooled],
+        sensitivity,
+    )
+
+
+def in_bands(observed: Sequence[Observed]) -> tuple[Array, list[BandChange]]:
+    """Return J, B and K of epochs together, and how they change in other bands.
+
+    Parameters
+    ----------
+    observed : sequence of Observed
+        As `misfits` gives them.
+    """
+    members = [
+        Member(one.observation.wider, one.caused_wider, one.fitted, one.values)
+        for one in observed
+        if one.observation.wider is not None
+    ]
+    try:
+        return band_changes(members) if members else (np.full(3, np.nan), [])
+    except np.linalg.LinAlgError:
+        return np.full(3, np.nan), []  # the fits say why
+
+
+def misfits(
+    members: Sequence[tuple[PreparedEpoch, Fit]], estimator: Method
+) -> tuple[list[Observed], list[Misfit]]:
+    """Return the epochs in which the lack of fit can be seen, and what each test says of them.
+
+    Parameters
+    ----------
+    members : sequence of (PreparedEpoch, Fit)
+        Epochs of one condition that count; those without a perturbation are passed over.
+    estimator : Method
+        That made the fits.
+    """
+    known = [(p, f) for p, f in members if not closed_loop_obstacle(p.epoch)]
+    if not estimator.uses_perturbation and known:
+        by_iv, _ = method_named("iv").fit([p for p, _ in known], None, lambda _: None, False)
+        known = [(p, fit) for (p, _), fit in zip(known, by_iv, strict=True) if fit.outcome.included]
+    if not known:
+        return [], []
+    values = np.array([fit.value for _, fit in known])
+    common = np.maximum(np.median(values, axis=0), LEAST)
+    observed: list[Observed] = []
+    made: dict[int, Complex] = {}
+    for (epoch, _), own in zip(known, values, strict=True):
+        try:
+            observed.append(_member(epoch.once(observe), own, common, made))
+        except ValueError:
+            continue  # the fit of the epoch says why
+    if not observed:
+        return [], []
+    return observed, _tested([member.answer for member in observed], known[0], common)
+
+
+def _member(
+    observation: Observation, values: Array, common: Array, made: dict[int, Complex]
+) -> Observed:
+    """Return an epoch as observed; `made` keeps what each perturbation causes, made once."""
+    excitation = observation.excitation
+    assert excitation is not None  # `observe` gives it
+    J, B, K = common.tolist()
+    grid = observation.lines.grid
+    wider = grid if observation.wider is None else observation.wider.grid
+    if id(excitation) not in made:
+        made[id(excitation)] = replace(excitation, grid=wider).motion_lines((J, B, K))
+    first = int(grid.line[0] - wider.line[0])
+    fitted = slice(first, first + grid.line.size)
+    return Observed(observation, values, made[id(excitation)], fitted)
+
+
+def _tested(
+    answers: Sequence[Answer], first: tuple[PreparedEpoch, Fit], common: Array
+) -> list[Misfit]:
+    """Return what each test finds: those of sequences need two epochs or two periods."""
+    found = proportional(answers)
+    together = max(same_sequence(answers), key=len)
+    if len(together) > 1:
+        return found + repeated(together)
+    prepared, fit = first
+    try:
+        periods = prepared.once(observe_periods)
+    except ValueError:
+        return found  # there are not two periods
+    return found + periodic(_member(periods, fit.value, common, {}).answer, periods.excited)
+
+
+def lack_of_fit(
+    found: Sequence[Misfit], observed: Sequence[Observed], settings: DiagnosticsSettings
+) -> list[Finding]:
+    """Return the finding for the part with the largest misfit that is not noise, if any.
+
+    Parameters
+    ----------
+    found : sequence of Misfit
+    observed : sequence of Observed
+        As `misfits` gives them.
+    settings : DiagnosticsSettings
+    """
+    most = settings.lack_of_fit_most_percent
+    sure = [part for part in found if part.p * len(found) < CHANCE and 100 * part.share > most]
+    if not sure:
+        return []
+    worst = max(sure, key=lambda part: part.share)
+    finding = Finding(
+        "lack_of_fit",
+        settings.levels.lack_of_fit,
+        100 * worst.share,
+        most,
+        f"from {worst.low_hz:.3g} to {worst.high_hz:.3g} Hz "
+        f"{in_full(100 * worst.share, limit=most)} % of the torque's response to the "
+        f"perturbation is not J, B and K (at most {most:g} %; by chance p = {worst.p:.1g})"
+        f"{_in_half_the_band(observed)}: friction, a reflex, a soft cuff or a "
+        "lag of a channel is taken for the joint",
+        "lower the upper edge of the band (--band-hz) and see whether J and B change; look at the "
+        "coupling; `rigidimeter model --compare` tries terms for it",
+    )
+    return [finding]
+
+
+def _in_half_the_band(observed: Sequence[Observed]) -> str:
+    """Say how far J, B and K are different where only the lower half of the band is fitted."""
+    found = []
+    for share in (1.0, 0.5):
+        gram, moment = np.zeros((3, 3)), np.zeros(3)
+        for member in observed:
+            lines = member.observation.lines
+            part = slice(0, int(share * lines.torque_nm.size))
+            power = np.abs(lines.torque_nm[part] - lines.motion[part] @ member.values) ** 2
+            weighted = member.caused[part] / np.mean(power)
+            gram += (weighted.conj().T @ lines.motion[part]).real
+            moment += (weighted.conj().T @ lines.torque_nm[part]).real
+        scale = np.sqrt(np.abs(np.diag(gram)))
+        found.append(np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale)
+    J, B, K = 100 * (found[1] / found[0] - 1)
+    return f"; the lower half of the band gives J {J:+.2g} %, B {B:+.2g} %, K {K:+.2g} %"
+
+
+def _pooled_bias(
+    fit: Fit, counting: Sequence[tuple[PreparedEpoch, Fit]], estimator: Method
+) -> list[Finding]:
+    """Return the bias of a pooled fit by least squares, where it is more than its interval."""
+    if estimator.uses_perturbation:
+        return []
+    own = [(p, f) for p, f in counting if fit.condition in ("", f.condition)]
+    if not own:
+        return []
+    bias = np.mean([one.value - p.once(unbiased) for p, one in own], axis=0)
+    settings = own[0][0].settings.diagnostics
+    look = loop_bias(fit, fit.value - bias, settings)
+    (check,) = (check for check in CHECKS if check.name == "loop_bias")
+    return [check.finding(look, settings)] if look.failed else []
+
+
+def _with(fit: Fit, findings: Sequence[Finding]) -> Fit:
+    return replace(fit, findings=(*fit.findings, *findings)) if findings else fit

@@ -1,0 +1,152 @@
+"""Torque models of one epoch, behind the checks that an estimate of it has to pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from rigidimeter.analysis.estimation.bandlimited import band_hz
+from rigidimeter.analysis.estimation.diagnostics import checked
+from rigidimeter.analysis.estimation.methods import method_named
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimation.signals import motion_channels
+from rigidimeter.analysis.estimation.stretches import longest_part
+from rigidimeter.analysis.estimation.terms import (
+    Comparison,
+    compare_models,
+    fit_model,
+    fit_models,
+    wideband_signals,
+)
+from rigidimeter.core.records import Finding, Fit
+from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE
+
+REFUSING = ("conditioning",)
+"""Checks that forbid a choice of terms though an estimate only is in doubt: where J, B and K cannot
+be told apart, further terms cannot either."""
+
+
+class EpochModels(NamedTuple):
+    """The models of one epoch, the band they were fitted in, and what the checks found."""
+
+    band_hz: tuple[float, float]
+    compared: Comparison
+    findings: tuple[Finding, ...]
+
+
+def model_epoch(
+    prepared: PreparedEpoch,
+    models: Sequence[Sequence[str]],
+    *,
+    compare: bool = False,
+    grow: bool = False,
+    high_hz: float | None = None,
+) -> EpochModels:
+    """Fit models to an epoch, or compare them.
+
+    Parameters
+    ----------
+    prepared : PreparedEpoch
+        With torque and motion on one clock.
+    models : sequence of sequences of str
+        The terms of each.
+    compare : bool
+        Let each model predict what it has not seen, and recommend one.
+    grow : bool
+        As for `compare_models`.
+    high_hz : float, optional
+        The upper edge of a band that begins at 0 Hz, instead of the band of the settings.
+
+    Raises
+    ------
+    ValueError
+        If the epoch cannot be used; the text says why.
+    """
+    band = _band_hz(prepared, high_hz)
+    epoch, estimation = prepared.epoch, prepared.settings.estimation
+    fit = _estimate(prepared)
+    motion = wideband_signals(longest_part(epoch), band[1])
+    if not compare:
+        fitted = fit_models(motion, models, band, estimation.trim_s)
+        return EpochModels(band, fitted, fit.findings)
+    compared = compare_models(motion, models, band, estimation.trim_s, grow=grow)
+    refused = _refused(fit)
+    if refused and compared.recommended is not None:
+        compared = replace(compared, recommended=None, reason=refused)
+    return EpochModels(band, compared, fit.findings)
+
+
+def clock_of_models(
+    aligned: PreparedEpoch,
+    recorded: PreparedEpoch,
+    models: Sequence[Sequence[str]],
+    *,
+    high_hz: float | None = None,
+) -> tuple[PreparedEpoch, str]:
+    """Return the epoch on the clock on which its models explain more of the torque, and a remark.
+
+    The delay of the torque is found with J, B and K alone. Friction and a reflex look like a delay
+    to them, so where terms are asked for that may be what was taken for one, both clocks are tried.
+
+    Parameters
+    ----------
+    aligned, recorded : PreparedEpoch
+        With the delay corrected, and as recorded; the same object where there is none.
+    models, high_hz
+        As for `model_epoch`.
+
+    Raises
+    ------
+    ValueError
+        If the epoch cannot be used; the text says why.
+    """
+    if aligned is recorded:
+        return aligned, ""
+    vaf_percent = []
+    for prepared in (aligned, recorded):
+        band = _band_hz(prepared, high_hz)
+        motion = wideband_signals(longest_part(prepared.epoch), band[1])
+        trim_s = prepared.settings.estimation.trim_s
+        fits = [fit_model(motion, model, band, trim_s).fit for model in models]
+        vaf_percent.append(max((fit.vaf_percent for fit in fits if fit), default=0.0))
+    if vaf_percent[0] >= vaf_percent[1]:
+        return aligned, ""
+    first_s = recorded.epoch.channels["torque_nm"].time_s[0]
+    delay_ms = 1e3 * (first_s - aligned.epoch.channels["torque_nm"].time_s[0])
+    left = [f"{100 - one:.2g} %" for one in vaf_percent]
+    return recorded, (
+        f"torque as recorded: J, B and K alone would have it {delay_ms:.2g} ms late, but these "
+        f"terms leave {left[1]} of its variance as recorded and {left[0]} if it is moved"
+    )
+
+
+def _band_hz(prepared: PreparedEpoch, high_hz: float | None) -> tuple[float, float]:
+    if prepared.obstacle:
+        raise ValueError(prepared.obstacle)
+    epoch = prepared.epoch
+    if high_hz is None:
+        return band_hz(epoch, prepared.settings.estimation)
+    used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
+    slowest_hz = min(channel.rate_hz for channel in used)
+    return (0.0, min(high_hz, USABLE_FRACTION_OF_RATE * slowest_hz))
+
+
+def _estimate(prepared: PreparedEpoch) -> Fit:
+    """Return J, B and K by least squares, as the models are fitted, with what the checks found.
+
+    By `iv` they would not be biased by torque of the subject's own, and checks would say so of
+    models that are.
+    """
+    (fit,), _ = method_named("bandlimited").fit([prepared], None, lambda _: None, False)
+    return checked(prepared, fit)
+
+
+def _refused(fit: Fit) -> str:
+    """Return why no model may be recommended for an epoch, or an empty text."""
+    if fit.outcome.kind in ("excluded", "failed"):
+        return f"none of these models is recommended for this epoch: {fit.outcome.reason}"
+    for finding in fit.findings:
+        if finding.name in REFUSING:
+            return f"none of these models is recommended for this epoch: {finding.text}"
+    return ""

@@ -1,0 +1,199 @@
+"""Neurodata Without Borders: one session, one HDF5 file.
+
+    acquisition              what was measured: torque, motion, lateness of the loop, EMG
+    stimulus                 what was commanded: torque perturbation, angle
+    processing/recording     counts and status words of the loop and its devices
+    intervals/trials         a row for each epoch and each rest
+    intervals/dbs_settings   the stimulation, where it is known
+    events                   what happened, by time
+    processing/rigidimeter   tables of estimates, scores and ratings
+    scratch                  the controller's settings, and the whole document, as JSON
+
+Time stamps are explicit unless they are even to 1e-9 s, for which NWB asks for a rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from hashlib import blake2b
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigidimeter.analysis.export.exported_sessions import ExportedSession
+from rigidimeter.analysis.export.names import label, subject_label
+from rigidimeter.analysis.export.nwb_tables import (
+    add_events,
+    add_stimulation,
+    add_tables,
+    add_trials,
+)
+from rigidimeter.analysis.reading.formats.clocked_table import ROUNDING_S, Stream
+from rigidimeter.core.files import json_text
+
+if TYPE_CHECKING:
+    from pynwb import NWBFile, TimeSeries
+
+SIMULATED = (
+    "Simulated: computed by a virtual rig from a model of the joint; there was no living subject."
+)
+UNKNOWN_START = datetime(1900, 1, 1, tzinfo=UTC)
+UNKNOWN_AGE = "P0D/"
+"""ISO 8601, from 0 days on."""
+
+_SERIES: Mapping[str, tuple[str, str, str, str]] = {
+    "torque_nm": (
+        "acquisition", "TorqueMeasured", "N·m",
+        "Torque applied to the joint, positive when it drives the joint toward positive angles.",
+    ),
+    "angle_rad": ("acquisition", "{joint}Angle", "radians", "Angle of the joint."),
+    "velocity_rad_s": ("acquisition", "{joint}AngularVelocity", "rad/s", "Measured velocity."),
+    "velocity_command_rad_s": (
+        "acquisition", "AngularVelocityCommand", "rad/s", "Velocity sent to the drive.",
+    ),
+    "lateness_s": (
+        "acquisition", "ControlLoopLateness", "s", "How late each tick of the loop was.",
+    ),
+    "emg_v": ("acquisition", "EMG", "V", "Raw electromyogram of one muscle."),
+    "perturbation_nm": (
+        "stimulus", "TorquePerturbation", "N·m", "Torque that the perturbation commanded.",
+    ),
+    "target_angle_rad": (
+        "stimulus", "AngleCommand", "radians", "Angle that was commanded; NaN where none was.",
+    ),
+}  # fmt: skip
+
+
+def write_nwb(session: ExportedSession, path: Path) -> None:
+    """Write one session.
+
+    Raises
+    ------
+    ImportError
+        If pynwb is not installed.
+    """
+    from pynwb import NWBHDF5IO
+
+    file = _file(session.about)
+    _add_streams(file, session)
+    add_trials(file, session.about)
+    add_stimulation(file, session.about)
+    add_events(file, session.about)
+    add_tables(file, session.about)
+    file.add_scratch(
+        json_text(session.about["settings"]["controller"]),
+        name="controller_settings",
+        description="Settings of the admittance controller, JSON, units in the names.",
+    )
+    file.add_scratch(
+        json_text(session.about),
+        name="rigidimeter_document",
+        description=f"All that is known of the session, JSON, {session.about['schema']}.",
+    )
+    with NWBHDF5IO(path, "w") as io:
+        io.write(file)
+
+
+def _file(about: Mapping[str, Any]) -> NWBFile:
+    from pynwb import NWBFile
+    from pynwb.file import Subject
+
+    archive, recorded = about.get("archive", {}), about["recorded"]
+    participant = about.get("participant", {})
+    joint, virtual = about["joint"], about["virtual"]
+    tasks = sorted({str(epoch["task"]) for epoch in about["epochs"] if epoch["task"]})
+    condition = f" Condition {about['condition']}." if about["condition"] else ""
+    coded = " The condition is a blinded code." if about.get("blinded") else ""
+    started = recorded.get("created_utc", "")
+    age_years = participant.get("age_years")
+    name, _, version = str(about["software"]).partition(" ")
+    digest = blake2b(json_text(about).encode(), digest_size=16).hexdigest()
+    return NWBFile(
+        session_description=(
+            f"{SIMULATED + ' ' if virtual else ''}Rigidity of the {joint}: torque and motion under "
+            f"a robot's perturbation ({', '.join(tasks) or 'task unknown'}).{condition}{coded}"
+        ),
+        identifier=str(recorded.get("session_id") or digest),
+        session_start_time=_aware(started) if started else UNKNOWN_START,
+        session_id=label(f"{about['day']}{about['condition']}{about['part']}", "1"),
+        experiment_description=about.get("title") or f"Rigidity of the {joint}",
+        experimenter=[_surname_first(author) for author in archive.get("authors", ())] or None,
+        institution=archive.get("institution") or None,
+        lab=archive.get("lab") or None,
+        keywords=[*archive.get("keywords", ()), "joint rigidity", joint]
+        + (["simulated"] if virtual else []),
+        notes=" ".join(
+            [SIMULATED] * virtual
+            + ["The time of recording is unknown; 1900 stands in for it."] * (not started)
+        )
+        or None,
+        was_generated_by=[[name, version]],
+        subject=Subject(
+            subject_id=subject_label(about),
+            age=UNKNOWN_AGE if age_years is None else f"P{age_years:g}Y",
+            sex=participant.get("sex", "U"),
+            species=participant.get("species", "Homo sapiens"),
+            description=SIMULATED if virtual else about["subject"] or "unknown",
+        ),
+    )
+
+
+def _aware(text: str) -> datetime:
+    found = datetime.fromisoformat(text)
+    return found if found.tzinfo else found.replace(tzinfo=UTC)
+
+
+def _surname_first(author: str) -> str:
+    """Return `Doe, Jane` for `Jane Doe`, as NWB asks."""
+    given, _, surname = author.strip().rpartition(" ")
+    return author if "," in author or not given else f"{surname}, {given}"
+
+
+def _add_streams(file: NWBFile, session: ExportedSession) -> None:
+    joint = label(session.about["joint"].title(), "Joint")
+    status = None
+    for stream in session.streams:
+        first: TimeSeries | None = None
+        for column, values in stream.columns.items():
+            if not np.isfinite(values).any():
+                continue  # an angle that was never commanded
+            place, name, unit, text = _SERIES.get(column, ("recording", column, "n/a", ""))
+            name = name.format(joint=joint)
+            text = text or str(session.about["column_meanings"].get(column, column))
+            series = _series(stream, column, name, unit, text, first)
+            first = first or series
+            if place == "acquisition":
+                file.add_acquisition(series)
+            elif place == "stimulus":
+                file.add_stimulus(series)
+            else:
+                if status is None:
+                    status = file.create_processing_module(
+                        "recording", "Counts and status words of the loop and its devices."
+                    )
+                status.add(series)
+
+
+def _series(
+    stream: Stream, column: str, name: str, unit: str, text: str, first: TimeSeries | None
+) -> TimeSeries:
+    from hdmf.backends.hdf5 import H5DataIO
+    from pynwb import TimeSeries
+    from pynwb.behavior import SpatialSeries
+
+    time: dict[str, Any] = {"timestamps": first if first is not None else stream.time_s}
+    step_s = 1.0 / stream.rate_hz
+    even_s = stream.time_s[0] + step_s * np.arange(stream.time_s.size)
+    if stream.time_s.size > 1 and np.max(np.abs(even_s - stream.time_s)) < ROUNDING_S / 2:
+        time = {"starting_time": float(stream.time_s[0]), "rate": 1.0 / step_s}
+    elif first is None:
+        time = {"timestamps": H5DataIO(stream.time_s, compression="gzip", shuffle=True)}
+    data = H5DataIO(np.asarray(stream.columns[column]), compression="gzip", shuffle=True)
+    if unit == "radians":
+        zero = "0 where the session began, positive as the torque is"
+        return SpatialSeries(
+            name=name, data=data, unit=unit, description=text, reference_frame=zero, **time
+        )
+    return TimeSeries(name=name, data=data, unit=unit, description=text, **time)

@@ -1,0 +1,196 @@
+"""Estimates as files: JSON with everything, CSV with the epoch table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import csv_text, plain_values, read_json, write_json, write_text
+from rigidimeter.core.records import (
+    BAND_VECTORS,
+    PARAMETER_VECTORS,
+    PARAMETERS,
+    STATISTICS,
+    Analysis,
+    BandEstimate,
+    Delay,
+    Finding,
+    Fit,
+    Outcome,
+    Score,
+    readonly,
+)
+
+ESTIMATES_SCHEMA = "rigidimeter.estimates/1"
+
+_PARAMETERS = tuple(parameter.name for parameter in PARAMETERS)
+
+
+def estimates_document(analysis: Analysis) -> dict[str, Any]:
+    """Return an analysis as plain values; numbers that do not exist are null."""
+    document = {
+        "schema": ESTIMATES_SCHEMA,
+        "method": analysis.method,
+        "method_reason": analysis.method_reason,
+        "weight_in_stiffness": analysis.weight_in_stiffness,
+        "delays": [vars(delay) for delay in analysis.delays],
+        "pooled": _pooled(analysis.pooled),
+        "epochs": [_fit_row(fit) for fit in analysis.fits],
+        "fixed_inertia": {
+            "inertia_kg_m2": analysis.inertia_kg_m2,
+            "epochs": [_fit_row(fit) for fit in analysis.fixed_inertia],
+        },
+        "scores": [score.row() for score in analysis.scores],
+        "sensitivity": [one.row() for one in analysis.sensitivity],
+    }
+    return dict(plain_values(document))
+
+
+def write_estimates_json(path: Path, analysis: Analysis) -> None:
+    """Write the document of an analysis."""
+    write_json(path, estimates_document(analysis))
+
+
+def write_estimates_csv(path: Path, analysis: Analysis) -> None:
+    """Write the epoch table: one row a fit, with B and K at fixed inertia beside, full precision.
+
+    An analysis of sinusoids alone gives the table of scores.
+    """
+    rows = analysis.rows()
+    write_text(path, csv_text(list(rows[0]) if rows else ["epoch"], rows))
+
+
+def read_estimates(path: Path) -> Analysis:
+    """Read back what `write_estimates_json` wrote.
+
+    Raises
+    ------
+    UserError
+        If the file is not such a document.
+    """
+    document = read_json(path)
+    schema = document.get("schema") if isinstance(document, dict) else None
+    if schema != ESTIMATES_SCHEMA:
+        raise UserError(f"{path}: schema is {schema!r}; expected {ESTIMATES_SCHEMA!r}")
+    try:
+        method = str(document["method"])
+        fixed = document["fixed_inertia"]
+        return Analysis(
+            method,
+            tuple(_fit(row, method) for row in document["epochs"]),
+            tuple(_fit(row, method) for row in fixed["epochs"]),
+            _number(fixed["inertia_kg_m2"]),
+            tuple(_score(row) for row in document["scores"]),
+            _read_pooled(document["pooled"], method),
+            tuple(_read_delay(row) for row in document["delays"]),
+            str(document["method_reason"]),
+            tuple(_band_estimate(row) for row in document["sensitivity"]),
+        )
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise UserError(
+            f"{path}: is not a complete {ESTIMATES_SCHEMA} document ({error})"
+        ) from None
+
+
+def _number(value: Any) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _read_outcome(row: Mapping[str, Any], numbers: Sequence[str]) -> Outcome:
+    kind = row["outcome"]
+    if kind not in ("included", "excluded", "failed"):
+        raise ValueError(f"outcome {kind!r}")
+    if kind == "included" and not all(math.isfinite(_number(row[name])) for name in numbers):
+        raise ValueError(f"epoch {row['epoch']} is included without all its numbers")
+    return Outcome(kind, str(row["reason"]))
+
+
+def _fit_row(fit: Fit) -> dict[str, Any]:
+    band = list(fit.band_hz) if all(map(math.isfinite, fit.band_hz)) else None
+    findings = [vars(finding) for finding in fit.findings]
+    return fit.row() | {"band_hz": band, "findings": findings}
+
+
+def _pooled(fits: Sequence[Fit]) -> dict[str, Any] | None:
+    """Return the fit to all epochs, and under `conditions` that to each; None without any."""
+    if not fits:
+        return None
+    conditions = {fit.condition: _fit_row(fit) for fit in fits if fit.condition or len(fits) == 1}
+    return {**_fit_row(fits[-1]), "conditions": conditions}
+
+
+def _fit(row: Mapping[str, Any], method: str) -> Fit:
+    low, high = row["band_hz"] or (math.nan, math.nan)
+    numbers: dict[str, Any] = {
+        vector: readonly([_number(row[name + ending]) for name in _PARAMETERS])
+        for vector, ending in PARAMETER_VECTORS.items()
+    }
+    numbers |= {name: _number(row[name]) for name in STATISTICS}
+    return Fit(
+        source=str(row["source"]),
+        epoch=str(row["epoch"]),
+        condition=str(row["condition"]),
+        method=method,
+        outcome=_read_outcome(row, _PARAMETERS),
+        n_samples=int(row["n_samples"]),
+        band_hz=(float(low), float(high)),
+        findings=tuple(_read_finding(found) for found in row["findings"]),
+        **numbers,
+    )
+
+
+def _read_finding(row: Mapping[str, Any]) -> Finding:
+    level = row["level"]
+    if level not in ("note", "doubt", "exclude"):
+        raise ValueError(f"finding level {level!r}")
+    return Finding(
+        str(row["name"]),
+        level,
+        _number(row["value"]),
+        _number(row["threshold"]),
+        str(row["text"]),
+        str(row["remedy"]),
+    )
+
+
+def _band_estimate(row: Mapping[str, Any]) -> BandEstimate:
+    vectors: dict[str, Any] = {
+        vector: tuple(_number(row[name + ending]) for name in _PARAMETERS)
+        for vector, ending in BAND_VECTORS.items()
+    }
+    low_hz, high_hz = _number(row["low_hz"]), _number(row["high_hz"])
+    return BandEstimate(str(row["condition"]), low_hz, high_hz, str(row["part"]), **vectors)
+
+
+def _read_delay(row: Mapping[str, Any]) -> Delay:
+    return Delay(
+        str(row["source"]),
+        _number(row["delay_s"]),
+        _number(row["delay_s_se"]),
+        bool(row["corrected"]),
+        str(row["remark"]),
+    )
+
+
+def _read_pooled(row: Mapping[str, Any] | None, method: str) -> tuple[Fit, ...]:
+    if row is None:
+        return ()
+    fits = [_fit(part, method) for part in row["conditions"].values()]
+    overall = _fit(row, method)
+    return tuple(fits if overall in fits else [*fits, overall])
+
+
+def _score(row: Mapping[str, Any]) -> Score:
+    return Score(
+        source=str(row["source"]),
+        epoch=str(row["epoch"]),
+        condition=str(row["condition"]),
+        outcome=_read_outcome(row, ("impulse_nm_s", "work_j")),
+        impulse_nm_s=_number(row["impulse_nm_s"]),
+        work_j=_number(row["work_j"]),
+        n_cycles=int(row["n_cycles"]),
+        frequency_hz=_number(row["frequency_hz"]),
+    )

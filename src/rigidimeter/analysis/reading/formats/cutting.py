@@ -1,0 +1,205 @@
+"""Where epochs begin and end in a table: by its labels, or by a length.
+
+Rows are counted from 0; a stretch ends before its `stop`.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Collection
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.analysis.reading.channels.quantities import names_epochs
+from rigidimeter.analysis.reading.formats.columns import seconds
+from rigidimeter.analysis.reading.formats.gaps import Rows, longest_s
+from rigidimeter.analysis.reading.formats.table import Table, label_text
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import EPOCHS
+from rigidimeter.core.records import Notice
+
+ROWS_A_LABEL = 100
+"""A column whose label changes more often, on average, is no column of trials."""
+_COMPLETE = 0.95
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Rows `start` to `stop` (not included) of a table, and the name of the epoch they are."""
+
+    label: str
+    start: int
+    stop: int
+
+
+def by_label(
+    source: str, time_s: NDArray[np.float64], column: NDArray[Any]
+) -> tuple[list[Stretch], list[Notice]]:
+    """Cut where the label changes; rows without a label are rest and belong to no stretch.
+
+    A label that returns after something else is another epoch: the second run of `1` is named
+    `1 (2)`, and a notice says so.
+    """
+    runs = _runs(column, 2 * EPOCHS)
+    if not runs:
+        raise UserError(
+            f"{source}: the epoch column changes more than {2 * EPOCHS} times; name the column of "
+            "the epochs with --column epoch=NAME"
+        )
+    stretches: list[Stretch] = []
+    notices: list[Notice] = []
+    times_seen: dict[str, int] = {}
+    for label, start, stop in runs:
+        if not label:
+            continue
+        times_seen[label] = times_seen.get(label, 0) + 1
+        name = label
+        if times_seen[label] > 1:
+            name = f"{label} ({times_seen[label]})"
+            text = (
+                f"{source}: epoch {label} occurs again at {seconds(float(time_s[start]))} after "
+                f"other rows; this run is read as epoch {name}"
+            )
+            notices.append(Notice("warning", text))
+        stretches.append(Stretch(name, start, stop))
+    if not stretches:
+        raise UserError(
+            f"{source}: the epoch column is empty in every row, which means rest; label the rows "
+            "of each epoch"
+        )
+    return stretches, notices
+
+
+def by_length(source: str, clock: Rows, length_s: float) -> tuple[list[Stretch], list[Notice]]:
+    """Cut into consecutive stretches of one length by the clock, named `1`, `2` and so on.
+
+    The last one may be up to 5 % short; what is shorter is left out, and a notice says how much.
+    """
+    time_s, step_s = clock.time_s, clock.step_s
+    elapsed = time_s - time_s[0]
+    if not elapsed[-1] + step_s <= EPOCHS * length_s:
+        raise UserError(
+            f"{source} lasts {seconds(float(elapsed[-1]))}, which is more than {EPOCHS} epochs of "
+            f"--epoch-length-s {length_s:g}; give a longer one"
+        )
+    # A quarter of an interval keeps a stamp that rounding put just before its boundary.
+    index = np.floor((elapsed + 0.25 * step_s) / length_s).astype(np.int64)
+    starts = np.flatnonzero(np.diff(index, prepend=-1))
+    stops = np.append(starts[1:], time_s.size)
+    stretches = [
+        Stretch(str(index[start] + 1), int(start), int(stop))
+        for start, stop in zip(starts, stops, strict=True)
+    ]
+    notices = _gaps_between(source, time_s, stretches, step_s)
+    last = stretches[-1]
+    # The file ends one interval after its last stamp.
+    left_s = float(elapsed[-1]) + step_s - int(index[-1]) * length_s
+    if left_s < _COMPLETE * length_s:
+        text = (
+            f"{source}: the last {seconds(left_s)}, from {seconds(float(time_s[last.start]))} on, "
+            f"are shorter than an epoch of {length_s:g} s and were left out"
+        )
+        notices.append(Notice("warning", text))
+        stretches = stretches[:-1]
+    if not stretches:
+        raise UserError(
+            f"{source} lasts {seconds(left_s)}, which is shorter than one epoch of "
+            f"--epoch-length-s {length_s:g}"
+        )
+    return stretches, notices
+
+
+def unused_labels(table: Table, used: Collection[str], n_rows: int) -> list[Notice]:
+    """Return a warning for each column that numbers trials by its name and values, and is unused.
+
+    Parameters
+    ----------
+    table : Table
+    used : collection of str
+        Columns that are used.
+    n_rows : int
+    """
+    notices = []
+    for name in (one for one in table.columns if one not in used and names_epochs(one)):
+        column = table.columns[name]
+        runs = _runs(column, n_rows // ROWS_A_LABEL) if column.size == n_rows else []
+        labels = [label for label, _, _ in runs if label]
+        if len(runs) > 1 and labels:
+            shown = ", ".join(labels[:3]) + (", …" if labels[3:] else "")
+            option = shlex.quote(f"epoch={name}")
+            text = (
+                f"{table.source}: column {name!r} ({shown}) is not used; --column {option} reads "
+                "each of its labels as an epoch"
+            )
+            notices.append(Notice("warning", text))
+    return notices
+
+
+def constant_label(table: Table, standard: str, column: NDArray[Any], stretch: Stretch) -> str:
+    """Return the one label that a column has within a stretch, or nothing if it has none.
+
+    Raises
+    ------
+    UserError
+        If the label changes within the stretch.
+    """
+    seen = ""
+    for label, start, _ in _runs(column[stretch.start : stretch.stop]):
+        if seen and label and label != seen:
+            raise UserError(
+                f"{table.where(stretch.start + start)}: {standard} changes from {seen} to {label} "
+                f"within epoch {stretch.label}; it must stay the same throughout an epoch"
+            )
+        seen = seen or label
+    return seen
+
+
+def lettered(label: str, pieces: int) -> list[str]:
+    """Name the pieces of an epoch: `3a`, `3b` and so on, or `3` if there is only one."""
+    return [label] if pieces == 1 else [label + _letters(index) for index in range(pieces)]
+
+
+def _letters(index: int) -> str:
+    rest, last = divmod(index, 26)
+    return (_letters(rest - 1) if rest else "") + chr(ord("a") + last)
+
+
+def _runs(column: NDArray[Any], most: int | None = None) -> list[tuple[str, int, int]]:
+    """Return label, start and stop of each run of one label; empty labels are runs too.
+
+    Nothing is returned where the column changes more than `most` times.
+    """
+    changed = np.asarray(column[1:] != column[:-1], dtype=bool)
+    if column.dtype != object:
+        changed &= ~(np.isnan(column[1:]) & np.isnan(column[:-1]))
+    starts = [0, *(np.flatnonzero(changed) + 1).tolist()]
+    runs: list[tuple[str, int, int]] = []
+    if most is not None and len(starts) > most:
+        return runs
+    for start, stop in zip(starts, [*starts[1:], column.size], strict=True):
+        label = label_text(column[start])
+        if runs and runs[-1][0] == label:  # the same label, written in two ways
+            runs[-1] = (label, runs[-1][1], stop)
+        else:
+            runs.append((label, start, stop))
+    return runs
+
+
+def _gaps_between(
+    source: str, time_s: NDArray[np.float64], stretches: list[Stretch], step_s: float
+) -> list[Notice]:
+    """Report gaps that fall on a boundary, where no epoch is cut because of them."""
+    notices = []
+    for before, after in pairwise(stretches):
+        start_s, stop_s = float(time_s[before.stop - 1]), float(time_s[after.start])
+        if stop_s - start_s > longest_s(step_s):
+            text = (
+                f"{source}: a gap of {seconds(stop_s - start_s)} from {seconds(start_s)} on lies "
+                f"between epochs {before.label} and {after.label}"
+            )
+            notices.append(Notice("warning", text))
+    return notices

@@ -1,0 +1,32 @@
+"""The report of a result: one page, its tables as CSV, its figures as SVG.
+
+Loaded when it is asked for: matplotlib, which only figures need, takes as long as an epoch.
+"""
+
+from typing import TYPE_CHECKING
+
+from rigidimeter.core.lazy_names import lazy_names
+
+if TYPE_CHECKING:
+    from rigidimeter.analysis.report.contents import Column, Figure, Section, Table, paragraph
+    from rigidimeter.analysis.report.make_report import report
+    from rigidimeter.analysis.report.sections import SECTIONS
+
+__all__ = [
+    "SECTIONS",
+    "Column",
+    "Figure",
+    "Section",
+    "Table",
+    "paragraph",
+    "report",
+]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "contents": ("Column", "Figure", "Section", "Table", "paragraph"),
+        "make_report": ("report",),
+        "sections": ("SECTIONS",),
+    },
+)

@@ -1,0 +1,298 @@
+"""The report: one page that needs no other file, and its tables and figures as files."""
+
+from __future__ import annotations
+
+import base64
+import functools
+import hashlib
+import itertools
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jinja2
+from markupsafe import Markup
+
+from rigidimeter.analysis.report import first_screen
+from rigidimeter.analysis.report.contents import Block, Column, Figure, Section, Table
+from rigidimeter.analysis.report.epoch_traces import page_traces, traces_json
+from rigidimeter.analysis.report.inline_svg import inline_svg
+from rigidimeter.analysis.report.numbers import interval, number, p_value, short_names
+from rigidimeter.analysis.report.sections import SECTIONS
+from rigidimeter.analysis.report.sections.methods_prose import methods_prose
+from rigidimeter.analysis.report.style import svg_text
+from rigidimeter.analysis.report.verdict_text import verdict
+from rigidimeter.analysis.study import StudyResult, traffic_light
+from rigidimeter.core.files import csv_text, visible
+from rigidimeter.core.version import __version__
+
+Contents = Sequence[tuple[Section, Sequence[Block]]]
+"""The sections of a result, each with its text, tables and figures."""
+
+
+def contents(result: StudyResult, progress: Callable[[float], None] = lambda _: None) -> Contents:
+    """Return the sections of a result in the order of the page, also those with nothing to show."""
+    shown = [section for section in SECTIONS if section.shown_if(result)]
+    made = []
+    for done, section in enumerate(shown, start=1):
+        made.append((section, tuple(section.blocks(result))))
+        progress(done / len(shown))
+    return made
+
+
+class Part(NamedTuple):
+    """A part of the page: an entry of its contents bar, with one section or several."""
+
+    anchor: str
+    title: str
+    printed: bool
+    sections: Contents
+
+
+def parts(made: Contents) -> list[Part]:
+    """Return the sections that show anything, by part, each part once."""
+    found: dict[str, list[tuple[Section, Sequence[Block]]]] = {}
+    for section, blocks in made:
+        if any(map(_is_shown, blocks)):
+            found.setdefault(section.part or section.title, []).append((section, blocks))
+    return [
+        Part(
+            f"part-{place}",
+            title,
+            any(section.printed for section, _ in own),
+            own,
+        )
+        for place, (title, own) in enumerate(found.items(), start=1)
+    ]
+
+
+def _is_shown(block: Block) -> bool:
+    if isinstance(block, Table):
+        return bool(block.columns and block.rows)
+    return True
+
+
+def tables(made: Contents) -> dict[str, Table]:
+    """Return every table by name, those without rows and those that are files only too."""
+    return {block.name: block for _, blocks in made for block in blocks if isinstance(block, Table)}
+
+
+def write_report(
+    result: StudyResult, out: Path, progress: Callable[[float], None] = lambda _: None
+) -> Path:
+    """Write ``report.html``, ``tables/*.csv`` and ``figures/*`` into a folder.
+
+    A study folder also gets ``methods.txt``, the paragraphs of methods as plain text. The same
+    result gives the same bytes.
+
+    Parameters
+    ----------
+    result : StudyResult
+        What to show.
+    out : Path
+        The folder; made if it does not exist. Files of the same names are replaced.
+    progress : callable
+        Takes the share that is done, from 0 to 1.
+
+    Returns
+    -------
+    Path
+        Of the page.
+    """
+    made = contents(result, lambda share: progress(share / 2))
+    figures = [block for _, blocks in made for block in blocks if isinstance(block, Figure)]
+    mark = _mark(result)
+    svg: dict[str, str] = {}
+    for figure in figures:
+        svg[figure.name] = svg_text(figure.draw(), mark)
+        progress(0.5 + 0.5 * len(svg) / len(figures))
+    (out / "tables").mkdir(parents=True, exist_ok=True)
+    (out / "figures").mkdir(parents=True, exist_ok=True)
+    for table in tables(made).values():
+        _write(out / "tables" / f"{table.name}.csv", _csv(table))
+    for name, text in svg.items():
+        _write(out / "figures" / f"{file_stem(name)}.svg", text)
+    if result.sessions:
+        _write(out / "methods.txt", methods_prose(result).text)
+    page = out / "report.html"
+    _write(page, render_page(result, made, svg))
+    progress(1.0)
+    return page
+
+
+def file_stem(name: str) -> str:
+    """Return the name of the files of a figure."""
+    return name.replace("/", "_")
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
+def _csv(table: Table) -> str:
+    """Return all values of the rows; without rows, a header of what the page would show."""
+    names = dict.fromkeys(name for row in table.rows for name in row)
+    return csv_text(list(names) or [column.name for column in table.columns], table.rows)
+
+
+def _mark(result: StudyResult) -> str:
+    """Return what is written into every figure where data were simulated."""
+    virtual = sum(epoch.virtual for epoch in result.epochs)
+    if result.virtual or 0 < virtual == len(result.epochs):
+        return "virtual data"
+    return "some of the data are virtual" if virtual else ""
+
+
+def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> str:
+    """Return the page as text, with its style inside, and the figures that `svg` has by name."""
+    analysis = result.analysis
+    sources = [epoch.source for epoch in result.epochs]
+    sources += [fit.source for fit in (*analysis.fits, *analysis.fixed_inertia)]
+    names = short_names([*sources, *(score.source for score in analysis.scores)])
+    light = traffic_light(result)
+    traces = page_traces(result)
+    script = _script() if traces else ""
+    return _template().render(
+        result=result,
+        show=lambda value, column: _shown(value, column, names),
+        below=lambda row, column: _below(row, column, names),
+        shown_columns=lambda table: _shown_columns(table, len(names) > 1),
+        # The style is this package's own file and needs no escaping.
+        css=Markup("\n".join([_text("page.css"), *([_plot(".min.css")] if traces else [])])),
+        parts=parts(made),
+        images=_images(made, svg, {key: place for place, key in enumerate(traces)}),
+        traces=Markup(traces_json(traces.values())) if traces else "",
+        script=Markup(script),
+        script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii"),
+        verdict=verdict(result),
+        strips=[
+            (pair, first_screen.tested_words(pair), rows)
+            for pair in (result, *result.further_pairs)
+            if (rows := first_screen.strip(pair))
+        ],
+        precision=first_screen.precision_tables(result),
+        light=light,
+        screen=first_screen,
+        advice=() if result.other else first_screen.advice(result, light),
+        virtual=sum(epoch.virtual for epoch in result.epochs),
+        version=__version__,
+    )
+
+
+@functools.cache
+def _template() -> jinja2.Template:
+    """Return the template of the page, which takes longer to compile than to fill."""
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(_text),
+        autoescape=True,
+        finalize=shown_text,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.tests["table"] = lambda block: isinstance(block, Table)
+    environment.tests["figure"] = lambda block: isinstance(block, Figure)
+    environment.globals["heads"] = _heads
+    environment.globals["file_stem"] = file_stem
+    return environment.get_template("page.html")
+
+
+def _images(
+    made: Contents, svg: Mapping[str, str], places: Mapping[tuple[str, str], int]
+) -> dict[str, Markup]:
+    """Return the figures that are drawn as elements of the page."""
+    return {
+        block.name: inline_svg(svg[block.name], block.name, block.alt, block.marks, places)
+        for _, blocks in made
+        for block in blocks
+        if isinstance(block, Figure) and block.name in svg
+    }
+
+
+def _text(name: str) -> str:
+    """Return a file of this room."""
+    return (resources.files("rigidimeter.analysis.report") / name).read_text(encoding="utf-8")
+
+
+def _plot(ending: str) -> str:
+    """Return a file of uPlot, which the operator's page shows, too."""
+    place = resources.files("rigidimeter") / "vendored" / f"uPlot{ending}"
+    return place.read_text(encoding="utf-8")
+
+
+def _script() -> str:
+    """Return what the page runs: uPlot with its licence, and what opens the traces of an epoch."""
+    # Its first line names an address, and the page names none outside itself.
+    plot = _plot(".iife.min.js").partition("*/")[2].strip()
+    licence, page = _plot(".LICENSE").strip(), _text("page.js").strip()
+    return f"/*! uPlot 1.6.32\n{licence}\n*/\n{plot}\n{page}"
+
+
+def shown_text(value: Any) -> Any:
+    """Return a value of a page; in text control characters are escapes, which HTML forbids."""
+    return visible(value, lines=True) if type(value) is str else value
+
+
+def data_uri(svg: str) -> str:
+    """Return an SVG document as the source of an image."""
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode("ascii")
+
+
+def _shown(value: Any, column: Column, names: Mapping[str, str]) -> str:
+    """Return a value as the page prints it."""
+    if value is None or value == "":
+        return "(no condition)" if column.kind == "condition" else "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if column.kind == "source":
+        return names.get(str(value), str(value))
+    if column.kind == "p":
+        return p_value(value)
+    if column.kind == "percent":
+        return "–" if math.isnan(value) else f"{100 * value:.0f} %"
+    if isinstance(value, float):
+        if column.kind == "setting":
+            return f"{value:g}"
+        return number(value * column.page_factor, column.digits)
+    return str(value)
+
+
+def _shown_columns(table: Table, several_sources: bool) -> list[Column]:
+    """Return the columns of a table without those that would say nothing.
+
+    A column of reasons is left out if all are empty, and that of sources if there is only one.
+    """
+    by_epoch = any(column.name == "epoch" for column in table.columns)
+    return [
+        column
+        for column in table.columns
+        if (column.kind != "reason" or any(row.get(column.name) for row in table.rows))
+        and (column.kind != "source" or several_sources or not by_epoch)
+    ]
+
+
+def _heads(columns: Iterable[Column]) -> list[tuple[str, list[Column]]]:
+    """Return the columns by their groups; each column without a group by itself."""
+    found: list[tuple[str, list[Column]]] = []
+    for group, members in itertools.groupby(columns, lambda column: column.group):
+        own = list(members)
+        found += [(group, own)] if group else [("", [column]) for column in own]
+    return found
+
+
+def _below(row: Mapping[str, Any], column: Column, names: Mapping[str, str]) -> str:
+    """Return what is shown below a value: the second value of its column, or its interval.
+
+    A value that was held has no interval.
+    """
+    if column.below:
+        second = row.get(column.below)
+        return "" if second in (None, "") else f"({_shown(second, column, names)})"
+    if column.ends is None:
+        return ""
+    low, high = (row.get(name) for name in column.ends)
+    if not isinstance(low, float) or not isinstance(high, float) or not low < high:
+        return ""
+    return interval(low * column.page_factor, high * column.page_factor, column.digits)

@@ -1,0 +1,231 @@
+"""What was estimated: the method, delays, each epoch, and all epochs of a condition together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from markupsafe import Markup
+
+from rigidimeter.analysis.report.contents import INTERVAL, Block, Column, Section, Table, paragraph
+from rigidimeter.analysis.report.method_words import interval_basis, method_title
+from rigidimeter.analysis.report.numbers import number
+from rigidimeter.analysis.report.sections.recordings import longest_s
+from rigidimeter.analysis.study import StudyResult, result_table, split_pooled
+from rigidimeter.analysis.study.drawing import channel_facts
+from rigidimeter.core.records import PARAMETER_VECTORS, PARAMETERS, Delay, Fit
+
+ALL_CONDITIONS = "(all)"
+"""What the column of conditions holds for the fit to all epochs of all of them."""
+
+WHO = (
+    Column("source", "Source", "source"),
+    Column("epoch", "Epoch", "label"),
+    Column("condition", "Condition", "condition"),
+)
+HOW = (Column("outcome", "Outcome", "outcome"), Column("reason", "Reason", "reason"))
+
+
+def _parameters(prefix: str = "") -> tuple[Column, ...]:
+    return tuple(
+        Column(
+            f"{prefix}{p.name}",
+            f"{p.symbol} ({p.unit}) {INTERVAL}",
+            ends=(f"{prefix}{p.name}_low", f"{prefix}{p.name}_high"),
+        )
+        for p in PARAMETERS
+    )
+
+
+def _quality(prefix: str = "") -> tuple[Column, ...]:
+    return (
+        Column(f"{prefix}r_squared", "R²"),
+        Column(f"{prefix}vaf_percent", "VAF (%)"),
+        Column(f"{prefix}condition_number", "Condition number"),
+        Column(f"{prefix}residual_sd_nm", "Residual SD (N·m)"),
+    )
+
+
+def _band(fits: Sequence[Fit]) -> tuple[tuple[Column, ...], str]:
+    """Return columns for the band where it differs, else the band for the title."""
+    bands = {fit.band_hz for fit in fits if math.isfinite(fit.band_hz[0])}
+    if len(bands) != 1:
+        low, high = ("band_low_hz", "Band from (Hz)"), ("band_high_hz", "Band to (Hz)")
+        return (Column(*low), Column(*high)), ""
+    ((low_hz, high_hz),) = bands
+    return (), f", band {number(low_hz, 3)} to {number(high_hz, 3)} Hz"
+
+
+def pooled_table(result: StudyResult, note: str) -> Table:
+    """Return the fits to all epochs of each condition together, and to all of them."""
+    by_condition, overall = split_pooled(result.analysis)
+    band, in_which = _band(result.analysis.pooled)
+    ordered = [name for name in result.condition_names if name in by_condition]
+    named = [(name, by_condition[name]) for name in ordered] + (
+        [(ALL_CONDITIONS, overall)] if overall else []
+    )
+    return Table(
+        "pooled",
+        f"All epochs of a condition together{in_which}",
+        (WHO[2], *_parameters(), *_quality(), *band),
+        [{"condition": condition} | _pooled_row(fit) for condition, fit in named],
+        note=note,
+        empty="No condition has a fit to all of its epochs.",
+    )
+
+
+def _pooled_row(fit: Fit) -> dict[str, Any]:
+    names = [f"{p.name}{ending}" for p in PARAMETERS for ending in PARAMETER_VECTORS.values()]
+    names += [*(column.name for column in _quality()), "n_samples"]
+    low, high = fit.band_hz
+    return (
+        {"method": fit.method}
+        | {name: getattr(fit, name) for name in names}
+        | {"band_low_hz": low, "band_high_hz": high}
+    )
+
+
+def _estimation(result: StudyResult) -> Iterator[Block]:
+    analysis = result.analysis
+    chosen = (
+        f"Chosen automatically: {analysis.method_reason}."
+        if analysis.method_reason
+        else "It was requested by name."
+    )
+    yield paragraph(
+        Markup("Method: <strong>{}</strong> ({}). {}").format(
+            analysis.method, method_title(analysis.method), chosen
+        )
+    )
+    yield Table(
+        "delays",
+        "Delay of the torque relative to the motion",
+        (
+            WHO[0],
+            Column("delay_s", "Torque late by (ms)", page_factor=1e3),
+            Column("delay_s_se", "SE (ms)", page_factor=1e3),
+            Column("corrected", "Corrected", "label"),
+            Column("done", "What was done", "reason"),
+        ),
+        [
+            {
+                "source": d.source,
+                "delay_s": d.delay_s,
+                "delay_s_se": d.delay_s_se,
+                "corrected": d.corrected,
+                "done": _done(d),
+            }
+            for d in analysis.delays
+        ],
+        note="A delay is positive where the time stamps of the torque are later than the motion "
+        "that they belong to. SE is its standard error.",
+        empty="The delay between torque and motion was not estimated.",
+    )
+
+
+def _done(delay: Delay) -> str:
+    if not delay.corrected:
+        return delay.remark
+    way = "earlier" if delay.delay_s > 0 else "later"
+    moved = f"the torque was moved {way} by this delay before anything was fitted or scored"
+    return f"{moved}; {delay.remark}" if delay.remark else moved
+
+
+def _epochs(result: StudyResult) -> Iterator[Block]:
+    analysis = result.analysis
+    yield paragraph(
+        Markup(
+            "In brackets: 95 % intervals. {}. With the inertia fixed, the intervals of B and K do "
+            "not include the error of the median J. The files also have standard errors and, in "
+            "columns that end with <code>_bound</code>, the smallest standard error that an "
+            "unbiased estimate from the same excitation and noise could have (Cramér–Rao)."
+        ).format(interval_basis(analysis.method))
+    )
+    band, in_which = _band(analysis.fits)
+    found: tuple[Column, ...] = ()
+    doubts: tuple[Column, ...] = ()
+    if any(fit.findings for fit in analysis.fits):
+        found = (Column("n_findings", "Findings", "count"),)
+    if any(fit.doubts for fit in analysis.fits):
+        doubts = (Column("doubts", "Doubted by", "reason"),)
+    estimates = result_table(result, "estimates")
+    yield Table(
+        "estimates",
+        f"Inertia, damping and stiffness, epoch by epoch{in_which}",
+        (*WHO, *HOW, *_parameters(), *_quality(), *band, *found, *doubts),
+        estimates,
+        empty="No epoch was fitted.",
+        folding=True,
+    )
+    prefix = "fixed_inertia_"
+    held = f"{number(analysis.inertia_kg_m2)} kg·m²"
+    if result.several_subjects:
+        held = "of the subject"
+    yield Table(
+        "estimates",
+        f"Damping and stiffness with the inertia fixed at its median ({held}), epoch by epoch",
+        (
+            *WHO,
+            Column(f"{prefix}outcome", "Outcome", "outcome"),
+            Column(f"{prefix}reason", "Reason", "reason"),
+            *_parameters(prefix),
+            *_quality(prefix),
+            *doubts,
+        ),
+        estimates,
+        empty="No epoch was fitted with the inertia fixed.",
+        folding=True,
+    )
+    yield Table(
+        "scores",
+        "Scores of the epochs with an imposed sinusoid",
+        (
+            *WHO,
+            *HOW,
+            Column("impulse_nm_s", "Angular impulse per cycle (N·m·s)"),
+            Column("work_j", "Work per cycle (J)"),
+            Column("n_cycles", "Cycles", "count"),
+            Column("frequency_hz", "Frequency (Hz)"),
+        ),
+        result_table(result, "scores"),
+        empty="No epoch was scored.",
+        folding=True,
+    )
+    yield Table(
+        "epochs",
+        "Epochs as recorded",
+        (
+            *WHO,
+            Column("task", "Task", "label"),
+            Column("duration_s", "Duration (s)"),
+            Column("virtual", "Virtual", "label"),
+            Column("closed", "Recording ended", "outcome"),
+            Column("reason", "Reason", "reason"),
+            Column("channels", "Channels", "reason"),
+        ),
+        _recorded(result),
+        empty="There are no epochs.",
+        folding=True,
+    )
+
+
+def _recorded(result: StudyResult) -> list[Mapping[str, Any]]:
+    return [
+        {
+            "source": epoch.source,
+            "epoch": epoch.label,
+            "condition": epoch.condition,
+            "task": epoch.task,
+            "duration_s": longest_s(channels),
+            "virtual": epoch.virtual,
+            "closed": epoch.closed.kind,
+            "reason": epoch.closed.reason,
+            "channels": ", ".join(f"{c.name} at {c.rate_hz:.4g} Hz" for c in channels),
+        }
+        for epoch, channels in zip(result.epochs, channel_facts(result), strict=True)
+    ]
+
+
+ESTIMATION = Section("estimation", "Estimation", _estimation)
+EPOCHS = Section("tables", "Epoch by epoch", _epochs)

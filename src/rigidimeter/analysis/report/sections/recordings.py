@@ -1,0 +1,236 @@
+"""How the study was made: what was measured, epochs, settings, and where the files come from."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+from pydantic import BaseModel
+
+from rigidimeter.analysis.report.contents import SESSION, Block, Column, Section, Table, paragraph
+from rigidimeter.analysis.report.numbers import number, plural
+from rigidimeter.analysis.study import StudyResult, result_table
+from rigidimeter.analysis.study.drawing import channel_facts
+from rigidimeter.analysis.study.drawn_signals import ChannelFacts
+from rigidimeter.core.settings import Settings
+from rigidimeter.core.units import rad_from_deg
+
+_TASKS = {"prbs": "torque perturbation", "sinusoid": "imposed sinusoid", None: "not stated"}
+
+_OF_THE_RIG = ("Controller", "PRBS", "Sinusoid", "Limits")
+"""Settings that recordings of another rig were not made with."""
+
+
+def longest_s(channels: Iterable[ChannelFacts]) -> float:
+    """Return how long the longest channel of an epoch lasts; NaN without samples."""
+    return max((c.span_s for c in channels if math.isfinite(c.span_s)), default=math.nan)
+
+
+def _about(result: StudyResult) -> Iterator[Block]:
+    median = (
+        "the median of the same subject"
+        if result.several_subjects
+        else f"the median ({number(result.analysis.inertia_kg_m2)} kg·m²)"
+    )
+    yield paragraph(
+        Markup(
+            "A robot moved a joint while torque and motion were recorded. Each epoch with a torque "
+            "perturbation gives the joint’s inertia J, viscous damping B and stiffness K: the "
+            'values with which <span class="formula">J θ″ + B θ′ + K θ = M</span> comes closest to '
+            "the measured torque M. B and K are then estimated again with J held at {} over all "
+            "included epochs; those values are compared. Each epoch with an imposed sinusoid gives "
+            "two scores per cycle: the angular impulse ∑|M|Δt and the work, which is the area of "
+            "the torque–angle loop."
+        ).format(median)
+    )
+    yield paragraph(
+        Markup(
+            "Numbers on this page are rounded. The files in <code>tables/</code> have every digit; "
+            "<code>figures/</code> has the drawings."
+        )
+    )
+
+
+def _design(result: StudyResult) -> Iterator[Block]:
+    if result.sessions:
+        yield Table(
+            "sessions",
+            "Sessions, in the order of the study’s table",
+            (
+                *SESSION,
+                *(
+                    [Column("code", "Code", "label")]
+                    if any(s.code != s.condition for s in result.sessions)
+                    else []
+                ),
+                Column("path", "Path", "text"),
+            ),
+            result_table(result, "sessions"),
+            folding=True,
+        )
+    elif result.epochs:
+        items = Markup("\n").join(
+            Markup('<li><span class="path">{}</span> ({})</li>').format(
+                source, plural(count, "epoch")
+            )
+            for source, count in Counter(epoch.source for epoch in result.epochs).items()
+        )
+        yield Markup('<h3>Sources</h3>\n<ol class="sources">\n{}\n</ol>').format(items)
+    yield Table(
+        "counts",
+        "Epochs by task and condition",
+        (
+            Column("task", "Task", "text"),
+            Column("condition", "Condition", "condition"),
+            Column("epochs", "Epochs", "count"),
+            Column("virtual_epochs", "Of them virtual", "count"),
+            Column("median_duration_s", "Median duration (s)"),
+            Column("shortest_s", "Shortest (s)"),
+            Column("longest_s", "Longest (s)"),
+        ),
+        list(_counts(result)),
+        empty="There are no epochs.",
+    )
+    yield Table(
+        "ticks",
+        "Late and missed ticks of the loop",
+        (
+            Column("source", "Source", "source"),
+            Column("epoch", "Epoch", "label"),
+            Column("ran", "Ticks", "count"),
+            Column("late", "Late", "count"),
+            Column("missed", "Missed", "count"),
+            Column("missed_percent", "Missed (%)"),
+            Column("limited", "Limited", "count"),
+        ),
+        [
+            {"source": epoch.source, "epoch": epoch.label, **epoch.ticks._asdict()}
+            | {"missed_percent": epoch.ticks.missed_percent}
+            for epoch in result.epochs
+            if epoch.ticks is not None
+        ],
+        note="A tick that began more than half a tick after it was due was late; one that never "
+        "ran was missed, and the drive held its command. At a limited one the guard changed it.",
+        folding=True,
+    )
+    names = ("part", "quantity", "value", "unit")
+    yield Table(
+        "design",
+        "Main settings",
+        (
+            Column("part", "Part", "text"),
+            Column("quantity", "Quantity", "text"),
+            Column("value", "Value", "setting"),
+            Column("unit", "Unit", "text"),
+        ),
+        [
+            dict(zip(names, row, strict=True))
+            for row in _main_settings(result.settings)
+            if result.own_rig or row[0] not in _OF_THE_RIG
+        ],
+        note=Markup('Every setting is in <a href="tables/settings.csv">tables/settings.csv</a>.'),
+    )
+    yield Table("settings", "Every setting", (), list(_flat("", result.settings)))
+
+
+def _counts(result: StudyResult) -> Iterator[dict[str, Any]]:
+    lengths_s = [longest_s(channels) for channels in channel_facts(result)]
+    recorded = list(zip(result.epochs, lengths_s, strict=True))
+    for task, title in _TASKS.items():
+        for condition in result.condition_names:
+            group = [(e, s) for e, s in recorded if e.task == task and e.condition == condition]
+            if not group:
+                continue
+            durations = [s for _, s in group if math.isfinite(s)] or [math.nan]
+            yield {
+                "task": title,
+                "condition": condition,
+                "epochs": len(group),
+                "virtual_epochs": sum(epoch.virtual for epoch, _ in group),
+                "median_duration_s": float(np.median(durations)),
+                "shortest_s": min(durations),
+                "longest_s": max(durations),
+            }
+
+
+def _main_settings(s: Settings) -> list[tuple[str, str, float, str]]:
+    """Return the settings that define the measurement and the analysis."""
+    prbs, guard, sinusoid = s.prbs, s.guard, s.sinusoid
+    length = 2**prbs.register_bits - 1
+    inertia, damping = s.controller.inertia_kg_m2, s.controller.damping_nm_s_rad
+    degree = rad_from_deg(1.0)
+    return [
+        ("Controller", "virtual inertia J_c", inertia, "kg·m²/rad"),
+        ("Controller", "the same per degree", inertia * degree, "kg·m²/deg"),
+        ("Controller", "virtual damping B_c", damping, "N·m·s/rad"),
+        ("Controller", "the same per degree", damping * degree, "N·m·s/deg"),
+        ("Controller", "torque low-pass", s.controller.torque_cutoff_hz, "Hz"),
+        ("PRBS", "amplitude, either way", prbs.amplitude_nm, "N·m"),
+        ("PRBS", "duration", prbs.duration_s, "s"),
+        ("PRBS", "clock", prbs.clock_hz, "Hz"),
+        ("PRBS", f"length of the {prbs.register_bits}-bit sequence", length, "chips"),
+        ("PRBS", "its period", length / prbs.clock_hz, "s"),
+        ("PRBS", "intended band from", prbs.wanted_low_hz, "Hz"),
+        ("PRBS", "intended band to", prbs.wanted_high_hz, "Hz"),
+        ("Sinusoid", "amplitude, either way", sinusoid.amplitude_deg, "deg"),
+        ("Sinusoid", "frequency", sinusoid.frequency_hz, "Hz"),
+        ("Sinusoid", "motion", sinusoid.motion_s, "s"),
+        ("Limits", "position, either way", guard.position_limit_deg, "deg"),
+        ("Limits", "speed", guard.speed_limit_deg_s, "deg/s"),
+        ("Limits", "acceleration", guard.acceleration_limit_deg_s2, "deg/s²"),
+        ("Estimation", "band from", s.estimation.band_low_hz, "Hz"),
+        ("Estimation", "band to, perturbation known", s.estimation.band_high_hz, "Hz"),
+        ("Estimation", "band to, perturbation unknown", s.estimation.band_high_unknown_hz, "Hz"),
+        ("Estimation", "band to, iv and spectral", s.estimation.band_high_closed_loop_hz, "Hz"),
+        ("Scores", "band from", s.scores.band_low_hz, "Hz"),
+        ("Scores", "band to", s.scores.band_high_hz, "Hz"),
+        ("Scores", "cycles", s.scores.cycles, "cycles"),
+    ]
+
+
+def _flat(prefix: str, value: object, unit: str = "") -> Iterator[dict[str, str]]:
+    """Yield key, value and unit of whatever a model, a mapping or a list holds."""
+    if isinstance(value, BaseModel):
+        for name, field in type(value).model_fields.items():
+            extra = field.json_schema_extra
+            field_unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+            yield from _flat(f"{prefix}.{name}".lstrip("."), getattr(value, name), field_unit)
+    elif isinstance(value, dict):
+        for name, item in value.items():
+            yield from _flat(f"{prefix}.{name}", item, unit)
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from _flat(f"{prefix}[{index}]", item, unit)
+    else:
+        text = repr(value) if isinstance(value, float) else str(value)
+        yield {"key": prefix, "value": text, "unit": unit}
+
+
+def _notices(result: StudyResult) -> Iterator[Block]:
+    yield Table(
+        "notices",
+        "Messages while reading and analysing",
+        (Column("level", "Level", "outcome"), Column("text", "Message", "reason")),
+        [{"level": notice.level, "text": notice.text} for notice in result.notices],
+        empty="None.",
+    )
+
+
+def _provenance(result: StudyResult) -> Iterator[Block]:
+    yield Table(
+        "provenance",
+        "Software, settings and files",
+        (Column("key", "What", "text"), Column("value", "Value", "reason")),
+        [{"key": key, "value": value} for key, value in result.provenance.items()],
+        empty="Not recorded.",
+    )
+
+
+ABOUT = Section("about", "What this is", _about)
+DESIGN = Section("design", "Study design", _design)
+NOTICES = Section("notices", "Notices", _notices)
+PROVENANCE = Section("provenance", "Provenance", _provenance)

@@ -1,0 +1,296 @@
+"""Compare two conditions of whatever holds them: a study folder, estimates, or a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rigidimeter.analysis.estimation.method_record import Progress
+from rigidimeter.analysis.reading import read_estimates
+from rigidimeter.analysis.reading.formats import READERS
+from rigidimeter.analysis.study.compared import Comparison
+from rigidimeter.analysis.study.comparison import (
+    against_reference,
+    compare_analysis,
+    compare_measures,
+    measured,
+    with_further,
+)
+from rigidimeter.analysis.study.measures import (
+    Measure,
+    Observation,
+    chosen_pair,
+    conditions,
+    off_first,
+)
+from rigidimeter.analysis.study.results import StudyResult
+from rigidimeter.analysis.study.study_analysis import analyse_study, read_study
+from rigidimeter.analysis.study.tested import LEVEL
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import TextTable, lines_text, read_text_table
+from rigidimeter.core.records import Analysis, Notice
+from rigidimeter.core.settings import Settings, settings_from
+from rigidimeter.core.study_files import is_study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_FEW_SESSIONS = 10
+
+
+def compare(
+    x: str | PathLike[str] | Analysis | pd.DataFrame,
+    other: str | None = None,
+    *,
+    reference: str | None = None,
+    value: str | Sequence[str] | None = None,
+    by: str = "condition",
+    session: str | None = None,
+    key: str | PathLike[str] | None = None,
+    settings: Settings | str | Path | Mapping[str, Any] | None = None,
+    method: str = "auto",
+    seed: int = 1,
+    resamples: int = 9999,
+    progress: Progress = lambda _: None,
+) -> StudyResult:
+    """Compare two conditions: medians, rank-sum tests, shifts, effect sizes.
+
+    Parameters
+    ----------
+    x : path, Analysis or pandas.DataFrame
+        A study folder, which adds tests by days, ratings and other methods; estimates, or the JSON
+        file of them; or a table, or the CSV file of one, with `value` and `by`.
+    other, reference : str, optional
+        The two conditions; differences are reference − other. Where not given, those of the study,
+        or the first two, ``OFF`` first. Without `other` each further condition is compared with the
+        reference, too.
+    value : str or sequence of str, optional
+        Columns of the table to compare.
+    by : str
+        The table's column of conditions.
+    session : str, optional
+        The table's column whose labels the bootstrap resamples; by default each row.
+    key : path, optional
+        The blinding key of a study folder that is kept elsewhere.
+    settings : Settings, path or mapping, optional
+        Of a study folder, instead of those that its first session was recorded with.
+    method : str
+        Of a study folder: the estimator, instead of that of its ``study.toml``.
+    seed, resamples : int
+        Of the bootstrap.
+    progress : callable
+        Called with the share of the work that was done since, 1 in all.
+
+    Raises
+    ------
+    UserError
+        If there is nothing to compare, or a name is unknown.
+    """
+    wanted = (reference, other)
+    path = Path(x) if isinstance(x, (str, PathLike)) else None
+    tabled = value is not None or not (isinstance(x, Analysis) or path)
+    if tabled and path is None and not hasattr(x, "columns"):
+        raise UserError(
+            "compare takes a study folder, estimates, their JSON file, or a table; not something "
+            f"of type {type(x).__name__}"
+        )
+    if tabled:
+        table = _as_text(x) if path is None else read_text_table(path)
+        return _compare_columns(
+            table,
+            _names(value),
+            by,
+            wanted,
+            session=session,
+            seed=seed,
+            resamples=resamples,
+            progress=progress,
+        )
+    if path is not None and is_study(path):
+        secret = None if key is None else Path(key)
+        chosen = None if settings is None else settings_from(settings)
+        read = read_study(path, key=secret, settings=chosen, method=method, pair=wanted)
+        return analyse_study(read, seed=seed, resamples=resamples, progress=progress)
+    if path is not None and (
+        path.is_dir() or any(path.suffix.lower() in reader.suffixes for reader in READERS)
+    ):
+        raise UserError(
+            f"{path} is neither a study folder nor a JSON file of estimates; for a recording give "
+            "what estimate returns, for a table also value=, the columns to compare"
+        )
+    analysis = x if isinstance(x, Analysis) else read_estimates(Path(x))
+    known = conditions(analysis)
+    pair = chosen_pair(known, wanted)
+    return compare_analysis(
+        analysis,
+        *pair,
+        seed=seed,
+        resamples=resamples,
+        further=() if other is not None else [name for name in known if name not in pair],
+        progress=progress,
+    )
+
+
+def _names(value: str | Sequence[str] | None) -> list[str]:
+    names = [value] if isinstance(value, str) else value
+    if not isinstance(names, Iterable) or not (listed := [str(name) for name in names]):
+        raise UserError("a table needs value=, the column or columns to compare")
+    return listed
+
+
+def _as_text(table: Any) -> TextTable:
+    """Return a table of pandas as text, its rows numbered as in a file with one header line."""
+    if not table.columns.is_unique:
+        twice = table.columns[table.columns.duplicated()][0]
+        raise UserError(f"the table has two columns with the name {twice}")
+    columns = {
+        str(name): tuple("" if missing else str(cell) for cell, missing in zip(
+            table[name], table[name].isna(), strict=True))
+        for name in table.columns
+    }  # fmt: skip
+    return TextTable("the table", columns, tuple(range(2, len(table) + 2)))
+
+
+def _compare_columns(
+    table: TextTable,
+    values: Sequence[str],
+    by: str,
+    pair: tuple[str | None, str | None] = (None, None),
+    *,
+    session: str | None = None,
+    seed: int = 1,
+    resamples: int = 9999,
+    progress: Progress = lambda _: None,
+) -> StudyResult:
+    """Compare two groups of a table in one column or several.
+
+    Parameters
+    ----------
+    table : TextTable
+    values : sequence of str
+        Columns of numbers.
+    by : str
+        The column that names the group.
+    pair : tuple of str or None
+        Reference and other group; the first two where not given, ``OFF`` first where it occurs, and
+        without the other each further group with the reference.
+    session : str, optional
+        A column whose labels are resampled as units; else each row is one.
+    seed, resamples : int
+        Of the bootstrap.
+    progress : callable
+
+    Raises
+    ------
+    UserError
+        If a column or a group is not there, or a cell is no number.
+    """
+    labels = table.column(by, "--by")
+    for name in values:
+        table.column(name, "--value")
+    units = table.column(session, "--session") if session is not None else None
+    known = off_first(labels)
+    names = chosen_pair(
+        known,
+        pair,
+        holder=f"column {by} of {table.source} has",
+        remedy="name another column with --by",
+    )
+    further = [name for name in known if name not in names] if pair[1] is None else []
+    rows, notices = _kept(table, labels, [*names, *further], by)
+    comparisons = []
+    for name in dict.fromkeys(values):
+        one, said = _column(table, name, labels, units, names, rows)
+        comparisons.append(one)
+        notices += said
+    tested, differences = compare_measures(
+        comparisons, seed=seed, resamples=resamples, progress=progress
+    )
+    tested, more = with_further(tested, against_reference(tested, further))
+    for each in (*tested, *more):
+        notices += _cautions(table.source, each, units is not None)
+    return StudyResult(
+        "",
+        *names,
+        tested,
+        differences,
+        tuple(Notice("warning", text) for text in notices),
+        seed,
+        resamples,
+        source=table.source,
+        by=by,
+        further=more,
+    )
+
+
+def _kept(
+    table: TextTable, labels: Sequence[str], names: Sequence[str], by: str
+) -> tuple[list[int], list[str]]:
+    """Return the rows of both groups, without those that an analysis has excluded."""
+    rows = [k for k, label in enumerate(labels) if label in names]
+    notices = []
+    nameless = [table.lines[k] for k, label in enumerate(labels) if not label]
+    if nameless:
+        notices.append(f"{table.source}: no {by} in {lines_text(nameless)}; left out")
+    outcomes = table.columns.get("outcome")
+    if outcomes is not None and set(outcomes) <= {"included", "excluded", "failed"}:
+        out = [table.lines[k] for k in rows if outcomes[k] != "included"]
+        rows = [k for k in rows if outcomes[k] == "included"]
+        if out:
+            notices.append(
+                f"{table.source}: outcome is excluded or failed in {lines_text(out)}; left out"
+            )
+    return rows, notices
+
+
+def _column(
+    table: TextTable,
+    name: str,
+    labels: Sequence[str],
+    units: Sequence[str] | None,
+    names: tuple[str, str],
+    rows: Sequence[int],
+) -> tuple[Comparison, list[str]]:
+    observations, missing = [], []
+    for row in rows:
+        line = table.lines[row]
+        value = table.number(name, row)
+        unit = units[row] if units is not None else f"line {line}"
+        if value is None or not unit:
+            missing.append(line)
+        else:
+            observations.append(Observation(value, labels[row], epoch=f"line {line}", unit=unit))
+    found = measured(Measure(name, name, "", "column"), observations, names)
+    for group in names:
+        if not found.summaries[group].n:
+            raise UserError(
+                f"{table.source}: {name} has no value in {group}, so there is nothing to compare"
+            )
+    notices = [f"{table.source}: no {name} in {lines_text(missing)}; left out"] if missing else []
+    return found, notices
+
+
+def _cautions(source: str, found: Comparison, by_session: bool) -> list[str]:
+    """Say where a test could not find a difference, or an interval comes out too narrow."""
+    name = found.measure.name
+    if found.test is None:
+        return [f"{source}: {name}: {found.remark}. Medians and quartiles are given without one"]
+    sizes = [found.summaries[group].n for group in found.pair]
+    counts = " and ".join(f"{n} in {group}" for n, group in zip(sizes, found.pair, strict=True))
+    said = []
+    least = 2 / math.comb(sum(sizes), sizes[0])
+    if least > LEVEL:
+        said.append(
+            f"{source}: {name} has {counts}; even groups that do not overlap have an exact p of "
+            f"{least:.2g}, so this test cannot show a difference"
+        )
+    sessions = min(len({o.unit for o in found.of(group)}) for group in found.pair)
+    if by_session and sessions < _FEW_SESSIONS:
+        said.append(
+            f"{source}: {name} has {sessions} sessions in one group; so few make a bootstrap "
+            "interval too narrow"
+        )
+    return said

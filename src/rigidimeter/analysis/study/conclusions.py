@@ -1,0 +1,148 @@
+"""What a comparison of two conditions shows of each measure, and what it does not.
+
+A difference is shown where p of the test (`tested`), adjusted by Holm's method for the measures, is
+below the level, and nothing that is known of the recordings can have made it (`objections`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from rigidimeter.analysis.statistics import holm
+from rigidimeter.analysis.study.compared import Comparison, measure_names
+from rigidimeter.analysis.study.differences import Difference, simulated_difference
+from rigidimeter.analysis.study.objections import hidden, negligible, objections, untested
+from rigidimeter.analysis.study.results import StudyResult
+from rigidimeter.analysis.study.sensitivity import method_caveats
+from rigidimeter.analysis.study.tested import LEVEL, Basis, basis_of, tested, too_few
+
+Verdict = Literal["lower", "higher", "no difference shown", "not supported", "cannot be decided"]
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What is concluded of one measure: the second condition against the first.
+
+    Attributes
+    ----------
+    comparison : Comparison
+    verdict : str
+        ``lower``, ``higher``, ``no difference shown``, ``not supported`` (one was found and
+        something else may have made it) or ``cannot be decided``.
+    p : float
+        Of the test, adjusted for the measures; NaN without one.
+    reason : str
+        A clause; empty where the test is the whole reason.
+    difference : Difference
+        Of the test, with both values.
+    simulated : Difference or None
+        What a virtual study simulated.
+    """
+
+    comparison: Comparison
+    verdict: Verdict
+    difference: Difference
+    p: float = math.nan
+    reason: str = ""
+    simulated: Difference | None = None
+
+
+@dataclass(frozen=True)
+class Conclusions:
+    """The conclusions on all measures, what was tested, and how many tests p is adjusted for."""
+
+    basis: Basis
+    each: tuple[Conclusion, ...]
+    adjusted_for: int = 0
+
+    def of(self, *verdicts: Verdict) -> tuple[Conclusion, ...]:
+        """Return those with one of these verdicts."""
+        return tuple(one for one in self.each if one.verdict in verdicts)
+
+    @property
+    def units(self) -> str:
+        """What the tests compared: days, subjects, recordings or values."""
+        tests = (one.comparison.days for one in self.each if not math.isnan(one.p))
+        units = [f"{test.unit}s" for test in tests if test is not None]
+        return " and ".join(dict.fromkeys(units)) if self.basis == "days" and units else self.basis
+
+    @property
+    def tested(self) -> int:
+        """The number of measures that were tested."""
+        return sum(not math.isnan(one.p) for one in self.each)
+
+
+def conclude(result: StudyResult) -> Conclusions | None:
+    """Return what is concluded of each measure; None where no two conditions were compared."""
+    compared = [c for c in result.comparisons if c.paired]
+    if not compared:
+        return None
+    basis = basis_of(compared)
+    tests = [tested(c, basis) for c in compared]
+    # Of each other condition with the reference: p is adjusted for these as well.
+    p_further = [tested(c, basis).p for c in result.further if c.paired]
+    adjusted = holm([*(test.p for test in tests), *p_further])[: len(tests)]
+    with_p = sum(not math.isnan(p) for p in (*(test.p for test in tests), *p_further))
+    moved = next(
+        (
+            test.comparison
+            for test, p in zip(tests, adjusted, strict=True)
+            if test.comparison.measure.name == "inertia_kg_m2"
+            and p < LEVEL
+            and not negligible(test.comparison, result)
+        ),
+        None,
+    )
+    found = []
+    for test, p in zip(tests, adjusted, strict=True):
+        c = test.comparison
+        verdict: Verdict
+        if math.isnan(p):
+            verdict, reason = "cannot be decided", untested(c, result, moved) or test.remark
+        elif p < LEVEL and (reason := negligible(c, result)):
+            verdict = "no difference shown"
+        elif p < LEVEL:
+            reason = next(objections(test, basis, result, moved), "")
+            verdict = "not supported" if reason else "lower" if test.sign > 0 else "higher"
+        elif reason := too_few(test, basis, with_p):
+            verdict = "cannot be decided"
+        else:
+            few = c.days.few if c.days is not None and basis == "days" else ""
+            verdict, reason = "no difference shown", hidden(c, result) or few
+        simulated = simulated_difference(c, result.conditions)
+        found.append(Conclusion(c, verdict, test.difference, p, reason, simulated))
+    ordered = tuple(sorted(found, key=lambda one: one.comparison.measure.place))
+    return Conclusions(basis, ordered, with_p)
+
+
+def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
+    """Return the conclusions as rows of a document."""
+    caveats = method_caveats(result.sensitivity)
+    return [
+        {
+            **measure_names(one.comparison.measure),
+            "reference": one.comparison.reference,
+            "other": one.comparison.other,
+            "verdict": one.verdict,
+            **one.difference.row(),
+            "p_holm": one.p,
+            "tested_by": concluded.basis,
+            "reason": one.reason,
+            "caveat": caveats.get(one.comparison.measure.name, ""),
+            **({} if one.simulated is None else _simulated_row(one.simulated)),
+        }
+        for concluded in map(conclude, (result, *result.further_pairs))
+        if concluded is not None
+        for one in concluded.each
+    ]
+
+
+def _simulated_row(found: Difference) -> dict[str, float]:
+    return {
+        "simulated_reference": found.reference,
+        "simulated_other": found.other,
+        "simulated_estimate": found.estimate,
+        "simulated_percent": found.percent[0],
+    }

@@ -1,0 +1,245 @@
+"""What a comparison of two conditions found: every number that a page, a table or a line shows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from html import escape
+from typing import TYPE_CHECKING, Literal
+
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.statistics import (
+    EffectDifference,
+)
+from rigidimeter.analysis.study.compared import Comparison, comparison_rows
+from rigidimeter.analysis.study.measures import Measure
+from rigidimeter.analysis.study.ratings_found import RatingsFound
+from rigidimeter.core.records import Analysis, Epoch, Fit, Notice, Score
+from rigidimeter.core.settings import Settings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class EffectPair:
+    """How much larger the effect size of one measure is than that of another, by stored names.
+
+    `p_holm` is adjusted by Holm's method for all pairs.
+    """
+
+    first: str
+    second: str
+    difference: EffectDifference
+    p_holm: float
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One condition of a study: its name, and the stimulation if there is one.
+
+    What was not written down is None or empty. `simulated` are the medians of a virtual condition,
+    by the names of the measures.
+    """
+
+    name: str
+    title: str = ""
+    frequency_hz: float | None = None
+    amplitude: float | None = None
+    amplitude_unit: str = ""
+    pulse_width_us: float | None = None
+    electrodes: str = ""
+    wash_in_min: float | None = None
+    simulated: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class SessionEntry:
+    """One recording of a study: whose, when, in what condition, and where it lies.
+
+    `source` is the name by which its epochs go in an analysis; `code` is the blinded name of its
+    condition as the table has it, `condition` what the key says, or the code without a key.
+    """
+
+    subject: str
+    day: str
+    condition: str
+    code: str
+    path: str
+    source: str
+
+
+@dataclass(frozen=True)
+class SensitivityRow:
+    """The comparison of one measure by another method.
+
+    `method` is the estimator; `inertia` says whether J was held at its median (``fixed``) or
+    fitted with B and K in each epoch (``free``). `p_day` is that of the test by days.
+    """
+
+    measure: Measure
+    method: str
+    inertia: Literal["fixed", "free"]
+    n_reference: int
+    n_other: int
+    shift: float
+    shift_low: float
+    shift_high: float
+    p: float
+    r: float
+    p_day: float
+    chosen: bool
+
+
+@dataclass(frozen=True)
+class Exclusion:
+    """One epoch that does not count, who said so, and why.
+
+    `by` is ``protocol`` (ended early or was repeated), ``check`` (a diagnostic), ``estimate`` (no
+    fit) or ``operator`` (the study's table of exclusions; `who` is whom it names).
+    """
+
+    subject: str
+    day: str
+    condition: str
+    source: str
+    epoch: str
+    task: str
+    by: Literal["protocol", "check", "estimate", "operator"]
+    reason: str
+    who: str = ""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """One recording of a study's table that does not count at all, and why.
+
+    `condition` is as the table has it, a code or a name.
+    """
+
+    path: str
+    subject: str
+    day: str
+    condition: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """Everything that was concluded from two conditions of recordings, a study or a table.
+
+    Attributes
+    ----------
+    title : str
+    reference, other : str
+        The conditions that are compared; `other` is empty where there is only one.
+    comparisons : tuple of Comparison
+        One for each measure; the ratings of a study are the last.
+    further : tuple of Comparison
+        Those of each other condition with the reference, where no two were chosen; p is adjusted
+        for these and `comparisons` together.
+    differences : tuple of EffectPair
+    notices : tuple of Notice
+    seed, resamples : int
+        Of the bootstrap.
+    source, by : str
+        The table and its column of conditions, where columns of a table are compared.
+    analysis, epochs, settings
+        What was analysed; empty for columns of a table.
+    prepared : tuple of PreparedEpoch
+        The epochs as they were analysed, with what was made of them, for the figures; empty where
+        they were not analysed here.
+    provenance : mapping of str to str
+    conditions, sessions, blinded, virtual, ratings, sensitivity, exclusions, left_out, changes
+        Of a study folder alone; `sessions` is empty if there is none. `blinded`: the conditions are
+        codes, for no key was given. `virtual`: every session comes from the virtual rig.
+        `changes`: what is new since the last analysis was kept, in sentences.
+    own_rig : bool
+        Whether a session of this program was among what was analysed, so that the settings of the
+        rig are those that it was recorded with.
+    """
+
+    title: str
+    reference: str
+    other: str
+    comparisons: tuple[Comparison, ...]
+    differences: tuple[EffectPair, ...] = ()
+    notices: tuple[Notice, ...] = ()
+    seed: int = 1
+    resamples: int = 9999
+    source: str = ""
+    by: str = ""
+    analysis: Analysis = Analysis("", (), (), math.nan, ())  # noqa: RUF009
+    epochs: tuple[Epoch, ...] = ()
+    prepared: tuple[PreparedEpoch, ...] = field(default=(), repr=False, compare=False)
+    settings: Settings = field(default_factory=Settings)
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    conditions: tuple[Condition, ...] = ()
+    sessions: tuple[SessionEntry, ...] = ()
+    blinded: bool = False
+    virtual: bool = False
+    ratings: RatingsFound | None = None
+    sensitivity: tuple[SensitivityRow, ...] = ()
+    exclusions: tuple[Exclusion, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
+    changes: tuple[str, ...] = ()
+    own_rig: bool = False
+    further: tuple[Comparison, ...] = ()
+
+    @property
+    def further_pairs(self) -> tuple[StudyResult, ...]:
+        """The same result with each further condition in the place of `other`."""
+        every = (*self.comparisons, *self.further)
+        return tuple(
+            replace(
+                self,
+                other=other,
+                comparisons=tuple(c for c in self.further if c.other == other),
+                further=tuple(c for c in every if c.other != other),
+                ratings=None if self.ratings is None else replace(self.ratings, other=other),
+            )
+            for other in dict.fromkeys(c.other for c in self.further)
+        )
+
+    @property
+    def condition_names(self) -> tuple[str, ...]:
+        """All conditions in the order of the study or the protocol, then as recorded."""
+        compared = [name for name in (self.reference, self.other) if name]
+        found = self.analysis
+        results: tuple[Fit | Score, ...] = (*found.fits, *found.fixed_inertia, *found.scores)
+        recorded = [each.condition for each in (*self.epochs, *results)]
+        tabled = [name for each in self.comparisons for name in each.summaries]
+        order = [each.name for each in self.conditions]
+        order = order or [block.condition for block in self.settings.protocol.blocks]
+        found_in = dict.fromkeys([*compared, *recorded, *tabled])
+        return tuple(sorted(found_in, key=lambda n: order.index(n) if n in order else len(order)))
+
+    @property
+    def several_subjects(self) -> bool:
+        """Whether J was held at each subject's own median, for there are several subjects."""
+        return len({session.subject for session in self.sessions}) > 1
+
+    @property
+    def resampled(self) -> str:
+        """What the bootstrap of the effect sizes resamples."""
+        if not self.sessions:
+            return "sessions or single values"
+        return "the days of each subject" if self.several_subjects else "whole days"
+
+    def comparison(self, measure: str) -> Comparison | None:
+        """Return the comparison of a measure by its stored name."""
+        return next((each for each in self.comparisons if each.measure.name == measure), None)
+
+    def table(self) -> pd.DataFrame:
+        """Return the comparisons as a pandas table, a row for each measure."""
+        import pandas as pd
+
+        return pd.DataFrame(comparison_rows((*self.comparisons, *self.further)))
+
+    def _repr_html_(self) -> str:
+        columns = ["title", "unit", "median_reference", "median_other", "shift", "shift_low",
+                   "shift_high", "p", "p_holm", "r", "days_p", "days_p_holm"]  # fmt: skip
+        shown = self.table().reindex(columns=columns).dropna(axis="columns", how="all")
+        heading = f"{self.title}: {self.reference} − {self.other}".strip(": ")
+        return f"<p>{escape(heading)}</p>{shown.to_html(index=False, float_format='{:.4g}'.format)}"

@@ -1,0 +1,303 @@
+"""A study folder from its tables to its conclusions.
+
+Each subject is analysed apart, for J is held at the median of one joint; with one subject that is
+the analysis of all. Methods of the sensitivity analysis run once each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rigidimeter.analysis.estimation import (
+    choose_method,
+    method_named,
+    method_names,
+    no_such_method,
+)
+from rigidimeter.analysis.estimation.method_record import Progress
+from rigidimeter.analysis.study.analysis import Preparation, analyse_prepared
+from rigidimeter.analysis.study.blinding import Naming, naming
+from rigidimeter.analysis.study.compared import Comparison
+from rigidimeter.analysis.study.comparison import (
+    against_reference,
+    compare_measures,
+    day_tests,
+    gathered,
+    with_further,
+)
+from rigidimeter.analysis.study.exclusions import exclusions_of, operators_exclusions
+from rigidimeter.analysis.study.measures import MEASURES, RATING, chosen_pair
+from rigidimeter.analysis.study.ratings_model import rated, ratings_comparison, ratings_days
+from rigidimeter.analysis.study.results import SensitivityRow, SessionEntry, StudyResult
+from rigidimeter.analysis.study.sensitivity import sensitivity_methods, sensitivity_rows
+from rigidimeter.analysis.study.sessions import Gathered, gather
+from rigidimeter.analysis.study.warnings import analysis_warnings, lacking
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.records import Analysis, Epoch, Notice
+from rigidimeter.core.settings import Settings
+from rigidimeter.core.study_files import Row, StudyFolder, read_study_folder
+
+MEASURE_MS, RESAMPLE_MS = 50.0, 0.01
+"""What the tests of a measure cost, beside the steps of `analysis.step_costs`."""
+
+
+@dataclass(frozen=True)
+class StudyRead:
+    """A study folder with its recordings, ready to be analysed.
+
+    Attributes
+    ----------
+    folder : StudyFolder
+    names : Naming
+    gathered : Gathered
+    epochs : tuple of Epoch
+        With what the operator excluded.
+    operator : mapping of (str, str) to Row
+        The operator's exclusions that met an epoch, by source and label.
+    settings : Settings
+        Those that the first session was recorded with, or what was given instead.
+    method : str
+        Of `study.toml`, or what was given instead.
+    notices : tuple of Notice
+    further : tuple of str
+        Conditions with epochs that are compared with the reference beside those of `names.pair`.
+    """
+
+    folder: StudyFolder
+    names: Naming
+    gathered: Gathered
+    epochs: tuple[Epoch, ...]
+    operator: Mapping[tuple[str, str], Row]
+    settings: Settings
+    method: str
+    notices: tuple[Notice, ...]
+    further: tuple[str, ...] = ()
+
+
+def read_study(
+    folder: Path,
+    *,
+    key: Path | None = None,
+    settings: Settings | None = None,
+    method: str = "auto",
+    pair: tuple[str | None, str | None] = (None, None),
+    progress: Progress = lambda _: None,
+) -> StudyRead:
+    """Read a study folder and every recording in it.
+
+    Parameters
+    ----------
+    folder : Path
+    key : Path, optional
+        A blinding key kept elsewhere.
+    settings : Settings, optional
+        Instead of those of the first session.
+    method : str
+        Instead of that of `study.toml`; ``auto`` leaves it.
+    pair : (str or None, str or None)
+        Other conditions than `study.toml` compares.
+    progress : callable
+        Called with the share of the recordings that was read since, 1 in all.
+
+    Raises
+    ------
+    UserError
+        If there is nothing to analyse, or an option names what does not exist.
+    """
+    read = read_study_folder(folder, key)
+    chosen = method if method != "auto" else read.about.analysis.method
+    if chosen not in method_names():
+        where = "--method" if method != "auto" else f"{folder / 'study.toml'}: analysis.method ="
+        raise UserError(f"{where} {chosen}: {no_such_method(chosen)}")
+    names, said = naming(read)
+    if pair != (None, None):
+        wanted = pair[0] or names.pair[0], pair[1] or names.pair[1]
+        holder = "the study has"
+        names = replace(names, pair=chosen_pair(names.known, wanted, holder=holder))
+    gathered = gather(read, names, progress=progress)
+    epochs, operator, excluded = operators_exclusions(read, gathered)
+    there = {epoch.condition for epoch in epochs} - {*names.pair}
+    return StudyRead(
+        read,
+        names,
+        gathered,
+        epochs,
+        operator,
+        settings or gathered.settings or Settings(),
+        chosen,
+        (*read.notices, *said, *gathered.notices, *excluded),
+        tuple(name for name in names.known if name in there) if pair[1] is None else (),
+    )
+
+
+def analyse_study(
+    read: StudyRead,
+    *,
+    seed: int = 1,
+    resamples: int = 9999,
+    progress: Progress = lambda _: None,
+) -> StudyResult:
+    """Analyse a study: estimates, comparisons, days, effects, ratings, sensitivity, exclusions.
+
+    Parameters
+    ----------
+    read : StudyRead
+    seed, resamples : int
+        Of the bootstrap.
+    progress : callable
+        Called with the share of the work that was done since, 1 in all.
+    """
+    sessions = read.gathered.entries
+    pair = read.names.pair
+    subjects = _by_subject(read.epochs, sessions, read.settings)
+    fitted = [epoch for epoch in read.epochs if epoch.task == "prbs"]
+    others = sensitivity_methods() if fitted and all(pair) else ()
+    statistics = len(MEASURES) * (MEASURE_MS + RESAMPLE_MS * resamples)
+    methods = [read.method, *others]
+    if read.method in ("auto", *others):  # the chosen method is not made again
+        methods = methods[: max(len(others), 1)]
+    work = statistics + sum(own.work(methods) for own in subjects.values())
+
+    def done(work_ms: float) -> None:
+        progress(work_ms / work)
+
+    main, notices = _analysed(subjects, read.method, done)
+    comparisons = gathered(main, pair, sessions)
+    ratings, said = rated(read.folder, read.names)
+    if ratings is not None:
+        comparisons = (*comparisons, ratings_comparison(ratings))
+    comparisons, differences = compare_measures(
+        comparisons,
+        seed=seed,
+        resamples=resamples,
+        progress=lambda share: done(share * statistics),
+    )
+    comparisons, further = with_further(comparisons, _further(read, comparisons))
+    notices += [*lacking([c for c in comparisons if c.measure is not RATING], pair), *said]
+    ready = {} if ratings is None else {RATING.name: ratings_days(ratings)}
+    every = day_tests((*comparisons, *further), ready)
+    comparisons, further = every[: len(comparisons)], every[len(comparisons) :]
+    rows: list[SensitivityRow] = []
+    if others:
+        analyses = {main.method: main}
+        for method in others:
+            if method != main.method:
+                analyses[method], _ = _analysed(subjects, method, done, fits_alone=True)
+        ordered = {name: analyses[name] for name in others} | analyses
+        rows, said = sensitivity_rows(ordered, main.method, sessions, pair)
+        notices += said
+    return StudyResult(
+        title=read.folder.about.title,
+        reference=pair[0],
+        other=pair[1],
+        comparisons=comparisons,
+        differences=differences,
+        notices=(*read.notices, *notices),
+        seed=seed,
+        resamples=resamples,
+        analysis=main,
+        epochs=read.epochs,
+        prepared=tuple(
+            prepared
+            for own in subjects.values()
+            for prepared in own.analysed(as_recorded=method_named(main.method).as_recorded)
+        ),
+        settings=read.settings,
+        conditions=read.names.conditions,
+        sessions=tuple(session.entry for session in read.gathered.sessions),
+        blinded=read.names.blinded,
+        virtual=all(epoch.virtual for epoch in read.epochs),
+        ratings=ratings,
+        sensitivity=tuple(rows),
+        exclusions=tuple(exclusions_of(read.epochs, main, sessions, read.operator)),
+        left_out=read.gathered.left_out,
+        own_rig=read.gathered.settings is not None,
+        further=further,
+    )
+
+
+def _further(read: StudyRead, comparisons: Sequence[Comparison]) -> list[Comparison]:
+    """Return the comparisons of further conditions; of the ratings with their test by days."""
+    found = []
+    for c in against_reference(comparisons, read.further):
+        if c.measure is not RATING:
+            found.append(c)
+            continue
+        ratings, _ = rated(read.folder, replace(read.names, pair=(c.reference, c.other)))
+        if ratings is not None:
+            found.append(replace(ratings_comparison(ratings), days=ratings_days(ratings)))
+    return found
+
+
+def estimate_study(
+    read: StudyRead, progress: Progress = lambda _: None
+) -> tuple[Analysis, list[Notice]]:
+    """Estimate and score every epoch of a study, without comparing anything.
+
+    Parameters
+    ----------
+    read : StudyRead
+    progress : callable
+        Called with the share of the work that was done since, 1 in all.
+    """
+    sessions = read.gathered.entries
+    subjects = _by_subject(read.epochs, sessions, read.settings)
+    work = sum(own.work([read.method]) for own in subjects.values()) or 1.0
+    return _analysed(subjects, read.method, lambda done: progress(done / work))
+
+
+def _by_subject(
+    epochs: Sequence[Epoch], sessions: Mapping[str, SessionEntry], settings: Settings
+) -> dict[str, Preparation]:
+    own: dict[str, list[Epoch]] = {}
+    for epoch in epochs:
+        own.setdefault(sessions[epoch.source].subject, []).append(epoch)
+    return {subject: Preparation(epochs, settings) for subject, epochs in own.items()}
+
+
+def _analysed(
+    subjects: Mapping[str, Preparation],
+    method: str,
+    progress: Progress,
+    *,
+    fits_alone: bool = False,
+) -> tuple[Analysis, list[Notice]]:
+    """Analyse each subject apart and put the parts together, in the order of the epochs."""
+    if len(subjects) < 2:
+        (preparation,) = subjects.values()
+        found = analyse_prepared(preparation, method, fits_alone=fits_alone, progress=progress)
+        return found, list(analysis_warnings(found))
+    reason = ""
+    if method == "auto":
+        everything = [p for own in subjects.values() for p in own.perturbed(as_recorded=True)]
+        method, reason = choose_method(everything)
+    parts = {
+        subject: analyse_prepared(own, method, fits_alone=fits_alone, progress=progress)
+        for subject, own in subjects.items()
+    }
+    notices = [
+        Notice(notice.level, f"subject {subject}: {notice.text}")
+        for subject, part in parts.items()
+        for notice in analysis_warnings(part)
+    ]
+    reasons = dict.fromkeys([reason, *(part.method_reason for part in parts.values())])
+    fits = [fit for part in parts.values() for fit in part.fits]
+    included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
+    merged = Analysis(
+        method=method,
+        fits=tuple(fits),
+        fixed_inertia=tuple(fit for part in parts.values() for fit in part.fixed_inertia),
+        inertia_kg_m2=float(np.median(included)) if included else float("nan"),
+        scores=tuple(score for part in parts.values() for score in part.scores),
+        delays=tuple(delay for part in parts.values() for delay in part.delays),
+        method_reason=". ".join(filter(None, reasons)),
+    )
+    if included:
+        held = ", ".join(f"{subject} {part.inertia_kg_m2:.4g}" for subject, part in parts.items())
+        text = f"J is held at the median of each subject, in kg·m²: {held}"
+        notices.append(Notice("warning", text))
+    return merged, notices

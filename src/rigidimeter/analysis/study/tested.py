@@ -1,0 +1,117 @@
+"""The test of one measure on which its verdict rests.
+
+What is tested is, in this order,
+
+- days: the test by days of a study folder;
+- recordings: the same test with each recording in the place of a day, where days are not known:
+  what differs between two recordings need not be their condition;
+- values: the rank-sum test of the values of a table, which are taken as independent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from rigidimeter.analysis.statistics import DayDifference, ranksum, summarise
+from rigidimeter.analysis.study.compared import Comparison
+from rigidimeter.analysis.study.comparison import day_test, rank_test
+from rigidimeter.analysis.study.differences import Difference, by_units, by_values
+from rigidimeter.analysis.study.measures import Observation
+
+LEVEL = 0.05
+
+Basis = Literal["days", "recordings", "values"]
+
+
+@dataclass(frozen=True)
+class Test:
+    """A test of one measure.
+
+    Attributes
+    ----------
+    comparison : Comparison
+    difference : Difference
+        With an interval and p of NaN where there is no test, for the reason in `remark`.
+    sign : float
+        That of reference − other.
+    remark : str
+    """
+
+    comparison: Comparison
+    difference: Difference
+    sign: float = 0.0
+    remark: str = ""
+
+    @property
+    def p(self) -> float:
+        """Of this measure alone."""
+        return self.difference.p
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a difference at the level, of this measure alone."""
+        return self.p < LEVEL
+
+    def agrees(self, other: Test) -> bool:
+        """Whether this test finds a difference of the sign of another."""
+        return self.found and self.sign * other.sign > 0
+
+    def stands_against(self, bias: float) -> bool:
+        """Whether the interval would exclude zero if the difference were smaller by a bias."""
+        d = self.difference
+        return abs(d.estimate) - bias > (d.high - d.low) / 2.0
+
+    @property
+    def said(self) -> str:
+        """p, or why there is none."""
+        return self.remark if math.isnan(self.p) else f"p = {self.p:.2g}"
+
+
+def basis_of(compared: Sequence[Comparison]) -> Basis:
+    """Return what the verdicts on these measures rest on."""
+    if any(c.days is not None for c in compared):
+        return "days"
+    return "values" if all(c.measure.origin == "column" for c in compared) else "recordings"
+
+
+def tested(c: Comparison, basis: Basis) -> Test:
+    """Return the test of a comparison."""
+    if basis == "values":
+        found = by_values(c)
+        return Test(c, found, c.test.z) if c.test is not None else Test(c, found, remark=c.remark)
+    if basis == "recordings":
+        by_source = replace(c, observations=tuple(replace(o, day=o.source) for o in c.observations))
+        days = day_test(by_source)
+        remark = days.remark.replace("days", "recordings").replace("day", "recording")
+        return Test(c, by_units(by_source, days), days.estimate, remark)
+    return by_days(c, c.days) if c.days is not None else Test(c, by_units(c, None), remark=c.remark)
+
+
+def by_days(c: Comparison, found: DayDifference) -> Test:
+    """Return a test by days as the test of a comparison."""
+    return Test(c, by_units(c, found), found.estimate, found.remark)
+
+
+def tested_again(c: Comparison, observations: Sequence[Observation], basis: Basis) -> Test:
+    """Return the test of a comparison with other observations."""
+    values = {name: [o.value for o in observations if o.condition == name] for name in c.summaries}
+    summaries = {name: summarise(own) for name, own in values.items()}
+    again = replace(c, observations=tuple(observations), summaries=summaries)
+    if basis == "days":
+        again = replace(again, days=day_test(rank_test(again)))
+    return tested(rank_test(again), basis)
+
+
+def too_few(test: Test, basis: Basis, tests: int) -> str:
+    """Return that no values could be far enough apart for this test; else nothing."""
+    if basis != "values":
+        return ""
+    n_x, n_y = (len(test.comparison.values[name]) for name in test.comparison.pair)
+    least = ranksum(range(n_x), range(n_x, n_x + n_y)).p * tests
+    if least < LEVEL:
+        return ""
+    of = f" for {tests} measures" if tests > 1 else ""
+    return f"{n_x} values against {n_y} cannot reach p < {LEVEL:g}{of}, whatever they are"

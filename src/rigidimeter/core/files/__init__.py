@@ -1,0 +1,58 @@
+"""Files of text, JSON, CSV and TOML: the one place where they are written, and read as values."""
+
+from rigidimeter.core.files.escaping import NUMBER, as_read, as_written, printable, visible
+from rigidimeter.core.files.label_table import (
+    TextTable,
+    cell_number,
+    cells_of,
+    checked_names,
+    first_line_names,
+    read_text_table,
+    refuse_duplicates,
+)
+from rigidimeter.core.files.locking import lock
+from rigidimeter.core.files.reading import (
+    noted_digests,
+    open_regular,
+    parse_json,
+    parse_toml,
+    read_bytes,
+    read_json,
+    read_toml,
+)
+from rigidimeter.core.files.size_limits import (
+    BOOTSTRAP_COUNTS,
+    CELLS,
+    COLUMNS,
+    DIGITS,
+    DOCUMENT_BYTES,
+    EPOCHS,
+    EXPANDED_BYTES,
+    EXPANSION,
+    MAGNITUDE,
+    MIB,
+    NESTING,
+    NOTICES,
+    RANKED_PAIRS,
+    RECORDING_BYTES,
+    SAMPLING_RATE_HZ,
+    SCORES_BY_GROUPS_SQUARED,
+    SETTINGS_BYTES,
+    TABLE_BYTES,
+    TABLE_ROWS,
+    lines_text,
+    size_text,
+)
+from rigidimeter.core.files.text_lines import content, read_utf8, records, trimmed, whole_names
+from rigidimeter.core.files.writing import (
+    csv_text,
+    in_place,
+    json_line,
+    json_text,
+    plain_values,
+    replace_file,
+    text_bytes,
+    toml_text,
+    write_json,
+    write_text,
+)

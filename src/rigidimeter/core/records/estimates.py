@@ -1,0 +1,222 @@
+"""What was estimated from an epoch: parameters and their uncertainty, scores, findings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.core.records.epochs import Outcome, readonly
+from rigidimeter.core.records.parameters import PARAMETER_VECTORS, PARAMETERS
+
+STATISTICS = ("r_squared", "vaf_percent", "condition_number", "residual_sd_nm")
+"""How well a fit explains the torque, beside its parameters."""
+
+FIT_NUMBERS = (
+    *(p.name + ending for p in PARAMETERS for ending in PARAMETER_VECTORS.values()),
+    *STATISTICS,
+)
+"""The numbers of a fit, as files and tables name them."""
+
+SCORE_NUMBERS = ("impulse_nm_s", "work_j", "frequency_hz", "n_cycles")
+"""The numbers of a score, as files and tables name them."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one check found in an epoch.
+
+    Parameters
+    ----------
+    name : str
+        The check, as the settings name it.
+    level : {"note", "doubt", "exclude"}
+        `note` says what is; `doubt` asks for a look before the numbers are used; `exclude` says
+        that they mean nothing.
+    value, threshold : float
+        What was found and where it would change sides, in the unit that the text states.
+    text : str
+        Value, threshold and meaning in words.
+    remedy : str
+        What to do about it; empty where nothing is wrong.
+    """
+
+    name: str
+    level: Literal["note", "doubt", "exclude"]
+    value: float
+    threshold: float
+    text: str
+    remedy: str
+
+
+class _Entry:
+    """One entry of a vector of a `Fit`, as an attribute."""
+
+    def __init__(self, vector: str, index: int) -> None:
+        self._vector, self._index = vector, index
+
+    def __get__(self, fit: Fit, owner: type[Fit]) -> float:
+        return float(getattr(fit, self._vector)[self._index])
+
+
+def _unknown() -> NDArray[np.float64]:
+    return np.full(len(PARAMETERS), math.nan)
+
+
+def _unknown_square() -> NDArray[np.float64]:
+    return np.full((len(PARAMETERS), len(PARAMETERS)), math.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """J, B, K of one epoch with their standard errors and how far to trust them.
+
+    Numbers are NaN when the outcome is `failed`. With the inertia held fixed its standard error is
+    0, and the statistics are those of the two-parameter fit. A fit to several epochs is called
+    ``pooled``. Every entry of the vectors is also an attribute: `inertia_kg_m2`,
+    `inertia_kg_m2_se`, `inertia_kg_m2_low`, `inertia_kg_m2_high`, `inertia_kg_m2_bound`, and
+    likewise for `damping_nm_s_rad` and `stiffness_nm_rad`.
+
+    Attributes
+    ----------
+    value, se : arrays, shape (3,)
+        The parameters in the order of `PARAMETERS`, and their standard errors.
+    low, high : arrays, shape (3,)
+        The ends of the 95 % intervals.
+    bound : array, shape (3,)
+        The standard errors that no unbiased estimate from the same excitation can beat for the
+        noise that was found (Cramér–Rao).
+    covariance : array, shape (3, 3)
+        Of the parameters; NaN where it is not known, as in estimates read from a file.
+    r_squared : float
+        1 − Σ(residual²)/Σ((torque − mean)²) over the fitted samples.
+    vaf_percent : float
+        Variance accounted for, 100·(1 − var(residual)/var(torque)).
+    condition_number : float
+        Of the regressors after each column is scaled to unit length, so that it does not depend
+        on units.
+    residual_sd_nm : float
+        Standard deviation of the residual torque.
+    n_samples : int
+        Samples that entered the fit, after trimming.
+    band_hz : (float, float)
+        The band in which the fit was made; (0, Nyquist) for the unfiltered signals of `published`.
+    """
+
+    source: str
+    epoch: str
+    condition: str
+    method: str
+    outcome: Outcome
+    value: NDArray[np.float64] = field(default_factory=_unknown)
+    se: NDArray[np.float64] = field(default_factory=_unknown)
+    low: NDArray[np.float64] = field(default_factory=_unknown)
+    high: NDArray[np.float64] = field(default_factory=_unknown)
+    bound: NDArray[np.float64] = field(default_factory=_unknown)
+    covariance: NDArray[np.float64] = field(default_factory=_unknown_square)
+    r_squared: float = math.nan
+    vaf_percent: float = math.nan
+    condition_number: float = math.nan
+    residual_sd_nm: float = math.nan
+    n_samples: int = 0
+    band_hz: tuple[float, float] = (math.nan, math.nan)
+    findings: tuple[Finding, ...] = ()
+
+    inertia_kg_m2 = _Entry("value", 0)
+    inertia_kg_m2_se = _Entry("se", 0)
+    inertia_kg_m2_low = _Entry("low", 0)
+    inertia_kg_m2_high = _Entry("high", 0)
+    inertia_kg_m2_bound = _Entry("bound", 0)
+    damping_nm_s_rad = _Entry("value", 1)
+    damping_nm_s_rad_se = _Entry("se", 1)
+    damping_nm_s_rad_low = _Entry("low", 1)
+    damping_nm_s_rad_high = _Entry("high", 1)
+    damping_nm_s_rad_bound = _Entry("bound", 1)
+    stiffness_nm_rad = _Entry("value", 2)
+    stiffness_nm_rad_se = _Entry("se", 2)
+    stiffness_nm_rad_low = _Entry("low", 2)
+    stiffness_nm_rad_high = _Entry("high", 2)
+    stiffness_nm_rad_bound = _Entry("bound", 2)
+
+    def __post_init__(self) -> None:
+        p = len(PARAMETERS)
+        for name, shape in (*((name, (p,)) for name in PARAMETER_VECTORS), ("covariance", (p, p))):
+            array = readonly(getattr(self, name))
+            if array.shape != shape:
+                raise ValueError(f"{name} of a fit must have shape {shape}, not {array.shape}")
+            object.__setattr__(self, name, array)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal in every field; numbers that are NaN in both are equal."""
+        if not isinstance(other, Fit):
+            return NotImplemented
+        return all(
+            np.array_equal(mine, theirs, equal_nan=True)
+            if isinstance(mine, float | np.ndarray) or name == "band_hz"
+            else mine == theirs
+            for (name, mine), theirs in zip(vars(self).items(), vars(other).values(), strict=True)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.source, self.epoch, self.condition, self.method, self.outcome))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the parameters, in the order of the vectors."""
+        return tuple(parameter.name for parameter in PARAMETERS)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """The names of the checks that cast doubt on it, or exclude it."""
+        return tuple(dict.fromkeys(one.name for one in self.findings if one.level != "note"))
+
+    def row(self) -> dict[str, Any]:
+        """Return the names and numbers of the fit, as files and tables have them."""
+        numbers = {name: getattr(self, name) for name in FIT_NUMBERS}
+        return _named(self) | numbers | {"n_samples": self.n_samples}
+
+
+@dataclass(frozen=True)
+class Delay:
+    """How late the torque's stamps are against the motion's, in one source.
+
+    `corrected` says whether the torque was moved by it before anything was fitted or scored;
+    `remark` says why, or why there is no estimate.
+    """
+
+    source: str
+    delay_s: float = math.nan
+    delay_s_se: float = math.nan
+    corrected: bool = False
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Score:
+    """Angular impulse (Eq. 1) and work (Eq. 2) of one sinusoidal epoch, per cycle."""
+
+    source: str
+    epoch: str
+    condition: str
+    outcome: Outcome
+    impulse_nm_s: float = math.nan
+    work_j: float = math.nan
+    n_cycles: int = 0
+    frequency_hz: float = math.nan
+
+    def row(self) -> dict[str, Any]:
+        """Return the names and numbers of the score, as files and tables have them."""
+        return _named(self) | {name: getattr(self, name) for name in SCORE_NUMBERS}
+
+
+def _named(result: Fit | Score) -> dict[str, Any]:
+    return {
+        "source": result.source,
+        "epoch": result.epoch,
+        "condition": result.condition,
+        "outcome": result.outcome.kind,
+        "reason": result.outcome.reason,
+    }

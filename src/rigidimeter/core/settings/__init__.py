@@ -1,0 +1,46 @@
+"""Validated settings: TOML with the unit in every key."""
+
+from rigidimeter.core.settings.commissioning_settings import CommissioningSettings
+from rigidimeter.core.settings.estimation_settings import (
+    FEWEST_LINES,
+    USABLE_FRACTION_OF_RATE,
+    DiagnosticLevels,
+    DiagnosticsSettings,
+    EstimationSettings,
+    Level,
+    OnlineSettings,
+    ScoreSettings,
+)
+from rigidimeter.core.settings.experiment_settings import (
+    BlockSettings,
+    MarginsSettings,
+    PrbsSettings,
+    ProtocolSettings,
+    SinusoidSettings,
+)
+from rigidimeter.core.settings.load import (
+    changed_settings,
+    dump_settings,
+    load_settings,
+    parse_settings,
+    read_section,
+    settings_from,
+)
+from rigidimeter.core.settings.loop_settings import (
+    GAP_S,
+    LONGEST_STEP,
+    ControllerSettings,
+    GuardSettings,
+    ZeroingSettings,
+)
+from rigidimeter.core.settings.messages import validated
+from rigidimeter.core.settings.models import Settings
+from rigidimeter.core.settings.rig_settings import (
+    MotionSensorSettings,
+    RigSettings,
+    SubjectSettings,
+    TorqueSensorSettings,
+)
+from rigidimeter.core.settings.section import Section, quantity
+
+__all__ = ["Settings", "load_settings", "parse_settings"]

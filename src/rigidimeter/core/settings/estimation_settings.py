@@ -1,0 +1,199 @@
+"""Settings of what is computed from an epoch: estimate, scores, checks, live estimate."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Literal, Self
+
+from pydantic import model_validator
+
+from rigidimeter.core.settings.section import Section, quantity
+
+USABLE_FRACTION_OF_RATE = 0.4
+"""A channel carries information up to half its rate; interpolation is good to about 0.4 of it."""
+
+FEWEST_LINES = 8
+"""Spectral lines that a band must hold for a fit of J, B and K."""
+
+Level = Literal["note", "doubt", "exclude"]
+
+
+class EstimationSettings(Section):
+    """How J, B and K are estimated from an epoch.
+
+    `band_high_hz` applies where the perturbation is known; `band_high_unknown_hz` where it is not,
+    since an imposed motion may excite the joint far above the paper's 10 Hz;
+    `band_high_closed_loop_hz` to the methods that weight each frequency by its noise. Higher, they
+    gain precision where the subject pushes slowly, and take a soft cuff for the joint.
+
+    `torque_lowpass_hz` is the corner of the low-pass in the torque sensor or its amplifier, a
+    Butterworth filter of the given order; 0 where there is none, or none below half the rate. What
+    it does to the torque is then done to the motion too.
+    """
+
+    band_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
+    band_high_hz: float = quantity(10.0, "Hz", 0.1, 1000.0)
+    band_high_unknown_hz: float = quantity(50.0, "Hz", 0.1, 1000.0)
+    band_high_closed_loop_hz: float = quantity(30.0, "Hz", 0.1, 1000.0)
+    torque_lowpass_hz: float = quantity(0.0, "Hz", 0.0, 100000.0)
+    torque_lowpass_order: int = quantity(2, "1", 1, 8)
+    trim_s: float = quantity(1.0, "s", 0.0, 60.0)
+    shortest_epoch_s: float = quantity(5.0, "s", 1.0, 600.0)
+    published_highpass_hz: float = quantity(0.2, "Hz", 0.001, 10.0)
+    published_highpass_order: int = quantity(2, "1", 1, 6)
+    correct_delay: bool = True
+    longest_delay_s: float = quantity(0.04, "s", 0.001, 0.2)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        highest = min(self.band_high_hz, self.band_high_unknown_hz, self.band_high_closed_loop_hz)
+        if self.band_low_hz >= highest:
+            raise ValueError(
+                "band_low_hz must be below band_high_hz, band_high_unknown_hz and "
+                "band_high_closed_loop_hz"
+            )
+        return self
+
+
+class ScoreSettings(Section):
+    """How the impulse and work scores are computed (Sec. 2.3)."""
+
+    ascending: ClassVar = (("band_low_hz", "band_high_hz"),)
+
+    band_low_hz: float = quantity(0.2, "Hz", 0.001, 10.0)
+    band_high_hz: float = quantity(5.0, "Hz", 0.1, 100.0)
+    cycles: int = quantity(8, "1", 1, 1000)
+    discard_s: float = quantity(1.0, "s", 0.0, 60.0)
+
+    def cycles_in(self, length_s: float, frequency_hz: float) -> int:
+        """Return how many whole cycles are scored of a motion without its discarded ends."""
+        return min(self.cycles, math.floor(length_s * frequency_hz + 1e-6))
+
+
+class DiagnosticLevels(Section):
+    """What a check that fails does: leave a note, mark the epoch as doubtful, or exclude it.
+
+    The names are those of the findings.
+
+    By default a check excludes the epoch if it shows that a channel did not measure or that the
+    numbers are meaningless. A negative or unlikely parameter does not: leaving out epochs because
+    of their result shifts the median of the others.
+    """
+
+    conditioning: Level = "doubt"
+    coherence: Level = "doubt"
+    band_share: Level = "doubt"
+    imposed_sinusoid: Level = "exclude"
+    computed_torque: Level = "exclude"
+    static_torque: Level = "exclude"
+    residual_whiteness: Level = "note"
+    residual_perturbation: Level = "doubt"
+    lack_of_fit: Level = "doubt"
+    band_sensitivity: Level = "doubt"
+    between_samples: Level = "doubt"
+    held_out_vaf: Level = "exclude"
+    missing_term: Level = "doubt"
+    r_squared: Level = "doubt"
+    voluntary_torque: Level = "doubt"
+    tremor: Level = "doubt"
+    active_movement: Level = "doubt"
+    loop_bias: Level = "doubt"
+    emg_activity: Level = "doubt"
+    varying_with_time: Level = "doubt"
+    varying_with_angle: Level = "doubt"
+    varying_with_phase: Level = "doubt"
+    varying_between_epochs: Level = "note"
+    saturation: Level = "exclude"
+    frozen: Level = "exclude"
+    left_out: Level = "note"
+    lost_samples: Level = "exclude"
+    gravity: Level = "note"
+    velocity_scale: Level = "exclude"
+    velocity_delay: Level = "doubt"
+    torque_delay: Level = "doubt"
+    velocity_shape: Level = "doubt"
+    missed_ticks: Level = "doubt"
+    guard_limited: Level = "doubt"
+    position_limit: Level = "doubt"
+    negative_parameters: Level = "doubt"
+    implausible_parameters: Level = "doubt"
+    controller_misfit: Level = "doubt"
+    unstable_loop: Level = "doubt"
+
+
+class DiagnosticsSettings(Section):
+    """Thresholds of the checks. `_least` and `_most` are the ends of what is taken as sound.
+
+    `gravity_nm` is m g l, the moment of the limb's weight about the axis when the limb is
+    horizontal; 0 where it is not known or the axis is vertical. `gravity_angle_deg` is the limb's
+    angle from hanging straight down where the angle that is recorded is 0, in its direction.
+    """
+
+    ascending: ClassVar = (
+        ("voluntary_low_hz", "voluntary_high_hz"),
+        ("tremor_low_hz", "tremor_high_hz"),
+        ("inertia_least_kg_m2", "inertia_most_kg_m2"),
+    )
+
+    condition_number_most: float = quantity(10.0, "1", 1.0, 1e6)
+    coherence_least: float = quantity(0.5, "1", 0.0, 1.0)
+    band_share_least_percent: float = quantity(50.0, "%", 0.0, 100.0)
+    single_frequency_most_percent: float = quantity(85.0, "%", 1.0, 100.0)
+    computed_torque_least_percent: float = quantity(1e-3, "%", 0.0, 100.0)
+    static_torque_least_percent: float = quantity(0.5, "%", 0.0, 100.0)
+    residual_flatness_least: float = quantity(0.7, "1", 0.0, 1.0)
+    residual_perturbation_most_percent: float = quantity(10.0, "%", 0.0, 100.0)
+    lack_of_fit_most_percent: float = quantity(2.0, "%", 0.0, 100.0)
+    band_sensitivity_most_percent: float = quantity(3.0, "%", 0.0, 100.0)
+    r_squared_least: float = quantity(0.3, "1", -100.0, 1.0)
+    between_samples_most_percent: float = quantity(1.0, "%", 0.0, 100.0)
+    held_out_vaf_least_percent: float = quantity(0.0, "%", -1000.0, 100.0)
+    voluntary_low_hz: float = quantity(0.3, "Hz", 0.01, 20.0)
+    voluntary_high_hz: float = quantity(4.0, "Hz", 0.05, 50.0)
+    voluntary_share_most_percent: float = quantity(15.0, "%", 0.0, 100.0)
+    tremor_low_hz: float = quantity(4.0, "Hz", 1.0, 50.0)
+    tremor_high_hz: float = quantity(12.0, "Hz", 1.0, 50.0)
+    tremor_share_most_percent: float = quantity(3.0, "%", 0.0, 100.0)
+    loop_bias_most_percent: float = quantity(50.0, "%", 0.0, 1000.0)
+    active_torque_nm: float = quantity(0.1, "N·m", 0.0, 100.0, above=True)
+    active_share_percent: float = quantity(50.0, "%", 0.0, 1000.0)
+    active_most_percent: float = quantity(20.0, "%", 0.0, 100.0)
+    emg_window_s: float = quantity(0.25, "s", 0.01, 10.0)
+    emg_baseline_factor: float = quantity(3.0, "1", 1.0, 1000.0, above=True)
+    emg_active_most_percent: float = quantity(20.0, "%", 0.0, 100.0)
+    varying_most_percent: float = quantity(10.0, "%", 0.0, 1000.0)
+    varying_chance: float = quantity(0.005, "1", 0.001, 0.5)
+    saturated_most_percent: float = quantity(0.5, "%", 0.0, 100.0)
+    frozen_most_s: float = quantity(0.1, "s", 0.0, 60.0)
+    left_out_most_percent: float = quantity(50.0, "%", 0.0, 100.0)
+    gravity_nm: float = quantity(0.0, "N·m", 0.0, 1000.0)
+    gravity_angle_deg: float = quantity(0.0, "deg", -180.0, 180.0)
+    velocity_scale_most_percent: float = quantity(10.0, "%", 0.1, 1000.0)
+    velocity_delay_most_ms: float = quantity(5.0, "ms", 0.01, 1000.0)
+    velocity_shape_most_percent: float = quantity(5.0, "%", 0.0, 1000.0)
+    missed_ticks_most_percent: float = quantity(0.1, "%", 0.0, 100.0)
+    limited_most_percent: float = quantity(1.0, "%", 0.0, 100.0)
+    position_most_percent: float = quantity(98.0, "%", 1.0, 100.0)
+    controller_misfit_most_percent: float = quantity(20.0, "%", 0.0, 1000.0)
+    inertia_least_kg_m2: float = quantity(1e-5, "kg·m²", 0.0, 10.0)
+    inertia_most_kg_m2: float = quantity(1.0, "kg·m²", 0.0, 100.0, above=True)
+    damping_most_nm_s_rad: float = quantity(50.0, "N·m·s/rad", 0.0, 1000.0, above=True)
+    stiffness_most_nm_rad: float = quantity(2000.0, "N·m/rad", 0.0, 100000.0, above=True)
+    levels: DiagnosticLevels = DiagnosticLevels()
+
+
+class OnlineSettings(Section):
+    """The band of the causal filters, and how long the live estimate remembers.
+
+    A sample counts 1/e after `forgetting_s`; a step of a parameter is followed from 10 to 90 % in
+    2.2 times that. While the motion has less than `rest_share_percent` of its usual power,
+    the estimate is neither updated nor forgotten.
+    """
+
+    ascending: ClassVar = (("band_low_hz", "band_high_hz"),)
+
+    band_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
+    band_high_hz: float = quantity(10.0, "Hz", 0.1, 1000.0)
+    forgetting_s: float = quantity(5.0, "s", 0.05, 3600.0)
+    rest_share_percent: float = quantity(1.0, "%", 0.0, 50.0)
+    rest_window_s: float = quantity(0.5, "s", 0.01, 60.0)

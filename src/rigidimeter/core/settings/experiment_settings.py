@@ -1,0 +1,128 @@
+"""Settings of the perturbations, the session, and what is predicted before it."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from rigidimeter.core.settings.section import Section, quantity
+
+
+class PrbsSettings(Section):
+    """The torque perturbation: a maximal-length pseudo-random binary sequence.
+
+    By the torque's answer to it the guard finds a torque sensor of the wrong sign. Where the
+    subject's own torque is larger than about a tenth of `amplitude_nm` it may not;
+    `rigidimeter commission` and `check` print what it finds with the settings.
+    """
+
+    ascending: ClassVar = (("wanted_low_hz", "wanted_high_hz"),)
+
+    register_bits: int = quantity(7, "1", 3, 20)
+    clock_hz: float = quantity(20.0, "Hz", 0.1, 1000.0)
+    amplitude_nm: float = quantity(1.0, "N·m", 0.0, 50.0, above=True)
+    duration_s: float = quantity(20.0, "s", 1.0, 3600.0)
+    wanted_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
+    wanted_high_hz: float = quantity(10.0, "Hz", 0.01, 500.0)
+
+
+class SinusoidSettings(Section):
+    """The position perturbation for the impulse and work scores."""
+
+    frequency_hz: float = quantity(1.0, "Hz", 0.05, 10.0)
+    amplitude_deg: float = quantity(20.0, "deg", 0.1, 90.0)
+    motion_s: float = quantity(10.0, "s", 1.0, 600.0)
+    duration_s: float = quantity(20.0, "s", 1.0, 3600.0)
+    taper_s: float = quantity(1.0, "s", 0.0, 10.0)
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.motion_s > self.duration_s:
+            raise ValueError("motion_s must not exceed duration_s")
+        if 2 * self.taper_s > self.motion_s:
+            raise ValueError("taper_s must be at most half of motion_s")
+        return self
+
+
+class BlockSettings(Section):
+    """A run of epochs of one task in one condition."""
+
+    task: Literal["prbs", "sinusoid"] = "prbs"
+    condition: str = Field("OFF", min_length=1, max_length=40)
+    epochs: int = quantity(4, "1", 1, 1000)
+
+
+class ProtocolSettings(Section):
+    """Blocks of epochs in order, with random rests in between.
+
+    With `repeat_limited`, an epoch in which the arm came to a limit is run again at the end, once.
+    """
+
+    blocks: list[BlockSettings] = Field(
+        default_factory=lambda: [BlockSettings(task="prbs"), BlockSettings(task="sinusoid")],
+        min_length=1,
+    )
+    rests_s: list[float] = Field([10.0, 20.0], min_length=1, json_schema_extra={"unit": "s"})
+    return_s: float = quantity(3.0, "s", 0.5, 60.0)
+    repeat_limited: bool = False
+
+    @model_validator(mode="after")
+    def _rests_hold_the_return(self) -> Self:
+        for rest_s in self.rests_s:
+            if not self.return_s <= rest_s <= 3600:
+                raise ValueError(
+                    f"rests_s holds {rest_s:g} s; each rest must last at least return_s "
+                    f"({self.return_s:g} s) and at most 3600 s"
+                )
+        return self
+
+
+class MarginsSettings(Section):
+    """How far the loop must stay from instability, and for which joints.
+
+    Each of J, B and K of every subject is varied by the two factors to find the worst case. A loop
+    that is unstable or has smaller margins is refused for a condition's own joint, and brings a
+    warning for the worst case.
+    """
+
+    gain_margin_db: float = quantity(6.0, "dB", 0.0, 60.0)
+    phase_margin_deg: float = quantity(30.0, "deg", 0.0, 90.0)
+    joint_factor_low: float = quantity(0.25, "1", 0.01, 1.0)
+    joint_factor_high: float = quantity(4.0, "1", 1.0, 100.0)
+
+
+class OptimiseSettings(Section):
+    """Where `design --optimise` looks for a better PRBS.
+
+    The amplitude of each candidate is the largest that keeps `limit_margin_percent` of the guard's
+    limits in hand, and at most `amplitude_high_nm`.
+    """
+
+    clock_low_hz: float = quantity(5.0, "Hz", 0.1, 1000.0)
+    clock_high_hz: float = quantity(60.0, "Hz", 0.1, 1000.0)
+    clocks: int = quantity(9, "1", 1, 100)
+    bits_low: int = quantity(5, "1", 3, 20)
+    bits_high: int = quantity(10, "1", 3, 20)
+    amplitude_high_nm: float = quantity(3.0, "N·m", 0.0, 50.0, above=True)
+    limit_margin_percent: float = quantity(20.0, "%", 0.0, 90.0)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.clock_low_hz > self.clock_high_hz:
+            raise ValueError("clock_low_hz must not be above clock_high_hz")
+        if self.bits_low > self.bits_high:
+            raise ValueError("bits_low must not be above bits_high")
+        return self
+
+
+class MultisineSettings(Section):
+    """A multisine in place of the PRBS: equal lines at whole multiples of 1 / `period_s`.
+
+    It lies in the wanted band of `[prbs]`, lasts as long, and has the same peak torque. Without
+    `period_s`, which is 0, its period is that of the epoch.
+    """
+
+    period_s: float = quantity(0.0, "s", 0.0, 3600.0)
+    phases: Literal["schroeder", "random"] = "schroeder"
+    crest_steps: int = quantity(200, "1", 0, 10000)

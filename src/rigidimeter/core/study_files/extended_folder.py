@@ -1,0 +1,213 @@
+"""A folder of sessions becomes a study folder, and grows with each session that is recorded.
+
+Nothing that a person wrote is changed: rows are added behind theirs, and a `study.toml` that was
+edited stays as it is.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import DOCUMENT_BYTES, read_bytes, write_text
+from rigidimeter.core.session import EVENTS, is_session, read_events, read_manifest
+from rigidimeter.core.settings import validated
+from rigidimeter.core.study_files.folder import is_study
+from rigidimeter.core.study_files.recorded_sessions import (
+    RecordedSession,
+    rating_rows,
+    recorded_session,
+    session_rows,
+    stimulated,
+)
+from rigidimeter.core.study_files.study_text import is_own, own_text, pair_of, study_text, toml_key
+from rigidimeter.core.study_files.study_toml import STUDY_FILE, ConditionTable, read_study_toml
+from rigidimeter.core.study_files.tables import (
+    add_rows,
+    commented_cells,
+    empty_table,
+    table_path,
+    table_rows,
+)
+
+
+def extend_study(
+    study: Path,
+    folders: Iterable[Path] | None = None,
+    *,
+    subject: str = "",
+    known: Sequence[str] | None = None,
+    refused: list[str] | None = None,
+) -> list[str]:
+    """Add recorded sessions to a study folder, which is made if it is none yet.
+
+    A session is added once. One whose row was made a comment stays out of the study.
+
+    Parameters
+    ----------
+    study : Path
+    folders : iterable of Path, optional
+        Session folders; those in the study folder and in its folder `sessions` by default.
+    subject : str
+        Of sessions that do not say theirs.
+    known : sequence of str, optional
+        Names of conditions; any other may be a code. Those of the session's settings by default.
+    refused : list of str, optional
+        Takes the sentences about sessions without a subject, or of a condition that an edited
+        `study.toml` does not know; by default they are among those that are returned.
+
+    Returns
+    -------
+    list of str
+        What was done and what was not, a sentence each.
+
+    Raises
+    ------
+    UserError
+        If a table or `study.toml` cannot be read or written.
+    """
+    table = table_path(study, "sessions")
+    there = {os.path.normpath(row["path"]) for row in table_rows(table, "sessions")}
+    there |= {os.path.normpath(cell) for cell in commented_cells(table) if cell}
+    asked = folders is not None
+    said = []
+    for folder in _found(study) if folders is None else folders:
+        path = os.path.relpath(os.path.realpath(folder), os.path.realpath(study))
+        if path in there:
+            said += [f"{path}: is in {table.name} already"] if asked else []
+            continue
+        if path.split(os.sep)[0] == os.pardir:
+            said.append(
+                f"{folder}: lies outside the study folder {study}; copy or link it there to add it"
+            )
+            continue
+        kept_out, told = (said, asked) if refused is None else (refused, True)
+        said += _added(study, table, Path(path), subject, known, kept_out, asked=told)
+    return said
+
+
+def _found(study: Path) -> list[Path]:
+    """Return the session folders of a study folder, the oldest first."""
+    if not study.is_dir():
+        raise UserError(f"{study}: there is no such folder")
+    places = (study, study / "sessions")
+    found = [path for place in places if place.is_dir() for path in place.iterdir()]
+    return sorted(path for path in found if path.is_dir() and is_session(path))
+
+
+def _added(
+    study: Path,
+    table: Path,
+    path: Path,
+    subject: str,
+    known: Sequence[str] | None,
+    refused: list[str],
+    *,
+    asked: bool,
+) -> list[str]:
+    """Add one session; return what is to be said of it."""
+    folder = study / path
+    manifest = read_manifest(folder)
+    events, _ = read_events(folder / EVENTS) if (folder / EVENTS).is_file() else ([], False)
+    if not any(event["event"] == "session_ended" for event in events):
+        return [f"{path}: was not closed, so it is not in the study yet"] if asked else []
+    session = recorded_session(path.as_posix(), manifest, events)
+    session = replace(session, subject=session.subject or subject)
+    if not session.subject:
+        if asked:
+            refused.append(f"{path}: does not say its subject; name it with --subject")
+        return []
+    if not session.conditions:
+        return [f"{path}: no epoch was begun in it, so it is not in the study"] if asked else []
+    before = table_rows(table, "sessions")
+    kinds = (_virtual(study / row["path"]) for row in before)
+    if next((kind for kind in kinds if kind is not None), session.virtual) != session.virtual:
+        kind, other = ("virtual", "real") if session.virtual else ("real", "virtual")
+        return [
+            f"{path}: was recorded on a {kind} rig, the sessions of the study on a {other} one; "
+            "it is not in the study, so use another folder for it"
+        ]
+    recorded = [*(row["condition"] for row in before), *session.conditions]
+    names = list(manifest["settings"]["subject"]) if known is None else list(known)
+    if is_study(study) and not is_own(read_bytes(study / STUDY_FILE, DOCUMENT_BYTES)):
+        about = read_study_toml(study / STUDY_FILE)
+        defined = about.conditions or (about.reference, about.other)
+        new = [name for name in _new(study, recorded, defined) if name in session.conditions]
+        if new:
+            refused.append(
+                f"{path}: is not in the study, for {study / STUDY_FILE} lacks its condition "
+                f"{new[0]}: write [conditions.{toml_key(new[0])}] there and add the session again"
+            )
+            return []
+    said = _described(study, session, recorded, names)
+    ratings = table_path(study, "ratings")
+    # The row of the session comes last: what was interrupted before is done again.
+    add_rows(ratings, "ratings", rating_rows(session, table_rows(ratings, "ratings")))
+    add_rows(table, "sessions", session_rows(session, before))
+    # Not in which condition: the operator may be blinded.
+    return [f"{path}: is in {table.name}, subject {session.subject}, day {session.day}.", *said]
+
+
+def _virtual(folder: Path) -> bool | None:
+    """Whether a row's recording was made on the virtual rig; None where that is not known."""
+    try:
+        return bool(read_manifest(folder)["virtual"]) if is_session(folder) else None
+    except UserError:
+        return None
+
+
+def _new(study: Path, recorded: Sequence[str], defined: Collection[str]) -> list[str]:
+    """Return the recorded conditions that a study does not know; not its codes.
+
+    Where it knows none of them, all are codes, and the study is analysed blinded.
+    """
+    codes = {row["code"] for row in table_rows(table_path(study, "key"), "key")}
+    if not codes and set(recorded).isdisjoint(defined):
+        return []
+    return [name for name in dict.fromkeys(recorded) if name not in defined and name not in codes]
+
+
+def _described(
+    study: Path, session: RecordedSession, recorded: Sequence[str], known: list[str]
+) -> list[str]:
+    """Write `study.toml`, or add to one that is the program's own; return what could not be."""
+    path = study / STUDY_FILE
+    names = [name for name in known if name in recorded]
+    title, pair = study.resolve().name, pair_of(names, known)
+    conditions: dict[str, ConditionTable] = {}
+    own = True
+    if is_study(study):
+        content, about = read_bytes(path, DOCUMENT_BYTES), read_study_toml(path)
+        own, title, conditions = is_own(content), about.title, dict(about.conditions)
+        pair = pair if own else (about.reference, about.other)
+    for name in (*pair, *names):
+        conditions.setdefault(name, ConditionTable())
+    conditions |= {name: ConditionTable() for name in _new(study, recorded, conditions)}
+    said = []
+    for name in stimulated(session, pair[0]):
+        if name not in conditions:  # a code; whose stimulation it was would tell
+            continue
+        given = validated(ConditionTable, dict(session.stimulation), "stimulation")
+        there = conditions[name].model_dump(exclude={"title"}, exclude_defaults=True)
+        new = given.model_dump(exclude={"title"}, exclude_defaults=True)
+        if there == new:
+            continue
+        if there or not own:
+            told = ", ".join(f"{key} = {value}" for key, value in new.items())
+            said.append(
+                f"{session.path}: its stimulation was {told}; {path.name} says otherwise and "
+                "stays as it is"
+            )
+        else:
+            conditions[name] = ConditionTable(**new)
+    if own:
+        for table in ("ratings", "exclusions"):
+            if not table_path(study, table).exists():
+                write_text(table_path(study, table), empty_table(table))
+        text = own_text(study_text(title, *pair, conditions))
+        if not path.exists() or read_bytes(path, DOCUMENT_BYTES) != text.encode():
+            write_text(path, text)
+    return said

@@ -1,0 +1,177 @@
+"""`study.toml`: what a study is, which two conditions it compares, and how they differ.
+
+Strict as the settings are: an unknown key is refused with the nearest known one, a number out of
+its range with the range and the unit.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from rigidimeter.core.settings import Section, read_section
+
+STUDY_FILE = "study.toml"
+STUDY_SCHEMA = "rigidimeter.study/1"
+
+
+def _optional(unit: str, low: float, high: float) -> Any:
+    return Field(None, ge=low, le=high, json_schema_extra={"unit": unit})
+
+
+def _text(default: Any, least: int = 1, most: int = 200) -> Any:
+    return Field(default, min_length=least, max_length=most)
+
+
+class SimulatedTable(Section):
+    """``[simulated.NAME]``: medians of a virtual condition, by the measures' names."""
+
+    inertia_kg_m2: float | None = _optional("kg·m²", 0.0, 1e3)
+    damping_nm_s_rad: float | None = _optional("N·m·s/rad", 0.0, 1e4)
+    stiffness_nm_rad: float | None = _optional("N·m/rad", 0.0, 1e5)
+    impulse_nm_s: float | None = _optional("N·m·s", 0.0, 1e5)
+    work_j: float | None = _optional("J", 0.0, 1e5)
+    rating: float | None = _optional("points", -1e3, 1e3)
+
+
+class ConditionTable(Section):
+    """``[conditions.NAME]``: how people call it, and the stimulation if there is one."""
+
+    title: str = _text("", 0)
+    frequency_hz: float | None = _optional("Hz", 0.0, 1000.0)
+    amplitude_v: float | None = _optional("V", 0.0, 50.0)
+    amplitude_ma: float | None = _optional("mA", 0.0, 50.0)
+    pulse_width_us: float | None = _optional("µs", 0.0, 10000.0)
+    electrodes: str = _text("", 0)
+    wash_in_min: float | None = _optional("min", 0.0, 100000.0)
+
+    @model_validator(mode="after")
+    def _one_amplitude(self) -> Self:
+        if self.amplitude_v is not None and self.amplitude_ma is not None:
+            raise ValueError(
+                "amplitude_v and amplitude_ma are both given; a stimulator holds one of them, so "
+                "give the one that it holds"
+            )
+        return self
+
+
+class RatingTable(Section):
+    """``[rating]``: lowest and highest score, and the step of the scale (0 for none)."""
+
+    scale: list[float] = Field(
+        default_factory=lambda: [0.0, 3.0], min_length=2, max_length=2,
+        json_schema_extra={"meaning": "two numbers, the lowest and the highest score"},
+    )  # fmt: skip
+    step: float = Field(0.5, ge=0.0, le=100.0, json_schema_extra={"unit": "1"})
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.scale[0] < self.scale[1]:
+            raise ValueError(
+                f"scale = [{self.scale[0]:g}, {self.scale[1]:g}] must be the lowest score and then "
+                "the highest"
+            )
+        return self
+
+
+class SubjectTable(Section):
+    """``[subjects.NAME]``: what archives ask about a subject."""
+
+    age_years: float | None = _optional("years", 0.0, 130.0)
+    sex: Literal["F", "M", "O", "U"] = "U"
+    species: str = _text("Homo sapiens")
+
+
+class ArchiveTable(Section):
+    """``[archive]``: what archives ask about a data set; nothing is computed from it."""
+
+    joint: str = _text("elbow", 1, 40)
+    authors: list[str] = Field(default_factory=list, max_length=200)
+    institution: str = _text("", 0)
+    lab: str = _text("", 0)
+    license: str = _text("", 0)
+    keywords: list[str] = Field(default_factory=list, max_length=50)
+
+
+class AnalysisTable(Section):
+    """``[analysis]``: how the study is analysed.
+
+    Parameters
+    ----------
+    method : str
+        Of estimation, as ``--method`` takes it.
+    one_offset_a_day : bool
+        Read and without effect: the test by days is chosen by which days have which conditions.
+    """
+
+    method: str = _text("auto", 1, 40)
+    one_offset_a_day: bool = False
+
+
+class StudyToml(Section):
+    """All of `study.toml` but its schema."""
+
+    title: str = _text(...)
+    reference: str = _text(..., 1, 40)
+    other: str = _text(..., 1, 40)
+    sessions: str = _text("sessions.csv")
+    ratings: str = _text("ratings.csv")
+    exclusions: str = _text("exclusions.csv")
+    key: str = _text("key.csv")
+    mapping: str | None = Field(None, min_length=1, max_length=200)
+    conditions: dict[str, ConditionTable] = Field(default_factory=dict)
+    simulated: dict[str, SimulatedTable] = Field(default_factory=dict)
+    rating: RatingTable = RatingTable()
+    subjects: dict[str, SubjectTable] = Field(default_factory=dict)
+    archive: ArchiveTable = ArchiveTable()
+    analysis: AnalysisTable = AnalysisTable()
+
+    @model_validator(mode="after")
+    def _tables_below(self) -> Self:
+        for name in ("sessions", "ratings", "exclusions"):  # a key may be kept elsewhere
+            if is_outside(getattr(self, name)):
+                raise ValueError(
+                    f"{name} = {getattr(self, name)!r} is outside the study folder; name a file "
+                    f'in it, as in {name} = "{name}.csv"'
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _mapping_below(self) -> Self:
+        if self.mapping is not None and is_outside(self.mapping):
+            raise ValueError(
+                f"mapping = {self.mapping!r} is outside the study folder; copy the file into it"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _two_conditions(self) -> Self:
+        if self.reference == self.other:
+            raise ValueError(f"reference and other are both {self.reference!r}; name two")
+        for key in ("reference", "other"):
+            name = getattr(self, key)
+            if self.conditions and name not in self.conditions:
+                raise ValueError(
+                    f"{key} = {name!r}, but there is no [conditions.{name}]; there are: "
+                    f"{', '.join(self.conditions)}"
+                )
+        return self
+
+
+def is_outside(path: str) -> bool:
+    """Whether a path that a study names leads out of its folder."""
+    return os.path.isabs(path) or os.path.normpath(path).split(os.sep)[0] == os.pardir
+
+
+def read_study_toml(path: Path) -> StudyToml:
+    """Read and check a `study.toml`.
+
+    Raises
+    ------
+    UserError
+        Naming each offending key, its value, and what would be right.
+    """
+    return read_section(path, STUDY_SCHEMA, StudyToml)

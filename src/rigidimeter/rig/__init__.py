@@ -1,0 +1,1 @@
+"""What moves the arm: guard, devices, the loop of a session, commissioning, and the console."""

@@ -1,0 +1,123 @@
+"""What is asked of the joint at each tick: to give way, to follow, to return, to stand still.
+
+The parameters that may change meanwhile are few and bounded, and a change never makes the loop less
+stable. A heavier or more damped admittance is more stable, a lighter one less. The margin was
+checked for the protocol's own values, so they are the lower bound. The perturbation may only become
+smaller. A change makes no bump: the velocity, the controller's only memory, stays as it is, and
+what follows is limited by the guard like anything else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rigidimeter.core.settings import LONGEST_STEP, ControllerSettings
+from rigidimeter.model import admittance_step, minimum_jerk, tracking_step
+from rigidimeter.rig.acquisition.run_states import Order
+from rigidimeter.rig.acquisition.tick import (
+    REST,
+    ControlLoop,
+    TickResult,
+    run_ticks,
+    set_admittance,
+)
+from rigidimeter.rig.devices.base import Reading
+
+LARGEST_FACTOR = 10.0
+"""A parameter may grow to so many times the protocol's value."""
+
+
+def perturb(loop: ControlLoop, epoch: int, perturbation_nm: Sequence[float]) -> TickResult:
+    """Let the subject move freely while the torque perturbation runs, one value a tick."""
+
+    def command(_: Reading, torque_nm: float, k: int) -> tuple[float, float, float]:
+        value = loop.perturbation_scale * perturbation_nm[k]
+        step = loop.admittances[min(loop.elapsed_ticks, LONGEST_STEP) - 1]
+        velocity = loop.guard.velocity_rad_s
+        return admittance_step(step, velocity, value, torque_nm), value, math.nan
+
+    return run_ticks(loop, epoch, len(perturbation_nm), command)
+
+
+def follow(
+    loop: ControlLoop, epoch: int, angle_rad: Sequence[float], velocity_rad_s: Sequence[float]
+) -> TickResult:
+    """Impose a position, one value a tick."""
+
+    def command(reading: Reading, _: float, k: int) -> tuple[float, float, float]:
+        target = angle_rad[k]
+        # The reading is compared with where the target was when it was taken.
+        then = angle_rad[min(max(k - _age_ticks(loop, reading), 0), len(angle_rad) - 1)]
+        gain = loop.tracking_gain_per_s
+        return tracking_step(gain, then, velocity_rad_s[k], reading.angle_rad), 0.0, target
+
+    return run_ticks(loop, epoch, len(angle_rad), command)
+
+
+def rest(loop: ControlLoop, duration_s: float, return_s: float) -> TickResult:
+    """Return to the initial position by a minimum-jerk motion, then hold it."""
+    start_rad, interval_s = loop.angle_rad, loop.interval_s
+
+    def command(reading: Reading, _: float, k: int) -> tuple[float, float, float]:
+        target, velocity = minimum_jerk(start_rad, return_s, k * interval_s)
+        before_s = max(k - _age_ticks(loop, reading), 0) * interval_s
+        then, _ = minimum_jerk(start_rad, return_s, before_s)
+        gain = loop.tracking_gain_per_s
+        return tracking_step(gain, then, velocity, reading.angle_rad), 0.0, target
+
+    return run_ticks(loop, REST, round(duration_s * loop.rate_hz), command)
+
+
+def hold(
+    loop: ControlLoop, duration_s: float, take: Callable[[Reading], None] = lambda _: None
+) -> TickResult:
+    """Stand still; `take` is called with every reading."""
+
+    def command(reading: Reading, _: float, __: int) -> tuple[float, float, float]:
+        take(reading)
+        return 0.0, 0.0, math.nan
+
+    return run_ticks(loop, REST, round(duration_s * loop.rate_hz), command, latched=True)
+
+
+def _age_ticks(loop: ControlLoop, reading: Reading) -> int:
+    """Return the age of a reading; 0 for a stamp that is no number, which the guard names."""
+    age_ticks = loop.tick - reading.motion_time_s * loop.rate_hz
+    return round(age_ticks) if math.isfinite(age_ticks) else 0
+
+
+def change_parameter(
+    loop: ControlLoop, protocol: ControllerSettings, order: Order
+) -> dict[str, Any]:
+    """Change a parameter within its bounds; return what happened, for the record.
+
+    Parameters
+    ----------
+    loop : ControlLoop
+    protocol : ControllerSettings
+        The values that the protocol began with.
+    order : Order
+    """
+    name, value = order.name, order.value
+    facts: dict[str, Any] = {"name": name, "value": value if math.isfinite(value) else None}
+    before = {
+        "inertia_kg_m2": loop.inertia_kg_m2,
+        "damping_nm_s_rad": loop.damping_nm_s_rad,
+        "perturbation_scale": loop.perturbation_scale,
+    }
+    low, high = math.nan, math.nan  # no value lies between them: other parameters may not change
+    if name == "perturbation_scale":
+        low, high = 0.0, 1.0
+    elif name in before:
+        low = getattr(protocol, name)
+        high = LARGEST_FACTOR * low
+    if not low <= value <= high:
+        return {**facts, "refused": f"must be between {low:g} and {high:g}"}
+    if name == "perturbation_scale":
+        loop.perturbation_scale = value
+    else:
+        now = {**before, name: value}
+        set_admittance(loop, now["inertia_kg_m2"], now["damping_nm_s_rad"])
+    return {**facts, "before": before[name]}

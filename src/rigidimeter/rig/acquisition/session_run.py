@@ -1,0 +1,354 @@
+"""Run a protocol on a rig and write it down as it happens."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.session import Ending, PlannedEpoch, Protocol
+from rigidimeter.core.settings import Settings
+from rigidimeter.core.units import deg_from_rad
+from rigidimeter.planning import prbs_nm, sinusoid
+from rigidimeter.rig.acquisition.clock import Clock
+from rigidimeter.rig.acquisition.control_modes import follow, hold, perturb, rest
+from rigidimeter.rig.acquisition.controller_run import ControllerRun
+from rigidimeter.rig.acquisition.ramp import ramp_to_rest
+from rigidimeter.rig.acquisition.run_states import Command, Run, State, after, epoch_over
+from rigidimeter.rig.acquisition.supervision import Sink, Supervision
+from rigidimeter.rig.acquisition.tick import ControlLoop, release, skip_passed_ticks
+from rigidimeter.rig.acquisition.zeroing import bias_and_noise, moved
+from rigidimeter.rig.devices.base import Reading, Rig
+from rigidimeter.rig.guard import Cause, Reaction, why_ended
+
+BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
+
+LOOK_S = 0.1
+"""A paused run looks so often whether it may go on."""
+
+BRAKE_S = 0.1
+"""For so long a drive that left its state brakes by its own ramp before its power goes."""
+
+
+WATCHED_S = 1.0
+"""For so long the joint is watched once its power is off."""
+
+
+@dataclass(frozen=True)
+class SessionResult:
+    """How a session ended, and how many epochs ended with success."""
+
+    outcome: Ending
+    reason: str
+    epochs_run: int
+    epochs_good: int
+    cause: Cause
+
+
+@dataclass
+class _Session:
+    """What is left to run, on what, and how it goes.
+
+    What an epoch imposes is computed before the first tick: it would make a tick late.
+    """
+
+    settings: Settings
+    rig: Rig
+    sink: Sink
+    run: ControllerRun
+    queue: deque[PlannedEpoch]
+    next_number: int
+    before_epoch: BeforeEpoch
+    perturbation_nm: list[float]
+    angle_rad: list[float]
+    velocity_rad_s: list[float]
+    epochs_run: int = 0
+    epochs_good: int = 0
+
+
+def run_session(
+    protocol: Protocol,
+    settings: Settings,
+    rig: Rig,
+    clock: Clock,
+    sink: Sink,
+    *,
+    before_epoch: BeforeEpoch = lambda _: {},
+    progress: Callable[[float], None] = lambda _: None,
+    supervision: Supervision | None = None,
+    zero_first: bool = False,
+    state_changed: Callable[[Run], None] = lambda _: None,
+    watch: Callable[[ControlLoop], None] = lambda _: None,
+) -> SessionResult:
+    """Run every epoch of a protocol with its rest.
+
+    However it ends, the velocity is ramped to zero, the rig disabled, and each open epoch and the
+    session closed with a reason.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    settings : Settings
+    rig : Rig
+        Connected and configured.
+    clock : Clock
+    sink : Sink
+        Closed on return.
+    before_epoch : callable
+        Called while the arm rests, before each epoch; what it returns is stored with the epoch.
+    progress : callable
+        Called with the session time, about once a second of it.
+    supervision : Supervision
+        Where orders and causes from other processes come from; nobody if not given.
+    zero_first : bool
+        Whether to zero the torque sensor, and check its noise, before the first epoch.
+    state_changed : callable
+        Called whenever the run changes its state.
+    watch : callable
+        Called once with the loop, before its first tick; whoever shows it may look at it.
+    """
+    run = ControllerRun(settings, rig, clock, sink, progress, supervision, state_changed)
+    watch(run.loop)
+    queue, rate_hz = deque(protocol.epochs), settings.rig.tick_rate_hz
+    angle_rad, velocity_rad_s = sinusoid(settings.sinusoid, rate_hz)
+    session = _Session(
+        settings,
+        rig,
+        sink,
+        run,
+        queue,
+        max((epoch.number for epoch in protocol.epochs), default=0) + 1,
+        before_epoch,
+        prbs_nm(settings.prbs, rate_hz).tolist(),
+        angle_rad.tolist(),
+        velocity_rad_s.tolist(),
+    )
+    sink.event("session_started", time_s=0.0)
+    try:
+        run.change_state(after(run.run, Command.START))
+        rig.enable()
+        # A device may take long to come up. The clock is not set back for that: it is the drivers'
+        # clock too, and their heartbeats would cease meanwhile.
+        skip_passed_ticks(run.loop)
+        if zero_first:
+            sink.event("rig_enabled", time_s=run.loop.time_s, origin_rad=rig.origin_rad)
+        if not zero_first or _zero_sensor(session):
+            _run_epochs(session)
+        run.conclude(len(queue))
+    except KeyboardInterrupt:
+        run.outcome, run.reason = "abort", "interrupted by the operator"
+    except Exception as error:
+        plain = isinstance(error, UserError)
+        reason = str(error) if plain else f"{type(error).__name__}: {error}"
+        run.outcome, run.reason = "fail", reason
+        raise
+    finally:
+        _close(session)
+    return SessionResult(
+        run.outcome, run.reason, session.epochs_run, session.epochs_good, run.cause
+    )
+
+
+def _run_epochs(session: _Session) -> None:
+    """Run what is in the queue, pausing where asked."""
+    run = session.run
+    while session.queue and _ready_for_epoch(session):
+        planned = session.queue.popleft()
+        _run_epoch(session, planned)
+        run.change_state(epoch_over(run.run))
+        if not run.may_go_on():
+            return
+        if run.is_in(State.RUNNING):
+            rest(run.loop, planned.rest_s, session.settings.protocol.return_s)
+            if not run.may_go_on():
+                return
+
+
+def _ready_for_epoch(session: _Session) -> bool:
+    """Wait out a pause and return to where epochs begin; return whether the session goes on."""
+    run, loop = session.run, session.run.loop
+    return_s = session.settings.protocol.return_s
+    run.change_state(epoch_over(run.run))
+    while run.is_in(State.PAUSED):
+        if loop.reaction is Reaction.NONE:
+            rest(loop, return_s, return_s)
+            if not run.may_go_on():
+                return False
+        while run.is_in(State.PAUSED):
+            if not _look(run):
+                return False
+        while run.is_in(State.RUNNING) and not loop.at_rest:
+            if not _look(run):
+                return False
+        if run.is_in(State.RUNNING):
+            release(loop)
+            # The full way back, whatever was ordered before it: an epoch begins at its place.
+            rest(loop, return_s, return_s)
+        if not run.may_go_on():
+            return False
+        run.change_state(epoch_over(run.run))
+    return run.is_in(State.RUNNING)
+
+
+def _look(run: ControllerRun) -> bool:
+    """Stand still for a moment; return whether the run goes on.
+
+    A hold that comes meanwhile pauses it again: what was ordered before it does not end it.
+    """
+    before = run.loop.reaction
+    hold(run.loop, LOOK_S)
+    return run.loop.reaction is before or run.may_go_on()
+
+
+def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
+    """Run one epoch and close it."""
+    settings, sink, run = session.settings, session.sink, session.run
+    facts = session.before_epoch(planned)
+    sink.event(
+        "epoch_started",
+        epoch=planned.number,
+        label=planned.label,
+        task=planned.task,
+        condition=planned.condition,
+        time_s=run.loop.time_s,
+        planned_s=planned.duration_s,
+        **facts,
+    )
+    run.open_epoch = planned.number
+    if planned.task == "prbs":
+        ticks = perturb(run.loop, planned.number, session.perturbation_nm)
+    else:
+        ticks = follow(run.loop, planned.number, session.angle_rad, session.velocity_rad_s)
+    why = why_ended(settings, ticks.cause, ticks.limit_time_s)
+    ending: Ending = "fail" if why else "success"
+    if ticks.interrupted and not why:
+        ending, why = "abort", "ended by the operator"
+    again = _repetition(session, planned, ending)
+    sink.event(
+        "epoch_ended",
+        epoch=planned.number,
+        time_s=run.loop.time_s,
+        outcome=ending,
+        reason=why,
+        limited_ticks=ticks.limited_ticks,
+        late_ticks=ticks.late_ticks,
+        missed_ticks=ticks.missed_ticks,
+        counts=dict(session.rig.counts),
+        **({"again_as": again.number} if again is not None else {}),
+    )
+    run.open_epoch = None
+    session.epochs_run += 1
+    session.epochs_good += ending == "success"
+
+
+def _repetition(session: _Session, planned: PlannedEpoch, ending: Ending) -> PlannedEpoch | None:
+    """Put the repetition of an epoch into the queue, if it is to be repeated, and return it."""
+    if planned.label.endswith("r"):  # a repetition is not repeated
+        return None
+    again = replace(planned, number=session.next_number, label=f"{planned.label}r")
+    if ending == "abort":
+        session.queue.appendleft(again)
+    elif ending == "fail" and session.settings.protocol.repeat_limited:
+        session.queue.append(again)
+    else:
+        return None
+    session.next_number += 1
+    return again
+
+
+def _zero_sensor(session: _Session) -> bool:
+    """Zero the torque sensor while the joint stands still; return whether all is well.
+
+    What was heard before a hold or an order is thrown away: a zero is made from the full time or
+    not at all.
+    """
+    limits, run = session.settings.zeroing, session.run
+    while True:
+        readings: list[Reading] = []
+        ticks = hold(run.loop, limits.duration_s, readings.append)
+        if not run.may_go_on():
+            return False
+        if ticks.cause is Cause.NONE and not ticks.interrupted:
+            break
+        if not _ready_for_epoch(session):
+            return False
+    bias_nm, noise_sd_nm, why = bias_and_noise(readings, limits)
+    why = why or moved(readings, session.settings)
+    session.sink.event(
+        "sensor_zeroed",
+        time_s=run.loop.time_s,
+        bias_nm=bias_nm if math.isfinite(bias_nm) else None,
+        noise_sd_nm=noise_sd_nm if math.isfinite(noise_sd_nm) else None,
+        refused=why,
+    )
+    if why:
+        run.outcome, run.reason = "fail", why
+        return False
+    session.rig.zero(bias_nm)
+    return True
+
+
+def _close(session: _Session) -> None:
+    """Stop, disable, close: every step is tried even when one before it fails."""
+    run, sink = session.run, session.sink
+    try:
+        ramp_to_rest(run.loop)
+    finally:
+        if not run.is_in(State.FAULTED):
+            run.change_state(Run(State.STOPPING))
+        try:
+            _brake_and_disable(session)
+            if why := _after_power(session):
+                run.reason = f"{run.reason}; {why}" if run.reason else why
+                run.outcome = "fail" if run.outcome == "success" else run.outcome
+        finally:
+            time_s = run.loop.time_s
+            if run.open_epoch is not None:
+                ending = {"outcome": run.outcome, "reason": run.reason}
+                sink.event("epoch_ended", epoch=run.open_epoch, time_s=time_s, **ending)
+            sink.close(time_s, run.outcome, run.reason)
+
+
+def _brake_and_disable(session: _Session) -> None:
+    """Take the power away; a drive that no longer obeys brakes by its own ramp first."""
+    loop, rig = session.run.loop, session.rig
+    try:
+        if loop.cause in (Cause.DRIVE_LOST, Cause.DRIVE_STATE):
+            rig.stop()
+        if loop.cause is Cause.DRIVE_STATE:  # it answers: let it come to rest
+            hold(loop, BRAKE_S)
+    finally:
+        rig.disable()
+
+
+def _after_power(session: _Session) -> str:
+    """Watch the joint once its power is off; return in a clause what keeps hands off it.
+
+    Its weight, or whoever takes the arm out, may move it: they do work on the drive. Where the
+    drive moves the joint, W = ∫ M dθ is above zero.
+    """
+    loop, rig = session.run.loop, session.rig
+    settle_s, most_rad = loop.agreement.settle_s, loop.agreement.hold_rad
+    work_j = moved_rad = 0.0
+    began_rad = before_rad = math.nan
+    for k in range(1, round(WATCHED_S * loop.rate_hz) + 1):
+        loop.clock.wait_until((loop.tick + k) / loop.rate_hz)
+        reading = rig.read()
+        rig.write(0.0)  # a drive may speak only when it is spoken to
+        angle_rad = reading.angle_rad
+        if k < settle_s * loop.rate_hz or not math.isfinite(angle_rad + reading.torque_nm):
+            continue
+        if math.isnan(began_rad):
+            began_rad = before_rad = angle_rad
+        work_j += reading.torque_nm * (angle_rad - before_rad)
+        moved_rad, before_rad = max(moved_rad, abs(angle_rad - began_rad)), angle_rad
+    if rig.powered:
+        why = f"{WATCHED_S:g} s after it was told to switch its power off the drive has not said so"
+    elif moved_rad > most_rad and work_j > 0.0:
+        why = f"the drive moved the joint by {deg_from_rad(moved_rad):.1f} deg with its power off"
+    else:
+        return ""
+    return f"{why}: keep hands off the joint, press the emergency stop, and look at its wiring"

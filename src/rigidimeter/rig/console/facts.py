@@ -1,0 +1,254 @@
+"""What an operator needs to know while a session runs, as values: one place for every view.
+
+`facts` computes them from the plan, the progress and what the processes show; it reads nothing
+itself. Who shows them computes nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigidimeter.core.session import PlannedEpoch
+from rigidimeter.core.units import deg_from_rad
+from rigidimeter.rig.acquisition import State
+from rigidimeter.rig.acquisition.processes import PAUSE_NEXT, STOP_NEXT, LiveEstimate, LoopStatus
+from rigidimeter.rig.console.lamps import Lamp, RecorderState, lamps
+from rigidimeter.rig.console.limit_distances import LimitDistance, limit_distances
+from rigidimeter.rig.console.live_values import LiveValue, live_values
+from rigidimeter.rig.console.recent_samples import RecentSamples
+from rigidimeter.rig.console.session_plan import SessionPlan
+from rigidimeter.rig.console.session_progress import Progress
+from rigidimeter.rig.guard import Cause, Reaction
+
+
+@dataclass(frozen=True)
+class EpochFacts:
+    """An epoch as the operator sees it: epoch `place` of the session's `of`.
+
+    `condition` is the code where the operator is blinded; `again` says that it is a repetition.
+    """
+
+    place: int
+    of: int
+    label: str
+    task: str
+    condition: str
+    duration_s: float
+    again: bool
+
+    @property
+    def text(self) -> str:
+        """The epoch in words."""
+        again = ", again" if self.again else ""
+        return f"epoch {self.place} of {self.of}{again}: {self.condition}, {self.task}"
+
+
+@dataclass(frozen=True)
+class ConditionCount:
+    """How many epochs of a condition ended with success, did not, and are left to run."""
+
+    condition: str
+    good: int
+    bad: int
+    left: int
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What an operator needs to know.
+
+    Attributes
+    ----------
+    time_s : float
+        Of the session.
+    state : State
+    state_words : str
+        The state, and what comes after this epoch.
+    epoch, next_epoch : EpochFacts or None
+        The epoch that runs, and the one after it.
+    counts : tuple of ConditionCount
+        In order of first appearance.
+    countdown_words : str
+        Of what `countdown_s` is left; empty where nothing runs for a known time.
+    countdown_s, session_left_s : float
+        NaN where not known. A pause is not counted.
+    live : tuple of LiveValue
+        J, B and K.
+    live_words : str
+        Of which epoch they are.
+    angle_deg, torque_nm : float
+        Now; the torque is the mean of 0.1 s.
+    distances : tuple of LimitDistance
+    lamps : tuple of Lamp
+    cause : Cause
+        For which the guard holds or has stopped the rig.
+    stop_words : str
+        The same as a sentence, or how the session ended; empty while all is well.
+    """
+
+    time_s: float
+    state: State
+    state_words: str
+    epoch: EpochFacts | None
+    next_epoch: EpochFacts | None
+    counts: tuple[ConditionCount, ...]
+    countdown_words: str
+    countdown_s: float
+    session_left_s: float
+    live: tuple[LiveValue, ...]
+    live_words: str
+    angle_deg: float
+    torque_nm: float
+    distances: tuple[LimitDistance, ...]
+    lamps: tuple[Lamp, ...]
+    cause: Cause
+    stop_words: str
+
+
+def facts(
+    plan: SessionPlan,
+    progress: Progress,
+    loop: LoopStatus,
+    history: Sequence[LiveEstimate] = (),
+    recent: RecentSamples | None = None,
+    recorder: RecorderState | None = None,
+    caution: str = "",
+) -> Facts:
+    """Return what the operator needs to know now.
+
+    Parameters
+    ----------
+    plan : SessionPlan
+    progress : Progress
+    loop : LoopStatus
+    history : sequence of LiveEstimate
+        The live estimates of the last seconds, oldest first.
+    recent : RecentSamples
+    recorder : RecorderState
+    caution : str
+        What is wrong with the torque of the last epoch.
+    """
+    recent, recorder = recent or RecentSamples(), recorder or RecorderState()
+    state = State(loop.state)
+    words, countdown_s = _countdown(progress, loop, state)
+    left_s = session_left_s(progress, loop)
+    distances = limit_distances(plan.settings.guard, recent, loop.energy_j)
+    live, live_words = _live(plan, progress, history)
+    return Facts(
+        time_s=loop.time_s,
+        state=state,
+        state_words=_state_words(progress, loop, state),
+        epoch=_epoch(plan, progress, progress.current) if progress.running else None,
+        next_epoch=_epoch(plan, progress, progress.to_run[0]) if progress.to_run else None,
+        counts=_counts(plan, progress),
+        countdown_words=words,
+        countdown_s=countdown_s,
+        session_left_s=left_s,
+        live=live,
+        live_words=live_words,
+        angle_deg=deg_from_rad(loop.angle_rad),
+        torque_nm=recent.torque_nm,
+        distances=distances,
+        lamps=lamps(plan.settings, loop, recent, distances, recorder, left_s, caution),
+        cause=Cause(loop.cause),
+        stop_words=_stop_words(progress, loop),
+    )
+
+
+def session_left_s(progress: Progress, loop: LoopStatus) -> float:
+    """Return how long the session takes from now on, the last rest included.
+
+    Where the arm rests the time that this rest still lasts is counted, in an epoch what it still
+    lasts and its rest.
+    """
+    if progress.outcome:
+        return 0.0
+    left_s = sum(epoch.duration_s + epoch.rest_s for epoch in progress.to_run)
+    until_s = loop.until_s - loop.time_s
+    if State(loop.state) is State.RUNNING and math.isfinite(until_s):
+        left_s += max(until_s, 0.0)
+    if progress.running and progress.current is not None:
+        left_s += progress.current.rest_s
+    return left_s
+
+
+def _countdown(progress: Progress, loop: LoopStatus, state: State) -> tuple[str, float]:
+    """Return of what a countdown is, and how much is left of it in s."""
+    left_s = loop.until_s - loop.time_s
+    if state is not State.RUNNING or not math.isfinite(left_s) or progress.outcome:
+        return "", math.nan
+    what = "rest"
+    if progress.running:
+        what = "epoch"
+    elif progress.current is None and not progress.zeroed:
+        what = "zero of the torque sensor"
+    return what, max(left_s, 0.0)
+
+
+def _state_words(progress: Progress, loop: LoopStatus, state: State) -> str:
+    if progress.outcome:
+        return f"ended: {progress.outcome}"
+    words = {
+        State.IDLE: "starts",
+        State.RUNNING: "epoch runs" if progress.running else "between epochs",
+        State.PAUSED: "paused",
+        State.STOPPING: "stops",
+        State.FAULTED: "stopped by a fault",
+    }[state]
+    if state is State.PAUSED and loop.cause:
+        words = "held by the guard"
+    if loop.pending & STOP_NEXT:
+        return f"{words}, ends after this epoch"
+    return f"{words}, pauses after this epoch" if loop.pending & PAUSE_NEXT else words
+
+
+def _epoch(plan: SessionPlan, progress: Progress, epoch: PlannedEpoch | None) -> EpochFacts | None:
+    if epoch is None:
+        return None
+    return EpochFacts(
+        progress.places.get(epoch.number, epoch.number),
+        plan.total,
+        epoch.label,
+        epoch.task,
+        plan.shown(epoch.condition),
+        epoch.duration_s,
+        epoch.label.endswith("r"),
+    )
+
+
+def _counts(plan: SessionPlan, progress: Progress) -> tuple[ConditionCount, ...]:
+    current = [progress.current] if progress.running and progress.current else []
+    left = [epoch.condition for epoch in (*current, *progress.to_run)]
+    good = [epoch.condition for epoch in progress.ended if epoch.outcome == "success"]
+    bad = [epoch.condition for epoch in progress.ended if epoch.outcome != "success"]
+    conditions = dict.fromkeys([*(epoch.condition for epoch in plan.epochs), *good, *bad, *left])
+    return tuple(
+        ConditionCount(plan.shown(name), good.count(name), bad.count(name), left.count(name))
+        for name in conditions
+    )
+
+
+def _live(
+    plan: SessionPlan, progress: Progress, history: Sequence[LiveEstimate]
+) -> tuple[tuple[LiveValue, ...], str]:
+    now = history[-1] if history else LiveEstimate()
+    tasks = {epoch.number: (epoch.task, epoch.place) for epoch in progress.ended}
+    if progress.current is not None:
+        number = progress.current.number
+        tasks[number] = (progress.current.task, progress.places.get(number, number))
+    task, place = tasks.get(now.epoch, ("", now.epoch))
+    words = f"epoch {place}" if now.epoch >= 0 else ""
+    runs = progress.current.number if progress.running and progress.current else None
+    return live_values(history, task, plan.settings.online, running=runs == now.epoch), words
+
+
+def _stop_words(progress: Progress, loop: LoopStatus) -> str:
+    if progress.outcome:
+        return progress.reason
+    cause = Cause(loop.cause)
+    if cause is Cause.NONE:
+        return ""
+    held = cause.reaction is Reaction.HOLD and State(loop.state) is not State.FAULTED
+    return f"{'held' if held else 'stopped'}: {progress.stop or cause.sentence}"

@@ -1,0 +1,292 @@
+"""The part of the page before a session: the form, what is predicted, and the start."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import read_json, toml_text, write_json
+from rigidimeter.core.session import count_epochs
+from rigidimeter.core.settings import Settings, dump_settings
+from rigidimeter.rig.console.page.desk import Desk, StartRequest
+from rigidimeter.rig.console.page.prediction import dry_run_lines, prediction_lines
+from rigidimeter.rig.console.page.protocols import protocol_names, read_protocol
+from rigidimeter.rig.console.page.rig_steps import refusal
+from rigidimeter.rig.console.page.rig_view import RigView
+from rigidimeter.rig.console.page.session_form import (
+    BLINDED,
+    METADATA,
+    MOST_BLOCKS,
+    NOTE,
+    SETTINGS,
+    STIMULATION,
+    YES,
+    EnteredSession,
+    Field,
+    block_form,
+    blocks_of,
+    empty_form,
+    kept_form,
+    read_form,
+)
+from rigidimeter.rig.console.page.work import Work
+
+DRAFT = "draft.json"
+DETECTED = ("--detect", "damping=20%", "--detect", "stiffness=20%")
+
+
+class BeforeView:
+    """The form of one page.
+
+    Parameters
+    ----------
+    desk : Desk
+    work : Work
+    in_control : callable
+        Whether the page may act.
+    """
+
+    def __init__(self, desk: Desk, work: Work, in_control: Callable[[], bool]) -> None:
+        self._desk, self._work, self._in_control = desk, work, in_control
+        self._base = desk.place.settings
+        self._form = kept_form(_stored(desk.place.root / DRAFT), self._base)
+        self._inputs: dict[str, Any] = {}
+        self._entered: EnteredSession | None = None
+        place = desk.place
+        rig = "the virtual rig" if place.rig is None else place.rig.name
+        with ui.row().classes("w-full items-center"):
+            ui.label(f"Rig: {rig}. Protocol: {place.settings_name}.").classes("text-lg").mark(
+                "what"
+            )
+            names = [] if place.one_session else protocol_names(place.protocols)
+            if names:
+                chosen = ui.select(names, label=f"Another protocol of {place.protocols}")
+                chosen.classes("entry").mark("protocol")
+                chosen.on_value_change(lambda event: self._choose(str(event.value or "")))
+        self._wrong_file = ui.label("").classes("problem").props('role="alert"')
+        self._not_kept = ui.label("").classes("problem").props('role="alert"')
+        self._rig = RigView(desk, work, self._may_act, in_control, self._settings, self._show_steps)
+        with ui.row().classes("w-full"):
+            for one in (*METADATA, NOTE):
+                self._input(one)
+        self._blocks()
+        with ui.row().classes("w-full items-start"):
+            self._input(Field("rests", "Rests, drawn from (several by ;)", "s"))
+            blinded = ui.checkbox("Blinded: show codes for conditions").mark("blinded")
+            blinded.value = self._form[BLINDED] == YES
+            blinded.on_value_change(lambda event: self._change(BLINDED, YES if event.value else ""))
+        with ui.expansion("Perturbation, controller and limits").classes("w-full").props("dense"):
+            with ui.row().classes("w-full"):
+                for one in SETTINGS:
+                    self._input(one)
+            ui.button("Back to the protocol's values", on_click=self._reset)
+        with (
+            ui.expansion("Stimulation (leave empty if there is none)")
+            .classes("w-full")
+            .props("dense"),
+            ui.row().classes("w-full"),
+        ):
+            for one in STIMULATION:
+                self._input(one)
+        self._problem = ui.label("").classes("problem").props('role="alert"')
+        self._refused = ui.label("").classes("problem").mark("refused").props('role="alert"')
+        with ui.row():
+            self._start = ui.button("Start session", on_click=self._ask).mark("start")
+            self._start.props("size=lg")
+            ui.button("Predict precision, margin, epochs needed", on_click=self._predict)
+            ui.button("Dry run on the virtual rig", on_click=self._dry_run)
+        self._answer = ui.html("", sanitize=False).classes("answer")
+        self._check()
+        ui.timer(5.0, self._show_steps)
+
+    def _choose(self, name: str) -> None:
+        """Begin the form anew with another protocol; of a wrong one the page says what is wrong."""
+        place = self._desk.place
+        if not name or not self._may_act():
+            return
+        try:
+            settings = read_protocol(place.protocols, name)
+        except UserError as error:
+            self._wrong_file.text = f"{error}. The form is still that of {place.settings_name}."
+            return
+        path = place.protocols / name
+        self._desk.place = replace(place, settings=settings, settings_name=name, settings_path=path)
+        self._keep(kept_form(self._form, settings))
+        ui.navigate.reload()
+
+    def _input(self, one: Field) -> None:
+        label = f"{one.label} [{one.unit}]" if one.unit else one.label
+        made = ui.input(label, value=self._form.get(one.key, ""))
+        made.classes("entry short" if one.key.startswith("epochs") else "entry")
+        made.without_auto_validation()  # what is wrong is said by `_check`
+        made.props(f"maxlength=400 data-field={one.key} debounce=150")
+        made.on_value_change(lambda event, key=one.key: self._change(key, event.value))
+        self._inputs[one.key] = made
+
+    @ui.refreshable_method
+    def _blocks(self) -> None:
+        blocks = blocks_of(self._form)
+        for k in blocks:
+            with ui.row().classes("w-full items-center"):
+                ui.label(f"Block {k + 1}").classes("text-base")
+                task = ui.select(
+                    {"prbs": "PRBS: J, B, K", "sinusoid": "sinusoid: work, impulse"},
+                    value=self._form[f"task{k}"]
+                    if self._form[f"task{k}"] == "sinusoid"
+                    else "prbs",
+                    label="Task",
+                ).classes("entry")
+                task.on_value_change(lambda event, k=k: self._change(f"task{k}", event.value))
+                self._input(Field(f"condition{k}", "Condition, or its code"))
+                self._input(Field(f"epochs{k}", "Epochs"))
+        with ui.row():
+            if len(blocks) < MOST_BLOCKS:
+                ui.button("Add a block", on_click=self._add)
+            if len(blocks) > 1:
+                ui.button("Remove the last block", on_click=self._remove)
+
+    def _add(self) -> None:
+        k = len(blocks_of(self._form))
+        last = {part: self._form[f"{part}{k - 1}"] for part in ("task", "condition", "epochs")}
+        self._form |= block_form(k, **last)
+        self._redraw()
+
+    def _remove(self) -> None:
+        k = len(blocks_of(self._form)) - 1
+        for key in block_form(k, "", "", ""):
+            del self._form[key]
+            self._inputs.pop(key, None)
+        self._redraw()
+
+    def _reset(self) -> None:
+        fresh = empty_form(self._base)
+        for one in SETTINGS:
+            self._inputs[one.key].value = fresh[one.key]
+
+    def _redraw(self) -> None:
+        self._blocks.refresh()
+        self._check()
+
+    def _change(self, key: str, value: Any) -> None:
+        self._form[key] = str(value or "")[:400]
+        self._check()
+        if self._in_control():
+            self._keep(self._form)
+
+    def _keep(self, form: Mapping[str, str]) -> None:
+        """Keep the form for a reload; say why where that is not possible."""
+        try:
+            write_json(self._desk.place.root / DRAFT, form)
+            self._not_kept.text = ""
+        except UserError as error:
+            self._not_kept.text = f"A reload would empty this form: {error}"
+
+    def _check(self) -> None:
+        """Say under each field what is wrong with it."""
+        self._entered = read_form(self._form, self._base)
+        errors = self._entered.errors
+        for key, made in self._inputs.items():
+            made.error = errors.get(key)
+        general = [text for key, text in errors.items() if key not in self._inputs]
+        count = "1 field is" if len(errors) == 1 else f"{len(errors)} fields are"
+        wrong = f"{count} not right yet" if errors else ""
+        self._problem.text = " ".join([*general, wrong]) if general or wrong else ""
+        self._show_steps()
+
+    def _show_steps(self) -> None:
+        """Show the steps for what was entered, and why a session cannot start."""
+        if self._desk.busy or self._entered is None:
+            return
+        steps = self._work.rig_steps(
+            self._entered.settings or self._base, self._desk.place.settings_path
+        )
+        self._rig.show(steps)
+        why = refusal(steps)
+        self._refused.text = f"No session can start: {why}." if why else ""
+        self._start.set_enabled(not self._entered.errors and not why)
+
+    def _settings(self) -> Settings | None:
+        return self._entered.settings if self._entered is not None else None
+
+    def _may_act(self) -> bool:
+        if not self._in_control():
+            ui.notify("this page can only look: another one has control")
+        elif self._desk.busy:
+            ui.notify("not while a session runs or the rig is checked")
+        else:
+            return True
+        return False
+
+    def _ask(self) -> None:
+        entered = self._entered
+        if not self._may_act():
+            return
+        if entered is None or entered.settings is None:
+            return
+        now = time.localtime()
+        folder = f"{entered.subject}-{time.strftime('%Y%m%d-%H%M%S', now)}"
+        request = StartRequest(
+            self._desk.place.one_session or folder, entered.settings, entered.about
+        )
+        self._desk.ask(request)
+
+    async def _predict(self) -> None:
+        """Say what the session would tell, and what to change."""
+
+        def lines(folder: Path, settings: Settings) -> list[str]:
+            document = folder / "design.json"
+            if not document.is_file():
+                return []
+            return prediction_lines(read_json(document), settings.margins)
+
+        await self._compute(("design",), (*DETECTED, "--json", "design.json"), lines)
+
+    async def _dry_run(self) -> None:
+        """Run the protocol on a simulated clock; the folder is deleted."""
+
+        def lines(folder: Path, _: Settings) -> list[str]:
+            return dry_run_lines(*count_epochs(folder / "dry-run"))
+
+        await self._compute(("simulate",), ("--out", "dry-run"), lines)
+
+    async def _compute(
+        self,
+        command: tuple[str, ...],
+        options: tuple[str, ...],
+        lines: Callable[[Path, Settings], list[str]],
+    ) -> None:
+        """Show what a command says of the settings that were entered, first in sentences."""
+        if not self._may_act():
+            return
+        settings = self._settings()
+        if settings is None:
+            ui.notify("first put right what is wrong in the form")
+            return
+        self._answer.set_content("<p>computing …</p>")
+        with tempfile.TemporaryDirectory(prefix="rigidimeter-form-") as name:
+            folder = Path(name)
+            path = folder / "protocol.toml"
+            path.write_text(toml_text(dump_settings(settings)), encoding="utf-8")
+            answer = await self._work.command(
+                *command, "--settings", str(path), *options, folder=folder
+            )
+            try:
+                said = lines(folder, settings)
+            except UserError as error:
+                said = [str(error)]
+        self._answer.set_content(answer.html(name, said))
+
+
+def _stored(path: Path) -> Any:
+    """Return a form that was kept; None if there is none that can be read."""
+    try:
+        return read_json(path) if path.is_file() else None
+    except UserError:
+        return None

@@ -1,0 +1,198 @@
+"""What the server of the page and the session beside it know of each other.
+
+The session is seen through by the program's first thread, as in a terminal; the server has a thread
+of its own. They share this desk. Each attribute is written by one of the two.
+"""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import Settings
+from rigidimeter.rig.acquisition import State
+from rigidimeter.rig.acquisition.processes import Flag, SessionMemory
+from rigidimeter.rig.console import SessionPlan
+from rigidimeter.rig.console.page.presence import Presence
+
+
+@dataclass(frozen=True)
+class StartRequest:
+    """What the operator wants to run: a new session, or the rest of one.
+
+    Attributes
+    ----------
+    folder : str
+        Name of the new session's folder.
+    settings : Settings or None
+        None where a session is continued.
+    about : dict
+        What was said of subject, operator, condition and stimulation, and whether the page names
+        conditions by codes alone (`blinded`).
+    resume : str
+        Name of the folder of the session to be continued; empty for none.
+    epoch : int or None
+        Of that session, the one epoch to be run again; None for all that are left.
+    left : tuple of int
+        The planned epochs that are left, by number; empty for those that this session lacks.
+    """
+
+    folder: str
+    settings: Settings | None = None
+    about: Mapping[str, Any] = field(default_factory=dict)
+    resume: str = ""
+    epoch: int | None = None
+    left: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class RunningSession:
+    """A session as the server sees it: its names in shared memory, its plan, its folder."""
+
+    number: int
+    names: tuple[str, str, str]
+    plan: SessionPlan
+    folder: Path
+
+
+@dataclass(frozen=True)
+class FinishedSession:
+    """How the last session ended, and what is said of it."""
+
+    number: int
+    folder: Path
+    outcome: str
+    sentences: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where this console works: rig, folder of its sessions, settings that a form begins with."""
+
+    root: Path
+    settings: Settings
+    settings_name: str
+    rig: Path | None = None
+    one_session: str = ""
+    settings_path: Path | None = None
+
+    @property
+    def protocols(self) -> Path:
+        """The folder whose protocol files can be chosen."""
+        return self.settings_path.parent if self.settings_path is not None else Path.cwd()
+
+
+class Desk:
+    """Requests to the session's thread, and the session to the server's.
+
+    Parameters
+    ----------
+    place : Place
+    now_ns : callable
+        CLOCK_MONOTONIC in nanoseconds.
+    """
+
+    def __init__(self, place: Place, now_ns: Callable[[], int] = time.monotonic_ns) -> None:
+        self.place = place
+        self.presence = Presence()
+        self.running: RunningSession | None = None
+        self.finished: FinishedSession | None = None
+        self.starting = ""
+        self.checking = ""
+        self.check_stopped = False
+        self.stop_pressed = False
+        self.told_to_end = False
+        self._now_ns = now_ns
+        self._requests: queue.SimpleQueue[StartRequest] = queue.SimpleQueue()
+        self._still = True
+        self._count = 0
+
+    # For the server
+
+    @property
+    def in_session(self) -> bool:
+        """Whether a session runs or is about to."""
+        return bool(self.starting) or self.running is not None
+
+    @property
+    def busy(self) -> bool:
+        """Whether something has the rig: a session, or a check of it."""
+        return self.in_session or bool(self.checking)
+
+    def begin_check(self, what: str) -> bool:
+        """Take the rig for a check; return False if something else has it."""
+        if self.busy:
+            return False
+        self.checking, self.check_stopped = what, False
+        return True
+
+    def stop_check(self) -> None:
+        """Stop the check of the rig, if one runs."""
+        self.check_stopped = True
+
+    def press_stop(self) -> None:
+        """Keep the emergency stop for a session that starts and is not in shared memory yet."""
+        self.stop_pressed = self.in_session
+
+    def end_check(self) -> None:
+        """Give the rig back."""
+        self.checking = ""
+
+    def ask(self, request: StartRequest) -> bool:
+        """Ask for a session; return False if something else has the rig."""
+        if self.busy:
+            return False
+        self.starting, self.stop_pressed = request.folder, False
+        self._requests.put(request)
+        return True
+
+    # For the session's thread
+
+    def next_request(self) -> StartRequest:
+        """Wait for the operator; a signal ends the wait."""
+        while True:
+            try:
+                return self._requests.get(timeout=0.2)
+            except queue.Empty:
+                continue
+
+    def refuse_stopped(self) -> None:
+        """Refuse a session whose start the emergency stop has ended.
+
+        Raises
+        ------
+        UserError
+        """
+        if self.stop_pressed:
+            raise UserError("the emergency stop was pressed while the session started")
+
+    def console(self, plan: SessionPlan, folder: Path) -> Callable[[SessionMemory], None]:
+        """Return what `supervise` calls about 20 times a second."""
+        self._count += 1
+        self._still = True
+
+        def look(shared: SessionMemory) -> None:
+            if self.stop_pressed:
+                shared.status.raise_flag(Flag.EMERGENCY_STOP)
+            loop = shared.status.loop()
+            self._still = loop is None or loop.tick < 0 or loop.state == State.PAUSED
+            if self.running is None:
+                self.running = RunningSession(self._count, shared.names, plan, folder)
+
+        return look
+
+    def operator_seen_ns(self) -> int:
+        """Return the operator's heartbeat: when the page in control was last heard of."""
+        return self.presence.seen_ns(self._now_ns(), still=self._still)
+
+    def over(self, folder: Path, outcome: str, sentences: tuple[str, ...]) -> None:
+        """Say how the session ended."""
+        self.finished = FinishedSession(self._count, folder, outcome, sentences)
+        self.running = None
+        self.stop_pressed = False
+        self.starting = ""

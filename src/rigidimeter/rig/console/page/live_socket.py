@@ -1,0 +1,264 @@
+"""The socket between the server and each open page: beats and orders in, samples and state out.
+
+What a page says is acted upon as it comes. What it is told waits in a short queue of its own: a
+page that is slow misses samples, and nothing waits for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import time
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from rigidimeter.core.files import json_line
+from rigidimeter.rig.acquisition import Command, Order
+from rigidimeter.rig.acquisition.processes import Condition, Flag, Role, SessionMemory
+from rigidimeter.rig.console import BandTorque, Observer, TraceReader, save_to
+from rigidimeter.rig.console.page.desk import Desk, RunningSession
+from rigidimeter.rig.console.page.kept_study import off_scale
+from rigidimeter.rig.console.page.page_messages import Message, RefusedMessage, parse_message
+from rigidimeter.rig.console.page.session_state import is_known, points, session_state
+
+FRAME_S = 1 / 30
+"""How often samples are sent."""
+
+POINTS_PER_S = 125.0
+"""Pieces of time in a second; of each the page draws two points."""
+
+STATE_FRAMES = 3
+"""Every so many frames the state is sent."""
+
+MOST_WAITING = 30
+"""Frames that wait for a slow page; older ones are dropped."""
+
+MOST_PAGES = 8
+MOST_KNOWN = 1000
+"""Pages that were sent and may open a socket; the oldest are forgotten."""
+
+MOST_NOTES = 20
+"""Notes that wait for the loop to take them."""
+
+_HELLO_S = 5.0
+_NOTE = '{"kind":"note"'
+"""How the page begins a note. Each has one answer while a session runs: whether it was taken."""
+
+
+@dataclass(eq=False)
+class OpenPage:
+    """A page with its socket, and what waits to be sent to it."""
+
+    socket: WebSocket
+    secret: str
+    waiting: deque[bytes | str] = field(default_factory=lambda: deque(maxlen=MOST_WAITING))
+    wake: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def tell(self, frame: bytes | str) -> None:
+        """Send a frame soon; of those that wait too long the oldest is dropped."""
+        self.waiting.append(frame)
+        self.wake.set()
+
+
+class _Attached:
+    """A running session as the server's thread has it."""
+
+    def __init__(self, running: RunningSession) -> None:
+        self.running = running
+        self.memory = SessionMemory.attach(running.names)
+        settings = running.plan.settings
+        rate_hz = settings.rig.tick_rate_hz
+        self._band = BandTorque(settings.online, rate_hz)
+        self._traces = TraceReader(self.memory.samples, rate_hz, POINTS_PER_S, band=self._band)
+        self._known_since_s = math.nan
+        self._observer = Observer(running.plan, self.memory)
+        self.notes: deque[str] = deque()
+
+    def samples(self) -> bytes:
+        traces = self._traces.read()
+        return points(traces, modelled=self._band.since_s == self._known_since_s)
+
+    def state(self) -> dict[str, Any]:
+        live = self.memory.status.live()
+        facts = self._observer.look()
+        # Of the epoch in which J, B and K are known, and of no other.
+        self._known_since_s = live.since_s if live is not None and is_known(facts) else math.nan
+        full = self.memory.status.condition(Role.RECORDER) is Condition.TROUBLE
+        state = session_state(facts, self._observer.progress)
+        return state | {"number": self.running.number, "save": full}
+
+    def post_notes(self) -> None:
+        while self.notes and self.memory.status.post_note(self.notes[0]) is not None:
+            self.notes.popleft()
+
+
+class LiveSockets:
+    """All open pages.
+
+    Parameters
+    ----------
+    desk : Desk
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._pages: set[OpenPage] = set()
+        self._attached: _Attached | None = None
+        self._known: deque[str] = deque(maxlen=MOST_KNOWN)
+
+    def admit(self, secret: str) -> None:
+        """Let a page come that was just sent; the secret is its own."""
+        self._known.append(secret)
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Serve one page until it is gone."""
+        await socket.accept()
+        try:
+            hello = parse_message(await asyncio.wait_for(socket.receive_text(), _HELLO_S))
+        except (RefusedMessage, TimeoutError, WebSocketDisconnect, KeyError):
+            await _close(socket)
+            return
+        if hello.kind != "hello" or hello.page not in self._known or len(self._pages) >= MOST_PAGES:
+            await _close(socket)
+            return
+        page = OpenPage(socket, hello.page)
+        presence, now_ns = self._desk.presence, time.monotonic_ns()
+        presence.arrive(page.secret, hello.tab, now_ns, session=self._desk.busy)
+        self._pages.add(page)
+        sender = asyncio.create_task(_send(page))
+        try:
+            while True:
+                self._hear(page, await socket.receive_text())
+        except (WebSocketDisconnect, KeyError):  # it is gone, or sent bytes
+            pass
+        finally:
+            self._pages.discard(page)
+            presence.gone(page.secret)
+            sender.cancel()
+
+    def _hear(self, page: OpenPage, text: str) -> None:
+        try:
+            self._obey(page, parse_message(text))
+        except (RefusedMessage, ValueError) as error:
+            is_note = text.startswith(_NOTE)
+            page.tell(_refused(str(error)) if is_note else json.dumps({"say": str(error)}))
+
+    def _obey(self, page: OpenPage, message: Message) -> None:
+        """Do what a page in control says; a page that looks is told so."""
+        presence, now_ns = self._desk.presence, time.monotonic_ns()
+        if message.kind == "beat":
+            presence.beat(page.secret, now_ns)
+            if self._attached is not None and presence.has_control(page.secret):
+                # At once, and not when the session's thread looks next.
+                self._attached.memory.status.beat(Role.CONSOLE, now_ns)
+            return
+        if message.kind == "hello":
+            return
+        if not presence.has_control(page.secret):
+            why = "this page can only look: another one has control"
+            page.tell(_refused(why) if message.kind == "note" else json.dumps({"say": why}))
+            return
+        if message.kind == "leave":
+            presence.leave(page.secret, now_ns)
+        if message.kind in ("emergency", "leave"):
+            self._desk.stop_check()
+        attached = self._attached
+        if attached is None:
+            if message.kind == "emergency":
+                self._desk.press_stop()
+            return
+        status = attached.memory.status
+        if message.kind == "emergency":
+            status.raise_flag(Flag.EMERGENCY_STOP)
+        elif message.kind == "leave":
+            status.post(Order(Command.PAUSE_NOW))
+        elif message.kind == "order":
+            status.post(Order(message.command))
+        elif message.kind == "save":
+            page.tell(json.dumps({"say": save_to(message.folder, status)}))
+        elif message.note is not None:
+            if len(attached.notes) < MOST_NOTES:
+                attached.notes.append(json_line(message.note).decode())
+                attached.post_notes()
+                score = message.note.get("score")
+                doubt = "" if score is None else off_scale(self._desk.place, score)
+                page.tell(json.dumps({"noted": True} | ({"say": doubt} if doubt else {})))
+            else:
+                page.tell(_refused("the loop takes no notes now; send it again later"))
+
+    async def pump(self) -> None:
+        """Send samples and state to every page, for ever."""
+        count, due_s = 0, time.monotonic()
+        while True:
+            due_s = max(due_s + FRAME_S, time.monotonic())
+            await asyncio.sleep(due_s - time.monotonic())
+            count += 1
+            self._follow()
+            attached = self._attached
+            if attached is not None:
+                attached.post_notes()
+                samples = attached.samples()
+                if samples:
+                    for page in self._pages:
+                        page.tell(samples)
+            if count % STATE_FRAMES == 0:
+                self._tell_state()
+
+    def _follow(self) -> None:
+        """Attach to a session that began, let go of one that ended."""
+        running, attached = self._desk.running, self._attached
+        if attached is not None and attached.running is not running:
+            attached.memory.leave()
+            self._attached = None
+        if running is not None and self._attached is None:
+            with suppress(FileNotFoundError):  # it ended meanwhile
+                self._attached = _Attached(running)
+
+    def _tell_state(self) -> None:
+        desk, attached = self._desk, self._attached
+        state: dict[str, Any] = {
+            "starting": desk.starting,
+            "checking": desk.checking,
+            "session": None,
+            "finished": None,
+        }
+        if attached is not None:
+            state["session"] = attached.state()
+        elif desk.finished is not None and not desk.in_session:
+            finished = desk.finished
+            state["finished"] = {
+                "number": finished.number,
+                "folder": finished.folder.name,
+                "outcome": finished.outcome,
+                "sentences": list(finished.sentences),
+            }
+        for page in self._pages:
+            control = desk.presence.has_control(page.secret)
+            page.tell(json.dumps({"state": state, "control": control}))
+
+
+def _refused(why: str) -> str:
+    return json.dumps({"noted": False, "say": why})
+
+
+async def _send(page: OpenPage) -> None:
+    while True:
+        await page.wake.wait()
+        page.wake.clear()
+        while page.waiting:
+            frame = page.waiting.popleft()
+            with suppress(WebSocketDisconnect, RuntimeError):
+                if isinstance(frame, bytes):
+                    await page.socket.send_bytes(frame)
+                else:
+                    await page.socket.send_text(frame)
+
+
+async def _close(socket: WebSocket) -> None:
+    with suppress(WebSocketDisconnect, RuntimeError):
+        await socket.close(1008)

@@ -1,0 +1,227 @@
+"""The sessions of a folder, their epochs, and what was said of them; nothing here changes them.
+
+An epoch is left out of results by a row in `exclusions.csv`, as in a study folder: path, epoch,
+reason, by. The samples stay as they are.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.session import (
+    EVENTS,
+    NO_CODE,
+    codes_of,
+    is_session,
+    locked,
+    read_events,
+    read_manifest,
+    rest_of,
+)
+from rigidimeter.core.study_files import add_rows, table_path, table_rows
+from rigidimeter.rig.console.page.entered import line, name
+
+MOST_SESSIONS = 200
+NEVER_S = 1e9
+"""When an epoch ended that nobody ended: later than any."""
+
+
+@dataclass(frozen=True)
+class FoundEpoch:
+    """An epoch that was begun; `excluded` is the reason why it is left out, and who said so.
+
+    Of a session in which conditions were hidden, they stay so.
+    """
+
+    number: int
+    label: str
+    task: str
+    condition: str
+    outcome: str
+    reason: str
+    rating: str
+    excluded: str
+    begun_s: float = 0.0
+    ended_s: float = NEVER_S
+
+
+@dataclass(frozen=True)
+class FoundSession:
+    """A session folder; `outcome` is empty where the session was not closed.
+
+    `left` are the numbers of the planned epochs that neither it nor a session that continues it
+    ran, or will run.
+    """
+
+    name: str
+    created_utc: str
+    subject: str
+    virtual: bool
+    outcome: str
+    reason: str
+    planned: int
+    recording: bool
+    epochs: tuple[FoundEpoch, ...]
+    session_id: str = ""
+    continues: str = ""
+    plan: tuple[int, ...] = ()
+    left: tuple[int, ...] = ()
+    blinded: bool = False
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether it was interrupted, or epochs are left."""
+        return not self.recording and (not self.outcome or bool(self.left))
+
+    @property
+    def good(self) -> int:
+        """How many epochs ended with success."""
+        return sum(epoch.outcome == "success" for epoch in self.epochs)
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """Options of `estimate` and `report` that leave out the excluded epochs, and say why.
+
+        Those of a blinded session hide its conditions, too.
+        """
+        words = ["--blinded"] if self.blinded else []
+        for epoch in self.epochs:
+            if epoch.excluded:
+                words += ["--leave-out", f"{epoch.begun_s}:{epoch.ended_s} {epoch.excluded}"]
+        return tuple(words)
+
+
+def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
+    """Return the sessions of a folder, newest first, and a sentence for each that is not read."""
+    folders = [path for path in root.iterdir() if path.is_dir() and is_session(path)]
+    folders = sorted(folders, key=lambda path: path.stat().st_mtime, reverse=True)
+    excluded, problems = _exclusions(root)
+    found = []
+    for folder in folders[:MOST_SESSIONS]:
+        try:
+            found.append(_session(folder, excluded))
+        except (UserError, OSError, KeyError, TypeError) as error:
+            problems.append(f"{folder.name}: {error}")
+    return [_with_left(one, root, found) for one in found], problems
+
+
+def _with_left(one: FoundSession, root: Path, found: Sequence[FoundSession]) -> FoundSession:
+    """Return a session with what is left of it."""
+    if not one.outcome or one.good >= one.planned:
+        return one
+    continued = {
+        number
+        for other in found
+        if one.session_id and other.continues == one.session_id
+        for number in other.plan
+    }
+    try:
+        rest = [epoch.number for epoch in rest_of(root / one.name).epochs]
+    except UserError:  # such as one without a protocol
+        rest = []
+    return replace(one, left=tuple(number for number in rest if number not in continued))
+
+
+def exclude(root: Path, session: str, epoch: str, reason: str, by: str) -> None:
+    """Leave an epoch out of results, with a reason and a name.
+
+    Raises
+    ------
+    UserError
+        If there is no such epoch, it is left out already, or reason or name is missing.
+    """
+    folder = root / name(session, "session")
+    found = _session(folder, {})
+    reason, by = line(reason, "reason"), line(by, "name", 40)
+    if not reason or not by:
+        raise UserError("to leave an epoch out, give a reason and your name")
+    if epoch not in {one.label for one in found.epochs}:
+        raise UserError(f"{session} has no epoch {epoch}")
+    path = table_path(root, "exclusions")
+    if any((row["path"], row["epoch"]) == (session, epoch) for row in _rows(path)):
+        raise UserError(f"epoch {epoch} of {session} is left out already")
+    row = {"path": session, "epoch": epoch, "reason": reason, "by": by}
+    add_rows(path, "exclusions", [row])
+
+
+def _session(folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession:
+    manifest = read_manifest(folder)
+    about = manifest.get("about", {})
+    path = folder / EVENTS
+    events, _ = read_events(path)
+    end = next((event for event in events if event["event"] == "session_ended"), {})
+    recording = False
+    if not end:
+        try:
+            with locked(path, ""):
+                pass
+        except UserError:
+            recording = True
+    plan = manifest["protocol"]
+    return FoundSession(
+        folder.name,
+        manifest["created_utc"],
+        str(about.get("subject", "")),
+        manifest["virtual"],
+        end.get("outcome", ""),
+        end.get("reason", "still being recorded" if recording else "it was interrupted"),
+        len(plan),
+        recording,
+        tuple(_epochs(folder.name, events, excluded, about)),
+        manifest.get("session_id", ""),
+        manifest.get("continues", {}).get("session_id", ""),
+        tuple(entry["number"] for entry in plan),
+        blinded=about.get("blinded") is True,
+    )
+
+
+def _epochs(
+    session: str,
+    events: Sequence[dict[str, Any]],
+    excluded: dict[tuple[str, str], str],
+    about: Mapping[str, Any],
+) -> list[FoundEpoch]:
+    codes = codes_of(about)
+    ends = {event["epoch"]: event for event in events if event["event"] == "epoch_ended"}
+    ratings: dict[int, list[str]] = {}
+    for event in events:
+        if event["event"] == "note" and event.get("what") == "rating":
+            ratings.setdefault(event["epoch"], []).append(f"{event['score']:g} ({event['by']})")
+    return [
+        FoundEpoch(
+            begun["epoch"],
+            begun["label"],
+            begun["task"],
+            codes.get(begun["condition"], NO_CODE) if about.get("blinded") else begun["condition"],
+            ends.get(begun["epoch"], {}).get("outcome", ""),
+            ends.get(begun["epoch"], {}).get("reason", "not ended"),
+            "; ".join(ratings.get(begun["epoch"], ())),
+            excluded.get((session, begun["label"]), ""),
+            begun["time_s"],
+            ends.get(begun["epoch"], {}).get("time_s", NEVER_S),
+        )
+        for begun in events
+        if begun["event"] == "epoch_started"
+    ]
+
+
+def _exclusions(root: Path) -> tuple[dict[tuple[str, str], str], list[str]]:
+    try:
+        rows = _rows(table_path(root, "exclusions"))
+    except UserError as error:
+        return {}, [str(error)]
+    return {
+        (row["path"], row["epoch"]): row["reason"] + (f" ({row['by']})" if row.get("by") else "")
+        for row in rows
+    }, []
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    """Return the exclusions that were written down, each path as `found_sessions` names it."""
+    rows = table_rows(path, "exclusions")
+    return [row | {"path": os.path.normpath(row["path"])} for row in rows]

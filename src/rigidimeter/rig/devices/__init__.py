@@ -1,0 +1,59 @@
+"""Torque sensors, drives and rigs, behind the protocols of `base`."""
+
+from rigidimeter.rig.devices.ascii.drive import AsciiDrive
+from rigidimeter.rig.devices.ascii.language import Feedback, get, move_target, parse, seconds, set_
+from rigidimeter.rig.devices.ascii.line import AsciiLine, Exchange
+from rigidimeter.rig.devices.ascii.setup import PATIENCE
+from rigidimeter.rig.devices.ati.analogue import AtiAnalogue, ReaderError
+from rigidimeter.rig.devices.ati.calibration import (
+    AXES,
+    FORCE_UNITS_N,
+    TORQUE_UNITS_NM,
+    read_calibration,
+)
+from rigidimeter.rig.devices.ati.rdt import AtiRdt
+from rigidimeter.rig.devices.ati.rdt_packets import (
+    COUNTS,
+    START_REALTIME,
+    STOP,
+    RdtStream,
+    request,
+    status_words,
+)
+from rigidimeter.rig.devices.ati.rdt_setup import changes, parse_page
+from rigidimeter.rig.devices.ati.sample_clock import LONGEST_DELAY_S, SampleClock
+from rigidimeter.rig.devices.cia402.drive import Cia402Drive
+from rigidimeter.rig.devices.cia402.eds import fits
+from rigidimeter.rig.devices.cia402.setup import (
+    Cia402Settings,
+    Object,
+    displayed_mode,
+    objects,
+    put,
+    read_back,
+    scale,
+)
+from rigidimeter.rig.devices.cia402.state_words import (
+    NEXT_CONTROL,
+    OPERATIONAL,
+    PRE_OPERATIONAL,
+    STOPPED,
+    Control,
+    State,
+    command_bytes,
+    emergency,
+    fastest_tick_rate_hz,
+    frame_bits,
+    frames,
+    position_of,
+    sdo_answer,
+    sdo_read_bytes,
+    sdo_write_bytes,
+    state_of,
+    velocity_of,
+)
+from rigidimeter.rig.devices.composed import ComposedRig, Home
+from rigidimeter.rig.devices.enable_line import SerialEnableLine
+from rigidimeter.rig.devices.rig_lock import RigLock, lock_path
+from rigidimeter.rig.devices.rigfile import RigFile, load_rig
+from rigidimeter.rig.devices.simulated import SimulatedRig

@@ -1,0 +1,308 @@
+"""A CiA 402 servo over CANopen in profile-velocity mode.
+
+Before the loop, SDO transfers write the settings and read them back. The loop waits for no SDO and
+has no threads: each `write` sends a SYNC and the command, the drive answers every SYNC with its
+state, position and velocity, and the next `read` receives them. `write` also sends the heartbeat
+that keeps the drive enabled. If the loop hangs, the heartbeat ends with it, and the drive stops by
+itself: by its heartbeat watchdog (0x1016), and sooner by its command deadline (0x1400:05) if it has
+one.
+
+A measurement is taken at the SYNC, so its time is that at which this SYNC was sent; see `bus` for
+how the two are matched. Where no measurement belongs to a SYNC for `lost_s`, or frames come that no
+SYNC of ours asked for, the drive counts as lost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from rigidimeter.rig.devices.base import DeviceError, DeviceFacts, MotionSample, Now
+from rigidimeter.rig.devices.cia402.bus import NodeBus
+from rigidimeter.rig.devices.cia402.power_up_sequence import FAULTS, power_up, reset_fault
+from rigidimeter.rig.devices.cia402.setup import (
+    BRAKING,
+    CONTROLWORD,
+    IDENTITY,
+    TARGET,
+    Cia402Settings,
+    displayed_mode,
+    get,
+    objects,
+    put,
+    read_back,
+    refuse_two_nodes,
+    scale,
+    text,
+)
+from rigidimeter.rig.devices.cia402.state_words import (
+    OPERATIONAL,
+    POWERED,
+    Control,
+    Nmt,
+    State,
+    fastest_tick_rate_hz,
+)
+from rigidimeter.rig.guard import Cause
+
+MOST_FRAMES_A_READ = 400
+"""A full bus at 1 Mbit/s brings 18 frames a ms, which is 364 in a tick of 20 ms."""
+
+
+class Cia402Drive:
+    """A `VelocityDrive`; see the module for the protocol.
+
+    The first `Cause` in the loop is kept until the next `enable`. A drive that left operation by
+    itself is commanded to quick stop and is not enabled again.
+
+    Parameters
+    ----------
+    settings : Cia402Settings
+    now : callable
+        Seconds on the loop's clock.
+    """
+
+    Settings = Cia402Settings
+
+    def __init__(self, settings: Cia402Settings, now: Now) -> None:
+        self._settings, self._now = settings, now
+        self._who = (
+            f"CiA 402 drive, node {settings.node_id} on {settings.interface} {settings.channel}"
+        )
+        self._wire = NodeBus(settings, now, self._who)
+        self._scale = scale(settings)
+        self._objects = objects(settings)
+        self._readable = (*self._objects, displayed_mode(settings))
+        self._stops_itself_s = settings.drive_watchdog_s - settings.heartbeat_s
+        if settings.command_deadline_s > 0:
+            self._stops_itself_s = min(self._stops_itself_s, settings.command_deadline_s)
+        self._configured = False
+        self._control = Control.DISABLE_VOLTAGE
+        self._halted = False  # `control` is not sent yet
+        self._sent = 0
+        self._settled_s = -math.inf
+        self._cause = Cause.NONE
+        self._sample = MotionSample(math.nan, math.nan, -math.inf, cause=int(Cause.DRIVE_LOST))
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Measurements received or lost; frames damaged, unsent, unplaced; reads at their limit."""
+        return self._wire.counts
+
+    @property
+    def powered(self) -> bool:
+        """Whether its last statusword is of a state in which it may turn the motor.
+
+        Between `enable` and `disable` it is, so after `disable` any other is news.
+        """
+        return self._wire.is_open and self._wire.state in POWERED
+
+    def connect(self) -> None:
+        """Open the bus and make the drive pre-operational; nothing is energised."""
+        self._wire.open()
+        self._wire.network(Nmt.PRE_OPERATIONAL)
+
+    def configure(self) -> DeviceFacts:
+        """Write every setting, read each back, and start the drive's cyclic frames.
+
+        Raises
+        ------
+        DeviceError
+            If the drive does not answer, or does not accept a value.
+        """
+        if not self._wire.is_open:
+            raise DeviceError(f"{self._who}: not connected; connect it before it is configured")
+        self._configured = False
+        self._control = Control.DISABLE_VOLTAGE
+        settings, who = self._settings, self._who
+        self._wire.network(Nmt.PRE_OPERATIONAL)
+        with self._wire.sdo_client() as sdo:
+            self._wire.booted = False
+            refuse_two_nodes(sdo, who)
+            identity = {entry.name: get(sdo, entry, who) for entry in IDENTITY}
+            firmware, name = text(sdo, 0x100A, who), text(sdo, 0x1008, who)
+            absent = [entry for entry in self._objects if not put(sdo, entry, who)]
+            found = read_back(sdo, self._readable, who)
+        self._wire.network(Nmt.START)
+        self._configured = True
+        watchdogs = [settings.drive_watchdog_s]
+        if settings.command_deadline_s > 0 and not any(entry.index == 0x1400 for entry in absent):
+            watchdogs.append(settings.command_deadline_s)
+        values: dict[str, str | float | int] = {"firmware (0x100A)": firmware, **found}
+        values.update({entry.label: "absent" for entry in absent})
+        values.update({k: value for k, value in identity.items() if value is not None})
+        ramps = [found[entry.label] for entry in self._objects if entry.name in BRAKING]
+        values["braking_rad_s2"] = min(ramps) / self._scale.units_per_rad_s2
+        return DeviceFacts(
+            model=name or f"vendor {identity['vendor']}, product {identity['product']}",
+            serial="" if identity["serial"] is None else str(identity["serial"]),
+            fastest_tick_rate_hz=fastest_tick_rate_hz(settings.bitrate),
+            watchdog_s=min(watchdogs),
+            values=values,
+        )
+
+    def reset_fault(self) -> None:
+        """Reset a fault at the operator's request; the drive stays without power.
+
+        Raises
+        ------
+        DeviceError
+            If the fault remains.
+        """
+        self._require_configured()
+        self._control = Control.DISABLE_VOLTAGE
+        reset_fault(self._wire, self._now, self._settings.enable_timeout_s, self._who)
+        self._cause = Cause.NONE
+
+    def enable(self) -> None:
+        """Write zero velocity, read it and every setting back, then energise.
+
+        The loop must start to write within the drive's watchdog time.
+
+        Raises
+        ------
+        DeviceError
+            If a setting or the target is not as written, or the drive does not start in time.
+        """
+        self._require_configured()
+        self._control = Control.DISABLE_VOLTAGE
+        wire = self._wire
+        try:
+            with wire.sdo_client() as sdo:
+                for entry in self._objects:
+                    if entry.name in (CONTROLWORD, TARGET):
+                        put(sdo, entry, self._who)
+                read_back(sdo, self._readable, self._who)
+            wire.network(Nmt.START)
+            wire.drain()
+            self._require_configured()
+            wire.alarmed = wire.unheard = False
+            self._cause = Cause.NONE
+            power_up(wire, self._now, self._settings.enable_timeout_s, self._who)
+        except BaseException:  # also when interrupted: the drive may have power by now
+            self.disable()
+            raise
+        self._control, self._halted = Control.ENABLE_OPERATION, False
+        self._sent = 0
+        wire.emergency, wire.left_operation = 0, False
+        wire.heard_s, wire.network_state = self._now(), OPERATIONAL
+
+    def read(self) -> MotionSample:
+        """Return the newest sample without waiting; the previous one if there is no new one."""
+        wire = self._wire
+        for _ in range(MOST_FRAMES_A_READ):
+            if not wire.receive():
+                break
+        else:
+            wire.counts["backlog"] += 1
+        now_s = self._now()
+        found = self._find_cause(now_s)
+        if found in (Cause.DRIVE_FAULT, Cause.DRIVE_STATE) and (
+            wire.left_operation or wire.network_state != OPERATIONAL
+        ):
+            # Repeating "enable operation" would restart a drive that stopped by itself, and a node
+            # that is not operational does not hear the guard's ramp.
+            self._halt(Control.QUICK_STOP)
+        self._cause = self._cause or found
+        self._check_watchdog(now_s)
+        if wire.sequence and wire.sequence != self._sample.sequence:
+            position, velocity = wire.raw
+            self._sample = MotionSample(
+                (position - self._settings.zero_counts) / self._scale.counts_per_rad,
+                velocity / self._scale.units_per_rad_s,
+                wire.measured_s,
+                wire.sequence,
+                wire.raw,
+            )
+        status = wire.emergency << 16 | wire.statusword
+        cause = self._cause if wire.sequence else Cause.DRIVE_LOST
+        return self._sample._replace(status=status, cause=int(cause))
+
+    def _check_watchdog(self, now_s: float) -> None:
+        """Halt a drive that may be braking by itself: "enable operation" would restart it."""
+        if self._control is not Control.ENABLE_OPERATION:
+            return
+        wire = self._wire
+        if now_s - min(wire.told_s, wire.asked_s) > self._stops_itself_s:
+            answered = wire.asked_s == math.inf
+            self._cause = self._cause or (Cause.DRIVE_STATE if answered else Cause.DRIVE_LOST)
+            self._halt(Control.QUICK_STOP)
+
+    def _find_cause(self, now_s: float) -> Cause:
+        """Return why the drive is not in the commanded state, NONE if it is."""
+        wire, settings = self._wire, self._settings
+        if wire.booted:
+            self._halt(Control.DISABLE_VOLTAGE)
+        unheard = wire.unheard and self._control is Control.ENABLE_OPERATION
+        if wire.booted or wire.alarmed or unheard or wire.state in FAULTS:
+            return Cause.DRIVE_FAULT
+        if self._control is Control.ENABLE_OPERATION:
+            if wire.left_operation or wire.network_state != OPERATIONAL:
+                return Cause.DRIVE_STATE
+            if wire.unplaced or now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s:
+                return Cause.DRIVE_LOST
+        elif wire.state is State.OPERATION_ENABLED and now_s > self._settled_s:
+            return Cause.DRIVE_STATE
+        lost = not wire.is_open or now_s - wire.asked_s > settings.lost_s
+        return Cause.DRIVE_LOST if lost else Cause.NONE
+
+    def write(self, velocity_rad_s: float) -> float:
+        """Send velocity, SYNC and, when due, our heartbeat; return what was actually sent.
+
+        Zero is sent to a drive that is not enabled, and in place of a value that is not finite.
+        After a pause in which the drive's watchdog may have acted, a quick stop is sent.
+        """
+        self._check_watchdog(self._now())
+        target = 0
+        if self._control is Control.ENABLE_OPERATION and math.isfinite(velocity_rad_s):
+            most = self._settings.max_velocity_rad_s
+            wanted = max(-most, min(most, velocity_rad_s)) * self._scale.units_per_rad_s
+            target = max(-(2**31), min(2**31 - 1, round(wanted)))
+        if self._wire.is_open:
+            if self._halted:
+                self._send_halt()
+            elif self._wire.ask(self._control, target):
+                self._sent = target
+        return self._sent / self._scale.units_per_rad_s
+
+    def stop(self) -> None:
+        """Brake along the drive's quick-stop ramp; only `enable` starts it again."""
+        if self._wire.is_open and self._control is not Control.DISABLE_VOLTAGE:
+            self._halt(Control.QUICK_STOP)
+            self._send_halt()
+
+    def disable(self) -> None:
+        """Remove the power at once."""
+        if self._wire.is_open:
+            self._halt(Control.DISABLE_VOLTAGE)
+            self._send_halt()
+
+    def close(self) -> None:
+        """Remove the power, make the drive pre-operational, close the bus."""
+        self._configured = False
+        try:
+            if self._wire.is_open:
+                self.disable()
+                self._wire.network(Nmt.PRE_OPERATIONAL)
+        finally:
+            self._wire.close()
+
+    def _halt(self, control: Control) -> None:
+        """Halt with the next `write`: a program that is silent must not be the one that stops."""
+        # Power that was removed is not restored for a quick stop.
+        if self._control not in (control, Control.DISABLE_VOLTAGE):
+            self._control = control
+            self._halted = True
+            self._settled_s = self._now() + self._settings.lost_s
+        self._sent = 0
+
+    def _send_halt(self) -> None:
+        self._wire.send_both_ways(self._control)
+        self._halted = False
+
+    def _require_configured(self) -> None:
+        self._configured = self._configured and not self._wire.booted
+        if not (self._wire.is_open and self._configured):
+            raise DeviceError(
+                f"{self._who}: not configured, or restarted since; configure it, then enable it"
+            )

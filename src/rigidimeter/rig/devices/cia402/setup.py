@@ -1,0 +1,405 @@
+"""Settings of a CiA 402 drive, the objects that are written, and the SDO transfers.
+
+Angle, velocity and acceleration are those of the joint; the drive counts at its motor:
+
+    position units      counts_per_rev · gear_ratio / 2π              per rad
+    velocity units      velocity_units_per_rev_s · gear_ratio / 2π    per rad/s
+    acceleration units  acceleration_units_per_rev_s2 · gear_ratio / 2π per rad/s²
+
+`sign` −1 reverses position and velocity. Every object is written and read back. Enabling reads all
+of them again, because a drive that restarted in between has lost them, including its watchdog.
+
+A drive of several axes has each object of the profile (0x6000 to 0x67FF) once an axis: by CiA 402
+at `axis_offset` = 0x800, 0x1000, … more, in some drives at the sub-index `axis_subindex`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Literal, NamedTuple, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from rigidimeter.core.settings import Section, quantity
+from rigidimeter.rig.devices.base import DeviceError
+from rigidimeter.rig.devices.cia402.state_words import PROFILE_VELOCITY, Frames, frames
+
+INVALID = 1 << 31
+NO_REMOTE_REQUEST = 1 << 30
+
+NOT_THERE = {
+    0x06020000: "the drive has no such object",
+    0x06090011: "the drive has no such sub-index",
+}
+"""What the abort codes of an index and of a subindex that do not exist mean."""
+
+SECOND_ANSWER_S = 0.05
+"""A node answers within some ms; the second of two has the bus as soon as the first has sent."""
+
+
+class Cia402Settings(Section):
+    """A CANopen servo drive, profile CiA 402, in profile-velocity mode.
+
+    `interface` and `channel` are those of python-can; some interfaces number their channels.
+    `bitrate` is that of the bus; with socketcan the operating system sets it, and here it only
+    limits the loop rate. `port` is used by udp_multicast alone. `axis_offset` and `axis_subindex`
+    are those of the axis, 0 for a drive of one. `command_deadline_s` 0 means no command deadline; a
+    drive without one still has its heartbeat watchdog.
+
+    The default decelerations are above the default `guard.acceleration_limit_deg_s2`, since the
+    guard relies on a drive that brakes at least that fast; commissioning compares the two.
+    """
+
+    interface: str = Field(
+        "socketcan",
+        min_length=1,
+        json_schema_extra={"meaning": 'the name of a python-can interface, such as "socketcan"'},
+    )
+    channel: str | int = "can0"
+    bitrate: int = quantity(1_000_000, "bit/s", 10_000, 1_000_000)
+    port: int = quantity(43113, "1", 1, 65535)
+    node_id: int = quantity(1, "1", 1, 127)
+    master_id: int = quantity(127, "1", 1, 127)
+    axis_offset: Literal[0, 0x800, 0x1000, 0x1800, 0x2000, 0x2800, 0x3000, 0x3800] = 0
+    axis_subindex: int = quantity(0, "1", 0, 254)
+    counts_per_rev: float = quantity(8192.0, "counts/rev", 1.0, 2.0**31)
+    velocity_units_per_rev_s: float = quantity(8192.0, "unit/(rev/s)", 1e-3, 2.0**31)
+    acceleration_units_per_rev_s2: float = quantity(8192.0, "unit/(rev/s²)", 1e-3, 2.0**31)
+    gear_ratio: float = quantity(100.0, "1", 1e-3, 1e5)
+    sign: Literal[1, -1] = 1
+    zero_counts: int = quantity(0, "counts", -(2**31), 2**31 - 1)
+    max_velocity_rad_s: float = quantity(4.0, "rad/s", 0.0, 100.0, above=True)
+    acceleration_rad_s2: float = quantity(60.0, "rad/s²", 0.0, 1e4, above=True)
+    deceleration_rad_s2: float = quantity(120.0, "rad/s²", 0.0, 1e4, above=True)
+    quick_stop_rad_s2: float = quantity(120.0, "rad/s²", 0.0, 1e4, above=True)
+    quick_stop_option: Literal[2, 6] = 2
+    abort_option: Literal[1, 2, 3] = 3
+    heartbeat_s: float = quantity(0.02, "s", 0.001, 1.0)
+    drive_watchdog_s: float = quantity(0.1, "s", 0.002, 5.0)
+    command_deadline_s: float = quantity(0.05, "s", 0.0, 5.0)
+    lost_s: float = quantity(0.02, "s", 0.001, 1.0)
+    sdo_timeout_s: float = quantity(0.3, "s", 0.01, 5.0)
+    enable_timeout_s: float = quantity(2.0, "s", 0.05, 30.0)
+
+    def axis(self, index: int) -> tuple[int, int]:
+        """Return index and sub-index at which the axis has an object of the profile."""
+        return index + self.axis_offset, self.axis_subindex
+
+    @property
+    def emulated(self) -> bool:
+        """Whether the bus is virtual, with no hardware connected."""
+        return self.interface in ("virtual", "udp_multicast") or (
+            self.interface == "socketcan" and str(self.channel).startswith("vcan")
+        )
+
+    @property
+    def lock_names(self) -> tuple[str, ...]:
+        """What the drive is, in whatever rig file; a virtual bus ends with its process."""
+        if self.interface == "virtual":
+            return ()
+        port = f" port {self.port}" if self.interface == "udp_multicast" else ""
+        return (f"node {self.node_id} on {self.interface} {self.channel}{port}",)
+
+    @field_validator("channel", mode="before")
+    @classmethod
+    def _text_or_number(cls, value: Any) -> Any:
+        text = isinstance(value, str) and value != ""
+        if not text and (isinstance(value, bool) or not isinstance(value, int) or value < 0):
+            raise ValueError(
+                f'{value!r} names no channel; it must be a text such as "can0", or a whole number '
+                "such as 0, as the interface has it"
+            )
+        return value
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.drive_watchdog_s < 2 * self.heartbeat_s:
+            raise ValueError(
+                f"drive_watchdog_s = {self.drive_watchdog_s:g} s must be at least twice heartbeat_s"
+                f" = {self.heartbeat_s:g} s: one late heartbeat must not stop the drive"
+            )
+        if self.node_id == self.master_id:
+            raise ValueError(
+                f"node_id and master_id are both {self.node_id}: drive and computer must differ"
+            )
+        return self
+
+
+class Scale(NamedTuple):
+    """Units of the drive in one of the joint, with the sign."""
+
+    counts_per_rad: float
+    units_per_rad_s: float
+    units_per_rad_s2: float
+
+
+def scale(settings: Cia402Settings) -> Scale:
+    """Return the drive's units in the joint's; the sign is in those of angle and velocity."""
+    turns_per_rad = settings.gear_ratio / (2 * math.pi)
+    return Scale(
+        settings.sign * settings.counts_per_rev * turns_per_rad,
+        settings.sign * settings.velocity_units_per_rev_s * turns_per_rad,
+        settings.acceleration_units_per_rev_s2 * turns_per_rad,
+    )
+
+
+@dataclass(frozen=True)
+class Object:
+    """One entry of the drive's object dictionary, and the value it must have.
+
+    `optional` entries are skipped if the drive does not have them; `fixed` ones may refuse to be
+    written if they read back as they must be; bits outside `mask` belong to the drive.
+    """
+
+    name: str
+    index: int
+    subindex: int
+    size: int
+    value: int
+    signed: bool = False
+    optional: bool = False
+    fixed: bool = False
+    mask: int = -1
+
+    @property
+    def label(self) -> str:
+        """The name, with the address as written in the drive's manual."""
+        return f"{self.name} (0x{self.index:04X}:{self.subindex:02X})"
+
+
+CONTROLWORD, TARGET = "controlword", "target velocity"
+BRAKING = ("profile deceleration", "quick-stop deceleration")
+
+IDENTITY = tuple(
+    Object(name, 0x1018, k, 4, 0, optional=k > 1)
+    for k, name in enumerate(("vendor", "product", "revision", "serial"), 1)
+)
+"""Read, never written."""
+
+
+def objects(settings: Cia402Settings) -> tuple[Object, ...]:
+    """Return the objects to write, in order; if one is written twice the last value remains."""
+    units = scale(settings)
+    ids = frames(settings.node_id)
+    watchdog_ms = round(settings.drive_watchdog_s * 1e3)
+
+    def acceleration(rad_s2: float) -> int:
+        return max(1, round(rad_s2 * units.units_per_rad_s2))
+
+    def of_axis(name: str, index: int, size: int, value: int, **more: bool) -> Object:
+        return Object(name, *settings.axis(index), size, value, **more)
+
+    most = math.ceil(settings.max_velocity_rad_s * abs(units.units_per_rad_s))
+    return (
+        of_axis(CONTROLWORD, 0x6040, 2, 0),
+        of_axis("mode of operation", 0x6060, 1, PROFILE_VELOCITY, signed=True),
+        of_axis(TARGET, 0x60FF, 4, 0, signed=True),
+        # The drive's own limit is a second one: `write` sends nothing above it.
+        of_axis("max profile velocity", 0x607F, 4, most, optional=True),
+        of_axis("profile acceleration", 0x6083, 4, acceleration(settings.acceleration_rad_s2)),
+        of_axis(BRAKING[0], 0x6084, 4, acceleration(settings.deceleration_rad_s2)),
+        of_axis(BRAKING[1], 0x6085, 4, acceleration(settings.quick_stop_rad_s2)),
+        of_axis("quick-stop option", 0x605A, 2, settings.quick_stop_option, signed=True),
+        of_axis("abort-connection option", 0x6007, 2, settings.abort_option, signed=True),
+        Object("drive's heartbeat in ms", 0x1017, 0, 2, round(settings.heartbeat_s * 1e3)),
+        Object("heartbeat watchdog", 0x1016, 1, 4, settings.master_id << 16 | watchdog_ms),
+        *_messages(settings, ids, round(settings.command_deadline_s * 1e3)),
+    )
+
+
+def displayed_mode(settings: Cia402Settings) -> Object:
+    """Return the mode that the drive reports; read, never written."""
+    address = settings.axis(0x6061)
+    return Object("mode of operation display", *address, 1, PROFILE_VELOCITY, signed=True)
+
+
+def _messages(settings: Cia402Settings, ids: Frames, deadline_ms: int) -> tuple[Object, ...]:
+    """Return the PDO mapping: one command frame, two answers to every SYNC, and no others."""
+
+    def mapped(*entries: tuple[int, int]) -> tuple[int, ...]:
+        return tuple(
+            index << 16 | subindex << 8 | bits
+            for of_profile, bits in entries
+            for index, subindex in (settings.axis(of_profile),)
+        )
+
+    command = mapped((0x6040, 16), (0x60FF, 32))
+    position = mapped((0x6041, 16), (0x6061, 8), (0x6064, 32))
+    velocity = mapped((0x606C, 32))
+    deadline = Object("command deadline in ms", 0x1400, 5, 2, deadline_ms, optional=True)
+    return (
+        # A command takes effect when it arrives (255), a measurement is taken at every SYNC (1).
+        *_message("command frame", 0x1400, ids.command, 255, command, (deadline,)),
+        *_message("position frame", 0x1800, ids.position, 1, position),
+        *_message("velocity frame", 0x1801, ids.velocity, 1, velocity),
+        *(
+            Object(
+                "unused frame",
+                index,
+                1,
+                4,
+                INVALID | id_,
+                optional=True,
+                fixed=True,
+                mask=~NO_REMOTE_REQUEST,
+            )
+            for index, id_ in (
+                (0x1401, ids.command + 0x100),
+                (0x1402, ids.command + 0x200),
+                (0x1403, ids.command + 0x300),
+                (0x1802, ids.position + 0x200),
+                (0x1803, ids.position + 0x300),
+            )
+        ),
+    )
+
+
+def _message(
+    name: str,
+    index: int,
+    id_: int,
+    transmission: int,
+    entries: tuple[int, ...],
+    more: tuple[Object, ...] = (),
+) -> tuple[Object, ...]:
+    """Return the steps in which CiA 301 allows a mapping to change: off, emptied, filled, on."""
+    fixed = partial(Object, fixed=True)
+    identifier = fixed(f"{name}'s identifier", index, 1, 4, id_, mask=~NO_REMOTE_REQUEST)
+    count = fixed(f"{name}'s number of entries", index + 0x200, 0, 1, len(entries))
+    return (
+        replace(identifier, value=INVALID | id_),
+        fixed(f"{name}'s transmission type", index, 2, 1, transmission),
+        *more,
+        replace(count, value=0),
+        *(fixed(f"{name}'s entry {k}", index + 0x200, k, 4, e) for k, e in enumerate(entries, 1)),
+        count,
+        identifier,
+    )
+
+
+def library(name: str) -> Any:
+    """Import a library that only this drive needs."""
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError:
+        raise DeviceError(
+            f"the CiA 402 drive needs the package {name}, which is not installed: "
+            "pip install 'rigidimeter[canopen]'"
+        ) from None
+
+
+def put(sdo: Any, entry: Object, who: str) -> bool:
+    """Write one object; return False if it is optional and the drive does not have it.
+
+    Raises
+    ------
+    DeviceError
+        If the drive does not answer or refuses the value.
+    """
+    data = entry.value.to_bytes(entry.size, "little", signed=entry.signed)
+    try:
+        sdo.download(entry.index, entry.subindex, data)
+    except library("canopen").SdoAbortedError as error:
+        missing = NOT_THERE.get(error.code)
+        if entry.optional and missing:
+            return False
+        if entry.fixed and not missing:
+            return True  # `read_back` says whether it is as it must be
+        why = missing or "the settings must name a value the drive takes"
+        raise DeviceError(
+            f"{who}: {entry.label} = {entry.value} was refused with abort code 0x{error.code:08X}; "
+            f"{why}"
+        ) from None
+    except _silence() as error:
+        raise _no_answer(entry, who, error) from None
+    return True
+
+
+def get(sdo: Any, entry: Object, who: str) -> int | None:
+    """Read one object, None if it is optional and the drive does not have it.
+
+    Raises
+    ------
+    DeviceError
+        If the drive does not answer or does not have it.
+    """
+    try:
+        data = sdo.upload(entry.index, entry.subindex)
+    except library("canopen").SdoAbortedError as error:
+        if entry.optional and error.code in NOT_THERE:
+            return None
+        raise DeviceError(
+            f"{who}: {entry.label} cannot be read, abort code 0x{error.code:08X}; "
+            f"{NOT_THERE.get(error.code, 'the drive must have this object')}"
+        ) from None
+    except _silence() as error:
+        raise _no_answer(entry, who, error) from None
+    return int.from_bytes(data[: entry.size], "little", signed=entry.signed)
+
+
+def refuse_two_nodes(sdo: Any, who: str) -> None:
+    """Ask one question and wait a moment for a second answer.
+
+    Two nodes of one number would both move at each command, and answer for each other.
+
+    Raises
+    ------
+    DeviceError
+        If nobody answers, or two do.
+    """
+    get(sdo, IDENTITY[0], who)
+    time.sleep(SECOND_ANSWER_S)
+    if not sdo.responses.empty():
+        raise DeviceError(
+            f"{who}: two answers came to one question, so another node on the bus has this node_id "
+            "too; give each node its own, or take the other off the bus"
+        )
+
+
+def text(sdo: Any, index: int, who: str) -> str:
+    """Read an optional text object; empty if the drive does not have it."""
+    try:
+        data = bytes(sdo.upload(index, 0))
+    except library("canopen").SdoAbortedError:
+        return ""
+    except _silence() as error:
+        raise _no_answer(Object("text", index, 0, 0, 0), who, error) from None
+    return data.rstrip(b"\0").decode("ascii", "replace")
+
+
+def read_back(sdo: Any, written: Iterable[Object], who: str) -> Mapping[str, int]:
+    """Read every object and return the values by name, without the optional ones that are absent.
+
+    Raises
+    ------
+    DeviceError
+        If a value is not the one that was written.
+    """
+    kept = {(entry.index, entry.subindex): entry for entry in written}
+    found: dict[str, int] = {}
+    for entry in kept.values():
+        value = get(sdo, entry, who)
+        if value is None:
+            continue
+        if (value ^ entry.value) & entry.mask:
+            raise DeviceError(
+                f"{who}: {entry.label} reads back as {value} where it must be {entry.value}; the "
+                "drive must take this value, or the settings must name one that it takes"
+            )
+        found[entry.label] = value
+    return found
+
+
+def _silence() -> tuple[type[Exception], ...]:
+    return (library("canopen").SdoCommunicationError, library("can").CanError, OSError)
+
+
+def _no_answer(entry: Object, who: str, error: Exception) -> DeviceError:
+    return DeviceError(
+        f"{who}: no answer about {entry.label} ({error}); check power, wiring, bit rate and node_id"
+    )

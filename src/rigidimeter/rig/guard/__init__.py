@@ -1,0 +1,74 @@
+"""The last word before the wire: limits, plausibility, and a latch that keeps the first cause."""
+
+from rigidimeter.rig.guard.agreement import (
+    OLD_SHARE,
+    SQUARED_S,
+    SUMMED_S,
+    WRONG_GAIN,
+    WRONG_SHARE,
+    ConsistencyLimits,
+    MeansState,
+    consistency_limits,
+    larger_gain,
+    means_step,
+)
+from rigidimeter.rig.guard.causes import REACTIONS, Cause, Reaction
+from rigidimeter.rig.guard.consistency import (
+    ConsistencyState,
+    consistency_state,
+    consistency_step,
+)
+from rigidimeter.rig.guard.limits import (
+    GuardLimits,
+    GuardState,
+    guard_limits,
+    guard_state,
+    released,
+)
+from rigidimeter.rig.guard.step import Limited, guard_step, why_ended
+from rigidimeter.rig.guard.torque_answer import (
+    AT_REST,
+    FILTER_RAD_S,
+    HARDLY_SHOWN,
+    LONGEST_S,
+    MEAN_OF_S,
+    NOISE_ORDERS,
+    NOTHING_YET,
+    ROW_S,
+    ROWS,
+    ROWS_A_LOOK,
+    SETTLED,
+    SHOWN_MEMORY_S,
+    UNSHOWN_NM,
+    AnswerLimits,
+    answer_limits,
+    answer_state,
+    answer_step,
+    lowpassed,
+    mean_of_ticks,
+)
+from rigidimeter.rig.guard.torque_sign import (
+    ACCELERATION,
+    BEFORE,
+    COLUMNS,
+    DIFFERENCES,
+    FALSE_ALARMS,
+    IF_EARLY,
+    INSTRUMENTS,
+    JERK,
+    LAGS,
+    PASSES,
+    SINGULAR,
+    Left,
+    explained,
+    fits_better,
+    least_of_each_sign,
+    most_left,
+    sign_is_wrong,
+    solved,
+    solved_for,
+    table,
+    whitened,
+    without,
+)
+from rigidimeter.rig.guard.watch import energy_after, found_wrong, outside

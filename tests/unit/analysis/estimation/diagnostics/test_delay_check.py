@@ -1,0 +1,56 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.scenarios.catalogue import SCENARIOS
+from tests.scenarios.recordings import measured_alone
+
+from rigidimeter.analysis.estimation.closedloop.between_samples import acceleration_late_s
+from rigidimeter.analysis.study import estimate
+from rigidimeter.model import DriveModel
+
+
+@pytest.mark.parametrize("bandwidth_hz", [5.0, 20.0])
+def test_the_acceleration_of_a_slow_drive_is_late_at_the_ticks(bandwidth_hz):
+    """By ζ ω₀ T²/6."""
+    interval_s, damping = 1e-3, 0.6
+    late_s = acceleration_late_s(DriveModel.second_order(bandwidth_hz, damping), interval_s)
+    assert late_s == pytest.approx(damping * 2 * np.pi * bandwidth_hz * interval_s**2 / 6, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "late_ms", "recording", "epochs"),
+    [
+        ("torque stamped 4 ms late", 4.0, 0, 1),
+        ("relaxed", 0.0, 0, 1),
+        # 0.04 ms, at 3.1 standard errors and 1.02 times what B bears; ζ ω₀ T²/6 is 0.037 ms.
+        ("ankle, relaxed", 0.0, 1, 4),
+    ],
+)
+def test_a_delay_that_is_not_corrected_is_said_where_it_matters(name, late_ms, recording, epochs):
+    epochs, _ = SCENARIOS[name].simulated(recording, epochs)
+    alone = [measured_alone(epoch) for epoch in epochs]
+    analysis = estimate(alone, "bandlimited", settings=SCENARIOS[name].analysed_with())
+    found = [one for one in analysis.fits[0].findings if one.name == "torque_delay"]
+    if not late_ms:
+        assert found == []
+        return
+    (finding,) = found
+    assert finding.level == "doubt"
+    assert finding.value == pytest.approx(late_ms, rel=0.1)
+    # B τ off J is less than half its interval below that delay.
+    J = analysis.fits[0]
+    assert finding.threshold <= 1e3 * 0.5 * (J.high[0] - J.low[0]) / J.value[1] * 1.001
+
+
+@pytest.mark.parametrize("name", ["drive PI 20 Hz with load", "drive PI 30 Hz, 500/s"])
+def test_with_the_command_recorded_what_the_drive_does_is_no_delay(name):
+    """The drive is followed, and what is left between torque and motion is no delay."""
+    (epoch,), truth = SCENARIOS[name].simulated(0, 1)
+    channels = {k: v for k, v in epoch.channels.items() if k != "perturbation_nm"}
+    known = replace(epoch, channels=channels, excitation_hz=None)
+    analysis = estimate([known], "bandlimited", settings=SCENARIOS[name].analysed_with())
+    (fit,) = analysis.fits
+    assert not {finding.name for finding in fit.findings if finding.level != "note"}
+    assert abs(analysis.delays[0].delay_s) < 4.0 * analysis.delays[0].delay_s_se
+    np.testing.assert_allclose(fit.value, truth[0], rtol=0.004)

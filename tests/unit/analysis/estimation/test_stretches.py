@@ -1,0 +1,233 @@
+"""Stretches that are left out: what is left gives the joint that was there before the fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigidimeter.analysis.estimation.bad_stretches import (
+    frozen_stretches,
+    saturated_stretches,
+    without_bad_stretches,
+)
+from rigidimeter.analysis.estimation.closedloop.spectral_lines import epoch_grid
+from rigidimeter.analysis.estimation.diagnostics import checked
+from rigidimeter.analysis.estimation.methods import method_named
+from rigidimeter.analysis.estimation.prepared import prepare
+from rigidimeter.analysis.estimation.stretches import bridged, longest_part, sound, used_s
+from rigidimeter.analysis.estimation.window import repetition
+from rigidimeter.core.records import Channel, Epoch, LeftOut
+from rigidimeter.core.settings import Settings, parse_settings
+
+SETTINGS = Settings()
+RATE_HZ = 200.0
+TRUTH = np.array([0.005, 0.14, 1.8])
+FREQUENCIES_HZ = (0.31, 0.73, 1.51, 3.13, 6.07, 9.01)
+
+
+def motion(time_s):
+    """Return acceleration, velocity and angle of a sum of sines."""
+    w = 2 * np.pi * np.array(FREQUENCIES_HZ)
+    phase = np.outer(time_s, w) + np.arange(w.size) ** 2
+    a = 0.02 / w
+    return (
+        (-a * w**2 * np.sin(phase)).sum(1),
+        (a * w * np.cos(phase)).sum(1),
+        (a * np.sin(phase)).sum(1),
+    )
+
+
+def an_epoch(length_s=20.0, **extra):
+    time_s = np.arange(0.0, length_s, 1 / RATE_HZ)
+    acceleration, velocity, angle = motion(time_s)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(time_s.size)
+    torque = np.column_stack([acceleration, velocity, angle]) @ TRUTH + noise
+    values = {"torque_nm": torque, "angle_rad": angle, "velocity_rad_s": velocity, **extra}
+    channels = {name: Channel(name, time_s, column) for name, column in values.items()}
+    return Epoch("made", "1", channels, task="prbs")
+
+
+def hung(epoch, name, start_s, stop_s):
+    channel = epoch.channels[name]
+    values = channel.values.copy()
+    rows = (channel.time_s >= start_s) & (channel.time_s <= stop_s)
+    values[rows] = values[rows][0]
+    changed = Channel(name, channel.time_s, values)
+    return replace(epoch, channels={**epoch.channels, name: changed})
+
+
+def fitted(epoch, settings=SETTINGS):
+    (prepared,) = prepare([epoch], settings)
+    (fit,), _ = method_named("bandlimited").fit([prepared], None, lambda _: None, False)
+    return checked(prepared, fit)
+
+
+def finding(fit, name):
+    return next(found for found in fit.findings if found.name == name)
+
+
+@pytest.mark.parametrize("name", ["torque_nm", "angle_rad", "velocity_rad_s"])
+def test_the_rest_of_an_epoch_whose_sensor_hung_gives_the_joint(name):
+    fit = fitted(hung(an_epoch(), name, 8.0, 9.0))
+    assert fit.outcome.included
+    assert fit.value == pytest.approx(TRUTH, rel=0.01)
+    found = finding(fit, "frozen")
+    assert found.level == "note"
+    assert f"{name} repeats one value for 1 s (at most 0.1 s), from 8 s" in found.text
+    assert "left out, from 8 to 9 s; 19 of 20 s are used" in found.text
+
+
+def test_a_torque_at_the_end_of_its_range_for_a_second_is_left_out():
+    epoch = an_epoch()
+    torque = epoch.channels["torque_nm"]
+    values = torque.values.copy()
+    limit = 2 * values.max()
+    for start_s in (8.0, 8.2):
+        values[(torque.time_s >= start_s) & (torque.time_s <= start_s + 0.091)] = limit
+    clipped = Channel("torque_nm", torque.time_s, values)
+    fit = fitted(replace(epoch, channels={**epoch.channels, "torque_nm": clipped}))
+    assert fit.outcome.included
+    assert fit.value == pytest.approx(TRUTH, rel=0.01)
+    found = finding(fit, "saturation")
+    assert found.level == "note"
+    assert "from 8 to 8.09 s and from 8.2 to 8.29 s" in found.text
+
+
+def test_a_short_rest_in_a_long_recording_excludes_nothing():
+    fit = fitted(hung(an_epoch(100.0), "angle_rad", 50.0, 50.2))
+    assert fit.outcome.included
+    assert finding(fit, "frozen").level == "note"
+
+
+def test_a_sensor_that_hung_for_most_of_the_epoch_excludes_it():
+    fit = fitted(hung(an_epoch(), "torque_nm", 4.0, 16.0))
+    assert fit.outcome.kind == "excluded"
+    assert "torque_nm repeats one value for 12 s" in fit.outcome.reason
+    assert finding(fit, "frozen").level == "exclude"
+
+
+def test_too_little_that_is_left_excludes():
+    settings = parse_settings({"diagnostics": {"left_out_most_percent": 99.0}})
+    epoch = hung(an_epoch(), "torque_nm", 3.0, 17.0)
+    assert fitted(epoch, settings).outcome.kind == "excluded"
+    by_hand = replace(an_epoch(), left_out=(LeftOut(3.0, 17.0),))
+    fit = fitted(by_hand)
+    assert fit.outcome.kind == "failed"
+    assert "leaves 2 s; at least 3 s are needed" in fit.outcome.reason
+
+
+@pytest.mark.parametrize("level", ["note", "doubt"])
+def test_what_is_not_to_be_excluded_is_left_in(level):
+    settings = parse_settings({"diagnostics": {"levels": {"frozen": level}}})
+    epoch = hung(an_epoch(), "torque_nm", 8.0, 9.0)
+    assert without_bad_stretches(epoch, settings) is epoch
+    assert finding(fitted(epoch, settings), "frozen").level == level
+
+
+def held(**extra):
+    """Steps to either side with rests between, in which the angle is constant, at its extremes."""
+    time_s = np.arange(0.0, 20.0, 1 / RATE_HZ)
+    pulse = np.where(time_s % 2 < 0.5, np.sin(2 * np.pi * time_s), 0.0) ** 2
+    command = 0.3 * pulse * np.where(time_s % 4 < 2, 1.0, -1.0)
+    late = np.roll(command, 2)  # by the delay of the drive
+    epoch = an_epoch(velocity_command_rad_s=command, **extra)
+    moved = {"velocity_rad_s": late, "angle_rad": np.round(np.cumsum(late) / RATE_HZ, 9)}
+    channels = {name: Channel(name, time_s, values) for name, values in moved.items()}
+    return replace(epoch, channels={**epoch.channels, **channels})
+
+
+def found_in(epoch):
+    diagnostics = SETTINGS.diagnostics
+    frozen, saturated = (
+        {stretch.reason.split()[0] for stretch in find(epoch, diagnostics)}
+        for find in (frozen_stretches, saturated_stretches)
+    )
+    return frozen, saturated
+
+
+def test_a_joint_that_was_told_to_rest_is_no_broken_sensor():
+    assert found_in(held()) == (set(), set())
+    assert found_in(held(perturbation_nm=np.zeros(4000))) == (set(), set())
+
+
+def ramps(**changed):
+    """Positions that are reached at one speed, which the velocity repeats, with rests between."""
+    time_s = np.arange(0.0, 20.0, 1 / RATE_HZ)
+    going = (time_s % 2 > 0.5) & (time_s % 2 < 0.8)
+    command = np.where(going, np.where(time_s % 4 < 2, 0.3, -0.3), 0.0)
+    velocity = np.roll(command, 2)  # by the delay of the drive
+    moved = {"velocity_rad_s": velocity, "angle_rad": np.cumsum(velocity) / RATE_HZ, **changed}
+    return an_epoch(velocity_command_rad_s=command, **moved)
+
+
+def test_a_joint_that_was_told_to_go_on_at_one_velocity_is_no_broken_sensor():
+    assert found_in(ramps()) == (set(), set())
+
+
+def test_a_velocity_that_is_not_the_one_told_is_one():
+    stuck = ramps().channels["velocity_rad_s"].values.copy()
+    stuck[stuck != 0] *= 0.5
+    assert found_in(ramps(velocity_rad_s=stuck)) == ({"velocity_rad_s"}, {"velocity_rad_s"})
+
+
+def test_a_joint_that_rests_though_something_moves_it_is_one():
+    both = {"angle_rad", "velocity_rad_s"}
+    assert found_in(held(perturbation_nm=np.full(4000, 0.3))) == (both, {"angle_rad"})
+    epoch = held()
+    nobody = {k: v for k, v in epoch.channels.items() if k != "velocity_command_rad_s"}
+    assert found_in(replace(epoch, channels=nobody)) == (both, {"angle_rad"})
+
+
+def test_what_the_user_leaves_out_is_noted_with_the_reason():
+    fit = fitted(replace(an_epoch(), left_out=(LeftOut(12.3, 14.0, "cough"),)))
+    found = finding(fit, "left_out")
+    assert found.level == "note"
+    assert "1.7 s are left out by hand, from 12.3 to 14 s: cough; 18.3 of 20 s" in found.text
+
+
+def test_torque_and_motion_are_bridged_and_their_causes_are_not():
+    epoch = replace(an_epoch(perturbation_nm=np.ones(4000)), left_out=(LeftOut(8.0, 9.0),))
+    done = bridged(epoch)
+    torque = done.channels["torque_nm"]
+    rows = ~sound(epoch, torque.time_s)
+    assert rows.sum() == 201
+    assert np.ptp(np.diff(torque.values[rows])) == pytest.approx(0.0, abs=1e-15)
+    assert done.channels["perturbation_nm"] is epoch.channels["perturbation_nm"]
+
+
+def test_how_much_is_left_and_the_longest_part():
+    out = (LeftOut(12.0, 13.0), LeftOut(5.0, 6.0))
+    epoch = replace(an_epoch(20.005), left_out=out)  # 0 to 20 s
+    # 1 to 4, 7 to 11 and 14 to 19 s.
+    assert used_s(epoch, 1.0) == pytest.approx((12.0, 18.0))
+    part = longest_part(epoch)
+    time_s = part.channels["torque_nm"].time_s
+    assert (time_s[0], time_s[-1]) == pytest.approx((13.005, 20.0))
+    assert part.left_out == ()
+
+
+def test_lines_do_not_see_what_is_left_out():
+    """∫ w e^(−iωt) x' dt = iω ∫ w e^(−iωt) x dt − ∫ w' e^(−iωt) x dt, whatever x in the hole."""
+    epoch = replace(an_epoch(), left_out=(LeftOut(8.0, 8.5),))
+    grid = epoch_grid(epoch, (0.15, 20.0), 1.0)
+    acceleration, velocity, _ = motion(grid.time_s)
+    inside = ~sound(epoch, grid.time_s)
+    assert np.all(grid.window[inside] == 0)
+    assert np.all(grid.window_slope_per_s[inside] == 0)
+    velocity[inside] = 1e3
+    found = 1j * grid.omega_rad_s * grid.transform(velocity) - grid.transform_slope(velocity)
+    wanted = grid.transform(acceleration)
+    assert np.max(np.abs(found - wanted)) < 1e-3 * np.max(np.abs(wanted))
+
+
+def test_half_a_window_doubles_the_variance():
+    """As many independent samples as the window holds, however many lines they are spread over."""
+    window = np.ones(1000)
+    assert repetition(window) == pytest.approx(1.0)
+    window[::2] = 0.0
+    assert repetition(window) == pytest.approx(2.0)
+    assert epoch_grid(an_epoch(), (0.15, 20.0), 1.0).spread == 1.0
+    half = replace(an_epoch(), left_out=(LeftOut(5.0, 15.0),))
+    assert epoch_grid(half, (0.15, 20.0), 1.0).spread > 1.9

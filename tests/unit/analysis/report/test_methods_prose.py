@@ -1,0 +1,70 @@
+"""The methods paragraphs say what was done in this study, and nothing else."""
+
+import dataclasses
+
+import pytest
+from tests.unit.analysis.report.cohorts import Design, made_study
+
+from rigidimeter.analysis.estimation import METHODS, Method
+from rigidimeter.analysis.report.sections.methods_prose import methods_prose
+from rigidimeter.analysis.study import StudyResult
+
+
+@pytest.fixture(scope="module")
+def study() -> StudyResult:
+    return made_study(Design(days=(5, 4), epochs=(5, 5), scores=(4, 4)))
+
+
+def test_methods_hold_the_facts_of_the_study(study: StudyResult) -> None:
+    prose = methods_prose(study)
+    text = prose.text
+    assert text.startswith(
+        "One subject was measured on 9 days (5 days in OFF, 4 days in DBS), in 9"
+    )
+    assert "45 epochs with a torque perturbation and 36 epochs with an imposed sinusoid" in text
+    assert "DBS, stimulation on, 130 Hz, 0.32 mA, pulse width 60 µs" in text
+    assert "±40 deg" in text
+    assert "torque, angle and velocity at 100 samples/s" in text
+    assert (
+        "Of 81 epochs 3 were excluded: 2 that did not end with success, 1 excluded by the operator."
+        in text
+    )
+    assert "3 examiners gave 27 ratings" in text
+    for name in ("Werning", "Young", "Gilson", "Kenward", "Hodges", "Efron", "Holm"):
+        assert sum(name in reference for reference in prose.references) >= 1
+    assert "Newcombe" not in text
+
+
+def test_methods_take_the_text_of_an_estimator_from_outside(study: StudyResult) -> None:
+    toy = Method("toy", "a guess", (), "by a guess of ours", METHODS[0].fit, references=("bca",))
+    by_toy = dataclasses.replace(study, analysis=dataclasses.replace(study.analysis, method="toy"))
+    METHODS.append(toy)
+    try:
+        text = methods_prose(by_toy).text
+    finally:
+        METHODS.remove(toy)
+    assert "were estimated epoch by epoch by a guess of ours (Efron 1987) in the band" in text
+    assert "by the method “toy”" in methods_prose(by_toy).text
+
+
+def test_methods_leave_out_what_was_not(study: StudyResult) -> None:
+    foreign = tuple(
+        dataclasses.replace(epoch, excitation_hz=None, motion=None) for epoch in study.epochs
+    )
+    analysis = dataclasses.replace(study.analysis, method="bandlimited")
+    other = dataclasses.replace(
+        study,
+        epochs=foreign,
+        analysis=analysis,
+        comparisons=(),
+        differences=(),
+        ratings=None,
+        sensitivity=(),
+    )
+    text = " ".join(methods_prose(other).paragraphs)
+    for absent in ("guard", "admittance", "examiner", "Kenward", "Efron", "Young", "Holm", "rank"):
+        assert absent not in text
+    assert "least squares of signals that passed one zero-phase filter" in text
+    blind = methods_prose(dataclasses.replace(study, blinded=True)).text
+    assert "130 Hz" not in blind
+    assert "The analysis was blinded: conditions are codes" in blind

@@ -1,0 +1,247 @@
+"""The page of a study folder: its numbers are those of the result, and any part may be missing."""
+
+import dataclasses
+import re
+from pathlib import Path
+
+import pytest
+from tests.unit.analysis.report.cohorts import Design, altered, made_study, untested
+from tests.unit.analysis.report.parsed_page import ParsedPage
+
+from rigidimeter.analysis.report import SECTIONS
+from rigidimeter.analysis.report import page as page_module
+from rigidimeter.analysis.report.numbers import interval, number, p_value
+from rigidimeter.analysis.report.page import contents, render_page, write_report
+from rigidimeter.analysis.study import Condition, StudyResult
+
+SMALL = Design(days=(4, 3), epochs=(4, 4), scores=(3, 3))
+NASTY = "<script>alert('x')</script>&amp;\"$_$"
+
+
+def shown(result: StudyResult) -> ParsedPage:
+    """Return the page without the images of its figures, which is quick."""
+    return ParsedPage(render_page(result, contents(result), {}))
+
+
+@pytest.fixture(scope="module")
+def study() -> StudyResult:
+    return made_study(SMALL)
+
+
+@pytest.fixture(scope="module")
+def page(study: StudyResult) -> ParsedPage:
+    return shown(study)
+
+
+def test_the_comparison_has_epochs_and_days_of_every_measure(
+    study: StudyResult, page: ParsedPage
+) -> None:
+    epochs = page.table("OFF against DBS: each epoch counted")[2:]
+    days = page.table("OFF against DBS: days counted")[1:]
+    assert len(epochs) == len(days) == 6
+    for c, row, by_days in zip(study.comparisons, epochs, days, strict=True):
+        test, summary, day = c.test, c.summaries["OFF"], c.days
+        assert test is not None
+        assert day is not None
+        assert row[0] == by_days[0] == f"{c.measure.title} ({c.measure.unit})"
+        assert row[1] == f"{summary.n} ({c.excluded['OFF']})"
+        quartiles = interval(summary.q1, summary.q3, 3)
+        assert row[2] == f"{number(summary.median, 3)} {quartiles}"
+        shift = interval(test.shift_low, test.shift_high, 3)
+        assert row[3] == number(summary.sd_percent, 2)
+        assert row[7] == f"{number(test.shift, 3)} {shift}"
+        assert row[8:10] == [number(test.z, 3), number(test.r, 2)]
+        assert row[10] == f"{p_value(test.p)} ({p_value(c.p_holm)})"
+        assert by_days[1] == f"{number(day.estimate)} {interval(day.low, day.high)}"
+        assert by_days[2:5] == [str(day.n_days_x), str(day.n_days_y), number(day.df)]
+        assert by_days[5] == f"{p_value(day.p)} ({p_value(c.days_p_holm)})"
+        assert by_days[6] == p_value(day.p_days)
+        if c.measure.name != "rating":
+            assert by_days[7] == f"{100 * day.day_share:.0f} %"
+
+
+def test_ratings_are_compared_by_their_own_model(study: StudyResult, page: ParsedPage) -> None:
+    found = study.ratings
+    assert found is not None
+    assert found.contrast_days is not None
+    (row,) = (r for r in page.table("OFF against DBS: days") if r[0].startswith("Examiners"))
+    assert row[1].startswith(number(found.contrast_days.estimate))
+    assert row[5].startswith(p_value(found.contrast_days.p_kenward_roger))
+    contrast = page.table("Contrast of the ratings, OFF − DBS")
+    assert [row[-1] for row in contrast[1:]] == [
+        p_value(found.contrast.p_residual),
+        p_value(found.contrast.p_satterthwaite),
+        p_value(found.contrast.p_kenward_roger),
+        p_value(found.contrast_days.p_kenward_roger),
+    ]
+    offsets = {row[1]: row[3] for row in page.table("Predicted offsets")[1:]}
+    assert offsets == {name: number(b) for name, b in found.fit.offsets["examiner"].items()}
+
+
+def test_differences_between_effects_are_all_shown(study: StudyResult, page: ParsedPage) -> None:
+    rows = page.table("Differences between effect sizes")[1:]
+    assert len(rows) == len(study.differences) == 15
+    for row, pair in zip(rows, study.differences, strict=True):
+        assert row[2].startswith(number(pair.difference.estimate))
+        assert row[3:5] == [p_value(pair.difference.p), p_value(pair.p_holm)]
+
+
+def test_the_overview_has_days_conditions_and_stimulation(page: ParsedPage) -> None:
+    text = page.words("study")
+    assert "Subjects1: M1" in text.replace("Subjects 1", "Subjects1")
+    assert "7: 4 in OFF and 3 in DBS" in text
+    row = page.table("Conditions")[2]
+    assert row == ["DBS", "stimulation on", "130", "0.32", "mA", "60", "C+ 1-", "15", "3", "3"]
+
+
+def test_every_excluded_epoch_is_there_and_the_account_balances(
+    study: StudyResult, page: ParsedPage
+) -> None:
+    rows = page.table("Excluded epochs: by whom and why")[1:]
+    assert len(rows) == len(study.exclusions) == 3
+    assert {row[6] for row in rows} == {"protocol", "operator"}
+    for row in page.table("All recorded epochs")[1:]:
+        recorded, *parts = (int(cell) for cell in row[2:])
+        assert recorded == sum(parts)
+        assert parts[-1] == 0
+    assert "neither included nor listed" not in page.words()
+
+
+def test_an_epoch_that_is_not_accounted_for_is_named(study: StudyResult) -> None:
+    fewer = dataclasses.replace(study, exclusions=study.exclusions[1:])
+    text = shown(fewer).words("exclusions")
+    assert "1 recorded epoch is neither included nor listed as excluded" in text
+
+
+def test_sensitivity_and_changes(study: StudyResult, page: ParsedPage) -> None:
+    rows = page.table("The shift by each method")[1:]
+    assert len(rows) == len(study.sensitivity) == 15
+    assert [row[0] for row in rows if row[-1] == "yes"] == [
+        "Inertia J (kg·m²)",
+        "Viscous damping B (N·m·s/rad)",
+        "Stiffness K (N·m/rad)",
+    ]
+    assert "changes" not in page.sections
+    changed = made_study(SMALL, changes=("sessions/M1-day-09: new",))
+    assert "sessions/M1-day-09: new" in shown(changed).words("changes")
+
+
+def test_a_study_without_ratings_sensitivity_or_exclusions() -> None:
+    bare = made_study(SMALL, ratings=None, sensitivity=(), exclusions=(), differences=())
+    page = shown(bare)
+    assert "nan" not in page.words().split()
+    assert not {"ratings", "sensitivity", "excluded_epochs"} & set(page.sections)
+    assert not any(name.startswith("Differences") for name in page.rows)
+
+
+def test_a_measure_that_days_cannot_test_says_why(study: StudyResult) -> None:
+    page = shown(untested(study, "work_j", "there is one day in each condition"))
+    (row,) = (r for r in page.table("OFF against DBS: days") if r[0].startswith("Work"))
+    assert row[-1] == "there is one day in each condition"
+    assert (
+        "It cannot be decided whether the conditions differ in work: there is one day in each "
+        "condition."
+    ) in page.words()
+
+
+def test_a_blinded_study_keeps_its_codes_and_shows_no_stimulation() -> None:
+    blind = made_study(dataclasses.replace(SMALL, names=("a7", "k2")), blinded=True)
+    page = shown(blind)
+    text = page.words()
+    assert text.count("are codes") >= 3
+    assert "a7 against k2" in " ".join(page.rows)
+    assert not re.search(r"130 Hz|stimulation|0\.32 mA|\bOFF\b|\bDBS\b", text)
+
+
+def test_the_test_by_days_is_said_in_words(page: ParsedPage) -> None:
+    assert "Welch's t-test of 4 days of OFF and 3 days of DBS" in page.words("comparison")
+    assert "Satterthwaite FE" in page.words("methods")
+    study = made_study(dataclasses.replace(SMALL, both_on_a_day=True))
+    page = shown(study)
+    assert "Paired t-test of 4 days. In brackets" in page.words("comparison")
+    assert "by the means of the days: paired t-test of 4 days" in page.words("methods")
+    words = "t-test paired by 4 days, with 5 days of OFF alone at weight 0.28"
+    page = shown(
+        altered(
+            study,
+            lambda c: dataclasses.replace(c, days=dataclasses.replace(c.days, test=words)),
+        )
+    )
+    assert "T-test paired by 4 days, with 5 days of OFF alone" in page.words("comparison")
+    assert f"{words}, with 95 % intervals. The weights follow from the" in page.words("methods")
+
+
+def test_several_subjects_are_distinguished() -> None:
+    design = Design((3, 3), (3, 3), (2, 2), subjects=("M1", "M2"), both_on_a_day=True)
+    page = shown(made_study(design))
+    assert "2: M1, M2" in page.words("study")
+    assert "6: 6 in OFF and 6 in DBS, 6 in both" in page.words("study")
+    assert "no conclusion on other subjects" in page.words("comparison")
+    assert "J held at the median of the same subject" in page.words()
+
+
+def test_one_condition_alone_has_a_page() -> None:
+    study = dataclasses.replace(
+        made_study(SMALL), comparisons=(), differences=(), ratings=None, sensitivity=()
+    )
+    page = shown(study)
+    assert "No two conditions were compared." in page.words("comparison")
+    assert "effects" not in page.sections
+
+
+def test_special_characters_are_escaped(tmp_path: Path) -> None:
+    design = dataclasses.replace(
+        SMALL, names=(NASTY, "DBS"), subjects=(NASTY,), examiners=(NASTY, "B")
+    )
+    study = made_study(design, changes=(NASTY,))
+    conditions = (Condition(NASTY, NASTY, electrodes=NASTY), Condition("DBS"))
+    study = dataclasses.replace(study, title=NASTY, conditions=conditions)
+    page = shown(study)
+    assert len(page.scripts) == 2  # its own: the traces, and what opens them
+    assert not any("<script>" in script for script in page.scripts)
+    assert page.text.count(NASTY) > 20
+
+
+OWN = ("effects", "ratings", "sensitivity")
+LONG = ("days", "distributions", "perturbation", "torque", "voluntary", "loops", "recorded")
+"""Sections whose figures take long and have their own tests."""
+
+
+def short_report(study: StudyResult, folder: Path) -> Path:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(page_module, "SECTIONS", [s for s in SECTIONS if s.name not in LONG])
+        return write_report(study, folder)
+
+
+@pytest.fixture(scope="module")
+def written(study: StudyResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return short_report(study, tmp_path_factory.mktemp("report") / "a")
+
+
+def test_the_same_study_gives_the_same_bytes(
+    study: StudyResult, written: Path, tmp_path: Path
+) -> None:
+    again = short_report(study, tmp_path / "b")
+    files = [path for path in written.parent.rglob("*") if path.is_file()]
+    names = {path.relative_to(written.parent).as_posix() for path in files}
+    assert {"methods.txt", "tables/comparisons.csv", "tables/account.csv"} <= names
+    assert {f"figures/{name}.svg" for name in OWN} <= names
+    for path in files:
+        assert (again.parent / path.relative_to(written.parent)).read_bytes() == path.read_bytes()
+    text = written.read_text(encoding="utf-8")
+    assert text.count("<figcaption>") == sum(name.endswith("svg") for name in names)
+    assert not re.search(r"url\([^#]|@import|https?:", text)
+
+
+def test_virtual_data_say_so_in_every_figure(
+    study: StudyResult, written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(page_module, "SECTIONS", [s for s in SECTIONS if s.name in OWN])
+    virtual = write_report(dataclasses.replace(study, virtual=True), tmp_path)
+    assert len(list((tmp_path / "figures").glob("*.svg"))) == 3
+    for name in OWN:
+        one, other = (
+            (page.parent / "figures" / f"{name}.svg").read_text() for page in (written, virtual)
+        )
+        assert ">virtual data</text>" not in one
+        assert ">virtual data</text>" in other

@@ -1,0 +1,103 @@
+"""The error of two clocks' offset in J, B and K, against its closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.known_joint import DAMPING_NM_S_RAD, INERTIA_KG_M2, STIFFNESS_NM_RAD, TRUTH
+
+from rigidimeter.analysis.estimation.clock_error import with_clock_error
+from rigidimeter.analysis.estimation.methods import method_named
+from rigidimeter.analysis.estimation.prepared import prepare
+from rigidimeter.analysis.study.analysis import estimate
+from rigidimeter.core.records import Channel, Delay, Epoch
+from rigidimeter.core.settings import load_settings
+
+ERROR_S = 1e-3
+OMEGA = 2 * np.pi * np.array([1.0, 1.5, 2.0])
+TIME_S = np.arange(4000) / 200.0
+
+
+def epoch(clock_error_s: float = 0.0, label: str = "1", seed: int = 0, source: str = "r") -> Epoch:
+    """Return three lines of 0.1 rad, and the torque with a little noise."""
+    angle, velocity, acceleration = (
+        0.1 * np.sum(OMEGA[:, None] ** n * np.cos(np.outer(OMEGA, TIME_S) + n * np.pi / 2), axis=0)
+        for n in range(3)
+    )
+    torque = (
+        INERTIA_KG_M2 * acceleration + DAMPING_NM_S_RAD * velocity + STIFFNESS_NM_RAD * angle
+    ) + 1e-3 * np.random.default_rng(seed).normal(size=TIME_S.size)
+    channels = {
+        name: Channel(name, TIME_S, values)
+        for name, values in (("torque_nm", torque), ("angle_rad", angle))
+    }
+    return Epoch(source, label, channels, task="prbs", clock_error_s=clock_error_s)
+
+
+def fits(epochs, inertia_kg_m2=None, delays=()):
+    prepared = prepare(epochs, load_settings(None))
+    fit = method_named("bandlimited").fit
+    found = fit(prepared, inertia_kg_m2, lambda _: None, True)
+    return found, with_clock_error(fit, prepared, inertia_kg_m2, found, delays)
+
+
+def test_what_is_added_is_the_closed_form():
+    """dJ = −B δ, dK = 0, dB = −K δ + J δ ⟨ω²⟩, the mean weighted by the power of the velocity."""
+    ((plain,), _), ((wide,), _) = fits([epoch(ERROR_S)])
+    mean = np.sum(OMEGA**4) / np.sum(OMEGA**2)
+    added = ERROR_S * np.array([DAMPING_NM_S_RAD, STIFFNESS_NM_RAD - INERTIA_KG_M2 * mean, 0.0])
+    found = np.sqrt(np.diag(wide.covariance - plain.covariance))
+    np.testing.assert_allclose(found[:2], np.abs(added[:2]), rtol=0.02)
+    assert found[2] < 1e-3 * STIFFNESS_NM_RAD
+    np.testing.assert_allclose(wide.se, np.hypot(plain.se, found), rtol=1e-9)
+    np.testing.assert_array_equal(wide.value, plain.value)
+
+
+def test_the_interval_holds_the_truth_of_a_torque_that_is_late_by_its_error():
+    late = epoch(ERROR_S)
+    torque = late.channels["torque_nm"]
+    moved = Channel(torque.name, torque.time_s + ERROR_S, torque.values)
+    late = replace(late, channels={**late.channels, torque.name: moved})
+    ((plain,), _), ((wide,), _) = fits([late])
+    assert not np.all((plain.low <= TRUTH)[:2] & (plain.high >= TRUTH)[:2])
+    assert np.all((wide.low <= TRUTH)[:2] & (wide.high >= TRUTH)[:2])
+
+
+def test_it_does_not_become_smaller_by_pooling():
+    (_, (plain, *_)), ((one, *_), (pooled, *_)) = fits(
+        [epoch(ERROR_S, str(k), k) for k in range(4)]
+    )
+    added = np.sqrt(np.diag(pooled.covariance - plain.covariance))[:2]
+    alone = np.sqrt(np.diag(one.covariance))[:2]
+    np.testing.assert_allclose(added, alone, rtol=0.05)
+
+
+def test_independent_errors_of_two_sources_become_smaller_by_pooling():
+    """Of two equal ones by √2: their mean is pooled."""
+    (_, (plain, *_)), ((one, *_), (pooled, *_)) = fits(
+        [epoch(ERROR_S, "1", k, source) for k, source in enumerate("ab")]
+    )
+    added = np.sqrt(np.diag(pooled.covariance - plain.covariance))[:2]
+    np.testing.assert_allclose(added, one.se[:2] / np.sqrt(2), rtol=0.05)
+
+
+def test_without_an_error_nothing_is_fitted_again():
+    found, wide = fits([epoch()])
+    assert wide is found
+
+
+@pytest.mark.parametrize("clock_error_s", [0.0, ERROR_S])
+def test_of_a_corrected_delay_its_own_error_counts(clock_error_s):
+    """Whether torque and motion had two clocks or one."""
+    delay = Delay("r", 0.01, ERROR_S / 10, corrected=True)
+    ((plain,), _), ((wide,), _) = fits([epoch(clock_error_s)], delays=[delay])
+    added = np.sqrt((wide.covariance - plain.covariance)[0, 0])
+    assert added == pytest.approx(0.1 * ERROR_S * DAMPING_NM_S_RAD, rel=0.05)
+
+
+def test_estimate_contains_it_in_both_stages():
+    plain, wide = (estimate([epoch(error_s)], "bandlimited") for error_s in (0.0, ERROR_S))
+    for stage in ("fits", "fixed_inertia"):
+        (a,), (b,) = getattr(plain, stage), getattr(wide, stage)
+        assert b.se[1] > 5 * a.se[1]
+    assert wide.fixed_inertia[0].se[0] == 0.0

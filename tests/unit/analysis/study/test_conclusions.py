@@ -1,0 +1,296 @@
+"""What is concluded of a measure, and what keeps a difference that was found from being claimed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from tests.unit.analysis.report.cohorts import Design, made_study, ratings_found
+
+from rigidimeter.analysis.study import (
+    Observation,
+    StudyResult,
+    compare,
+    compare_analysis,
+    conclude,
+    conclusion_rows,
+)
+from rigidimeter.analysis.study.comparison import day_tests, gathered
+from rigidimeter.analysis.study.conclusions import Conclusion
+from rigidimeter.analysis.study.ratings_model import ratings_comparison, ratings_days
+from rigidimeter.core.records import Finding, Fit
+
+SMALL = Design(days=(5, 4), epochs=(5, 5), scores=(4, 4))
+
+
+@pytest.fixture(scope="module")
+def study() -> StudyResult:
+    return made_study(SMALL)
+
+
+def of(result: StudyResult, measure: str) -> Conclusion:
+    concluded = conclude(result)
+    assert concluded is not None
+    (found,) = (one for one in concluded.each if one.comparison.measure.name == measure)
+    return found
+
+
+def doubted(study: StudyResult, name: str, where, level: str = "doubt") -> StudyResult:
+    """Return the study with a finding on those fits for which `where` is true."""
+    finding = Finding(name, level, 2.0, 1.0, "something is wrong", "mend it")  # type: ignore[arg-type]
+    fits = tuple(
+        replace(fit, findings=(finding,)) if where(fit) else fit for fit in study.analysis.fits
+    )
+    return replace(study, analysis=replace(study.analysis, fits=fits))
+
+
+def unsupported(study: StudyResult, name: str, where) -> StudyResult:
+    """Return the study with such findings, and no other method that could clear them."""
+    return replace(doubted(study, name, where), sensitivity=())
+
+
+def in_dbs(fit: Fit) -> bool:
+    return fit.condition == "DBS"
+
+
+def one_in_dbs(fit: Fit) -> bool:
+    return fit.condition == "DBS" and fit.epoch == "p02"
+
+
+def test_a_difference_without_any_doubt_is_shown(study):
+    for measure in ("stiffness_nm_rad", "damping_nm_s_rad", "impulse_nm_s"):
+        found = of(study, measure)
+        assert (found.verdict, found.reason) == ("lower", "")
+        assert found.p < 0.05
+    assert of(study, "inertia_kg_m2").verdict == "no difference shown"
+
+
+def test_a_difference_made_by_doubted_epochs_is_not_supported(study):
+    found = of(unsupported(study, "voluntary_torque", in_dbs), "stiffness_nm_rad")
+    assert found.verdict == "not supported"
+    assert found.reason.startswith(
+        "torque of the subject's own (voluntary_torque) casts doubt on 0 of 23 epochs in OFF and "
+        "19 of 19 epochs in DBS; without these epochs a test needs 3 epochs in each condition"
+    )
+
+
+def test_a_difference_that_stands_without_them_is_shown(study):
+    assert of(doubted(study, "lack_of_fit", one_in_dbs), "stiffness_nm_rad").verdict == "lower"
+
+
+def test_a_doubt_that_can_hide_a_difference_is_said(study):
+    found = of(doubted(study, "lack_of_fit", in_dbs), "inertia_kg_m2")
+    assert found.verdict == "no difference shown"
+    assert found.reason.endswith("which can hide a difference")
+
+
+def test_a_note_is_no_doubt_of_an_estimate_but_of_a_score_of_the_same_epoch(study):
+    noted = doubted(study, "voluntary_torque", in_dbs, "note")
+    assert of(noted, "stiffness_nm_rad").verdict == "lower"
+    scores = tuple(
+        replace(score, epoch=score.epoch.replace("s", "p")) for score in study.analysis.scores
+    )
+    moved = replace(noted, analysis=replace(noted.analysis, scores=scores))
+    work = next(c for c in moved.comparisons if c.measure.name == "work_j")
+    same = replace(
+        work,
+        observations=tuple(replace(o, epoch=o.epoch.replace("s", "p")) for o in work.observations),
+    )
+    moved = replace(moved, comparisons=(same,))
+    assert of(moved, "work_j").verdict == "not supported"
+    assert of(replace(study, comparisons=(same,)), "work_j").verdict == "lower"
+
+
+@pytest.mark.parametrize("name", ["between_samples", "varying_between_epochs"])
+def test_what_is_alike_in_both_conditions_makes_no_difference(study, name):
+    assert of(doubted(study, name, lambda _: True), "stiffness_nm_rad").verdict == "lower"
+
+
+def test_a_method_that_the_subject_does_not_bias_clears_its_torque_alone(study):
+    row = next(
+        row
+        for row in study.sensitivity
+        if row.measure.name == "stiffness_nm_rad" and row.method == "iv" and row.inertia == "fixed"
+    )
+    with_iv = replace(study, sensitivity=(row,))
+    assert of(doubted(with_iv, "tremor", in_dbs), "stiffness_nm_rad").verdict == "lower"
+    assert of(doubted(with_iv, "lack_of_fit", in_dbs), "stiffness_nm_rad").verdict != "lower"
+    other_sign = replace(study, sensitivity=(replace(row, shift=-row.shift),))
+    found = of(doubted(other_sign, "tremor", in_dbs), "stiffness_nm_rad")
+    assert found.verdict == "not supported"
+
+
+def test_a_doubt_on_all_epochs_of_a_condition_together(study):
+    finding = Finding("missing_term", "doubt", 2.0, 1.0, "friction", "include it")
+    pooled = replace(study.analysis.fits[0], condition="OFF", findings=(finding,))
+    together = replace(study, analysis=replace(study.analysis, pooled=(pooled,)))
+    found = of(together, "stiffness_nm_rad")
+    assert found.verdict == "not supported"
+    assert found.reason == "missing_term casts doubt on all epochs of a condition together"
+    assert of(together, "impulse_nm_s").verdict == "lower"
+
+
+def test_no_treatment_changes_the_inertia(study):
+    """Degrees in one condition's files, for example, make all three of J, B and K larger."""
+    fits = tuple(
+        replace(fit, value=57.3 * fit.value) if in_dbs(fit) else fit for fit in study.analysis.fits
+    )
+    turned = replace(study.analysis, fits=fits, fixed_inertia=fits)
+    by_source = {session.source: session for session in study.sessions}
+    comparisons = day_tests(gathered(turned, ("OFF", "DBS"), by_source))
+    found = replace(study, analysis=turned, comparisons=comparisons)
+    for measure in ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"):
+        assert of(found, measure).verdict == "not supported"
+        assert of(found, measure).reason.startswith("inertia differs by 98 %")
+
+
+def with_values(study: StudyResult, change) -> StudyResult:
+    """Return the study with other estimates, tested anew."""
+    fits = tuple(replace(fit, value=change(fit)) for fit in study.analysis.fits)
+    analysis = replace(study.analysis, fits=fits)
+    by_source = {session.source: session for session in study.sessions}
+    comparisons = day_tests(gathered(analysis, ("OFF", "DBS"), by_source))
+    return replace(study, analysis=analysis, comparisons=comparisons)
+
+
+def test_a_difference_that_is_not_there_with_the_inertia_free(study):
+    """What an inertia held at the wrong value does to K is seen in the fits that leave it free."""
+
+    def free(fit: Fit) -> np.ndarray:
+        heavier = 1.2 if in_dbs(fit) else 1.0
+        spread = 1.0 + 0.01 * (int(fit.epoch[1:]) % 3)
+        return np.array([0.0045 * heavier, 0.137, 1.75]) * spread
+
+    found = of(with_values(study, free), "stiffness_nm_rad")
+    assert found.p < 0.05
+    assert found.verdict == "not supported"
+    assert found.reason.startswith("inertia differs by 17 %, and no treatment changes it; held at")
+
+
+def test_a_difference_smaller_than_the_error_between_samples_is_none(study):
+    def same(fit: Fit) -> np.ndarray:
+        lower = 0.995 if in_dbs(fit) else 1.0
+        return np.array([0.0045, 0.137, 1.75]) * lower * (1 + 1e-4 * int(fit.epoch[1:]))
+
+    found = of(with_values(study, same), "inertia_kg_m2")
+    assert found.p < 0.05
+    assert found.verdict == "no difference shown"
+    assert "within the 1 % by which the motion between samples may move it" in found.reason
+
+
+@pytest.mark.parametrize(("half_width", "verdict"), [(0.02, "lower"), (0.5, "not supported")])
+def test_a_bias_counts_as_far_as_it_could_make_the_difference(study, half_width, verdict):
+    """60 % of half the interval of all epochs together."""
+    finding = Finding("loop_bias", "doubt", 60.0, 50.0, "torque comes back", "record it")
+    value = study.analysis.fits[0].value
+    pooled = replace(
+        study.analysis.fits[0],
+        condition="DBS",
+        findings=(finding,),
+        low=value - half_width,
+        high=value + half_width,
+    )
+    together = replace(study.analysis, pooled=(pooled,))
+    found = of(replace(study, analysis=together, sensitivity=()), "stiffness_nm_rad")
+    assert found.verdict == verdict
+    if verdict != "lower":
+        assert found.reason == "loop_bias casts doubt on all epochs of a condition together"
+
+
+@pytest.mark.parametrize(
+    ("label", "verdict"),
+    [
+        (lambda n: str(n), "not supported"),
+        (lambda n: f"day {n}", "not supported"),
+        (lambda n: f"2026-01-{n:02d}", "not supported"),
+        (lambda n: f"{n}. January", "lower"),
+    ],
+    ids=["numbers", "numbered", "dates", "of no known order"],
+)
+def test_days_of_one_condition_after_all_of_the_other(study, label, verdict):
+    """Where days tell their order; 10 is after 9."""
+
+    def later(observation: Observation) -> Observation:
+        day = int(observation.day) + (10 if observation.condition == "DBS" else 0)
+        return replace(observation, day=label(day))
+
+    comparisons = tuple(
+        replace(c, observations=tuple(later(o) for o in c.observations))
+        for c in study.comparisons
+        if c.measure.origin != "ratings"
+    )
+    found = of(replace(study, comparisons=comparisons), "stiffness_nm_rad")
+    assert found.verdict == verdict
+    if verdict != "lower":
+        assert found.reason.startswith("all days in DBS came after all days in OFF")
+
+
+class TestRecordings:
+    """Where days are not known, a recording stands for a day."""
+
+    def test_a_difference_between_them_may_be_that_of_one_day_from_another(self, study):
+        found = compare_analysis(study.analysis, "OFF", "DBS", resamples=0)
+        assert conclude(found).basis == "recordings"
+        stiffness = of(found, "stiffness_nm_rad")
+        assert stiffness.p < 0.05
+        assert stiffness.verdict == "not supported"
+        assert stiffness.reason.startswith("which recordings are of one day is not known")
+        assert of(found, "inertia_kg_m2").verdict == "no difference shown"
+
+    def test_one_of_each_decides_nothing(self, study):
+        """Another day may have shifted all stiffness: there is nothing to tell the two apart."""
+        first = {fit.condition: fit.source for fit in reversed(study.analysis.fits)}
+        fits = tuple(f for f in study.analysis.fits if f.source == first[f.condition])
+        alone = replace(study.analysis, fits=fits, fixed_inertia=fits, scores=())
+        result = compare_analysis(alone, "OFF", "DBS", resamples=0)
+        assert result.comparison("stiffness_nm_rad").test.p < 0.05
+        found = of(result, "stiffness_nm_rad")
+        assert found.verdict == "cannot be decided"
+        assert "one recording in each condition" in found.reason
+
+
+class TestTables:
+    def test_three_against_three_cannot_decide(self):
+        table = pd.DataFrame({"condition": ["a"] * 3 + ["b"] * 3, "k": [1, 2, 3, 7, 8, 9]})
+        found = of(compare(table, value="k", resamples=0), "k")
+        assert found.verdict == "cannot be decided"
+        assert found.reason == "3 values against 3 cannot reach p < 0.05, whatever they are"
+
+    def test_ten_against_ten_can(self):
+        values = [*range(10), *range(20, 30)]
+        table = pd.DataFrame({"condition": ["a"] * 10 + ["b"] * 10, "k": values})
+        assert of(compare(table, value="k", resamples=0), "k").verdict == "higher"
+        assert of(
+            compare(table, other="a", reference="b", value="k", resamples=0), "k"
+        ).verdict == ("lower")
+
+
+def test_an_examiner_for_each_condition_makes_no_difference():
+    """A rated OFF and B, who rates lower, DBS: nobody saw both."""
+    scores = {"1": 2.0, "2": 2.5, "3": 2.0, "4": 2.5, "5": 1.0, "6": 1.5, "7": 1.0, "8": 1.5}
+    rows = [
+        ("OFF" if day < "5" else "DBS", "A" if day < "5" else "B", "M1", day, score + again)
+        for day, score in scores.items()
+        for again in (0.0, 0.5)
+    ]
+    found = ratings_found(tuple(rows), ("OFF", "DBS"))
+    rated = replace(ratings_comparison(found), days=ratings_days(found))
+    result = of(replace(made_study(SMALL), ratings=found, comparisons=(rated,)), "rating")
+    assert result.p < 0.05
+    assert result.verdict == "not supported"
+    assert "examiners A, B rated one of the conditions alone" in result.reason
+
+
+def test_rows_of_the_document(study):
+    rows = conclusion_rows(unsupported(study, "voluntary_torque", in_dbs))
+    assert [row["measure"] for row in rows][:3] == [
+        "stiffness_nm_rad",
+        "damping_nm_s_rad",
+        "inertia_kg_m2",
+    ]
+    assert {row["tested_by"] for row in rows} == {"days"}
+    assert rows[0]["verdict"] == "not supported"
+    alone = replace(
+        study, other="", comparisons=tuple(replace(c, other="") for c in study.comparisons)
+    )
+    assert conclusion_rows(alone) == []

@@ -1,0 +1,146 @@
+import math
+import re
+
+import pytest
+
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import Settings, dump_settings, load_settings, parse_settings
+
+
+def test_the_controller_is_read_per_degree():
+    # 0.0008 kg·m²/deg and 0.028 N·m·s/deg are 180/π times as much per radian.
+    controller = Settings().controller
+    assert controller.inertia_kg_m2 == pytest.approx(0.0008 * 180 / math.pi, rel=1e-14)
+    assert controller.damping_nm_s_rad == pytest.approx(0.028 * 180 / math.pi, rel=1e-14)
+    assert round(controller.inertia_kg_m2, 4) == 0.0458
+    assert round(controller.damping_nm_s_rad, 3) == 1.604
+
+
+@pytest.mark.parametrize(
+    ("values", "sentence"),
+    [
+        (
+            {"controller": {"inertia_kg_m2": -1.0}},
+            "controller.inertia_kg_m2 = -1 is not allowed: it must be a number greater than "
+            "0 kg·m² and at most 10 kg·m²",
+        ),
+        (
+            {"rig": {"torque": {"rate_hz": "fast"}}},
+            "rig.torque.rate_hz = 'fast' is not allowed: it must be a number at least 1 Hz and "
+            "at most 20000 Hz",
+        ),
+        (
+            {"prbs": {"register_bits": 7.5}},
+            "prbs.register_bits = 7.5 is not allowed: it must be a whole number at least 3 and "
+            "at most 20",
+        ),
+        (
+            {"subject": {"OFF": {"damping_nm_s_rad": math.nan}}},
+            "subject.OFF.damping_nm_s_rad = nan is not allowed: it must be a number at least "
+            "0 N·m·s/rad and at most 100 N·m·s/rad",
+        ),
+        (
+            {"protocol": {"blocks": [{"task": "prb"}]}},
+            "protocol.blocks[0].task = 'prb' is not allowed: it must be one of 'prbs', 'sinusoid'",
+        ),
+        ({"prbs": 3}, "prbs = 3 is not allowed: it must be a table"),
+        (
+            {"protocol": {"rests_s": [1.0]}},
+            "each rest must last at least return_s (3 s)",
+        ),
+        (
+            {"protocol": {"blocks": [{"condition": "X"}]}},
+            "names condition 'X', but there is no [subject.X]",
+        ),
+        ({"sinusoid": {"amplitude_deg": 60.0}}, "must stay below guard.position_limit_deg"),
+        ({"guard": {"reaction_time_s": 0.001}}, "is shorter than this rig may take to react"),
+        ({"rig": {"torque": {"rate_hz": 2000.0}}}, "must not exceed rig.tick_rate_hz"),
+    ],
+)  # fmt: skip
+def test_a_bad_value_is_answered_with_key_value_unit_and_range(values, sentence):
+    with pytest.raises(UserError, match=re.escape(sentence)):
+        parse_settings(values)
+
+
+@pytest.mark.parametrize(
+    ("values", "nearest"),
+    [
+        ({"controller": {"inertia_kgm2": 1.0}}, "controller.inertia_kg_m2"),
+        ({"contoller": {}}, "controller"),
+        ({"rig": {"torque": {"noise_nm": 1.0}}}, "rig.torque.noise_sd_nm"),
+        ({"protocol": {"blocks": [{"condtion": "A"}]}}, "protocol.blocks[0].condition"),
+        ({"subject": {"OFF": {"stifness_nm_rad": 1.0}}}, "subject.OFF.stiffness_nm_rad"),
+    ],
+)
+def test_an_unknown_key_is_refused_with_the_nearest_known_one(values, nearest):
+    with pytest.raises(UserError, match=re.escape(f"is not a setting; the nearest is {nearest} ")):
+        parse_settings(values)
+
+
+def test_every_mistake_is_named_at_once():
+    with pytest.raises(UserError) as caught:
+        parse_settings({"prbs": {"clock_hz": -1.0}, "seed": -4})
+    assert "prbs.clock_hz" in str(caught.value)
+    assert "seed" in str(caught.value)
+
+
+def test_settings_survive_a_round_trip():
+    settings = parse_settings({"seed": 5, "subject": {"A": {}}, "protocol": {
+        "blocks": [{"condition": "A", "epochs": 2}]}})  # fmt: skip
+    assert parse_settings(dump_settings(settings)) == settings
+
+
+def test_a_file_is_read_and_named_when_it_is_wrong(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text("seed = 3\n[controller]\ninertia_kg_m2 = 0.05\n")
+    assert load_settings(path).controller.inertia_kg_m2 == 0.05
+    path.write_text("seed = \n")
+    with pytest.raises(UserError, match=r"rig\.toml: is not valid TOML"):
+        load_settings(path)
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(UserError, match="UTF-8"):
+        load_settings(path)
+    with pytest.raises(UserError, match="cannot be read"):
+        load_settings(tmp_path / "none.toml")
+
+
+def test_every_number_states_its_unit():
+    """A unit in the key is the only defence against the paper's own slip of units."""
+
+    def walk(model, prefix=""):
+        for name, field in model.model_fields.items():
+            inner = field.annotation
+            if hasattr(inner, "model_fields"):
+                walk(inner, f"{prefix}{name}.")
+            elif inner in (int, float):
+                unit = (field.json_schema_extra or {}).get("unit")
+                assert unit, f"{prefix}{name} has no unit"
+                suffix = {"1": "", "%": "_percent"}.get(unit)
+                if suffix is None:
+                    ending = unit.replace("·", "_").replace("²", "2").replace("/", "_").lower()
+                    ending = {"1_s": "per_s"}.get(ending, ending)
+                    assert name.endswith(ending.replace("n_m", "nm")), f"{prefix}{name}: {unit}"
+                else:
+                    assert name.endswith(suffix)
+
+    walk(Settings)
+
+
+@pytest.mark.parametrize("name", ["torque", "motion"])
+def test_a_stamp_that_takes_off_too_much_makes_a_reading_old(name):
+    """The guard goes by the stamp: 0.06 s old at most by it, however short the latency is."""
+    sensor = {"rate_hz": 100.0, "latency_s": 0.001, "stamp_latency_s": 0.05}
+    values = {"rig": {name: sensor}, "guard": {"reaction_time_s": 0.2, "stale_s": 0.055}}
+    with pytest.raises(UserError, match=rf"too short for rig\.{name}, .* may be 0\.06 s old"):
+        parse_settings(values)
+    values["guard"]["stale_s"] = 0.065
+    parse_settings(values)
+
+
+def test_a_kind_of_interval_is_read_in_an_old_session_and_refused_in_a_file(tmp_path):
+    old = {"estimation": {"intervals": "white", "bootstrap_draws": 99, "trim_s": 0.5}}
+    assert parse_settings(old).estimation.trim_s == 0.5
+    assert "intervals" not in dump_settings(parse_settings(old))["estimation"]
+    (tmp_path / "rig.toml").write_text('[estimation]\nintervals = "white"\n')
+    with pytest.raises(UserError, match=r"rig.toml: estimation.intervals was removed"):
+        load_settings(tmp_path / "rig.toml")

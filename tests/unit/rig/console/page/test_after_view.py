@@ -1,0 +1,104 @@
+"""The list of sessions on the page, without a browser: the server's side of its rows."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from nicegui import Client, ui
+from nicegui.page import page
+
+from rigidimeter.core.session import SessionWriter
+from rigidimeter.core.settings import Settings
+from rigidimeter.rig.console.page import AfterView, Answer, Desk, Place, Work
+
+BEGUN = {"task": "prbs", "condition": "OFF", "time_s": 0.0}
+
+
+def session(root: Path, name: str) -> SessionWriter:
+    writer = SessionWriter(root / name, Settings(), [], {}, virtual=True)
+    writer.event("epoch_started", epoch=1, label="1", **BEGUN)
+    return writer
+
+
+def ended(writer: SessionWriter) -> None:
+    writer.event("session_ended", outcome="success", reason="")
+    writer.close_files()
+
+
+@pytest.fixture
+def client():
+    with Client(page("/after")) as client:
+        yield client
+    client.delete()
+
+
+def shown(client: Client, kind: type[ui.element]) -> dict[int, str]:
+    """Return the words of what can be seen of a kind, by the number a click names."""
+    return {
+        number: one.text for number, one in client.elements.items()
+        if isinstance(one, kind) and one.visible
+    }  # fmt: skip
+
+
+def test_a_row_stays_when_a_session_ends_so_that_no_click_on_it_is_lost(client, tmp_path):
+    ended(session(tmp_path, "S01-1"))
+    desk = Desk(Place(tmp_path, Settings(), "the protocol"))
+    AfterView(desk, Work(), lambda: True, ui.label())
+    (timer,) = (one for one in client.elements.values() if isinstance(one, ui.timer))
+    (first,) = (one for one in client.elements.values() if isinstance(one, ui.expansion))
+    before = shown(client, ui.button)
+    assert list(before.values()).count("Leave out") == 1
+    assert "Recover" not in before.values()
+
+    second = session(tmp_path, "S01-2")
+    ended(second)
+    desk.over(second.folder, "success", ())
+    timer.callback()
+    assert before.items() <= shown(client, ui.button).items()
+    rows = first.parent_slot.children
+    assert [row.text.split(":")[0] for row in rows] == ["S01-2", "S01-1"]
+    assert [row.value for row in rows] == [True, False]
+
+
+def test_rows_say_what_is_known_now(client, tmp_path):
+    writer = session(tmp_path, "S01-1")
+    desk = Desk(Place(tmp_path, Settings(), "the protocol"))
+    AfterView(desk, Work(), lambda: True, ui.label())
+    (timer,) = (one for one in client.elements.values() if isinstance(one, ui.timer))
+    assert "still being recorded" in shown(client, ui.label).values()
+    assert "Repeat" not in shown(client, ui.button).values()
+    writer.event("epoch_ended", epoch=1, outcome="success", reason="", time_s=1.0)
+    writer.event("epoch_started", epoch=2, label="2", **BEGUN)
+    ended(writer)
+    desk.over(writer.folder, "success", ())
+    timer.callback()
+    words = list(shown(client, ui.label).values())
+    assert "epoch 1 · OFF · prbs · success" in words
+    assert "epoch 2 · OFF · prbs · not ended" in words
+    assert "still being recorded" not in words
+    assert list(shown(client, ui.button).values()).count("Repeat") == 2
+
+
+def test_a_double_click_runs_a_command_once(client, tmp_path):
+    asked = []
+
+    class Slow(Work):
+        async def command(self, *arguments, **_):
+            asked.append(arguments)
+            await asyncio.sleep(0.01)
+            return Answer(True, "done")
+
+    view = AfterView(Desk(Place(tmp_path, Settings(), "")), Slow(), lambda: True, ui.label())
+
+    async def run(command):
+        with client:
+            return await view._command(command, "S01-1")
+
+    async def twice():
+        return await asyncio.gather(run("estimate"), run("estimate"))
+
+    assert asyncio.run(twice()) == [True, False]
+    assert asyncio.run(run("report"))
+    assert [command for command, _ in asked] == ["estimate", "report"]
