@@ -21,6 +21,10 @@ RAMP = "only a ramp uses it, and its controller does not ask for the tick's numb
 
 EQUIVALENT: dict[str, str] = {
     "agreement.py means_step: passed_s > _SAME_STAMP_S → passed_s >= _SAME_STAMP_S": MOMENT,
+    "consistency.py ConsistencyState: ticks: int = 0 → ticks: int = -1": GIVEN,
+    "consistency.py ConsistencyState: 0 → 1": GIVEN,
+    "consistency.py ConsistencyState: 0 → -1": GIVEN,
+    STEP + "same_s > age_s → same_s >= age_s": MOMENT,
     STEP + "1 → 0": "elapsed_ticks if not given: none counts as one",
     STEP + "elapsed_ticks < 1 → elapsed_ticks <= 1": "one counts as one",
     STEP + "1 → 2 #2": "one counts as one",

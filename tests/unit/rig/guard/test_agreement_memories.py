@@ -11,6 +11,7 @@ from rigidimeter.rig.guard import (
     MeansState,
     answer_state,
     consistency_limits,
+    larger_gain,
     means_step,
 )
 
@@ -97,8 +98,10 @@ def allowed(law, at):
         "energy": {"energy_j": 4.0 * at},
         "resolution": {"apart_rad2": 0.25 * at, "moved_rad2": 0.125, "reported_rad2": 0.125},
         "share": {"apart_rad2": 0.375 * at, "moved_rad2": 0.5, "reported_rad2": 0.5},
+        # With <p q> = 1.5 at: the gain on the smaller of the two.
+        "gain": {"apart_rad2": 3.25 - 3.0 * at, "moved_rad2": 1.0, "reported_rad2": 2.25},
     }[law]
-    unseen_rad = {"resolution": 0.5, "share": 0.1}.get(law, math.inf)
+    unseen_rad = {"resolution": 0.5, "share": 0.1, "gain": 0.1}.get(law, math.inf)
     return LIMITS._replace(energy_j=4.0, unseen_rad=unseen_rad), state(angle_rad=0.0, **values)
 
 
@@ -110,6 +113,7 @@ def allowed(law, at):
         ("energy", Cause.ENERGY_HIGH),
         ("resolution", Cause.VELOCITY_WRONG),
         ("share", Cause.VELOCITY_WRONG),
+        ("gain", Cause.VELOCITY_WRONG),
     ],
 )
 def test_what_is_at_a_limit_is_allowed_and_what_is_above_is_not(law, cause):
@@ -124,3 +128,39 @@ def test_the_torque_answers_the_angle_of_its_own_time():
     after, _ = means_step(LIMITS, state(), 0.0, 0.0, 0.5, 2.0, 0.0, 0.0, 0.0, STEP_S, 0.01)
     assert after.angle_rad == 0.5
     assert after.answer.angle[0] == pytest.approx(0.52)
+
+
+def test_a_mean_as_often_old_as_a_reading_may_be_is_answered():
+    for share, unanswered_s in ((0.2, 0.0), (0.201, STEP_S)):
+        after = step(state(), old=(0.0, share))[0]
+        assert after.unanswered_s == pytest.approx(unanswered_s)
+
+
+@pytest.mark.parametrize("unanswered_s", [0.0, 0.0005, 0.008])
+def test_after_a_mean_that_was_not_answered_the_velocity_may_be_that_of_before(unanswered_s):
+    """From rest to 1 rad/s in 10 ms, and no motion: what agrees best is the velocity of before."""
+    before = state(angle_rad=0.0, unanswered_s=unanswered_s)
+    after, _ = means_step(LIMITS, before, 0, 0, 0.0, 1.0, 0.01, 0, 0, 0.01, 0)
+    assert after.reported_rad == pytest.approx(0.0 if unanswered_s else 0.005)
+
+
+def test_a_step_longer_than_the_memory_of_the_squares_leaves_nothing_of_before():
+    before = state(angle_rad=0.0, apart_rad2=9.0, moved_rad2=9.0, reported_rad2=9.0)
+    after, _ = means_step(LIMITS, before, 0, 0, 0.5, 0.0, 0.6, 0, 0, 0.6, 0)
+    assert after[6:9] == pytest.approx((0.25, 0.25, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("moved2", "reported2", "apart2", "gain"),
+    [
+        (1.0, 2.25, 0.25, 1.5),  # the velocity 1.5 times the change
+        (2.25, 1.0, 0.25, 1.5),  # or the change 1.5 times the velocity
+        (1.0, 4.0, 9.0, -2.0),  # with the sign turned
+        (0.0005, 0.0005, 0.0, 1.0),
+        (0.0, 1.0, 1.0, math.inf),
+        (0.0, 0.0, 0.0, math.inf),
+    ],
+)
+def test_the_gain_is_that_of_the_larger_on_the_smaller(moved2, reported2, apart2, gain):
+    means = state(moved_rad2=moved2, reported_rad2=reported2, apart_rad2=apart2)
+    assert larger_gain(means) == pytest.approx(gain)

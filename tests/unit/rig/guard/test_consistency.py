@@ -125,7 +125,11 @@ def test_over_a_gap_the_velocity_was_any_of_those_before_and_after(angle, said, 
     before = MeansState(answer_state(), 0.2, first, 0.0, 0.3, 0.1, 0.05, 0.06, 0.06, 0.5)
     after, _ = means_step(NOTHING, before, 0, 0, angle, then, 1.0, 0, 0, 1.0, 0)
     assert after[4:6] == pytest.approx((angle - 0.2, said))
-    for elapsed_s, late in ((0.0118, False), (0.0121, True)):  # means are of 8 ms
+    for elapsed_s, late in (
+        (0.0118, False),
+        (1.5 * 8 * DT, False),
+        (0.0121, True),
+    ):  # means are of 8 ms
         after, _ = means_step(
             NOTHING._replace(mean_of_ticks=8), before, 0, 0, 0.2, then, 0.01, 0, 0, elapsed_s, 0
         )
@@ -239,6 +243,7 @@ def test_what_its_stamp_says_is_older_stays_older():
     ("speed_rad_s", "sent", "tick", "cause"),
     [
         (1.0, 1.0, 150, Cause.MOTION_STALE),
+        (-1.0, 1.0, 150, Cause.MOTION_STALE),
         (0.018, 1.0, 155, Cause.NONE),  # 1.8 mrad in 100 ms: no more than they may disagree
         (1.0, 0.0, 112, Cause.VELOCITY_WRONG),  # the joint may be at rest
     ],
@@ -246,6 +251,25 @@ def test_what_its_stamp_says_is_older_stays_older():
 def test_a_reading_that_repeats_itself_for_too_long_is_stale(speed_rad_s, sent, tick, cause):
     found = run(REPEATED, 155, *repeating(speed_rad_s), sent=sent)
     assert found[:2] == (tick, cause)
+
+
+@pytest.mark.parametrize(
+    ("angle", "velocity"),
+    [(0.0, lambda t: 1.0 + t), (lambda t: t, 1.0)],
+    ids=["the velocity changes", "the angle changes"],
+)
+def test_a_reading_of_which_one_part_changes_is_a_new_one(angle, velocity):
+    limits = REPEATED._replace(mean_of_ticks=1000)
+    _, cause, state = run(limits, 400, angle, velocity)
+    assert (cause, state.same_s, state.motion_old_ticks) == (Cause.NONE, 0.0, 0)
+
+
+def test_what_repeats_itself_may_go_as_far_and_stay_as_long_as_the_limits():
+    limits = NOTHING._replace(mean_of_ticks=1000, unseen_rad=0.002)
+    assert run(limits, 3, 0.0, 1.0)[2].before_s == 0.0  # 2 mrad in 2 ms
+    assert run(limits, 4, 0.0, 1.0)[2].before_s == pytest.approx(0.003)
+    limits = limits._replace(unseen_rad=0.0005, stale_s=0.002)
+    assert run(limits, 5, 0.0, 1.0)[:2] == (3, Cause.MOTION_STALE)
 
 
 def test_the_torque_is_not_asked_to_answer_a_motion_that_is_old():
@@ -377,6 +401,7 @@ def test_the_figures_of_the_laws_and_what_they_begin_with():
         0.375,
     )
     assert (agreement.UNSEEN_DEG, agreement.SMOOTHED_S) == (0.1, 0.02)
+    assert (agreement.WRONG_GAIN, agreement.LATE) == (1.5, 1.5)
     assert (agreement.FEW_SAMPLES, agreement.LEAST_OLD_S) == (3.0, 0.012)
     assert (*(0.2, 0.5, 5.0),) == (
         agreement.OLD_SHARE,
@@ -398,7 +423,7 @@ def test_the_figures_of_the_laws_and_what_they_begin_with():
     )
     state = consistency_state(NOTHING)
     assert state.still_s == 0.0
-    assert math.isnan(state.held_rad)
+    assert all(map(math.isnan, (state.held_rad, state.read_rad, state.read_rad_s)))
     assert state[5:] == (0.0, 7, 0, 0, 0, 0) + (0.0,) * 6
     assert math.isnan(state.means.angle_rad)
     assert state.means[2:] == (0.0,) * 12

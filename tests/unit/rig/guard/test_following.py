@@ -71,6 +71,7 @@ def test_a_jump_of_the_angle_is_found_at_once(sign):
     ("jump", "elapsed", "drift"),
     [
         (0.5, 1, 0.0),  # half the limit is looked at no closer
+        (0.501953125, 1, 0.03125),  # anything above half is
         (0.5625, 1, 0.03125),  # 0.25 rad/s, a tick of 0.125 s
         (0.75, 1, 0.03125),
         (0.75, 3, 0.09375),
