@@ -32,7 +32,7 @@ _NAME_LINES = 16
 _MISSING = {"", "na", "n/a", "#n/a", "nan", "null", "none", "-", "–", "."}
 
 
-def read_utf8(path: Path, most_bytes: int) -> bytes:
+def read_utf8(path: Path, max_bytes: int) -> bytes:
     """Return the text of a file as UTF-8, with line feeds as line ends.
 
     Raises
@@ -41,12 +41,12 @@ def read_utf8(path: Path, most_bytes: int) -> bytes:
         If it cannot be read, is too large, or is not a text.
     """
     source = str(path)
-    with open_regular(path, most_bytes) as file:
+    with open_regular(path, max_bytes) as file:
         try:
             data = file.read(_HEAD_BYTES)
             if data.startswith(_GZIP):
                 file.seek(0)
-                data = _expanded(path, file, most_bytes)
+                data = _expanded(path, file, max_bytes)
             elif len(data) == _HEAD_BYTES:
                 _refuse_zeros(source, data)  # before the rest of a large file
                 data += file.read(os.fstat(file.fileno()).st_size)
@@ -55,9 +55,9 @@ def read_utf8(path: Path, most_bytes: int) -> bytes:
     return _utf8(source, data)
 
 
-def _expanded(path: Path, file: BinaryIO, most_bytes: int) -> bytes:
+def _expanded(path: Path, file: BinaryIO, max_bytes: int) -> bytes:
     """Return what a file that gzip compressed holds."""
-    most = min(most_bytes, max(EXPANDED_BYTES, EXPANSION * os.fstat(file.fileno()).st_size))
+    most = min(max_bytes, max(EXPANDED_BYTES, EXPANSION * os.fstat(file.fileno()).st_size))
     try:
         data = gzip.GzipFile(fileobj=file).read(most + 1)
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:

@@ -9,8 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-from rigidimeter.core.files import text_bytes
-from rigidimeter.core.session import FIELD, ZEROS, checksum_holds, with_checksum
+from rigidimeter.core.files import FIELD, ZEROS, checksum_holds, text_bytes, with_checksum
 from rigidimeter.core.study_files.study_toml import STUDY_SCHEMA, ConditionTable
 
 OFF, DBS = "OFF", "DBS"
