@@ -11,8 +11,8 @@ from rigidimeter.paper import (
     AGREES,
     DIFFERS,
     UNPUBLISHED,
-    Check,
-    Row,
+    AgreementCheck,
+    PaperRow,
     bounded,
     near,
     rounded,
@@ -20,9 +20,9 @@ from rigidimeter.paper import (
 )
 
 
-def row_with(*checks: Check, **changes: object) -> Row:
+def row_with(*checks: AgreementCheck, **changes: object) -> PaperRow:
     return replace(
-        Row("o", (near("x", "m", 1.0, 1.0, 0.1),)),
+        PaperRow("o", (near("x", "m", 1.0, 1.0, 0.1),)),
         checks=checks,
         **changes,
     )
@@ -58,4 +58,4 @@ def test_rounding_allows_half_of_the_last_digit() -> None:
 
 def test_a_row_needs_something_that_decides() -> None:
     with pytest.raises(ValueError, match="neither a check"):
-        Row("o")
+        PaperRow("o")

@@ -40,7 +40,7 @@ from rigidimeter.model.sensors import SAME_TIME_S
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-EVEN = 0.01
+EDGE_TOLERANCE = 0.01
 """A time this share of an interval away from an edge of the command is the edge."""
 
 APART = 1e-4
@@ -166,9 +166,9 @@ class DriveModel:
     def _since_edge(self, after_s: float, interval_s: float) -> tuple[int, float]:
         """Return the tick and the time after it that are `after_s` less the delay."""
         place = (after_s - self.delay_s) / interval_s
-        whole = math.floor(place + EVEN)
+        whole = math.floor(place + EDGE_TOLERANCE)
         rest = place - whole
-        return whole, (rest if rest > EVEN else 0.0) * interval_s
+        return whole, (rest if rest > EDGE_TOLERANCE else 0.0) * interval_s
 
     def modes(self) -> Iterator[tuple[complex, complex, bool]]:
         """Yield pole, residue, and whether they stand for a conjugate pair."""

@@ -5,8 +5,8 @@ from rigidimeter.paper.comparison_table import (
     DIFFERS,
     UNPUBLISHED,
     VERDICTS,
-    Check,
-    Row,
+    AgreementCheck,
+    PaperRow,
     bounded,
     near,
     rounded,
@@ -15,14 +15,23 @@ from rigidimeter.paper.comparison_table import (
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.controller import position_sd_deg
 from rigidimeter.paper.highpass import highpass_errors_percent
-from rigidimeter.paper.paper_page import drawn, ledger_text, render_page, tally, write_ledger
-from rigidimeter.paper.printed import COUNTS
+from rigidimeter.paper.printed import TABLE_1_COUNTS
 from rigidimeter.paper.printed_effects import n_from, p_from, r_from
 from rigidimeter.paper.protocol_rows import cycles_counted
-from rigidimeter.paper.rows import MAKERS, SECTIONS, chosen, make_rows
+from rigidimeter.paper.rows import (
+    MAKERS,
+    PAGE_SECTIONS,
+    chosen,
+    drawn,
+    ledger_text,
+    make_rows,
+    render_paper_page,
+    tally,
+    write_ledger,
+)
 from rigidimeter.paper.score_rows import (
     imposed_epoch,
-    scaled,
+    scaled_joint,
     scored,
     work_change_percent,
     work_closed_form_j,

@@ -28,7 +28,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import readonly
 from rigidimeter.core.settings import Settings
 from rigidimeter.planning.perturbations import tick_count, tick_times_s
-from rigidimeter.planning.precision import Precision, predicted_precision
+from rigidimeter.planning.precision import PredictedPrecision, predicted_precision
 
 _POINTS_PER_CYCLE = 16
 _CLIP_AT = 0.9
@@ -148,7 +148,7 @@ class MultisineComparison:
 def compare_multisine(
     settings: Settings,
     perturbation_nm: NDArray[np.float64],
-    of_prbs: Mapping[str, Precision],
+    of_prbs: Mapping[str, PredictedPrecision],
 ) -> MultisineComparison:
     """Return the multisine and its standard errors beside those of the PRBS in each condition.
 

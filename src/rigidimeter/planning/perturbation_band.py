@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigidimeter.core.records import readonly
 from rigidimeter.core.settings import PrbsSettings
-from rigidimeter.planning.perturbations import chip_count, period_s, prbs_nm
+from rigidimeter.planning.perturbations import chip_count, prbs_nm, prbs_period_s
 
 DROP_DB = 6.0
 """How far below its plateau the perturbation may be at an edge of the wanted band."""
@@ -37,7 +37,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class TorqueSpectrum:
     """One-sided power spectral density of a torque.
 
     Parameters
@@ -111,7 +111,7 @@ def envelope_edge_hz(clock_hz: float, drop_db: float = HALF_POWER_DB) -> float:
     return float(ratio) * clock_hz
 
 
-def power_spectrum(torque_nm: ArrayLike, rate_hz: float) -> Spectrum:
+def power_spectrum(torque_nm: ArrayLike, rate_hz: float) -> TorqueSpectrum:
     """Return the one-sided power spectral density of a torque, by the plain periodogram.
 
     The mean is taken off and no window is applied, so that by Parseval's theorem the density sums,
@@ -127,7 +127,7 @@ def power_spectrum(torque_nm: ArrayLike, rate_hz: float) -> Spectrum:
     frequency_hz, density_n2m2_hz = scipy.signal.periodogram(
         np.asarray(torque_nm, dtype=np.float64), fs=rate_hz, detrend="constant"
     )
-    return Spectrum(frequency_hz, density_n2m2_hz)
+    return TorqueSpectrum(frequency_hz, density_n2m2_hz)
 
 
 @dataclass(frozen=True)
@@ -293,7 +293,7 @@ def _high_sentence(settings: PrbsSettings, rate_hz: float, power_high_db: float)
 def _period_and_changes(
     settings: PrbsSettings, enough: PrbsSettings, rate_hz: float, enough_rate_hz: float
 ) -> Iterator[str]:
-    periods = settings.duration_s / period_s(settings)
+    periods = settings.duration_s / prbs_period_s(settings)
     if periods < 1.0:
         yield (
             f"The epoch holds only {100.0 * periods:.0f} % of a period, so its spectrum is flat "

@@ -18,8 +18,8 @@ from typing import Any
 
 from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files.size_limits import (
-    DIGITS,
     DOCUMENT_BYTES,
+    MAX_DIGITS,
     NESTING,
     SETTINGS_BYTES,
     size_text,
@@ -210,7 +210,7 @@ def _check_values(values: Any, source: str) -> None:
     for name, value in _leaves(values):
         if value is _DEEPER:
             raise UserError(_too_deep(source))
-        if isinstance(value, int) and abs(value) >= 10**DIGITS:
+        if isinstance(value, int) and abs(value) >= 10**MAX_DIGITS:
             raise UserError(_too_long(source, name or "a whole number"))
 
 
@@ -242,4 +242,6 @@ def _too_deep(source: str) -> str:
 
 
 def _too_long(source: str, name: str) -> str:
-    return f"{source}: {name} has more than {DIGITS} digits; write a whole number of at most that"
+    return (
+        f"{source}: {name} has more than {MAX_DIGITS} digits; write a whole number of at most that"
+    )

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files.escaping import NUMBER
+from rigidimeter.core.files.escaping import NUMBER_TEXT
 from rigidimeter.core.files.reading import open_regular
 from rigidimeter.core.files.size_limits import EXPANDED_BYTES, EXPANSION, size_text
 
@@ -104,7 +104,7 @@ def _decoded(data: bytes) -> str:
         return text
 
 
-def whole_names(data: bytes) -> bytes:
+def joined_names(data: bytes) -> bytes:
     """Return the text with names that go over several lines, in quotes, on the first.
 
     Empty lines stand in for those that it had, so that all lines keep their numbers.
@@ -165,11 +165,11 @@ def _is_text(line: bytes, is_whole: bool, first: bytes, mark: bytes) -> bool:
     """Whether a line is no row: it begins with no number, though the first row does."""
     start = line.decode("utf-8").strip()
     if not is_whole:
-        return not NUMBER.match(start)
+        return not NUMBER_TEXT.match(start)
     cells = [row.split(mark)[0].strip().decode("utf-8") for row in (first, line)]
     if is_missing(cells[1]) or cells[1].lower() in ("inf", "infinity"):
         return False
-    return bool(NUMBER.fullmatch(cells[0])) and cells[1][:1].isalpha()
+    return bool(NUMBER_TEXT.fullmatch(cells[0])) and cells[1][:1].isalpha()
 
 
 def trimmed(

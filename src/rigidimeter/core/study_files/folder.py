@@ -44,7 +44,7 @@ _MAY_BE_EMPTY = ("note", "part", "by", "mapping", "join", "clock_offset")
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """One row of a table: its file and line, and its cells by column."""
 
     source: str
@@ -79,8 +79,8 @@ class StudyFolder:
     ----------
     folder : Path
     about : StudyToml
-    sessions, ratings, exclusions : tuple of Row
-    key : tuple of Row or None
+    sessions, ratings, exclusions : tuple of TableRow
+    key : tuple of TableRow or None
         None where there is no blinding key.
     files : mapping of str to Path
         The tables and `study.toml` that exist, by the name under which a digest is kept.
@@ -92,10 +92,10 @@ class StudyFolder:
 
     folder: Path
     about: StudyToml
-    sessions: tuple[Row, ...]
-    ratings: tuple[Row, ...]
-    exclusions: tuple[Row, ...]
-    key: tuple[Row, ...] | None
+    sessions: tuple[TableRow, ...]
+    ratings: tuple[TableRow, ...]
+    exclusions: tuple[TableRow, ...]
+    key: tuple[TableRow, ...] | None
     files: Mapping[str, Path]
     digests: Mapping[str, str]
     notices: tuple[Notice, ...]
@@ -129,16 +129,16 @@ def _read_folder(folder: Path, key: Path | None, noted: Mapping[Path, str]) -> S
         )
         notices.append(Notice("warning", text))
     files = {STUDY_FILE: folder / STUDY_FILE}
-    tables: dict[str, tuple[Row, ...] | None] = {}
+    tables: dict[str, tuple[TableRow, ...] | None] = {}
     for name in TABLE_COLUMNS:
-        path = folder / getattr(about, name)
+        path, namer = folder / getattr(about, name), STUDY_FILE
         named = name in about.model_fields_set or name == "sessions"
         if name == "key" and key is not None:
-            path, named = key, True
+            path, named, namer = key, True, "--key"
         if not path.exists():
             if named:
                 raise UserError(
-                    f"{path}: there is no such file, but {_namer(name, key)} names it as the table "
+                    f"{path}: there is no such file, but {namer} names it as the table "
                     f"with the columns {', '.join(TABLE_COLUMNS[name][0])}"
                 )
             tables[name] = None
@@ -164,13 +164,7 @@ def _read_folder(folder: Path, key: Path | None, noted: Mapping[Path, str]) -> S
     )
 
 
-def _namer(name: str, key: Path | None) -> str:
-    if name == "key" and key is not None:
-        return "--key"
-    return STUDY_FILE
-
-
-def _read_table(path: Path, name: str, notices: list[Notice]) -> tuple[Row, ...]:
+def _read_table(path: Path, name: str, notices: list[Notice]) -> tuple[TableRow, ...]:
     table = read_text_table(path, may_be_empty=True)
     needed, allowed = TABLE_COLUMNS[name]
     present = tuple(table.columns)
@@ -197,7 +191,7 @@ def _unknown_columns(path: Path, present: Sequence[str], known: Sequence[str]) -
         yield Notice("warning", f"{path}: column {column} is not read; {nearest}")
 
 
-def _rows(table: TextTable, needed: Sequence[str], notices: list[Notice]) -> Iterable[Row]:
+def _rows(table: TextTable, needed: Sequence[str], notices: list[Notice]) -> Iterable[TableRow]:
     lacking: dict[str, list[int]] = {}
     for index, line in enumerate(table.lines):
         cells = {name: cells[index] for name, cells in table.columns.items()}
@@ -205,7 +199,7 @@ def _rows(table: TextTable, needed: Sequence[str], notices: list[Notice]) -> Ite
         if empty:
             lacking.setdefault(" and ".join(empty), []).append(line)
             continue
-        yield Row(table.source, line, cells)
+        yield TableRow(table.source, line, cells)
     for names, lines in lacking.items():
         rows = "the row is" if len(lines) == 1 else "the rows are"
         text = f"{table.source}, {lines_text(lines)}: no {names} is given; {rows} left out"

@@ -7,7 +7,7 @@ from rigidimeter.virtual.batch.batch_simulate import (
     simulate_chunks,
     simulate_epochs,
 )
-from rigidimeter.virtual.batch.compiled_steps import numbers, with_helpers
+from rigidimeter.virtual.batch.compiled_steps import enum_numbers, with_helpers
 
 __all__ = [
     "Batch",

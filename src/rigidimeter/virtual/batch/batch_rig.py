@@ -200,7 +200,7 @@ def draw_inputs(
         Voluntary torque and tremor, and the joint where none is given.
     rng : numpy.random.Generator
     joint : JointDynamics, optional
-        In place of the one drawn; the other numbers stay the same.
+        In place of the one drawn; the other enum_numbers stay the same.
     """
     settings = bench.settings
     rig = settings.rig

@@ -32,10 +32,10 @@ from rigidimeter.model import (
     median_joint,
     voluntary_motion_sd,
 )
-from rigidimeter.planning.demand import demand
+from rigidimeter.planning.motion_demand import demand
 from rigidimeter.planning.perturbation_band import check_band
 from rigidimeter.planning.perturbations import prbs_nm
-from rigidimeter.planning.precision import Precision, predicted_precision
+from rigidimeter.planning.precision import PredictedPrecision, predicted_precision
 
 _VOLUNTARY_SDS = 3.0
 _HALVINGS = 30
@@ -66,7 +66,7 @@ class Candidate:
     covered: bool
 
 
-def _relative(precision: Precision) -> Array:
+def _relative(precision: PredictedPrecision) -> Array:
     """Return the covariance of the relative errors, in %²."""
     values = np.array(precision.values)
     return precision.covariance * 1e4 / np.outer(values, values)
