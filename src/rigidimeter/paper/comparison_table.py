@@ -19,12 +19,12 @@ from typing import Any, Literal, TypeAlias
 from rigidimeter.analysis.report.contents import Figure
 from rigidimeter.analysis.report.numbers import number
 
-Agreement: TypeAlias = Literal["agrees", "differs", "cannot be computed from what was published"]
+RowVerdict: TypeAlias = Literal["agrees", "differs", "cannot be computed from what was published"]
 
-AGREES: Agreement = "agrees"
-DIFFERS: Agreement = "differs"
-UNPUBLISHED: Agreement = "cannot be computed from what was published"
-VERDICTS: tuple[Agreement, ...] = (AGREES, DIFFERS, UNPUBLISHED)
+AGREES: RowVerdict = "agrees"
+DIFFERS: RowVerdict = "differs"
+UNPUBLISHED: RowVerdict = "cannot be computed from what was published"
+VERDICTS: tuple[RowVerdict, ...] = (AGREES, DIFFERS, UNPUBLISHED)
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class PaperRow:
             raise ValueError(f"a row has neither a check nor missing data: {self.ours}")
 
     @property
-    def verdict(self) -> Agreement:
+    def verdict(self) -> RowVerdict:
         """What the rule says."""
         if self.unpublished:
             return UNPUBLISHED

@@ -46,13 +46,6 @@ def n_from(p: float, r: float) -> float:
     return (float(norm.isf(p / 2.0)) / r) ** 2
 
 
-def _better_p(measured: Measured) -> float:
-    """Return the printed p from which the printed r follows more nearly."""
-    return min(
-        (measured.p_table, measured.p_text), key=lambda p: abs(r_from(p, measured.n) - measured.r)
-    )
-
-
 _PRINTS: Mapping[str, Callable[[Measured], float]] = {
     "Table 2": lambda measured: measured.p_table,
     "the text": lambda measured: measured.p_text,
@@ -96,7 +89,9 @@ def _reading(name: str) -> str:
         return "The text prints the same p."
     if name == "mupdrs":
         return "Its p is that of an F-test, from which the paper gives no z."
-    best = _better_p(measured)
+    best = min(
+        (measured.p_table, measured.p_text), key=lambda p: abs(r_from(p, measured.n) - measured.r)
+    )
     where = "the table's" if best == measured.p_table else f"that of {measured.place}"
     return f"Of the two printed p, {where} is nearer to r."
 

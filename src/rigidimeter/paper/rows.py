@@ -34,8 +34,8 @@ from rigidimeter.paper.comparison_table import (
     DIFFERS,
     UNPUBLISHED,
     VERDICTS,
-    Agreement,
     PaperRow,
+    RowVerdict,
 )
 from rigidimeter.paper.context import Context
 
@@ -170,7 +170,7 @@ def make_rows(
     return rows
 
 
-def tally(rows: Sequence[PaperRow]) -> dict[Agreement, int]:
+def tally(rows: Sequence[PaperRow]) -> dict[RowVerdict, int]:
     """Return how many rows have each verdict."""
     counted = Counter(row.verdict for row in rows)
     return {verdict: counted[verdict] for verdict in VERDICTS}

@@ -74,14 +74,14 @@ def multisine_phases_rad(
         spectrum[lines] = np.exp(1j * of)
         return np.asarray(scipy.fft.irfft(spectrum, points), dtype=np.float64)
 
-    best, least = phases, crest_factor(signal(phases))
+    best, lowest = phases, crest_factor(signal(phases))
     for step in range(steps):
         wave = signal(phases)
         peak = float(np.max(np.abs(wave))) * (_CLIP_AT + (1.0 - _CLIP_AT) * step / steps)
         phases = np.angle(scipy.fft.rfft(np.clip(wave, -peak, peak))[lines])
         crest = crest_factor(signal(phases))
-        if crest < least:
-            best, least = phases, crest
+        if crest < lowest:
+            best, lowest = phases, crest
     return best
 
 

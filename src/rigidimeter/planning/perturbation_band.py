@@ -214,6 +214,7 @@ def check_band(settings: PrbsSettings, rate_hz: float) -> BandCheck:
         *_period_and_changes(settings, enough, rate_hz, enough_rate_hz),
     ]
     covered = low_covered and high_covered
+    first_line = max(1, math.ceil(low_hz / lowest_hz - _ROUNDING))
     band = f"{low_hz:g}–{high_hz:g} Hz"
     opening = f"The wanted band {band} is {'covered' if covered else 'not covered'}."
     return BandCheck(
@@ -224,7 +225,7 @@ def check_band(settings: PrbsSettings, rate_hz: float) -> BandCheck:
         wanted_high_hz=high_hz,
         line_spacing_hz=line_spacing_hz(settings),
         lowest_hz=lowest_hz,
-        lines_in_band=_multiples(lowest_hz, low_hz, high_hz),
+        lines_in_band=max(0, math.floor(high_hz / lowest_hz + _ROUNDING) - first_line + 1),
         half_power_hz=envelope_edge_hz(settings.clock_hz),
         drop_db=DROP_DB,
         drop_edge_hz=drop_edge_hz,
@@ -238,21 +239,16 @@ def check_band(settings: PrbsSettings, rate_hz: float) -> BandCheck:
     )
 
 
-def _multiples(spacing_hz: float, low_hz: float, high_hz: float) -> int:
-    first = max(1, math.ceil(low_hz / spacing_hz - _ROUNDING))
-    return max(0, math.floor(high_hz / spacing_hz + _ROUNDING) - first + 1)
-
-
 def _tenth_up(value: float) -> float:
     return math.ceil(value * 10.0 - _ROUNDING) / 10.0
 
 
 def _enough(settings: PrbsSettings) -> PrbsSettings:
     """Return settings that cover the wanted band, changing as little as possible."""
-    least_clock_hz = settings.wanted_high_hz / envelope_edge_hz(1.0, DROP_DB)
+    min_clock_hz = settings.wanted_high_hz / envelope_edge_hz(1.0, DROP_DB)
     clock_hz = settings.clock_hz
     if envelope_edge_hz(clock_hz, DROP_DB) < settings.wanted_high_hz:
-        clock_hz = _tenth_up(least_clock_hz * (1.0 + _ROUNDING))
+        clock_hz = _tenth_up(min_clock_hz * (1.0 + _ROUNDING))
     bits = settings.register_bits
     while clock_hz / (2**bits - 1) > 2.0 * settings.wanted_low_hz:
         bits += 1

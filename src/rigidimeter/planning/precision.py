@@ -234,20 +234,16 @@ def _least_squares(
             f"the band {low_hz:g} to {high_hz:g} Hz holds {np.count_nonzero(inside)} lines of an "
             f"epoch of {kept / rig.tick_rate_hz:g} s; the fit needs at least {len(PARAMETER_NAMES)}"
         )
-    gain = _zero_phase_gain(frequency, low_hz, high_hz)
+    # Butterworth filters, second order below and fourth above, used twice.
+    with np.errstate(divide="ignore"):
+        above = 1.0 / (1.0 + (low_hz / frequency) ** 4)
+    gain = np.asarray(above / (1.0 + (frequency / high_hz) ** 8))
     Z = np.asarray(scipy.fft.rfft(np.stack(motion[1:])[:, trim : trim + kept]))
     A = _products(Z, gain**2, kept) / rig.tick_rate_hz
     Q = _products(Z, gain**4, kept) / rig.tick_rate_hz * sensor_density(rig.torque)
     voluntary = subject_density(subject, frequency, rig.tick_rate_hz) * gain**2
     bias = _bias(A, settings, joint, frequency, voluntary)
     return (low_hz, high_hz), _errors(A, Q), bias
-
-
-def _zero_phase_gain(frequency_hz: Array, low_hz: float, high_hz: float) -> Array:
-    """Return the gain of Butterworth filters, second order below and fourth above, used twice."""
-    with np.errstate(divide="ignore"):
-        above = 1.0 / (1.0 + (low_hz / frequency_hz) ** 4)
-    return np.asarray(above / (1.0 + (frequency_hz / high_hz) ** 8))
 
 
 def _bias(

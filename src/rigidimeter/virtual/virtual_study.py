@@ -81,17 +81,7 @@ def write_virtual_study(
             with suppress(OSError):
                 folder.rmdir()
         raise
-    subject = design.subject
-    sessions = [(plan.folder, subject, plan.day, plan.condition, plan.note) for plan in plans]
-    columns = ("path", "subject", "day", "condition", "note")
-    write_text(folder / "sessions.csv", csv_text(columns, sessions))
-    ratings = [
-        (subject, plan.day, plan.condition, examiner, f"{score:g}")
-        for plan in plans
-        for examiner, score in plan.ratings.items()
-    ]
-    columns = ("subject", "day", "condition", "examiner", "score")
-    write_text(folder / "ratings.csv", csv_text(columns, ratings))
+    _write_tables(folder, plans, design.subject)
     write_text(folder / "study.toml", _study_toml(design, seed))
     return plans
 
@@ -104,6 +94,19 @@ def _run(plan: DayPlan, folder: Path) -> None:
         raise UserError(
             f"{folder / plan.folder}: the session ended with {result.outcome}: {result.reason}"
         )
+
+
+def _write_tables(folder: Path, plans: Sequence[DayPlan], subject: str) -> None:
+    sessions = [(plan.folder, subject, plan.day, plan.condition, plan.note) for plan in plans]
+    columns = ("path", "subject", "day", "condition", "note")
+    write_text(folder / "sessions.csv", csv_text(columns, sessions))
+    ratings = [
+        (subject, plan.day, plan.condition, examiner, f"{score:g}")
+        for plan in plans
+        for examiner, score in plan.ratings.items()
+    ]
+    columns = ("subject", "day", "condition", "examiner", "score")
+    write_text(folder / "ratings.csv", csv_text(columns, ratings))
 
 
 def _study_toml(design: StudyDesign, seed: int) -> str:

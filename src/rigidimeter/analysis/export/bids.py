@@ -59,7 +59,12 @@ def write_bids(sessions: Sequence[ExportedSession], folder: Path) -> None:
             scans.setdefault(place / f"{day_of}_scans.tsv", []).append(line)
         events = "_".join(filter(None, [head, tail]))
         _write_events(own, motion / f"{events}_events")
-        _write_derivatives(own, folder, place.relative_to(folder) / "motion", events)
+        derived = folder / "derivatives" / "rigidimeter" / place.relative_to(folder) / "motion"
+        derived.mkdir(parents=True, exist_ok=True)
+        write_json(derived / f"{events}_session.json", own)
+        for name, rows in document_tables(own).items():
+            if name in ("estimates", "scores"):
+                _write_tsv(derived / f"{events}_{name}.tsv", rows)
         person = own.get("participant", {})
         participants[names["sub"]] = {
             "participant_id": f"sub-{names['sub']}",
@@ -225,15 +230,6 @@ def _write_events(about: Mapping[str, Any], stem: Path) -> None:
         write_json(
             Path(f"{stem}.json"), {name: text for name, text in _EVENTS.items() if name in present}
         )
-
-
-def _write_derivatives(about: Mapping[str, Any], folder: Path, place: Path, stem: str) -> None:
-    derived = folder / "derivatives" / "rigidimeter" / place
-    derived.mkdir(parents=True, exist_ok=True)
-    write_json(derived / f"{stem}_session.json", about)
-    for name, rows in document_tables(about).items():
-        if name in ("estimates", "scores"):
-            _write_tsv(derived / f"{stem}_{name}.tsv", rows)
 
 
 def _ratings(about: Mapping[str, Any], days: Iterable[_Row]) -> _Row:

@@ -151,12 +151,15 @@ def day_difference(
         [""] * sample.size if given is None else list(map(str, given))
         for sample, given in zip(samples, (x_subjects, y_subjects), strict=True)
     ]
-    for name, sample, day, subject in zip(("x", "y"), samples, days, subjects, strict=True):
-        if not len(day) == len(subject) == sample.size:
+    for name, sample, own_days, own in zip(("x", "y"), samples, days, subjects, strict=True):
+        if not len(own_days) == len(own) == sample.size:
             raise ValueError(
-                f"{name} has {sample.size} values, {len(day)} days and {len(subject)} subjects"
+                f"{name} has {sample.size} values, {len(own_days)} days and {len(own)} subjects"
             )
-    epochs = _by_day(samples, subjects, days)
+    epochs: SubjectEpochs = {}
+    for k, columns in enumerate(zip(samples, subjects, days, strict=True)):
+        for value, subject, day in zip(*columns, strict=True):
+            epochs.setdefault(subject, {}).setdefault(day, ([], []))[k].append(float(value))
     tested = test_by_levels(epochs, names)
     estimate, se, df = tested.estimate, tested.se, tested.df
     low, high = interval_of(estimate, se, df, confidence)
@@ -189,16 +192,6 @@ def day_medians(values: ArrayLike, days: Sequence[str]) -> dict[str, float]:
     sample = np.asarray(values, dtype=np.float64)
     labels = np.asarray(days, dtype=object)
     return {str(day): float(np.median(sample[labels == day])) for day in dict.fromkeys(days)}
-
-
-def _by_day(
-    samples: Sequence[Array], subjects: Sequence[Sequence[str]], days: Sequence[Sequence[str]]
-) -> SubjectEpochs:
-    found: SubjectEpochs = {}
-    for k, columns in enumerate(zip(samples, subjects, days, strict=True)):
-        for value, subject, day in zip(*columns, strict=True):
-            found.setdefault(subject, {}).setdefault(day, ([], []))[k].append(float(value))
-    return found
 
 
 def _day_share(epochs: SubjectEpochs) -> float:

@@ -33,11 +33,9 @@ def visible(text: str, *, lines: bool = False) -> str:
     >>> visible("a\x1b[31m")
     'a\\x1b[31m'
     """
-    return (_LINES if lines else _COMMANDS).sub(_escape, text)
-
-
-def _escape(found: re.Match[str]) -> str:
-    return found[0].encode("unicode_escape").decode("ascii")
+    return (_LINES if lines else _COMMANDS).sub(
+        lambda found: found[0].encode("unicode_escape").decode("ascii"), text
+    )
 
 
 def as_written(text: str) -> str:

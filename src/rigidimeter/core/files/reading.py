@@ -67,17 +67,15 @@ def _opened(path: Path, max_bytes: int) -> io.BufferedReader:
         _check(path, os.stat(path), max_bytes)
         # Another file may have this name by now; without O_NONBLOCK a pipe waits for its writer.
         with ExitStack() as on_failure:
-            file = on_failure.enter_context(open(path, "rb", opener=_without_waiting))
+            file = on_failure.enter_context(
+                open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
+            )
             _check(path, os.fstat(file.fileno()), max_bytes)
             on_failure.pop_all()
         return file
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         reason = getattr(error, "strerror", None) or error
         raise UserError(f"{path}: cannot be read ({reason})") from None
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_NONBLOCK)
 
 
 @contextmanager

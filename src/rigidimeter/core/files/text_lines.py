@@ -161,10 +161,10 @@ def is_missing(text: str) -> bool:
     return text.lower() in _MISSING
 
 
-def _is_text(line: bytes, is_whole: bool, first: bytes, mark: bytes) -> bool:
+def _is_text(line: bytes, is_row: bool, first: bytes, mark: bytes) -> bool:
     """Whether a line is no row: it begins with no number, though the first row does."""
     start = line.decode("utf-8").strip()
-    if not is_whole:
+    if not is_row:
         return not NUMBER_TEXT.match(start)
     cells = [row.split(mark)[0].strip().decode("utf-8") for row in (first, line)]
     if is_missing(cells[1]) or cells[1].lower() in ("inf", "infinity"):

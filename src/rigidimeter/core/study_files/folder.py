@@ -116,52 +116,48 @@ def read_study_folder(folder: Path, key: Path | None = None) -> StudyFolder:
         no session.
     """
     with noted_digests() as noted:
-        return _read_folder(folder, key, noted)
-
-
-def _read_folder(folder: Path, key: Path | None, noted: Mapping[Path, str]) -> StudyFolder:
-    about = read_study_toml(folder / STUDY_FILE)
-    notices: list[Notice] = []
-    if "one_offset_a_day" in about.analysis.model_fields_set:
-        text = (
-            f"{folder / STUDY_FILE}: one_offset_a_day has no effect any more, for the test by days "
-            "is chosen by which days have which conditions; remove the line"
+        about = read_study_toml(folder / STUDY_FILE)
+        notices: list[Notice] = []
+        if "one_offset_a_day" in about.analysis.model_fields_set:
+            text = (
+                f"{folder / STUDY_FILE}: one_offset_a_day has no effect any more, for the test by "
+                "days is chosen by which days have which conditions; remove the line"
+            )
+            notices.append(Notice("warning", text))
+        files = {STUDY_FILE: folder / STUDY_FILE}
+        tables: dict[str, tuple[TableRow, ...] | None] = {}
+        for name in TABLE_COLUMNS:
+            path, namer = folder / getattr(about, name), STUDY_FILE
+            named = name in about.model_fields_set or name == "sessions"
+            if name == "key" and key is not None:
+                path, named, namer = key, True, "--key"
+            if not path.exists():
+                if named:
+                    raise UserError(
+                        f"{path}: there is no such file, but {namer} names it as the table "
+                        f"with the columns {', '.join(TABLE_COLUMNS[name][0])}"
+                    )
+                tables[name] = None
+                continue
+            # A key is listed by its role: it may be kept anywhere, and its place is not recorded.
+            files["key" if name == "key" else getattr(about, name)] = path
+            tables[name] = _read_table(path, name, notices)
+        if not tables["sessions"]:
+            raise UserError(
+                f"{folder / about.sessions}: holds no session; write a row with "
+                "path,subject,day,condition for each"
+            )
+        return StudyFolder(
+            folder,
+            about,
+            tables["sessions"] or (),
+            tables["ratings"] or (),
+            tables["exclusions"] or (),
+            tables["key"],
+            files,
+            {name: noted[path] for name, path in files.items()},
+            tuple(notices),
         )
-        notices.append(Notice("warning", text))
-    files = {STUDY_FILE: folder / STUDY_FILE}
-    tables: dict[str, tuple[TableRow, ...] | None] = {}
-    for name in TABLE_COLUMNS:
-        path, namer = folder / getattr(about, name), STUDY_FILE
-        named = name in about.model_fields_set or name == "sessions"
-        if name == "key" and key is not None:
-            path, named, namer = key, True, "--key"
-        if not path.exists():
-            if named:
-                raise UserError(
-                    f"{path}: there is no such file, but {namer} names it as the table "
-                    f"with the columns {', '.join(TABLE_COLUMNS[name][0])}"
-                )
-            tables[name] = None
-            continue
-        # A key is listed by its role: it may be kept anywhere, and its place is not recorded.
-        files["key" if name == "key" else getattr(about, name)] = path
-        tables[name] = _read_table(path, name, notices)
-    if not tables["sessions"]:
-        raise UserError(
-            f"{folder / about.sessions}: holds no session; write a row with "
-            "path,subject,day,condition for each"
-        )
-    return StudyFolder(
-        folder,
-        about,
-        tables["sessions"] or (),
-        tables["ratings"] or (),
-        tables["exclusions"] or (),
-        tables["key"],
-        files,
-        {name: noted[path] for name, path in files.items()},
-        tuple(notices),
-    )
 
 
 def _read_table(path: Path, name: str, notices: list[Notice]) -> tuple[TableRow, ...]:
@@ -177,18 +173,15 @@ def _read_table(path: Path, name: str, notices: list[Notice]) -> tuple[TableRow,
             f"{path}: there is no column {missing[0]}{hint}; its columns are {', '.join(present)}, "
             f"and it must have {', '.join(needed)}"
         )
-    notices += _unknown_columns(path, present, (*needed, *allowed))
-    return tuple(_rows(table, needed, notices))
-
-
-def _unknown_columns(path: Path, present: Sequence[str], known: Sequence[str]) -> Iterable[Notice]:
     for column in present:
-        if column in known or column.startswith("column "):
+        if column in (*needed, *allowed) or column.startswith("column "):
             continue
-        free = [name for name in known if name not in present]
+        free = [name for name in (*needed, *allowed) if name not in present]
         near = difflib.get_close_matches(column, free, n=1, cutoff=0.6)
         nearest = f"the nearest that is known is {near[0]}" if near else "it means nothing here"
-        yield Notice("warning", f"{path}: column {column} is not read; {nearest}")
+        text = f"{path}: column {column} is not read; {nearest}"
+        notices.append(Notice("warning", text))
+    return tuple(_rows(table, needed, notices))
 
 
 def _rows(table: TextTable, needed: Sequence[str], notices: list[Notice]) -> Iterable[TableRow]:

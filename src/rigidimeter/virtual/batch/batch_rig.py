@@ -127,11 +127,11 @@ def draw_sampling(
     assert newest[0] >= 0  # each sensor has a sample before the first tick
     seen_s = (arrives_s - sensor.stamp_latency_s)[newest]
     return Sampling(
-        _whole(taken, np.uint32),
-        _whole(newest, np.uint32),
+        _frozen_integers(taken, np.uint32),
+        _frozen_integers(newest, np.uint32),
         readonly(seen_s),
         readonly(np.arange(ticks) / rig.tick_rate_hz - seen_s),
-        _whole(part, np.int32),
+        _frozen_integers(part, np.int32),
         readonly(left),
         readonly(parts),
     )
@@ -145,7 +145,7 @@ def _through(end_s: float, blocks: Iterator[NDArray[np.float64]]) -> Iterator[ND
             return
 
 
-def _whole(values: NDArray[Any], kind: type[np.integer[Any]]) -> NDArray[Any]:
+def _frozen_integers(values: NDArray[Any], kind: type[np.integer[Any]]) -> NDArray[Any]:
     array = values.astype(kind)
     array.setflags(write=False)
     return array
@@ -200,7 +200,7 @@ def draw_inputs(
         Voluntary torque and tremor, and the joint where none is given.
     rng : numpy.random.Generator
     joint : JointDynamics, optional
-        In place of the one drawn; the other enum_numbers stay the same.
+        In place of the one drawn; the other numbers stay the same.
     """
     settings = bench.settings
     rig = settings.rig
