@@ -36,9 +36,7 @@ import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.model.sensors import SAME_TIME_S
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from rigidimeter.model.velocity_drive import Array, Complex
 
 EDGE_TOLERANCE = 0.01
 """A time this share of an interval away from an edge of the command is the edge."""

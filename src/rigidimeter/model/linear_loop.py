@@ -36,9 +36,10 @@ from numpy.typing import ArrayLike
 
 from rigidimeter.core.settings import ControllerSettings, RigSettings, Settings, SubjectSettings
 from rigidimeter.model.controller import admittance, butterworth_lowpass
-from rigidimeter.model.drive_model import Array, Complex, DriveModel, lowpass
+from rigidimeter.model.drive_model import DriveModel, lowpass
 from rigidimeter.model.joint import JointDynamics, median_joint
 from rigidimeter.model.subject_torque import subject_density
+from rigidimeter.model.velocity_drive import Array, Complex
 
 Parameters = tuple[float, float, float]
 """J, B and K of the joint."""

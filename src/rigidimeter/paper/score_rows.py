@@ -19,7 +19,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rigidimeter.analysis.estimation import Cycles, score_epoch, scoring_cycles
@@ -31,7 +30,7 @@ from rigidimeter.analysis.report.style import GREY
 from rigidimeter.core.records import Channel, Epoch, Motion, Score
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg
-from rigidimeter.model import JointDynamics
+from rigidimeter.model import Array, JointDynamics
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import PaperRow, bounded, within_percent
 from rigidimeter.paper.context import Context
@@ -39,8 +38,6 @@ from rigidimeter.planning import sinusoid
 
 SCORE_PERCENT = 0.5
 """How far a score may be from its closed form; the band-pass remembers the start of the motion."""
-
-Array = NDArray[np.float64]
 
 
 def imposed_epoch(joint: JointDynamics, settings: Settings, uneven: float = 0.0) -> Epoch:

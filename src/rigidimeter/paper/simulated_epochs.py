@@ -15,12 +15,13 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rigidimeter.analysis.estimation import fit_epochs
 from rigidimeter.analysis.report.numbers import number
 from rigidimeter.core.records import Fit
 from rigidimeter.core.settings import Settings, SubjectSettings, parse_settings
+from rigidimeter.model import Array
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import (
     AgreementCheck,
@@ -34,7 +35,6 @@ from rigidimeter.planning import prbs_nm, predicted_precision
 from rigidimeter.virtual import PAPER_RATES
 from rigidimeter.virtual.batch import simulate_epochs
 
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 TRUTH = np.array(printed.SEC_34.parameters)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
@@ -26,13 +25,11 @@ from rigidimeter.analysis.study.examples import (
     representative_scores,
 )
 from rigidimeter.analysis.study.rating_table import groupings
-from rigidimeter.model import ClosedLoopMotion, JointDynamics, closed_loop_motion
+from rigidimeter.model import Array, ClosedLoopMotion, JointDynamics, closed_loop_motion
 from rigidimeter.paper.comparison_table import PaperRow
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.paper_figures import torque_traces
 from rigidimeter.paper.printed_effects import virtual_ratings
-
-Array = NDArray[np.float64]
 
 _COLOURS = condition_colours(("OFF", "DBS"))
 _MISSING = "The recordings of the animal were not published; "

@@ -28,9 +28,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from rigidimeter.analysis.statistics.summary import Array
 
 CORRELATION = 0.5
 """Of two conditions in one unit, for the weights only."""

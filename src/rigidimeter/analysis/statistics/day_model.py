@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import t as t_distribution
 
 from rigidimeter.analysis.statistics.contrasts import interval_of
@@ -20,7 +20,6 @@ from rigidimeter.analysis.statistics.day_levels import SubjectEpochs, test_by_le
 from rigidimeter.analysis.statistics.ranks import exact_ranksum
 from rigidimeter.analysis.statistics.summary import checked_sample
 
-Array = NDArray[np.float64]
 FEW_DF = 3.0
 """With fewer degrees of freedom the interval is wider than ± 3.2 standard errors."""
 

@@ -14,13 +14,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rigidimeter.analysis.statistics.profiled_likelihood import Point, minimise, products
-from rigidimeter.analysis.statistics.summary import checked_sample
+from rigidimeter.analysis.statistics.summary import Array, checked_sample
 from rigidimeter.core.files import SCORES_BY_GROUPS_SQUARED
-
-Array = NDArray[np.float64]
 
 _NOTHING = 1e-10
 

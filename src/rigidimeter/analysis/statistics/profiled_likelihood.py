@@ -17,10 +17,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
-Array = NDArray[np.float64]
+from rigidimeter.analysis.statistics.summary import Array
 
 _STEPS = 200
 _PRECISION = 1e-13

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import mannwhitneyu, norm, rankdata
 
-from rigidimeter.analysis.statistics.summary import checked_sample
+from rigidimeter.analysis.statistics.summary import Array, checked_sample
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import RANKED_PAIRS
 
@@ -169,7 +169,7 @@ def ranksum(x: ArrayLike, y: ArrayLike, *, confidence: float = 0.95) -> RankSum:
     )
 
 
-def _tie_term(values: NDArray[np.float64]) -> float:
+def _tie_term(values: Array) -> float:
     sizes = np.unique(values, return_counts=True)[1].astype(np.float64)
     return float(np.sum(sizes**3 - sizes))
 
@@ -180,7 +180,7 @@ def _sigma_from_ties(m: int, n: int, tie_term: float) -> float:
     return math.sqrt(max(variance, 0.0))
 
 
-def u_sigma(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+def u_sigma(x: Array, y: Array) -> float:
     """Return the standard deviation of U with the ties of these samples, 0 where all are equal."""
     pooled = np.concatenate([x, y])
     if pooled.min() == pooled.max():
@@ -195,7 +195,7 @@ def _z(excess: float, sigma: float, correction: float) -> float:
     return math.copysign(size, excess) / sigma
 
 
-def _lower_end(x: NDArray[np.float64], y: NDArray[np.float64], confidence: float) -> int:
+def _lower_end(x: Array, y: Array, confidence: float) -> int:
     """Return which of the sorted differences is the lower end, from 1 on; see `ranksum`.
 
     Above k of the differences, U(d) − m n / 2 = m n / 2 − k. The test does not reject while its
@@ -205,9 +205,6 @@ def _lower_end(x: NDArray[np.float64], y: NDArray[np.float64], confidence: float
     sigma = _sigma_from_ties(x.size, y.size, _tie_term(x) + _tie_term(y))
     reach = float(norm.isf((1 - confidence) / 2)) * sigma + 0.5
     return math.ceil(x.size * y.size / 2 - reach)
-
-
-Array = NDArray[np.float64]
 
 
 def exact_ranksum(strata: Sequence[tuple[ArrayLike, ArrayLike]]) -> float:

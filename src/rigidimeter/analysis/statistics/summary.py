@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Summary:
@@ -45,7 +47,7 @@ def summarise(values: ArrayLike) -> Summary:
     return Summary(int(sample.size), float(median), float(q1), float(q3), sd_percent)
 
 
-def checked_sample(name: str, values: ArrayLike, *, min_size: int = 1) -> NDArray[np.float64]:
+def checked_sample(name: str, values: ArrayLike, *, min_size: int = 1) -> Array:
     """Return values as an array; `name` is what a message calls them.
 
     Raises
