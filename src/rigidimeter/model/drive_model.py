@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from rigidimeter.model.sensors import SAME_TIME_S
 from rigidimeter.model.velocity_drive import Array, Complex
 
-EDGE_TOLERANCE = 0.01
+ON_EDGE = 0.01
 """A time this share of an interval away from an edge of the command is the edge."""
 
 APART = 1e-4
@@ -164,9 +164,9 @@ class DriveModel:
     def _since_edge(self, after_s: float, interval_s: float) -> tuple[int, float]:
         """Return the tick and the time after it that are `after_s` less the delay."""
         place = (after_s - self.delay_s) / interval_s
-        whole = math.floor(place + EDGE_TOLERANCE)
+        whole = math.floor(place + ON_EDGE)
         rest = place - whole
-        return whole, (rest if rest > EDGE_TOLERANCE else 0.0) * interval_s
+        return whole, (rest if rest > ON_EDGE else 0.0) * interval_s
 
     def modes(self) -> Iterator[tuple[complex, complex, bool]]:
         """Yield pole, residue, and whether they stand for a conjugate pair."""

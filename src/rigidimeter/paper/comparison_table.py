@@ -28,7 +28,7 @@ VERDICTS: tuple[RowVerdict, ...] = (AGREES, DIFFERS, UNPUBLISHED)
 
 
 @dataclass(frozen=True)
-class AgreementCheck:
+class Bound:
     """One computed number and the interval in which it counts as what the paper says.
 
     Attributes
@@ -77,19 +77,17 @@ class AgreementCheck:
         }
 
 
-def within_percent(
-    what: str, unit: str, paper: float, ours: float, percent: float
-) -> AgreementCheck:
+def within_percent(what: str, unit: str, paper: float, ours: float, percent: float) -> Bound:
     """Allow so many percent of the printed number either way."""
     return near(what, unit, paper, ours, abs(paper) * percent / 100.0)
 
 
-def near(what: str, unit: str, paper: float, ours: float, margin: float) -> AgreementCheck:
+def near(what: str, unit: str, paper: float, ours: float, margin: float) -> Bound:
     """Allow a margin in the unit of the number either way."""
-    return AgreementCheck(what, unit, paper, ours, paper - margin, paper + margin)
+    return Bound(what, unit, paper, ours, paper - margin, paper + margin)
 
 
-def rounded(what: str, unit: str, paper: float, ours: float, last_digit: float) -> AgreementCheck:
+def rounded(what: str, unit: str, paper: float, ours: float, last_digit: float) -> Bound:
     """Allow half of the last digit that the paper prints."""
     # A number that ends in a five may be rounded either way.
     return near(what, unit, paper, ours, 0.5 * last_digit * (1.0 + 1e-9))
@@ -97,13 +95,13 @@ def rounded(what: str, unit: str, paper: float, ours: float, last_digit: float) 
 
 def bounded(
     what: str, unit: str, ours: float, *, low: float = -math.inf, high: float = math.inf
-) -> AgreementCheck:
+) -> Bound:
     """Hold a number against a statement without one, such as "falls"."""
-    return AgreementCheck(what, unit, None, ours, low, high)
+    return Bound(what, unit, None, ours, low, high)
 
 
 @dataclass(frozen=True)
-class PaperRow:
+class Claim:
     """One equation, figure, table or statement of the paper beside what we compute.
 
     The words that do not depend on our numbers are in ``statements.toml``; `rows.make_rows` adds
@@ -113,7 +111,7 @@ class PaperRow:
     ----------
     ours : str
         What we compute, in words and numbers.
-    checks : tuple of AgreementCheck
+    checks : tuple of Bound
         They decide. May be empty only where `unpublished` says what is missing.
     figures : tuple of Figure
     unpublished : str
@@ -136,7 +134,7 @@ class PaperRow:
     """
 
     ours: str
-    checks: tuple[AgreementCheck, ...] = ()
+    checks: tuple[Bound, ...] = ()
     figures: tuple[Figure, ...] = ()
     unpublished: str = ""
     virtual: bool = False

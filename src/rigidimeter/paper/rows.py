@@ -34,7 +34,7 @@ from rigidimeter.paper.comparison_table import (
     DIFFERS,
     UNPUBLISHED,
     VERDICTS,
-    PaperRow,
+    Claim,
     RowVerdict,
 )
 from rigidimeter.paper.context import Context
@@ -42,9 +42,9 @@ from rigidimeter.paper.context import Context
 _SHORT = {AGREES: "agrees", DIFFERS: "differs", UNPUBLISHED: "unpublished"}
 """As names of CSS classes."""
 
-Maker = Callable[[Context], PaperRow]
+Maker = Callable[[Context], Claim]
 
-PAGE_SECTIONS: Mapping[str, Mapping[str, Mapping[str, Any]]] = tomllib.loads(
+STATEMENTS: Mapping[str, Mapping[str, Mapping[str, Any]]] = tomllib.loads(
     (resources.files("rigidimeter.paper") / "statements.toml").read_text(encoding="utf-8")
 )
 """The page: by section and row, those texts of a row that do not depend on our numbers."""
@@ -132,21 +132,19 @@ def chosen(only: Iterable[str]) -> tuple[str, ...]:
     wanted = set(only)
     unknown = sorted(wanted - MAKERS.keys())
     if unknown:
-        every = ", ".join(row_id for texts in PAGE_SECTIONS.values() for row_id in texts)
+        every = ", ".join(row_id for texts in STATEMENTS.values() for row_id in texts)
         raise UserError(f"--only {unknown[0]}: there is no such row; the rows are {every}")
     return tuple(
         row_id
-        for texts in PAGE_SECTIONS.values()
+        for texts in STATEMENTS.values()
         for row_id in texts
         if not wanted or row_id in wanted
     )
 
 
 def make_rows(
-    context: Context,
-    only: Iterable[str] = (),
-    progress: Callable[[str], None] = lambda _: None,
-) -> list[PaperRow]:
+    context: Context, only: Iterable[str] = (), progress: Callable[[str], None] = lambda _: None
+) -> list[Claim]:
     """Make rows in the order of the page.
 
     Parameters
@@ -162,7 +160,7 @@ def make_rows(
     UserError
         If a name is no row.
     """
-    texts = {row_id: each for section in PAGE_SECTIONS.values() for row_id, each in section.items()}
+    texts = {row_id: each for section in STATEMENTS.values() for row_id, each in section.items()}
     rows = []
     for row_id in chosen(only):
         rows.append(replace(MAKERS[row_id](context), id=row_id, **texts[row_id]))
@@ -170,19 +168,19 @@ def make_rows(
     return rows
 
 
-def tally(rows: Sequence[PaperRow]) -> dict[RowVerdict, int]:
+def tally(rows: Sequence[Claim]) -> dict[RowVerdict, int]:
     """Return how many rows have each verdict."""
     counted = Counter(row.verdict for row in rows)
     return {verdict: counted[verdict] for verdict in VERDICTS}
 
 
-def ledger_text(rows: Sequence[PaperRow]) -> str:
+def ledger_text(rows: Sequence[Claim]) -> str:
     """Return ``ledger.json``: a list with one object for each row."""
     return json_text([row.as_dict() for row in rows])
 
 
 def drawn(
-    rows: Sequence[PaperRow], progress: Callable[[str], None] = lambda _: None
+    rows: Sequence[Claim], progress: Callable[[str], None] = lambda _: None
 ) -> dict[str, str]:
     """Return every figure as SVG by its name; those of virtual data are marked."""
     svg = {}
@@ -193,7 +191,7 @@ def drawn(
     return svg
 
 
-def render_paper_page(rows: Sequence[PaperRow], svg: Mapping[str, str], seed: int) -> str:
+def render_paper(rows: Sequence[Claim], svg: Mapping[str, str], seed: int) -> str:
     """Return the page as text, with its style inside, and the figures that `svg` has by name."""
     own, report = (
         resources.files("rigidimeter.paper"),
@@ -216,7 +214,7 @@ def render_paper_page(rows: Sequence[PaperRow], svg: Mapping[str, str], seed: in
         css=Markup("\n".join(css)),
         sections=[
             (title, kept)
-            for title, makers in PAGE_SECTIONS.items()
+            for title, makers in STATEMENTS.items()
             if (kept := [by_id[row_id] for row_id in makers if row_id in by_id])
         ],
         images={name: data_uri(text) for name, text in svg.items()},
@@ -228,13 +226,13 @@ def render_paper_page(rows: Sequence[PaperRow], svg: Mapping[str, str], seed: in
 
 
 def write_ledger(
-    rows: Sequence[PaperRow], out: Path, seed: int, progress: Callable[[str], None] = lambda _: None
+    rows: Sequence[Claim], out: Path, seed: int, progress: Callable[[str], None] = lambda _: None
 ) -> Path:
     """Write page, ledger and figures into a folder; return the page's path.
 
     Parameters
     ----------
-    rows : sequence of PaperRow
+    rows : sequence of Claim
     out : Path
         Made if it does not exist. Files of the same names are replaced.
     seed : int
@@ -248,5 +246,5 @@ def write_ledger(
         write_text(out / "figures" / f"{name}.svg", text)
     write_text(out / "ledger.json", ledger_text(rows))
     page = out / "paper.html"
-    write_text(page, render_paper_page(rows, svg, seed))
+    write_text(page, render_paper(rows, svg, seed))
     return page

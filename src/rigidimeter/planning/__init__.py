@@ -74,5 +74,3 @@ from rigidimeter.planning.search import (
     prbs_toml,
     strongest_amplitude_nm,
 )
-
-__all__ = ["design", "prbs_nm"]

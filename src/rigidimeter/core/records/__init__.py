@@ -31,28 +31,3 @@ from rigidimeter.core.records.estimates import (
     Score,
     Three,
 )
-
-__all__ = [
-    "CHANNEL_UNITS",
-    "FIT_NUMBERS",
-    "LATE_TICK",
-    "LOST_SAMPLES",
-    "PARAMETERS",
-    "PARAMETER_VECTORS",
-    "STATISTICS",
-    "Analysis",
-    "BandEstimate",
-    "Channel",
-    "Delay",
-    "Epoch",
-    "Finding",
-    "Fit",
-    "LeftOut",
-    "Motion",
-    "Notice",
-    "Outcome",
-    "Score",
-    "Task",
-    "Ticks",
-    "readonly",
-]

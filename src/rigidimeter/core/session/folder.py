@@ -46,7 +46,7 @@ from rigidimeter.core.version import __version__
 
 MANIFEST, SAMPLES, EVENTS = "manifest.json", "samples.arrows", "events.jsonl"
 SESSION_SCHEMA = "rigidimeter.session/2"
-_SCHEMAS = ("rigidimeter.session/1", SESSION_SCHEMA)
+SCHEMAS = ("rigidimeter.session/1", SESSION_SCHEMA)
 """Those that are read; version 1 has neither checksums nor the id of a session."""
 
 MANIFEST_TYPES: Mapping[str, type] = {
@@ -213,10 +213,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     content = read_bytes(path, DOCUMENT_BYTES)
     manifest = parse_json(content, str(path))
     schema = manifest.get("schema") if isinstance(manifest, dict) else None
-    if schema not in _SCHEMAS:
-        raise UserError(
-            f"{path}: schema is {schema!r}; this version reads {' and '.join(_SCHEMAS)}"
-        )
+    if schema not in SCHEMAS:
+        raise UserError(f"{path}: schema is {schema!r}; this version reads {' and '.join(SCHEMAS)}")
     for key, kind in MANIFEST_TYPES.items():
         if not isinstance(manifest.get(key), kind):
             raise UserError(f"{path}: {key} is missing or damaged; the manifest was changed")

@@ -8,14 +8,3 @@ from rigidimeter.virtual.batch.batch_simulate import (
     simulate_epochs,
 )
 from rigidimeter.virtual.batch.compiled_steps import enum_numbers, with_helpers
-
-__all__ = [
-    "Batch",
-    "Bench",
-    "bench",
-    "draw_inputs",
-    "epoch_generator",
-    "simulate_chunks",
-    "simulate_epochs",
-    "simulate_inputs",
-]
