@@ -162,7 +162,11 @@ def _write_top(sessions: Sequence[ExportedSession], folder: Path) -> None:
 
 def _write_stream(stream: Stream, about: Mapping[str, Any], stem: Path) -> None:
     columns = {"time_s": stream.time_s, **stream.columns}
-    arrays = [_cells(values) for values in columns.values()]
+    arrays = [pa.array(values, from_pandas=True) for values in columns.values()]
+    arrays = [
+        pa.compute.fill_null(array.cast(pa.string()), "n/a") if array.null_count else array
+        for array in arrays
+    ]
     table = pa.Table.from_arrays(arrays, names=list(columns))
     options = pa.csv.WriteOptions(include_header=False, delimiter="\t", quoting_style="none")
     pa.csv.write_csv(table, f"{stem}_motion.tsv", write_options=options)
@@ -185,11 +189,6 @@ def _write_stream(stream: Stream, about: Mapping[str, Any], stem: Path) -> None:
             **{f"{kind}ChannelCount": kinds.count(kind) for kind in _COUNTED if kind in kinds},
         },
     )
-
-
-def _cells(values: Any) -> pa.Array:
-    array = pa.array(values, from_pandas=True)
-    return array if not array.null_count else pa.compute.fill_null(array.cast(pa.string()), "n/a")
 
 
 def _channel(column: str, about: Mapping[str, Any]) -> _Row:
