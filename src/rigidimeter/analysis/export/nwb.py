@@ -14,7 +14,7 @@ Time stamps are explicit unless they are even to 1e-9 s, for which NWB asks for 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from hashlib import blake2b
 from pathlib import Path
@@ -288,6 +288,8 @@ def _add_events(file: NWBFile, about: Mapping[str, Any]) -> None:
 
 def _add_tables(file: NWBFile, about: Mapping[str, Any]) -> None:
     """Add estimates, scores and ratings, where there are any."""
+    from hdmf.common import DynamicTable, VectorData
+
     texts = {
         "estimates": "Inertia, damping and stiffness of each epoch, with standard errors and 95 % "
         "intervals; fixed_inertia: fitted again with the median inertia held. Units in the names.",
@@ -299,16 +301,9 @@ def _add_tables(file: NWBFile, about: Mapping[str, Any]) -> None:
         return
     module = file.create_processing_module("rigidimeter", f"Results of {about['software']}.")
     for name, rows in tables.items():
-        module.add(_table(name, texts[name], rows))
-
-
-def _table(name: str, description: str, rows: Iterable[Mapping[str, Any]]) -> Any:
-    from hdmf.common import DynamicTable, VectorData
-
-    columns: list[Any] = []
-    for column, cells in columns_of(rows).items():
-        if all(cell == "" or cell != cell for cell in cells):
-            continue
-        text = column.replace("_", " ")
-        columns.append(VectorData(name=column, description=text, data=cells))
-    return DynamicTable(name=name, description=description, columns=columns)
+        columns = [
+            VectorData(name=column, description=column.replace("_", " "), data=cells)
+            for column, cells in columns_of(rows).items()
+            if any(cell != "" and cell == cell for cell in cells)
+        ]
+        module.add(DynamicTable(name=name, description=texts[name], columns=columns))

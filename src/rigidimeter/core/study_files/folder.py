@@ -14,13 +14,12 @@ the rows mean.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import (
-    TextTable,
     cell_number,
     lines_text,
     noted_digests,
@@ -181,10 +180,7 @@ def _read_table(path: Path, name: str, notices: list[Notice]) -> tuple[TableRow,
         nearest = f"the nearest that is known is {near[0]}" if near else "it means nothing here"
         text = f"{path}: column {column} is not read; {nearest}"
         notices.append(Notice("warning", text))
-    return tuple(_rows(table, needed, notices))
-
-
-def _rows(table: TextTable, needed: Sequence[str], notices: list[Notice]) -> Iterable[TableRow]:
+    rows: list[TableRow] = []
     lacking: dict[str, list[int]] = {}
     for index, line in enumerate(table.lines):
         cells = {name: cells[index] for name, cells in table.columns.items()}
@@ -192,8 +188,9 @@ def _rows(table: TextTable, needed: Sequence[str], notices: list[Notice]) -> Ite
         if empty:
             lacking.setdefault(" and ".join(empty), []).append(line)
             continue
-        yield TableRow(table.source, line, cells)
+        rows.append(TableRow(table.source, line, cells))
     for names, lines in lacking.items():
-        rows = "the row is" if len(lines) == 1 else "the rows are"
-        text = f"{table.source}, {lines_text(lines)}: no {names} is given; {rows} left out"
+        left = "the row is" if len(lines) == 1 else "the rows are"
+        text = f"{table.source}, {lines_text(lines)}: no {names} is given; {left} left out"
         notices.append(Notice("error", text))
+    return tuple(rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -228,7 +228,15 @@ def batch_of(
     first: int = 0,
 ) -> Batch:
     """Return written rows as a batch."""
-    columns: _Rows = {**rows, **dict(_shared_stamps(bench, rows["ticks"]))}
+    columns = {**rows}
+    ticks = rows["ticks"]
+    ended = np.arange(bench.ticks) >= ticks[:, None] if ticks.min() < bench.ticks else None
+    for name, sensor in _STAMPS.items():  # those that every epoch has in common
+        sampling = getattr(bench, sensor)
+        if sampling is not None:
+            shared = np.broadcast_to(sampling.seen_s, (ticks.size, bench.ticks))
+            # Copied only if one ended early.
+            columns[name] = shared if ended is None else np.where(ended, np.nan, shared)
     return Batch(
         settings=bench.settings,
         source=source,
@@ -244,15 +252,3 @@ def batch_of(
 def _jittering(bench: Bench) -> list[str]:
     """Return the stamps that differ from epoch to epoch."""
     return [name for name, sensor in _STAMPS.items() if getattr(bench, sensor) is None]
-
-
-def _shared_stamps(
-    bench: Bench, ticks: NDArray[np.int64]
-) -> Iterator[tuple[str, NDArray[np.float64]]]:
-    """Yield the stamps that every epoch has in common, as rows; copied only if one ended early."""
-    ended = np.arange(bench.ticks) >= ticks[:, None] if ticks.min() < bench.ticks else None
-    for name, sensor in _STAMPS.items():
-        sampling = getattr(bench, sensor)
-        if sampling is not None:
-            rows = np.broadcast_to(sampling.seen_s, (ticks.size, bench.ticks))
-            yield name, rows if ended is None else np.where(ended, np.nan, rows)
