@@ -101,13 +101,7 @@ def simulate_chunks(
     for what, given in (("joints", joints), ("conditions", names), ("subjects", subjects)):
         if given is not None and len(given) != n_epochs:
             raise ValueError(f"{n_epochs} epochs need as many {what}, got {len(given)}")
-    if subjects is None:
-        for name in names:
-            if name not in settings.subject:
-                known = ", ".join(sorted(settings.subject))
-                raise UserError(f"there is no [subject.{name}]; known conditions: {known}")
-        subjects = [settings.subject[name] for name in names]
-    whose = subjects
+    whose = _subjects(settings, names) if subjects is None else subjects
     if perturbation_nm is None:
         perturbation_nm = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
     perturbation = perturbation_rows(perturbation_nm, n_epochs)
@@ -144,3 +138,11 @@ def simulate_chunks(
                 yield run_chunk(start, min(start + chunk, n_epochs), pool)
 
     return chunks()
+
+
+def _subjects(settings: Settings, conditions: Sequence[str]) -> list[SubjectSettings]:
+    for name in conditions:
+        if name not in settings.subject:
+            known = ", ".join(sorted(settings.subject))
+            raise UserError(f"there is no [subject.{name}]; known conditions: {known}")
+    return [settings.subject[name] for name in conditions]
